@@ -1,0 +1,102 @@
+/// The policy: the best action, or with probability epsilon any.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "sdnn/core/check.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::agents {
+
+/// Which of several best actions is taken (reading: the paper does not say).
+enum class TieRule {
+  uniform,  ///< each with the same probability
+  lowest,   ///< the one with the lowest index
+  middle,   ///< the middle (rounded down) of the widest run of neighbours, the first such run
+};
+
+/// The policy's parameters; the defaults are the paper's (section 4.2).
+struct EpsilonGreedyConfig {
+  double epsilon = 0.1;                  ///< probability of a random action, in [0, 1]
+  int n_greedy_steps = 10;               ///< first steps of an episode without random actions
+  TieRule tie_rule = TieRule::uniform;
+};
+
+/// Epsilon-greedy selection over a row of action values.
+///
+/// Learning and evaluation break ties by different random streams, so evaluating an agent never
+/// changes how it goes on learning.
+class EpsilonGreedy {
+ public:
+  /// Throws std::invalid_argument naming the field that is out of range.
+  EpsilonGreedy(const EpsilonGreedyConfig& config, std::uint64_t seed)
+      : config_(config),
+        exploration_(seed, core::Stream::exploration),
+        ties_(seed, core::Stream::ties),
+        evaluation_ties_(seed, core::Stream::evaluation_ties) {
+    core::require_in_range("epsilon", config.epsilon, 0.0, 1.0);
+    core::require_in_range("n_greedy_steps", config.n_greedy_steps, 0, 1 << 30);
+  }
+
+  const EpsilonGreedyConfig& config() const noexcept { return config_; }
+
+  /// The action for step number `step` (from 0) of an episode; without `explore` always a best one.
+  ///
+  /// Shape: values (n_actions,), not empty.
+  std::size_t select(std::span<const double> values, int step, bool explore) {
+    if (explore && step >= config_.n_greedy_steps && config_.epsilon > 0.0 &&
+        exploration_.uniform() < config_.epsilon) {
+      return static_cast<std::size_t>(exploration_.below(values.size()));
+    }
+    return greedy(values, explore ? ties_ : evaluation_ties_);
+  }
+
+ private:
+  std::size_t greedy(std::span<const double> values, core::Random& ties) const {
+    const double best = *std::max_element(values.begin(), values.end());
+    switch (config_.tie_rule) {
+      case TieRule::lowest:
+        return first_of(values, best);
+      case TieRule::middle:
+        return middle_of_widest_run(values, best);
+      case TieRule::uniform:
+        break;
+    }
+    const auto n_tied = static_cast<std::uint64_t>(std::count(values.begin(), values.end(), best));
+    std::uint64_t skip = n_tied > 1 ? ties.below(n_tied) : 0;
+    std::size_t action = first_of(values, best);
+    for (; skip > 0; --skip) {
+      do { ++action; } while (values[action] != best);
+    }
+    return action;
+  }
+
+  static std::size_t first_of(std::span<const double> values, double best) noexcept {
+    return static_cast<std::size_t>(std::find(values.begin(), values.end(), best) -
+                                    values.begin());
+  }
+
+  static std::size_t middle_of_widest_run(std::span<const double> values, double best) noexcept {
+    std::size_t widest = 0;
+    std::size_t middle = 0;
+    std::size_t run = 0;
+    for (std::size_t action = 0; action < values.size(); ++action) {
+      run = values[action] == best ? run + 1 : 0;
+      if (run > widest) {
+        widest = run;
+        middle = action - run / 2;  // of actions action - run + 1 .. action, rounded down
+      }
+    }
+    return middle;
+  }
+
+  EpsilonGreedyConfig config_;
+  core::Random exploration_;
+  core::Random ties_;
+  core::Random evaluation_ties_;
+};
+
+}  // namespace sdnn::agents

@@ -1,0 +1,80 @@
+/// Q-learning over any approximator of action values.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/agents/epsilon_greedy.hpp"
+#include "sdnn/approximators/action_value.hpp"
+#include "sdnn/core/check.hpp"
+
+namespace sdnn::agents {
+
+/// The agent's parameters; the defaults are the paper's (section 4.2).
+struct QLearningConfig {
+  double learning_rate = 0.5;  ///< alpha, in (0, 1]
+  double discount = 0.9;       ///< gamma, in [0, 1]
+  EpsilonGreedyConfig policy = {};
+};
+
+/// An agent that learns Q(s, a) by Eq. (1) and acts epsilon-greedily.
+///
+/// q_hat = (1 - alpha) Q(s, a) + alpha (r + gamma max_a' Q(s', a')); a terminated transition has
+/// target r alone. A time limit is no termination: it bootstraps.
+template <approximators::ActionValue Q>
+class QLearning {
+ public:
+  /// Throws std::invalid_argument naming the field that is out of range.
+  QLearning(Q action_value, const QLearningConfig& config, std::uint64_t seed)
+      : config_(config),
+        action_value_(std::move(action_value)),
+        policy_(config.policy, seed),
+        values_(action_value_.n_actions()) {
+    core::require(config.learning_rate > 0.0 && config.learning_rate <= 1.0, "learning_rate",
+                  "in (0, 1]", config.learning_rate);
+    core::require_in_range("discount", config.discount, 0.0, 1.0);
+  }
+
+  const QLearningConfig& config() const noexcept { return config_; }
+  Q& action_value() noexcept { return action_value_; }
+  const Q& action_value() const noexcept { return action_value_; }
+
+  /// Starts counting the steps of an episode anew (for the greedy first steps).
+  void begin_episode() noexcept { step_ = 0; }
+
+  /// The action to take in `state`; without `explore` a best one. Shape: state (l,) in [0, 1].
+  std::size_t act(std::span<const double> state, bool explore = true) {
+    action_value_.values(state, values_);
+    return policy_.select(values_, step_++, explore);
+  }
+
+  /// Learns one transition. Throws std::invalid_argument for a reward that is not finite, and as
+  /// the approximator does; then nothing has been learned.
+  void learn(std::span<const double> state, std::size_t action, double reward,
+             std::span<const double> next_state, bool terminated) {
+    core::require_finite("reward", reward);
+    // The next state first: the network then remembers it, corrected, for the next decision.
+    double goal = reward;
+    if (!terminated) {
+      action_value_.values(next_state, values_);
+      goal += config_.discount * *std::max_element(values_.begin(), values_.end());
+    }
+    const double value = action_value_.value(state, action);
+    action_value_.correct(state, action,
+                          (1.0 - config_.learning_rate) * value + config_.learning_rate * goal);
+  }
+
+ private:
+  QLearningConfig config_;
+  Q action_value_;
+  EpsilonGreedy policy_;
+  std::vector<double> values_;
+  int step_ = 0;
+};
+
+}  // namespace sdnn::agents

@@ -1,0 +1,56 @@
+/// Layer 6: from a number of active units to a value, and back.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+
+#include "sdnn/core/check.hpp"
+
+namespace sdnn::approximators {
+
+/// g: the straight line that maps [u_low, u_high] onto [q_low, q_high], saturating outside.
+///
+/// Source: section 4.2 (the paper's g: 20 <= u <= 280 onto [-20, 20]); spec section 1, item 6.
+class OutputScale {
+ public:
+  /// Throws std::invalid_argument unless u_low < u_high and q_low < q_high, both finite.
+  OutputScale(int u_low, int u_high, double q_low, double q_high)
+      : u_low_(u_low), u_high_(u_high), q_low_(q_low), q_high_(q_high) {
+    core::require_in_range("u_low", u_low, 0, 1 << 20);
+    core::require(u_high > u_low, "u_high", "greater than u_low", u_high);
+    core::require_finite("q_low", q_low);
+    core::require_finite("q_high", q_high);
+    core::require(q_high > q_low, "q_high", "greater than q_low", q_high);
+  }
+
+  int u_low() const noexcept { return u_low_; }
+  int u_high() const noexcept { return u_high_; }
+  double q_low() const noexcept { return q_low_; }
+  double q_high() const noexcept { return q_high_; }
+
+  /// g(u), the value of `n_firing` active units.
+  double operator()(int n_firing) const noexcept {
+    if (n_firing > u_high_) return q_high_;
+    if (n_firing < u_low_) return q_low_;
+    return q_low_ + (q_high_ - q_low_) * (n_firing - u_low_) / (u_high_ - u_low_);
+  }
+
+  /// The number of units whose value is nearest to `value` clipped to [q_low, q_high]; halves are
+  /// rounded up. For every u in [u_low, u_high], inverse(g(u)) == u. Requires a finite value.
+  int inverse(double value) const noexcept {
+    assert(!std::isnan(value));
+    const double clipped = std::clamp(value, q_low_, q_high_);
+    const double exact = u_low_ + (clipped - q_low_) * (u_high_ - u_low_) / (q_high_ - q_low_);
+    return static_cast<int>(std::floor(exact + 0.5));
+  }
+
+ private:
+  int u_low_;
+  int u_high_;
+  double q_low_;
+  double q_high_;
+};
+
+}  // namespace sdnn::approximators

@@ -1,0 +1,305 @@
+/// SDNN-C: a network that gives Q(s, a) for every action at once.
+#pragma once
+
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/approximators/error_correction.hpp"
+#include "sdnn/approximators/output_scale.hpp"
+#include "sdnn/approximators/parallel_perceptron.hpp"
+#include "sdnn/coding/action_code.hpp"
+#include "sdnn/coding/desensitization.hpp"
+#include "sdnn/coding/pattern_code.hpp"
+#include "sdnn/core/check.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::approximators {
+
+/// How the weights start (spec section 1, "Start").
+enum class InitialWeights {
+  ternary,  ///< -1, 0 or +1 lattice steps with probabilities 1/4, 1/2, 1/4
+  uniform,  ///< uniform within +- initial_weight_limit, rounded to the lattice
+};
+
+/// Everything that defines an SDNN-C; the defaults are the paper's values.
+struct SdnnCConfig {
+  int n_inputs = 4;                 ///< l >= 2
+  int n_pattern_units = 200;        ///< m
+  int n_anchor_patterns = 9;        ///< p_1 .. p_9
+  int n_interpolated = 44;          ///< patterns between neighbouring anchors
+  bool balanced_anchors = true;     ///< reading: anchors have as many +1 as -1
+  std::vector<bool> circular = {};  ///< per input; empty: none (reading: p_9 independent of p_1)
+  int n_hidden_units = 900;         ///< n
+  int n_active_units = 300;         ///< n', units in an action's window
+  int n_actions = 0;                ///< 0: all n - n' + 1 windows
+  double q_low = -20.0;             ///< g saturates at these values ...
+  double q_high = 20.0;
+  std::optional<int> u_low = {};    ///< ... at these counts; none: n' / 15 rounded down (20),
+  std::optional<int> u_high = {};   ///< and n' - u_low (280)
+  double learning_coefficient = 0.1;      ///< c; scales weights only, never decisions
+  int lattice = 1;                        ///< weights are multiples of c / lattice
+  double initial_threshold = 200.0;       ///< |w_i0| at the start, in units of c
+  InitialWeights initial_weights = InitialWeights::ternary;
+  double initial_weight_limit = 0.1;      ///< of InitialWeights::uniform, in units of c
+};
+
+/// The network of section 3 with patterns of at most `Capacity` units.
+///
+/// Wiring (code books, permutations) is fixed by config and seed. Reading does not change what is
+/// returned, but the network remembers the potentials of the last two states it was asked about,
+/// and keeps them exact while it learns: a correction of w_i by +-x_SD(s) moves h_i(s') by
+/// +-(<x_SD(s), x_SD(s')> + 1). So one decision needs one pass over the weights. An object must
+/// not be used by two threads at once; copies share the wiring and nothing else.
+template <std::size_t Capacity>
+class SdnnC {
+ public:
+  /// Throws std::invalid_argument naming the field that is impossible; std::length_error if a
+  /// pattern does not fit into Capacity; std::bad_alloc.
+  SdnnC(const SdnnCConfig& config, std::uint64_t seed)
+      : config_(config),
+        code_(make_code(config, seed)),
+        actions_(config.n_hidden_units, config.n_active_units, config.n_actions),
+        scale_(make_scale(config)),
+        perceptron_(actions_.n_hidden_units(), code_->n_columns()) {
+    core::require_positive("learning_coefficient", config.learning_coefficient);
+    core::require_in_range("lattice", config.lattice, 1, 64);
+    value_of_count_.resize(actions_.n_active_units() + 1);
+    for (std::size_t u = 0; u < value_of_count_.size(); ++u) {
+      value_of_count_[u] = scale_(static_cast<int>(u));
+    }
+    initialize_weights(seed);
+    initialize_thresholds();
+    for (Remembered& entry : memory_) {
+      entry.bins.assign(code_->n_inputs(), 0);
+      entry.potentials.assign(perceptron_.n_units(), 0);
+    }
+    bins_.resize(code_->n_inputs());
+    columns_.positive.reserve(code_->n_columns());
+    columns_.negative.reserve(code_->n_columns());
+    n_firing_before_.assign(perceptron_.n_units() + 1, 0);
+    selected_.reserve(actions_.n_active_units());
+  }
+
+  const SdnnCConfig& config() const noexcept { return config_; }
+  const coding::StateCode<Capacity>& state_code() const noexcept { return *code_; }
+  const coding::ActionCode& action_code() const noexcept { return actions_; }
+  const OutputScale& output_scale() const noexcept { return scale_; }
+  const ParallelPerceptron& perceptron() const noexcept { return perceptron_; }
+  std::size_t n_inputs() const noexcept { return code_->n_inputs(); }
+  std::size_t n_actions() const noexcept { return actions_.n_actions(); }
+
+  /// Q(state, a) for every action. Shapes: state (l,) in [0, 1], out (n_actions,).
+  ///
+  /// Throws std::invalid_argument for a state of wrong size or outside [0, 1].
+  void values(std::span<const double> state, std::span<double> out) {
+    core::require(out.size() == n_actions(), "out", std::to_string(n_actions()) + " values",
+                  out.size());
+    const Remembered& entry = recall(state);
+    count_firing(entry.potentials);
+    for (std::size_t action = 0; action < out.size(); ++action) {
+      const std::size_t first = actions_.first_unit(action);
+      out[action] = value_of_count_[static_cast<std::size_t>(
+          n_firing_before_[first + actions_.n_active_units()] - n_firing_before_[first])];
+    }
+  }
+
+  /// Q(state, action). Throws like values, and std::invalid_argument for an action out of range.
+  double value(std::span<const double> state, std::size_t action) {
+    return scale_(count_in_window(recall(state), action));
+  }
+
+  /// One step of error correction: Q(state, action) moves towards `target` (q_hat).
+  ///
+  /// Source: Fig. 2, Eqs. (2), (3); spec section 1, "Learning". Throws std::invalid_argument for a
+  /// bad state, action or a NaN target, std::overflow_error; then nothing has changed.
+  void correct(std::span<const double> state, std::size_t action, double target) {
+    core::require(!std::isnan(target), "target", "a number", target);
+    const Remembered& entry = recall(state);
+    const int deficit = scale_.inverse(target) - count_in_window(entry, action);
+    if (deficit == 0) return;
+    const std::size_t first = actions_.first_unit(action);
+    select_units(std::span(entry.potentials).subspan(first, actions_.n_active_units()), deficit,
+                 selected_);
+    if (selected_.empty()) return;
+    for (std::uint32_t& unit : selected_) unit += static_cast<std::uint32_t>(first);
+
+    const std::int32_t step = deficit > 0 ? config_.lattice : -config_.lattice;
+    code_->columns(entry.bins, columns_);
+    perceptron_.correct(selected_, columns_, step);
+    for (Remembered& other : memory_) {
+      if (other.last_use == 0) continue;
+      const std::int32_t change = step * (code_->inner_product(entry.bins, other.bins) + 1);
+      for (const std::uint32_t unit : selected_) other.potentials[unit] += change;
+    }
+  }
+
+  /// The inner potentials in lattice steps (c / lattice), by a full pass. Shape: out (n,).
+  ///
+  /// Thread-safe: uses nothing remembered. Allocates.
+  void potentials(std::span<const double> state, std::span<std::int32_t> out) const {
+    core::require(out.size() == perceptron_.n_units(), "out",
+                  std::to_string(perceptron_.n_units()) + " values", out.size());
+    std::vector<coding::Bin> bins(n_inputs());
+    coding::SignedColumns columns;
+    code_->encode(state, bins);
+    code_->columns(bins, columns);
+    perceptron_.potentials(columns, out);
+  }
+
+  /// Replaces weights and thresholds, in lattice steps. Shapes: weights (n, D) row by row,
+  /// thresholds (n,). Throws std::invalid_argument, and then nothing has changed.
+  void set_parameters(std::span<const std::int32_t> weights,
+                      std::span<const std::int32_t> thresholds) {
+    const std::size_t n_columns = perceptron_.n_columns();
+    core::require(weights.size() == perceptron_.n_units() * n_columns, "weights",
+                  "n_hidden_units x D values", weights.size());
+    core::require(thresholds.size() == perceptron_.n_units(), "thresholds",
+                  "n_hidden_units values", thresholds.size());
+    ParallelPerceptron replaced(perceptron_.n_units(), n_columns);
+    for (std::size_t unit = 0; unit < perceptron_.n_units(); ++unit) {
+      for (std::size_t j = 0; j < n_columns; ++j) {
+        replaced.set_weight(unit, j, weights[unit * n_columns + j]);
+      }
+      replaced.set_threshold(unit, thresholds[unit]);
+    }
+    perceptron_ = std::move(replaced);
+    for (Remembered& entry : memory_) entry.last_use = 0;
+  }
+
+ private:
+  /// The potentials of one state, exact for the present weights; last_use 0 means empty.
+  struct Remembered {
+    std::vector<coding::Bin> bins;
+    std::vector<std::int32_t> potentials;
+    std::uint64_t last_use = 0;
+  };
+
+  static std::shared_ptr<const coding::StateCode<Capacity>> make_code(const SdnnCConfig& config,
+                                                                      std::uint64_t seed) {
+    core::require_in_range("n_inputs", config.n_inputs, 2, 1024);
+    const auto l = static_cast<std::size_t>(config.n_inputs);
+    core::require(config.circular.empty() || config.circular.size() == l, "circular",
+                  "empty or one flag per input", config.circular.size());
+    std::vector<coding::CodeBook<Capacity>> books;
+    for (std::size_t mu = 0; mu < l; ++mu) {
+      core::Random random(seed, core::Stream::code_books, mu);
+      books.push_back(coding::anchor_interpolation<Capacity>(
+          {.n_pattern_units = config.n_pattern_units,
+           .n_anchor_patterns = config.n_anchor_patterns,
+           .n_interpolated = config.n_interpolated,
+           .balanced_anchors = config.balanced_anchors,
+           .circular = !config.circular.empty() && config.circular[mu]},
+          random));
+    }
+    std::vector<coding::Permutation> permutations;
+    for (std::size_t group = 0; group < l * (l - 1); ++group) {
+      core::Random random(seed, core::Stream::permutations, group);
+      permutations.push_back(
+          coding::random_permutation(static_cast<std::size_t>(config.n_pattern_units), random));
+    }
+    return std::make_shared<const coding::StateCode<Capacity>>(std::move(books),
+                                                               std::move(permutations));
+  }
+
+  static OutputScale make_scale(const SdnnCConfig& config) {
+    const int u_low = config.u_low.value_or(config.n_active_units / 15);
+    const int u_high = config.u_high.value_or(config.n_active_units - u_low);
+    core::require_in_range("u_high", u_high, 0, config.n_active_units);
+    return {u_low, u_high, config.q_low, config.q_high};
+  }
+
+  void initialize_weights(std::uint64_t seed) {
+    core::require(std::isfinite(config_.initial_weight_limit) && config_.initial_weight_limit >= 0,
+                  "initial_weight_limit", "finite and not negative", config_.initial_weight_limit);
+    core::Random random(seed, core::Stream::weights);
+    const double limit = config_.initial_weight_limit * config_.lattice;
+    for (std::size_t j = 0; j < perceptron_.n_columns(); ++j) {
+      std::uint64_t bits = 0;
+      for (std::size_t i = 0; i < perceptron_.n_units(); ++i) {
+        if (config_.initial_weights == InitialWeights::ternary) {
+          if (i % 32 == 0) bits = random.bits();  // two bits a weight
+          perceptron_.set_weight(i, j, static_cast<std::int32_t>(bits & 1) -
+                                           static_cast<std::int32_t>(bits >> 1 & 1));
+          bits >>= 2;
+        } else {
+          const double drawn = limit * (2.0 * random.uniform() - 1.0);
+          perceptron_.set_weight(i, j, static_cast<std::int32_t>(std::floor(drawn + 0.5)));
+        }
+      }
+    }
+  }
+
+  /// Units are numbered from 1 in the paper: the first one is odd and starts active.
+  void initialize_thresholds() {
+    const double steps = config_.initial_threshold * config_.lattice;
+    core::require(steps >= 0 && steps < (1 << 30) && std::floor(steps) == steps,
+                  "initial_threshold", "a multiple of 1 / lattice, not negative",
+                  config_.initial_threshold);
+    const auto threshold = static_cast<std::int32_t>(steps);
+    for (std::size_t i = 0; i < perceptron_.n_units(); ++i) {
+      perceptron_.set_threshold(i, i % 2 == 0 ? -threshold : threshold);
+    }
+  }
+
+  /// The remembered potentials of `state`; computed by a pass if there are none.
+  const Remembered& recall(std::span<const double> state) {
+    code_->encode(state, bins_);
+    Remembered* oldest = &memory_[0];
+    for (Remembered& entry : memory_) {
+      if (entry.last_use != 0 && entry.bins == bins_) {
+        entry.last_use = ++clock_;
+        return entry;
+      }
+      if (entry.last_use < oldest->last_use) oldest = &entry;
+    }
+    oldest->bins = bins_;
+    code_->columns(bins_, columns_);
+    perceptron_.potentials(columns_, oldest->potentials);
+    oldest->last_use = ++clock_;
+    return *oldest;
+  }
+
+  int count_in_window(const Remembered& entry, std::size_t action) const {
+    core::require(action < n_actions(), "action", "less than " + std::to_string(n_actions()),
+                  action);
+    const std::size_t first = actions_.first_unit(action);
+    int n_firing = 0;
+    for (std::size_t i = first; i < first + actions_.n_active_units(); ++i) {
+      n_firing += entry.potentials[i] > 0;
+    }
+    return n_firing;
+  }
+
+  void count_firing(std::span<const std::int32_t> potentials) noexcept {
+    std::int32_t n_firing = 0;
+    for (std::size_t i = 0; i < potentials.size(); ++i) {
+      n_firing += potentials[i] > 0;
+      n_firing_before_[i + 1] = n_firing;
+    }
+  }
+
+  SdnnCConfig config_;
+  std::shared_ptr<const coding::StateCode<Capacity>> code_;
+  coding::ActionCode actions_;
+  OutputScale scale_;
+  ParallelPerceptron perceptron_;
+  std::vector<double> value_of_count_;
+
+  // Workspace: sized once, so that a step allocates nothing.
+  std::array<Remembered, 2> memory_;
+  std::uint64_t clock_ = 0;
+  std::vector<coding::Bin> bins_;
+  coding::SignedColumns columns_;
+  std::vector<std::int32_t> n_firing_before_;  ///< active units among the first i
+  std::vector<std::uint32_t> selected_;
+};
+
+}  // namespace sdnn::approximators

@@ -1,0 +1,61 @@
+/// The action code of layer 4: each action is a window of hidden units.
+#pragma once
+
+#include <cassert>
+#include <cstddef>
+
+#include "sdnn/core/check.hpp"
+
+namespace sdnn::coding {
+
+/// Windows of `n_active_units` neighbouring hidden units, evenly spread over `n_hidden_units`.
+///
+/// With the default number of actions, n_hidden_units - n_active_units + 1, window a starts at unit
+/// a: every possible window is used once. With fewer actions the starts are spread evenly,
+/// floor(a * (n_hidden_units - n_active_units) / (n_actions - 1)), so that a task with a few
+/// discrete actions gets windows that overlap little.
+///
+/// Source: section 3.1 (layer 4, y); spec section 1, item 4. Units are counted from 0.
+class ActionCode {
+ public:
+  /// `n_actions` = 0 means all windows.
+  ///
+  /// Throws std::invalid_argument naming the size that is impossible.
+  ActionCode(int n_hidden_units, int n_active_units, int n_actions = 0) {
+    core::require_in_range("n_hidden_units", n_hidden_units, 1, 1 << 20);
+    core::require_in_range("n_active_units", n_active_units, 1, n_hidden_units);
+    const int n_windows = n_hidden_units - n_active_units + 1;
+    if (n_actions != 0) core::require_in_range("n_actions", n_actions, 1, n_windows);
+    n_hidden_units_ = static_cast<std::size_t>(n_hidden_units);
+    n_active_units_ = static_cast<std::size_t>(n_active_units);
+    n_actions_ = static_cast<std::size_t>(n_actions == 0 ? n_windows : n_actions);
+  }
+
+  std::size_t n_hidden_units() const noexcept { return n_hidden_units_; }
+  std::size_t n_active_units() const noexcept { return n_active_units_; }
+  std::size_t n_actions() const noexcept { return n_actions_; }
+
+  /// The first unit of the window of `action`; the window has `n_active_units()` units.
+  std::size_t first_unit(std::size_t action) const noexcept {
+    assert(action < n_actions_);
+    if (n_actions_ == 1) return 0;
+    return action * (n_hidden_units_ - n_active_units_) / (n_actions_ - 1);
+  }
+
+ private:
+  std::size_t n_hidden_units_;
+  std::size_t n_active_units_;
+  std::size_t n_actions_;
+};
+
+/// The physical value of `action` when the range [low, high] is cut evenly into `n_actions`.
+///
+/// Source: section 4.1, the 601 torques -10, -10 + 1/30, ..., 10 N m.
+inline double action_value(std::size_t action, std::size_t n_actions, double low,
+                           double high) noexcept {
+  assert(action < n_actions);
+  if (n_actions == 1) return low;
+  return low + (high - low) * static_cast<double>(action) / static_cast<double>(n_actions - 1);
+}
+
+}  // namespace sdnn::coding

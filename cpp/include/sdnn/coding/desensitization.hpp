@@ -1,0 +1,207 @@
+/// Layer 3: every input's pattern, desensitized by every other input's.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <span>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "sdnn/coding/pattern_code.hpp"
+#include "sdnn/core/bit_layer.hpp"
+#include "sdnn/core/check.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::coding {
+
+/// A ternary pattern: unit k is 0 where `active` is off, else +1 or -1 as `positive` is on or off.
+template <std::size_t Capacity>
+struct TernaryPattern {
+  core::BitLayer<Capacity> active;
+  core::BitLayer<Capacity> positive;  ///< a subset of `active`
+
+  friend bool operator==(const TernaryPattern&, const TernaryPattern&) = default;
+};
+
+/// x_mu desensitized by x_nu (already permuted): neutral where the modifier is -1.
+///
+/// Source: section 3.1 (layer 3): x^mu(nu)_k = (1 + (sigma x^nu)_k) / 2 * x^mu_k.
+template <std::size_t Capacity>
+TernaryPattern<Capacity> desensitize(const core::BitLayer<Capacity>& x_mu,
+                                     const core::BitLayer<Capacity>& by) {
+  return {by, x_mu & by};
+}
+
+/// Unit k of a permuted pattern is unit `permutation[k]` of the pattern.
+using Permutation = std::vector<std::uint32_t>;
+
+/// `pattern` with its units permuted. Throws std::invalid_argument if the sizes differ.
+template <std::size_t Capacity>
+core::BitLayer<Capacity> permute(const core::BitLayer<Capacity>& pattern,
+                                 const Permutation& permutation) {
+  core::require(permutation.size() == pattern.size(), "permutation", "as long as the pattern",
+                permutation.size());
+  core::BitLayer<Capacity> permuted(pattern.size());
+  for (std::size_t k = 0; k < permutation.size(); ++k) permuted.set(k, pattern[permutation[k]]);
+  return permuted;
+}
+
+/// A uniformly random permutation of `n` units.
+inline Permutation random_permutation(std::size_t n, core::Random& random) {
+  Permutation permutation(n);
+  std::iota(permutation.begin(), permutation.end(), 0U);
+  random.shuffle(std::span(permutation));
+  return permutation;
+}
+
+/// The columns (units of layer 3) whose value is not 0, by sign.
+struct SignedColumns {
+  std::vector<std::uint32_t> positive;
+  std::vector<std::uint32_t> negative;
+
+  void clear() noexcept {
+    positive.clear();
+    negative.clear();
+  }
+};
+
+/// Layers 2 and 3 as fixed wiring: from a state to its ternary code x_SD.
+///
+/// Group (mu, nu), nu != mu, has number mu * (l - 1) + (nu < mu ? nu : nu - 1), and holds the
+/// columns [number * m, (number + 1) * m). Permuted patterns are looked up, not computed.
+template <std::size_t Capacity>
+class StateCode {
+ public:
+  using Pattern = core::BitLayer<Capacity>;
+
+  /// Wiring from given code books, one per input, and permutations, one per group.
+  ///
+  /// Throws std::invalid_argument unless there are at least two books of one pattern size, and
+  /// l (l - 1) permutations of that size.
+  StateCode(std::vector<CodeBook<Capacity>> books, std::vector<Permutation> permutations)
+      : books_(std::move(books)), permutations_(std::move(permutations)) {
+    core::require_in_range("n_inputs", books_.size(), 2, 1024);
+    for (const auto& book : books_) {
+      core::require(book.n_pattern_units() == n_pattern_units(), "code books",
+                    "of one n_pattern_units", book.n_pattern_units());
+    }
+    core::require(permutations_.size() == n_groups(), "number of permutations",
+                  "n_inputs * (n_inputs - 1)", permutations_.size());
+    for (const auto& permutation : permutations_) require_permutation(permutation);
+
+    permuted_.resize(n_groups());
+    for_each_group([&](std::size_t group, std::size_t, std::size_t nu) {
+      for (std::size_t bin = 0; bin < books_[nu].n_bins(); ++bin) {
+        permuted_[group].push_back(
+            permute(books_[nu][static_cast<Bin>(bin)], permutations_[group]));
+      }
+    });
+  }
+
+  std::size_t n_inputs() const noexcept { return books_.size(); }
+  std::size_t n_pattern_units() const noexcept { return books_.front().n_pattern_units(); }
+  std::size_t n_groups() const noexcept { return n_inputs() * (n_inputs() - 1); }
+  /// D = m l (l - 1), the length of x_SD.
+  std::size_t n_columns() const noexcept { return n_pattern_units() * n_groups(); }
+
+  const CodeBook<Capacity>& book(std::size_t input) const { return books_.at(input); }
+  const Permutation& permutation(std::size_t mu, std::size_t nu) const {
+    core::require(mu < n_inputs() && nu < n_inputs() && mu != nu, "(mu, nu)",
+                  "two different inputs", mu * n_inputs() + nu);
+    return permutations_[group_of(mu, nu)];
+  }
+
+  /// The bin of every input. Shapes: state (l,), bins (l,).
+  ///
+  /// Throws std::invalid_argument if the size is wrong or a value is not in [0, 1].
+  void encode(std::span<const double> state, std::span<Bin> bins) const {
+    core::require(state.size() == n_inputs(), "state", std::to_string(n_inputs()) + " values",
+                  state.size());
+    assert(bins.size() == n_inputs());
+    for (std::size_t mu = 0; mu < state.size(); ++mu) {
+      if (!(state[mu] >= 0.0 && state[mu] <= 1.0)) {
+        core::require_in_range("state[" + std::to_string(mu) + "]", state[mu], 0.0, 1.0);
+      }
+      bins[mu] = books_[mu].bin_of(state[mu]);
+    }
+  }
+
+  /// The ternary pattern of one group for a coded state.
+  TernaryPattern<Capacity> group(std::size_t mu, std::size_t nu, std::span<const Bin> bins) const {
+    return desensitize(books_[mu][bins[mu]], permuted_[group_of(mu, nu)][bins[nu]]);
+  }
+
+  /// Lists the columns of x_SD that are +1 and -1.
+  void columns(std::span<const Bin> bins, SignedColumns& out) const {
+    out.clear();
+    for_each_group([&](std::size_t group, std::size_t mu, std::size_t nu) {
+      const auto active = permuted_[group][bins[nu]].words();
+      const auto positive = books_[mu][bins[mu]].words();
+      for (std::size_t w = 0; w < active.size(); ++w) {
+        const std::size_t first = group * n_pattern_units() + w * 64;
+        append(active[w] & positive[w], first, out.positive);
+        append(active[w] & ~positive[w], first, out.negative);
+      }
+    });
+  }
+
+  /// The integer inner product <x_SD(a), x_SD(b)>.
+  std::int32_t inner_product(std::span<const Bin> a, std::span<const Bin> b) const noexcept {
+    std::int32_t sum = 0;
+    for_each_group([&](std::size_t group, std::size_t mu, std::size_t nu) {
+      const auto active_a = permuted_[group][a[nu]].words();
+      const auto active_b = permuted_[group][b[nu]].words();
+      const auto positive_a = books_[mu][a[mu]].words();
+      const auto positive_b = books_[mu][b[mu]].words();
+      for (std::size_t w = 0; w < active_a.size(); ++w) {
+        const std::uint64_t both = active_a[w] & active_b[w];
+        sum += std::popcount(both) - 2 * std::popcount(both & (positive_a[w] ^ positive_b[w]));
+      }
+    });
+    return sum;
+  }
+
+ private:
+  template <class Visit>
+  void for_each_group(Visit&& visit) const {
+    std::size_t group = 0;
+    for (std::size_t mu = 0; mu < n_inputs(); ++mu) {
+      for (std::size_t nu = 0; nu < n_inputs(); ++nu) {
+        if (nu != mu) visit(group++, mu, nu);
+      }
+    }
+  }
+
+  std::size_t group_of(std::size_t mu, std::size_t nu) const noexcept {
+    return mu * (n_inputs() - 1) + (nu < mu ? nu : nu - 1);
+  }
+
+  void require_permutation(const Permutation& permutation) const {
+    core::require(permutation.size() == n_pattern_units(), "permutation",
+                  std::to_string(n_pattern_units()) + " units long", permutation.size());
+    std::vector<bool> seen(permutation.size(), false);
+    for (const std::uint32_t unit : permutation) {
+      core::require(unit < seen.size() && !seen[unit], "permutation",
+                    "every unit number exactly once", unit);
+      seen[unit] = true;
+    }
+  }
+
+  static void append(std::uint64_t word, std::size_t first, std::vector<std::uint32_t>& list) {
+    for (; word != 0; word &= word - 1) {
+      list.push_back(static_cast<std::uint32_t>(
+          first + static_cast<std::size_t>(std::countr_zero(word))));
+    }
+  }
+
+  std::vector<CodeBook<Capacity>> books_;
+  std::vector<Permutation> permutations_;
+  std::vector<std::vector<Pattern>> permuted_;  ///< [group][bin of nu]
+};
+
+}  // namespace sdnn::coding

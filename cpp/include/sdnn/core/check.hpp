@@ -1,0 +1,42 @@
+/// Argument checks for public edges: say what was expected and what came.
+#pragma once
+
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+namespace sdnn::core {
+
+/// Throws std::invalid_argument "<name> must be <expected>, got <value>" unless `valid`.
+template <class Value>
+void require(bool valid, std::string_view name, std::string_view expected, const Value& value) {
+  if (valid) return;
+  std::ostringstream message;
+  message << name << " must be " << expected << ", got " << value;
+  throw std::invalid_argument(message.str());
+}
+
+/// Throws std::invalid_argument unless low <= value <= high; NaN is outside every range.
+template <class Value>
+void require_in_range(std::string_view name, Value value, std::type_identity_t<Value> low,
+                      std::type_identity_t<Value> high) {
+  if (value >= low && value <= high) return;
+  std::ostringstream expected;
+  expected << "in [" << low << ", " << high << "]";
+  require(false, name, expected.str(), value);
+}
+
+/// Throws std::invalid_argument unless `value` is a finite number greater than zero.
+inline void require_positive(std::string_view name, double value) {
+  require(std::isfinite(value) && value > 0.0, name, "a finite number greater than 0", value);
+}
+
+/// Throws std::invalid_argument unless `value` is a finite number.
+inline void require_finite(std::string_view name, double value) {
+  require(std::isfinite(value), name, "finite", value);
+}
+
+}  // namespace sdnn::core
