@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -45,8 +46,9 @@ class EpsilonGreedy {
 
   /// The action for step number `step` (from 0) of an episode; without `explore` always a best one.
   ///
-  /// Shape: values (n_actions,), not empty.
+  /// Shape: values (n_actions,). Throws std::invalid_argument if it is empty or begins with NaN.
   std::size_t select(std::span<const double> values, int step, bool explore) {
+    core::require(!values.empty(), "values", "not empty", values.size());
     if (explore && step >= config_.n_greedy_steps && config_.epsilon > 0.0 &&
         exploration_.uniform() < config_.epsilon) {
       return static_cast<std::size_t>(exploration_.below(values.size()));
@@ -57,6 +59,7 @@ class EpsilonGreedy {
  private:
   std::size_t greedy(std::span<const double> values, core::Random& ties) const {
     const double best = *std::max_element(values.begin(), values.end());
+    core::require(!std::isnan(best), "values", "numbers", best);
     switch (config_.tie_rule) {
       case TieRule::lowest:
         return first_of(values, best);

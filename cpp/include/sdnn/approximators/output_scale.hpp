@@ -34,7 +34,8 @@ class OutputScale {
   double operator()(int n_firing) const noexcept {
     if (n_firing > u_high_) return q_high_;
     if (n_firing < u_low_) return q_low_;
-    return q_low_ + (q_high_ - q_low_) * (n_firing - u_low_) / (u_high_ - u_low_);
+    // A weighted mean rounds once at the end, and is symmetric about the middle of the line.
+    return (q_low_ * (u_high_ - n_firing) + q_high_ * (n_firing - u_low_)) / (u_high_ - u_low_);
   }
 
   /// The number of units whose value is nearest to `value` clipped to [q_low, q_high]; halves are

@@ -9,12 +9,14 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "sdnn/approximators/error_correction.hpp"
 #include "sdnn/approximators/output_scale.hpp"
 #include "sdnn/approximators/parallel_perceptron.hpp"
+#include "sdnn/approximators/potential_memory.hpp"
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/coding/desensitization.hpp"
 #include "sdnn/coding/pattern_code.hpp"
@@ -54,10 +56,9 @@ struct SdnnCConfig {
 /// The network of section 3 with patterns of at most `Capacity` units.
 ///
 /// Wiring (code books, permutations) is fixed by config and seed. Reading does not change what is
-/// returned, but the network remembers the potentials of the last two states it was asked about,
-/// and keeps them exact while it learns: a correction of w_i by +-x_SD(s) moves h_i(s') by
-/// +-(<x_SD(s), x_SD(s')> + 1). So one decision needs one pass over the weights. An object must
-/// not be used by two threads at once; copies share the wiring and nothing else.
+/// returned, but the network remembers the potentials of recent states and keeps them exact while
+/// it learns (see PotentialMemory), so that one decision needs at most one pass over the weights.
+/// An object must not be used by two threads at once; copies share the wiring and nothing else.
 template <std::size_t Capacity>
 class SdnnC {
  public:
@@ -68,7 +69,8 @@ class SdnnC {
         code_(make_code(config, seed)),
         actions_(config.n_hidden_units, config.n_active_units, config.n_actions),
         scale_(make_scale(config)),
-        perceptron_(actions_.n_hidden_units(), code_->n_columns()) {
+        perceptron_(actions_.n_hidden_units(), code_->n_columns()),
+        memory_(*code_, actions_.n_hidden_units(), actions_.n_active_units()) {
     core::require_positive("learning_coefficient", config.learning_coefficient);
     core::require_in_range("lattice", config.lattice, 1, 64);
     value_of_count_.resize(actions_.n_active_units() + 1);
@@ -77,13 +79,8 @@ class SdnnC {
     }
     initialize_weights(seed);
     initialize_thresholds();
-    for (Remembered& entry : memory_) {
-      entry.bins.assign(code_->n_inputs(), 0);
-      entry.potentials.assign(perceptron_.n_units(), 0);
-    }
     bins_.resize(code_->n_inputs());
-    columns_.positive.reserve(code_->n_columns());
-    columns_.negative.reserve(code_->n_columns());
+    columns_ = coding::SignedColumns::with_capacity(code_->n_columns());
     n_firing_before_.assign(perceptron_.n_units() + 1, 0);
     selected_.reserve(actions_.n_active_units());
   }
@@ -93,6 +90,7 @@ class SdnnC {
   const coding::ActionCode& action_code() const noexcept { return actions_; }
   const OutputScale& output_scale() const noexcept { return scale_; }
   const ParallelPerceptron& perceptron() const noexcept { return perceptron_; }
+  const PotentialMemory<Capacity>& memory() const noexcept { return memory_; }
   std::size_t n_inputs() const noexcept { return code_->n_inputs(); }
   std::size_t n_actions() const noexcept { return actions_.n_actions(); }
 
@@ -102,8 +100,7 @@ class SdnnC {
   void values(std::span<const double> state, std::span<double> out) {
     core::require(out.size() == n_actions(), "out", std::to_string(n_actions()) + " values",
                   out.size());
-    const Remembered& entry = recall(state);
-    count_firing(entry.potentials);
+    count_firing(recall(state).potentials);
     for (std::size_t action = 0; action < out.size(); ++action) {
       const std::size_t first = actions_.first_unit(action);
       out[action] = value_of_count_[static_cast<std::size_t>(
@@ -113,7 +110,7 @@ class SdnnC {
 
   /// Q(state, action). Throws like values, and std::invalid_argument for an action out of range.
   double value(std::span<const double> state, std::size_t action) {
-    return scale_(count_in_window(recall(state), action));
+    return scale_(count_in_window(recall(state).potentials, action));
   }
 
   /// One step of error correction: Q(state, action) moves towards `target` (q_hat).
@@ -123,7 +120,7 @@ class SdnnC {
   void correct(std::span<const double> state, std::size_t action, double target) {
     core::require(!std::isnan(target), "target", "a number", target);
     const Remembered& entry = recall(state);
-    const int deficit = scale_.inverse(target) - count_in_window(entry, action);
+    const int deficit = scale_.inverse(target) - count_in_window(entry.potentials, action);
     if (deficit == 0) return;
     const std::size_t first = actions_.first_unit(action);
     select_units(std::span(entry.potentials).subspan(first, actions_.n_active_units()), deficit,
@@ -134,11 +131,7 @@ class SdnnC {
     const std::int32_t step = deficit > 0 ? config_.lattice : -config_.lattice;
     code_->columns(entry.bins, columns_);
     perceptron_.correct(selected_, columns_, step);
-    for (Remembered& other : memory_) {
-      if (other.last_use == 0) continue;
-      const std::int32_t change = step * (code_->inner_product(entry.bins, other.bins) + 1);
-      for (const std::uint32_t unit : selected_) other.potentials[unit] += change;
-    }
+    memory_.corrected(entry.bins, selected_, step);
   }
 
   /// The inner potentials in lattice steps (c / lattice), by a full pass. Shape: out (n,).
@@ -171,16 +164,11 @@ class SdnnC {
       replaced.set_threshold(unit, thresholds[unit]);
     }
     perceptron_ = std::move(replaced);
-    for (Remembered& entry : memory_) entry.last_use = 0;
+    memory_.forget();
   }
 
  private:
-  /// The potentials of one state, exact for the present weights; last_use 0 means empty.
-  struct Remembered {
-    std::vector<coding::Bin> bins;
-    std::vector<std::int32_t> potentials;
-    std::uint64_t last_use = 0;
-  };
+  using Remembered = typename PotentialMemory<Capacity>::Entry;
 
   static std::shared_ptr<const coding::StateCode<Capacity>> make_code(const SdnnCConfig& config,
                                                                       std::uint64_t seed) {
@@ -211,6 +199,7 @@ class SdnnC {
 
   static OutputScale make_scale(const SdnnCConfig& config) {
     const int u_low = config.u_low.value_or(config.n_active_units / 15);
+    core::require_in_range("u_low", u_low, 0, config.n_active_units);
     const int u_high = config.u_high.value_or(config.n_active_units - u_low);
     core::require_in_range("u_high", u_high, 0, config.n_active_units);
     return {u_low, u_high, config.q_low, config.q_high};
@@ -219,8 +208,11 @@ class SdnnC {
   void initialize_weights(std::uint64_t seed) {
     core::require(std::isfinite(config_.initial_weight_limit) && config_.initial_weight_limit >= 0,
                   "initial_weight_limit", "finite and not negative", config_.initial_weight_limit);
-    core::Random random(seed, core::Stream::weights);
     const double limit = config_.initial_weight_limit * config_.lattice;
+    core::require(limit <= perceptron_.weight_limit(), "initial_weight_limit",
+                  "at most " + std::to_string(perceptron_.weight_limit()) + " / lattice",
+                  config_.initial_weight_limit);
+    core::Random random(seed, core::Stream::weights);
     for (std::size_t j = 0; j < perceptron_.n_columns(); ++j) {
       std::uint64_t bits = 0;
       for (std::size_t i = 0; i < perceptron_.n_units(); ++i) {
@@ -249,31 +241,18 @@ class SdnnC {
     }
   }
 
-  /// The remembered potentials of `state`; computed by a pass if there are none.
   const Remembered& recall(std::span<const double> state) {
     code_->encode(state, bins_);
-    Remembered* oldest = &memory_[0];
-    for (Remembered& entry : memory_) {
-      if (entry.last_use != 0 && entry.bins == bins_) {
-        entry.last_use = ++clock_;
-        return entry;
-      }
-      if (entry.last_use < oldest->last_use) oldest = &entry;
-    }
-    oldest->bins = bins_;
-    code_->columns(bins_, columns_);
-    perceptron_.potentials(columns_, oldest->potentials);
-    oldest->last_use = ++clock_;
-    return *oldest;
+    return memory_.recall(*code_, perceptron_, bins_);
   }
 
-  int count_in_window(const Remembered& entry, std::size_t action) const {
+  int count_in_window(std::span<const std::int32_t> potentials, std::size_t action) const {
     core::require(action < n_actions(), "action", "less than " + std::to_string(n_actions()),
                   action);
     const std::size_t first = actions_.first_unit(action);
     int n_firing = 0;
     for (std::size_t i = first; i < first + actions_.n_active_units(); ++i) {
-      n_firing += entry.potentials[i] > 0;
+      n_firing += potentials[i] > 0;
     }
     return n_firing;
   }
@@ -294,8 +273,7 @@ class SdnnC {
   std::vector<double> value_of_count_;
 
   // Workspace: sized once, so that a step allocates nothing.
-  std::array<Remembered, 2> memory_;
-  std::uint64_t clock_ = 0;
+  PotentialMemory<Capacity> memory_;
   std::vector<coding::Bin> bins_;
   coding::SignedColumns columns_;
   std::vector<std::int32_t> n_firing_before_;  ///< active units among the first i

@@ -15,6 +15,7 @@
 #include "sdnn/coding/pattern_code.hpp"
 #include "sdnn/core/bit_layer.hpp"
 #include "sdnn/core/check.hpp"
+#include "sdnn/core/instruction_set.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::coding {
@@ -59,10 +60,20 @@ inline Permutation random_permutation(std::size_t n, core::Random& random) {
   return permutation;
 }
 
-/// The columns (units of layer 3) whose value is not 0, by sign.
+/// The columns (units of layer 3) whose value is not 0, by sign; one of value 2 comes twice.
 struct SignedColumns {
   std::vector<std::uint32_t> positive;
   std::vector<std::uint32_t> negative;
+  std::vector<std::int16_t> signs = {};  ///< scratch of whoever needs the whole row
+
+  /// No columns, but room for `n` of each sign, so that listing them allocates nothing.
+  static SignedColumns with_capacity(std::size_t n) {
+    SignedColumns columns;
+    columns.positive.reserve(n);
+    columns.negative.reserve(n);
+    columns.signs.reserve(n);
+    return columns;
+  }
 
   void clear() noexcept {
     positive.clear();
@@ -150,20 +161,34 @@ class StateCode {
     });
   }
 
-  /// The integer inner product <x_SD(a), x_SD(b)>.
-  std::int32_t inner_product(std::span<const Bin> a, std::span<const Bin> b) const noexcept {
-    std::int32_t sum = 0;
+  /// Lists the columns of x_SD(to) - x_SD(from), those that change by 2 twice.
+  void difference(std::span<const Bin> from, std::span<const Bin> to, SignedColumns& out) const {
+    out.clear();
     for_each_group([&](std::size_t group, std::size_t mu, std::size_t nu) {
-      const auto active_a = permuted_[group][a[nu]].words();
-      const auto active_b = permuted_[group][b[nu]].words();
-      const auto positive_a = books_[mu][a[mu]].words();
-      const auto positive_b = books_[mu][b[mu]].words();
-      for (std::size_t w = 0; w < active_a.size(); ++w) {
-        const std::uint64_t both = active_a[w] & active_b[w];
-        sum += std::popcount(both) - 2 * std::popcount(both & (positive_a[w] ^ positive_b[w]));
+      const auto active_from = permuted_[group][from[nu]].words();
+      const auto active_to = permuted_[group][to[nu]].words();
+      const auto x_from = books_[mu][from[mu]].words();
+      const auto x_to = books_[mu][to[mu]].words();
+      for (std::size_t w = 0; w < active_to.size(); ++w) {
+        const std::size_t first = group * n_pattern_units() + w * 64;
+        const std::uint64_t plus_from = active_from[w] & x_from[w];
+        const std::uint64_t minus_from = active_from[w] & ~x_from[w];
+        const std::uint64_t plus_to = active_to[w] & x_to[w];
+        const std::uint64_t minus_to = active_to[w] & ~x_to[w];
+        append(plus_to & ~plus_from, first, out.positive);
+        append(minus_from & ~minus_to, first, out.positive);
+        append(minus_to & ~minus_from, first, out.negative);
+        append(plus_from & ~plus_to, first, out.negative);
       }
     });
-    return sum;
+  }
+
+  /// The integer inner product <x_SD(a), x_SD(b)>.
+  std::int32_t inner_product(std::span<const Bin> a, std::span<const Bin> b) const noexcept {
+#if SDNN_X86_KERNELS
+    if (core::instruction_set() >= core::InstructionSet::avx2) return inner_product_popcnt(a, b);
+#endif
+    return inner_product_of_words(a, b);
   }
 
  private:
@@ -176,6 +201,34 @@ class StateCode {
       }
     }
   }
+
+  [[gnu::always_inline]] std::int32_t inner_product_of_words(std::span<const Bin> a,
+                                                             std::span<const Bin> b) const noexcept {
+    int sum = 0;
+    const std::size_t l = n_inputs();
+    for (std::size_t mu = 0, group = 0; mu < l; ++mu) {
+      const auto differing = (books_[mu][a[mu]] ^ books_[mu][b[mu]]).words();
+      for (std::size_t nu = 0; nu < l; ++nu) {
+        if (nu == mu) continue;
+        const auto active_a = permuted_[group][a[nu]].words();
+        const auto active_b = permuted_[group][b[nu]].words();
+        for (std::size_t w = 0; w < differing.size(); ++w) {
+          const std::uint64_t both = active_a[w] & active_b[w];
+          sum += std::popcount(both) - 2 * std::popcount(both & differing[w]);
+        }
+        ++group;
+      }
+    }
+    return sum;
+  }
+
+#if SDNN_X86_KERNELS
+  /// The same with the processor's own bit count, which every processor with AVX2 has.
+  [[gnu::target("popcnt")]] std::int32_t inner_product_popcnt(
+      std::span<const Bin> a, std::span<const Bin> b) const noexcept {
+    return inner_product_of_words(a, b);
+  }
+#endif
 
   std::size_t group_of(std::size_t mu, std::size_t nu) const noexcept {
     return mu * (n_inputs() - 1) + (nu < mu ? nu : nu - 1);

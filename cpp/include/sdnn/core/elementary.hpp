@@ -51,8 +51,9 @@ constexpr double polynomial(const std::array<double, Size>& c, double x) noexcep
 
 /// sin x and cos x for |x| <= 1e5; NaN beyond, and for infinities and NaN.
 ///
-/// Error: below 0.80 ulp for |x| <= 1e5 (measured against 60 digits; see the tests). sin is exactly
-/// odd, -0 included, and cos exactly even. No branch and no table, so that a loop over it can be
+/// Error: the largest of 570,000 arguments, a sixth of them next to multiples of pi/2, was 0.82 ulp
+/// (against 60 digits; the tests repeat a part of it). sin is exactly odd, -0 included, and cos
+/// exactly even. No branch and no table, so that a loop over it can be
 /// vectorized, and short chains of dependent operations, since an integrator waits for the result.
 /// Source: reduction by Cody and Waite, pi/2 as 34 + 34 + 53 bits; minimax-like polynomials of our
 /// own for (sin r - r) / r^3 and (cos r - 1 + r^2/2) / r^4 in r^2, |r| <= pi/4 (relative error
@@ -99,7 +100,7 @@ inline SinCos sin_cos(double x) noexcept {
 
 /// The natural logarithm; log 0 = -inf, NaN for negative numbers and NaN.
 ///
-/// Error: below 0.85 ulp (measured; see the tests).
+/// Error: the largest of 285,000 arguments over the whole range was 0.79 ulp.
 /// Source: x = 2^k (1 + f), s = f / (2 + f), log(1 + f) = 2 s + (2/3) s^3 + ..., summed so that the
 /// large parts are exact; coefficients of our own (relative error 2^-59).
 inline double log(double x) noexcept {

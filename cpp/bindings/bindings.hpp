@@ -1,0 +1,10 @@
+/// What every binding file shares: one function per room.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+void bind_coding(pybind11::module_& module);
+void bind_approximators(pybind11::module_& module);
+void bind_agents(pybind11::module_& module);
+void bind_environments(pybind11::module_& module);
+void bind_experiments(pybind11::module_& module);

@@ -1,0 +1,179 @@
+/// Potentials of recent states, kept exact while the network learns.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "sdnn/approximators/parallel_perceptron.hpp"
+#include "sdnn/coding/desensitization.hpp"
+
+namespace sdnn::approximators {
+
+/// The inner potentials of the last states a network was asked about.
+///
+/// Most states a network meets are old ones or lie near one. Two exact identities make use of it:
+/// a correction of w_i by step * x_SD(s) moves h_i(s') by step * (<x_SD(s), x_SD(s')> + 1), so a
+/// remembered state is brought up to date by one integer product per correction since; and
+/// h(s') - h(s) = W (x_SD(s') - x_SD(s)) touches only the columns in which the codes differ. The
+/// way that is cheapest by estimate is taken: from a remembered state, or by a full pass. Whichever
+/// it is, the result is the same integers.
+template <std::size_t Capacity>
+class PotentialMemory {
+ public:
+  /// One remembered state. Shapes: bins (l,), potentials (n,).
+  struct Entry {
+    std::vector<coding::Bin> bins;
+    std::vector<std::int32_t> potentials;
+    std::uint64_t up_to = 0;     ///< corrections that are accounted for
+    std::uint64_t last_use = 0;  ///< 0: empty
+  };
+
+  /// How potentials came about, counted since construction.
+  struct Counts {
+    std::uint64_t exact = 0;      ///< the state was remembered
+    std::uint64_t neighbour = 0;  ///< derived from a remembered neighbour
+    std::uint64_t full = 0;       ///< a full pass
+    std::uint64_t columns = 0;    ///< columns added, by passes and from neighbours
+  };
+
+  /// `max_corrected`: the most units that one correction may touch.
+  PotentialMemory(const coding::StateCode<Capacity>& code, std::size_t n_units,
+                  std::size_t max_corrected)
+      : columns_(coding::SignedColumns::with_capacity(2 * code.n_columns())),
+        max_corrected_(max_corrected),
+        log_bins_(kLogSize * code.n_inputs()),
+        log_units_(kLogSize * max_corrected),
+        log_(kLogSize) {
+    for (Entry& entry : entries_) {
+      entry.bins.assign(code.n_inputs(), 0);
+      entry.potentials.assign(n_units, 0);
+    }
+    // Neighbouring bins differ in about m / 2 / 45 units of each pattern; each is a column of
+    // l - 1 groups as modified (half of them active, counted twice: +1 to -1) and as modifier.
+    const double l = static_cast<double>(code.n_inputs());
+    const double differing =
+        static_cast<double>((code.book(0)[0] ^ code.book(0)[static_cast<coding::Bin>(std::min<
+            std::size_t>(10, code.book(0).n_bins() - 1))]).count()) / 10.0;
+    columns_per_bin_ = 2.0 * (l - 1.0) * std::max(differing, 0.05);
+    columns_per_correction_ = 0.3 * l * (l - 1.0);
+    columns_of_pass_ = 0.5 * static_cast<double>(code.n_columns());
+  }
+
+  const Counts& counts() const noexcept { return counts_; }
+
+  /// Forgets all states: the weights have been replaced.
+  void forget() noexcept {
+    for (Entry& entry : entries_) entry.last_use = 0;
+  }
+
+  /// The potentials of the state with these bins, for the present weights; valid until the next
+  /// call.
+  const Entry& recall(const coding::StateCode<Capacity>& code,
+                      const ParallelPerceptron& perceptron, std::span<const coding::Bin> bins) {
+    Entry* nearest = nullptr;
+    Entry* oldest = &entries_[0];
+    double least = columns_of_pass_;
+    for (Entry& entry : entries_) {
+      if (entry.last_use < oldest->last_use) oldest = &entry;
+      if (entry.last_use == 0 || n_corrections_ - entry.up_to > kLogSize) continue;
+      const double cost =
+          columns_per_bin_ * distance(entry.bins, bins) +
+          columns_per_correction_ * static_cast<double>(n_corrections_ - entry.up_to);
+      if (cost < least) {
+        least = cost;
+        nearest = &entry;
+      }
+    }
+    if (nearest == nullptr) {
+      code.columns(bins, columns_);
+      perceptron.potentials(columns_, oldest->potentials);
+      ++counts_.full;
+    } else {
+      catch_up(code, *nearest);
+      nearest->last_use = ++clock_;
+      if (std::ranges::equal(nearest->bins, bins)) {
+        ++counts_.exact;
+        return *nearest;
+      }
+      if (oldest == nearest) oldest = least_recently_used();
+      code.difference(nearest->bins, bins, columns_);
+      std::ranges::copy(nearest->potentials, oldest->potentials.begin());
+      perceptron.add(columns_, oldest->potentials);
+      ++counts_.neighbour;
+    }
+    counts_.columns += columns_.positive.size() + columns_.negative.size();
+    std::ranges::copy(bins, oldest->bins.begin());
+    oldest->up_to = n_corrections_;
+    oldest->last_use = ++clock_;
+    return *oldest;
+  }
+
+  /// Notes that w_i += step * x_SD(bins) and w_i0 -= step for every i in `units`.
+  void corrected(std::span<const coding::Bin> bins, std::span<const std::uint32_t> units,
+                 std::int32_t step) noexcept {
+    assert(units.size() <= max_corrected_);
+    const std::size_t slot = n_corrections_ % kLogSize;
+    std::ranges::copy(bins, log_bins_.begin() + static_cast<std::ptrdiff_t>(slot * bins.size()));
+    std::ranges::copy(units,
+                      log_units_.begin() + static_cast<std::ptrdiff_t>(slot * max_corrected_));
+    log_[slot] = {step, units.size()};
+    ++n_corrections_;
+  }
+
+ private:
+  struct Correction {
+    std::int32_t step = 0;
+    std::size_t n_units = 0;
+  };
+
+  static constexpr std::size_t kEntries = 64;
+  static constexpr std::size_t kLogSize = 512;
+
+  static int distance(std::span<const coding::Bin> a, std::span<const coding::Bin> b) noexcept {
+    int sum = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(int{a[i]} - int{b[i]});
+    return sum;
+  }
+
+  Entry* least_recently_used() noexcept {
+    return &*std::ranges::min_element(entries_, {}, &Entry::last_use);
+  }
+
+  void catch_up(const coding::StateCode<Capacity>& code, Entry& entry) noexcept {
+    const std::size_t l = entry.bins.size();
+    for (; entry.up_to < n_corrections_; ++entry.up_to) {
+      const std::size_t slot = entry.up_to % kLogSize;
+      const std::span<const coding::Bin> corrected(log_bins_.data() + slot * l, l);
+      const std::int32_t change =
+          log_[slot].step * (code.inner_product(corrected, entry.bins) + 1);
+      const std::uint32_t* const units = log_units_.data() + slot * max_corrected_;
+      for (std::size_t k = 0; k < log_[slot].n_units; ++k) entry.potentials[units[k]] += change;
+    }
+  }
+
+  std::array<Entry, kEntries> entries_;
+  std::uint64_t clock_ = 0;
+  coding::SignedColumns columns_;
+
+  // The last kLogSize corrections, in a ring.
+  std::uint64_t n_corrections_ = 0;
+  std::size_t max_corrected_;
+  std::vector<coding::Bin> log_bins_;     ///< [slot][input]
+  std::vector<std::uint32_t> log_units_;  ///< [slot][up to max_corrected_]
+  std::vector<Correction> log_;
+
+  // Estimated costs, in columns.
+  double columns_per_bin_;
+  double columns_per_correction_;
+  double columns_of_pass_;
+  Counts counts_;
+};
+
+}  // namespace sdnn::approximators

@@ -1,0 +1,86 @@
+/// Which vector instructions the kernels use: chosen once, at run time.
+#pragma once
+
+#include <atomic>
+#include <cstdlib>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#if (defined(__x86_64__) || defined(_M_X64)) && (defined(__GNUC__) || defined(__clang__))
+#define SDNN_X86_KERNELS 1
+#else
+#define SDNN_X86_KERNELS 0
+#endif
+
+namespace sdnn::core {
+
+/// Levels in rising order. Results have the same bits on all of them.
+enum class InstructionSet {
+  portable,  ///< whatever the compiler makes of plain loops
+  avx2,
+  avx512,  ///< AVX-512 F and BW
+};
+
+/// The level's name, as the environment variable SDNN_INSTRUCTION_SET spells it.
+inline std::string_view name_of(InstructionSet level) noexcept {
+  switch (level) {
+    case InstructionSet::avx512: return "avx512";
+    case InstructionSet::avx2: return "avx2";
+    default: return "portable";
+  }
+}
+
+/// The highest level this processor and operating system offer.
+inline InstructionSet best_instruction_set() noexcept {
+#if SDNN_X86_KERNELS
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw")) {
+    return InstructionSet::avx512;
+  }
+  if (__builtin_cpu_supports("avx2")) return InstructionSet::avx2;
+#endif
+  return InstructionSet::portable;
+}
+
+/// The level called `name`. Throws std::invalid_argument if there is no such level, or this
+/// processor does not offer it.
+inline InstructionSet instruction_set_named(std::string_view name) {
+  for (const auto level :
+       {InstructionSet::portable, InstructionSet::avx2, InstructionSet::avx512}) {
+    if (name != name_of(level)) continue;
+    if (level > best_instruction_set()) {
+      throw std::invalid_argument("instruction set must be one that this processor offers (up to " +
+                                  std::string(name_of(best_instruction_set())) + "), got " +
+                                  std::string(name));
+    }
+    return level;
+  }
+  throw std::invalid_argument("instruction set must be portable, avx2 or avx512, got " +
+                              std::string(name));
+}
+
+namespace internal {
+
+inline std::atomic<InstructionSet>& active_level() {
+  static std::atomic<InstructionSet> level = [] {
+    const char* const wanted = std::getenv("SDNN_INSTRUCTION_SET");
+    return wanted == nullptr ? best_instruction_set() : instruction_set_named(wanted);
+  }();
+  return level;
+}
+
+}  // namespace internal
+
+/// The level in use: the best one, unless SDNN_INSTRUCTION_SET or set_instruction_set chose.
+///
+/// Throws std::invalid_argument on the first call if the environment variable is unusable.
+inline InstructionSet instruction_set() {
+  return internal::active_level().load(std::memory_order_relaxed);
+}
+
+/// Forces a level, for the whole process. Throws like instruction_set_named.
+inline void set_instruction_set(std::string_view name) {
+  internal::active_level().store(instruction_set_named(name), std::memory_order_relaxed);
+}
+
+}  // namespace sdnn::core

@@ -1,0 +1,129 @@
+/// What an agent sees of the acrobot: normalized, redundant and noisy variables.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/core/check.hpp"
+#include "sdnn/core/elementary.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::environments {
+
+/// What noise does at the ends of a sensor's range [0, 1].
+enum class SensorEdge {
+  wrap,      ///< an angle: 1 continues at 0, the result is in [0, 1)
+  saturate,  ///< the result stays at the end
+};
+
+/// Number of turns apart from a whole number, in [0, 1).
+inline double wrap_to_unit(double x) noexcept {
+  const double wrapped = x - std::floor(x);
+  return wrapped < 1.0 ? wrapped : 0.0;  // a tiny negative x rounds to 1
+}
+
+/// The nearest number in [0, 1].
+inline double saturate_to_unit(double x) noexcept { return std::clamp(x, 0.0, 1.0); }
+
+/// The four basic observations s1..s4 of a state (theta1, theta2, theta1_dot, theta2_dot), rad and
+/// rad/s: angles as turns in [0, 1), speeds so that -3 pi .. 3 pi and -5 pi .. 5 pi fill [0, 1].
+inline std::array<double, 4> basic_observation(const Eigen::Vector4d& state) noexcept {
+  constexpr double kSpeedRange1 = 6.0 * core::kPi, kSpeedRange2 = 10.0 * core::kPi;
+  return {wrap_to_unit(state[0] / core::kTwoPi + 0.5), wrap_to_unit(state[1] / core::kTwoPi + 0.5),
+          saturate_to_unit(state[2] / kSpeedRange1 + 0.5),
+          saturate_to_unit(state[3] / kSpeedRange2 + 0.5)};
+}
+
+/// s5, like a kinetic energy: 2 ((s3 - 1/2)^2 + (s4 - 1/2)^2), in [0, 1].
+inline double energy_sensor(double s3, double s4) noexcept {
+  return 2.0 * ((s3 - 0.5) * (s3 - 0.5) + (s4 - 0.5) * (s4 - 0.5));
+}
+
+/// s6, the height of the tip: (2 + cos 2 pi s1 - cos 2 pi (s1 + s2)) / 4, in [0, 1].
+inline double height_sensor(double s1, double s2) noexcept {
+  return (2.0 + core::sin_cos(core::kTwoPi * s1).cos -
+          core::sin_cos(core::kTwoPi * (s1 + s2)).cos) / 4.0;
+}
+
+/// Independent Gaussian noise on every channel of an observation.
+class SensorNoise {
+ public:
+  /// `sigma` is the standard deviation, `edges` has one entry per channel. Throws
+  /// std::invalid_argument unless sigma is finite and not negative.
+  SensorNoise(double sigma, std::vector<SensorEdge> edges, std::uint64_t seed, core::Stream stream)
+      : sigma_(sigma), edges_(std::move(edges)), random_(seed, stream) {
+    core::require(std::isfinite(sigma) && sigma >= 0.0, "noise", "finite and at least 0", sigma);
+  }
+
+  /// Adds one normal number to every channel in order; sigma = 0 draws none and changes nothing.
+  /// Shapes: (n_channels,).
+  void apply(std::span<double> values) noexcept {
+    assert(values.size() == edges_.size());
+    if (sigma_ == 0.0) return;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const double noisy = values[i] + sigma_ * random_.normal();
+      values[i] = edges_[i] == SensorEdge::wrap ? wrap_to_unit(noisy) : saturate_to_unit(noisy);
+    }
+  }
+
+  int n_channels() const noexcept { return static_cast<int>(edges_.size()); }
+
+ private:
+  double sigma_;
+  std::vector<SensorEdge> edges_;
+  core::Random random_;
+};
+
+struct SensorConfig {
+  int n_sensors = 4;   ///< 4: s1..s4; 5: with s5; 6: with s5 and s6
+  double noise = 0.0;  ///< standard deviation on every sensor; the paper's noisy cases have 0.02
+};
+
+/// s1..s4 and, if asked for, s5 and s6, each with its own noise.
+///
+/// s5 and s6 are computed from the true s1..s4. Source: the paper's sections on the acrobot task
+/// and on noisy and redundant inputs.
+class AcrobotSensors {
+ public:
+  /// Throws std::invalid_argument if a number is outside its range.
+  AcrobotSensors(const SensorConfig& config, std::uint64_t seed, core::Stream stream)
+      : n_sensors_(checked(config.n_sensors)),
+        noise_(config.noise, edges(config.n_sensors), seed, stream) {}
+
+  /// Writes one observation of `state`. Shapes: out (n_sensors,), every entry in [0, 1].
+  void observe(const Eigen::Vector4d& state, std::span<double> out) noexcept {
+    assert(out.size() == n_sensors_);
+    const auto basic = basic_observation(state);
+    std::copy(basic.begin(), basic.end(), out.begin());
+    if (n_sensors_ > 4) out[4] = energy_sensor(basic[2], basic[3]);
+    if (n_sensors_ > 5) out[5] = height_sensor(basic[0], basic[1]);
+    noise_.apply(out);
+  }
+
+  int n_sensors() const noexcept { return static_cast<int>(n_sensors_); }
+
+ private:
+  static std::size_t checked(int n_sensors) {
+    core::require_in_range("n_sensors", n_sensors, 4, 6);
+    return static_cast<std::size_t>(n_sensors);
+  }
+
+  static std::vector<SensorEdge> edges(int n_sensors) {
+    std::vector<SensorEdge> result(checked(n_sensors), SensorEdge::saturate);
+    result[0] = result[1] = SensorEdge::wrap;
+    return result;
+  }
+
+  std::size_t n_sensors_;
+  SensorNoise noise_;
+};
+
+}  // namespace sdnn::environments

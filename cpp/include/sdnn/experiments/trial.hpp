@@ -1,0 +1,124 @@
+/// One trial: an agent meets the acrobot, by the paper's protocol, without Python in the loop.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/agents/q_learning.hpp"
+#include "sdnn/coding/action_code.hpp"
+#include "sdnn/core/check.hpp"
+#include "sdnn/core/random.hpp"
+#include "sdnn/environments/acrobot.hpp"
+#include "sdnn/environments/acrobot_sensors.hpp"
+#include "sdnn/environments/goal_schedule.hpp"
+
+namespace sdnn::experiments {
+
+/// How long a trial is, and how often the agent is tested (section 4.2).
+struct ProtocolConfig {
+  int n_learning_episodes = 15000;
+  int test_interval = 10;  ///< learning episodes between two test episodes
+};
+
+/// The outcome of one test episode.
+struct TestRow {
+  std::int32_t episode;   ///< learning episodes so far
+  std::int32_t steps;     ///< decisions used; all of them if not solved
+  double episode_return;  ///< undiscounted sum of rewards
+  bool solved;            ///< the goal was reached
+};
+
+/// A learning agent on the acrobot swing-up; the same configs and seed give the same rows.
+///
+/// Source: spec section 5. A test episode is greedy, learns nothing, uses the current lambda, and
+/// draws from random streams of its own.
+template <approximators::ActionValue Q>
+class AcrobotTrial {
+ public:
+  /// Throws std::invalid_argument if a config is impossible or agent and sensors do not fit.
+  AcrobotTrial(agents::QLearning<Q> agent, const environments::AcrobotConfig& acrobot,
+               const environments::GoalScheduleConfig& goal,
+               const environments::SensorConfig& sensors, const ProtocolConfig& protocol,
+               std::uint64_t seed)
+      : agent_(std::move(agent)),
+        max_torque_(acrobot.max_torque),
+        acrobot_(acrobot),
+        goal_(goal),
+        sensors_(sensors, seed, core::Stream::sensor_noise),
+        test_sensors_(sensors, seed, core::Stream::evaluation_sensor_noise),
+        protocol_(protocol),
+        observed_(static_cast<std::size_t>(sensors.n_sensors)),
+        next_observed_(observed_.size()) {
+    core::require_in_range("n_learning_episodes", protocol.n_learning_episodes, 1, 1 << 30);
+    core::require_in_range("test_interval", protocol.test_interval, 1, 1 << 30);
+    core::require(agent_.action_value().n_inputs() == observed_.size(), "n_inputs",
+                  "n_sensors of the sensors (" + std::to_string(observed_.size()) + ")",
+                  agent_.action_value().n_inputs());
+    rows_.reserve(
+        static_cast<std::size_t>(protocol.n_learning_episodes / protocol.test_interval));
+  }
+
+  int episode() const noexcept { return episode_; }
+  bool finished() const noexcept { return episode_ == protocol_.n_learning_episodes; }
+  /// Decisions made so far, in learning and test episodes.
+  std::int64_t n_decisions() const noexcept { return n_decisions_; }
+  std::span<const TestRow> rows() const noexcept { return rows_; }
+  const agents::QLearning<Q>& agent() const noexcept { return agent_; }
+
+  /// Runs up to `n_episodes` more learning episodes, with the test episodes that fall due.
+  void advance(int n_episodes) {
+    core::require_in_range("n_episodes", n_episodes, 0, 1 << 30);
+    const int last = episode_ + std::min(n_episodes, protocol_.n_learning_episodes - episode_);
+    while (episode_ < last) {
+      ++episode_;
+      run_episode(sensors_, true);
+      if (episode_ % protocol_.test_interval == 0) rows_.push_back(run_episode(test_sensors_, false));
+    }
+  }
+
+ private:
+  TestRow run_episode(environments::AcrobotSensors& sensors, bool learning) {
+    const double lambda = goal_(episode_);
+    TestRow row{.episode = episode_, .steps = 0, .episode_return = 0.0, .solved = false};
+    acrobot_.reset();
+    agent_.begin_episode();
+    sensors.observe(acrobot_.state(), observed_);
+    for (bool truncated = false; !row.solved && !truncated;) {
+      const std::size_t action = agent_.act(observed_, learning);
+      const auto result = acrobot_.step(
+          max_torque_ *
+              coding::action_value(action, agent_.action_value().n_actions(), -1.0, 1.0),
+          lambda);
+      sensors.observe(acrobot_.state(), next_observed_);
+      if (learning) {
+        agent_.learn(observed_, action, result.reward, next_observed_, result.terminated);
+      }
+      std::swap(observed_, next_observed_);
+      ++row.steps;
+      row.episode_return += result.reward;
+      row.solved = result.terminated;
+      truncated = result.truncated;
+    }
+    n_decisions_ += row.steps;
+    return row;
+  }
+
+  agents::QLearning<Q> agent_;
+  double max_torque_;
+  environments::Acrobot acrobot_;
+  environments::GoalSchedule goal_;
+  environments::AcrobotSensors sensors_;
+  environments::AcrobotSensors test_sensors_;
+  ProtocolConfig protocol_;
+  std::vector<double> observed_;
+  std::vector<double> next_observed_;
+  std::vector<TestRow> rows_;
+  std::int64_t n_decisions_ = 0;
+  int episode_ = 0;
+};
+
+}  // namespace sdnn::experiments

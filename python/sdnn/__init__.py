@@ -1,0 +1,33 @@
+"""Selective desensitization neural networks: exact, online, fast.
+
+Rooms, from the network up (each is imported when first used):
+
+- ``sdnn.approximators``: SDNN-C, a network that gives Q(s, a) for every action at once
+- ``sdnn.agents``: Q-learning with it, for any Gymnasium environment
+- ``sdnn.environments``: the acrobot swing-up, redundant and noisy sensors
+- ``sdnn.experiments``: the paper's experiments, also as the command ``sdnn reproduce``
+"""
+
+from __future__ import annotations
+
+import importlib
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+from sdnn import environments
+from sdnn._core import __version__
+
+if TYPE_CHECKING:
+    from sdnn import agents, approximators, experiments
+
+__all__ = ["__version__", "agents", "approximators", "environments", "experiments"]
+
+
+def __getattr__(name: str) -> ModuleType:
+    if name in __all__:
+        return importlib.import_module(f"sdnn.{name}")
+    raise AttributeError(f"module 'sdnn' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,704 @@
+"""
+The compiled core of sdnn; use it through the package's rooms.
+"""
+from __future__ import annotations
+import collections.abc
+import numpy
+import numpy.typing
+import typing
+class Stream:
+    """
+    What a random number is for
+    
+    Members:
+    
+      code_books
+    
+      permutations
+    
+      weights
+    
+      ties
+    
+      exploration
+    
+      sensor_noise
+    
+      evaluation_ties
+    
+      evaluation_sensor_noise
+    """
+    __members__: typing.ClassVar[dict[str, Stream]]
+    code_books: typing.ClassVar[Stream]
+    evaluation_sensor_noise: typing.ClassVar[Stream]
+    evaluation_ties: typing.ClassVar[Stream]
+    exploration: typing.ClassVar[Stream]
+    permutations: typing.ClassVar[Stream]
+    sensor_noise: typing.ClassVar[Stream]
+    ties: typing.ClassVar[Stream]
+    weights: typing.ClassVar[Stream]
+    @typing.overload
+    def __eq__(self, other: Stream) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: Stream) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class Random:
+    """
+    The core's random generator: (seed, stream, index)
+    """
+    def __init__(self, seed: typing.SupportsInt | typing.SupportsIndex, stream: Stream, index: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def below(self, n: typing.SupportsInt | typing.SupportsIndex) -> int:
+        ...
+    def bits(self) -> int:
+        ...
+    def normal(self) -> float:
+        ...
+    def uniform(self) -> float:
+        ...
+class ActionCode:
+    """
+    Windows of hidden units, one per action
+    """
+    def __init__(self, n_hidden_units: typing.SupportsInt | typing.SupportsIndex, n_active_units: typing.SupportsInt | typing.SupportsIndex, n_actions: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def first_unit(self, action: typing.SupportsInt | typing.SupportsIndex) -> int:
+        ...
+    @property
+    def n_actions(self) -> int:
+        ...
+class InitialWeights:
+    """
+    How the weights start
+    
+    Members:
+    
+      ternary
+    
+      uniform
+    """
+    __members__: typing.ClassVar[dict[str, InitialWeights]]
+    ternary: typing.ClassVar[InitialWeights]
+    uniform: typing.ClassVar[InitialWeights]
+    @typing.overload
+    def __eq__(self, other: InitialWeights) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: InitialWeights) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class SdnnCConfig:
+    """
+    Everything that defines an SDNN-C
+    """
+    def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_pattern_units: typing.SupportsInt | typing.SupportsIndex = 200, n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex = 9, n_interpolated: typing.SupportsInt | typing.SupportsIndex = 44, balanced_anchors: bool = True, circular: collections.abc.Sequence[bool] = [], n_hidden_units: typing.SupportsInt | typing.SupportsIndex = 900, n_active_units: typing.SupportsInt | typing.SupportsIndex = 300, n_actions: typing.SupportsInt | typing.SupportsIndex = 0, q_low: typing.SupportsFloat | typing.SupportsIndex = -20.0, q_high: typing.SupportsFloat | typing.SupportsIndex = 20.0, u_low: typing.SupportsInt | typing.SupportsIndex | None = None, u_high: typing.SupportsInt | typing.SupportsIndex | None = None, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.1, lattice: typing.SupportsInt | typing.SupportsIndex = 1, initial_threshold: typing.SupportsFloat | typing.SupportsIndex = 200.0, initial_weights: InitialWeights = InitialWeights.ternary, initial_weight_limit: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
+        ...
+    @property
+    def balanced_anchors(self) -> bool:
+        ...
+    @property
+    def circular(self) -> list[bool]:
+        ...
+    @property
+    def initial_threshold(self) -> float:
+        ...
+    @property
+    def initial_weight_limit(self) -> float:
+        ...
+    @property
+    def initial_weights(self) -> InitialWeights:
+        ...
+    @property
+    def lattice(self) -> int:
+        ...
+    @property
+    def learning_coefficient(self) -> float:
+        ...
+    @property
+    def n_actions(self) -> int:
+        ...
+    @property
+    def n_active_units(self) -> int:
+        ...
+    @property
+    def n_anchor_patterns(self) -> int:
+        ...
+    @property
+    def n_hidden_units(self) -> int:
+        ...
+    @property
+    def n_inputs(self) -> int:
+        ...
+    @property
+    def n_interpolated(self) -> int:
+        ...
+    @property
+    def n_pattern_units(self) -> int:
+        ...
+    @property
+    def q_high(self) -> float:
+        ...
+    @property
+    def q_low(self) -> float:
+        ...
+    @property
+    def u_high(self) -> int | None:
+        ...
+    @property
+    def u_low(self) -> int | None:
+        ...
+class SdnnC:
+    """
+    A network that gives Q(s, a) for every action at once
+    """
+    def __init__(self, config: SdnnCConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def code_book(self, input: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
+        """
+        Patterns of an input: (n_bins, m) of -1, +1
+        """
+    def correct(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        One step of error correction of Q(state, action) towards target
+        """
+    def first_unit(self, action: typing.SupportsInt | typing.SupportsIndex) -> int:
+        ...
+    def permutation(self, mu: typing.SupportsInt | typing.SupportsIndex, nu: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.uint32]:
+        """
+        sigma_mu_nu: (m,)
+        """
+    def potentials(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        Inner potentials in lattice steps; shapes (l,) -> (n,)
+        """
+    def set_parameters(self, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], thresholds: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> None:
+        ...
+    def thresholds(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        A copy, in lattice steps: (n,)
+        """
+    def value(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex) -> float:
+        ...
+    def values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Q(state, a) for every action; shapes (l,) -> (n_actions,)
+        """
+    def weights(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        A copy, in lattice steps: (n, D)
+        """
+    @property
+    def config(self) -> SdnnCConfig:
+        ...
+    @property
+    def n_actions(self) -> int:
+        ...
+    @property
+    def n_inputs(self) -> int:
+        ...
+    @property
+    def n_wide_units(self) -> int:
+        ...
+    @property
+    def u_high(self) -> int:
+        ...
+    @property
+    def u_low(self) -> int:
+        ...
+class GoalScheduleKind:
+    """
+    The formula of lambda(k)
+    
+    Members:
+    
+      inverse_linear
+    
+      inverse_sqrt
+    
+      constant
+    """
+    __members__: typing.ClassVar[dict[str, GoalScheduleKind]]
+    constant: typing.ClassVar[GoalScheduleKind]
+    inverse_linear: typing.ClassVar[GoalScheduleKind]
+    inverse_sqrt: typing.ClassVar[GoalScheduleKind]
+    @typing.overload
+    def __eq__(self, other: GoalScheduleKind) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: GoalScheduleKind) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class GoalScheduleConfig:
+    """
+    How lambda(k) falls
+    """
+    def __init__(self, *, kind: GoalScheduleKind = GoalScheduleKind.inverse_linear, scale: typing.SupportsFloat | typing.SupportsIndex = 100.0, last_episode: typing.SupportsInt | typing.SupportsIndex = 10000, floor: typing.SupportsFloat | typing.SupportsIndex = 0.01, constant_value: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        ...
+    @property
+    def constant_value(self) -> float:
+        ...
+    @property
+    def floor(self) -> float:
+        ...
+    @property
+    def kind(self) -> GoalScheduleKind:
+        ...
+    @property
+    def last_episode(self) -> int:
+        ...
+    @property
+    def scale(self) -> float:
+        ...
+class GoalSchedule:
+    """
+    lambda as a function of the learning episode
+    """
+    def __call__(self, episode: typing.SupportsInt | typing.SupportsIndex) -> float:
+        ...
+    def __init__(self, config: GoalScheduleConfig) -> None:
+        ...
+class GoalTest:
+    """
+    When the goal is looked for
+    
+    Members:
+    
+      every_step
+    
+      decision_instant
+    """
+    __members__: typing.ClassVar[dict[str, GoalTest]]
+    decision_instant: typing.ClassVar[GoalTest]
+    every_step: typing.ClassVar[GoalTest]
+    @typing.overload
+    def __eq__(self, other: GoalTest) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: GoalTest) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class AcrobotConfig:
+    """
+    The numbers of the acrobot's task
+    """
+    def __init__(self, *, link_mass_1: typing.SupportsFloat | typing.SupportsIndex = 1.0, link_mass_2: typing.SupportsFloat | typing.SupportsIndex = 1.0, link_length_1: typing.SupportsFloat | typing.SupportsIndex = 1.0, link_length_2: typing.SupportsFloat | typing.SupportsIndex = 1.0, center_of_mass_1: typing.SupportsFloat | typing.SupportsIndex = 0.5, center_of_mass_2: typing.SupportsFloat | typing.SupportsIndex = 0.5, inertia_1: typing.SupportsFloat | typing.SupportsIndex = 1.0, inertia_2: typing.SupportsFloat | typing.SupportsIndex = 1.0, gravity: typing.SupportsFloat | typing.SupportsIndex = 9.8, max_torque: typing.SupportsFloat | typing.SupportsIndex = 10.0, decision_interval: typing.SupportsFloat | typing.SupportsIndex = 1.0, integration_step: typing.SupportsFloat | typing.SupportsIndex = 0.02, max_decisions: typing.SupportsInt | typing.SupportsIndex = 50, goal_height: typing.SupportsFloat | typing.SupportsIndex = 1.5, goal_velocity_1: typing.SupportsFloat | typing.SupportsIndex = 9.42477796076938, goal_velocity_2: typing.SupportsFloat | typing.SupportsIndex = 15.707963267948966, goal_test: GoalTest = GoalTest.every_step, goal_reward: typing.SupportsFloat | typing.SupportsIndex = 10.0, penalty: typing.SupportsFloat | typing.SupportsIndex = -5.0, idle_angle: typing.SupportsFloat | typing.SupportsIndex = 0.08726646259971647) -> None:
+        ...
+    @property
+    def center_of_mass_1(self) -> float:
+        ...
+    @property
+    def center_of_mass_2(self) -> float:
+        ...
+    @property
+    def decision_interval(self) -> float:
+        ...
+    @property
+    def goal_height(self) -> float:
+        ...
+    @property
+    def goal_reward(self) -> float:
+        ...
+    @property
+    def goal_test(self) -> GoalTest:
+        ...
+    @property
+    def goal_velocity_1(self) -> float:
+        ...
+    @property
+    def goal_velocity_2(self) -> float:
+        ...
+    @property
+    def gravity(self) -> float:
+        ...
+    @property
+    def idle_angle(self) -> float:
+        ...
+    @property
+    def inertia_1(self) -> float:
+        ...
+    @property
+    def inertia_2(self) -> float:
+        ...
+    @property
+    def integration_step(self) -> float:
+        ...
+    @property
+    def link_length_1(self) -> float:
+        ...
+    @property
+    def link_length_2(self) -> float:
+        ...
+    @property
+    def link_mass_1(self) -> float:
+        ...
+    @property
+    def link_mass_2(self) -> float:
+        ...
+    @property
+    def max_decisions(self) -> int:
+        ...
+    @property
+    def max_torque(self) -> float:
+        ...
+    @property
+    def penalty(self) -> float:
+        ...
+class Acrobot:
+    """
+    Dynamics, reward and episode end of the acrobot
+    """
+    def __init__(self, config: AcrobotConfig) -> None:
+        ...
+    def decisions(self) -> int:
+        ...
+    def energy(self) -> float:
+        ...
+    def reset(self) -> None:
+        ...
+    def set_state(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def state(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def step(self, torque: typing.SupportsFloat | typing.SupportsIndex, lambda_: typing.SupportsFloat | typing.SupportsIndex) -> tuple[float, bool, bool]:
+        """
+        (reward, terminated, truncated)
+        """
+    def tip_height(self) -> float:
+        ...
+class SensorEdge:
+    """
+    What noise does at the ends of a sensor's range
+    
+    Members:
+    
+      wrap
+    
+      saturate
+    """
+    __members__: typing.ClassVar[dict[str, SensorEdge]]
+    saturate: typing.ClassVar[SensorEdge]
+    wrap: typing.ClassVar[SensorEdge]
+    @typing.overload
+    def __eq__(self, other: SensorEdge) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: SensorEdge) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class SensorNoise:
+    """
+    Gaussian noise on every channel
+    """
+    def __init__(self, sigma: typing.SupportsFloat | typing.SupportsIndex, edges: collections.abc.Sequence[SensorEdge], seed: typing.SupportsInt | typing.SupportsIndex, stream: Stream) -> None:
+        ...
+    def apply(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        A noisy copy
+        """
+class SensorConfig:
+    """
+    Which sensors there are and how noisy
+    """
+    def __init__(self, *, n_sensors: typing.SupportsInt | typing.SupportsIndex = 4, noise: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    @property
+    def n_sensors(self) -> int:
+        ...
+    @property
+    def noise(self) -> float:
+        ...
+class AcrobotSensors:
+    """
+    s1..s4, s5 and s6 with their noise
+    """
+    def __init__(self, config: SensorConfig, seed: typing.SupportsInt | typing.SupportsIndex, stream: Stream) -> None:
+        ...
+    def observe(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+class TieRule:
+    """
+    Which of several best actions is taken
+    
+    Members:
+    
+      uniform
+    
+      lowest
+    
+      middle
+    """
+    __members__: typing.ClassVar[dict[str, TieRule]]
+    lowest: typing.ClassVar[TieRule]
+    middle: typing.ClassVar[TieRule]
+    uniform: typing.ClassVar[TieRule]
+    @typing.overload
+    def __eq__(self, other: TieRule) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: TieRule) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class EpsilonGreedy:
+    """
+    The policy, over rows of values
+    """
+    def __init__(self, *, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def select(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step: typing.SupportsInt | typing.SupportsIndex, explore: bool = True) -> int:
+        ...
+class QLearningConfig:
+    """
+    The parameters of Q-learning
+    """
+    def __init__(self, *, learning_rate: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform) -> None:
+        ...
+    @property
+    def discount(self) -> float:
+        ...
+    @property
+    def epsilon(self) -> float:
+        ...
+    @property
+    def learning_rate(self) -> float:
+        ...
+    @property
+    def n_greedy_steps(self) -> int:
+        ...
+    @property
+    def tie_rule(self) -> TieRule:
+        ...
+class SdnnQLearning:
+    """
+    Q-learning with SDNN-C
+    """
+    def __init__(self, *, network: SdnnCConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> int:
+        ...
+    def begin_episode(self) -> None:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
+        ...
+    @property
+    def network(self) -> SdnnC:
+        ...
+class ProtocolConfig:
+    """
+    How long a trial is
+    """
+    def __init__(self, *, n_learning_episodes: typing.SupportsInt | typing.SupportsIndex = 15000, test_interval: typing.SupportsInt | typing.SupportsIndex = 10) -> None:
+        ...
+    @property
+    def n_learning_episodes(self) -> int:
+        ...
+    @property
+    def test_interval(self) -> int:
+        ...
+class AcrobotTrial:
+    """
+    SDNN-C learns the acrobot swing-up
+    """
+    def __init__(self, *, network: SdnnCConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Runs up to n more learning episodes
+        """
+    def test_rows(self) -> dict[str, numpy.ndarray]:
+        """
+        Columns of the test episodes so far
+        """
+    @property
+    def episode(self) -> int:
+        ...
+    @property
+    def finished(self) -> bool:
+        ...
+    @property
+    def n_decisions(self) -> int:
+        ...
+def action_value(action: typing.SupportsInt | typing.SupportsIndex, n_actions: typing.SupportsInt | typing.SupportsIndex, low: typing.SupportsFloat | typing.SupportsIndex, high: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    The value of an action in a range cut evenly
+    """
+def basic_observation(state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    s1..s4 of a state
+    """
+def energy_sensor(s3: typing.SupportsFloat | typing.SupportsIndex, s4: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    ...
+def height_sensor(s1: typing.SupportsFloat | typing.SupportsIndex, s2: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    ...
+def log(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    ...
+def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    ...
+def sin_cos(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    (sin x, cos x), item by item
+    """
+__version__: str

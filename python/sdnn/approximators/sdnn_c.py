@@ -1,0 +1,183 @@
+"""SDNN-C: a network that gives Q(s, a) for every action at once."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sdnn import _core
+from sdnn.choices import choice
+
+__all__ = ["SDNNC", "SDNNCConfig"]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class SDNNCConfig:
+    """Everything that defines an SDNN-C; the defaults are the paper's values.
+
+    Values are checked when a network is built from them.
+
+    Attributes
+    ----------
+    n_inputs : int
+        l, number of inputs, at least 2 (section 3.1).
+    n_pattern_units : int
+        m, units per pattern, 2 to 4096 (section 4.2: 200).
+    n_anchor_patterns : int
+        Random anchor patterns p_1, p_2, ... of a code book (section 3.1: 9). The last one is not
+        assigned to a bin.
+    n_interpolated : int
+        Patterns between neighbouring anchors (section 3.1: 44). There are
+        ``(n_anchor_patterns - 1) * (n_interpolated + 1)`` bins, 360 in the paper.
+    balanced_anchors : bool
+        Whether anchors have as many +1 as -1. A reading: the paper says "random".
+    circular : tuple of bool
+        Per input, whether the last anchor equals the first, as angles want it; empty: none. A
+        reading: the paper does not say.
+    n_hidden_units, n_active_units : int
+        n and n', hidden units and units in an action's window (section 4.2: 900 and 300).
+    n_actions : int
+        Number of actions; 0 stands for all ``n_hidden_units - n_active_units + 1`` (601).
+    q_low, q_high : float
+        The output range (section 4.2: -20 and 20).
+    u_low, u_high : int, optional
+        Counts of active units at which the output saturates; by default ``n_active_units // 15``
+        and ``n_active_units - u_low`` (section 4.2: 20 and 280).
+    learning_coefficient : float
+        c (section 4.2: 0.1). It scales weights and thresholds alike and changes no decision.
+    lattice : int
+        Weights are integer multiples of ``learning_coefficient / lattice``.
+    initial_threshold : float
+        The "large" initial threshold, in units of c. A reading.
+    initial_weights : {"ternary", "uniform"}
+        The "small random" initial weights: one lattice step down, none, or up with probabilities
+        1/4, 1/2, 1/4; or uniform within ``initial_weight_limit``, rounded to the lattice. A
+        reading.
+    initial_weight_limit : float
+        Of ``"uniform"``, in units of c.
+    """
+
+    n_inputs: int = 4
+    n_pattern_units: int = 200
+    n_anchor_patterns: int = 9
+    n_interpolated: int = 44
+    balanced_anchors: bool = True
+    circular: tuple[bool, ...] = ()
+    n_hidden_units: int = 900
+    n_active_units: int = 300
+    n_actions: int = 0
+    q_low: float = -20.0
+    q_high: float = 20.0
+    u_low: int | None = None
+    u_high: int | None = None
+    learning_coefficient: float = 0.1
+    lattice: int = 1
+    initial_threshold: float = 200.0
+    initial_weights: Literal["ternary", "uniform"] = "ternary"
+    initial_weight_limit: float = 0.1
+
+    def to_core(self) -> _core.SdnnCConfig:
+        """Make the core's struct of the same values.
+
+        Raises
+        ------
+        ValueError
+            If ``initial_weights`` is not one of its two words.
+        TypeError
+            If a value has the wrong type.
+        """
+        fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        fields["circular"] = list(self.circular)
+        fields["initial_weights"] = choice(
+            _core.InitialWeights.__members__, "initial_weights", self.initial_weights
+        )
+        return _core.SdnnCConfig(**fields)
+
+
+class SDNNC:
+    """The network of section 3: layers 1 to 6, and its error correction.
+
+    Parameters
+    ----------
+    config : SDNNCConfig, optional
+        Sizes and readings; by default the paper's, with 4 inputs.
+    seed : int
+        Code books, permutations and initial weights follow from it (0 to 2**64 - 1).
+
+    Raises
+    ------
+    ValueError
+        If a size is impossible; the message names it.
+
+    Examples
+    --------
+    >>> from sdnn.approximators import SDNNC, SDNNCConfig
+    >>> network = SDNNC(SDNNCConfig(n_inputs=2), seed=1)
+    >>> network.values([0.2, 0.7]).shape
+    (601,)
+    >>> network.value([0.2, 0.7], 300)
+    0.0
+    >>> for _ in range(50):
+    ...     network.correct([0.2, 0.7], 300, 5.0)
+    >>> round(network.value([0.2, 0.7], 300), 1)
+    5.1
+    """
+
+    def __init__(self, config: SDNNCConfig | None = None, *, seed: int = 0) -> None:
+        self.config = config if config is not None else SDNNCConfig()
+        self._core = _core.SdnnC(self.config.to_core(), seed)
+
+    @property
+    def _lattice_step(self) -> np.float64:
+        return np.float64(self.config.learning_coefficient / self.config.lattice)
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs, l."""
+        return self._core.n_inputs
+
+    @property
+    def n_actions(self) -> int:
+        """Number of actions."""
+        return self._core.n_actions
+
+    def values(self, state: ArrayLike) -> NDArray[np.float64]:
+        """Q(state, a) for every action.
+
+        Parameters
+        ----------
+        state : array_like, shape (l,)
+            One value in [0, 1] per input.
+
+        Returns
+        -------
+        ndarray, shape (n_actions,)
+        """
+        return self._core.values(state)
+
+    def value(self, state: ArrayLike, action: int) -> float:
+        """Q(state, action)."""
+        return self._core.value(state, action)
+
+    def correct(self, state: ArrayLike, action: int, target: float) -> None:
+        """One step of error correction of Q(state, action) towards ``target`` (Fig. 2).
+
+        Raises
+        ------
+        ValueError
+            For a bad state or action, or a NaN target.
+        OverflowError
+            If a weight would leave its range. In both cases nothing has changed.
+        """
+        self._core.correct(state, action, target)
+
+    def weights(self) -> NDArray[np.float64]:
+        """Copy the weights in the paper's units, shape (n, D)."""
+        return self._core.weights() * self._lattice_step
+
+    def thresholds(self) -> NDArray[np.float64]:
+        """Copy the thresholds in the paper's units, shape (n,)."""
+        return self._core.thresholds() * self._lattice_step

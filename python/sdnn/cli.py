@@ -1,0 +1,207 @@
+"""The command ``sdnn``. It reads options and prints; the work is done in the rooms."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+import click
+
+from sdnn.experiments.cases import EXPERIMENTS, select_experiments
+
+if TYPE_CHECKING:
+    from sdnn.experiments.reproduce import ReproduceRequest, Reproduction
+
+EXIT_FAILURE = 1
+EXIT_INTERRUPTED = 130
+PLAIN_WIDTH = 160
+"""Width of tables that go to a file or pipe."""
+
+
+def _library_version() -> str:
+    import sdnn
+
+    version: str = sdnn.__version__
+    return version
+
+
+def _print_version(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
+    if value:
+        click.echo(f"sdnn {_library_version()}")
+        context.exit()
+
+
+def _print_cmake_dir(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
+    if not value:
+        return
+    import sdnn
+
+    # An editable install has two folders: the sources and the installed files.
+    for folder in sdnn.__path__:
+        found = Path(folder) / "share" / "cmake" / "sdnn"
+        if found.is_dir():
+            click.echo(found)
+            context.exit()
+    raise click.ClickException("this copy of sdnn has no CMake package; install it with pip")
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_version,
+    help="Print the version and exit.",
+)
+@click.option(
+    "--cmakedir",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_cmake_dir,
+    help="Print the folder of the CMake package, for -Dsdnn_ROOT=..., and exit.",
+)
+def main() -> None:
+    """Reproduce the paper's experiments with selective desensitization neural networks."""
+
+
+@main.command()
+@click.argument("experiment", type=click.Choice([*(e.id for e in EXPERIMENTS), "all"]))
+@click.option(
+    "--trials",
+    type=click.IntRange(min=1),
+    help="Trials per case and agent.  [default: 10, as in the paper]",
+)
+@click.option(
+    "--episodes",
+    type=click.IntRange(min=1),
+    help="Learning episodes per trial.  [default: 15000, as in the paper]",
+)
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    help="Trials to run at the same time.  [default: all cores]",
+)
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Root of all seeds."
+)
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("results"),
+    show_default=True,
+    help="Folder for the result file, figures and tables.",
+)
+@click.option(
+    "--quick",
+    is_flag=True,
+    help="A look at a fraction: 2 trials x 300 episodes. Not the result.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
+@click.option("--dry-run", is_flag=True, help="Only say what would be run.")
+@click.pass_context
+def reproduce(
+    context: click.Context,
+    experiment: str,
+    trials: int | None,
+    episodes: int | None,
+    jobs: int | None,
+    seed: int,
+    out: Path,
+    quick: bool,
+    as_json: bool,
+    dry_run: bool,
+) -> None:
+    """Run one of the paper's experiments and draw its figure.
+
+    Finished trials are kept in OUT/results.sqlite; the same command goes on where it stopped.
+    """
+    from sdnn.experiments.errors import ExperimentError
+    from sdnn.experiments.reproduce import ReproduceRequest
+
+    request = ReproduceRequest(
+        experiments=select_experiments(experiment),
+        out=out,
+        n_trials=trials,
+        n_episodes=episodes,
+        seed=seed,
+        jobs=jobs,
+        quick=quick,
+    )
+    try:
+        request.plan()
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
+    try:
+        if dry_run:
+            _print_plan(request, as_json)
+        else:
+            _finish(context, _run(request), out, quick, as_json)
+    except (ExperimentError, OSError) as error:
+        raise click.ClickException(str(error)) from error
+    except KeyboardInterrupt:
+        _exit_interrupted(context, "interrupted; what was finished is stored")
+
+
+def _run(request: ReproduceRequest) -> Reproduction:
+    from rich.console import Console
+
+    from sdnn.experiments import trial
+    from sdnn.experiments.progress import ProgressObserver
+    from sdnn.experiments.reproduce import reproduce as run
+
+    with ProgressObserver(Console(stderr=True)) as observer:
+        return run(request, trial.make_core_trial, version=_library_version(), observer=observer)
+
+
+def _print_plan(request: ReproduceRequest, as_json: bool) -> None:
+    from sdnn.experiments.reproduce import count_stored
+
+    counts = [
+        {"case": case, "agent": agent, "planned": planned, "stored": stored}
+        for (case, agent), (planned, stored) in count_stored(request).items()
+    ]
+    n_episodes = request.plan()[0].config.protocol.n_learning_episodes
+    if as_json:
+        click.echo(json.dumps({"n_learning_episodes": n_episodes, "trials": counts}, indent=2))
+        return
+    for row in counts:
+        click.echo(
+            f"{row['case']} {row['agent']}: {row['planned']} trials x {n_episodes} episodes,"
+            f" {row['stored']} of them stored in {request.out}"
+        )
+
+
+def _finish(
+    context: click.Context, done: Reproduction, out: Path, quick: bool, as_json: bool
+) -> None:
+    from rich.console import Console
+
+    from sdnn.experiments.progress import describe
+    from sdnn.experiments.report import print_report
+
+    outcome = done.outcome
+    n_stored = outcome.n_reused + outcome.n_run
+    stored = f"{n_stored} of {outcome.n_planned} trials are stored in {out}"
+    for failure in outcome.failures:
+        message = f"{type(failure.error).__name__}: {failure.error}"
+        click.echo(f"Error: {describe(failure.key)} failed: {message}", err=True)
+    if outcome.interrupted:
+        _exit_interrupted(context, f"interrupted; {stored}; the same command goes on from there")
+    if outcome.failures:
+        click.echo(f"Error: no figure drawn; {stored}", err=True)
+        context.exit(EXIT_FAILURE)
+    if as_json:
+        click.echo(json.dumps(done.table, indent=2))
+        return
+    console = Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
+    print_report(done.reports, console, quick=quick)
+    click.echo(f"{stored} ({outcome.n_run} run now); wrote {', '.join(map(str, done.files))}")
+
+
+def _exit_interrupted(context: click.Context, message: str) -> NoReturn:
+    click.echo(message, err=True)
+    context.exit(EXIT_INTERRUPTED)

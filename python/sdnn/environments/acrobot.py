@@ -1,0 +1,275 @@
+"""The acrobot swing-up of the SDNN papers as a Gymnasium environment."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sdnn import _core
+from sdnn.environments.config import AcrobotConfig
+from sdnn.environments.goal_schedule import GoalSchedule
+
+if TYPE_CHECKING:
+    from sdnn.environments.acrobot_picture import AcrobotPicture
+
+__all__ = ["AcrobotSwingUpEnv"]
+
+_DTYPES: dict[str, type[np.float32] | type[np.float64]] = {
+    "float32": np.float32,
+    "float64": np.float64,
+}
+
+
+class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
+    r"""Swing a two-link pendulum up with a motor at its elbow, ever more gently.
+
+    ## Description
+
+    Two links hang from a fixed joint. A motor at the joint between them is the only drive. The
+    tip must pass 1.5 m above the fixed joint, at speeds below limits that tighten from episode to
+    episode, so that in the end the tip has to come almost to rest there. The agent decides once a
+    second and has 50 decisions.
+
+    ## Action space
+
+    `Box(-1, 1, (1,), float32)`: the torque as a share of `max_torque`, held until the next
+    decision.
+
+    | Num | Action                            | Min | Max | Unit          |
+    |-----|-----------------------------------|-----|-----|---------------|
+    | 0   | torque on the joint between links | -1  | 1   | 10 N m        |
+
+    An action outside the range or NaN raises ValueError.
+
+    ## Observation space
+
+    `Box(0, 1, (4,), float32)`: the state, normalized. `sat` clips to [0, 1].
+
+    | Num | Observation                       | 0 stands for | 1 stands for | Unit  |
+    |-----|-----------------------------------|--------------|--------------|-------|
+    | 0   | s1 = theta1 / (2 pi) + 1/2        | -pi          | pi           | rad   |
+    | 1   | s2 = theta2 / (2 pi) + 1/2        | -pi          | pi           | rad   |
+    | 2   | s3 = sat(theta1' / (6 pi) + 1/2)  | -3 pi        | 3 pi         | rad/s |
+    | 3   | s4 = sat(theta2' / (10 pi) + 1/2) | -5 pi        | 5 pi         | rad/s |
+
+    - `theta1` is the angle of link 1, 0 where it hangs down;
+    - `theta2` is the angle of link 2 relative to link 1, 0 where they are in line.
+
+    Angles are wrapped to [-pi, pi); speeds are not clipped, their observations are. Redundant and
+    noisy sensors are wrappers: `RedundantSensors`, then `NoisySensors`.
+
+    ## Dynamics
+
+    Spong's equations with m = 1 kg, l = 1 m, lc = 0.5 m, I = 1 kg m^2 for both links and
+    g = 9.8 m/s^2, integrated by the classical Runge-Kutta method in steps of 0.02 s. All of it is
+    compiled and gives the same bits on every machine.
+
+    ## Rewards
+
+    | Reward | When, at the decision instant                                          |
+    |--------|------------------------------------------------------------------------|
+    | +10    | the goal was reached                                                   |
+    | -5     | else, \|theta1\| < 5 degrees, \|theta1'\| > 3 pi or \|theta2'\| > 5 pi |
+    | 0      | else                                                                   |
+
+    ## Starting state
+
+    At rest, hanging down. Nothing is random.
+
+    ## Episode end
+
+    1. Termination: the goal. The tip is at least 1.5 m above joint 1, with
+       \|theta1'\| < 3 pi lambda and \|theta2'\| < 5 pi lambda. It is looked for after every
+       integration step, and the episode ends at that instant.
+    2. Truncation: after 50 decisions, by the environment itself.
+
+    lambda depends on the number k of the learning episode: 1 / (1 + k / 100) up to k = 10000 and
+    0.01 beyond. The environment counts the episodes: every `reset` begins the next one, a `reset`
+    with a seed begins the first one, and `options={"episode": k}` begins episode k (test episodes
+    give the k of the learning episode before them).
+
+    ## Arguments
+
+    - `config`: an `AcrobotConfig`, all the numbers above;
+    - `goal_schedule`: lambda, a `GoalSchedule` or any function of k;
+    - `render_mode`: `"rgb_array"`, `"human"` or None (needs pygame-ce);
+    - `dtype`: `"float32"`, or `"float64"` for actions and observations without rounding: then a
+      loop in Python meets the compiled trial bit for bit.
+
+    `info` holds the true `state` (theta1, theta2, theta1', theta2'), `tip_height` in m, `lambda`,
+    and `is_success`.
+
+    ```python
+    >>> import gymnasium as gym
+    >>> import sdnn
+    >>> env = gym.make("sdnn/AcrobotSwingUp-v0")
+    >>> observation, info = env.reset(seed=1, options={"episode": 100})
+    >>> observation.tolist(), info["lambda"], info["tip_height"]
+    ([0.5, 0.5, 0.5, 0.5], 0.5, -2.0)
+    >>> observation, reward, terminated, truncated, info = env.step([1.0])
+    >>> float(reward), terminated, truncated, round(info["tip_height"], 3)
+    (0.0, False, False, 0.496)
+
+    ```
+
+    ## Open readings
+
+    The paper is silent or garbled in print at some points. The alternatives can be chosen:
+
+    | Point           | Default                  | Alternatives                   |
+    |-----------------|--------------------------|--------------------------------|
+    | goal looked for | `goal_test="every_step"` | `"decision_instant"`           |
+    | idling          | `idle_angle` 5 degrees   | pi / 5; 0 (no such rule)       |
+    | lambda          | `kind="inverse_linear"`  | `"inverse_sqrt"`, `"constant"` |
+    | integration     | `integration_step=0.02`  | any whole fraction of a second |
+
+    ## Version history
+
+    - v0: first version
+
+    ## References
+
+    - Kobayashi, T., Shibuya, T., Morita, M. (2015). Q-Learning in Continuous State-Action Space
+      with Noisy and Redundant Inputs by Using a Selective Desensitization Neural Network. Journal
+      of Advanced Computational Intelligence and Intelligent Informatics 19(6), 825-832.
+    - Spong, M. W. (1995). The Swing Up Control Problem for the Acrobot. IEEE Control Systems
+      15(1), 49-55.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 4,
+    }
+
+    def __init__(
+        self,
+        *,
+        config: AcrobotConfig | None = None,
+        goal_schedule: Callable[[int], float] | None = None,
+        render_mode: str | None = None,
+        dtype: Literal["float32", "float64"] = "float32",
+    ) -> None:
+        if dtype not in _DTYPES:
+            raise ValueError(f"dtype must be one of {', '.join(map(repr, _DTYPES))}, got {dtype!r}")
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(
+                f"render_mode must be None or one of {self.metadata['render_modes']}, "
+                f"got {render_mode!r}"
+            )
+        self.config = config or AcrobotConfig()
+        self.goal_schedule = goal_schedule or GoalSchedule()
+        self.render_mode = render_mode
+        self._dtype = _DTYPES[dtype]
+        self._acrobot = _core.Acrobot(self.config.to_core())
+        self._episode = 0
+        self._lambda = float("nan")
+        self._torque = 0.0
+        self._success = False
+        self._picture: AcrobotPicture | None = None
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (1,), self._dtype)
+        self.observation_space = gym.spaces.Box(0.0, 1.0, (4,), self._dtype)
+
+    @property
+    def episode(self) -> int:
+        """Number of the present learning episode, 0 before the first reset."""
+        return self._episode
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[Any], dict[str, Any]]:
+        """Begin an episode at rest, hanging down.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Begins the count of episodes anew; there is no randomness to seed.
+        options : dict, optional
+            ``"episode"``: the number k >= 1 of the learning episode, for lambda(k).
+
+        Raises
+        ------
+        ValueError
+            For an unknown option or an episode below 1.
+        """
+        super().reset(seed=seed)
+        options = options or {}
+        unknown = sorted(set(options) - {"episode"})
+        if unknown:
+            raise ValueError(f"options may hold 'episode', got {', '.join(map(repr, unknown))}")
+        following = 1 if seed is not None else self._episode + 1
+        episode = operator.index(options.get("episode", following))
+        self._lambda = float(self.goal_schedule(episode))
+        self._episode = episode
+        self._torque = 0.0
+        self._success = False
+        self._acrobot.reset()
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(), self._info()
+
+    def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
+        """Hold a torque for one decision interval.
+
+        Parameters
+        ----------
+        action : array_like, shape (1,)
+            The torque as a share of ``config.max_torque``, in [-1, 1].
+
+        Raises
+        ------
+        ValueError
+            Unless the action is one number in [-1, 1].
+        RuntimeError
+            If the episode is over.
+        """
+        if self._episode == 0:
+            raise gym.error.ResetNeeded("call reset before step")
+        share = np.asarray(action, dtype=np.float64)
+        if share.size != 1 or not abs(share.item()) <= 1.0:
+            raise ValueError(f"action must be one number in [-1, 1], got {action!r}")
+        self._torque = self.config.max_torque * share.item()
+        reward, terminated, truncated = self._acrobot.step(self._torque, self._lambda)
+        self._success = terminated
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(), reward, terminated, truncated, self._info()
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Draw the present state: shape (500, 500, 3) for ``"rgb_array"``, else None."""
+        if self.render_mode is None:
+            gym.logger.warn("render() needs a render_mode: 'rgb_array' or 'human'")
+            return None
+        if self._picture is None:
+            from sdnn.environments.acrobot_picture import AcrobotPicture
+
+            window_fps = self.metadata["render_fps"] if self.render_mode == "human" else None
+            self._picture = AcrobotPicture(self.config, window_fps)
+        return self._picture.draw(
+            state=self._acrobot.state(),
+            torque=self._torque,
+            decision=self._acrobot.decisions(),
+            tip_height=self._acrobot.tip_height(),
+            solved=self._success,
+        )
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._picture is not None:
+            self._picture.close()
+            self._picture = None
+
+    def _observation(self) -> NDArray[Any]:
+        return _core.basic_observation(self._acrobot.state()).astype(self._dtype)
+
+    def _info(self) -> dict[str, Any]:
+        return {
+            "state": self._acrobot.state(),
+            "tip_height": self._acrobot.tip_height(),
+            "lambda": self._lambda,
+            "is_success": self._success,
+        }

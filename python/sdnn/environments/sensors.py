@@ -1,0 +1,182 @@
+"""Redundant and noisy sensors, in the paper's order: redundancy first, then noise on all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn import _core
+from sdnn.choices import choice
+
+__all__ = ["NoisySensors", "RedundantSensors"]
+
+Observation = NDArray[Any]
+SensorFunction = Callable[[Observation], float]
+Edge = Literal["wrap", "saturate"]
+
+_NAMED: dict[str, SensorFunction] = {
+    "energy": lambda s: _core.energy_sensor(s[2], s[3]),
+    "height": lambda s: _core.height_sensor(s[0], s[1]),
+}
+
+
+class RedundantSensors(
+    gym.ObservationWrapper[Observation, Any, Observation], gym.utils.RecordConstructorArgs
+):
+    """Appends functions of the observation to it.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        With a one-dimensional ``Box`` of observations, shape (l,).
+    functions : sequence of {"energy", "height"} or callable
+        ``"energy"`` is the paper's s5 = 2 ((s3 - 1/2)^2 + (s4 - 1/2)^2); ``"height"`` its s6 =
+        (2 + cos 2 pi s1 - cos 2 pi (s1 + s2)) / 4. A callable is given the wrapped environment's
+        observation, shape (l,), and returns a number.
+    bounds : sequence of (low, high), optional
+        Of each function's values; by default (0, 1).
+
+    Raises
+    ------
+    ValueError
+        For an unknown name, or bounds that do not match the functions.
+
+    Examples
+    --------
+    >>> from sdnn.environments import AcrobotSwingUpEnv, RedundantSensors
+    >>> env = RedundantSensors(AcrobotSwingUpEnv(), ("energy", "height"))
+    >>> env.reset()[0].tolist()
+    [0.5, 0.5, 0.5, 0.5, 0.0, 0.0]
+    """
+
+    def __init__(
+        self,
+        env: gym.Env[Observation, Any],
+        functions: Sequence[str | SensorFunction] = ("energy", "height"),
+        bounds: Sequence[tuple[float, float]] | None = None,
+    ) -> None:
+        gym.utils.RecordConstructorArgs.__init__(self, functions=functions, bounds=bounds)
+        super().__init__(env)
+        space = _vector_space(env)
+        self.functions = tuple(functions)
+        self._functions = tuple(
+            function if callable(function) else choice(_NAMED, "functions", function)
+            for function in functions
+        )
+        if bounds is None:
+            bounds = [(0.0, 1.0)] * len(self._functions)
+        if len(bounds) != len(self._functions):
+            raise ValueError(
+                f"bounds must have {len(self._functions)} entries, one per function, "
+                f"got {len(bounds)}"
+            )
+        low = np.append(space.low, [low for low, _ in bounds]).astype(space.dtype)
+        high = np.append(space.high, [high for _, high in bounds]).astype(space.dtype)
+        self.observation_space = gym.spaces.Box(low, high, dtype=_float_type(space))
+
+    def observation(self, observation: Observation) -> Observation:
+        """Append the functions' values, shape (l + n_functions,)."""
+        extra = [function(observation) for function in self._functions]
+        return np.append(observation, extra).astype(observation.dtype)
+
+
+class NoisySensors(
+    gym.ObservationWrapper[Observation, Any, Observation], gym.utils.RecordConstructorArgs
+):
+    """Adds independent Gaussian noise to every channel of every observation.
+
+    The numbers come from a stream of their own, the same as in a compiled trial with the same
+    seed: over ``AcrobotSwingUpEnv(dtype="float64")`` the observations agree bit for bit.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        With a one-dimensional ``Box`` of observations within [0, 1], shape (l,).
+    sigma : float
+        Standard deviation, >= 0; 0 changes nothing and draws nothing.
+    edge : {"wrap", "saturate"} or sequence of them, shape (l,), optional
+        What happens at the ends of [0, 1], for all channels or for each: an angle wraps to
+        [0, 1), anything else saturates. By default right for the acrobot: two angles come first.
+    seed : int
+        Where the noise starts; ``reset(seed=...)`` with a number starts it anew from that number.
+    stream : {"sensor_noise", "evaluation_sensor_noise"}
+        Which of the core's streams: that of a trial's learning episodes or of its test episodes.
+
+    Raises
+    ------
+    ValueError
+        For an unknown word, a wrong number of edges, bounds beyond [0, 1] or a bad sigma.
+
+    Examples
+    --------
+    >>> from sdnn.environments import AcrobotSwingUpEnv, NoisySensors, RedundantSensors
+    >>> env = NoisySensors(RedundantSensors(AcrobotSwingUpEnv()), sigma=0.02, seed=1)
+    >>> env.reset()[0].shape
+    (6,)
+    """
+
+    def __init__(
+        self,
+        env: gym.Env[Observation, Any],
+        sigma: float = 0.02,
+        edge: Edge | Sequence[Edge] | None = None,
+        seed: int = 0,
+        stream: Literal["sensor_noise", "evaluation_sensor_noise"] = "sensor_noise",
+    ) -> None:
+        gym.utils.RecordConstructorArgs.__init__(
+            self, sigma=sigma, edge=edge, seed=seed, stream=stream
+        )
+        super().__init__(env)
+        space = _vector_space(env)
+        n_channels = space.shape[0]
+        if not (np.all(space.low >= 0.0) and np.all(space.high <= 1.0)):
+            raise ValueError("the observation space must lie within [0, 1] in every channel")
+        if edge is None:
+            words: list[str] = ["wrap" if i < 2 else "saturate" for i in range(n_channels)]
+        else:
+            words = [edge] * n_channels if isinstance(edge, str) else list(edge)
+        if len(words) != n_channels:
+            raise ValueError(f"edge must have {n_channels} entries, got {len(words)}")
+        self.sigma = sigma
+        self._edges = [choice(_core.SensorEdge.__members__, "edge", word) for word in words]
+        self._stream = choice(
+            {name: _core.Stream.__members__[name] for name in _STREAMS}, "stream", stream
+        )
+        self._restart(seed)
+        self.observation_space = gym.spaces.Box(0.0, 1.0, (n_channels,), _float_type(space))
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Reset the environment; a ``seed`` starts the noise anew too."""
+        if seed is not None:
+            self._restart(seed)
+        return super().reset(seed=seed, options=options)
+
+    def observation(self, observation: Observation) -> Observation:
+        """Add the noise, shape (l,)."""
+        noisy: Observation = self._noise.apply(observation)
+        return noisy.astype(observation.dtype)
+
+    def _restart(self, seed: int) -> None:
+        if not 0 <= seed < 2**64:
+            raise ValueError(f"seed must be in [0, 2**64), got {seed}")
+        self._noise = _core.SensorNoise(self.sigma, self._edges, seed, self._stream)
+
+
+_STREAMS = ("sensor_noise", "evaluation_sensor_noise")
+
+
+def _vector_space(env: gym.Env[Observation, Any]) -> gym.spaces.Box:
+    space = env.observation_space
+    if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
+        raise ValueError(f"env must have a one-dimensional Box of observations, got {space}")
+    return space
+
+
+def _float_type(space: gym.spaces.Box) -> type[np.floating[Any]]:
+    return np.float64 if space.dtype == np.float64 else np.float32

@@ -1,0 +1,78 @@
+"""Experiments: trials, their store, their statistics and figures.
+
+Names are loaded when they are first used, so that the command line starts quickly.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sdnn.experiments.cases import EXPERIMENTS, Case, Experiment, select_experiments
+    from sdnn.experiments.config import ProtocolConfig, TrialConfig, case_config, trial_seed
+    from sdnn.experiments.engine import Observer, run_trials
+    from sdnn.experiments.errors import ExperimentError, PlotUnavailableError, StoreError
+    from sdnn.experiments.figures import draw_experiment, save_figure
+    from sdnn.experiments.plan import PlannedTrial, plan_trials
+    from sdnn.experiments.records import TrialKey, TrialRecord, TrialRows
+    from sdnn.experiments.results import CaseResult, CaseSummary, collect, summarize
+    from sdnn.experiments.statistics import MeasureConfig
+    from sdnn.experiments.store import ResultStore
+    from sdnn.experiments.trial import Trial, make_core_trial
+
+_HOMES = {
+    "cases": ("EXPERIMENTS", "Case", "Experiment", "select_experiments"),
+    "config": ("ProtocolConfig", "TrialConfig", "case_config", "trial_seed"),
+    "engine": ("Observer", "run_trials"),
+    "errors": ("ExperimentError", "PlotUnavailableError", "StoreError"),
+    "figures": ("draw_experiment", "save_figure"),
+    "plan": ("PlannedTrial", "plan_trials"),
+    "records": ("TrialKey", "TrialRecord", "TrialRows"),
+    "results": ("CaseResult", "CaseSummary", "collect", "summarize"),
+    "statistics": ("MeasureConfig",),
+    "store": ("ResultStore",),
+    "trial": ("Trial", "make_core_trial"),
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "EXPERIMENTS",
+    "Case",
+    "CaseResult",
+    "CaseSummary",
+    "Experiment",
+    "ExperimentError",
+    "MeasureConfig",
+    "Observer",
+    "PlannedTrial",
+    "PlotUnavailableError",
+    "ProtocolConfig",
+    "ResultStore",
+    "StoreError",
+    "Trial",
+    "TrialConfig",
+    "TrialKey",
+    "TrialRecord",
+    "TrialRows",
+    "case_config",
+    "collect",
+    "draw_experiment",
+    "make_core_trial",
+    "plan_trials",
+    "run_trials",
+    "save_figure",
+    "select_experiments",
+    "summarize",
+    "trial_seed",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME_OF[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,207 @@
+"""Figures like the paper's, drawn from stored rows only.
+
+matplotlib is an extra and is imported when it is needed. Figures are made without pyplot, so no
+window, backend or style of the user's session is touched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, Experiment, agent_title
+from sdnn.experiments.errors import PlotUnavailableError
+from sdnn.experiments.results import CaseResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MAX_STEPS = 50
+"""Upper end of the steps axis: an episode's limit."""
+
+START_EPISODES = 500
+"""Learning episodes shown in the panels of the start."""
+
+_PANEL_HEIGHT = 3.3
+_START_HEIGHT = 1.9
+
+_AGENT_COLORS = ("#1f5a96", "#c2542d", "#3c7d4b")
+_WARNING_COLOR = "#a31515"
+_INK = "#2b2b2b"
+_FAINT = "#6f6f6f"
+
+
+def require_matplotlib() -> None:
+    """Check that figures can be drawn.
+
+    Raises
+    ------
+    PlotUnavailableError
+        If matplotlib is not installed.
+    """
+    if find_spec("matplotlib") is None:
+        raise PlotUnavailableError(
+            'figures need matplotlib, which is not installed: pip install "sdnn[plot]"'
+        )
+
+
+def draw_experiment(
+    experiment: Experiment, results: Sequence[CaseResult], *, quick: bool = False
+) -> Figure:
+    """Draw an experiment: a panel per case, a line and an interquartile band per agent.
+
+    Parameters
+    ----------
+    experiment
+        Its cases give the panels.
+    results
+        One for each case and agent.
+    quick
+        Whether to mark the figure as a quick look, which is no result.
+
+    Raises
+    ------
+    PlotUnavailableError
+        If matplotlib is not installed.
+    """
+    require_matplotlib()
+    from matplotlib.figure import Figure
+
+    n_columns = min(2, len(experiment.cases))
+    n_rows = -(-len(experiment.cases) // n_columns)
+    with_start = experiment.start_panels and _is_long(results)
+    heights = (_PANEL_HEIGHT, _START_HEIGHT) if with_start else (_PANEL_HEIGHT,)
+    height = 1.1 + n_rows * sum(heights)
+    figure = Figure(figsize=(5.4 * n_columns, height))
+    figure.subplots_adjust(
+        left=0.133 / n_columns, right=0.97, top=1 - 0.82 / height, bottom=0.86 / height,
+        wspace=0.1, hspace=0.4,
+    )  # fmt: skip
+    grid = figure.subplots(
+        n_rows * len(heights), n_columns, sharey=True, squeeze=False,
+        gridspec_kw={"height_ratios": heights * n_rows},
+    )  # fmt: skip
+    panels = grid[:: len(heights)].ravel()
+    starts = grid[1::2].ravel() if with_start else None
+    agents = list(dict.fromkeys(result.agent for result in results))
+    colors = {agent: _AGENT_COLORS[i % len(_AGENT_COLORS)] for i, agent in enumerate(agents)}
+    for number, (case, axes) in enumerate(zip(experiment.cases, panels, strict=False)):
+        shown = [result for result in results if result.case == case]
+        letter = f"({'abcdefgh'[number]})  " if len(experiment.cases) > 1 else ""
+        axes.set_title(f"{letter}{case.title}", fontsize=10.5, loc="left", color=_INK)
+        axes.set_title(f"paper: {case.paper_figure}", fontsize=8, loc="right", color=_FAINT)
+        _draw_case(axes, shown, colors)
+        if number % n_columns == 0:
+            axes.set_ylabel("steps per test episode")
+        if with_start or number >= len(experiment.cases) - n_columns:
+            axes.set_xlabel("learning episodes")
+        if quick:
+            _watermark(axes)
+        if starts is not None:
+            _draw_start(starts[number], shown, colors)
+        if len(agents) > 1:
+            axes.legend(frameon=False, fontsize=8.5, loc="upper right")
+    for row in (panels, starts if starts is not None else ()):
+        for axes in row[len(experiment.cases) :]:
+            axes.set_visible(False)
+    _label(figure, experiment, results, quick)
+    return figure
+
+
+def save_figure(figure: Figure, stem: Path) -> tuple[Path, Path]:
+    """Write a figure as PNG and SVG; the same rows give the same bytes.
+
+    Parameters
+    ----------
+    figure
+        What to write.
+    stem
+        Path without suffix.
+
+    Returns
+    -------
+    tuple of Path
+        The PNG and the SVG.
+    """
+    from matplotlib import rc_context
+
+    png, svg = stem.with_name(stem.name + ".png"), stem.with_name(stem.name + ".svg")
+    with rc_context({"svg.hashsalt": "sdnn"}):
+        figure.savefig(png, dpi=200, metadata={"Software": None})
+        figure.savefig(svg, metadata={"Date": None})
+    return png, svg
+
+
+def _draw_curves(axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str]) -> None:
+    for result in shown:
+        curve, color = result.curve, colors[result.agent]
+        axes.fill_between(
+            curve.episode, curve.lower, curve.upper, color=color, alpha=0.22, linewidth=0
+        )
+        axes.plot(
+            curve.episode, curve.median, color=color, linewidth=0.9, label=agent_title(result.agent)
+        )
+
+
+def _draw_case(axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str]) -> None:
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    _draw_curves(axes, shown, colors)
+    axes.set_xlim(0, max(int(result.episode[-1]) for result in shown))
+    axes.set_ylim(0, MAX_STEPS)
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
+    axes.grid(axis="y", color="#e4e4e4", linewidth=0.7)
+    axes.set_axisbelow(True)
+    axes.tick_params(colors=_INK, labelsize=8.5)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _draw_start(axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str]) -> None:
+    _draw_case(axes, shown, colors)
+    axes.set_xlim(0, START_EPISODES)
+    axes.set_title(
+        f"the first {START_EPISODES} learning episodes", fontsize=8.5, loc="left", color=_FAINT
+    )
+
+
+def _is_long(results: Sequence[CaseResult]) -> bool:
+    """Whether the start is too small a part of the panels to be seen in them."""
+    return max(int(result.episode[-1]) for result in results) >= 4 * START_EPISODES
+
+
+def _watermark(axes: Axes) -> None:
+    axes.text(
+        0.5, 0.6, "quick", transform=axes.transAxes, ha="center", va="center",
+        fontsize=44, color=_WARNING_COLOR, alpha=0.13, weight="bold", zorder=0,
+    )  # fmt: skip
+
+
+def _label(
+    figure: Figure, experiment: Experiment, results: Sequence[CaseResult], quick: bool
+) -> None:
+    """Write title, what kind of run it is, and where the rows come from."""
+    height = figure.get_figheight()
+    counts = sorted({result.n_trials for result in results})
+    trials = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+    n_episodes = max(int(result.episode[-1]) for result in results)
+    scale = f"{trials} {'trial' if trials == '1' else 'trials'} x {n_episodes:,} episodes"
+    paper_scale = f"{PAPER_TRIALS} x {PAPER_EPISODES:,}"
+    figure.text(0.012, 1 - 0.13 / height, experiment.title, fontsize=12, va="top", color=_INK)
+    if quick or counts[0] < PAPER_TRIALS or n_episodes < PAPER_EPISODES:
+        what = "QUICK LOOK, not the result" if quick else "smaller than the paper's experiment"
+        figure.text(
+            0.012, 1 - 0.36 / height, f"{what}: {scale} instead of {paper_scale}",
+            fontsize=9, va="top", color=_WARNING_COLOR,
+        )  # fmt: skip
+    hashes = ", ".join(f"{r.case.id}/{r.agent} {r.config_hash[:8]}" for r in results)
+    versions = ", ".join(sorted({rec.version for res in results for rec in res.records}))
+    figure.text(
+        0.012, 0.07 / height,
+        f"Line: median over trials; band: quartiles. {scale} per case and agent."
+        f"\nsdnn {versions}; configuration {hashes}",
+        fontsize=6.5, va="bottom", color=_FAINT, linespacing=1.4,
+    )  # fmt: skip

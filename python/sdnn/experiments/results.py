@@ -1,0 +1,162 @@
+"""Stored trials of one case and agent, and what is measured on them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.experiments import statistics
+from sdnn.experiments.cases import Case, Experiment, MeasureName
+from sdnn.experiments.records import TrialKey, TrialRecord
+from sdnn.experiments.statistics import DEFAULT_MEASURES, Curve, Estimate, MeasureConfig
+from sdnn.experiments.store import ResultStore
+
+
+@dataclass(frozen=True)
+class CaseResult:
+    """The trials of an agent in a case, all under the same settings.
+
+    Parameters
+    ----------
+    case
+        What was observed.
+    agent
+        Id of the agent.
+    records
+        Its trials, at least one.
+
+    Raises
+    ------
+    ValueError
+        If there are no trials, or they were run under different settings.
+    """
+
+    case: Case
+    agent: str
+    records: tuple[TrialRecord, ...]
+
+    def __post_init__(self) -> None:
+        hashes = {record.key.config_hash for record in self.records}
+        if len(hashes) != 1:
+            raise ValueError(
+                f"trials of {self.agent} in {self.case.id} must share one configuration,"
+                f" got {len(hashes)}"
+            )
+
+    @property
+    def n_trials(self) -> int:
+        """Number of trials."""
+        return len(self.records)
+
+    @property
+    def config_hash(self) -> str:
+        """Hash of the settings."""
+        return self.records[0].key.config_hash
+
+    @property
+    def episode(self) -> NDArray[np.int32]:
+        """Learning episodes done before each test, (n_tests,)."""
+        return self.records[0].rows.episode
+
+    @cached_property
+    def steps(self) -> NDArray[np.int32]:
+        """Steps of the test episodes, (n_trials, n_tests)."""
+        return np.stack([record.rows.steps for record in self.records])
+
+    @property
+    def n_decisions(self) -> int:
+        """Decisions of all trials."""
+        return sum(record.n_decisions for record in self.records)
+
+    @property
+    def microseconds_per_decision(self) -> float:
+        """Processor time per decision with everything it needs, in microseconds.
+
+        That is sensing, choosing, the second of physics that follows, and learning.
+        """
+        seconds = sum(record.seconds for record in self.records)
+        return 1e6 * seconds / self.n_decisions if self.n_decisions else math.nan
+
+    @cached_property
+    def curve(self) -> Curve:
+        """Median and quartiles of the steps over trials."""
+        return statistics.learning_curve(self.episode, self.steps)
+
+
+@dataclass(frozen=True)
+class CaseSummary:
+    """The measures of a case and agent, each over trials.
+
+    Parameters
+    ----------
+    result
+        The trials measured.
+    values
+        Measures of each trial, arrays (n_trials,).
+    medians
+        Their medians over trials.
+    iqms
+        Their interquartile means over trials.
+    median_curve_episodes_to_learn
+        `episodes_to_learn` of the median curve: what a reader sees in the paper's figure.
+    """
+
+    result: CaseResult
+    values: dict[MeasureName, NDArray[np.float64]]
+    medians: dict[MeasureName, Estimate]
+    iqms: dict[MeasureName, Estimate]
+    median_curve_episodes_to_learn: float
+
+
+def collect(
+    experiment: Experiment, keys: Iterable[TrialKey], store: ResultStore
+) -> tuple[CaseResult, ...]:
+    """Read an experiment's trials out of the store, one result for each case and agent.
+
+    Only the given keys are read, so trials under other settings never mix in.
+
+    Parameters
+    ----------
+    experiment
+        Its cases and agents.
+    keys
+        Keys of the planned trials; those of other experiments are passed over.
+    store
+        Where the trials are.
+    """
+    by_pair: dict[tuple[str, str], list[TrialRecord]] = {}
+    pairs = {(case.id, agent) for case in experiment.cases for agent in case.agents}
+    for record in store.load(key for key in keys if (key.case_id, key.agent) in pairs):
+        by_pair.setdefault((record.key.case_id, record.key.agent), []).append(record)
+    return tuple(
+        CaseResult(case, agent, tuple(by_pair.get((case.id, agent), ())))
+        for case in experiment.cases
+        for agent in case.agents
+    )
+
+
+def summarize(result: CaseResult, config: MeasureConfig = DEFAULT_MEASURES) -> CaseSummary:
+    """Measure every trial of a result, then take statistics over trials."""
+    values: dict[MeasureName, NDArray[np.float64]] = {
+        "episodes_to_learn": np.array(
+            [statistics.episodes_to_learn(result.episode, steps, config) for steps in result.steps]
+        ),
+        "final_steps": np.array([statistics.final_steps(s, config) for s in result.steps]),
+        "final_share_solved": np.array(
+            [statistics.final_share_solved(r.rows.solved, config) for r in result.records]
+        ),
+    }
+    return CaseSummary(
+        result=result,
+        values=values,
+        medians={n: statistics.estimate(v, "median", config) for n, v in values.items()},
+        iqms={n: statistics.estimate(v, "iqm", config) for n, v in values.items()},
+        median_curve_episodes_to_learn=statistics.episodes_to_learn(
+            result.episode, result.curve.median, config
+        ),
+    )

@@ -1,0 +1,267 @@
+"""One SQLite file that holds every finished trial, each written in one transaction.
+
+The file survives a kill at any instant (write-ahead log, full synchronization): a trial is in it
+as a whole or not at all. Trials under different settings live side by side under different keys.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+
+from sdnn.experiments.errors import StoreError
+from sdnn.experiments.records import TrialKey, TrialRecord, TrialRows, records_digest
+
+STORE_NAME = "results.sqlite"
+SCHEMA_VERSION = 1
+APPLICATION_ID = int.from_bytes(b"sdnn", "big")
+"""Marks a SQLite file as ours (SQLite's header field of that name)."""
+BUSY_SECONDS = 60.0
+"""How long to wait for another process that writes the same file."""
+
+_SCHEMA = """
+CREATE TABLE trials (
+  id INTEGER PRIMARY KEY,
+  case_id TEXT NOT NULL, agent TEXT NOT NULL, trial INTEGER NOT NULL, seed INTEGER NOT NULL,
+  config_hash TEXT NOT NULL, config TEXT NOT NULL, version TEXT NOT NULL,
+  n_decisions INTEGER NOT NULL, seconds REAL NOT NULL, finished_at TEXT NOT NULL,
+  rows_digest TEXT NOT NULL,
+  UNIQUE (case_id, agent, trial, seed, config_hash)
+);
+CREATE TABLE rows (
+  trial_id INTEGER NOT NULL REFERENCES trials (id),
+  episode INTEGER NOT NULL, steps INTEGER NOT NULL, episode_return REAL NOT NULL,
+  solved INTEGER NOT NULL,
+  PRIMARY KEY (trial_id, episode)
+) WITHOUT ROWID;
+CREATE VIEW labelled_rows AS
+  SELECT case_id, agent, trial, seed, config_hash, version,
+         episode, steps, episode_return, solved
+  FROM rows JOIN trials ON trials.id = rows.trial_id;
+"""
+
+
+class ResultStore:
+    """The result file of a folder, made if it is not there.
+
+    Parameters
+    ----------
+    folder
+        Folder of the file, made if missing.
+
+    Raises
+    ------
+    StoreError
+        If the folder is a file, or the file in it is damaged, of another program or of a newer
+        version of this one. Such a file is left as it is.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / STORE_NAME
+        if folder.exists() and not folder.is_dir():
+            raise StoreError(f"the output must be a folder, but {folder} is a file")
+        with _as_store_error(self.path):
+            folder.mkdir(parents=True, exist_ok=True)
+            is_new = _inspect(self.path)
+            self._connection = sqlite3.connect(self.path, timeout=BUSY_SECONDS)
+            try:
+                self._prepare(is_new)
+            except BaseException:
+                self._connection.close()
+                raise
+
+    def _prepare(self, is_new: bool) -> None:
+        connection = self._connection
+        connection.execute("PRAGMA journal_mode = WAL")
+        connection.execute("PRAGMA synchronous = FULL")
+        connection.execute("PRAGMA foreign_keys = ON")
+        if is_new:
+            # One transaction: a killed process leaves an empty file or a whole schema.
+            try:
+                connection.executescript(
+                    f"BEGIN IMMEDIATE; {_SCHEMA} PRAGMA application_id = {APPLICATION_ID};"
+                    f"PRAGMA user_version = {SCHEMA_VERSION}; COMMIT;"
+                )
+            except sqlite3.OperationalError:
+                connection.rollback()
+                if _inspect(self.path):  # else another process has just made it
+                    raise
+
+    def __enter__(self) -> ResultStore:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._connection.close()
+
+    def add(self, record: TrialRecord) -> None:
+        """Store a finished trial, as a whole or not at all.
+
+        Storing the same trial again (another process was quicker) changes nothing.
+
+        Raises
+        ------
+        StoreError
+            If the file cannot be written, or holds other rows under the same key.
+        """
+        rows = record.rows
+        digest = rows.digest()
+        with _as_store_error(self.path), self._connection as connection:
+            connection.execute("BEGIN IMMEDIATE")
+            known = connection.execute(
+                "SELECT rows_digest FROM trials WHERE case_id = ? AND agent = ? AND trial = ?"
+                " AND seed = ? AND config_hash = ?",
+                record.key,
+            ).fetchone()
+            if known is not None:
+                if known[0] != digest:
+                    raise StoreError(
+                        f"{self.path} already holds other rows for {record.key}:"
+                        " the same trial gave two results"
+                    )
+                return
+            cursor = connection.execute(
+                "INSERT INTO trials (case_id, agent, trial, seed, config_hash, config, version,"
+                " n_decisions, seconds, finished_at, rows_digest)"
+                " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                (
+                    *record.key,
+                    record.config,
+                    record.version,
+                    record.n_decisions,
+                    record.seconds,
+                    record.finished_at,
+                    digest,
+                ),
+            )
+            trial_id = cursor.lastrowid
+            columns = (rows.episode, rows.steps, rows.episode_return, rows.solved.astype(int))
+            connection.executemany(
+                "INSERT INTO rows VALUES (?, ?, ?, ?, ?)",
+                ((trial_id, *row) for row in zip(*(c.tolist() for c in columns), strict=True)),
+            )
+
+    def keys(self) -> set[TrialKey]:
+        """Return the keys of all stored trials."""
+        with _as_store_error(self.path):
+            return {
+                TrialKey(*row)
+                for row in self._connection.execute(
+                    "SELECT case_id, agent, trial, seed, config_hash FROM trials"
+                )
+            }
+
+    def load(self, keys: Iterable[TrialKey] | None = None) -> tuple[TrialRecord, ...]:
+        """Return the stored trials of the given keys (default: all), sorted by key.
+
+        Keys that are not stored are left out.
+
+        Raises
+        ------
+        StoreError
+            If the rows of a trial are not the ones that were stored.
+        """
+        wanted = sorted(self.keys() if keys is None else self.keys() & set(keys))
+        with _as_store_error(self.path):
+            return tuple(self._load_one(key) for key in wanted)
+
+    def _load_one(self, key: TrialKey) -> TrialRecord:
+        (trial_id, config, version, n_decisions, seconds, finished_at, digest) = (
+            self._connection.execute(
+                "SELECT id, config, version, n_decisions, seconds, finished_at, rows_digest"
+                " FROM trials WHERE case_id = ? AND agent = ? AND trial = ? AND seed = ?"
+                " AND config_hash = ?",
+                key,
+            ).fetchone()
+        )
+        found = self._connection.execute(
+            "SELECT episode, steps, episode_return, solved FROM rows WHERE trial_id = ?"
+            " ORDER BY episode",
+            (trial_id,),
+        ).fetchall()
+        names = ("episode", "steps", "episode_return", "solved")
+        rows = TrialRows.from_arrays(
+            {name: np.array([row[i] for row in found]) for i, name in enumerate(names)}
+        )
+        if rows.digest() != digest:
+            raise StoreError(f"{self.path} is damaged: the rows of {key} have changed")
+        return TrialRecord(
+            key=key,
+            config=config,
+            version=version,
+            n_decisions=n_decisions,
+            seconds=seconds,
+            finished_at=finished_at,
+            rows=rows,
+        )
+
+    def content_digest(self, keys: Iterable[TrialKey] | None = None) -> str:
+        """SHA-256 of the stored results, to compare runs.
+
+        It covers keys, configurations, decisions and rows, sorted by key; it leaves out times and
+        the version, so runs with other jobs, interruptions or order agree.
+        """
+        return records_digest(self.load(keys))
+
+
+@contextmanager
+def _as_store_error(path: Path) -> Iterator[None]:
+    """Turn errors of SQLite and the file system into one that names the file."""
+    try:
+        yield
+    except (sqlite3.DatabaseError, OSError, ValueError, OverflowError) as error:
+        if isinstance(error, sqlite3.OperationalError | OSError):
+            raise StoreError(f"cannot use {path}: {error}") from error
+        raise StoreError(
+            f"{path} is damaged or not a result file of sdnn ({error});"
+            " move it away or choose another output folder"
+        ) from error
+
+
+def _inspect(path: Path) -> bool:
+    """Return whether the file has yet to be made; refuse damaged and foreign ones.
+
+    The file is opened for reading only: what is not ours stays as it is, to the byte.
+    """
+    if not path.exists() or path.stat().st_size == 0:
+        return True
+    with path.open("rb") as file:
+        if file.read(16) != b"SQLite format 3\0":
+            raise sqlite3.DatabaseError("no SQLite file")
+    connection = sqlite3.connect(
+        f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=BUSY_SECONDS
+    )
+    try:
+        application_id = connection.execute("PRAGMA application_id").fetchone()[0]
+        version = connection.execute("PRAGMA user_version").fetchone()[0]
+        n_objects = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+        if application_id == 0 and n_objects == 0:
+            return True  # killed before the schema was written
+        if application_id != APPLICATION_ID:
+            raise StoreError(
+                f"{path} is a SQLite file of another program; choose another output folder"
+            )
+        if version > SCHEMA_VERSION:
+            raise StoreError(
+                f"{path} has schema version {version}, written by a newer sdnn;"
+                f" this one reads up to {SCHEMA_VERSION}"
+            )
+        findings = connection.execute("PRAGMA integrity_check").fetchall()
+        if findings != [("ok",)]:
+            raise sqlite3.DatabaseError(str(findings[0][0]))
+        return False
+    finally:
+        connection.close()

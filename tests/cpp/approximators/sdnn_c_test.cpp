@@ -1,0 +1,433 @@
+#include "sdnn/approximators/sdnn_c.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "allocation_count.hpp"
+#include "sdnn/core/bit_layer.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::approximators {
+namespace {
+
+using Network = SdnnC<256>;
+using State = std::vector<double>;
+
+/// The learning tests run on a smaller network, which has the same parts.
+SdnnCConfig small() {
+  return {.n_inputs = 3, .n_pattern_units = 50, .n_hidden_units = 200, .n_active_units = 60};
+}
+
+State random_state(std::size_t n_inputs, core::Random& random) {
+  State state(n_inputs);
+  for (double& value : state) value = random.uniform();
+  return state;
+}
+
+std::vector<double> values(Network& network, const State& state) {
+  std::vector<double> out(network.n_actions());
+  network.values(state, out);
+  return out;
+}
+
+std::vector<std::int32_t> potentials(const Network& network, const State& state) {
+  std::vector<std::int32_t> out(network.perceptron().n_units());
+  network.potentials(state, out);
+  return out;
+}
+
+/// Q(s, a) of every action from a full pass and window masks: nothing remembered, nothing sliding.
+std::vector<double> values_by_masks(const Network& network, const State& state) {
+  constexpr std::size_t kHidden = 1024;
+  const std::vector<std::int32_t> h = potentials(network, state);
+  core::BitLayer<kHidden> hidden(h.size());
+  for (std::size_t i = 0; i < h.size(); ++i) hidden.set(i, h[i] > 0);
+  const coding::ActionCode& code = network.action_code();
+  std::vector<double> out(code.n_actions());
+  for (std::size_t action = 0; action < code.n_actions(); ++action) {
+    core::BitLayer<kHidden> window(h.size());
+    for (std::size_t i = 0; i < code.n_active_units(); ++i) {
+      window.set(code.first_unit(action) + i);
+    }
+    const auto n_firing = static_cast<int>((hidden & window).count());
+    out[action] = network.output_scale()(n_firing);
+  }
+  return out;
+}
+
+void expect_equal_parameters(const Network& a, const Network& b) {
+  const ParallelPerceptron& p = a.perceptron();
+  const ParallelPerceptron& q = b.perceptron();
+  std::size_t n_different = 0;
+  for (std::size_t i = 0; i < p.n_units(); ++i) {
+    n_different += p.threshold(i) != q.threshold(i);
+    for (std::size_t j = 0; j < p.n_columns(); ++j) n_different += p.weight(i, j) != q.weight(i, j);
+  }
+  EXPECT_EQ(n_different, 0U);
+}
+
+TEST(SdnnC, ThePapersSizesFollowFromTheDefaults) {
+  const Network network({}, 1);
+  EXPECT_EQ(network.n_inputs(), 4U);
+  EXPECT_EQ(network.n_actions(), 601U);
+  EXPECT_EQ(network.state_code().n_columns(), 2400U);
+  EXPECT_EQ(network.state_code().book(0).n_bins(), 360U);
+  EXPECT_EQ(network.perceptron().n_units(), 900U);
+  EXPECT_EQ(network.output_scale().u_low(), 20);
+  EXPECT_EQ(network.output_scale().u_high(), 280);
+  EXPECT_EQ(Network({.n_inputs = 5}, 1).state_code().n_columns(), 4000U);
+  EXPECT_EQ(Network({.n_inputs = 6}, 1).state_code().n_columns(), 6000U);
+}
+
+TEST(SdnnC, ThresholdsAlternateAndWeightsAreTernaryAtTheStart) {
+  const Network network({}, 1);
+  const ParallelPerceptron& p = network.perceptron();
+  EXPECT_EQ(p.threshold(0), -200);  // unit 1 in the paper: odd, negative
+  EXPECT_EQ(p.threshold(1), 200);
+  std::array<double, 3> count{};
+  for (std::size_t i = 0; i < p.n_units(); ++i) {
+    for (std::size_t j = 0; j < p.n_columns(); ++j) {
+      ++count.at(static_cast<std::size_t>(p.weight(i, j) + 1));
+    }
+  }
+  const double n = 900.0 * 2400.0;
+  EXPECT_NEAR(count[0] / n, 0.25, 0.002);
+  EXPECT_NEAR(count[1] / n, 0.50, 0.002);
+  EXPECT_NEAR(count[2] / n, 0.25, 0.002);
+}
+
+TEST(SdnnC, QIsExactlyZeroEverywhereAtTheStart) {
+  for (const int n_inputs : {4, 6}) {
+    Network network({.n_inputs = n_inputs}, 7);
+    core::Random random(3, core::Stream::weights);
+    const std::vector<double> zeros(601, 0.0);
+    for (int i = 0; i < 150; ++i) {
+      const State state = random_state(static_cast<std::size_t>(n_inputs), random);
+      ASSERT_EQ(values(network, state), zeros);
+    }
+  }
+}
+
+TEST(SdnnC, UniformInitialWeightsStayWithinTheirLimitOnTheLattice) {
+  SdnnCConfig config = small();
+  config.lattice = 8;
+  config.initial_weights = InitialWeights::uniform;
+  config.initial_weight_limit = 0.5;
+  config.initial_threshold = 10.0;
+  const Network network(config, 1);
+  int largest = 0;
+  for (std::size_t i = 0; i < 200; ++i) {
+    EXPECT_EQ(network.perceptron().threshold(i), i % 2 == 0 ? -80 : 80);
+    for (std::size_t j = 0; j < network.perceptron().n_columns(); ++j) {
+      largest = std::max(largest, std::abs(network.perceptron().weight(i, j)));
+    }
+  }
+  EXPECT_EQ(largest, 4);
+}
+
+// One correction by hand: d subsets, in each the nearest unit, moved by lattice * (|x|^2 + 1).
+TEST(SdnnC, OneCorrectionMovesOneUnitOfEachSubset) {
+  SdnnCConfig config = small();
+  config.lattice = 4;
+  config.initial_threshold = 2.0;
+  Network network(config, 5);
+  const State state = {0.1, 0.5, 0.9};
+  const std::size_t action = 11;
+  const std::vector<std::int32_t> before = potentials(network, state);
+  std::vector<coding::Bin> bins(3);
+  network.state_code().encode(state, bins);
+  const std::int32_t self = network.state_code().inner_product(bins, bins);
+
+  // Three units more: three subsets of twenty, in each the inactive unit nearest to 0.
+  int n_firing = 0;
+  for (std::size_t i = action; i < action + 60; ++i) n_firing += before[i] > 0;
+  std::vector<std::int32_t> expected = before;
+  for (std::size_t subset = 0; subset < 3; ++subset) {
+    std::size_t best = 0;
+    std::int32_t nearest = INT32_MAX;
+    for (std::size_t i = action + 20 * subset; i < action + 20 * (subset + 1); ++i) {
+      if (before[i] <= 0 && -before[i] < nearest) {
+        nearest = -before[i];
+        best = i;
+      }
+    }
+    expected[best] += 4 * (self + 1);
+  }
+  network.correct(state, action, network.output_scale()(n_firing + 3));
+  EXPECT_EQ(potentials(network, state), expected);
+  EXPECT_EQ(network.value(state, action), network.output_scale()(n_firing + 3));
+}
+
+TEST(SdnnC, NothingHappensWhenTheCountIsRightAlready) {
+  Network network(small(), 5);
+  const Network before = network;
+  const State state = {0.1, 0.5, 0.9};
+  network.correct(state, 3, network.value(state, 3));
+  network.correct(state, 3, network.value(state, 3) + 0.01);  // rounds to the same count
+  expect_equal_parameters(network, before);
+}
+
+TEST(SdnnC, CorrectionsReachAnyTargetAndSaturateBeyond) {
+  Network network(small(), 5);
+  const State state = {0.3, 0.6, 0.2};
+  for (const double target : {20.0, -20.0, 4.0, 1e300, -1e300, 0.0}) {
+    for (int i = 0; i < 400; ++i) network.correct(state, 70, target);
+    EXPECT_NEAR(network.value(state, 70), std::clamp(target, -20.0, 20.0), 20.0 / 52);
+  }
+}
+
+TEST(SdnnC, PopcountsOfWindowsEqualTheSlidingCount) {
+  core::Random random(4, core::Stream::weights);
+  for (const int n_actions : {0, 2, 7, 141}) {
+    SdnnCConfig config = small();
+    config.n_actions = n_actions;
+    Network network(config, 9);
+    for (int i = 0; i < 40; ++i) {
+      const State state = random_state(3, random);
+      network.correct(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
+      EXPECT_EQ(values(network, state), values_by_masks(network, state));
+    }
+  }
+}
+
+/// A walk of transitions, as an agent meets them: mostly small steps, sometimes a jump.
+void walk(State& state, core::Random& random) {
+  if (random.below(20) == 0) {
+    state = random_state(state.size(), random);
+    return;
+  }
+  for (double& value : state) {
+    value = std::clamp(value + 0.1 * (random.uniform() - 0.5), 0.0, 1.0);
+  }
+}
+
+// The remembered potentials must be those of a full pass, whatever has been learned since.
+TEST(SdnnC, RememberingChangesNothingOverThousandsOfLearningSteps) {
+  Network remembering(small(), 2);
+  Network forgetful(small(), 2);
+  const State away = {0.0, 0.0, 0.0};
+  const State further_away = {1.0, 1.0, 1.0};
+  core::Random random(5, core::Stream::weights);
+  State state = random_state(3, random);
+  for (int step = 0; step < 4000; ++step) {
+    const State next = [&] {
+      State moved = state;
+      walk(moved, random);
+      return moved;
+    }();
+    const std::size_t action = random.below(remembering.n_actions());
+    const double reward = random.below(10) == 0 ? 10.0 : -1.0;
+    const auto learn = [&](Network& network, bool forget) {
+      const std::vector<double> following = values(network, next);
+      if (forget) {
+        (void)network.value(away, 0);
+        (void)network.value(further_away, 0);
+      }
+      network.correct(state, action,
+                      0.5 * network.value(state, action) +
+                          0.5 * (reward + 0.9 * *std::max_element(following.begin(),
+                                                                  following.end())));
+      if (forget) {
+        (void)network.value(away, 0);
+        (void)network.value(further_away, 0);
+      }
+    };
+    learn(remembering, false);
+    learn(forgetful, true);
+    if (step % 50 == 0) {
+      ASSERT_EQ(values(remembering, next), values_by_masks(remembering, next)) << step;
+      ASSERT_EQ(values(remembering, state), values_by_masks(remembering, state)) << step;
+    }
+    state = next;
+  }
+  expect_equal_parameters(remembering, forgetful);
+}
+
+TEST(SdnnC, ActingAndLearningAllocateNothing) {
+  Network network({}, 1);
+  core::Random random(6, core::Stream::weights);
+  std::vector<double> out(network.n_actions());
+  State state = random_state(4, random);
+  const std::size_t before = testing::allocation_count();
+  for (int step = 0; step < 300; ++step) {
+    network.values(state, out);
+    const std::size_t action = random.below(network.n_actions());
+    network.correct(state, action, 40.0 * random.uniform() - 20.0);
+    for (double& value : state) value = random.uniform();
+  }
+  EXPECT_EQ(testing::allocation_count(), before);
+}
+
+// Weights that need two bytes take another way; it must not allocate on its first use either.
+TEST(SdnnC, LargeWeightsAllocateNothing) {
+  SdnnCConfig config = small();
+  config.lattice = 64;
+  config.initial_threshold = 0.0;
+  Network network(config, 1);
+  core::Random random(6, core::Stream::weights);
+  std::vector<double> out(network.n_actions());
+  State state = random_state(3, random);
+  const std::size_t before = testing::allocation_count();
+  for (int step = 0; step < 300; ++step) {
+    network.values(state, out);
+    network.correct(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
+    for (double& value : state) value = random.uniform();
+  }
+  EXPECT_EQ(testing::allocation_count(), before);
+  EXPECT_GT(network.perceptron().n_wide_units(), 0U);
+  EXPECT_EQ(values(network, state), values_by_masks(network, state));
+}
+
+TEST(SdnnC, CopiesShareNothingThatIsLearned) {
+  Network original(small(), 3);
+  const State state = {0.2, 0.4, 0.6};
+  original.correct(state, 5, 9.0);
+  const std::vector<double> before = values(original, state);
+  const std::vector<std::int32_t> potentials_before = potentials(original, state);
+  Network copy = original;
+  EXPECT_EQ(values(copy, state), before);
+  expect_equal_parameters(copy, original);
+  for (int i = 0; i < 100; ++i) copy.correct(state, 5, -20.0);
+  EXPECT_NE(values(copy, state), before);
+  EXPECT_EQ(values(original, state), before);
+  EXPECT_EQ(potentials(original, state), potentials_before);
+  original = copy;
+  EXPECT_EQ(values(original, state), values(copy, state));
+}
+
+TEST(SdnnC, ParametersCanBeMovedToAnotherNetworkOfTheSameWiring) {
+  Network teacher(small(), 3);
+  Network pupil(small(), 3);
+  const State state = {0.2, 0.4, 0.6};
+  for (int i = 0; i < 100; ++i) teacher.correct(state, 5, 12.0);
+  (void)pupil.value(state, 5);  // remembered: must be forgotten
+  const ParallelPerceptron& p = teacher.perceptron();
+  std::vector<std::int32_t> weights;
+  std::vector<std::int32_t> thresholds;
+  for (std::size_t i = 0; i < p.n_units(); ++i) {
+    thresholds.push_back(p.threshold(i));
+    for (std::size_t j = 0; j < p.n_columns(); ++j) weights.push_back(p.weight(i, j));
+  }
+  pupil.set_parameters(weights, thresholds);
+  expect_equal_parameters(pupil, teacher);
+  EXPECT_EQ(values(pupil, state), values(teacher, state));
+
+  weights.back() = 1 << 20;
+  thresholds.front() += 1;
+  EXPECT_THROW(pupil.set_parameters(weights, thresholds), std::invalid_argument);
+  expect_equal_parameters(pupil, teacher);
+  weights.pop_back();
+  EXPECT_THROW(pupil.set_parameters(weights, thresholds), std::invalid_argument);
+}
+
+TEST(SdnnC, TheSameSeedGivesTheSameNetworkAndAnotherSeedAnother) {
+  const Network first(small(), 3), same(small(), 3), other(small(), 4);
+  expect_equal_parameters(first, same);
+  const auto& book = [](const Network& network) -> const auto& {
+    return network.state_code().book(1);
+  };
+  EXPECT_EQ(book(first)[10], book(same)[10]);
+  EXPECT_NE(book(first)[10], book(other)[10]);
+  EXPECT_EQ(first.state_code().permutation(0, 2), same.state_code().permutation(0, 2));
+  EXPECT_NE(first.state_code().permutation(0, 2), other.state_code().permutation(0, 2));
+  EXPECT_NE(first.state_code().permutation(0, 2), first.state_code().permutation(2, 0));
+}
+
+TEST(SdnnC, OddSizesLearnAsWell) {
+  core::Random random(8, core::Stream::weights);
+  for (const SdnnCConfig& config :
+       {SdnnCConfig{.n_inputs = 2, .n_pattern_units = 2, .n_anchor_patterns = 2,
+                    .n_interpolated = 0, .n_hidden_units = 2, .n_active_units = 1},
+        SdnnCConfig{.n_inputs = 5, .n_pattern_units = 37, .n_anchor_patterns = 4,
+                    .n_interpolated = 10, .n_hidden_units = 101, .n_active_units = 33},
+        SdnnCConfig{.n_inputs = 2, .n_pattern_units = 256, .circular = {true, false},
+                    .n_hidden_units = 65, .n_active_units = 64, .n_actions = 2},
+        SdnnCConfig{.n_inputs = 3, .n_pattern_units = 65, .balanced_anchors = false,
+                    .n_hidden_units = 1000, .n_active_units = 1000, .lattice = 64}}) {
+    Network network(config, 1);
+    for (int i = 0; i < 60; ++i) {
+      const State state = random_state(network.n_inputs(), random);
+      network.correct(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
+      ASSERT_EQ(values(network, state), values_by_masks(network, state));
+    }
+  }
+}
+
+TEST(SdnnC, TheEndsOfTheUnitIntervalAreStates) {
+  Network network(small(), 1);
+  EXPECT_EQ(values(network, {0.0, 0.0, 0.0}).size(), 141U);
+  EXPECT_EQ(values(network, {1.0, 1.0, 1.0}), values(network, {0.9999, 0.9999, 0.9999}));
+  EXPECT_EQ(values(network, {-0.0, 0.0, 0.0}), values(network, {0.0, 0.0, 0.0}));
+}
+
+std::string message(const SdnnCConfig& config) {
+  try {
+    Network(config, 1);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+void expect_named(const SdnnCConfig& config, const std::string& name) {
+  EXPECT_EQ(message(config).rfind(name + " must be ", 0), 0U) << message(config);
+}
+
+TEST(SdnnC, NamesTheFieldThatIsImpossible) {
+  const double nan = std::nan("");
+  EXPECT_EQ(message({.n_hidden_units = 900, .n_active_units = 901}),
+            "n_active_units must be in [1, 900], got 901");
+  EXPECT_EQ(message({.n_inputs = 1}), "n_inputs must be in [2, 1024], got 1");
+  EXPECT_EQ(message({.circular = {true}}), "circular must be empty or one flag per input, got 1");
+  expect_named({.n_pattern_units = 1}, "n_pattern_units");
+  expect_named({.n_anchor_patterns = 1}, "n_anchor_patterns");
+  expect_named({.n_interpolated = -1}, "n_interpolated");
+  expect_named({.n_hidden_units = 0}, "n_hidden_units");
+  expect_named({.n_actions = 602}, "n_actions");
+  expect_named({.n_actions = -1}, "n_actions");
+  expect_named({.q_low = 20.0}, "q_high");
+  expect_named({.q_low = nan}, "q_low");
+  expect_named({.u_low = -1}, "u_low");
+  expect_named({.u_low = 290, .u_high = 280}, "u_high");
+  expect_named({.u_high = 301}, "u_high");
+  expect_named({.learning_coefficient = 0.0}, "learning_coefficient");
+  expect_named({.learning_coefficient = nan}, "learning_coefficient");
+  expect_named({.lattice = 0}, "lattice");
+  expect_named({.lattice = 65}, "lattice");
+  expect_named({.initial_threshold = -1.0}, "initial_threshold");
+  expect_named({.initial_threshold = 0.5}, "initial_threshold");
+  expect_named({.initial_threshold = nan}, "initial_threshold");
+  expect_named({.initial_weight_limit = nan}, "initial_weight_limit");
+  expect_named({.initial_weights = InitialWeights::uniform, .initial_weight_limit = 1e300},
+               "initial_weight_limit");
+  EXPECT_THROW(Network({.n_pattern_units = 257}, 1), std::length_error);
+}
+
+TEST(SdnnC, ABadArgumentChangesNothing) {
+  Network network(small(), 1);
+  const Network before = network;
+  const State good = {0.1, 0.2, 0.3};
+  for (const double bad : {std::nan(""), -1e-300, 1.0000001,
+                           std::numeric_limits<double>::infinity()}) {
+    const State state = {0.1, bad, 0.3};
+    EXPECT_THROW((void)network.value(state, 0), std::invalid_argument);
+    EXPECT_THROW(network.correct(state, 0, 1.0), std::invalid_argument);
+    EXPECT_THROW((void)values(network, state), std::invalid_argument);
+    EXPECT_THROW((void)potentials(network, state), std::invalid_argument);
+  }
+  EXPECT_THROW(network.correct(good, 0, std::nan("")), std::invalid_argument);
+  EXPECT_THROW(network.correct(good, 141, 1.0), std::invalid_argument);
+  EXPECT_THROW((void)network.value(good, 141), std::invalid_argument);
+  EXPECT_THROW((void)network.value(State{0.1, 0.2}, 0), std::invalid_argument);
+  std::vector<double> short_row(140);
+  EXPECT_THROW(network.values(good, short_row), std::invalid_argument);
+  expect_equal_parameters(network, before);
+  EXPECT_EQ(values(network, good), values_by_masks(network, good));
+}
+
+}  // namespace
+}  // namespace sdnn::approximators

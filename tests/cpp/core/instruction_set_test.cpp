@@ -1,0 +1,32 @@
+#include "sdnn/core/instruction_set.hpp"
+
+#include <gtest/gtest.h>
+
+namespace sdnn::core {
+namespace {
+
+TEST(InstructionSet, AnyLevelUpToTheBestCanBeForced) {
+  const InstructionSet before = instruction_set();
+  for (const auto level :
+       {InstructionSet::portable, InstructionSet::avx2, InstructionSet::avx512}) {
+    if (level <= best_instruction_set()) {
+      set_instruction_set(name_of(level));
+      EXPECT_EQ(instruction_set(), level);
+    } else {
+      EXPECT_THROW(set_instruction_set(name_of(level)), std::invalid_argument);
+    }
+  }
+  set_instruction_set(name_of(before));
+}
+
+TEST(InstructionSet, NamesWhatIsImpossible) {
+  try {
+    set_instruction_set("sse9");
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "instruction set must be portable, avx2 or avx512, got sse9");
+  }
+}
+
+}  // namespace
+}  // namespace sdnn::core

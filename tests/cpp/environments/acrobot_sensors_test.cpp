@@ -1,0 +1,139 @@
+#include "sdnn/environments/acrobot_sensors.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+namespace {
+
+using namespace sdnn::environments;
+using sdnn::core::kPi;
+using sdnn::core::Stream;
+
+std::vector<double> observe(AcrobotSensors& sensors, const Eigen::Vector4d& state) {
+  std::vector<double> out(static_cast<std::size_t>(sensors.n_sensors()));
+  sensors.observe(state, out);
+  return out;
+}
+
+std::vector<double> observe(const SensorConfig& config, const Eigen::Vector4d& state) {
+  AcrobotSensors sensors(config, 1, Stream::sensor_noise);
+  return observe(sensors, state);
+}
+
+TEST(AcrobotSensors, NormalizeAsWorkedByHand) {
+  const auto rest = observe({6, 0.0}, {0.0, 0.0, 0.0, 0.0});
+  EXPECT_EQ(rest, (std::vector<double>{0.5, 0.5, 0.5, 0.5, 0.0, 0.0}));
+  const auto seen = observe({6, 0.0}, {kPi / 2.0, -kPi / 2.0, 1.5 * kPi, -2.5 * kPi});
+  EXPECT_DOUBLE_EQ(seen[0], 0.75);
+  EXPECT_DOUBLE_EQ(seen[1], 0.25);
+  EXPECT_DOUBLE_EQ(seen[2], 0.75);
+  EXPECT_DOUBLE_EQ(seen[3], 0.25);
+  EXPECT_DOUBLE_EQ(seen[4], 0.25);  // 2 (1/16 + 1/16)
+  EXPECT_DOUBLE_EQ(seen[5], 0.25);  // tip 1 m below joint 1: (2 - 0 - 1) / 4
+  const auto up = observe({6, 0.0}, {-kPi, 0.0, 100.0, -100.0});
+  EXPECT_EQ(up, (std::vector<double>{0.0, 0.5, 1.0, 0.0, 1.0, 1.0}));
+}
+
+TEST(AcrobotSensors, HeightIsTheNormalizedTipHeight) {
+  for (double theta1 = -3.0; theta1 < 3.1; theta1 += 0.5) {
+    for (double theta2 = -3.0; theta2 < 3.1; theta2 += 0.5) {
+      const auto seen = observe({6, 0.0}, {theta1, theta2, 0.0, 0.0});
+      const double tip = -std::cos(theta1) - std::cos(theta1 + theta2);
+      EXPECT_NEAR(seen[5], (tip + 2.0) / 4.0, 1e-15);
+    }
+  }
+}
+
+TEST(AcrobotSensors, FewerSensorsSeeTheSame) {
+  const Eigen::Vector4d state{0.3, -2.0, 4.0, -6.0};
+  const auto six = observe({6, 0.0}, state);
+  for (int n = 4; n < 6; ++n) {
+    EXPECT_EQ(observe({n, 0.0}, state), std::vector<double>(six.begin(), six.begin() + n));
+  }
+}
+
+TEST(AcrobotSensors, AnglesNeverReachOne) {
+  const double below_pi = std::nextafter(kPi, 0.0);
+  const auto seen = observe({4, 0.0}, {below_pi, below_pi, 0.0, 0.0});
+  EXPECT_LT(seen[0], 1.0);
+  EXPECT_LT(seen[1], 1.0);
+  EXPECT_EQ(wrap_to_unit(-1e-20), 0.0);
+  EXPECT_EQ(wrap_to_unit(1.0), 0.0);
+  EXPECT_EQ(wrap_to_unit(-0.25), 0.75);
+  EXPECT_EQ(wrap_to_unit(2.5), 0.5);
+  EXPECT_EQ(saturate_to_unit(-0.25), 0.0);
+  EXPECT_EQ(saturate_to_unit(2.5), 1.0);
+}
+
+TEST(AcrobotSensors, NoiseIsOneNormalNumberPerSensorInOrder) {
+  const Eigen::Vector4d state{0.3, -1.0, 2.0, -3.0};
+  const auto clean = observe({6, 0.0}, state);
+  AcrobotSensors sensors({6, 0.001}, 42, Stream::sensor_noise);
+  sdnn::core::Random random(42, Stream::sensor_noise);
+  for (int i = 0; i < 10; ++i) {
+    const auto noisy = observe(sensors, state);
+    for (std::size_t j = 0; j < 6; ++j) EXPECT_EQ(noisy[j], clean[j] + 0.001 * random.normal());
+  }
+}
+
+TEST(AcrobotSensors, NoiseHasItsStandardDeviationAndNoCorrelation) {
+  AcrobotSensors sensors({6, 0.02}, 7, Stream::sensor_noise);
+  const Eigen::Vector4d state{0.5, 0.5, 3.0, -5.0};
+  const auto clean = observe({6, 0.0}, state);
+  constexpr int kDraws = 40000;
+  std::array<double, 6> mean{}, variance{};
+  double product = 0.0;
+  for (int i = 0; i < kDraws; ++i) {
+    const auto noisy = observe(sensors, state);
+    for (std::size_t j = 0; j < 6; ++j) {
+      const double z = (noisy[j] - clean[j]) / 0.02;
+      mean[j] += z / kDraws;
+      variance[j] += z * z / kDraws;
+    }
+    product += (noisy[2] - clean[2]) * (noisy[4] - clean[4]) / (0.02 * 0.02) / kDraws;
+  }
+  for (std::size_t j = 0; j < 6; ++j) {
+    EXPECT_NEAR(mean[j], 0.0, 5.0 / 200.0);
+    EXPECT_NEAR(variance[j], 1.0, 5.0 * std::sqrt(2.0) / 200.0);
+  }
+  EXPECT_NEAR(product, 0.0, 5.0 / 200.0);
+}
+
+TEST(AcrobotSensors, NoiseWrapsAnglesAndSaturatesTheRest) {
+  AcrobotSensors sensors({6, 0.02}, 8, Stream::sensor_noise);
+  int low = 0, high = 0, floor = 0, ceiling = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const auto seen = observe(sensors, {-kPi, 0.0, 100.0, -100.0});
+    for (const double value : seen) {
+      EXPECT_GE(value, 0.0);
+      EXPECT_LE(value, 1.0);
+    }
+    EXPECT_LT(seen[0], 1.0);
+    low += seen[0] < 0.5;
+    high += seen[0] > 0.5;
+    ceiling += seen[2] == 1.0;
+    floor += seen[3] == 0.0;
+  }
+  EXPECT_GT(low, 850);
+  EXPECT_GT(high, 850);
+  EXPECT_GT(ceiling, 850);
+  EXPECT_GT(floor, 850);
+}
+
+TEST(AcrobotSensors, RejectsBadArguments) {
+  for (const int bad : {3, 7, -1}) {
+    EXPECT_THROW(AcrobotSensors({bad, 0.0}, 1, Stream::sensor_noise), std::invalid_argument);
+  }
+  for (const double bad : {-0.1, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    EXPECT_THROW(AcrobotSensors({4, bad}, 1, Stream::sensor_noise), std::invalid_argument);
+    EXPECT_THROW(SensorNoise(bad, {SensorEdge::wrap}, 1, Stream::sensor_noise),
+                 std::invalid_argument);
+  }
+}
+
+}  // namespace

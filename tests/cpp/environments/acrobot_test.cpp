@@ -1,0 +1,308 @@
+#include "sdnn/environments/acrobot.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "sdnn/core/random.hpp"
+
+namespace {
+
+using namespace sdnn::environments;
+using sdnn::core::kPi;
+using Eigen::Vector4d;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// The state reached from `start` after one second without goal or torque.
+Vector4d after_a_second(const Vector4d& start, double integration_step) {
+  AcrobotConfig config;
+  config.integration_step = integration_step;
+  Acrobot acrobot(config);
+  acrobot.set_state(start);
+  acrobot.step(0.0, 0.0);
+  return acrobot.state();
+}
+
+// Hanging, 10 N m: d11 = 4.5, d12 = 1.75, d22 = 1.25, determinant 2.5625; accelerations
+// -1.75 * 10 / 2.5625 and 4.5 * 10 / 2.5625.
+TEST(AcrobotDynamics, AcceleratesUnderTorqueAsWorkedByHand) {
+  const auto slope = Acrobot().derivative({0.0, 0.0, 0.0, 0.0}, 10.0);
+  EXPECT_EQ(slope[0], 0.0);
+  EXPECT_EQ(slope[1], 0.0);
+  EXPECT_NEAR(slope[2], -6.8292682926829268, 1e-14);
+  EXPECT_NEAR(slope[3], 17.560975609756098, 1e-14);
+}
+
+// Level arm: phi1 = 19.6, phi2 = 4.9; (1.25 (-19.6) + 1.75 4.9) / 2.5625 and so on.
+TEST(AcrobotDynamics, FallsFromTheLevelAsWorkedByHand) {
+  const auto slope = Acrobot().derivative({kPi / 2.0, 0.0, 0.0, 0.0}, 0.0);
+  EXPECT_NEAR(slope[2], -6.2146341463414634, 1e-14);
+  EXPECT_NEAR(slope[3], 4.7804878048780488, 1e-14);
+}
+
+// Reference: Spong's equations as printed, solved with 40 digits; every term takes part.
+TEST(AcrobotDynamics, AgreesWithTheEquationsAsPrinted) {
+  const std::array<double, 4> state{0.3, -1.1, 2.0, -3.5};
+  const auto plain = Acrobot().derivative(state, 4.25);
+  EXPECT_EQ(plain[0], 2.0);
+  EXPECT_EQ(plain[1], -3.5);
+  EXPECT_NEAR(plain[2], -5.1289272681782542, 1e-14);
+  EXPECT_NEAR(plain[3], 13.697479526970495, 1e-14);
+  AcrobotConfig config;
+  config.link_mass_1 = 2.0;
+  config.link_mass_2 = 3.0;
+  config.link_length_1 = 1.5;
+  config.center_of_mass_1 = 0.25;
+  config.center_of_mass_2 = 0.75;
+  config.inertia_1 = 0.5;
+  config.inertia_2 = 1.25;
+  config.gravity = 9.81;
+  const auto other = Acrobot(config).derivative(state, 4.25);
+  EXPECT_NEAR(other[2], -6.4236974764663264, 1e-14);
+  EXPECT_NEAR(other[3], 20.704240814855918, 3e-14);
+}
+
+TEST(AcrobotDynamics, KeepsItsEnergyWithoutTorque) {
+  AcrobotConfig config;
+  config.integration_step = 0.001;
+  Acrobot acrobot(config);
+  acrobot.set_state({1.0, -0.5, 1.5, -2.0});
+  const double energy = acrobot.energy();
+  for (int i = 0; i < 10; ++i) {
+    acrobot.step(0.0, 0.0);
+    EXPECT_NEAR(acrobot.energy(), energy, 1e-9);
+  }
+}
+
+// Power is torque times theta2_dot: the energy won over a short time.
+TEST(AcrobotDynamics, GainsTheWorkOfTheTorque) {
+  AcrobotConfig config;
+  config.decision_interval = config.integration_step = 1e-4;
+  Acrobot acrobot(config);
+  acrobot.set_state({0.4, 0.9, -1.0, 2.5});
+  const double before = acrobot.energy(), angle = acrobot.state()[1];
+  acrobot.step(7.0, 0.0);
+  EXPECT_NEAR(acrobot.energy() - before, 7.0 * (acrobot.state()[1] - angle), 1e-12);
+}
+
+TEST(AcrobotDynamics, ErrorFallsWithTheFourthPowerOfTheStep) {
+  const Vector4d start{1.0, -0.5, 1.5, -2.0};
+  const Vector4d exact = after_a_second(start, 0.0005);
+  const double coarse = (after_a_second(start, 0.02) - exact).norm();
+  const double fine = (after_a_second(start, 0.01) - exact).norm();
+  EXPECT_NEAR(std::log2(coarse / fine), 4.0, 0.15);
+  EXPECT_LT(coarse, 1e-5);
+}
+
+TEST(AcrobotDynamics, RestsWhereItHangs) {
+  Acrobot acrobot;
+  acrobot.step(0.0, 1.0);
+  EXPECT_EQ(acrobot.state(), Vector4d::Zero());
+  EXPECT_EQ(acrobot.tip_height(), -2.0);
+}
+
+TEST(AcrobotDynamics, MirrorsWithTheTorque) {
+  Acrobot left, right;
+  for (const double torque : {3.0, -10.0, 7.5, 0.25}) {
+    left.step(torque, 0.0);
+    right.step(-torque, 0.0);
+    EXPECT_EQ(left.state(), -right.state());
+  }
+}
+
+// The bits are the same with every compiler and optimization level.
+TEST(AcrobotDynamics, KeepsItsBits) {
+  Acrobot acrobot;
+  sdnn::core::Random random(1, sdnn::core::Stream::exploration);
+  std::uint64_t digest = 0;
+  for (int episode = 0; episode < 20; ++episode) {
+    acrobot.reset();
+    for (int i = 0; i < 50; ++i) {
+      acrobot.step(20.0 * random.uniform() - 10.0, 0.0);
+      for (const double value : acrobot.state()) {
+        digest = digest * 31 + std::bit_cast<std::uint64_t>(value);
+      }
+    }
+  }
+  EXPECT_EQ(digest, 12301352983019598016u);
+}
+
+TEST(WrapAngle, IsTheHalfOpenTurnAroundZero) {
+  const double below_pi = std::nextafter(kPi, 0.0);
+  for (const double inside : {0.0, 1.0, -1.0, below_pi, -below_pi, -kPi, 5e-324}) {
+    EXPECT_EQ(wrap_angle(inside), inside);
+  }
+  EXPECT_EQ(wrap_angle(kPi), -kPi);
+  EXPECT_EQ(wrap_angle(3.0 * kPi), -kPi);
+  EXPECT_EQ(wrap_angle(2.0 * kPi), 0.0);
+  EXPECT_DOUBLE_EQ(wrap_angle(4.0), 4.0 - 2.0 * kPi);
+  EXPECT_DOUBLE_EQ(wrap_angle(-4.0), 2.0 * kPi - 4.0);
+  for (double x = -500.0; x < 500.0; x += 0.37) {
+    EXPECT_GE(wrap_angle(x), -kPi);
+    EXPECT_LT(wrap_angle(x), kPi);
+    EXPECT_NEAR(std::sin(wrap_angle(x)), std::sin(x), 1e-13);
+  }
+}
+
+TEST(AcrobotTask, PenalizesIdlingAtTheDecisionInstant) {
+  AcrobotConfig config;
+  config.gravity = 0.0;  // drifts at constant speed
+  config.goal_height = 3.0;
+  Acrobot acrobot(config);
+  EXPECT_EQ(acrobot.step(0.0, 1.0).reward, -5.0);
+  acrobot.set_state({0.2, 0.0, -0.2, 0.0});  // arrives at 0
+  EXPECT_EQ(acrobot.step(0.0, 1.0).reward, -5.0);
+  acrobot.set_state({-0.1, 0.0, 0.2, 0.0});  // passes 0, arrives beyond 5 degrees
+  EXPECT_EQ(acrobot.step(0.0, 1.0).reward, 0.0);
+  config.idle_angle = 0.0;
+  Acrobot never(config);
+  EXPECT_EQ(never.step(0.0, 1.0).reward, 0.0);
+  config.idle_angle = kPi / 5.0;
+  Acrobot wide(config);
+  wide.set_state({0.6, 0.0, 0.0, 0.0});
+  EXPECT_EQ(wide.step(0.0, 1.0).reward, -5.0);
+  wide.set_state({0.7, 0.0, 0.0, 0.0});
+  EXPECT_EQ(wide.step(0.0, 1.0).reward, 0.0);
+}
+
+TEST(AcrobotTask, PenalizesSpeedWithoutEndingAnything) {
+  AcrobotConfig config;
+  config.gravity = 0.0;
+  config.goal_height = 3.0;
+  Acrobot acrobot(config);
+  acrobot.set_state({1.0, 0.0, 9.5, 0.0});  // 3 pi = 9.42
+  const auto fast_1 = acrobot.step(0.0, 1.0);
+  EXPECT_EQ(fast_1.reward, -5.0);
+  EXPECT_FALSE(fast_1.terminated || fast_1.truncated);
+  config.goal_velocity_1 = 1e6;
+  Acrobot other(config);
+  other.set_state({1.0, 0.0, -2.0, 40.0});
+  const double reward = other.step(0.0, 1.0).reward;
+  EXPECT_GT(std::abs(other.state()[3]), 5.0 * kPi);
+  EXPECT_EQ(reward, -5.0);
+  config.goal_velocity_2 = std::abs(other.state()[3]);  // the limit itself is allowed
+  Acrobot limited(config);
+  limited.set_state({1.0, 0.0, -2.0, 40.0});
+  EXPECT_EQ(limited.step(0.0, 1.0).reward, 0.0);
+}
+
+// Thrown upwards with both links straight, the arm passes 1.5 m on its way.
+TEST(AcrobotTask, EndsAtTheInstantTheGoalIsReached) {
+  Acrobot acrobot;
+  acrobot.set_state({2.0, 0.0, 2.0, 0.0});
+  EXPECT_LT(acrobot.tip_height(), 1.5);
+  const auto result = acrobot.step(0.0, 1.0);
+  EXPECT_EQ(result.reward, 10.0);
+  EXPECT_TRUE(result.terminated);
+  EXPECT_FALSE(result.truncated);
+  EXPECT_EQ(acrobot.decisions(), 1);
+  EXPECT_GE(acrobot.tip_height(), 1.5);
+  EXPECT_LT(acrobot.tip_height(), 1.5 + 0.02 * 2.0 * 5.0);  // within one integration step
+  EXPECT_THROW(acrobot.step(0.0, 1.0), std::logic_error);
+  acrobot.reset();
+  EXPECT_NO_THROW(acrobot.step(0.0, 1.0));
+}
+
+TEST(AcrobotTask, LooksForTheGoalOnlyAtDecisionsIfAsked) {
+  AcrobotConfig config;
+  config.goal_test = GoalTest::decision_instant;
+  Acrobot acrobot(config);
+  acrobot.set_state({2.0, 0.0, 2.0, 0.0});
+  const auto result = acrobot.step(0.0, 1.0);
+  EXPECT_EQ(result.terminated, acrobot.tip_height() >= 1.5);
+  acrobot.set_state({kPi - 0.01, 0.0, 0.0, 0.0});  // still up after a second
+  EXPECT_TRUE(acrobot.step(0.0, 1.0).terminated);
+}
+
+TEST(AcrobotTask, NeedsSpeedsBelowTheScaledLimits) {
+  const auto ends = [](const Vector4d& start, double lambda) {
+    AcrobotConfig config;
+    config.gravity = 0.0;
+    config.decision_interval = 0.02;
+    Acrobot acrobot(config);
+    acrobot.set_state(start);
+    return acrobot.step(0.0, lambda).terminated;
+  };
+  EXPECT_TRUE(ends({3.0, 0.0, 1.0, 0.0}, 1.0 / (3.0 * kPi) * 1.01));
+  EXPECT_FALSE(ends({3.0, 0.0, 1.0, 0.0}, 1.0 / (3.0 * kPi) * 0.99));
+  EXPECT_TRUE(ends({3.0, 0.0, 0.0, 1.0}, 0.5));
+  EXPECT_FALSE(ends({3.0, 0.0, 0.0, 1.0}, 0.05));
+  EXPECT_FALSE(ends({3.0, 0.0, 0.0, 0.0}, 0.0));  // no speed is below 0
+}
+
+TEST(AcrobotTask, TruncatesAfterTheLastDecision) {
+  Acrobot acrobot;
+  for (int i = 1; i < 50; ++i) EXPECT_FALSE(acrobot.step(0.0, 1.0).truncated);
+  const auto last = acrobot.step(0.0, 1.0);
+  EXPECT_TRUE(last.truncated);
+  EXPECT_FALSE(last.terminated);
+  EXPECT_EQ(last.reward, -5.0);
+  EXPECT_EQ(acrobot.decisions(), 50);
+  EXPECT_THROW(acrobot.step(0.0, 1.0), std::logic_error);
+}
+
+TEST(AcrobotTask, RejectsBadArguments) {
+  Acrobot acrobot;
+  for (const double bad : {kNaN, kInfinity, -kInfinity, 10.0001, -10.0001}) {
+    EXPECT_THROW(acrobot.step(bad, 1.0), std::invalid_argument) << bad;
+    EXPECT_EQ(acrobot.decisions(), 0);
+  }
+  for (const double bad : {kNaN, -0.1}) EXPECT_THROW(acrobot.step(0.0, bad), std::invalid_argument);
+  EXPECT_THROW(acrobot.set_state({0.0, kNaN, 0.0, 0.0}), std::invalid_argument);
+  EXPECT_THROW(acrobot.set_state({0.0, 0.0, kInfinity, 0.0}), std::invalid_argument);
+  EXPECT_EQ(acrobot.state(), Vector4d::Zero());
+  try {
+    acrobot.step(kNaN, 1.0);
+  } catch (const std::invalid_argument& error) {
+    EXPECT_EQ(std::string(error.what()), "torque must be in [-10, 10], got nan");
+  }
+}
+
+TEST(AcrobotTask, SaysWhenTheSpeedBreaksTheIntegration) {
+  Acrobot acrobot;
+  acrobot.set_state({0.0, 0.0, 1e300, 0.0});
+  EXPECT_THROW(acrobot.step(0.0, 1.0), std::overflow_error);
+  EXPECT_THROW(acrobot.step(0.0, 1.0), std::logic_error);
+  acrobot.reset();
+  EXPECT_NO_THROW(acrobot.step(0.0, 1.0));
+}
+
+TEST(AcrobotTask, RejectsBadConfigurations) {
+  for (double AcrobotConfig::*field :
+       {&AcrobotConfig::link_mass_1, &AcrobotConfig::link_mass_2, &AcrobotConfig::link_length_1,
+        &AcrobotConfig::link_length_2, &AcrobotConfig::center_of_mass_1,
+        &AcrobotConfig::center_of_mass_2, &AcrobotConfig::inertia_1, &AcrobotConfig::inertia_2,
+        &AcrobotConfig::max_torque, &AcrobotConfig::decision_interval,
+        &AcrobotConfig::integration_step, &AcrobotConfig::goal_velocity_1,
+        &AcrobotConfig::goal_velocity_2, &AcrobotConfig::idle_angle}) {
+    for (const double bad : {-1.0, kNaN, kInfinity}) {
+      AcrobotConfig config;
+      config.*field = bad;
+      EXPECT_THROW(Acrobot{config}, std::invalid_argument);
+    }
+  }
+  for (double AcrobotConfig::*field : {&AcrobotConfig::gravity, &AcrobotConfig::goal_height,
+                                       &AcrobotConfig::goal_reward, &AcrobotConfig::penalty}) {
+    AcrobotConfig config;
+    config.*field = kNaN;
+    EXPECT_THROW(Acrobot{config}, std::invalid_argument);
+  }
+  for (const double bad : {0.03, 0.7, 2.0, 1e-7}) {
+    AcrobotConfig config;
+    config.integration_step = bad;
+    EXPECT_THROW(Acrobot{config}, std::invalid_argument) << bad;
+  }
+  AcrobotConfig config;
+  config.max_decisions = 0;
+  EXPECT_THROW(Acrobot{config}, std::invalid_argument);
+}
+
+}  // namespace

@@ -1,0 +1,69 @@
+#include "sdnn/environments/goal_schedule.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace {
+
+using sdnn::environments::GoalSchedule;
+using sdnn::environments::GoalScheduleConfig;
+using sdnn::environments::GoalScheduleKind;
+
+TEST(GoalSchedule, InverseLinearIsTheDefault) {
+  const GoalSchedule lambda;
+  EXPECT_DOUBLE_EQ(lambda(1), 1.0 / 1.01);
+  EXPECT_DOUBLE_EQ(lambda(100), 0.5);
+  EXPECT_DOUBLE_EQ(lambda(300), 0.25);
+  EXPECT_DOUBLE_EQ(lambda(10000), 1.0 / 101.0);
+  EXPECT_EQ(lambda(10001), 0.01);
+  EXPECT_EQ(lambda(15000), 0.01);
+}
+
+TEST(GoalSchedule, InverseSqrtIsContinuousAtItsLastEpisode) {
+  GoalScheduleConfig config;
+  config.kind = GoalScheduleKind::inverse_sqrt;
+  const GoalSchedule lambda(config);
+  EXPECT_DOUBLE_EQ(lambda(3), 0.5);
+  EXPECT_DOUBLE_EQ(lambda(99), 0.1);
+  EXPECT_NEAR(lambda(10000), 0.01, 1e-6);
+  EXPECT_EQ(lambda(10001), 0.01);
+}
+
+TEST(GoalSchedule, ConstantIgnoresTheEpisode) {
+  GoalScheduleConfig config;
+  config.kind = GoalScheduleKind::constant;
+  config.constant_value = 0.25;
+  const GoalSchedule lambda(config);
+  EXPECT_EQ(lambda(1), 0.25);
+  EXPECT_EQ(lambda(20000), 0.25);
+}
+
+TEST(GoalSchedule, NeverRises) {
+  for (const auto kind : {GoalScheduleKind::inverse_linear, GoalScheduleKind::inverse_sqrt}) {
+    GoalScheduleConfig config;
+    config.kind = kind;
+    config.floor = 0.005;
+    const GoalSchedule lambda(config);
+    for (int k = 1; k < 12000; ++k) EXPECT_LE(lambda(k + 1), lambda(k));
+  }
+}
+
+TEST(GoalSchedule, RejectsBadArguments) {
+  EXPECT_THROW(GoalSchedule()(0), std::invalid_argument);
+  EXPECT_THROW(GoalSchedule()(-5), std::invalid_argument);
+  for (const double bad : {-0.1, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    GoalScheduleConfig scale, floor, constant;
+    scale.scale = floor.floor = constant.constant_value = bad;
+    EXPECT_THROW(GoalSchedule{scale}, std::invalid_argument);
+    EXPECT_THROW(GoalSchedule{floor}, std::invalid_argument);
+    EXPECT_THROW(GoalSchedule{constant}, std::invalid_argument);
+  }
+  GoalScheduleConfig config;
+  config.last_episode = -1;
+  EXPECT_THROW(GoalSchedule{config}, std::invalid_argument);
+}
+
+}  // namespace

@@ -1,0 +1,175 @@
+#include "sdnn/experiments/trial.hpp"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "allocation_count.hpp"
+#include "approximators/lookup_table.hpp"
+#include "sdnn/approximators/sdnn_c.hpp"
+
+namespace sdnn::experiments {
+namespace {
+
+using testing::LookupTable;
+using Network = approximators::SdnnC<256>;
+
+/// What a test varies; the rest is the paper's.
+struct Setting {
+  environments::AcrobotConfig acrobot = {};
+  environments::SensorConfig sensors = {};
+  ProtocolConfig protocol = {.n_learning_episodes = 100};
+  std::uint64_t seed = 1;
+};
+
+template <class Q>
+AcrobotTrial<Q> trial(Q q, const Setting& setting) {
+  return AcrobotTrial<Q>(agents::QLearning<Q>(std::move(q), {}, setting.seed), setting.acrobot, {},
+                         setting.sensors, setting.protocol, setting.seed);
+}
+
+/// A cheap learner for what does not depend on the approximator.
+AcrobotTrial<LookupTable> table_trial(const Setting& setting) {
+  return trial(LookupTable(static_cast<std::size_t>(setting.sensors.n_sensors), 8, 21), setting);
+}
+
+AcrobotTrial<Network> network_trial(const Setting& setting) {
+  return trial(Network({.n_inputs = setting.sensors.n_sensors}, setting.seed), setting);
+}
+
+/// FNV-1a over the rows, returns by their bits.
+std::uint64_t digest(std::span<const TestRow> rows) {
+  std::uint64_t hash = 0xcbf29ce484222325;
+  const auto add = [&hash](std::uint64_t word) {
+    for (int byte = 0; byte < 8; ++byte, word >>= 8) hash = (hash ^ (word & 0xff)) * 0x100000001b3;
+  };
+  for (const TestRow& row : rows) {
+    add(static_cast<std::uint64_t>(row.episode));
+    add(static_cast<std::uint64_t>(row.steps));
+    add(std::bit_cast<std::uint64_t>(row.episode_return));
+    add(row.solved ? 1 : 0);
+  }
+  return hash;
+}
+
+// Golden traces: they change only if what is computed changes, on any machine and compiler.
+TEST(AcrobotTrial, GoldenTraceWithoutNoise) {
+  auto run = network_trial({.protocol = {.n_learning_episodes = 200}});
+  run.advance(200);
+  ASSERT_EQ(run.rows().size(), 20U);
+  EXPECT_EQ(run.n_decisions(), 2541);
+  EXPECT_EQ(digest(run.rows()), 15772045298543882794U);
+}
+
+TEST(AcrobotTrial, GoldenTraceWithNoisyRedundantSensors) {
+  auto run = network_trial({.sensors = {.n_sensors = 6, .noise = 0.02},
+                            .protocol = {.n_learning_episodes = 60},
+                            .seed = 2});
+  run.advance(60);
+  ASSERT_EQ(run.rows().size(), 6U);
+  EXPECT_EQ(run.n_decisions(), 1125);
+  EXPECT_EQ(digest(run.rows()), 899986753393664466U);
+}
+
+TEST(AcrobotTrial, PiecesEqualTheWhole) {
+  const Setting setting{.sensors = {.n_sensors = 5, .noise = 0.02}};
+  auto whole = table_trial(setting);
+  auto pieces = table_trial(setting);
+  whole.advance(100);
+  for (const int n : {0, 1, 9, 10, 33, 46, 500}) pieces.advance(n);
+  EXPECT_TRUE(pieces.finished());
+  EXPECT_EQ(pieces.n_decisions(), whole.n_decisions());
+  EXPECT_EQ(digest(pieces.rows()), digest(whole.rows()));
+  EXPECT_EQ(pieces.agent().action_value(), whole.agent().action_value());
+}
+
+TEST(AcrobotTrial, TestEpisodesDoNotChangeWhatIsLearned) {
+  for (const double noise : {0.0, 0.02}) {
+    Setting setting{.sensors = {.noise = noise}};
+    setting.protocol.test_interval = 1;
+    auto often = table_trial(setting);
+    setting.protocol.test_interval = 1000;
+    auto never = table_trial(setting);
+    often.advance(100);
+    never.advance(100);
+    EXPECT_EQ(often.rows().size(), 100U);
+    EXPECT_EQ(never.rows().size(), 0U);
+    EXPECT_EQ(often.agent().action_value(), never.agent().action_value());
+  }
+}
+
+TEST(AcrobotTrial, EpisodesAreCountedAndTestedWhenDue) {
+  auto run = table_trial({.protocol = {.n_learning_episodes = 25, .test_interval = 10}});
+  EXPECT_EQ(run.episode(), 0);
+  EXPECT_FALSE(run.finished());
+  run.advance(9);
+  EXPECT_EQ(run.episode(), 9);
+  EXPECT_TRUE(run.rows().empty());
+  run.advance(1);
+  ASSERT_EQ(run.rows().size(), 1U);
+  EXPECT_EQ(run.rows()[0].episode, 10);
+  run.advance(100);
+  EXPECT_EQ(run.episode(), 25);
+  EXPECT_TRUE(run.finished());
+  ASSERT_EQ(run.rows().size(), 2U);
+  EXPECT_EQ(run.rows()[1].episode, 20);
+}
+
+TEST(AcrobotTrial, AnUnsolvedTestEpisodeCountsAllItsDecisions) {
+  auto run = table_trial({.acrobot = {.goal_height = 2.5}, .protocol = {.n_learning_episodes = 20}});
+  run.advance(20);
+  for (const TestRow& row : run.rows()) {
+    EXPECT_EQ(row.steps, 50);
+    EXPECT_FALSE(row.solved);
+    EXPECT_LE(row.episode_return, 0.0);
+    EXPECT_EQ(std::fmod(row.episode_return, 5.0), 0.0);
+  }
+  EXPECT_EQ(run.n_decisions(), 22 * 50);
+}
+
+TEST(AcrobotTrial, ASolvedTestEpisodeEndsAtTheGoal) {
+  // At the start the tip hangs 2 m below joint 1: a goal there is reached within the first second.
+  auto run = table_trial({.acrobot = {.goal_height = -2.5}, .protocol = {.n_learning_episodes = 10}});
+  run.advance(10);
+  ASSERT_EQ(run.rows().size(), 1U);
+  EXPECT_EQ(run.rows()[0].steps, 1);
+  EXPECT_TRUE(run.rows()[0].solved);
+  EXPECT_EQ(run.rows()[0].episode_return, 10.0);
+  EXPECT_EQ(run.n_decisions(), 11);
+}
+
+TEST(AcrobotTrial, AnEpisodeAllocatesNothing) {
+  auto run = network_trial({.sensors = {.noise = 0.02}, .protocol = {.n_learning_episodes = 10}});
+  const std::size_t before = testing::allocation_count();
+  run.advance(10);
+  EXPECT_EQ(testing::allocation_count(), before);
+}
+
+template <class Make>
+std::string message(Make make) {
+  try {
+    make();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(AcrobotTrial, NamesWhatIsImpossible) {
+  EXPECT_EQ(message([] { table_trial({.protocol = {.n_learning_episodes = 0}}); }),
+            "n_learning_episodes must be in [1, 1073741824], got 0");
+  EXPECT_EQ(message([] { table_trial({.protocol = {.test_interval = 0}}); }),
+            "test_interval must be in [1, 1073741824], got 0");
+  EXPECT_EQ(message([] { trial(LookupTable(5, 2, 3), {}); }),
+            "n_inputs must be n_sensors of the sensors (4), got 5");
+  EXPECT_EQ(message([] { trial(LookupTable(4, 2, 3), {.sensors = {.n_sensors = 7}}); }),
+            "n_sensors must be in [4, 6], got 7");
+  EXPECT_EQ(message([] { table_trial({}).advance(-1); }),
+            "n_episodes must be in [0, 1073741824], got -1");
+}
+
+}  // namespace
+}  // namespace sdnn::experiments

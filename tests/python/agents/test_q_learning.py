@@ -1,0 +1,429 @@
+import dataclasses
+import doctest
+import importlib
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import paper_transcription as paper
+from handed_over import transcribe
+from sdnn import _core
+from sdnn.agents import QLearningConfig, SDNNQLearning, Transition
+from sdnn.approximators import SDNNCConfig
+from sdnn.environments import (
+    AcrobotConfig,
+    AcrobotSwingUpEnv,
+    GoalScheduleConfig,
+    NoisySensors,
+    RedundantSensors,
+    SensorConfig,
+)
+from sdnn.environments.goal_schedule import GoalSchedule
+
+SMALL = SDNNCConfig(n_pattern_units=40, n_hidden_units=120, n_active_units=30)
+OBSERVATIONS = gym.spaces.Box(-2.0, 2.0, (3,), np.float64)
+TORQUES = gym.spaces.Box(-1.0, 3.0, (1,), np.float32)
+BUTTONS = gym.spaces.Discrete(4, start=2)
+
+
+def small_agent(actions=TORQUES, **options):
+    return SDNNQLearning(OBSERVATIONS, actions, network=SMALL, **options)
+
+
+# Against the transcription of the paper.
+
+
+def learn_side_by_side(network, learning, n_steps, n_sensors=4, noise=0.0):
+    """The core and the transcription live through the same acrobot episodes, as the agent acts."""
+    agent = _core.SdnnQLearning(network=network, learning=learning, seed=4)
+    slow = paper.QLearning(
+        transcribe(agent.network), alpha=learning.learning_rate, gamma=learning.discount
+    )
+    acrobot = _core.Acrobot(_core.AcrobotConfig())
+    sensors = _core.AcrobotSensors(
+        _core.SensorConfig(n_sensors=n_sensors, noise=noise), 4, _core.Stream.sensor_noise
+    )
+    n_corrected = n_random = 0
+    over = True
+    for step in range(n_steps):
+        if over:
+            acrobot.reset()
+            agent.begin_episode()
+            in_episode = 0
+            state = sensors.observe(acrobot.state())
+        expected = slow.network.values(state)
+        assert np.array_equal(agent.network.values(state), expected), step
+        action = agent.act(state)
+        if expected[action] != expected.max():
+            n_random += 1
+            assert in_episode >= learning.n_greedy_steps, "the first steps are greedy"
+        torque = _core.action_value(action, agent.network.n_actions, -10.0, 10.0)
+        reward, terminated, truncated = acrobot.step(torque, 0.05)
+        following = sensors.observe(acrobot.state())
+        agent.learn(state, action, reward, following, terminated)
+        n_corrected += slow.learn(state, action, reward, following, terminated)
+        if step % 1000 == 0:
+            assert np.array_equal(agent.network.weights(), slow.network.weights)
+        over = terminated or truncated
+        state = following
+        in_episode += 1
+    assert np.array_equal(agent.network.weights(), slow.network.weights)
+    assert np.array_equal(agent.network.thresholds(), slow.network.thresholds)
+    assert np.array_equal(agent.network.potentials(state), slow.network.potentials(state))
+    return n_corrected, n_random
+
+
+def test_learning_agrees_with_the_paper_over_5000_transitions():
+    n_corrected, n_random = learn_side_by_side(
+        _core.SdnnCConfig(), _core.QLearningConfig(), n_steps=5000
+    )
+    assert n_corrected > 5000
+    assert 150 < n_random < 500, "a tenth of the later steps"
+
+
+@pytest.mark.parametrize(("n_sensors", "noise"), [(5, 0.02), (6, 0.0)])
+def test_learning_agrees_with_the_paper_with_more_sensors(n_sensors, noise):
+    network = _core.SdnnCConfig(n_inputs=n_sensors)
+    learning = _core.QLearningConfig(tie_rule=_core.TieRule.middle)
+    learn_side_by_side(network, learning, 200, n_sensors=n_sensors, noise=noise)
+
+
+def test_learning_agrees_with_the_paper_at_odd_sizes():
+    network = _core.SdnnCConfig(
+        n_pattern_units=37,
+        n_hidden_units=149,
+        n_active_units=45,
+        n_actions=7,
+        circular=[True, True, False, False],
+        lattice=8,
+        initial_weights=_core.InitialWeights.uniform,
+        initial_threshold=10.0,
+    )
+    learning = _core.QLearningConfig(learning_rate=0.3, discount=0.99, epsilon=0.5)
+    n_corrected, _ = learn_side_by_side(network, learning, 2000, noise=0.02)
+    assert n_corrected > 1500
+
+
+def test_one_transition_by_hand():
+    agent = small_agent(seed=1, learning=QLearningConfig(learning_rate=1.0))
+    state, following = [0.1, 0.2, 0.3], [1.5, -1.0, 0.0]
+    for _ in range(200):
+        agent.learn(Transition(state, [-1.0], 10.0, following, True))
+    # Terminated: Q becomes r = 10, at the nearest count: 15 + 10 * 26 / 40 = 21.5, rounded to 22.
+    assert agent.q_values(state)[0] == paper.g(22, 2, 28, -20.0, 20.0)
+    for _ in range(200):
+        agent.learn(Transition(following, [3.0], 1.0, state, False))
+    # Otherwise r + 0.9 max Q(s'), whose windows may share units with those just corrected.
+    best = agent.q_values(state).max()
+    expected = paper.g(paper.g_inverse(1 + 0.9 * best, 2, 28, -20.0, 20.0), 2, 28, -20.0, 20.0)
+    assert agent.q_values(following)[-1] == expected
+
+
+# A loop in Python lives the compiled trial.
+
+
+def python_trial(*, n_sensors, noise, n_episodes, test_interval, seed):
+    """The paper's protocol written with the Python rooms; rows as the trial gives them."""
+
+    def make_env(stream):
+        env = AcrobotSwingUpEnv(
+            config=AcrobotConfig(), goal_schedule=GoalSchedule(), dtype="float64"
+        )
+        env = RedundantSensors(env, ("energy", "height")[: n_sensors - 4])
+        return NoisySensors(env, sigma=noise, seed=seed, stream=stream)
+
+    learning_env = make_env("sensor_noise")
+    test_env = make_env("evaluation_sensor_noise")
+    agent = SDNNQLearning(learning_env.observation_space, learning_env.action_space, seed=seed)
+    n_decisions = 0
+
+    def run(env, episode, learning):
+        nonlocal n_decisions
+        observation, _ = env.reset(options={"episode": episode})
+        agent.begin_episode()
+        steps, total, over = 0, 0.0, False
+        while not over:
+            action = agent.act(observation, explore=learning)
+            following, reward, terminated, truncated, _ = env.step(action)
+            if learning:
+                agent.learn(Transition(observation, action, reward, following, terminated))
+            observation = following
+            steps += 1
+            total += reward
+            over = terminated or truncated
+        n_decisions += steps
+        return steps, total, terminated
+
+    rows = []
+    for episode in range(1, n_episodes + 1):
+        run(learning_env, episode, True)
+        if episode % test_interval == 0:
+            rows.append((episode, *run(test_env, episode, False)))
+    return rows, n_decisions
+
+
+@pytest.mark.parametrize(("n_sensors", "noise"), [(4, 0.0), (4, 0.02), (5, 0.02), (6, 0.02)])
+def test_a_python_loop_reproduces_the_compiled_trial(n_sensors, noise):
+    n_episodes, test_interval, seed = 60, 5, 11
+    trial = _core.AcrobotTrial(
+        network=SDNNCConfig(n_inputs=n_sensors).to_core(),
+        learning=QLearningConfig().to_core(),
+        acrobot=AcrobotConfig().to_core(),
+        goal=GoalScheduleConfig().to_core(),
+        sensors=SensorConfig(n_sensors=n_sensors, noise=noise).to_core(),
+        protocol=_core.ProtocolConfig(n_learning_episodes=n_episodes, test_interval=test_interval),
+        seed=seed,
+    )
+    trial.advance(n_episodes)
+    columns = trial.test_rows()
+    names = ("episode", "steps", "episode_return", "solved")
+    expected = list(zip(*(columns[name].tolist() for name in names), strict=True))
+    rows, n_decisions = python_trial(
+        n_sensors=n_sensors,
+        noise=noise,
+        n_episodes=n_episodes,
+        test_interval=test_interval,
+        seed=seed,
+    )
+    assert rows == expected
+    assert n_decisions == trial.n_decisions
+
+
+# The Python face.
+
+
+def test_the_defaults_are_those_of_the_core():
+    core = _core.QLearningConfig()
+    for field in dataclasses.fields(QLearningConfig):
+        value = getattr(core, field.name)
+        value = value.name if field.name == "tie_rule" else value
+        assert getattr(QLearningConfig(), field.name) == value, field.name
+    public = {name for name in dir(core) if not name.startswith("_")}
+    assert public == {field.name for field in dataclasses.fields(QLearningConfig)}
+
+
+def test_every_field_reaches_the_core():
+    other = QLearningConfig(
+        learning_rate=0.25, discount=0.5, epsilon=0.75, n_greedy_steps=3, tie_rule="lowest"
+    )
+    core = other.to_core()
+    for field in dataclasses.fields(QLearningConfig):
+        value = getattr(core, field.name)
+        value = value.name if field.name == "tie_rule" else value
+        assert getattr(other, field.name) == value != field.default, field.name
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"tie_rule": "first"}, "tie_rule must be one of 'uniform', 'lowest', 'middle'"),
+        ({"tie_rule": None}, "tie_rule must be one of"),
+        ({"learning_rate": 0.0}, r"learning_rate must be in \(0, 1\], got 0"),
+        ({"learning_rate": float("nan")}, "learning_rate"),
+        ({"discount": 1.5}, r"discount must be in \[0, 1\], got 1.5"),
+        ({"epsilon": -0.1}, r"epsilon must be in \[0, 1\], got -0.1"),
+        ({"n_greedy_steps": -1}, "n_greedy_steps"),
+    ],
+)
+def test_impossible_settings_are_named(change, message):
+    with pytest.raises(ValueError, match=message):
+        small_agent(learning=QLearningConfig(**change))
+
+
+@pytest.mark.parametrize(
+    ("observations", "actions", "error", "message"),
+    [
+        (gym.spaces.Discrete(3), TORQUES, TypeError, "observation_space must be a Box"),
+        (gym.spaces.Box(0, 1, (2, 2)), TORQUES, ValueError, "observation_space must have shape"),
+        (gym.spaces.Box(-np.inf, np.inf, (2,)), TORQUES, ValueError, "finite bounds"),
+        (gym.spaces.Box(0, 0, (2,)), TORQUES, ValueError, "low < high"),
+        (gym.spaces.Box(0, 1, (1,)), TORQUES, ValueError, "n_inputs must be in"),
+        (OBSERVATIONS, gym.spaces.MultiBinary(2), TypeError, "action_space must be a Box or"),
+        (OBSERVATIONS, gym.spaces.Box(0, 1, (2,)), ValueError, "action_space must have 1 dim"),
+        (OBSERVATIONS, gym.spaces.Box(0, np.inf, (1,)), ValueError, "action_space must have fin"),
+        (OBSERVATIONS, gym.spaces.Discrete(92), ValueError, "n_actions must be in"),
+    ],
+)
+def test_spaces_that_do_not_fit_are_named(observations, actions, error, message):
+    with pytest.raises(error, match=message):
+        SDNNQLearning(observations, actions, network=SMALL)
+
+
+def test_a_box_of_actions_is_cut_evenly():
+    agent = small_agent()
+    assert agent.n_actions == 91
+    assert np.allclose(agent.actions, np.linspace(-1, 3, 91), rtol=0, atol=1e-12)
+    agent.begin_episode()
+    action = agent.act([0.0, 0.0, 0.0])
+    assert action.shape == (1,)
+    assert action.dtype == np.float32
+    assert action in TORQUES
+    assert agent.q_values([0.0, 0.0, 0.0]).tolist() == [0.0] * 91
+
+
+def test_every_action_of_a_box_is_learned_as_itself():
+    agent = small_agent()
+    for index, torque in enumerate(agent.actions):
+        for told in (np.array([torque], dtype=np.float32), [torque], torque):
+            agent_index = agent._index(np.clip(told, -1.0, 3.0))
+            assert agent_index == index
+
+
+def test_a_discrete_space_has_one_window_per_action():
+    agent = small_agent(BUTTONS, seed=2, learning=QLearningConfig(tie_rule="lowest"))
+    assert agent.n_actions == 4
+    assert agent.actions.tolist() == [2, 3, 4, 5]
+    observation = [0.5, -0.5, 0.0]
+    for _ in range(100):
+        agent.learn(Transition(observation, 4, 10.0, observation, True))
+    assert agent.q_values(observation).argmax() == 2
+    action = agent.act(observation, explore=False)
+    assert action == 4
+    assert action in BUTTONS
+
+
+def test_observations_are_scaled_by_the_bounds_and_saturate():
+    agent = small_agent()
+    agent.learn(Transition([2.0, -2.0, 0.0], [3.0], 10.0, [0.0, 0.0, 0.0], True))
+    inside = agent.q_values([2.0, -2.0, 0.0])
+    assert np.array_equal(agent.q_values([7.0, -np.inf, 0.0]), inside)
+    assert np.array_equal(agent.q_values(np.array([2, -2, 0], dtype=np.int8)), inside)
+    assert np.array_equal(agent.q_values(np.float32([2.0, -2.0, 0.0])), inside)
+    core = agent._core.network
+    assert np.array_equal(core.values([1.0, 0.0, 0.5]), inside)
+
+
+BAD_OBSERVATIONS = [
+    ([0.0, np.nan, 0.0], "must not hold NaN"),
+    ([0.0, 0.0], r"must have shape \(3,\), got \(2,\)"),
+    ([[0.0, 0.0, 0.0]], r"must have shape \(3,\), got \(1, 3\)"),
+    (0.0, r"must have shape \(3,\), got \(\)"),
+    (["a", "b", "c"], "could not convert"),
+]
+
+
+@pytest.mark.parametrize(("observation", "message"), BAD_OBSERVATIONS)
+def test_bad_observations_are_named_and_teach_nothing(observation, message):
+    agent = small_agent()
+    good = [0.0, 0.0, 0.0]
+    before = agent._core.network.weights()
+    for use in (
+        lambda: agent.act(observation),
+        lambda: agent.q_values(observation),
+        lambda: agent.learn(Transition(observation, [0.0], 1.0, good, False)),
+        lambda: agent.learn(Transition(good, [0.0], 1.0, observation, False)),
+    ):
+        with pytest.raises(ValueError, match=message):
+            use()
+    assert np.array_equal(agent._core.network.weights(), before)
+
+
+@pytest.mark.parametrize(
+    ("actions", "action"),
+    [
+        (TORQUES, [3.1]),
+        (TORQUES, [np.nan]),
+        (TORQUES, [0.0, 0.0]),
+        (TORQUES, []),
+        (BUTTONS, 1),
+        (BUTTONS, 6),
+    ],
+)
+def test_bad_actions_are_named_and_teach_nothing(actions, action):
+    agent = small_agent(actions)
+    good = [0.0, 0.0, 0.0]
+    before = agent._core.network.weights()
+    with pytest.raises(ValueError, match="action must be"):
+        agent.learn(Transition(good, action, 1.0, good, False))
+    assert np.array_equal(agent._core.network.weights(), before)
+
+
+@pytest.mark.parametrize("reward", [np.nan, np.inf, -np.inf])
+def test_bad_rewards_are_named_and_teach_nothing(reward):
+    agent = small_agent()
+    good = [0.0, 0.0, 0.0]
+    before = agent._core.network.weights()
+    with pytest.raises(ValueError, match="reward must be finite"):
+        agent.learn(Transition(good, [0.0], reward, good, False))
+    assert np.array_equal(agent._core.network.weights(), before)
+
+
+def live(env, agent, n_steps, seed=1):
+    """Acts and learns in any environment; returns the actions taken."""
+    observation, _ = env.reset(seed=seed)
+    agent.begin_episode()
+    actions = []
+    for _ in range(n_steps):
+        action = agent.act(observation)
+        following, reward, terminated, truncated, _ = env.step(action)
+        agent.learn(Transition(observation, action, float(reward), following, terminated))
+        observation = following
+        actions.append(np.asarray(action).tolist())
+        if terminated or truncated:
+            observation, _ = env.reset()
+            agent.begin_episode()
+    return actions
+
+
+def test_it_lives_in_pendulum():
+    env = gym.make("Pendulum-v1")
+    agents = [
+        SDNNQLearning(env.observation_space, env.action_space, network=SMALL, seed=3)
+        for _ in range(2)
+    ]
+    first, second = (live(env, agent, 450) for agent in agents)
+    assert first == second, "the same seeds live the same life"
+    assert len({tuple(action) for action in first}) > 20
+    fresh = SDNNQLearning(env.observation_space, env.action_space, network=SMALL, seed=3)
+    weights = [agent._core.network.weights() for agent in (*agents, fresh)]
+    assert np.array_equal(weights[0], weights[1])
+    assert not np.array_equal(weights[0], weights[2])
+
+
+def test_it_lives_in_cart_pole_with_bounds_that_matter():
+    env = gym.make("CartPole-v1")
+    with pytest.raises(ValueError, match="finite bounds"):
+        SDNNQLearning(env.observation_space, env.action_space)
+    bounds = np.array([2.4, 3.0, 0.21, 3.0])
+    agent = SDNNQLearning(
+        gym.spaces.Box(-bounds, bounds, dtype=np.float64),
+        env.action_space,
+        network=SMALL,
+        seed=3,
+    )
+    assert agent.n_actions == 2
+    assert set(live(env, agent, 300)) == {0, 1}
+
+
+def test_evaluation_has_no_effect_on_learning():
+    agents = [small_agent(seed=5) for _ in range(2)]
+    rng = np.random.default_rng(0)
+    for step in range(300):
+        observation, following = rng.uniform(-2, 2, (2, 3))
+        if step % 20 == 0:
+            for _ in range(step % 7):
+                agents[1].act(observation, explore=False)
+            for agent in agents:
+                agent.begin_episode()
+        first, second = (agent.act(observation) for agent in agents)
+        assert np.array_equal(first, second)
+        for agent in agents:
+            agent.learn(Transition(observation, first, 1.0, following, False))
+    weights = [agent._core.network.weights() for agent in agents]
+    assert np.array_equal(*weights)
+
+
+def test_a_bad_row_of_values_is_refused():
+    policy = _core.EpsilonGreedy(seed=1)
+    with pytest.raises(ValueError, match="values must be not empty"):
+        policy.select([], 0)
+    with pytest.raises(ValueError, match="values must be numbers"):
+        policy.select([np.nan, np.nan], 0)
+
+
+def test_docstrings():
+    module = importlib.import_module("sdnn.agents.q_learning")
+    result = doctest.testmod(module)
+    assert result.failed == 0
+    assert result.attempted > 0

@@ -1,0 +1,434 @@
+import dataclasses
+import doctest
+import importlib
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import paper_transcription as paper
+from handed_over import transcribe
+from sdnn import _core
+from sdnn.approximators import SDNNC, SDNNCConfig
+
+SMALL = {
+    "n_inputs": 3,
+    "n_pattern_units": 40,
+    "n_hidden_units": 120,
+    "n_active_units": 30,
+}
+
+ODD_SIZES = {
+    "two inputs": {"n_inputs": 2, "n_pattern_units": 37, "n_hidden_units": 101},
+    "three inputs": {"n_inputs": 3, "n_pattern_units": 65, "n_hidden_units": 129},
+    "five inputs": {"n_inputs": 5, "n_pattern_units": 50, "n_hidden_units": 90},
+    "circular": {
+        "n_inputs": 3,
+        "n_pattern_units": 51,
+        "circular": [True, False, True],
+        "n_anchor_patterns": 5,
+        "n_interpolated": 7,
+    },
+    "unbalanced": {"n_inputs": 2, "balanced_anchors": False, "n_pattern_units": 99},
+    "uniform weights on a lattice": {
+        "n_inputs": 3,
+        "initial_weights": _core.InitialWeights.uniform,
+        "initial_weight_limit": 0.9,
+        "initial_threshold": 10.0,
+        "lattice": 8,
+    },
+    "few actions": {"n_inputs": 2, "n_actions": 3, "n_hidden_units": 97},
+    "one action": {"n_inputs": 2, "n_actions": 1},
+    "another output line": {"n_inputs": 2, "q_low": -1.5, "q_high": 4.0, "u_low": 0, "u_high": 33},
+    "windows of all units": {"n_inputs": 2, "n_hidden_units": 33},
+    "more than one word ladder": {"n_inputs": 2, "n_pattern_units": 300},
+}
+ODD_DEFAULTS = {"n_pattern_units": 60, "n_hidden_units": 150, "n_active_units": 33}
+
+
+def next_state(rng, state):
+    """A walk as an agent takes it: mostly near, sometimes far, sometimes at the very ends."""
+    kind = rng.integers(20)
+    if kind == 0:
+        return rng.random(state.size)
+    if kind == 1:
+        return rng.integers(0, 2, state.size).astype(float)
+    return np.clip(state + 0.05 * rng.standard_normal(state.size), 0.0, 1.0)
+
+
+def assert_equal_parameters(core, slow):
+    assert np.array_equal(core.weights(), slow.weights)
+    assert np.array_equal(core.thresholds(), slow.thresholds)
+
+
+def compare_while_learning(config, seed, n_steps, compare_weights_every):
+    """Both learn the same; returns how many steps corrected something."""
+    core = _core.SdnnC(config, seed)
+    slow = transcribe(core)
+    rng = np.random.default_rng(seed)
+    state = rng.random(config.n_inputs)
+    span = config.q_high - config.q_low
+    n_active = 0
+    for step in range(n_steps):
+        action = int(rng.integers(core.n_actions))
+        q_hat = config.q_low + span * float(rng.uniform(-0.2, 1.2))
+        expected = slow.values(state)
+        assert np.array_equal(core.values(state), expected), step
+        assert core.value(state, action) == expected[action]
+        core.correct(state, action, q_hat)
+        n_active += slow.correct(state, action, q_hat) > 0
+        following = next_state(rng, state)
+        if step % compare_weights_every == 0:
+            assert np.array_equal(core.potentials(state), slow.potentials(state)), step
+            assert_equal_parameters(core, slow)
+        state = following
+    assert np.array_equal(core.potentials(state), slow.potentials(state))
+    assert_equal_parameters(core, slow)
+    return n_active
+
+
+def test_the_core_agrees_with_the_paper_over_5000_learning_steps():
+    assert compare_while_learning(_core.SdnnCConfig(), 1, 5000, 1000) > 4500
+
+
+@pytest.mark.parametrize("n_inputs", [5, 6])
+def test_the_core_agrees_with_the_paper_at_its_larger_sizes(n_inputs):
+    assert compare_while_learning(_core.SdnnCConfig(n_inputs=n_inputs), 2, 150, 75) > 100
+
+
+@pytest.mark.parametrize("name", ODD_SIZES)
+def test_the_core_agrees_with_the_paper_at_odd_sizes(name):
+    config = _core.SdnnCConfig(**{**ODD_DEFAULTS, **ODD_SIZES[name]})
+    assert compare_while_learning(config, 3, 500, 100) > 300
+
+
+@settings(max_examples=10, deadline=None, derandomize=True)
+@given(
+    n_inputs=st.integers(2, 4),
+    m=st.integers(2, 70),
+    n=st.integers(1, 140),
+    window=st.floats(0, 1),
+    lattice=st.integers(1, 8),
+    seed=st.integers(0, 2**64 - 1),
+)
+def test_the_core_agrees_with_the_paper_at_any_size(n_inputs, m, n, window, lattice, seed):
+    n_active = 1 + round(window * (n - 1))
+    config = _core.SdnnCConfig(
+        n_inputs=n_inputs,
+        n_pattern_units=m,
+        n_hidden_units=n,
+        n_active_units=n_active,
+        lattice=lattice,
+        initial_threshold=20.0,
+    )
+    core = _core.SdnnC(config, seed)
+    slow = transcribe(core)
+    rng = np.random.default_rng(seed)
+    for _ in range(30):
+        state = rng.random(n_inputs)
+        action = int(rng.integers(core.n_actions))
+        q_hat = float(rng.uniform(-25, 25))
+        assert np.array_equal(core.values(state), slow.values(state))
+        core.correct(state, action, q_hat)
+        slow.correct(state, action, q_hat)
+    assert_equal_parameters(core, slow)
+
+
+def test_the_paper_numbers_of_the_transcription():
+    line = (20, 280, -20.0, 20.0)
+    assert [paper.g(u, *line) for u in (0, 20, 150, 163, 280, 300)] == [-20, -20, 0, 2, 20, 20]
+    assert all(paper.g(u, *line) == (2 * u - 300) / 13 for u in range(20, 281))
+    assert paper.evenly_spread_windows(900, 300, 601) == list(range(601))
+    x_mu = np.array([1, 1, -1, -1], dtype=np.int8)
+    x_nu = np.array([1, -1, 1, -1], dtype=np.int8)
+    assert paper.desensitize(x_mu, x_nu).tolist() == [1, 0, -1, 0]
+
+
+# Wiring: what the core draws at random must be what section 3.1 describes.
+
+
+@pytest.fixture(scope="module")
+def paper_network():
+    return _core.SdnnC(_core.SdnnCConfig(), 5)
+
+
+@pytest.mark.parametrize("circular", [False, True])
+def test_code_books_follow_the_anchor_rule(circular):
+    core = _core.SdnnC(_core.SdnnCConfig(circular=[circular] * 4), 5)
+    for mu in range(4):
+        book = core.code_book(mu)
+        assert book.shape == (360, 200)
+        assert set(np.unique(book)) == {-1, 1}
+        for anchor in range(8):
+            stretch = book[45 * anchor : 45 * (anchor + 1)]
+            assert stretch[0].sum() == 0, "anchors are balanced"
+            if anchor < 7 or circular:
+                after = book[45 * (anchor + 1) % 360]
+                differing = np.flatnonzero(stretch[0] != after)
+                flipped = [np.flatnonzero(row != stretch[0]) for row in stretch]
+                assert [f.size for f in flipped] == [j * differing.size // 45 for j in range(45)]
+                for fewer, more in zip(flipped, [*flipped[1:], differing], strict=True):
+                    assert set(fewer) <= set(more), "a unit flips once between two anchors"
+
+
+def test_the_ends_of_a_range_are_alike_only_if_circular():
+    for circular, most in ((True, 6), (False, None)):
+        core = _core.SdnnC(_core.SdnnCConfig(circular=[circular] * 4), 5)
+        for mu in range(4):
+            book = core.code_book(mu)
+            distance = int((book[0] != book[359]).sum())
+            assert distance <= most if circular else distance > 60
+
+
+def test_code_books_of_two_inputs_are_independent(paper_network):
+    first, second = (paper_network.code_book(mu).astype(int) for mu in (0, 1))
+    anchors = [45 * i for i in range(8)]
+    # Balanced random patterns of 200 units: a product of standard deviation about 14.
+    assert np.abs(first[anchors] @ second[anchors].T).max() < 5 * 14.2
+    off_diagonal = first[anchors] @ first[anchors].T - 200 * np.eye(8, dtype=int)
+    assert np.abs(off_diagonal).max() < 5 * 14.2
+
+
+def test_permutations_are_permutations_and_differ(paper_network):
+    seen = set()
+    for mu in range(4):
+        for nu in range(4):
+            if mu == nu:
+                with pytest.raises(ValueError, match="two different inputs"):
+                    paper_network.permutation(mu, nu)
+                continue
+            permutation = paper_network.permutation(mu, nu)
+            assert np.array_equal(np.sort(permutation), np.arange(200))
+            seen.add(tuple(permutation))
+    assert len(seen) == 12
+
+
+def test_about_half_of_layer_3_is_neutral(paper_network):
+    x_sd = transcribe(paper_network).x_sd(np.array([0.1, 0.4, 0.6, 0.8]))
+    assert x_sd.shape == (2400,)
+    assert abs((x_sd == 0).mean() - 0.5) < 0.05
+    anchors = transcribe(paper_network).x_sd(np.array([0.0, 0.125, 0.25, 0.5]))
+    assert (anchors == 0).sum() == 1200, "exactly half with balanced modifiers"
+
+
+def test_initial_parameters_are_those_of_the_reading(paper_network):
+    assert paper_network.thresholds()[:4].tolist() == [-200, 200, -200, 200]
+    values, counts = np.unique(paper_network.weights(), return_counts=True)
+    assert values.tolist() == [-1, 0, 1]
+    assert np.allclose(counts / (900 * 2400), [0.25, 0.5, 0.25], atol=2e-3)
+
+
+# Properties.
+
+states = st.lists(st.floats(0, 1), min_size=3, max_size=3)
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(
+    state=states, action=st.integers(0, 90), target=st.floats(allow_nan=False), n=st.integers(1, 8)
+)
+def test_a_correction_never_moves_the_value_away_from_the_target(state, action, target, n):
+    network = _core.SdnnC(_core.SdnnCConfig(**SMALL), 1)
+    goal = paper.g(paper.g_inverse(target, 2, 28, -20.0, 20.0), 2, 28, -20.0, 20.0)
+    before = network.value(state, action)
+    assert before == 0.0
+    for _ in range(n):
+        network.correct(state, action, target)
+        after = network.value(state, action)
+        assert min(before, goal) <= after <= max(before, goal)
+        before = after
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(state=states, other=states, target=st.floats(-30, 30))
+def test_asking_changes_nothing(state, other, target):
+    asked = _core.SdnnC(_core.SdnnCConfig(**SMALL), 1)
+    silent = _core.SdnnC(_core.SdnnCConfig(**SMALL), 1)
+    for _ in range(4):
+        asked.values(other)
+        asked.value(state, 3)
+        asked.correct(state, 5, target)
+        silent.correct(state, 5, target)
+    assert np.array_equal(asked.weights(), silent.weights())
+    assert np.array_equal(asked.values(other), silent.values(other))
+
+
+@settings(max_examples=10, deadline=None, derandomize=True)
+@given(state=states, seed=st.integers(0, 2**64 - 1))
+def test_parameters_go_out_and_in_again(state, seed):
+    network = _core.SdnnC(_core.SdnnCConfig(**SMALL), seed)
+    for action in range(0, 90, 10):
+        network.correct(state, action, 15.0)
+    twin = _core.SdnnC(_core.SdnnCConfig(**SMALL), seed)
+    twin.set_parameters(network.weights(), network.thresholds())
+    assert np.array_equal(twin.weights(), network.weights())
+    assert np.array_equal(twin.thresholds(), network.thresholds())
+    assert np.array_equal(twin.values(state), network.values(state))
+
+
+def test_c_scales_weights_and_changes_no_decision():
+    small, large = (
+        SDNNC(SDNNCConfig(**SMALL, learning_coefficient=c), seed=1) for c in (0.125, 8.0)
+    )
+    state = [0.1, 0.5, 0.9]
+    for _ in range(30):
+        small.correct(state, 7, 12.0)
+        large.correct(state, 7, 12.0)
+    assert np.array_equal(small.values(state), large.values(state))
+    assert np.array_equal(64 * small.weights(), large.weights())
+    assert np.array_equal(64 * small.thresholds(), large.thresholds())
+
+
+# The Python face.
+
+
+def test_the_defaults_are_those_of_the_core():
+    core = _core.SdnnCConfig()
+    config = SDNNCConfig()
+    for field in dataclasses.fields(SDNNCConfig):
+        value = getattr(core, field.name)
+        if field.name == "circular":
+            value = tuple(value)
+        if field.name == "initial_weights":
+            value = value.name
+        assert getattr(config, field.name) == value, field.name
+    public = {name for name in dir(core) if not name.startswith("_")}
+    assert public == {field.name for field in dataclasses.fields(SDNNCConfig)}
+
+
+def test_every_field_reaches_the_core():
+    other = SDNNCConfig(
+        n_inputs=2,
+        n_pattern_units=30,
+        n_anchor_patterns=4,
+        n_interpolated=5,
+        balanced_anchors=False,
+        circular=(True, False),
+        n_hidden_units=70,
+        n_active_units=20,
+        n_actions=9,
+        q_low=-1.0,
+        q_high=2.0,
+        u_low=3,
+        u_high=18,
+        learning_coefficient=0.5,
+        lattice=4,
+        initial_threshold=50.25,
+        initial_weights="uniform",
+        initial_weight_limit=0.75,
+    )
+    core = other.to_core()
+    for field in dataclasses.fields(SDNNCConfig):
+        assert getattr(other, field.name) != field.default, field.name
+        value = getattr(core, field.name)
+        expected = getattr(other, field.name)
+        if field.name == "circular":
+            expected = list(expected)
+        if field.name == "initial_weights":
+            value = value.name
+        assert value == expected, field.name
+    assert SDNNC(other, seed=1).n_actions == 9
+
+
+def test_configurations_are_frozen_and_keyword_only():
+    with pytest.raises(TypeError):
+        SDNNCConfig(4)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        SDNNCConfig().n_inputs = 5
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"n_active_units": 901}, r"n_active_units must be in \[1, 900\], got 901"),
+        ({"n_inputs": 1}, r"n_inputs must be in \[2, 1024\], got 1"),
+        ({"circular": (True,)}, "circular must be empty or one flag per input, got 1"),
+        ({"u_low": -1}, "u_low must be"),
+        ({"initial_weights": "large"}, "initial_weights must be one of 'ternary', 'uniform'"),
+        ({"n_pattern_units": 5000}, "n_pattern_units must be at most 4096, got 5000"),
+        ({"initial_weights": "uniform", "initial_weight_limit": 1e300}, "initial_weight_limit"),
+    ],
+)
+def test_impossible_configurations_are_named(change, message):
+    with pytest.raises(ValueError, match=message):
+        SDNNC(SDNNCConfig(**change))
+
+
+@pytest.mark.parametrize("seed", [-1, 2**64, 0.5, "1"])
+def test_impossible_seeds(seed):
+    with pytest.raises((TypeError, ValueError, OverflowError)):
+        SDNNC(SDNNCConfig(**SMALL), seed=seed)
+
+
+@pytest.mark.parametrize(
+    ("state", "message"),
+    [
+        ([0.1, np.nan, 0.2], r"state\[1\] must be in \[0, 1\], got nan"),
+        ([0.1, 0.2, 1.5], r"state\[2\] must be in \[0, 1\], got 1.5"),
+        ([0.1, 0.2, -np.inf], r"state\[2\]"),
+        ([0.1, 0.2], "state must be 3 values, got 2"),
+        ([[0.1, 0.2, 0.3]], "state must have one dimension, got 2"),
+        ([], "state must be 3 values, got 0"),
+        (0.5, "state must have one dimension, got 0"),
+    ],
+)
+def test_bad_states_are_named_and_change_nothing(state, message):
+    network = SDNNC(SDNNCConfig(**SMALL), seed=1)
+    before = network.weights()
+    for use in (
+        lambda: network.values(state),
+        lambda: network.value(state, 0),
+        lambda: network.correct(state, 0, 1.0),
+    ):
+        with pytest.raises(ValueError, match=message):
+            use()
+    assert np.array_equal(network.weights(), before)
+
+
+def test_bad_actions_and_targets_are_named():
+    network = SDNNC(SDNNCConfig(**SMALL), seed=1)
+    state = [0.1, 0.2, 0.3]
+    with pytest.raises(ValueError, match="action must be less than 91, got 91"):
+        network.value(state, 91)
+    with pytest.raises(ValueError, match="target must be a number, got nan"):
+        network.correct(state, 0, np.nan)
+    with pytest.raises(TypeError):
+        network.value(state, -1)
+    with pytest.raises((TypeError, ValueError)):
+        network.values(["a", "b", "c"])
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        list,
+        tuple,
+        np.asarray,
+        lambda state: np.repeat(state, 2)[::2],
+        lambda state: np.array(state[::-1])[::-1],
+        lambda state: np.array(state, dtype=">f8"),
+        lambda state: np.array(state, dtype=np.float32),
+    ],
+)
+def test_states_of_any_layout(make):
+    network = SDNNC(SDNNCConfig(**SMALL), seed=1)
+    state = [0.125, 0.5, 0.875]
+    network.correct(state, 3, 20.0)
+    assert np.array_equal(network.values(make(state)), network.values(np.array(state)))
+
+
+def test_returned_arrays_are_copies():
+    network = SDNNC(SDNNCConfig(**SMALL), seed=1)
+    state = [0.1, 0.2, 0.3]
+    for read in (lambda: network.values(state), network.weights, network.thresholds):
+        array = read()
+        array += 1.0
+        assert not np.array_equal(array, read())
+
+
+def test_docstrings():
+    module = importlib.import_module("sdnn.approximators.sdnn_c")
+    result = doctest.testmod(module)
+    assert result.failed == 0
+    assert result.attempted > 0

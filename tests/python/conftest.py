@@ -1,0 +1,57 @@
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+# Small matrix products are slower on several threads than on one, far slower on a busy machine.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+@pytest.fixture(scope="session")
+def skip_unless_ci():
+    """Skips for a missing tool; where everything has to be tested (CI is set), fails instead."""
+
+    def _skip(reason):
+        if os.environ.get("CI"):
+            pytest.fail(f"{reason} (CI is set, so nothing may be skipped)")
+        pytest.skip(reason)
+
+    return _skip
+
+
+def _tool(name):
+    beside = Path(sys.executable).with_name(name)
+    return shutil.which(name) or (str(beside) if beside.exists() else None)
+
+
+@pytest.fixture(scope="session")
+def cmake(skip_unless_ci):
+    """Runs cmake, or with ``tool="ctest"`` its test driver; returns the finished process."""
+    if _tool("cmake") is None or _tool("ctest") is None:
+        skip_unless_ci("needs cmake: pip install cmake")
+    if all(_tool(compiler) is None for compiler in (os.environ.get("CXX", "c++"), "g++")):
+        skip_unless_ci("needs a C++ compiler")
+
+    def _run(*arguments, tool="cmake"):
+        command = [_tool(tool), *map(str, arguments)]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    return _run
+
+
+@pytest.fixture(scope="session")
+def configure(cmake):
+    """Configures a source folder into a build folder; finds Eigen as a wheel too."""
+
+    def _configure(source, build, *options):
+        generator = ["-G", "Ninja"] if _tool("ninja") else []
+        site = sysconfig.get_path("purelib")
+        eigen = Path(site) / "cmeel.prefix" / "share" / "eigen3" / "cmake"
+        hint = [f"-DEigen3_DIR={eigen}"] if eigen.is_dir() else []
+        return cmake("-S", source, "-B", build, *generator, *hint, *options)
+
+    return _configure

@@ -1,0 +1,74 @@
+"""The portable elementary functions against mpmath with 200 bits."""
+
+import mpmath
+import numpy as np
+import pytest
+
+from sdnn import _core
+
+
+@pytest.fixture(autouse=True)
+def precision():
+    with mpmath.workprec(200):
+        yield
+
+
+def worst_ulp(got, exact):
+    """The largest error in units of the last place of the exact value."""
+    return max(
+        float(abs(mpmath.mpf(float(g)) - e) / mpmath.mpf(float(np.spacing(abs(float(e))))))
+        for g, e in zip(got, exact, strict=True)
+    )
+
+
+def arguments(limit, n, seed):
+    """Uniform numbers, and neighbours of multiples of pi/2, where digits cancel."""
+    rng = np.random.default_rng(seed)
+    multiples = rng.integers(1, int(limit * 2 / np.pi) + 2, n // 4)
+    near = np.array([float(int(k) * mpmath.pi / 2) for k in multiples])
+    return np.concatenate([rng.uniform(-limit, limit, n), near[near <= limit]])
+
+
+@pytest.mark.parametrize("limit", [0.8, np.pi, 100.0, 1e5])
+def test_sin_cos_is_within_its_error(limit):
+    x = arguments(limit, 4000, seed=1)
+    sin, cos = _core.sin_cos(x)
+    assert worst_ulp(sin, [mpmath.sin(mpmath.mpf(float(v))) for v in x]) < 0.85
+    assert worst_ulp(cos, [mpmath.cos(mpmath.mpf(float(v))) for v in x]) < 0.85
+
+
+def test_sin_cos_of_tiny_and_bad_numbers():
+    tiny = np.array([5e-324, -1e-310, 1e-200, 1e-9, -0.0])
+    sin, cos = _core.sin_cos(tiny)
+    np.testing.assert_array_equal(sin, tiny)
+    np.testing.assert_array_equal(np.signbit(sin), np.signbit(tiny))
+    np.testing.assert_array_equal(cos, 1.0)
+    assert np.isnan(_core.sin_cos(np.array([np.nan, np.inf, -np.inf, 2e5, -1e300]))).all()
+
+
+def test_sin_cos_keeps_the_shape():
+    sin, cos = _core.sin_cos(np.zeros((2, 3)))
+    assert sin.shape == cos.shape == (2, 3)
+
+
+def test_log_is_within_its_error():
+    rng = np.random.default_rng(2)
+    x = np.concatenate(
+        [
+            rng.uniform(0.0, 1.0, 3000),
+            rng.uniform(0.5, 2.0, 4000),
+            np.exp(rng.uniform(-744.0, 709.0, 3000)),
+            1.0 + rng.uniform(-1e-5, 1e-5, 1000),
+        ]
+    )
+    assert worst_ulp(_core.log(x), [mpmath.log(mpmath.mpf(float(v))) for v in x]) < 0.85
+
+
+def test_normal_quantile_inverts_the_distribution_function():
+    rng = np.random.default_rng(3)
+    p = np.concatenate([rng.uniform(0.0, 1.0, 300), 10.0 ** rng.uniform(-300.0, 0.0, 200)])
+    for probability, quantile in zip(p, _core.normal_quantile(p), strict=True):
+        exact = mpmath.mpf(float(quantile))
+        for _ in range(3):  # Newton from an almost exact start
+            exact -= (mpmath.ncdf(exact) - float(probability)) / mpmath.npdf(exact)
+        assert abs(float(quantile) / exact - 1) < 1e-15

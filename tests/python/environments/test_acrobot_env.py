@@ -1,0 +1,192 @@
+"""The acrobot swing-up as a Gymnasium environment."""
+
+import doctest
+import importlib
+import re
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import sdnn
+from sdnn import _core
+from sdnn.environments import (
+    AcrobotConfig,
+    AcrobotSwingUpEnv,
+    GoalSchedule,
+    GoalScheduleConfig,
+)
+
+ID = "sdnn/AcrobotSwingUp-v0"
+
+
+@pytest.fixture(autouse=True)
+def no_screen(monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    monkeypatch.setitem(AcrobotSwingUpEnv.metadata, "render_fps", 1000)  # no waiting
+
+
+def shares(n, seed=0):
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, n)
+
+
+@pytest.mark.parametrize("render_mode", [None, "rgb_array", "human"])
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_check_env(render_mode, dtype):
+    env = gym.make(f"sdnn:{ID}", render_mode=render_mode, dtype=dtype)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped)
+    env.close()
+
+
+def test_importing_the_package_registers_the_environment():
+    assert ID in gym.registry
+    sdnn.environments.register_environments()
+    assert isinstance(gym.make(ID).unwrapped, AcrobotSwingUpEnv)
+
+
+def test_spaces():
+    env = AcrobotSwingUpEnv()
+    assert env.observation_space == gym.spaces.Box(0.0, 1.0, (4,), np.float32)
+    assert env.action_space == gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
+    env = AcrobotSwingUpEnv(config=AcrobotConfig(max_torque=3.0), dtype="float64")
+    assert env.observation_space == gym.spaces.Box(0.0, 1.0, (4,), np.float64)
+    assert env.action_space == gym.spaces.Box(-1.0, 1.0, (1,), np.float64)
+
+
+def test_equals_the_core_bit_for_bit():
+    env = AcrobotSwingUpEnv(dtype="float64")
+    core = _core.Acrobot(AcrobotConfig().to_core())
+    sensors = _core.AcrobotSensors(_core.SensorConfig(), 1, _core.Stream.sensor_noise)
+    schedule = GoalSchedule()
+    n_ends = 0
+    for episode in range(1, 41):
+        observation, info = env.reset()
+        core.reset()
+        np.testing.assert_array_equal(observation, sensors.observe(core.state()))
+        assert info["lambda"] == schedule(episode)
+        for share in shares(50, episode):
+            observation, *result, info = env.step(np.array([share]))
+            assert tuple(result) == core.step(10.0 * share, schedule(episode))
+            np.testing.assert_array_equal(info["state"], core.state())
+            np.testing.assert_array_equal(observation, sensors.observe(core.state()))
+            assert info["tip_height"] == core.tip_height()
+            assert info["is_success"] == result[1]
+            if result[1] or result[2]:
+                n_ends += 1
+                break
+    assert n_ends == 40
+
+
+def test_observations_are_in_the_space():
+    env = AcrobotSwingUpEnv()
+    env.reset()
+    for _ in range(5):
+        env.reset()
+        ended = False
+        while not ended:  # always along the motion: as fast as it gets
+            share = 1.0 if env._acrobot.state()[3] >= 0.0 else -1.0
+            observation, _, terminated, truncated, _ = env.step([share])
+            assert env.observation_space.contains(observation)
+            ended = terminated or truncated
+
+
+def test_truncates_by_itself_after_50_decisions():
+    env = gym.make(ID)
+    env.reset()
+    ends = [env.step(np.zeros(1, np.float32))[2:4] for _ in range(50)]
+    assert ends[:49] == [(False, False)] * 49
+    assert ends[49] == (False, True)
+    with pytest.raises(RuntimeError, match="call reset"):
+        env.step(np.zeros(1, np.float32))
+
+
+def test_counts_learning_episodes():
+    env = AcrobotSwingUpEnv()
+    assert env.episode == 0
+    schedule = GoalSchedule()
+    assert [env.reset()[1]["lambda"] for _ in range(3)] == [schedule(k) for k in (1, 2, 3)]
+    assert env.reset(options={"episode": 300})[1]["lambda"] == 0.25
+    assert env.reset()[1]["lambda"] == schedule(301)
+    assert env.reset(seed=5)[1]["lambda"] == schedule(1)
+    assert env.reset(seed=5, options={"episode": 100})[1]["lambda"] == 0.5
+
+
+def test_goal_schedule_is_any_function_of_the_episode():
+    env = AcrobotSwingUpEnv(goal_schedule=lambda episode: 0.5**episode)
+    assert [env.reset()[1]["lambda"] for _ in range(3)] == [0.5, 0.25, 0.125]
+    constant = GoalSchedule(GoalScheduleConfig(kind="constant", constant_value=0.3))
+    assert AcrobotSwingUpEnv(goal_schedule=constant).reset()[1]["lambda"] == 0.3
+    assert "constant" in repr(constant)
+
+
+def test_bad_arguments():
+    env = AcrobotSwingUpEnv()
+    with pytest.raises(gym.error.ResetNeeded):
+        env.step([0.0])
+    env.reset()
+    for bad in (np.nan, np.inf, -np.inf, 1.01, -1.01):
+        with pytest.raises(ValueError, match=re.escape("action must be one number in [-1, 1]")):
+            env.step([bad])
+    with pytest.raises(ValueError, match=re.escape("one number in [-1, 1], got [0.0, 0.0]")):
+        env.step([0.0, 0.0])
+    with pytest.raises(ValueError, match="episode must be at least 1, got 0"):
+        env.reset(options={"episode": 0})
+    with pytest.raises(TypeError):
+        env.reset(options={"episode": 1.5})
+    with pytest.raises(ValueError, match="'epsiode'"):
+        env.reset(options={"epsiode": 3})
+    with pytest.raises(ValueError, match="dtype must be one of"):
+        AcrobotSwingUpEnv(dtype="float16")
+    with pytest.raises(ValueError, match="render_mode"):
+        AcrobotSwingUpEnv(render_mode="ansi")
+    with pytest.raises(ValueError, match="integration_step"):
+        AcrobotSwingUpEnv(config=AcrobotConfig(integration_step=0.03))
+
+
+def test_renders_what_happens():
+    env = AcrobotSwingUpEnv(render_mode="rgb_array")
+    env.reset()
+    hanging = env.render()
+    assert hanging.shape == (500, 500, 3)
+    assert hanging.dtype == np.uint8
+    assert len(np.unique(hanging.reshape(-1, 3), axis=0)) > 20
+    np.testing.assert_array_equal(env.render(), hanging)
+    env.step([1.0])
+    moved = env.render()
+    assert (moved != hanging).any(axis=2).mean() > 0.01
+
+    def is_orange(picture):  # the torque's arrow
+        red, green, blue = np.moveaxis(picture.astype(int), 2, 0)
+        return (red > 200) & (green > 90) & (green < 160) & (blue < 90)
+
+    assert is_orange(hanging).sum() == 0
+    assert is_orange(moved).sum() > 300
+    env.close()
+    env.close()
+
+
+def test_human_mode_draws_by_itself_and_returns_nothing():
+    env = AcrobotSwingUpEnv(render_mode="human")
+    env.reset()
+    env.step([1.0])
+    assert env.render() is None
+    env.close()
+
+
+def test_render_without_a_mode_warns():
+    env = AcrobotSwingUpEnv()
+    env.reset()
+    with pytest.warns(UserWarning, match="render_mode"):
+        assert env.render() is None
+
+
+@pytest.mark.parametrize("name", ["", ".acrobot", ".goal_schedule", ".sensors"])
+def test_doctests(name):
+    module = importlib.import_module(f"sdnn.environments{name}")
+    result = doctest.testmod(module)
+    assert result.attempted > 0
+    assert result.failed == 0

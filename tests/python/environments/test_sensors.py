@@ -1,0 +1,124 @@
+"""Redundant and noisy sensors as wrappers."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from sdnn import _core
+from sdnn.environments import (
+    AcrobotSwingUpEnv,
+    NoisySensors,
+    RedundantSensors,
+    SensorConfig,
+)
+
+
+def run(env, n_episodes=20):
+    """Observations and true states of random episodes."""
+    rng = np.random.default_rng(1)
+    seen, states = [], []
+    for _ in range(n_episodes):
+        observation, info = env.reset()
+        ended = False
+        while True:
+            seen.append(observation)
+            states.append(info["state"])
+            if ended:
+                break
+            action = rng.uniform(-1.0, 1.0, 1)
+            observation, _, terminated, truncated, info = env.step(action)
+            ended = terminated or truncated
+    return seen, states
+
+
+@pytest.mark.parametrize("n_sensors", [4, 5, 6])
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize("stream", ["sensor_noise", "evaluation_sensor_noise"])
+def test_wrappers_equal_the_core_bit_for_bit(n_sensors, noise, stream):
+    functions = ("energy", "height")[: n_sensors - 4]
+    env = RedundantSensors(AcrobotSwingUpEnv(dtype="float64"), functions)
+    env = NoisySensors(env, sigma=noise, seed=42, stream=stream)
+    config = SensorConfig(n_sensors=n_sensors, noise=noise)
+    core = _core.AcrobotSensors(config.to_core(), 42, _core.Stream.__members__[stream])
+    seen, states = run(env)
+    assert len(seen) > 50
+    for observation, state in zip(seen, states, strict=True):
+        assert observation.dtype == np.float64
+        np.testing.assert_array_equal(observation, core.observe(state))
+
+
+def test_spaces_hold_the_observations():
+    env = NoisySensors(RedundantSensors(AcrobotSwingUpEnv()), sigma=0.3)
+    assert env.observation_space == gym.spaces.Box(0.0, 1.0, (6,), np.float32)
+    for observation in run(env)[0]:
+        assert env.observation_space.contains(observation)
+
+
+def test_own_functions_of_the_base_observation():
+    env = RedundantSensors(
+        AcrobotSwingUpEnv(dtype="float64"),
+        (lambda s: s[0] - s[1], "height", lambda s: len(s)),
+        bounds=[(-1.0, 1.0), (0.0, 1.0), (4.0, 4.0)],
+    )
+    np.testing.assert_array_equal(env.observation_space.low, [0, 0, 0, 0, -1, 0, 4])
+    np.testing.assert_array_equal(env.observation_space.high, [1, 1, 1, 1, 1, 1, 4])
+    for observation in run(env)[0]:
+        assert observation[4] == observation[0] - observation[1]
+        assert observation[6] == 4.0
+
+
+def test_edges_can_be_chosen():
+    env = gym.wrappers.TransformObservation(
+        AcrobotSwingUpEnv(), np.ones_like, gym.spaces.Box(0.0, 1.0, (4,), np.float32)
+    )
+    edges = ("saturate", "wrap", "saturate", "saturate")
+    noisy = NoisySensors(env, sigma=0.1, edge=edges, seed=3)
+    seen = np.array([noisy.reset()[0] for _ in range(100)])
+    assert (seen[:, 1] < 0.5).any()
+    assert (seen[:, 0] > 0.5).all()
+    assert (seen[:, 0] == 1.0).any()
+    noisy = NoisySensors(env, sigma=0.1, edge="saturate", seed=3)
+    assert (np.array([noisy.reset()[0] for _ in range(100)]) > 0.5).all()
+
+
+def test_a_seed_at_reset_starts_the_noise_anew():
+    env = NoisySensors(AcrobotSwingUpEnv(), seed=7)
+    first, second = env.reset()[0], env.reset()[0]
+    assert (first != second).all()
+    np.testing.assert_array_equal(env.reset(seed=7)[0], first)
+    np.testing.assert_array_equal(env.reset()[0], second)
+    assert (env.reset(seed=8)[0] != first).all()
+
+
+def test_noise_leaves_the_task_alone():
+    quiet, loud = AcrobotSwingUpEnv(), NoisySensors(AcrobotSwingUpEnv(), sigma=0.5)
+    for clean, noisy in zip(run(quiet)[1], run(loud)[1], strict=True):
+        np.testing.assert_array_equal(clean, noisy)
+
+
+def test_wrappers_are_part_of_the_spec():
+    env = NoisySensors(RedundantSensors(gym.make("sdnn/AcrobotSwingUp-v0")), sigma=0.01, seed=5)
+    again = gym.make(env.spec)
+    np.testing.assert_array_equal(env.reset()[0], again.reset()[0])
+
+
+def test_bad_arguments():
+    env = AcrobotSwingUpEnv()
+    with pytest.raises(ValueError, match="functions must be one of 'energy', 'height'"):
+        RedundantSensors(env, ("speed",))
+    with pytest.raises(ValueError, match="bounds must have 2 entries"):
+        RedundantSensors(env, bounds=[(0.0, 1.0)])
+    with pytest.raises(ValueError, match="noise must be finite and at least 0, got -1"):
+        NoisySensors(env, sigma=-1.0)
+    with pytest.raises(ValueError, match="edge must be one of 'wrap', 'saturate', got 'clip'"):
+        NoisySensors(env, edge="clip")
+    with pytest.raises(ValueError, match="edge must have 4 entries, got 2"):
+        NoisySensors(env, edge=("wrap", "wrap"))
+    with pytest.raises(ValueError, match="seed must be in"):
+        NoisySensors(env, seed=-1)
+    with pytest.raises(ValueError, match="stream must be one of"):
+        NoisySensors(env, stream="weights")
+    with pytest.raises(ValueError, match=r"within \[0, 1\]"):
+        NoisySensors(RedundantSensors(env, ("energy",), bounds=[(0.0, 2.0)]))
+    with pytest.raises(ValueError, match="one-dimensional Box"):
+        NoisySensors(gym.make("Blackjack-v1", disable_env_checker=True))

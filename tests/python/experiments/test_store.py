@@ -1,0 +1,207 @@
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sdnn.experiments import ResultStore, StoreError, TrialKey, TrialRecord, TrialRows
+
+
+def make_record(trial=0, config_hash="aa", steps=(50, 7), **changes):
+    n = len(steps)
+    rows = TrialRows(
+        episode=10 * np.arange(1, n + 1, dtype=np.int32),
+        steps=np.array(steps, np.int32),
+        episode_return=np.linspace(-5.0, 0.1, n),
+        solved=np.array(steps) < 50,
+    )
+    record = TrialRecord(
+        key=TrialKey("s4", "sdnn-c", trial, 2**63 - 1, config_hash),
+        config="{}",
+        version="0.1",
+        n_decisions=57,
+        seconds=0.5,
+        finished_at="2026-01-01T00:00:00+00:00",
+        rows=rows,
+    )
+    return replace(record, **changes)
+
+
+def filled(folder, n_trials=20):
+    with ResultStore(folder) as store:
+        for trial in range(n_trials):
+            store.add(make_record(trial, steps=range(1, 60)))
+        return store.path, store.content_digest()
+
+
+def test_stored_trial_comes_back_exactly(tmp_path):
+    with ResultStore(tmp_path / "new" / "folder") as store:
+        store.add(make_record())
+    with ResultStore(tmp_path / "new" / "folder") as store:
+        (back,) = store.load()
+    expected = make_record()
+    assert replace(back, rows=expected.rows) == expected
+    for name in ("episode", "steps", "episode_return", "solved"):
+        column = getattr(back.rows, name)
+        np.testing.assert_array_equal(column, getattr(expected.rows, name))
+        assert column.dtype == getattr(expected.rows, name).dtype
+
+
+def test_every_row_reaches_its_labels(tmp_path):
+    path, _ = filled(tmp_path, 2)
+    with sqlite3.connect(path) as connection:
+        row = connection.execute(
+            "SELECT case_id, agent, trial, seed, config_hash, version, episode, steps, solved"
+            " FROM labelled_rows ORDER BY trial, episode"
+        ).fetchone()
+    connection.close()
+    assert row == ("s4", "sdnn-c", 0, 2**63 - 1, "aa", "0.1", 10, 1, 1)
+
+
+def test_settings_live_side_by_side(tmp_path):
+    with ResultStore(tmp_path) as store:
+        store.add(make_record(config_hash="aa", steps=(50, 50)))
+        store.add(make_record(config_hash="bb", steps=(3, 3)))
+        (found,) = store.load([make_record(config_hash="bb").key])
+        assert found.rows.steps.tolist() == [3, 3]
+        assert len(store.keys()) == 2
+
+
+def test_same_trial_twice_is_one_trial_and_other_rows_are_refused(tmp_path):
+    with ResultStore(tmp_path) as store:
+        store.add(make_record())
+        store.add(make_record(seconds=9.0))
+        assert len(store.load()) == 1
+        with pytest.raises(StoreError, match="gave two results"):
+            store.add(make_record(steps=(50, 8)))
+        assert store.load()[0].rows.steps.tolist() == [50, 7]
+
+
+def test_digest_sees_rows_and_keys_but_not_times_version_or_order(tmp_path):
+    def digest(name, records):
+        with ResultStore(tmp_path / name) as store:
+            for record in records:
+                store.add(record)
+            return store.content_digest()
+
+    base = digest("1", [make_record(0), make_record(1)])
+    other = make_record(1, seconds=3.0, finished_at="later", version="0.2")
+    assert digest("2", [other, make_record(0)]) == base
+    assert digest("3", [make_record(0), make_record(1, steps=(50, 8))]) != base
+    assert digest("4", [make_record(0), make_record(2)]) != base
+
+
+def test_half_written_trial_leaves_nothing(tmp_path):
+    with ResultStore(tmp_path) as store:
+        bad = make_record()
+        bad.rows.episode[:] = 10  # breaks the primary key at the second row
+        with pytest.raises(StoreError):
+            store.add(bad)
+        assert store.load() == ()
+        store.add(make_record())
+
+
+def test_file_writes_through_to_the_disk(tmp_path):
+    with ResultStore(tmp_path) as store:
+        assert store._connection.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+        assert store._connection.execute("PRAGMA synchronous").fetchone() == (2,)
+
+
+def test_folder_that_is_a_file(tmp_path):
+    (tmp_path / "out").write_text("mine")
+    with pytest.raises(StoreError, match=r"must be a folder, but .*out is a file"):
+        ResultStore(tmp_path / "out")
+    assert (tmp_path / "out").read_text() == "mine"
+
+
+@pytest.mark.parametrize("content", [b"my notes", b"SQLite format 3\0" + bytes(200)])
+def test_damaged_or_other_file_is_named_and_kept(tmp_path, content):
+    path = tmp_path / "results.sqlite"
+    path.write_bytes(content)
+    with pytest.raises(StoreError, match=r"results\.sqlite is damaged or not"):
+        ResultStore(tmp_path)
+    assert path.read_bytes() == content
+
+
+def test_foreign_sqlite_file_is_named_and_kept(tmp_path):
+    path = tmp_path / "results.sqlite"
+    with sqlite3.connect(path) as connection:
+        connection.execute("CREATE TABLE trials (recipe TEXT)")
+    connection.close()
+    content = path.read_bytes()
+    with pytest.raises(StoreError, match=r"results\.sqlite is a SQLite file of another program"):
+        ResultStore(tmp_path)
+    assert path.read_bytes() == content
+    assert os.listdir(tmp_path) == ["results.sqlite"]
+
+
+def test_newer_schema_is_refused(tmp_path):
+    path, _ = filled(tmp_path, 1)
+    with sqlite3.connect(path) as connection:
+        connection.execute("PRAGMA user_version = 99")
+    connection.close()
+    with pytest.raises(StoreError, match=r"schema version 99"):
+        ResultStore(tmp_path)
+
+
+def test_file_of_a_process_killed_before_the_schema_is_used(tmp_path):
+    with sqlite3.connect(tmp_path / "results.sqlite") as connection:
+        connection.execute("PRAGMA journal_mode = WAL")
+    connection.close()
+    assert filled(tmp_path, 1)
+
+
+def test_damaged_bytes_never_give_wrong_rows(tmp_path):
+    path, digest = filled(tmp_path)
+    content = path.read_bytes()
+    expected = make_record(steps=range(1, 60)).rows.digest()
+    generator = np.random.default_rng(1)
+    n_noticed = 0
+    for _ in range(60):
+        damaged = bytearray(content)
+        begin = int(generator.integers(len(content)))
+        damaged[begin : begin + 64] = generator.bytes(len(damaged[begin : begin + 64]))
+        path.write_bytes(damaged)
+        try:
+            with ResultStore(tmp_path) as store:
+                records = store.load()
+        except StoreError as error:
+            message = str(error)
+            n_noticed += 1
+            assert str(path) in message
+            continue
+        # Labels that no figure reads may differ; rows and keys may not.
+        assert len(records) == 20
+        assert {r.rows.digest() for r in records} == {expected}
+    assert n_noticed > 30
+    path.write_bytes(content[: len(content) // 2])
+    with pytest.raises(StoreError, match="damaged"):
+        ResultStore(tmp_path)
+    path.write_bytes(content)
+    with ResultStore(tmp_path) as store:
+        assert store.content_digest() == digest
+
+
+def test_killed_run_resumes_to_the_same_content(tmp_path, fake, run):
+    script = Path(fake.__file__)
+    child = subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path / "killed")],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+    )
+    for _ in range(3):
+        assert child.stdout.readline() == "stored\n"
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    child.stdout.close()
+    plan = fake.make_plan(6, 100)
+    outcome, resumed = run(tmp_path / "killed", plan)
+    assert outcome.n_reused >= 3
+    assert outcome.n_reused + outcome.n_run == len(plan) == 12
+    assert resumed == run(tmp_path / "whole", plan)[1]

@@ -1,0 +1,30 @@
+"""Prints the type stub of the compiled core: python tests/python/reference/core_stub.py."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import sdnn._core
+
+
+def generate() -> str:
+    """The text that ``python/sdnn/_core.pyi`` should have for the installed core."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "pybind11_stubgen", "sdnn._core", "--exit-code"]
+        command += ["--enum-class-locations", ".+:sdnn._core"]
+        done = subprocess.run([*command, "-o", folder], capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise RuntimeError(done.stdout + done.stderr)
+        text = (Path(folder) / "sdnn" / "_core.pyi").read_text()
+    # The tool invents an __all__ that the module does not have, and writes down its version.
+    if not hasattr(sdnn._core, "__all__"):
+        text = re.sub(r"^__all__.*?\]\n", "", text, flags=re.MULTILINE | re.DOTALL)
+    return re.sub(r"^__version__: str = .*$", "__version__: str", text, flags=re.MULTILINE)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(generate())

@@ -1,0 +1,209 @@
+"""What is installed, shipped and imported."""
+
+import os
+import re
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import sdnn
+from sdnn import _core
+
+ROOT = Path(__file__).parents[2]
+EXAMPLE = ROOT / "docs" / "examples" / "cpp"
+STUB = ROOT / "python" / "sdnn" / "_core.pyi"
+STUB_COMMAND = "python tests/python/reference/core_stub.py > python/sdnn/_core.pyi"
+
+
+# The C++ library, installed and used from outside.
+
+
+def run_example(cmake, configure, build, *options):
+    """Builds the example against an installed library; returns the lines it prints."""
+    for done in (configure(EXAMPLE, build, *options), cmake("--build", build)):
+        assert done.returncode == 0, done.stdout + done.stderr
+    program = next(path for path in build.rglob("swing_up*") if os.access(path, os.X_OK))
+    done = subprocess.run([program, "40", "7"], capture_output=True, text=True, check=True)
+    return [tuple(line.split()) for line in done.stdout.splitlines()]
+
+
+def rows_of_trial():
+    """What the example should print: a trial of the same length and seed."""
+    trial = _core.AcrobotTrial(
+        network=_core.SdnnCConfig(),
+        learning=_core.QLearningConfig(),
+        acrobot=_core.AcrobotConfig(),
+        goal=_core.GoalScheduleConfig(),
+        sensors=_core.SensorConfig(),
+        protocol=_core.ProtocolConfig(n_learning_episodes=40),
+        seed=7,
+    )
+    trial.advance(40)
+    rows = trial.test_rows()
+    return [
+        (str(episode), str(steps), "solved" if solved else "-")
+        for episode, steps, solved in zip(
+            rows["episode"], rows["steps"], rows["solved"], strict=True
+        )
+    ]
+
+
+def test_the_cpp_example_builds_against_an_installed_prefix(cmake, configure, tmp_path):
+    prefix = tmp_path / "prefix"
+    for done in (
+        configure(ROOT, tmp_path / "library", f"-DCMAKE_INSTALL_PREFIX={prefix}"),
+        cmake("--install", tmp_path / "library"),
+    ):
+        assert done.returncode == 0, done.stdout + done.stderr
+    installed = {path.relative_to(prefix).as_posix() for path in prefix.rglob("*.hpp")}
+    sources = ROOT / "cpp" / "include"
+    assert installed == {
+        f"include/{path.relative_to(sources).as_posix()}" for path in sources.rglob("*.hpp")
+    }
+    build = tmp_path / "example"
+    lines = run_example(cmake, configure, build, f"-DCMAKE_PREFIX_PATH={prefix}")
+    assert lines == rows_of_trial()
+
+
+def test_the_cpp_example_builds_against_the_installed_package(cmake, configure, tmp_path):
+    command = [sys.executable, "-m", "sdnn", "--cmakedir"]
+    folder = subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    assert (Path(folder) / "sdnnConfig.cmake").is_file()
+    lines = run_example(cmake, configure, tmp_path / "example", f"-Dsdnn_ROOT={folder}")
+    assert lines == rows_of_trial()
+    cache = (tmp_path / "example" / "CMakeCache.txt").read_text()
+    found = re.search(r"^sdnn_DIR:PATH=(.*)$", cache, re.MULTILINE)[1]
+    assert Path(found).resolve() == Path(folder).resolve()
+
+
+def test_no_build_is_tied_to_the_machine_it_ran_on():
+    for path in (*ROOT.rglob("CMakeLists.txt"), *ROOT.glob("cmake/*"), ROOT / "pyproject.toml"):
+        if "build" not in path.relative_to(ROOT).parts:
+            assert not re.search(r"-m(arch|tune|cpu)=|ffast-math", path.read_text()), path
+
+
+# The Python package.
+
+
+def test_importing_sdnn_is_light():
+    heavy = {"matplotlib", "scipy", "pygame", "rich", "click", "sklearn", "pandas"}
+    code = "import sys, sdnn; print(*{name.partition('.')[0] for name in sys.modules})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.split())
+    assert "numpy" in loaded
+    assert loaded & heavy == set()
+
+
+def test_every_public_name_is_there():
+    for name in sdnn.__all__:
+        assert getattr(sdnn, name) is not None
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        _ = sdnn.nothing
+    assert set(sdnn.__all__) <= set(dir(sdnn))
+
+
+def test_the_version_is_that_of_the_build_files():
+    text = (ROOT / "CMakeLists.txt").read_text()
+    assert sdnn.__version__ == re.search(r"project\(sdnn VERSION ([0-9.]+)", text)[1]
+
+
+def test_the_type_stub_is_up_to_date():
+    pytest.importorskip("pybind11_stubgen")
+    import core_stub
+
+    assert STUB.read_text() == core_stub.generate(), f"regenerate it: {STUB_COMMAND}"
+
+
+# What is shipped.
+
+SHIPPED = (
+    r"PKG-INFO|CMakeLists\.txt|pyproject\.toml|\.gitignore|LICENSE|CITATION\.cff|[A-Z]+\.md",
+    r"cmake/[^/]+\.cmake(\.in)?",
+    r"cpp/include/sdnn/([a-z_]+/)?[a-z0-9_]+\.hpp",
+    r"cpp/bindings/([a-z_]+\.[ch]pp|CMakeLists\.txt)",
+    r"python/sdnn/([a-z_]+/)?[a-z_]+\.pyi?|python/sdnn/py\.typed",
+    r"(tests|bench|docs)/.*\.(py|cpp|hpp|txt|md|json|csv|png|svg|ipynb)",
+)
+"""Every file of a source distribution matches one of these."""
+
+NEEDED = (
+    "CMakeLists.txt",
+    "pyproject.toml",
+    "README.md",
+    "LICENSE",
+    "cmake/*",
+    "cpp/include/**/*.hpp",
+    "cpp/bindings/*",
+    "python/sdnn/**/*.py",
+    "python/sdnn/_core.pyi",
+    "python/sdnn/py.typed",
+)
+"""Every file of the tree that matches one of these is in a source distribution."""
+
+
+@pytest.fixture(scope="module")
+def sdist(tmp_path_factory):
+    """A source distribution, built without isolation: nothing is downloaded."""
+    pytest.importorskip("scikit_build_core")
+    out = tmp_path_factory.mktemp("sdist")
+    code = f"from scikit_build_core.build import build_sdist; build_sdist({str(out)!r})"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return next(out.glob("sdnn-*.tar.gz"))
+
+
+def names_in(sdist):
+    with tarfile.open(sdist) as archive:
+        names = [member.name for member in archive.getmembers() if member.isfile()]
+    top = {name.partition("/")[0] for name in names}
+    assert len(top) == 1, top
+    return {name.partition("/")[2] for name in names}
+
+
+def test_the_source_distribution_holds_nothing_but_sources(sdist):
+    rule = re.compile("|".join(f"(?:{pattern})" for pattern in SHIPPED))
+    strangers = [name for name in sorted(names_in(sdist)) if not rule.fullmatch(name)]
+    assert strangers == []
+
+
+def test_the_source_distribution_holds_everything_a_build_needs(sdist):
+    needed = {
+        path.relative_to(ROOT).as_posix()
+        for pattern in NEEDED
+        for path in ROOT.glob(pattern)
+        if path.is_file()
+    }
+    assert len(needed) > 40
+    assert needed <= names_in(sdist)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_a_wheel_built_from_the_source_distribution_is_complete(sdist, tmp_path):
+    for module in ("scikit_build_core", "pybind11", "pip"):
+        pytest.importorskip(module)
+    command = [sys.executable, "-m", "pip", "wheel", "--no-build-isolation", "--no-deps"]
+    done = subprocess.run(
+        [*command, "-w", tmp_path, sdist], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    wheel = next(tmp_path.glob("sdnn-*.whl"))
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+    sources = ROOT / "python"
+    expected = {path.relative_to(sources).as_posix() for path in sources.rglob("*.py")}
+    expected |= {"sdnn/_core.pyi", "sdnn/py.typed", "sdnn/share/cmake/sdnn/sdnnConfig.cmake"}
+    expected |= {
+        f"sdnn/include/{path.relative_to(ROOT / 'cpp' / 'include').as_posix()}"
+        for path in (ROOT / "cpp" / "include").rglob("*.hpp")
+    }
+    assert expected <= names
+    assert any(re.fullmatch(r"sdnn/_core\..*(so|pyd)", name) for name in names)
+    assert not any("Eigen" in name or name.startswith("tests") for name in names)
+    assert wheel.stat().st_size < 1_500_000
