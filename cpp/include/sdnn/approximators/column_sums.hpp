@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 
+#include "sdnn/core/aligned_buffer.hpp"
 #include "sdnn/core/instruction_set.hpp"
 
 #if SDNN_X86_KERNELS
@@ -81,76 +82,78 @@ inline void add_columns_portable(const std::int8_t* block, std::span<const std::
 
 #if SDNN_X86_KERNELS
 
-/// Sixteen 16-bit sums, added to or subtracted from sixteen 32-bit ones.
-[[gnu::target("avx2")]] inline void flush_avx2(__m256i wide, int sign, std::int32_t* sums) {
-  const __m256i halves[2] = {_mm256_cvtepi16_epi32(_mm256_castsi256_si128(wide)),
-                             _mm256_cvtepi16_epi32(_mm256_extracti128_si256(wide, 1))};
-  for (int h = 0; h < 2; ++h) {
-    auto* const at = reinterpret_cast<__m256i*>(sums + 8 * h);
-    const __m256i before = _mm256_loadu_si256(at);
-    _mm256_storeu_si256(at, sign > 0 ? _mm256_add_epi32(before, halves[h])
-                                     : _mm256_sub_epi32(before, halves[h]));
-  }
+// Both vector kernels take two groups of columns at a time: the columns of a group are added in 8
+// bits, the bytes of the two groups are interleaved, and one multiply-add by ones widens and adds
+// them pair by pair. Interleaving leaves the 16-bit sums in an order of their own, undone at the end.
+
+[[gnu::target("avx2"), gnu::always_inline]] inline __m256i group_sum_avx2(const std::int8_t* block,
+                                                                          const std::uint32_t* c,
+                                                                          int group, int half) {
+  const auto bytes = [block, c, half](int k) __attribute__((always_inline)) {
+    return reinterpret_cast<const __m256i*>(block + std::size_t{c[k]} * kBlockUnits) + half;
+  };
+  __m256i sum = _mm256_load_si256(bytes(0));
+  for (int k = 1; k < group; ++k) sum = _mm256_add_epi8(sum, _mm256_load_si256(bytes(k)));
+  return sum;
 }
 
-[[gnu::target("avx2")]] inline void add_columns_avx2(const std::int8_t* block,
-                                                     std::span<const std::uint32_t> columns,
-                                                     int group, int sign, std::int32_t* sums) {
-  const auto bytes = [block, columns](std::size_t c) {
-    return reinterpret_cast<const __m256i*>(block + std::size_t{columns[c]} * kBlockUnits);
-  };
+template <int Group>
+[[gnu::target("avx2")]] void add_groups_avx2(const std::int8_t* block,
+                                             std::span<const std::uint32_t> columns, int sign,
+                                             std::int32_t* sums) {
+  const __m256i ones = _mm256_set1_epi8(1);
   const std::size_t n = columns.size();
   for (std::size_t begin = 0; begin < n; begin += kColumnsPerSum) {
     const std::size_t end = std::min(begin + kColumnsPerSum, n);
-    __m256i s0 = _mm256_setzero_si256();
-    __m256i s1 = s0;
-    __m256i s2 = s0;
-    __m256i s3 = s0;
-    std::size_t c = begin;
-    const auto prefetch = [&](std::size_t ahead) __attribute__((always_inline)) {
-      if (ahead < n) _mm_prefetch(reinterpret_cast<const char*>(bytes(ahead)), _MM_HINT_T0);
-    };
-#define SDNN_WIDEN(low, high)                                                          \
-  s0 = _mm256_add_epi16(s0, _mm256_cvtepi8_epi16(_mm256_castsi256_si128(low)));        \
-  s1 = _mm256_add_epi16(s1, _mm256_cvtepi8_epi16(_mm256_extracti128_si256(low, 1)));   \
-  s2 = _mm256_add_epi16(s2, _mm256_cvtepi8_epi16(_mm256_castsi256_si128(high)));       \
-  s3 = _mm256_add_epi16(s3, _mm256_cvtepi8_epi16(_mm256_extracti128_si256(high, 1)))
-    if (group == 4) {
-      for (; c + 4 <= end; c += 4) {
-        for (std::size_t k = 0; k < 4; ++k) prefetch(c + kPrefetchAhead + k);
-        const __m256i* const w0 = bytes(c);
-        const __m256i* const w1 = bytes(c + 1);
-        const __m256i* const w2 = bytes(c + 2);
-        const __m256i* const w3 = bytes(c + 3);
-        const __m256i low = _mm256_add_epi8(
-            _mm256_add_epi8(_mm256_load_si256(w0), _mm256_load_si256(w1)),
-            _mm256_add_epi8(_mm256_load_si256(w2), _mm256_load_si256(w3)));
-        const __m256i high = _mm256_add_epi8(
-            _mm256_add_epi8(_mm256_load_si256(w0 + 1), _mm256_load_si256(w1 + 1)),
-            _mm256_add_epi8(_mm256_load_si256(w2 + 1), _mm256_load_si256(w3 + 1)));
-        SDNN_WIDEN(low, high);
+    __m256i wide[4] = {};  // units 0-7 and 16-23, 8-15 and 24-31, and the same of the second half
+    const std::uint32_t* c = columns.data() + begin;
+    std::size_t left = end - begin;
+    for (; left >= 2 * Group; left -= 2 * Group, c += 2 * Group) {
+      if (left >= 2 * Group + kPrefetchAhead) {
+        for (std::size_t k = kPrefetchAhead; k < kPrefetchAhead + 2 * Group; ++k) {
+          _mm_prefetch(reinterpret_cast<const char*>(block + std::size_t{c[k]} * kBlockUnits),
+                       _MM_HINT_T0);
+        }
       }
-    } else if (group == 2) {
-      for (; c + 2 <= end; c += 2) {
-        for (std::size_t k = 0; k < 2; ++k) prefetch(c + kPrefetchAhead + k);
-        const __m256i* const w0 = bytes(c);
-        const __m256i* const w1 = bytes(c + 1);
-        const __m256i low = _mm256_add_epi8(_mm256_load_si256(w0), _mm256_load_si256(w1));
-        const __m256i high = _mm256_add_epi8(_mm256_load_si256(w0 + 1), _mm256_load_si256(w1 + 1));
-        SDNN_WIDEN(low, high);
+      for (int half = 0; half < 2; ++half) {
+        const __m256i first = group_sum_avx2(block, c, Group, half);
+        const __m256i second = group_sum_avx2(block, c + Group, Group, half);
+        wide[2 * half] = _mm256_add_epi16(
+            wide[2 * half], _mm256_maddubs_epi16(ones, _mm256_unpacklo_epi8(first, second)));
+        wide[2 * half + 1] = _mm256_add_epi16(
+            wide[2 * half + 1], _mm256_maddubs_epi16(ones, _mm256_unpackhi_epi8(first, second)));
       }
     }
-    for (; c < end; ++c) {
-      prefetch(c + kPrefetchAhead);
-      const __m256i low = _mm256_load_si256(bytes(c));
-      const __m256i high = _mm256_load_si256(bytes(c) + 1);
-      SDNN_WIDEN(low, high);
+    for (; left > 0; --left, ++c) {
+      for (int half = 0; half < 2; ++half) {
+        const __m256i one = group_sum_avx2(block, c, 1, half);
+        const __m256i none = _mm256_setzero_si256();
+        wide[2 * half] = _mm256_add_epi16(
+            wide[2 * half], _mm256_maddubs_epi16(ones, _mm256_unpacklo_epi8(one, none)));
+        wide[2 * half + 1] = _mm256_add_epi16(
+            wide[2 * half + 1], _mm256_maddubs_epi16(ones, _mm256_unpackhi_epi8(one, none)));
+      }
     }
-#undef SDNN_WIDEN
-    flush_avx2(s0, sign, sums);
-    flush_avx2(s1, sign, sums + 16);
-    flush_avx2(s2, sign, sums + 32);
-    flush_avx2(s3, sign, sums + 48);
+    for (int quarter = 0; quarter < 8; ++quarter) {  // eight units each, in unit order
+      const int half = quarter / 4;
+      const __m256i sixteen = wide[2 * half + quarter % 2];
+      const __m128i eight = quarter % 4 < 2 ? _mm256_castsi256_si128(sixteen)
+                                            : _mm256_extracti128_si256(sixteen, 1);
+      auto* const at = reinterpret_cast<__m256i*>(sums + 8 * quarter);
+      const __m256i before = _mm256_loadu_si256(at);
+      const __m256i change = _mm256_cvtepi16_epi32(eight);
+      _mm256_storeu_si256(at, sign > 0 ? _mm256_add_epi32(before, change)
+                                       : _mm256_sub_epi32(before, change));
+    }
+  }
+}
+
+inline void add_columns_avx2(const std::int8_t* block, std::span<const std::uint32_t> columns,
+                             int group, int sign, std::int32_t* sums) {
+  switch (group) {
+    case 4: return add_groups_avx2<4>(block, columns, sign, sums);
+    case 2: return add_groups_avx2<2>(block, columns, sign, sums);
+    default: return add_groups_avx2<1>(block, columns, sign, sums);
   }
 }
 
@@ -161,55 +164,66 @@ inline void add_columns_portable(const std::int8_t* block, std::span<const std::
 #pragma GCC diagnostic ignored "-Wuninitialized"
 #endif
 
-[[gnu::target("avx512f,avx512bw")]] inline void add_columns_avx512(
-    const std::int8_t* block, std::span<const std::uint32_t> columns, int group, int sign,
-    std::int32_t* sums) {
-  const auto bytes = [block, columns](std::size_t c) {
-    return block + std::size_t{columns[c]} * kBlockUnits;
+[[gnu::target("avx512f,avx512bw"), gnu::always_inline]] inline __m512i group_sum_avx512(
+    const std::int8_t* block, const std::uint32_t* c, int group) {
+  const auto bytes = [block, c](int k) __attribute__((always_inline)) {
+    return block + std::size_t{c[k]} * kBlockUnits;
   };
+  __m512i sum = _mm512_load_si512(bytes(0));
+  for (int k = 1; k < group; ++k) sum = _mm512_add_epi8(sum, _mm512_load_si512(bytes(k)));
+  return sum;
+}
+
+template <int Group>
+[[gnu::target("avx512f,avx512bw")]] void add_groups_avx512(const std::int8_t* block,
+                                                           std::span<const std::uint32_t> columns,
+                                                           int sign, std::int32_t* sums) {
+  const __m512i ones = _mm512_set1_epi8(1);
   const std::size_t n = columns.size();
   for (std::size_t begin = 0; begin < n; begin += kColumnsPerSum) {
     const std::size_t end = std::min(begin + kColumnsPerSum, n);
-    __m512i s0 = _mm512_setzero_si512();
-    __m512i s1 = s0;
-    std::size_t c = begin;
-    const auto prefetch = [&](std::size_t ahead) __attribute__((always_inline)) {
-      if (ahead < n) _mm_prefetch(reinterpret_cast<const char*>(bytes(ahead)), _MM_HINT_T0);
-    };
-#define SDNN_WIDEN(all)                                                                 \
-  s0 = _mm512_add_epi16(s0, _mm512_cvtepi8_epi16(_mm512_castsi512_si256(all)));         \
-  s1 = _mm512_add_epi16(s1, _mm512_cvtepi8_epi16(_mm512_extracti64x4_epi64(all, 1)))
-    if (group == 4) {
-      for (; c + 4 <= end; c += 4) {
-        for (std::size_t k = 0; k < 4; ++k) prefetch(c + kPrefetchAhead + k);
-        const __m512i all = _mm512_add_epi8(
-            _mm512_add_epi8(_mm512_load_si512(bytes(c)), _mm512_load_si512(bytes(c + 1))),
-            _mm512_add_epi8(_mm512_load_si512(bytes(c + 2)), _mm512_load_si512(bytes(c + 3))));
-        SDNN_WIDEN(all);
+    __m512i low = _mm512_setzero_si512();  // of each 16 units the first eight
+    __m512i high = low;                    // and the last eight
+    const std::uint32_t* c = columns.data() + begin;
+    std::size_t left = end - begin;
+    for (; left >= 2 * Group; left -= 2 * Group, c += 2 * Group) {
+      if (left >= 2 * Group + kPrefetchAhead) {
+        for (std::size_t k = kPrefetchAhead; k < kPrefetchAhead + 2 * Group; ++k) {
+          _mm_prefetch(reinterpret_cast<const char*>(block + std::size_t{c[k]} * kBlockUnits),
+                       _MM_HINT_T0);
+        }
       }
-    } else if (group == 2) {
-      for (; c + 2 <= end; c += 2) {
-        for (std::size_t k = 0; k < 2; ++k) prefetch(c + kPrefetchAhead + k);
-        const __m512i all =
-            _mm512_add_epi8(_mm512_load_si512(bytes(c)), _mm512_load_si512(bytes(c + 1)));
-        SDNN_WIDEN(all);
-      }
+      const __m512i first = group_sum_avx512(block, c, Group);
+      const __m512i second = group_sum_avx512(block, c + Group, Group);
+      low = _mm512_add_epi16(low,
+                             _mm512_maddubs_epi16(ones, _mm512_unpacklo_epi8(first, second)));
+      high = _mm512_add_epi16(high,
+                              _mm512_maddubs_epi16(ones, _mm512_unpackhi_epi8(first, second)));
     }
-    for (; c < end; ++c) {
-      prefetch(c + kPrefetchAhead);
-      const __m512i all = _mm512_load_si512(bytes(c));
-      SDNN_WIDEN(all);
+    for (; left > 0; --left, ++c) {
+      const __m512i one = group_sum_avx512(block, c, 1);
+      const __m512i none = _mm512_setzero_si512();
+      low = _mm512_add_epi16(low, _mm512_maddubs_epi16(ones, _mm512_unpacklo_epi8(one, none)));
+      high = _mm512_add_epi16(high, _mm512_maddubs_epi16(ones, _mm512_unpackhi_epi8(one, none)));
     }
-#undef SDNN_WIDEN
-    const __m512i quarters[4] = {_mm512_cvtepi16_epi32(_mm512_castsi512_si256(s0)),
-                                 _mm512_cvtepi16_epi32(_mm512_extracti64x4_epi64(s0, 1)),
-                                 _mm512_cvtepi16_epi32(_mm512_castsi512_si256(s1)),
-                                 _mm512_cvtepi16_epi32(_mm512_extracti64x4_epi64(s1, 1))};
-    for (int q = 0; q < 4; ++q) {
-      const __m512i before = _mm512_loadu_si512(sums + 16 * q);
-      _mm512_storeu_si512(sums + 16 * q, sign > 0 ? _mm512_add_epi32(before, quarters[q])
-                                                  : _mm512_sub_epi32(before, quarters[q]));
+    alignas(core::kCacheLine) std::array<std::int16_t, 32> lows;
+    alignas(core::kCacheLine) std::array<std::int16_t, 32> highs;
+    _mm512_store_si512(lows.data(), low);
+    _mm512_store_si512(highs.data(), high);
+    for (std::size_t i = 0; i < 32; ++i) {
+      const std::size_t unit = i / 8 * 16 + i % 8;
+      sums[unit] += sign * lows[i];
+      sums[unit + 8] += sign * highs[i];
     }
+  }
+}
+
+inline void add_columns_avx512(const std::int8_t* block, std::span<const std::uint32_t> columns,
+                               int group, int sign, std::int32_t* sums) {
+  switch (group) {
+    case 4: return add_groups_avx512<4>(block, columns, sign, sums);
+    case 2: return add_groups_avx512<2>(block, columns, sign, sums);
+    default: return add_groups_avx512<1>(block, columns, sign, sums);
   }
 }
 
