@@ -124,8 +124,8 @@ void bind_approximators(py::module_& module) {
       .def_property_readonly("u_high",
                              [](const DynamicSdnnC& net) { return net.output_scale().u_high(); })
       .def_property_readonly(
-          "n_wide_units",
-          [](const DynamicSdnnC& net) { return net.perceptron().n_wide_units(); })
+          "n_carries",
+          [](const DynamicSdnnC& net) { return net.perceptron().n_carries(); })
       .def("first_unit",
            [](const DynamicSdnnC& net, std::size_t action) {
              core::require(action < net.n_actions(), "action",

@@ -250,10 +250,10 @@ class SdnnC:
     def n_actions(self) -> int:
         ...
     @property
-    def n_inputs(self) -> int:
+    def n_carries(self) -> int:
         ...
     @property
-    def n_wide_units(self) -> int:
+    def n_inputs(self) -> int:
         ...
     @property
     def u_high(self) -> int:

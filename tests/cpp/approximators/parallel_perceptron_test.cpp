@@ -33,7 +33,8 @@ TEST(ParallelPerceptron, PotentialsAndCorrectionByHand) {
 // Random problems of many shapes, with weights on both sides of one byte, against plain sums.
 TEST(ParallelPerceptron, EqualsPlainSumsOnRandomProblems) {
   core::Random random(11, core::Stream::weights);
-  std::size_t n_wide = 0;
+  std::size_t n_carries = 0;
+  int n_with_high_bytes = 0;
   for (int problem = 0; problem < 60; ++problem) {
     const std::size_t n = 1 + random.below(problem % 10 == 0 ? 2500 : 200);
     const std::size_t columns = 1 + random.below(700);
@@ -49,9 +50,10 @@ TEST(ParallelPerceptron, EqualsPlainSumsOnRandomProblems) {
       }
     }
     if (largest == 127) {
-      EXPECT_EQ(p.n_wide_units(), 0U);
+      EXPECT_EQ(p.n_carries(), 0U);
     }
-    n_wide += p.n_wide_units();
+    n_carries += p.n_carries();
+    n_with_high_bytes += p.has_high_bytes() ? 1 : 0;
     coding::SignedColumns x;
     for (std::uint32_t j = 0; j < columns; ++j) {
       switch (random.below(4)) {
@@ -68,7 +70,7 @@ TEST(ParallelPerceptron, EqualsPlainSumsOnRandomProblems) {
     }
     EXPECT_EQ(potentials(p, x), expected);
 
-    // A short list takes another way through the wide units; a column may come twice.
+    // A column may come twice.
     const auto last = static_cast<std::uint32_t>(columns - 1);
     const coding::SignedColumns few{.positive = {0, 0}, .negative = {last}};
     for (std::size_t i = 0; i < n; ++i) {
@@ -76,10 +78,11 @@ TEST(ParallelPerceptron, EqualsPlainSumsOnRandomProblems) {
     }
     EXPECT_EQ(potentials(p, few), expected);
   }
-  EXPECT_GT(n_wide, 100U);
+  EXPECT_GT(n_carries, 1000U);
+  EXPECT_GT(n_with_high_bytes, 0);
 }
 
-TEST(ParallelPerceptron, AUnitMovesToTwoBytesBeforeAWeightLeavesOne) {
+TEST(ParallelPerceptron, AWeightOutsideAByteIsCarried) {
   ParallelPerceptron p(3, 2);
   const coding::SignedColumns x{.positive = {0}, .negative = {1}};
   const std::vector<std::uint32_t> unit = {2};
@@ -90,35 +93,37 @@ TEST(ParallelPerceptron, AUnitMovesToTwoBytesBeforeAWeightLeavesOne) {
     ASSERT_EQ(p.threshold(2), -i);
     ASSERT_EQ(potentials(p, x), (std::vector<std::int32_t>{0, 0, 3 * i}));
   }
-  EXPECT_EQ(p.n_wide_units(), 1U);
-  for (int i = 500; i > -500; --i) p.correct(unit, x, -1);
+  EXPECT_EQ(p.n_carries(), 2U);
+  for (int i = 500; i > 0; --i) p.correct(unit, x, -1);
+  EXPECT_EQ(p.n_carries(), 0U);
+  for (int i = 0; i > -500; --i) p.correct(unit, x, -1);
   EXPECT_EQ(p.weight(2, 0), -500);
   EXPECT_EQ(p.weight(0, 0), 0);
 }
 
 // Going to and fro never needs more than a byte, however often it happens.
-TEST(ParallelPerceptron, CorrectionsThatCancelKeepAUnitNarrow) {
+TEST(ParallelPerceptron, CorrectionsThatCancelStayInAByte) {
   ParallelPerceptron p(70, 5);
   const coding::SignedColumns x{.positive = {0, 3}, .negative = {4}};
   const std::vector<std::uint32_t> unit = {69};
   for (int i = 0; i < 2000; ++i) p.correct(unit, x, i % 2 == 0 ? 1 : -1);
-  EXPECT_EQ(p.n_wide_units(), 0U);
+  EXPECT_EQ(p.n_carries(), 0U);
   EXPECT_EQ(p.weight(69, 3), 0);
 }
 
 TEST(ParallelPerceptron, OverflowIsDetectedBeforeAnythingChanges) {
   ParallelPerceptron p(2, 2);
   const coding::SignedColumns x{.positive = {0}, .negative = {}};
-  p.set_weight(1, 0, 32766);
+  p.set_weight(1, 0, 16382);
   const std::vector<std::uint32_t> both = {0, 1};
   p.correct(both, x, 1);
-  EXPECT_EQ(p.weight(1, 0), 32767);
+  EXPECT_EQ(p.weight(1, 0), 16383);
   EXPECT_THROW(p.correct(both, x, 1), std::overflow_error);
-  EXPECT_EQ(p.weight(1, 0), 32767);
+  EXPECT_EQ(p.weight(1, 0), 16383);
   EXPECT_EQ(p.weight(0, 0), 1);
   EXPECT_EQ(p.threshold(0), -1);
   p.correct(both, x, -1);  // going back is possible
-  EXPECT_EQ(p.weight(1, 0), 32766);
+  EXPECT_EQ(p.weight(1, 0), 16382);
 }
 
 TEST(ParallelPerceptron, ALargerInputLowersTheWeightLimitSoThatPotentialsFit) {

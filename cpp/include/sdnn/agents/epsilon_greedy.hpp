@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -25,6 +26,21 @@ struct EpsilonGreedyConfig {
   int n_greedy_steps = 10;               ///< first steps of an episode without random actions
   TieRule tie_rule = TieRule::uniform;
 };
+
+/// The largest of `values`, not empty; NaN if the first one is. Eight partial maxima at a time, so
+/// that the compiler can use vectors: a maximum has no rounding, its order does not matter.
+inline double best_value(std::span<const double> values) noexcept {
+  std::array<double, 8> best;
+  best.fill(values[0]);
+  std::size_t i = 0;
+  for (; i + best.size() <= values.size(); i += best.size()) {
+    for (std::size_t k = 0; k < best.size(); ++k) {
+      best[k] = values[i + k] > best[k] ? values[i + k] : best[k];
+    }
+  }
+  for (; i < values.size(); ++i) best[0] = values[i] > best[0] ? values[i] : best[0];
+  return *std::max_element(best.begin(), best.end());
+}
 
 /// Epsilon-greedy selection over a row of action values.
 ///
@@ -58,7 +74,7 @@ class EpsilonGreedy {
 
  private:
   std::size_t greedy(std::span<const double> values, core::Random& ties) const {
-    const double best = *std::max_element(values.begin(), values.end());
+    const double best = best_value(values);
     core::require(!std::isnan(best), "values", "numbers", best);
     switch (config_.tie_rule) {
       case TieRule::lowest:

@@ -1,7 +1,6 @@
 /// Q-learning over any approximator of action values.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -62,7 +61,7 @@ class QLearning {
     double goal = reward;
     if (!terminated) {
       action_value_.values(next_state, values_);
-      goal += config_.discount * *std::max_element(values_.begin(), values_.end());
+      goal += config_.discount * best_value(values_);
     }
     const double value = action_value_.value(state, action);
     action_value_.correct(state, action,

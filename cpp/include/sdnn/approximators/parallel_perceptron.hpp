@@ -10,6 +10,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "sdnn/approximators/column_sums.hpp"
@@ -23,9 +24,10 @@ namespace sdnn::approximators {
 ///
 /// Every sum is exact, so its order does not matter. The units come in blocks of 64; a block holds
 /// its weights column by column (one cache line: one input unit, 64 hidden units), because a pass
-/// reads only the columns that are not neutral. A weight is one byte; a unit one of whose weights
-/// might leave a byte moves to a row of its own, two bytes a weight. A correction that would leave
-/// those, or carry a potential out of 32 bits, throws and changes nothing.
+/// reads only the columns that are not neutral. A weight is one byte, -127 to 127; what a few
+/// weights exceed that by, in multiples of 128, is kept in a short list, and in a second layer of
+/// bytes when the list is full. A correction that would take a weight out of both bytes, or a
+/// potential out of 32 bits, throws and changes nothing.
 ///
 /// Source: section 3.1 (layer 4, z) and Eqs. (2), (3).
 class ParallelPerceptron {
@@ -36,11 +38,12 @@ class ParallelPerceptron {
     core::require_in_range("n_units", n_units, 1, std::size_t{1} << 20);
     core::require_in_range("n_columns", n_columns, 1, std::size_t{1} << 27);
     weight_limit_ = static_cast<std::int32_t>(
-        std::min<std::size_t>(32767, kThresholdLimit / n_columns));
+        std::min<std::size_t>(kWeightLimit, kThresholdLimit / n_columns));
     n_blocks_ = core::round_up(n_units, kBlockUnits) / kBlockUnits;
-    narrow_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * n_columns * kBlockUnits);
-    wide_ = core::AlignedBuffer<std::int16_t>(n_units * n_columns);  // untouched until needed
-    is_wide_.assign(n_units, 0);
+    bytes_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * n_columns * kBlockUnits);
+    high_bytes_ = core::AlignedBuffer<std::int8_t>(bytes_.size());  // untouched until needed
+    carries_.reserve(kMostCarries);
+    may_carry_.assign(n_units, 0);
     thresholds_.assign(n_units, 0);
     largest_weight_.assign(n_units, 0);
     group_of_block_.assign(n_blocks_, kLargestGroup);
@@ -48,30 +51,23 @@ class ParallelPerceptron {
 
   std::size_t n_units() const noexcept { return n_units_; }
   std::size_t n_columns() const noexcept { return n_columns_; }
-  /// How many units have needed two bytes a weight.
-  std::size_t n_wide_units() const noexcept { return n_wide_units_; }
+  /// How many weights outside one byte are listed.
+  std::size_t n_carries() const noexcept { return carries_.size(); }
+  /// Whether every weight has a second byte.
+  bool has_high_bytes() const noexcept { return has_high_bytes_; }
   /// The largest |weight| that is held before std::overflow_error.
   std::int32_t weight_limit() const noexcept { return weight_limit_; }
 
   std::int32_t weight(std::size_t unit, std::size_t column) const noexcept {
-    return is_wide_[unit] ? std::int32_t{wide_[unit * n_columns_ + column]}
-                          : std::int32_t{narrow_[narrow_index(unit, column)]};
+    return bytes_[byte_index(unit, column)] + carry(unit, column);
   }
   std::int32_t threshold(std::size_t unit) const noexcept { return thresholds_[unit]; }
 
   /// Throws std::invalid_argument if |value| exceeds weight_limit().
   void set_weight(std::size_t unit, std::size_t column, std::int32_t value) {
     core::require_in_range("weight", value, -weight_limit_, weight_limit_);
-    const std::int32_t size = std::abs(value);
-    if (size > largest_weight_[unit]) {
-      if (size > kByteLimit && !is_wide_[unit]) promote(unit);
-      note_largest(unit, size);
-    }
-    if (is_wide_[unit]) {
-      wide_[unit * n_columns_ + column] = static_cast<std::int16_t>(value);
-    } else {
-      narrow_[narrow_index(unit, column)] = static_cast<std::int8_t>(value);
-    }
+    if (std::abs(value) > largest_weight_[unit]) note_largest(unit, std::abs(value));
+    store(unit, column, value - carry(unit, column));
   }
   /// Throws std::invalid_argument if |value| reaches 2^30.
   void set_threshold(std::size_t unit, std::int32_t value) {
@@ -91,34 +87,26 @@ class ParallelPerceptron {
   void add(coding::SignedColumns& input, std::span<std::int32_t> out) const {
     const AddColumns add_columns = add_columns_kernel();
     alignas(core::kCacheLine) std::array<std::int32_t, kBlockUnits> sums;
-    for (std::size_t b = 0; b < n_blocks_; ++b) {
-      const std::int8_t* const block = narrow_.data() + b * n_columns_ * kBlockUnits;
+    const auto add_block = [&](const core::AlignedBuffer<std::int8_t>& bytes, std::size_t b,
+                               int group, std::int32_t factor) {
+      const std::int8_t* const block = bytes.data() + b * n_columns_ * kBlockUnits;
       sums.fill(0);
-      add_columns(block, input.positive, group_of_block_[b], +1, sums.data());
-      add_columns(block, input.negative, group_of_block_[b], -1, sums.data());
+      add_columns(block, input.positive, group, +1, sums.data());
+      add_columns(block, input.negative, group, -1, sums.data());
       const std::size_t first = b * kBlockUnits;
       const std::size_t n = std::min(kBlockUnits, n_units_ - first);
-      for (std::size_t i = 0; i < n; ++i) out[first + i] += sums[i];
+      for (std::size_t i = 0; i < n; ++i) out[first + i] += factor * sums[i];
+    };
+    for (std::size_t b = 0; b < n_blocks_; ++b) {
+      add_block(bytes_, b, group_of_block_[b], 1);
+      if (has_high_bytes_) add_block(high_bytes_, b, 1, kCarry);
     }
-    if (n_wide_units_ == 0) return;
-    if (input.positive.size() + input.negative.size() < n_columns_ / 8) {
-      add_wide(out, [&](const std::int16_t* row) {
-        std::int32_t sum = 0;
-        for (const std::uint32_t column : input.positive) sum += row[column];
-        for (const std::uint32_t column : input.negative) sum -= row[column];
-        return sum;
-      });
-    } else {  // dense: a product of two rows is quicker than picking half of one
-      std::vector<std::int16_t>& signs = input.signs;
-      signs.assign(n_columns_, 0);
-      for (const std::uint32_t column : input.positive) ++signs[column];
-      for (const std::uint32_t column : input.negative) --signs[column];
-      add_wide(out, [&](const std::int16_t* row) {
-        std::int32_t sum = 0;
-        for (std::size_t j = 0; j < n_columns_; ++j) sum += row[j] * signs[j];
-        return sum;
-      });
-    }
+    if (carries_.empty()) return;
+    std::vector<std::int16_t>& values = input.values;
+    values.assign(n_columns_, 0);
+    for (const std::uint32_t column : input.positive) ++values[column];
+    for (const std::uint32_t column : input.negative) --values[column];
+    for (const Carry& c : carries_) out[c.unit] += c.amount * values[c.column];
   }
 
   /// w_i += step * x and w_i0 -= step for every i in `units`; no column may come twice.
@@ -129,21 +117,17 @@ class ParallelPerceptron {
                std::int32_t step) {
     for (const std::uint32_t unit : units) require_room(unit, input, step);
     for (const std::uint32_t unit : units) {
-      make_room(unit, std::abs(step));
-      if (is_wide_[unit]) {
-        std::int16_t* const row = wide_.data() + unit * n_columns_;
-        for (const auto j : input.positive) row[j] = static_cast<std::int16_t>(row[j] + step);
-        for (const auto j : input.negative) row[j] = static_cast<std::int16_t>(row[j] - step);
+      raise_bound(unit, std::abs(step));
+      std::int8_t* const lane = bytes_.data() + byte_index(unit, 0);
+      const auto byte_of = [lane](std::uint32_t column) -> std::int8_t& {
+        return lane[std::size_t{column} * kBlockUnits];
+      };
+      if (largest_weight_[unit] <= kByteLimit) {
+        for (const auto j : input.positive) byte_of(j) = static_cast<std::int8_t>(byte_of(j) + step);
+        for (const auto j : input.negative) byte_of(j) = static_cast<std::int8_t>(byte_of(j) - step);
       } else {
-        std::int8_t* const lane = narrow_.data() + narrow_index(unit, 0);
-        for (const auto j : input.positive) {
-          std::int8_t& w = lane[std::size_t{j} * kBlockUnits];
-          w = static_cast<std::int8_t>(w + step);
-        }
-        for (const auto j : input.negative) {
-          std::int8_t& w = lane[std::size_t{j} * kBlockUnits];
-          w = static_cast<std::int8_t>(w - step);
-        }
+        for (const auto j : input.positive) store(unit, j, byte_of(j) + step);
+        for (const auto j : input.negative) store(unit, j, byte_of(j) - step);
       }
       thresholds_[unit] -= step;
     }
@@ -152,17 +136,80 @@ class ParallelPerceptron {
  private:
   static constexpr std::int32_t kThresholdLimit = (std::int32_t{1} << 30) - 1;
   static constexpr std::int32_t kByteLimit = 127;
+  static constexpr std::int32_t kCarry = 128;
+  static constexpr std::int32_t kWeightLimit = kByteLimit * kCarry + kByteLimit;
   static constexpr int kLargestGroup = 4;
+  static constexpr std::size_t kMostCarries = 4096;
 
-  std::size_t narrow_index(std::size_t unit, std::size_t column) const noexcept {
+  /// What a weight exceeds its byte by: a multiple of kCarry, not 0.
+  struct Carry {
+    std::uint32_t unit;
+    std::uint32_t column;
+    std::int32_t amount;
+  };
+
+  std::size_t byte_index(std::size_t unit, std::size_t column) const noexcept {
     return (unit / kBlockUnits * n_columns_ + column) * kBlockUnits + unit % kBlockUnits;
   }
 
-  template <class Product>
-  void add_wide(std::span<std::int32_t> out, Product&& product) const {
-    for (std::size_t unit = 0; unit < n_units_; ++unit) {
-      if (is_wide_[unit]) out[unit] += product(wide_.data() + unit * n_columns_);
+  /// Where the carry of a weight is in the sorted list, or would be.
+  std::size_t carry_index(std::size_t unit, std::size_t column) const noexcept {
+    const auto at = std::lower_bound(
+        carries_.begin(), carries_.end(), std::pair(unit, column), [](const Carry& c, auto key) {
+          return std::pair<std::size_t, std::size_t>(c.unit, c.column) < key;
+        });
+    return static_cast<std::size_t>(at - carries_.begin());
+  }
+
+  bool is_carry_of(std::size_t index, std::size_t unit, std::size_t column) const noexcept {
+    return index < carries_.size() && carries_[index].unit == unit &&
+           carries_[index].column == column;
+  }
+
+  std::int32_t carry(std::size_t unit, std::size_t column) const noexcept {
+    if (has_high_bytes_) return kCarry * high_bytes_[byte_index(unit, column)];
+    if (!may_carry_[unit]) return 0;
+    const std::size_t at = carry_index(unit, column);
+    return is_carry_of(at, unit, column) ? carries_[at].amount : 0;
+  }
+
+  /// Gives the byte of a weight this value, which may lie outside a byte: the rest is carried.
+  void store(std::size_t unit, std::size_t column, std::int32_t value) {
+    if (std::abs(value) > kByteLimit) {
+      const std::int32_t change = value / kCarry;  // towards 0
+      value -= change * kCarry;
+      add_carry(unit, column, change);
     }
+    bytes_[byte_index(unit, column)] = static_cast<std::int8_t>(value);
+  }
+
+  void add_carry(std::size_t unit, std::size_t column, std::int32_t change) {
+    if (!has_high_bytes_ && carries_.size() == kMostCarries) spread_carries();
+    if (has_high_bytes_) {
+      std::int8_t& high = high_bytes_[byte_index(unit, column)];
+      high = static_cast<std::int8_t>(high + change);
+      return;
+    }
+    const std::size_t at = carry_index(unit, column);
+    const auto place = carries_.begin() + static_cast<std::ptrdiff_t>(at);
+    if (!is_carry_of(at, unit, column)) {
+      carries_.insert(place, {static_cast<std::uint32_t>(unit), static_cast<std::uint32_t>(column),
+                              change * kCarry});
+      may_carry_[unit] = 1;
+    } else if (place->amount + change * kCarry == 0) {
+      carries_.erase(place);
+    } else {
+      place->amount += change * kCarry;
+    }
+  }
+
+  /// From the list to a second byte for every weight.
+  void spread_carries() noexcept {
+    for (const Carry& c : carries_) {
+      high_bytes_[byte_index(c.unit, c.column)] = static_cast<std::int8_t>(c.amount / kCarry);
+    }
+    carries_.clear();
+    has_high_bytes_ = true;
   }
 
   std::int32_t largest_weight(std::size_t unit) const noexcept {
@@ -176,20 +223,8 @@ class ParallelPerceptron {
   /// Keeps the bound of a unit, and how many columns of its block may be added in 8 bits.
   void note_largest(std::size_t unit, std::int32_t bound) noexcept {
     largest_weight_[unit] = bound;
-    if (is_wide_[unit]) return;
     int& group = group_of_block_[unit / kBlockUnits];
     while (group > 1 && bound > kByteLimit / group) group /= 2;
-  }
-
-  /// Moves a unit to two bytes a weight; its bytes become zero, so the sums of its block stay right.
-  void promote(std::size_t unit) noexcept {
-    for (std::size_t j = 0; j < n_columns_; ++j) {
-      std::int8_t& from = narrow_[narrow_index(unit, j)];
-      wide_[unit * n_columns_ + j] = from;
-      from = 0;
-    }
-    is_wide_[unit] = 1;
-    ++n_wide_units_;
   }
 
   /// Throws unless the correction keeps the unit in range. The bound kept per unit only grows, so
@@ -217,20 +252,17 @@ class ParallelPerceptron {
     return stays(input.positive, step) && stays(input.negative, -step);
   }
 
-  /// Raises the unit's bound by `growth`. Where the bound would cost speed or leave a byte, the true
-  /// maximum is looked up first; a unit within an eighth of the limit gives up at once, so that
-  /// look-ups stay rare.
-  void make_room(std::size_t unit, std::int32_t growth) {
+  /// Raises the unit's bound by `growth`. Where the bound would cost speed, the true maximum is
+  /// looked up first; a unit within an eighth of a limit gives that one up, so that look-ups stay
+  /// rare.
+  void raise_bound(std::size_t unit, std::int32_t growth) {
     const std::int32_t before = largest_weight_[unit];
     std::int32_t bound = before + growth;
-    if (!is_wide_[unit]) {
-      for (int group = kLargestGroup; group >= 1; group /= 2) {
-        const std::int32_t limit = kByteLimit / group;
-        if (before > limit || bound <= limit) continue;
-        const std::int32_t looked_up = largest_weight(unit) + growth;
-        bound = looked_up <= limit - limit / 8 ? looked_up : std::max(looked_up, limit + 1);
-      }
-      if (bound > kByteLimit) promote(unit);
+    for (int group = kLargestGroup; group >= 1; group /= 2) {
+      const std::int32_t limit = kByteLimit / group;
+      if (before > limit || bound <= limit) continue;
+      const std::int32_t looked_up = largest_weight(unit) + growth;
+      bound = looked_up <= limit - limit / 8 ? looked_up : std::max(looked_up, limit + 1);
     }
     note_largest(unit, bound);
   }
@@ -239,10 +271,11 @@ class ParallelPerceptron {
   std::size_t n_columns_;
   std::size_t n_blocks_ = 0;
   std::int32_t weight_limit_;
-  core::AlignedBuffer<std::int8_t> narrow_;  ///< [block][column][unit in block]
-  core::AlignedBuffer<std::int16_t> wide_;   ///< [unit][column]
-  std::vector<std::uint8_t> is_wide_;
-  std::size_t n_wide_units_ = 0;
+  core::AlignedBuffer<std::int8_t> bytes_;  ///< [block][column][unit in block]
+  core::AlignedBuffer<std::int8_t> high_bytes_;
+  bool has_high_bytes_ = false;
+  std::vector<Carry> carries_;              ///< sorted by unit and column
+  std::vector<std::uint8_t> may_carry_;     ///< whether a unit ever had a carry
   std::vector<std::int32_t> thresholds_;
   std::vector<std::int32_t> largest_weight_;  ///< an upper bound of max_j |w_ij|
   std::vector<int> group_of_block_;           ///< columns of a block that may be added in 8 bits

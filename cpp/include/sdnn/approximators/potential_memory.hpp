@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "sdnn/approximators/parallel_perceptron.hpp"
@@ -29,10 +30,8 @@ class PotentialMemory {
  public:
   /// One remembered state. Shapes: bins (l,), potentials (n,).
   struct Entry {
-    std::vector<coding::Bin> bins;
-    std::vector<std::int32_t> potentials;
-    std::uint64_t up_to = 0;     ///< corrections that are accounted for
-    std::uint64_t last_use = 0;  ///< 0: empty
+    std::span<const coding::Bin> bins;
+    std::span<const std::int32_t> potentials;
   };
 
   /// How potentials came about, counted since construction.
@@ -46,15 +45,15 @@ class PotentialMemory {
   /// `max_corrected`: the most units that one correction may touch.
   PotentialMemory(const coding::StateCode<Capacity>& code, std::size_t n_units,
                   std::size_t max_corrected)
-      : columns_(coding::SignedColumns::with_capacity(2 * code.n_columns())),
+      : n_inputs_(code.n_inputs()),
+        n_units_(n_units),
+        bins_(kEntries * n_inputs_),
+        potentials_(kEntries * n_units),
+        columns_(coding::SignedColumns::with_capacity(2 * code.n_columns())),
         max_corrected_(max_corrected),
-        log_bins_(kLogSize * code.n_inputs()),
+        log_bins_(kLogSize * n_inputs_),
         log_units_(kLogSize * max_corrected),
         log_(kLogSize) {
-    for (Entry& entry : entries_) {
-      entry.bins.assign(code.n_inputs(), 0);
-      entry.potentials.assign(n_units, 0);
-    }
     // Neighbouring bins differ in about m / 2 / 45 units of each pattern; each is a column of
     // l - 1 groups as modified (half of them active, counted twice: +1 to -1) and as modifier.
     const double l = static_cast<double>(code.n_inputs());
@@ -69,50 +68,52 @@ class PotentialMemory {
   const Counts& counts() const noexcept { return counts_; }
 
   /// Forgets all states: the weights have been replaced.
-  void forget() noexcept {
-    for (Entry& entry : entries_) entry.last_use = 0;
-  }
+  void forget() noexcept { last_use_.fill(0); }
 
   /// The potentials of the state with these bins, for the present weights; valid until the next
   /// call.
-  const Entry& recall(const coding::StateCode<Capacity>& code,
-                      const ParallelPerceptron& perceptron, std::span<const coding::Bin> bins) {
-    Entry* nearest = nullptr;
-    Entry* oldest = &entries_[0];
-    double least = columns_of_pass_;
-    for (Entry& entry : entries_) {
-      if (entry.last_use < oldest->last_use) oldest = &entry;
-      if (entry.last_use == 0 || n_corrections_ - entry.up_to > kLogSize) continue;
-      const double cost =
-          columns_per_bin_ * distance(entry.bins, bins) +
-          columns_per_correction_ * static_cast<double>(n_corrections_ - entry.up_to);
-      if (cost < least) {
-        least = cost;
-        nearest = &entry;
+  Entry recall(const coding::StateCode<Capacity>& code, const ParallelPerceptron& perceptron,
+               std::span<const coding::Bin> bins) {
+    for (const std::size_t slot : {latest_, before_latest_}) {  // a decision asks repeatedly
+      if (last_use_[slot] != 0 && std::ranges::equal(bins_of(slot), bins) &&
+          n_corrections_ - up_to_[slot] <= kLogSize) {
+        return use(code, slot);
       }
     }
-    if (nearest == nullptr) {
+    std::size_t nearest = kEntries;
+    std::size_t oldest = 0;
+    double least = columns_of_pass_;
+    for (std::size_t slot = 0; slot < kEntries; ++slot) {
+      if (last_use_[slot] < last_use_[oldest]) oldest = slot;
+      const std::uint64_t lag = n_corrections_ - up_to_[slot];
+      if (last_use_[slot] == 0 || lag > kLogSize) continue;
+      const double cost = columns_per_bin_ * distance(bins_of(slot), bins) +
+                          columns_per_correction_ * static_cast<double>(lag);
+      if (cost < least) {
+        least = cost;
+        nearest = slot;
+      }
+    }
+    const std::span<std::int32_t> fresh(potentials_.data() + oldest * n_units_, n_units_);
+    if (nearest == kEntries) {
       code.columns(bins, columns_);
-      perceptron.potentials(columns_, oldest->potentials);
+      perceptron.potentials(columns_, fresh);
       ++counts_.full;
     } else {
-      catch_up(code, *nearest);
-      nearest->last_use = ++clock_;
-      if (std::ranges::equal(nearest->bins, bins)) {
+      const Entry known = use(code, nearest);
+      if (std::ranges::equal(known.bins, bins)) {
         ++counts_.exact;
-        return *nearest;
+        return known;
       }
-      if (oldest == nearest) oldest = least_recently_used();
-      code.difference(nearest->bins, bins, columns_);
-      std::ranges::copy(nearest->potentials, oldest->potentials.begin());
-      perceptron.add(columns_, oldest->potentials);
+      code.difference(known.bins, bins, columns_);
+      if (oldest != nearest) std::ranges::copy(known.potentials, fresh.begin());
+      perceptron.add(columns_, fresh);
       ++counts_.neighbour;
     }
     counts_.columns += columns_.positive.size() + columns_.negative.size();
-    std::ranges::copy(bins, oldest->bins.begin());
-    oldest->up_to = n_corrections_;
-    oldest->last_use = ++clock_;
-    return *oldest;
+    std::ranges::copy(bins, bins_.begin() + static_cast<std::ptrdiff_t>(oldest * n_inputs_));
+    up_to_[oldest] = n_corrections_;
+    return use(code, oldest);
   }
 
   /// Notes that w_i += step * x_SD(bins) and w_i0 -= step for every i in `units`.
@@ -142,24 +143,36 @@ class PotentialMemory {
     return sum;
   }
 
-  Entry* least_recently_used() noexcept {
-    return &*std::ranges::min_element(entries_, {}, &Entry::last_use);
+  std::span<const coding::Bin> bins_of(std::size_t slot) const noexcept {
+    return {bins_.data() + slot * n_inputs_, n_inputs_};
   }
 
-  void catch_up(const coding::StateCode<Capacity>& code, Entry& entry) noexcept {
-    const std::size_t l = entry.bins.size();
-    for (; entry.up_to < n_corrections_; ++entry.up_to) {
-      const std::size_t slot = entry.up_to % kLogSize;
-      const std::span<const coding::Bin> corrected(log_bins_.data() + slot * l, l);
-      const std::int32_t change =
-          log_[slot].step * (code.inner_product(corrected, entry.bins) + 1);
-      const std::uint32_t* const units = log_units_.data() + slot * max_corrected_;
-      for (std::size_t k = 0; k < log_[slot].n_units; ++k) entry.potentials[units[k]] += change;
+  /// Marks a slot as used now and brings its potentials up to date.
+  Entry use(const coding::StateCode<Capacity>& code, std::size_t slot) noexcept {
+    const Entry entry{bins_of(slot), {potentials_.data() + slot * n_units_, n_units_}};
+    std::int32_t* const potentials = potentials_.data() + slot * n_units_;
+    for (std::uint64_t& next = up_to_[slot]; next < n_corrections_; ++next) {
+      const std::size_t at = next % kLogSize;
+      const std::span<const coding::Bin> corrected(log_bins_.data() + at * n_inputs_, n_inputs_);
+      const std::int32_t change = log_[at].step * (code.inner_product(corrected, entry.bins) + 1);
+      const std::uint32_t* const units = log_units_.data() + at * max_corrected_;
+      for (std::size_t k = 0; k < log_[at].n_units; ++k) potentials[units[k]] += change;
     }
+    last_use_[slot] = ++clock_;
+    if (slot != latest_) before_latest_ = std::exchange(latest_, slot);
+    return entry;
   }
 
-  std::array<Entry, kEntries> entries_;
+  // What is remembered, slot by slot.
+  std::size_t n_inputs_;
+  std::size_t n_units_;
+  std::vector<coding::Bin> bins_;                    ///< [slot][input]
+  std::vector<std::int32_t> potentials_;             ///< [slot][unit]
+  std::array<std::uint64_t, kEntries> up_to_{};      ///< corrections that are accounted for
+  std::array<std::uint64_t, kEntries> last_use_{};   ///< 0: empty
   std::uint64_t clock_ = 0;
+  std::size_t latest_ = 0;
+  std::size_t before_latest_ = 0;
   coding::SignedColumns columns_;
 
   // The last kLogSize corrections, in a ring.

@@ -119,7 +119,7 @@ class SdnnC {
   /// bad state, action or a NaN target, std::overflow_error; then nothing has changed.
   void correct(std::span<const double> state, std::size_t action, double target) {
     core::require(!std::isnan(target), "target", "a number", target);
-    const Remembered& entry = recall(state);
+    const Remembered entry = recall(state);
     const int deficit = scale_.inverse(target) - count_in_window(entry.potentials, action);
     if (deficit == 0) return;
     const std::size_t first = actions_.first_unit(action);
@@ -241,7 +241,7 @@ class SdnnC {
     }
   }
 
-  const Remembered& recall(std::span<const double> state) {
+  Remembered recall(std::span<const double> state) {
     code_->encode(state, bins_);
     return memory_.recall(*code_, perceptron_, bins_);
   }

@@ -3,6 +3,8 @@
 
 #include <cassert>
 #include <cstddef>
+#include <cstdint>
+#include <vector>
 
 #include "sdnn/core/check.hpp"
 
@@ -28,24 +30,27 @@ class ActionCode {
     if (n_actions != 0) core::require_in_range("n_actions", n_actions, 1, n_windows);
     n_hidden_units_ = static_cast<std::size_t>(n_hidden_units);
     n_active_units_ = static_cast<std::size_t>(n_active_units);
-    n_actions_ = static_cast<std::size_t>(n_actions == 0 ? n_windows : n_actions);
+    first_units_.resize(static_cast<std::size_t>(n_actions == 0 ? n_windows : n_actions), 0);
+    for (std::size_t action = 1; action < first_units_.size(); ++action) {
+      first_units_[action] = static_cast<std::uint32_t>(
+          action * (n_hidden_units_ - n_active_units_) / (first_units_.size() - 1));
+    }
   }
 
   std::size_t n_hidden_units() const noexcept { return n_hidden_units_; }
   std::size_t n_active_units() const noexcept { return n_active_units_; }
-  std::size_t n_actions() const noexcept { return n_actions_; }
+  std::size_t n_actions() const noexcept { return first_units_.size(); }
 
   /// The first unit of the window of `action`; the window has `n_active_units()` units.
   std::size_t first_unit(std::size_t action) const noexcept {
-    assert(action < n_actions_);
-    if (n_actions_ == 1) return 0;
-    return action * (n_hidden_units_ - n_active_units_) / (n_actions_ - 1);
+    assert(action < first_units_.size());
+    return first_units_[action];
   }
 
  private:
   std::size_t n_hidden_units_;
   std::size_t n_active_units_;
-  std::size_t n_actions_;
+  std::vector<std::uint32_t> first_units_;
 };
 
 /// The physical value of `action` when the range [low, high] is cut evenly into `n_actions`.

@@ -64,14 +64,14 @@ inline Permutation random_permutation(std::size_t n, core::Random& random) {
 struct SignedColumns {
   std::vector<std::uint32_t> positive;
   std::vector<std::uint32_t> negative;
-  std::vector<std::int16_t> signs = {};  ///< scratch of whoever needs the whole row
+  std::vector<std::int16_t> values = {};  ///< scratch of whoever needs the whole row
 
   /// No columns, but room for `n` of each sign, so that listing them allocates nothing.
   static SignedColumns with_capacity(std::size_t n) {
     SignedColumns columns;
     columns.positive.reserve(n);
     columns.negative.reserve(n);
-    columns.signs.reserve(n);
+    columns.values.reserve(n);
     return columns;
   }
 
