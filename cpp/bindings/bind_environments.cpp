@@ -1,12 +1,17 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
+#include <cstdint>
+#include <string>
 #include <tuple>
+#include <vector>
 
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "sdnn/core/elementary.hpp"
 #include "sdnn/environments/acrobot.hpp"
+#include "sdnn/environments/acrobot_batch.hpp"
 #include "sdnn/environments/acrobot_sensors.hpp"
 #include "sdnn/environments/goal_schedule.hpp"
 
@@ -150,6 +155,82 @@ void bind_acrobot(py::module_& module) {
       .def("decisions", &Acrobot::decisions);
 }
 
+void bind_acrobot_batch(py::module_& module) {
+  using Mask = ArrayArgument<bool>;
+  // A row of numbers for each acrobot, shape (size, width).
+  const auto rows = [](const AcrobotBatch& batch, py::ssize_t width, auto&& row_of) {
+    const auto size = static_cast<py::ssize_t>(batch.size());
+    py::array_t<double> result({size, width});
+    double* out = result.mutable_data();
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      const auto row = row_of(batch.state(i));
+      out = std::copy_n(row.data(), width, out);
+    }
+    return result;
+  };
+  const auto checked = [](const AcrobotBatch& batch, const Mask& mask, const char* name) {
+    const auto items = bindings::vector(mask, name);
+    core::require(items.size() == batch.size(), name,
+                  "of " + std::to_string(batch.size()) + " items", items.size());
+    return items;
+  };
+  py::class_<AcrobotBatch>(module, "AcrobotBatch", "Many acrobots in step, in vector lanes")
+      .def(py::init<const AcrobotConfig&, std::size_t>(), py::arg("config"), py::arg("n_acrobots"))
+      .def("__len__", &AcrobotBatch::size)
+      .def("reset",
+           [checked](AcrobotBatch& batch, const Mask& mask) {
+             const auto chosen = checked(batch, mask, "mask");
+             for (std::size_t i = 0; i < chosen.size(); ++i) {
+               if (chosen[i]) batch.reset(i);
+             }
+           },
+           py::arg("mask"))
+      .def("set_state",
+           [](AcrobotBatch& batch, std::size_t index, const ArrayArgument<double>& state) {
+             batch.set_state(index, state_vector(state));
+           },
+           py::arg("index"), py::arg("state"))
+      .def("step",
+           [checked](AcrobotBatch& batch, const ArrayArgument<double>& torques,
+                     const ArrayArgument<double>& lambdas, const Mask& moving) {
+             const auto chosen = checked(batch, moving, "moving");
+             const std::vector<std::uint8_t> mask(chosen.begin(), chosen.end());
+             std::vector<StepResult> results(batch.size());
+             {
+               const auto torque = bindings::vector(torques, "torques");
+               const auto lambda = bindings::vector(lambdas, "lambdas");
+               const py::gil_scoped_release unlocked;
+               batch.step(torque, lambda, mask, results);
+             }
+             const auto size = static_cast<py::ssize_t>(batch.size());
+             py::array_t<double> rewards(size);
+             py::array_t<bool> terminated(size), truncated(size);
+             for (py::ssize_t i = 0; i < size; ++i) {
+               const StepResult& result = results[static_cast<std::size_t>(i)];
+               rewards.mutable_at(i) = result.reward;
+               terminated.mutable_at(i) = result.terminated;
+               truncated.mutable_at(i) = result.truncated;
+             }
+             return std::make_tuple(rewards, terminated, truncated);
+           },
+           py::arg("torques"), py::arg("lambdas"), py::arg("moving"),
+           "(rewards, terminated, truncated)")
+      .def("states",
+           [rows](const AcrobotBatch& batch) {
+             return rows(batch, 4, [](const Eigen::Vector4d& state) { return state; });
+           })
+      .def("observations",
+           [rows](const AcrobotBatch& batch) { return rows(batch, 4, basic_observation); },
+           "s1..s4 of every state")
+      .def("tip_heights",
+           [](const AcrobotBatch& batch) {
+             std::vector<double> heights(batch.size());
+             for (std::size_t i = 0; i < heights.size(); ++i) heights[i] = batch.tip_height(i);
+             return array(heights);
+           })
+      .def("decisions", &AcrobotBatch::decisions, py::arg("index"));
+}
+
 void bind_sensors(py::module_& module) {
   const SensorConfig defaults;
   py::enum_<SensorEdge>(module, "SensorEdge", "What noise does at the ends of a sensor's range")
@@ -199,5 +280,6 @@ void bind_environments(py::module_& module) {
   bind_elementary(module);
   bind_goal_schedule(module);
   bind_acrobot(module);
+  bind_acrobot_batch(module);
   bind_sensors(module);
 }

@@ -61,7 +61,8 @@ void bind_experiments(py::module_& module) {
       .def_property_readonly("episode", &Trial::episode)
       .def_property_readonly("finished", &Trial::finished)
       .def_property_readonly("n_decisions", &Trial::n_decisions)
-      .def("advance", &Trial::advance, py::arg("n_episodes"),
-           py::call_guard<py::gil_scoped_release>(), "Runs up to n more learning episodes")
+      .def("advance", [](Trial& trial, int n_episodes) { trial.advance(n_episodes); },
+           py::arg("n_episodes"), py::call_guard<py::gil_scoped_release>(),
+           "Runs up to n more learning episodes")
       .def("test_rows", &test_rows, "Columns of the test episodes so far");
 }

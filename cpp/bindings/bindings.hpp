@@ -3,8 +3,10 @@
 
 #include <pybind11/pybind11.h>
 
+void bind_core(pybind11::module_& module);
 void bind_coding(pybind11::module_& module);
 void bind_approximators(pybind11::module_& module);
 void bind_agents(pybind11::module_& module);
 void bind_environments(pybind11::module_& module);
 void bind_experiments(pybind11::module_& module);
+void bind_benchmarks(pybind11::module_& module);

@@ -6,6 +6,10 @@ Rooms, from the network up (each is imported when first used):
 - ``sdnn.agents``: Q-learning with it, for any Gymnasium environment
 - ``sdnn.environments``: the acrobot swing-up, redundant and noisy sensors
 - ``sdnn.experiments``: the paper's experiments, also as the command ``sdnn reproduce``
+- ``sdnn.benchmarks``: how quick all this is here, also as the command ``sdnn bench``
+
+``sdnn.instruction_set()`` and ``sdnn.set_instruction_set(name)``: which vector instructions the
+core uses.
 """
 
 from __future__ import annotations
@@ -16,11 +20,21 @@ from typing import TYPE_CHECKING
 
 from sdnn import environments
 from sdnn._core import __version__
+from sdnn.instruction_sets import instruction_set, set_instruction_set
 
 if TYPE_CHECKING:
-    from sdnn import agents, approximators, experiments
+    from sdnn import agents, approximators, benchmarks, experiments
 
-__all__ = ["__version__", "agents", "approximators", "environments", "experiments"]
+__all__ = [
+    "__version__",
+    "agents",
+    "approximators",
+    "benchmarks",
+    "environments",
+    "experiments",
+    "instruction_set",
+    "set_instruction_set",
+]
 
 
 def __getattr__(name: str) -> ModuleType:

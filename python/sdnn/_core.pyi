@@ -475,6 +475,32 @@ class Acrobot:
         """
     def tip_height(self) -> float:
         ...
+class AcrobotBatch:
+    """
+    Many acrobots in step, in vector lanes
+    """
+    def __init__(self, config: AcrobotConfig, n_acrobots: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __len__(self) -> int:
+        ...
+    def decisions(self, index: typing.SupportsInt | typing.SupportsIndex) -> int:
+        ...
+    def observations(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        s1..s4 of every state
+        """
+    def reset(self, mask: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> None:
+        ...
+    def set_state(self, index: typing.SupportsInt | typing.SupportsIndex, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def states(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def step(self, torques: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], lambdas: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], moving: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool], numpy.typing.NDArray[numpy.bool]]:
+        """
+        (rewards, terminated, truncated)
+        """
+    def tip_heights(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
 class SensorEdge:
     """
     What noise does at the ends of a sensor's range
@@ -681,6 +707,77 @@ class AcrobotTrial:
     @property
     def n_decisions(self) -> int:
         ...
+class BufferRead:
+    """
+    Reads a buffer from front to back
+    """
+    def __init__(self, n_bytes: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def run(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        Nanoseconds per reading: (n_repetitions,)
+        """
+    @property
+    def n_bytes(self) -> int:
+        ...
+class DenseProduct:
+    """
+    A dense float32 matrix-vector product
+    """
+    def __init__(self, n_rows: typing.SupportsInt | typing.SupportsIndex, n_columns: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def run(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        Nanoseconds per product: (n_repetitions,)
+        """
+class NetworkParts:
+    """
+    The network's parts of a decision
+    """
+    @typing.overload
+    def __init__(self, trial: AcrobotTrial, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Times a copy of the trial's network
+        """
+    @typing.overload
+    def __init__(self, network: SdnnC, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Times a copy of the network
+        """
+    def mean_bytes_of_pass(self, n_states: typing.SupportsInt | typing.SupportsIndex) -> float:
+        ...
+    def time_corrections(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex, n_corrected: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        Learning steps
+        """
+    def time_remembered_values(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        All values at the same state again
+        """
+    def time_selections(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex, n_selections: typing.SupportsInt | typing.SupportsIndex, n_selected: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        n_selections selections of units per repetition
+        """
+    def time_values(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        All values at a new state: nanoseconds (n_repetitions,)
+        """
+    @property
+    def weight_bytes(self) -> int:
+        ...
+class AcrobotDecisions:
+    """
+    The acrobot under random torques
+    """
+    def __init__(self, config: AcrobotConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def run(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        Nanoseconds per decision: (n_repetitions,)
+        """
+    @property
+    def n_integration_steps(self) -> int:
+        ...
 def action_value(action: typing.SupportsInt | typing.SupportsIndex, n_actions: typing.SupportsInt | typing.SupportsIndex, low: typing.SupportsFloat | typing.SupportsIndex, high: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     The value of an action in a range cut evenly
@@ -689,16 +786,32 @@ def basic_observation(state: typing.Annotated[numpy.typing.ArrayLike, numpy.floa
     """
     s1..s4 of a state
     """
+def best_instruction_set() -> str:
+    """
+    The best instruction set that this machine offers
+    """
 def energy_sensor(s3: typing.SupportsFloat | typing.SupportsIndex, s4: typing.SupportsFloat | typing.SupportsIndex) -> float:
     ...
 def height_sensor(s1: typing.SupportsFloat | typing.SupportsIndex, s2: typing.SupportsFloat | typing.SupportsIndex) -> float:
     ...
+def instruction_set() -> str:
+    """
+    The instruction set in use
+    """
 def log(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
 def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
+def set_instruction_set(name: str) -> None:
+    """
+    Forces an instruction set, for the whole process
+    """
 def sin_cos(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     (sin x, cos x), item by item
+    """
+def time_decisions(trial: AcrobotTrial, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    Advances a trial; nanoseconds of every decision in it
     """
 __version__: str

@@ -146,6 +146,29 @@ def reproduce(
         _exit_interrupted(context, "interrupted; what was finished is stored")
 
 
+@main.command()
+@click.option("--quick", is_flag=True, help="Few repetitions: to see that it works.")
+@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON.")
+def bench(quick: bool, as_json: bool) -> None:
+    """Measure how quick the library is here, and what this machine allows.
+
+    Takes about half a minute. SDNN_INSTRUCTION_SET=portable, avx2 or avx512 forces a level.
+    """
+    from sdnn.benchmarks import BenchmarkError, run_benchmarks
+    from sdnn.benchmarks.report import print_results
+
+    try:
+        results = run_benchmarks(quick=quick)
+    except BenchmarkError as error:
+        raise click.ClickException(str(error)) from error
+    if as_json:
+        click.echo(json.dumps(results, indent=2))
+        return
+    from rich.console import Console
+
+    print_results(results, Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH))
+
+
 def _run(request: ReproduceRequest) -> Reproduction:
     from rich.console import Console
 

@@ -18,6 +18,7 @@ FLOORS = (
     ("approximators",),
     ("agents", "environments"),
     ("experiments",),
+    ("benchmarks",),
     ("sdnn",),
 )
 """Rooms of one floor do not know each other; the roof is the umbrella, the package, the command."""
@@ -25,7 +26,13 @@ FLOORS = (
 WINGS = {"environments": {"core"}}
 """Rooms that stand on less than all the floors below them."""
 
-PYTHON_MODULES = {"__init__": "sdnn", "__main__": "sdnn", "cli": "sdnn", "choices": "core"}
+PYTHON_MODULES = {
+    "__init__": "sdnn",
+    "__main__": "sdnn",
+    "cli": "sdnn",
+    "choices": "core",
+    "instruction_sets": "core",
+}
 """The room of every module at the top of the Python package."""
 
 SHARED_BINDINGS = {"core", "coding"}
@@ -161,6 +168,7 @@ def test_python_arrows_point_down():
         ("environments", "approximators"),
         ("environments", "coding"),
         ("agents", "experiments"),
+        ("experiments", "benchmarks"),
         ("agents", "sdnn"),
         ("helpers", "core"),
         ("agents", "helpers"),

@@ -6,6 +6,11 @@ Importing ``sdnn`` registers ``sdnn/AcrobotSwingUp-v0``:
 >>> import sdnn
 >>> gym.make("sdnn/AcrobotSwingUp-v0").observation_space.shape
 (4,)
+
+and many of them at once, stepped side by side in vector registers:
+
+>>> gym.make_vec("sdnn/AcrobotSwingUp-v0", num_envs=16).observation_space.shape
+(16, 4)
 """
 
 import gymnasium as gym
@@ -14,10 +19,12 @@ from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.config import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.environments.goal_schedule import GoalSchedule
 from sdnn.environments.sensors import NoisySensors, RedundantSensors
+from sdnn.environments.vector_env import AcrobotSwingUpVectorEnv
 
 __all__ = [
     "AcrobotConfig",
     "AcrobotSwingUpEnv",
+    "AcrobotSwingUpVectorEnv",
     "GoalSchedule",
     "GoalScheduleConfig",
     "NoisySensors",
@@ -33,6 +40,7 @@ def register_environments() -> None:
         gym.register(
             id="sdnn/AcrobotSwingUp-v0",
             entry_point="sdnn.environments.acrobot:AcrobotSwingUpEnv",
+            vector_entry_point="sdnn.environments.vector_env:AcrobotSwingUpVectorEnv",
             reward_threshold=10.0,
         )
 

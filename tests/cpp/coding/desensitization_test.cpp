@@ -2,9 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <limits>
-
 namespace sdnn::coding {
 namespace {
 
@@ -27,104 +24,6 @@ TEST(Desensitize, NeutralWhereTheModifierIsOff) {
 TEST(Permute, UnitKIsUnitPermutationOfK) {
   EXPECT_EQ(permute(layer({1, -1, -1}), {2, 0, 1}), layer({-1, 1, -1}));
   EXPECT_THROW(permute(layer({1, -1, -1}), {0, 1}), std::invalid_argument);
-}
-
-StateCode<64> small_code(std::size_t l, int m, std::uint64_t seed) {
-  std::vector<CodeBook<64>> books;
-  std::vector<Permutation> permutations;
-  for (std::size_t mu = 0; mu < l; ++mu) {
-    core::Random random(seed, core::Stream::code_books, mu);
-    books.push_back(anchor_interpolation<64>({.n_pattern_units = m}, random));
-  }
-  for (std::size_t g = 0; g < l * (l - 1); ++g) {
-    core::Random random(seed, core::Stream::permutations, g);
-    permutations.push_back(random_permutation(static_cast<std::size_t>(m), random));
-  }
-  return {std::move(books), std::move(permutations)};
-}
-
-std::vector<int> dense(const StateCode<64>& code, std::span<const Bin> bins) {
-  SignedColumns columns;
-  code.columns(bins, columns);
-  std::vector<int> x(code.n_columns(), 0);
-  for (const auto j : columns.positive) x[j] += 1;
-  for (const auto j : columns.negative) x[j] -= 1;
-  return x;
-}
-
-TEST(StateCode, ColumnsFollowTheEquationOfLayer3) {
-  const auto code = small_code(3, 37, 5);
-  EXPECT_EQ(code.n_columns(), 37U * 6U);
-  const std::vector<Bin> bins = {17, 200, 359};
-  const auto x = dense(code, bins);
-  std::size_t j = 0;
-  for (std::size_t mu = 0; mu < 3; ++mu) {
-    for (std::size_t nu = 0; nu < 3; ++nu) {
-      if (nu == mu) continue;
-      const auto& sigma = code.permutation(mu, nu);
-      const auto pattern = code.group(mu, nu, bins);
-      for (std::size_t k = 0; k < 37; ++k, ++j) {
-        const int x_mu = code.book(mu)[bins[mu]][k] ? 1 : -1;
-        const int modifier = code.book(nu)[bins[nu]][sigma[k]] ? 1 : -1;
-        EXPECT_EQ(x[j], (1 + modifier) / 2 * x_mu);
-        EXPECT_EQ(pattern.active[k], x[j] != 0);
-        EXPECT_EQ(pattern.positive[k], x[j] > 0);
-      }
-    }
-  }
-}
-
-TEST(StateCode, TheInnerProductIsThatOfTheDenseCodes) {
-  const auto code = small_code(4, 50, 6);
-  core::Random random(1, core::Stream::ties);
-  for (int trial = 0; trial < 200; ++trial) {
-    std::vector<Bin> a(4);
-    std::vector<Bin> b(4);
-    for (auto& bin : a) bin = static_cast<Bin>(random.below(360));
-    for (auto& bin : b) bin = static_cast<Bin>(random.below(360));
-    const auto x = dense(code, a);
-    const auto y = dense(code, b);
-    int expected = 0;
-    for (std::size_t j = 0; j < x.size(); ++j) expected += x[j] * y[j];
-    EXPECT_EQ(code.inner_product(a, b), expected);
-    EXPECT_EQ(code.inner_product(b, a), expected);
-  }
-}
-
-// |x_SD|^2 = sum over groups of the ones of the modifier: 1200 at the paper's size for anchors.
-TEST(StateCode, AnAnchorStateHasHalfOfItsColumns) {
-  const auto code = small_code(4, 64, 7);
-  const std::vector<Bin> anchors = {0, 45, 90, 135};
-  EXPECT_EQ(code.inner_product(anchors, anchors), 12 * 32);
-}
-
-TEST(StateCode, EncodeRefusesWhatIsNoState) {
-  const auto code = small_code(2, 10, 8);
-  std::vector<Bin> bins(2);
-  const auto message = [&](std::vector<double> state) -> std::string {
-    try {
-      code.encode(state, bins);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "no error";
-  };
-  EXPECT_EQ(message({0.0, 1.0}), "no error");
-  EXPECT_EQ(message({0.5}), "state must be 2 values, got 1");
-  EXPECT_EQ(message({0.5, 1.5}), "state[1] must be in [0, 1], got 1.5");
-  EXPECT_EQ(message({std::nan(""), 0.5}), "state[0] must be in [0, 1], got nan");
-  EXPECT_EQ(message({-std::numeric_limits<double>::infinity(), 0.5}),
-            "state[0] must be in [0, 1], got -inf");
-}
-
-TEST(StateCode, RefusesWrongWiring) {
-  const auto code = small_code(2, 3, 9);
-  const std::vector<CodeBook<64>> books = {code.book(0), code.book(1)};
-  EXPECT_THROW(StateCode<64>({code.book(0)}, {}), std::invalid_argument);
-  EXPECT_THROW(StateCode<64>(books, {{0, 1, 2}}), std::invalid_argument);
-  EXPECT_THROW(StateCode<64>(books, {{0, 1, 2}, {0, 1, 1}}), std::invalid_argument);
-  EXPECT_NO_THROW(StateCode<64>(books, {{0, 1, 2}, {2, 1, 0}}));
-  EXPECT_THROW(static_cast<void>(code.permutation(1, 1)), std::invalid_argument);
 }
 
 }  // namespace

@@ -34,48 +34,48 @@ namespace internal {
 /// How many columns ahead memory is asked for: about the latency of the last-level cache.
 inline constexpr std::size_t kPrefetchAhead = 16;
 
+using Bytes = std::array<std::int8_t, kBlockUnits>;
+
+/// The sum of `Group` columns in 8 bits, by halves: loops of a shape that every compiler vectorizes.
+/// Copied first, because bytes in memory may alias anything.
+template <std::size_t Group>
+Bytes group_sum_portable(const std::int8_t* block, const std::uint32_t* columns) noexcept {
+  Bytes sum;
+  if constexpr (Group == 1) {
+    std::copy_n(block + std::size_t{columns[0]} * kBlockUnits, kBlockUnits, sum.begin());
+  } else {
+    const Bytes first = group_sum_portable<Group / 2>(block, columns);
+    const Bytes second = group_sum_portable<Group / 2>(block, columns + Group / 2);
+    for (std::size_t i = 0; i < kBlockUnits; ++i) {
+      sum[i] = static_cast<std::int8_t>(first[i] + second[i]);
+    }
+  }
+  return sum;
+}
+
+/// Adds columns in groups of `Group`, as many as there are; returns how many columns that were.
+template <std::size_t Group>
+std::size_t add_groups_portable(const std::int8_t* block, std::span<const std::uint32_t> columns,
+                                std::array<std::int16_t, kBlockUnits>& wide) noexcept {
+  std::size_t c = 0;
+  for (; c + Group <= columns.size(); c += Group) {
+    const Bytes sum = group_sum_portable<Group>(block, columns.data() + c);
+    for (std::size_t i = 0; i < kBlockUnits; ++i) {
+      wide[i] = static_cast<std::int16_t>(wide[i] + sum[i]);
+    }
+  }
+  return c;
+}
+
 inline void add_columns_portable(const std::int8_t* block, std::span<const std::uint32_t> columns,
                                  int group, int sign, std::int32_t* sums) {
-  const auto column = [block, columns](std::size_t c) {
-    return block + std::size_t{columns[c]} * kBlockUnits;
-  };
-  for (std::size_t begin = 0; begin < columns.size(); begin += kColumnsPerSum) {
-    const std::size_t end = std::min(begin + kColumnsPerSum, columns.size());
+  while (!columns.empty()) {
+    auto some = columns.first(std::min(kColumnsPerSum, columns.size()));
+    columns = columns.subspan(some.size());
     std::array<std::int16_t, kBlockUnits> wide{};
-    std::size_t c = begin;
-    if (group == 4) {
-      for (; c + 4 <= end; c += 4) {
-        const std::int8_t* const w0 = column(c);
-        const std::int8_t* const w1 = column(c + 1);
-        const std::int8_t* const w2 = column(c + 2);
-        const std::int8_t* const w3 = column(c + 3);
-        std::array<std::int8_t, kBlockUnits> narrow;
-        for (std::size_t i = 0; i < kBlockUnits; ++i) {
-          narrow[i] = static_cast<std::int8_t>(w0[i] + w1[i] + w2[i] + w3[i]);
-        }
-        for (std::size_t i = 0; i < kBlockUnits; ++i) {
-          wide[i] = static_cast<std::int16_t>(wide[i] + narrow[i]);
-        }
-      }
-    } else if (group == 2) {
-      for (; c + 2 <= end; c += 2) {
-        const std::int8_t* const w0 = column(c);
-        const std::int8_t* const w1 = column(c + 1);
-        std::array<std::int8_t, kBlockUnits> narrow;
-        for (std::size_t i = 0; i < kBlockUnits; ++i) {
-          narrow[i] = static_cast<std::int8_t>(w0[i] + w1[i]);
-        }
-        for (std::size_t i = 0; i < kBlockUnits; ++i) {
-          wide[i] = static_cast<std::int16_t>(wide[i] + narrow[i]);
-        }
-      }
-    }
-    for (; c < end; ++c) {
-      const std::int8_t* const w = column(c);
-      for (std::size_t i = 0; i < kBlockUnits; ++i) {
-        wide[i] = static_cast<std::int16_t>(wide[i] + w[i]);
-      }
-    }
+    if (group == 4) some = some.subspan(add_groups_portable<4>(block, some, wide));
+    if (group >= 2) some = some.subspan(add_groups_portable<2>(block, some, wide));
+    add_groups_portable<1>(block, some, wide);
     for (std::size_t i = 0; i < kBlockUnits; ++i) sums[i] += sign * wide[i];
   }
 }

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "sdnn/approximators/parallel_perceptron.hpp"
-#include "sdnn/coding/desensitization.hpp"
+#include "sdnn/coding/state_code.hpp"
 
 namespace sdnn::approximators {
 

@@ -20,6 +20,7 @@
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/coding/desensitization.hpp"
 #include "sdnn/coding/pattern_code.hpp"
+#include "sdnn/coding/state_code.hpp"
 #include "sdnn/core/check.hpp"
 #include "sdnn/core/random.hpp"
 

@@ -12,32 +12,26 @@
 #include <cstdint>
 #include <limits>
 
+#include "sdnn/core/lanes.hpp"
+
 namespace sdnn::core {
 
 /// The double next to pi, which is 1.2e-16 below it.
 inline constexpr double kPi = 0x1.921fb54442d18p+1;
 inline constexpr double kTwoPi = 2.0 * kPi;
 
-/// sin x and cos x.
-struct SinCos {
-  double sin;
-  double cos;
+/// sin x and cos x, of one number or of several side by side.
+template <class Real>
+struct BasicSinCos {
+  Real sin;
+  Real cos;
 };
+using SinCos = BasicSinCos<double>;
 
 /// The largest |x| of sin_cos.
 inline constexpr double kSinCosLimit = 1e5;
 
 namespace detail {
-
-/// One of two numbers by a mask of all ones (`first`) or all zeros, without a branch.
-inline double select(std::uint64_t mask, double first, double second) noexcept {
-  return std::bit_cast<double>((std::bit_cast<std::uint64_t>(first) & mask) |
-                               (std::bit_cast<std::uint64_t>(second) & ~mask));
-}
-
-inline double flip_sign(double value, std::uint64_t sign_bit) noexcept {
-  return std::bit_cast<double>(std::bit_cast<std::uint64_t>(value) ^ sign_bit);
-}
 
 /// c[0] + c[1] x + ... by Horner's rule.
 template <std::size_t Size>
@@ -51,51 +45,54 @@ constexpr double polynomial(const std::array<double, Size>& c, double x) noexcep
 
 /// sin x and cos x for |x| <= 1e5; NaN beyond, and for infinities and NaN.
 ///
+/// `Real` is double or core::Lanes, with the same bits in every lane.
 /// Error: the largest of 570,000 arguments, a sixth of them next to multiples of pi/2, was 0.82 ulp
 /// (against 60 digits; the tests repeat a part of it). sin is exactly odd, -0 included, and cos
-/// exactly even. No branch and no table, so that a loop over it can be
-/// vectorized, and short chains of dependent operations, since an integrator waits for the result.
+/// exactly even. No branch and no table, so that it runs in lanes, and short chains of dependent
+/// operations, since an integrator waits for the result.
 /// Source: reduction by Cody and Waite, pi/2 as 34 + 34 + 53 bits; minimax-like polynomials of our
 /// own for (sin r - r) / r^3 and (cos r - 1 + r^2/2) / r^4 in r^2, |r| <= pi/4 (relative error
 /// 2^-57.8 and 2^-63.7).
-inline SinCos sin_cos(double x) noexcept {
+template <class Real>
+SDNN_INLINE BasicSinCos<Real> sin_cos(const Real& x) noexcept {
   constexpr std::uint64_t kSignBit = std::uint64_t{1} << 63;
   constexpr double kTwoOverPi = 0x1.45f306dc9c883p-1;
   constexpr double kRounder = 0x1.8p52;  // adding it leaves the nearest integer in the low bits
   constexpr double kHalfPi1 = 0x1.921fb5444p+0, kHalfPi2 = 0x1.68c234c4cp-39;
   constexpr double kHalfPi3 = 0x1.98a2e03707345p-77;
 
-  const std::uint64_t sign = std::bit_cast<std::uint64_t>(x) & kSignBit;
-  const double a = detail::flip_sign(x, sign);
-  const double poison = a <= kSinCosLimit ? 0.0 : std::numeric_limits<double>::quiet_NaN();
+  const auto sign = bits_of(x) & kSignBit;
+  const Real a = magnitude(x);
+  const Real poison =
+      select(a <= kSinCosLimit, Real(0.0), Real(std::numeric_limits<double>::quiet_NaN()));
 
   // |x| = n pi/2 + r + tail, |r| <= pi/4. n kHalfPi1 and n kHalfPi2 have at most 51 bits, so they
   // and the first difference are exact.
-  const double shifted = a * kTwoOverPi + kRounder;
-  const double n = shifted - kRounder;
-  const auto quadrant = std::bit_cast<std::uint64_t>(shifted);
-  const double coarse = a - n * kHalfPi1;
-  const double correction = n * kHalfPi2;
-  const double r = coarse - correction;
-  const double tail = ((coarse - r) - correction) - n * kHalfPi3 + poison;
+  const Real shifted = a * kTwoOverPi + kRounder;
+  const Real n = shifted - kRounder;
+  const auto quadrant = bits_of(shifted);
+  const Real coarse = a - n * kHalfPi1;
+  const Real correction = n * kHalfPi2;
+  const Real r = coarse - correction;
+  const Real tail = ((coarse - r) - correction) - n * kHalfPi3 + poison;
 
-  const double z = r * r, z2 = z * z, z4 = z2 * z2;
-  const double sin_poly = ((-0x1.5555555555548p-3 + 0x1.111111110f77cp-7 * z) +
-                           z2 * (-0x1.a01a019bf7bcbp-13 + 0x1.71de35649b231p-19 * z)) +
-                          z4 * (-0x1.ae5e591921411p-26 + 0x1.5d8f97c9f3d4bp-33 * z);
-  const double cos_poly = ((0x1.555555555554bp-5 + -0x1.6c16c16c1504bp-10 * z) +
-                           z2 * (0x1.a01a019c9773cp-16 + -0x1.27e4f7f8e48edp-22 * z)) +
-                          z4 * (0x1.1ee9e1583270bp-29 + -0x1.8fa99010a4496p-37 * z);
-  const double half_z = 0.5 * z;
-  const double one_minus = 1.0 - half_z;
-  const double sine = r + ((z * r) * sin_poly + tail * one_minus);
-  const double cosine = one_minus + (((1.0 - one_minus) - half_z - r * tail) + z2 * cos_poly);
+  const Real z = r * r, z2 = z * z, z4 = z2 * z2;
+  const Real sin_poly = ((-0x1.5555555555548p-3 + 0x1.111111110f77cp-7 * z) +
+                         z2 * (-0x1.a01a019bf7bcbp-13 + 0x1.71de35649b231p-19 * z)) +
+                        z4 * (-0x1.ae5e591921411p-26 + 0x1.5d8f97c9f3d4bp-33 * z);
+  const Real cos_poly = ((0x1.555555555554bp-5 + -0x1.6c16c16c1504bp-10 * z) +
+                         z2 * (0x1.a01a019c9773cp-16 + -0x1.27e4f7f8e48edp-22 * z)) +
+                        z4 * (0x1.1ee9e1583270bp-29 + -0x1.8fa99010a4496p-37 * z);
+  const Real half_z = 0.5 * z;
+  const Real one_minus = 1.0 - half_z;
+  const auto sine = bits_of(Real(r + ((z * r) * sin_poly + tail * one_minus)));
+  const auto cosine =
+      bits_of(Real(one_minus + (((1.0 - one_minus) - half_z - r * tail) + z2 * cos_poly)));
 
-  const std::uint64_t swap = std::uint64_t{0} - (quadrant & 1);
-  const std::uint64_t sin_sign = ((quadrant & 2) << 62) ^ sign;
-  const std::uint64_t cos_sign = ((quadrant + 1) & 2) << 62;
-  return {detail::flip_sign(detail::select(swap, cosine, sine), sin_sign),
-          detail::flip_sign(detail::select(swap, sine, cosine), cos_sign)};
+  const auto swap = (sine ^ cosine) & (std::uint64_t{0} - (quadrant & 1));
+  const auto sin_sign = ((quadrant & 2) << 62) ^ sign;
+  const auto cos_sign = ((quadrant + 1) & 2) << 62;
+  return {double_of(sine ^ (swap ^ sin_sign)), double_of(cosine ^ (swap ^ cos_sign))};
 }
 
 /// The natural logarithm; log 0 = -inf, NaN for negative numbers and NaN.

@@ -71,17 +71,27 @@ class AcrobotTrial {
 
   /// Runs up to `n_episodes` more learning episodes, with the test episodes that fall due.
   void advance(int n_episodes) {
+    advance(n_episodes, [] {});
+  }
+
+  /// The same, calling `after_decision()` after every decision, of test episodes too.
+  template <class AfterDecision>
+  void advance(int n_episodes, AfterDecision&& after_decision) {
     core::require_in_range("n_episodes", n_episodes, 0, 1 << 30);
     const int last = episode_ + std::min(n_episodes, protocol_.n_learning_episodes - episode_);
     while (episode_ < last) {
       ++episode_;
-      run_episode(sensors_, true);
-      if (episode_ % protocol_.test_interval == 0) rows_.push_back(run_episode(test_sensors_, false));
+      run_episode(sensors_, true, after_decision);
+      if (episode_ % protocol_.test_interval == 0) {
+        rows_.push_back(run_episode(test_sensors_, false, after_decision));
+      }
     }
   }
 
  private:
-  TestRow run_episode(environments::AcrobotSensors& sensors, bool learning) {
+  template <class AfterDecision>
+  TestRow run_episode(environments::AcrobotSensors& sensors, bool learning,
+                      AfterDecision& after_decision) {
     const double lambda = goal_(episode_);
     TestRow row{.episode = episode_, .steps = 0, .episode_return = 0.0, .solved = false};
     acrobot_.reset();
@@ -102,6 +112,7 @@ class AcrobotTrial {
       row.episode_return += result.reward;
       row.solved = result.terminated;
       truncated = result.truncated;
+      after_decision();
     }
     n_decisions_ += row.steps;
     return row;

@@ -1,0 +1,52 @@
+"""Puts the tables of a benchmark run into docs/performance.md.
+
+sdnn bench --json > docs/performance.json && python bench/performance_tables.py
+
+The profile in docs/profile.json, made by bench/profile_trial.py, becomes the last table.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from sdnn.benchmarks.report import to_markdown
+
+DOCS = Path(__file__).parents[1] / "docs"
+RESULTS = DOCS / "performance.json"
+PROFILE = DOCS / "profile.json"
+PAGE = DOCS / "performance.md"
+BEGIN = "<!-- tables: made by bench/performance_tables.py from performance.json -->"
+END = "<!-- end of tables -->"
+
+
+def profile_table(profile: dict[str, dict[str, float]]) -> str:
+    """Functions by their share of the time, one column per trial."""
+    functions = sorted(
+        {name for shares in profile.values() for name in shares},
+        key=lambda name: -sum(shares.get(name, 0.0) for shares in profile.values()),
+    )
+    lines = [
+        "**Where a trial's time goes (per cent of samples; below 1 left out)**",
+        "",
+        f"| function | {' | '.join(profile)} |",
+        f"| --- |{' ---: |' * len(profile)}",
+    ]
+    for name in functions:
+        shares = (f"{of[name]:.1f}" if name in of else "" for of in profile.values())
+        lines.append(f"| `{name}` | {' | '.join(shares)} |")
+    return "\n".join(lines) + "\n"
+
+
+def with_tables(page: str, results: dict, profile: dict[str, dict[str, float]]) -> str:
+    """The page with what stands between its two marks replaced."""
+    before, begin, rest = page.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise SystemExit(f"{PAGE} must hold the lines {BEGIN} and {END}")
+    return f"{before}{BEGIN}\n\n{to_markdown(results)}\n{profile_table(profile)}\n{END}{after}"
+
+
+if __name__ == "__main__":
+    stored = (json.loads(path.read_text()) for path in (RESULTS, PROFILE))
+    PAGE.write_text(with_tables(PAGE.read_text(), *stored))

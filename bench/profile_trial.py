@@ -1,0 +1,62 @@
+"""Where a trial's time goes, function by function, with Linux perf.
+
+python bench/profile_trial.py build/bench/sdnn_bench   (built with -DSDNN_BUILD_BENCH=ON)
+
+Writes docs/profile.json; bench/performance_tables.py puts it into docs/performance.md.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+PROFILE = Path(__file__).parents[1] / "docs" / "profile.json"
+TRIALS = {
+    "4 inputs": "trial/inputs:4/noise:0/episodes:2000",
+    "4 inputs, noise": "trial/inputs:4/noise:2/episodes:2000",
+    "6 inputs, noise": "trial/inputs:6/noise:2/episodes:2000",
+}
+SMALLEST_SHARE = 1.0
+
+
+def short_name(symbol: str) -> str:
+    """A function's name without namespaces, arguments and template arguments."""
+    symbol = symbol.replace("(anonymous namespace)::", "")
+    symbol = re.sub(r"\[clone.*\]|\(.*", "", symbol).strip()
+    previous = None
+    while previous != symbol:
+        previous, symbol = symbol, re.sub(r"<[^<>]*>", "", symbol)
+    symbol = re.sub(r"<.*", "", symbol)  # perf cuts long names
+    name = symbol.split(" ")[-1].removeprefix("sdnn::").replace("internal::", "")
+    return name.partition("::")[2] if name.count("::") and name[0].islower() else name
+
+
+def profile(program: str, benchmark: str) -> dict[str, float]:
+    """Per cent of samples by function."""
+    with tempfile.TemporaryDirectory() as folder:
+        data = str(Path(folder) / "perf.data")
+        command = ["perf", "record", "-q", "-F", "1999", "-o", data, program]
+        subprocess.run(
+            [*command, f"--benchmark_filter={benchmark}$", "--benchmark_min_time=2"],
+            check=True,
+            stdout=subprocess.DEVNULL,
+        )
+        report = ["perf", "report", "-i", data, "--no-children", "--stdio", "-F", "overhead,sym"]
+        done = subprocess.run(report, check=True, capture_output=True, text=True)
+    shares: dict[str, float] = {}
+    for share, symbol in re.findall(r"^\s*([\d.]+)%\s+\[[.k]\]\s+(.*)$", done.stdout, re.MULTILINE):
+        name = short_name(symbol)
+        shares[name] = shares.get(name, 0.0) + float(share)
+    return {name: round(share, 1) for name, share in shares.items() if share >= SMALLEST_SHARE}
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        raise SystemExit(__doc__)
+    profiles = {title: profile(sys.argv[1], name) for title, name in TRIALS.items()}
+    PROFILE.write_text(json.dumps(profiles, indent=2) + "\n")
+    print(f"wrote {PROFILE}")

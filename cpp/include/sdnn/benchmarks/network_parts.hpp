@@ -1,0 +1,150 @@
+/// The parts of a decision that belong to the network, timed one by one.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/approximators/column_sums.hpp"
+#include "sdnn/approximators/dynamic_sdnn_c.hpp"
+#include "sdnn/approximators/error_correction.hpp"
+#include "sdnn/benchmarks/stopwatch.hpp"
+#include "sdnn/coding/state_code.hpp"
+#include "sdnn/core/aligned_buffer.hpp"
+#include "sdnn/core/check.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::benchmarks {
+
+/// Times a network at random states, which are new to it: nothing it remembers helps.
+///
+/// It should have learned something before: a network that never learned has smaller weights than
+/// one at work, and small weights are added quicker.
+class NetworkParts {
+ public:
+  /// A copy of `network` is timed, and learns. The states follow from `seed`.
+  NetworkParts(approximators::DynamicSdnnC network, std::uint64_t seed)
+      : network_(std::move(network)),
+        random_(seed, core::Stream::exploration),
+        state_(network_.n_inputs()),
+        values_(network_.n_actions()),
+        potentials_(network_.perceptron().n_units()) {}
+
+  const approximators::DynamicSdnnC& network() const noexcept { return network_; }
+
+  /// Q(s, a) of all actions at a new state.
+  Times time_values(int n_repetitions) {
+    return time_each(n_repetitions, [this](int) { draw_state(); },
+                     [this](int) { network_.values(state_, values_); });
+  }
+
+  /// The same at a state the network was asked about just before.
+  Times time_remembered_values(int n_repetitions) {
+    return time_each(n_repetitions, [this](int) { recall_new_state(); },
+                     [this](int) { network_.values(state_, values_); });
+  }
+
+  /// A learning step at a state the network was just asked about, as an agent takes it; Q moves up
+  /// or down in turn by `n_corrected` units of its window, wherever that many can change.
+  /// Throws std::invalid_argument unless n_corrected is in [1, n'].
+  Times time_corrections(int n_repetitions, int n_corrected) {
+    require_units("n_corrected", n_corrected);
+    const auto& scale = network_.output_scale();
+    const auto& config = network_.config();
+    const double step = n_corrected * (config.q_high - config.q_low) /
+                        std::max(1, scale.u_high() - scale.u_low());
+    std::size_t action = 0;
+    double target = 0.0;
+    return time_each(
+        n_repetitions,
+        [&](int i) {
+          recall_new_state();
+          action = random_.below(network_.n_actions());
+          target = network_.value(state_, action) + (i % 2 == 0 ? step : -step);
+        },
+        [&](int) { network_.correct(state_, action, target); });
+  }
+
+  /// `n_selections` selections of units per repetition, each for a deficit of `n_selected` up or
+  /// down in a random action's window. Throws std::invalid_argument unless n_selected is in
+  /// [1, n'] and n_selections in [1, kMaxRepetitions].
+  Times time_selections(int n_repetitions, int n_selections, int n_selected) {
+    require_units("n_selected", n_selected);
+    core::require_in_range("n_selections", n_selections, 1, kMaxRepetitions);
+    const std::size_t n_active = network_.action_code().n_active_units();
+    std::vector<std::uint32_t> selected;
+    selected.reserve(n_active);
+    std::vector<std::size_t> windows(static_cast<std::size_t>(n_selections));
+    return time_each(
+        n_repetitions,
+        [&](int) {
+          draw_state();
+          network_.potentials(state_, potentials_);
+          for (std::size_t& first : windows) {
+            first = network_.action_code().first_unit(random_.below(network_.n_actions()));
+          }
+        },
+        [&](int) {
+          int deficit = n_selected;
+          for (const std::size_t first : windows) {
+            approximators::select_units(std::span(potentials_).subspan(first, n_active), deficit,
+                                        selected);
+            keep(selected);
+            deficit = -deficit;
+          }
+        });
+  }
+
+  /// Bytes of all weights, with the padding of the last block of units.
+  std::size_t weight_bytes() const noexcept {
+    return padded_units() * network_.perceptron().n_columns();
+  }
+
+  /// Bytes of the weights that a pass has to read: those of columns that are not neutral, the mean
+  /// over `n_states` new states. Throws std::invalid_argument unless n_states is at least 1.
+  double mean_bytes_of_pass(int n_states) {
+    core::require_in_range("n_states", n_states, 1, kMaxRepetitions);
+    std::size_t n_columns = 0;
+    network_.visit([&](const auto& network) {
+      std::vector<coding::Bin> bins(network.n_inputs());
+      coding::SignedColumns columns;
+      for (int i = 0; i < n_states; ++i) {
+        draw_state();
+        network.state_code().encode(state_, bins);
+        network.state_code().columns(bins, columns);
+        n_columns += columns.positive.size() + columns.negative.size();
+      }
+    });
+    return static_cast<double>(n_columns * padded_units()) / n_states;
+  }
+
+ private:
+  std::size_t padded_units() const noexcept {
+    return core::round_up(network_.perceptron().n_units(), approximators::kBlockUnits);
+  }
+
+  void require_units(const char* name, int n_units) const {
+    core::require_in_range(name, n_units, 1,
+                           static_cast<int>(network_.action_code().n_active_units()));
+  }
+
+  void draw_state() {
+    for (double& value : state_) value = random_.uniform();
+  }
+
+  void recall_new_state() {
+    draw_state();
+    network_.values(state_, values_);
+  }
+
+  approximators::DynamicSdnnC network_;
+  core::Random random_;
+  std::vector<double> state_;
+  std::vector<double> values_;
+  std::vector<std::int32_t> potentials_;
+};
+
+}  // namespace sdnn::benchmarks

@@ -1,0 +1,58 @@
+/// How everything here is timed: call by call, so that whoever reads the times can take medians.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "sdnn/core/check.hpp"
+
+namespace sdnn::benchmarks {
+
+/// One duration per repetition, in nanoseconds of std::chrono::steady_clock.
+using Times = std::vector<std::int64_t>;
+
+/// The most repetitions of one call.
+inline constexpr int kMaxRepetitions = 1 << 24;
+
+/// Nanoseconds since some fixed point in the past.
+inline std::int64_t now() noexcept {
+  using std::chrono::duration_cast, std::chrono::nanoseconds, std::chrono::steady_clock;
+  return duration_cast<nanoseconds>(steady_clock::now().time_since_epoch()).count();
+}
+
+/// Makes the compiler believe that `value` is read, so that its computation is not dropped.
+template <class Value>
+void keep(const Value& value) noexcept {
+#if defined(__GNUC__) || defined(__clang__)
+  asm volatile("" : : "r"(&value) : "memory");
+#else
+  static_cast<void>(*static_cast<const volatile Value*>(&value));
+#endif
+}
+
+/// The time of every call of timed(i), i = 0 .. n_repetitions - 1, each after an untimed prepare(i).
+///
+/// Reading the clock costs some 30 ns, which are included. Throws std::invalid_argument unless
+/// n_repetitions is in [0, kMaxRepetitions].
+template <class Prepare, class Timed>
+Times time_each(int n_repetitions, Prepare&& prepare, Timed&& timed) {
+  core::require_in_range("n_repetitions", n_repetitions, 0, kMaxRepetitions);
+  Times times(static_cast<std::size_t>(n_repetitions));
+  for (int i = 0; i < n_repetitions; ++i) {
+    prepare(i);
+    const std::int64_t begin = now();
+    timed(i);
+    times[static_cast<std::size_t>(i)] = now() - begin;
+  }
+  return times;
+}
+
+/// The same without anything to prepare.
+template <class Timed>
+Times time_each(int n_repetitions, Timed&& timed) {
+  return time_each(n_repetitions, [](int) {}, timed);
+}
+
+}  // namespace sdnn::benchmarks

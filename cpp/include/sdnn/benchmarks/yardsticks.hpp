@@ -1,0 +1,200 @@
+/// What the machine allows: how fast memory is read, and a good dense product, to compare with.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+
+#include "sdnn/benchmarks/stopwatch.hpp"
+#include "sdnn/core/aligned_buffer.hpp"
+#include "sdnn/core/check.hpp"
+#include "sdnn/core/instruction_set.hpp"
+#include "sdnn/core/random.hpp"
+
+#if SDNN_X86_KERNELS
+#include <immintrin.h>
+#endif
+
+namespace sdnn::benchmarks {
+
+namespace internal {
+
+inline std::uint64_t sum_of_words_portable(const std::byte* bytes, std::size_t size) noexcept {
+  std::array<std::uint64_t, 8> sums{};
+  for (std::size_t i = 0; i < size; i += core::kCacheLine) {
+    std::array<std::uint64_t, 8> words;
+    std::memcpy(words.data(), bytes + i, core::kCacheLine);
+    for (std::size_t k = 0; k < words.size(); ++k) sums[k] += words[k];
+  }
+  std::uint64_t total = 0;
+  for (const std::uint64_t sum : sums) total += sum;
+  return total;
+}
+
+inline void multiply_portable(const float* weights, std::size_t n_rows, std::size_t n_columns,
+                              const float* input, float* out) noexcept {
+  constexpr std::size_t kLanes = 16;
+  for (std::size_t i = 0; i < n_rows; ++i) {
+    const float* const row = weights + i * n_columns;
+    std::array<float, kLanes> sums{};
+    std::size_t j = 0;
+    for (; j + kLanes <= n_columns; j += kLanes) {
+      for (std::size_t k = 0; k < kLanes; ++k) sums[k] += row[j + k] * input[j + k];
+    }
+    float sum = 0.0F;
+    for (; j < n_columns; ++j) sum += row[j] * input[j];
+    for (const float lane : sums) sum += lane;
+    out[i] = sum;
+  }
+}
+
+#if SDNN_X86_KERNELS
+
+[[gnu::target("avx2")]] inline std::uint64_t sum_of_words_avx2(const std::byte* bytes,
+                                                               std::size_t size) noexcept {
+  __m256i low = _mm256_setzero_si256();
+  __m256i high = low;
+  for (std::size_t i = 0; i < size; i += core::kCacheLine) {
+    const auto* const line = reinterpret_cast<const __m256i*>(bytes + i);
+    low = _mm256_add_epi64(low, _mm256_load_si256(line));
+    high = _mm256_add_epi64(high, _mm256_load_si256(line + 1));
+  }
+  alignas(32) std::array<std::uint64_t, 4> sums;
+  _mm256_store_si256(reinterpret_cast<__m256i*>(sums.data()), _mm256_add_epi64(low, high));
+  return sums[0] + sums[1] + sums[2] + sums[3];
+}
+
+/// Eight rows at a time, so that a piece of the input is loaded once for all of them.
+[[gnu::target("avx2,fma")]] inline void multiply_avx2(const float* weights, std::size_t n_rows,
+                                                      std::size_t n_columns, const float* input,
+                                                      float* out) noexcept {
+  constexpr std::size_t kRows = 8;
+  constexpr std::size_t kLanes = 8;
+  const std::size_t whole_rows = n_rows - n_rows % kRows;
+  for (std::size_t i = 0; i < whole_rows; i += kRows) {
+    const float* const rows = weights + i * n_columns;
+    __m256 sums[kRows];
+    for (__m256& sum : sums) sum = _mm256_setzero_ps();
+    std::size_t j = 0;
+    for (; j + kLanes <= n_columns; j += kLanes) {
+      const __m256 x = _mm256_loadu_ps(input + j);
+      for (std::size_t r = 0; r < kRows; ++r) {
+        sums[r] = _mm256_fmadd_ps(_mm256_loadu_ps(rows + r * n_columns + j), x, sums[r]);
+      }
+    }
+    for (std::size_t r = 0; r < kRows; ++r) {
+      alignas(32) std::array<float, kLanes> lanes;
+      _mm256_store_ps(lanes.data(), sums[r]);
+      float sum = 0.0F;
+      for (std::size_t rest = j; rest < n_columns; ++rest) {
+        sum += rows[r * n_columns + rest] * input[rest];
+      }
+      for (const float lane : lanes) sum += lane;
+      out[i + r] = sum;
+    }
+  }
+  multiply_portable(weights + whole_rows * n_columns, n_rows - whole_rows, n_columns, input,
+                    out + whole_rows);
+}
+
+inline bool has_avx2_and_fma() noexcept {
+  return core::best_instruction_set() >= core::InstructionSet::avx2 &&
+         __builtin_cpu_supports("fma");
+}
+
+#endif  // SDNN_X86_KERNELS
+
+}  // namespace internal
+
+/// Reads a buffer from front to back: the most bytes per second that a pass over weights of the
+/// same size could read. Uses the best instructions there are, whatever level is in use.
+class BufferRead {
+ public:
+  /// `n_bytes` is rounded up to whole cache lines; the buffer is written, so its pages exist.
+  /// Throws std::invalid_argument, std::bad_alloc.
+  explicit BufferRead(std::size_t n_bytes)
+      : buffer_(core::round_up((core::require_in_range("n_bytes", n_bytes, std::size_t{1},
+                                                       std::size_t{1} << 34),
+                                n_bytes),
+                               core::kCacheLine)) {
+    for (std::size_t i = 0; i < buffer_.size(); ++i) {
+      buffer_[i] = static_cast<std::byte>(i * 31 % 251);
+    }
+  }
+
+  std::size_t n_bytes() const noexcept { return buffer_.size(); }
+
+  /// The sum of the buffer's 64-bit words, modulo 2^64.
+  std::uint64_t sum() const noexcept {
+#if SDNN_X86_KERNELS
+    if (core::best_instruction_set() >= core::InstructionSet::avx2) {
+      return internal::sum_of_words_avx2(buffer_.data(), buffer_.size());
+    }
+#endif
+    return internal::sum_of_words_portable(buffer_.data(), buffer_.size());
+  }
+
+  /// Times of `n_repetitions` readings.
+  Times run(int n_repetitions) const {
+    return time_each(n_repetitions, [this](int) { keep(sum()); });
+  }
+
+ private:
+  core::AlignedBuffer<std::byte> buffer_;
+};
+
+/// A dense float32 matrix-vector product, as quick as the processor makes it: what a hidden layer
+/// of this size costs in an ordinary network.
+///
+/// Eigen's product depends on the options of the compilation; this one is chosen at run time, like
+/// the kernels of the network. `bench/` compares the two.
+class DenseProduct {
+ public:
+  /// Weights and input uniform in [-1, 1). Throws std::invalid_argument, std::bad_alloc.
+  DenseProduct(std::size_t n_rows, std::size_t n_columns, std::uint64_t seed)
+      : n_rows_(n_rows), n_columns_(n_columns) {
+    core::require_in_range("n_rows", n_rows, std::size_t{1}, std::size_t{1} << 20);
+    core::require_in_range("n_columns", n_columns, std::size_t{1}, std::size_t{1} << 20);
+    weights_ = core::AlignedBuffer<float>(n_rows * n_columns);
+    input_ = core::AlignedBuffer<float>(n_columns);
+    out_ = core::AlignedBuffer<float>(n_rows);
+    core::Random random(seed, core::Stream::weights);
+    for (float& weight : weights_.span()) weight = draw(random);
+    for (float& value : input_.span()) value = draw(random);
+  }
+
+  std::span<const float> weights() const noexcept { return weights_.span(); }  ///< row by row
+  std::span<const float> input() const noexcept { return input_.span(); }
+
+  /// The product; valid until the next call. Shape: (n_rows,).
+  std::span<const float> multiply() noexcept {
+#if SDNN_X86_KERNELS
+    if (internal::has_avx2_and_fma()) {
+      internal::multiply_avx2(weights_.data(), n_rows_, n_columns_, input_.data(), out_.data());
+      return out_.span();
+    }
+#endif
+    internal::multiply_portable(weights_.data(), n_rows_, n_columns_, input_.data(), out_.data());
+    return out_.span();
+  }
+
+  /// Times of `n_repetitions` products.
+  Times run(int n_repetitions) {
+    return time_each(n_repetitions, [this](int) { keep(multiply()[0]); });
+  }
+
+ private:
+  static float draw(core::Random& random) {
+    return static_cast<float>(2.0 * random.uniform() - 1.0);
+  }
+
+  std::size_t n_rows_;
+  std::size_t n_columns_;
+  core::AlignedBuffer<float> weights_;
+  core::AlignedBuffer<float> input_;
+  core::AlignedBuffer<float> out_;
+};
+
+}  // namespace sdnn::benchmarks

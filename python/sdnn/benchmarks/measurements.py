@@ -1,0 +1,301 @@
+"""The measurements: what is repeated how often, and what becomes of the times.
+
+Other programs disturb every measurement. So everything is repeated often and briefly, things that
+are compared take turns, and medians are taken. The loops are in C++; here are nanoseconds per
+repetition only.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from datetime import date
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn import _core
+from sdnn.approximators import SDNNCConfig
+from sdnn.benchmarks.machine import describe_machine
+from sdnn.environments import AcrobotConfig, SensorConfig
+from sdnn.experiments.config import ProtocolConfig, TrialConfig
+from sdnn.experiments.trial import make_core_trial
+from sdnn.instruction_sets import (
+    available_instruction_sets,
+    best_instruction_set,
+    instruction_set,
+    set_instruction_set,
+)
+
+if TYPE_CHECKING:
+    from sdnn.benchmarks.results import (
+        AcrobotResult,
+        DecisionsResult,
+        NetworkResult,
+        Results,
+        Spread,
+        ThreadsResult,
+    )
+    from sdnn.experiments.trial import Trial
+
+Nanoseconds = NDArray[np.int64]
+Run = Callable[[int], Nanoseconds]
+"""Makes n repetitions and returns the time of each, shape (n,)."""
+
+SEED = 1
+
+NETWORK_INPUTS = (4, 6)
+"""Inputs of the paper's smallest and largest network."""
+
+CASES = ((4, 0.0), (4, 0.02), (6, 0.02))
+"""Inputs and noise of the trials whose decisions are timed."""
+
+THREADS_CASE = (6, 0.02)
+N_THREADS = 2
+
+N_CORRECTED = 5
+"""Units corrected by the learning steps that are timed: the mean over those that correct any."""
+
+SELECTIONS_PER_REPETITION = 100
+
+N_COLD = 2
+"""Repetitions after which a turn has the caches it would have without the others."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is measured.
+
+    Parameters
+    ----------
+    n_rounds
+        Turns that everything compared takes.
+    n_repetitions
+        Repetitions per turn; N_COLD more go before them and are not counted.
+    n_episodes
+        Learning episodes of a short trial.
+    n_runs
+        Runs of the same trial.
+    """
+
+    n_rounds: int = 30
+    n_repetitions: int = 10
+    n_episodes: int = 300
+    n_runs: int = 7
+
+
+QUICK = Effort(n_rounds=3, n_repetitions=2, n_episodes=10, n_runs=2)
+
+
+def measure(*, quick: bool = False) -> Results:
+    """Measure everything, about half a minute; with `quick` little of it.
+
+    NumPy's linear algebra should have one thread: see `sdnn.benchmarks.run`.
+    """
+    effort = QUICK if quick else Effort()
+    return {
+        "sdnn": version("sdnn"),
+        "date": date.today().isoformat(),
+        "quick": quick,
+        "machine": describe_machine(),
+        "instruction_set": instruction_set(),
+        "best_instruction_set": best_instruction_set(),
+        "instruction_sets": list(available_instruction_sets()),
+        "networks": [measure_network(n_inputs, effort) for n_inputs in NETWORK_INPUTS],
+        "acrobot": measure_acrobot(effort),
+        "decisions": [measure_decisions(*case, effort) for case in CASES],
+        "threads": measure_threads(*THREADS_CASE, effort),
+    }
+
+
+def in_turns(runs: Mapping[str, Run], effort: Effort) -> dict[str, Nanoseconds]:
+    """Let everything take turns; the first repetitions of a turn find cold caches and are dropped.
+
+    Returns
+    -------
+    dict
+        Times by name, shape (n_rounds * n_repetitions,) each.
+    """
+    times: dict[str, list[Nanoseconds]] = {name: [] for name in runs}
+    for _ in range(effort.n_rounds):
+        for name, run in runs.items():
+            times[name].append(run(N_COLD + effort.n_repetitions)[N_COLD:])
+    return {name: np.concatenate(turns) for name, turns in times.items()}
+
+
+def spread(times: Nanoseconds, n_parts: int = 1) -> Spread:
+    """Quartiles, in microseconds, of repetitions that consist of `n_parts` equal parts each.
+
+    Examples
+    --------
+    >>> spread(np.array([1000, 2000, 3000, 4000, 5000]))
+    {'lower': 2.0, 'median': 3.0, 'upper': 4.0}
+    """
+    lower, median, upper = np.percentile(times, (25, 50, 75)) / (1000.0 * n_parts)
+    return {"lower": float(lower), "median": float(median), "upper": float(upper)}
+
+
+def measure_network(n_inputs: int, effort: Effort) -> NetworkResult:
+    """Time the parts of a network that has learned a little, beside a dense product of its size."""
+    trial = _short_trial(n_inputs, 0.0, effort.n_episodes)
+    trial.advance(effort.n_episodes)
+    parts = _core.NetworkParts(cast("_core.AcrobotTrial", trial), SEED)
+    config = SDNNCConfig(n_inputs=n_inputs)
+    n_columns = config.n_pattern_units * n_inputs * (n_inputs - 1)
+    levels = available_instruction_sets()
+    read = _core.BufferRead(parts.weight_bytes)
+    dense: dict[str, Run] = {
+        "numpy": _numpy_product(config.n_hidden_units, n_columns),
+        "core": _core.DenseProduct(config.n_hidden_units, n_columns, SEED).run,
+    }
+    runs: dict[str, Run] = {
+        **{level: _at_level(level, parts.time_values) for level in levels},
+        **dense,
+        "read": read.run,
+        "remembered_values": parts.time_remembered_values,
+        "selection": lambda n: parts.time_selections(n, SELECTIONS_PER_REPETITION, N_CORRECTED),
+    }
+    times = {name: spread(taken) for name, taken in in_turns(runs, effort).items()}
+    # Afterwards, because corrections change the weights.
+    corrections = in_turns(
+        {"correction": lambda n: parts.time_corrections(n, N_CORRECTED)}, effort
+    )["correction"]
+
+    pass_bytes = parts.mean_bytes_of_pass(effort.n_rounds)
+    least_time = times["read"]["median"] * pass_bytes / read.n_bytes
+    least_dense = min(times[name]["median"] for name in dense)
+    n_selections = SELECTIONS_PER_REPETITION
+    return {
+        "n_inputs": n_inputs,
+        "n_hidden_units": config.n_hidden_units,
+        "n_columns": n_columns,
+        "n_actions": config.n_hidden_units - config.n_active_units + 1,
+        "n_learning_episodes": effort.n_episodes,
+        "values": {level: times[level] for level in levels},
+        "remembered_values": times["remembered_values"],
+        "correction": spread(corrections),
+        "n_corrected": N_CORRECTED,
+        "selection": {
+            "lower": times["selection"]["lower"] / n_selections,
+            "median": times["selection"]["median"] / n_selections,
+            "upper": times["selection"]["upper"] / n_selections,
+        },
+        "dense": {name: times[name] for name in dense},
+        "read": times["read"],
+        "weight_bytes": parts.weight_bytes,
+        "pass_bytes": pass_bytes,
+        "gigabytes_per_second": read.n_bytes / times["read"]["median"] / 1000.0,
+        "least_time": least_time,
+        "ratio_to_dense": {level: times[level]["median"] / least_dense for level in levels},
+        "share_of_limit": {level: least_time / times[level]["median"] for level in levels},
+    }
+
+
+def measure_acrobot(effort: Effort) -> AcrobotResult:
+    """Time the acrobot alone."""
+    acrobot = _core.AcrobotDecisions(AcrobotConfig().to_core(), SEED)
+    times = spread(in_turns({"acrobot": acrobot.run}, effort)["acrobot"])
+    n_steps = acrobot.n_integration_steps
+    return {
+        "decision": times,
+        "n_integration_steps": n_steps,
+        "integration_step_ns": 1000.0 * times["median"] / n_steps,
+    }
+
+
+def measure_decisions(n_inputs: int, noise: float, effort: Effort) -> DecisionsResult:
+    """Time every decision of a short trial, in several runs of the same trial."""
+    runs = []
+    for _ in range(effort.n_runs):
+        trial = _short_trial(n_inputs, noise, effort.n_episodes)
+        runs.append(_core.time_decisions(cast("_core.AcrobotTrial", trial), effort.n_episodes))
+    all_times = np.stack(runs) / 1000.0
+    times = np.median(all_times, axis=0)
+    p50, p99, longest = (float(q) for q in np.percentile(times, (50, 99, 100)))
+    return {
+        "n_inputs": n_inputs,
+        "noise": noise,
+        "n_episodes": effort.n_episodes,
+        "n_decisions": int(times.size),
+        "n_runs": effort.n_runs,
+        "mean": float(times.mean()),
+        "p50": p50,
+        "p99": p99,
+        "max": longest,
+        "max_over_p50": longest / p50,
+        "max_of_all_runs": float(all_times.max()),
+    }
+
+
+def measure_threads(n_inputs: int, noise: float, effort: Effort) -> ThreadsResult:
+    """Time equal trials alone and at once, in turns; the quickest of the runs."""
+
+    def advance(trial: Trial) -> float:
+        begin = time.thread_time()
+        trial.advance(effort.n_episodes)
+        return time.thread_time() - begin
+
+    def seconds(n_threads: int) -> tuple[float, float]:
+        trials = [_short_trial(n_inputs, noise, effort.n_episodes) for _ in range(n_threads)]
+        with ThreadPoolExecutor(n_threads) as pool:
+            begin = time.perf_counter()
+            processor = list(pool.map(advance, trials))
+            return time.perf_counter() - begin, sum(processor) / n_threads
+
+    runs = np.array([[*seconds(1), *seconds(N_THREADS)] for _ in range(effort.n_runs)])
+    alone, processor_alone, together, processor_together = (float(least) for least in runs.min(0))
+    return {
+        "n_inputs": n_inputs,
+        "noise": noise,
+        "n_episodes": effort.n_episodes,
+        "n_threads": N_THREADS,
+        "alone_s": alone,
+        "together_s": together,
+        "speedup": N_THREADS * alone / together,
+        "processor_alone_s": processor_alone,
+        "processor_together_s": processor_together,
+    }
+
+
+def _short_trial(n_inputs: int, noise: float, n_episodes: int) -> Trial:
+    """Make a trial of learning episodes only: its test episodes would not learn."""
+    config = TrialConfig(
+        network=replace(SDNNCConfig(), n_inputs=n_inputs),
+        sensors=SensorConfig(n_sensors=n_inputs, noise=noise),
+        protocol=ProtocolConfig(n_learning_episodes=n_episodes, test_interval=n_episodes + 1),
+    )
+    return make_core_trial(config, SEED)
+
+
+def _at_level(level: str, run: Run) -> Run:
+    def _run(n: int) -> Nanoseconds:
+        before = instruction_set()
+        set_instruction_set(level)
+        try:
+            return run(n)
+        finally:
+            set_instruction_set(before)
+
+    return _run
+
+
+def _numpy_product(n_rows: int, n_columns: int) -> Run:
+    """Make the run of NumPy's product; calling it from here costs less than a microsecond."""
+    generator = np.random.default_rng(SEED)
+    weights = generator.random((n_rows, n_columns), dtype=np.float32)
+    vector = generator.random(n_columns, dtype=np.float32)
+    out: NDArray[Any] = np.empty(n_rows, dtype=np.float32)
+
+    def _run(n: int) -> Nanoseconds:
+        times = np.empty(n, dtype=np.int64)
+        for i in range(n):
+            begin = time.perf_counter_ns()
+            np.dot(weights, vector, out=out)
+            times[i] = time.perf_counter_ns() - begin
+        return times
+
+    return _run

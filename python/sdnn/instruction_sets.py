@@ -1,0 +1,73 @@
+"""Which vector instructions the core uses.
+
+The core picks the best level that the processor offers when it is first used. The environment
+variable ``SDNN_INSTRUCTION_SET`` (``portable``, ``avx2`` or ``avx512``) or `set_instruction_set`
+choose another one, for the whole process. Results have the same bits on all levels; only the time
+differs.
+"""
+
+from __future__ import annotations
+
+from sdnn import _core
+
+__all__ = [
+    "INSTRUCTION_SETS",
+    "available_instruction_sets",
+    "best_instruction_set",
+    "instruction_set",
+    "set_instruction_set",
+]
+
+INSTRUCTION_SETS = ("portable", "avx2", "avx512")
+"""All levels, in rising order."""
+
+
+def instruction_set() -> str:
+    """Return the level in use.
+
+    Raises
+    ------
+    ValueError
+        If the environment variable names a level that does not exist, or not on this processor.
+    """
+    return _core.instruction_set()
+
+
+def best_instruction_set() -> str:
+    """Return the highest level that this processor and operating system offer."""
+    return _core.best_instruction_set()
+
+
+def available_instruction_sets() -> tuple[str, ...]:
+    """Return the levels that can be chosen here, in rising order.
+
+    Examples
+    --------
+    >>> available_instruction_sets()[0]
+    'portable'
+    """
+    return INSTRUCTION_SETS[: INSTRUCTION_SETS.index(best_instruction_set()) + 1]
+
+
+def set_instruction_set(name: str) -> None:
+    """Force a level, for the whole process.
+
+    Parameters
+    ----------
+    name : str
+        One of `available_instruction_sets`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such level, or this processor does not offer it.
+
+    Examples
+    --------
+    >>> before = instruction_set()
+    >>> set_instruction_set("portable")
+    >>> instruction_set()
+    'portable'
+    >>> set_instruction_set(before)
+    """
+    _core.set_instruction_set(name)

@@ -1,0 +1,75 @@
+#include "sdnn/benchmarks/network_parts.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <stdexcept>
+
+namespace sdnn::benchmarks {
+namespace {
+
+using approximators::DynamicSdnnC;
+
+DynamicSdnnC small_network() {
+  return DynamicSdnnC({.n_inputs = 3, .n_pattern_units = 40, .n_hidden_units = 100,
+                       .n_active_units = 30}, 1);
+}
+
+int n_different_weights(const DynamicSdnnC& a, const DynamicSdnnC& b) {
+  int n = 0;
+  for (std::size_t i = 0; i < a.perceptron().n_units(); ++i) {
+    for (std::size_t j = 0; j < a.perceptron().n_columns(); ++j) {
+      n += a.perceptron().weight(i, j) != b.perceptron().weight(i, j);
+    }
+  }
+  return n;
+}
+
+TEST(NetworkParts, OneTimePerRepetition) {
+  NetworkParts parts(small_network(), 1);
+  EXPECT_EQ(parts.time_values(5).size(), 5U);
+  EXPECT_EQ(parts.time_remembered_values(4).size(), 4U);
+  EXPECT_EQ(parts.time_selections(3, 10, 6).size(), 3U);
+  EXPECT_EQ(n_different_weights(parts.network(), small_network()), 0);
+  EXPECT_EQ(parts.time_corrections(2, 6).size(), 2U);
+}
+
+TEST(NetworkParts, ACorrectionCorrectsAsManyUnitsAsAsked) {
+  NetworkParts parts(small_network(), 1);
+  parts.time_corrections(1, 6);
+  int n_changed = 0;
+  const DynamicSdnnC before = small_network();
+  for (std::size_t i = 0; i < 100; ++i) {
+    n_changed += parts.network().perceptron().threshold(i) != before.perceptron().threshold(i);
+  }
+  EXPECT_EQ(n_changed, 6);
+}
+
+// A new state must mean a full pass: otherwise the pass is not what is timed.
+TEST(NetworkParts, NewStatesOfThePapersSizesTakeFullPasses) {
+  NetworkParts parts(DynamicSdnnC({.n_inputs = 6}, 1), 1);
+  parts.time_values(200);
+  parts.network().visit([](const auto& network) {
+    EXPECT_GE(network.memory().counts().full, 195U);
+  });
+}
+
+// 100 units are padded to 128; half of the 240 columns are neutral with balanced anchors.
+TEST(NetworkParts, BytesOfThePass) {
+  NetworkParts parts(small_network(), 1);
+  EXPECT_EQ(parts.weight_bytes(), 128U * 240U);
+  EXPECT_NEAR(parts.mean_bytes_of_pass(50), 128.0 * 120.0, 128.0 * 6.0);
+}
+
+TEST(NetworkParts, RefusesImpossibleNumbers) {
+  NetworkParts parts(small_network(), 1);
+  EXPECT_THROW(parts.time_values(-1), std::invalid_argument);
+  EXPECT_THROW(parts.time_corrections(1, 0), std::invalid_argument);
+  EXPECT_THROW(parts.time_corrections(1, 31), std::invalid_argument);
+  EXPECT_THROW(parts.time_selections(1, 0, 5), std::invalid_argument);
+  EXPECT_THROW(parts.time_selections(1, 1, 31), std::invalid_argument);
+  EXPECT_THROW(parts.mean_bytes_of_pass(0), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sdnn::benchmarks

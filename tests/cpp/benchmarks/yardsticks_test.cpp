@@ -1,0 +1,71 @@
+#include "sdnn/benchmarks/yardsticks.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+namespace sdnn::benchmarks {
+namespace {
+
+TEST(BufferRead, ReadsEveryByte) {
+  for (const std::size_t asked : {1U, 64U, 1000U, 4096U}) {
+    const BufferRead buffer(asked);
+    EXPECT_GE(buffer.n_bytes(), asked);
+    EXPECT_LT(buffer.n_bytes(), asked + 64);
+    // Byte i holds i * 31 mod 251, and words are little-endian where this is tested by hand.
+    std::uint64_t expected = 0;
+    for (std::size_t i = 0; i < buffer.n_bytes(); ++i) {
+      expected += std::uint64_t{i * 31 % 251} << 8 * (i % 8);
+    }
+    EXPECT_EQ(buffer.sum(), expected);
+    EXPECT_EQ(buffer.run(3).size(), 3U);
+  }
+}
+
+TEST(BufferRead, InstructionSetsAgree) {
+  std::vector<std::byte> bytes(640 + 64);
+  auto* const aligned =
+      bytes.data() + (64 - reinterpret_cast<std::size_t>(bytes.data()) % 64) % 64;
+  for (std::size_t i = 0; i < 640; ++i) aligned[i] = static_cast<std::byte>(i * i);
+#if SDNN_X86_KERNELS
+  if (core::best_instruction_set() >= core::InstructionSet::avx2) {
+    EXPECT_EQ(internal::sum_of_words_avx2(aligned, 640),
+              internal::sum_of_words_portable(aligned, 640));
+  }
+#endif
+}
+
+TEST(DenseProduct, IsTheProductAtAnySize) {
+  for (const auto& [n_rows, n_columns] : std::vector<std::pair<std::size_t, std::size_t>>{
+           {1, 1}, {3, 7}, {8, 16}, {9, 33}, {90, 240}, {16, 8}}) {
+    DenseProduct product(n_rows, n_columns, 1);
+    const auto out = product.multiply();
+    std::vector<float> portable(n_rows);
+    internal::multiply_portable(product.weights().data(), n_rows, n_columns,
+                                product.input().data(), portable.data());
+    ASSERT_EQ(out.size(), n_rows);
+    for (std::size_t i = 0; i < n_rows; ++i) {
+      double expected = 0.0;
+      for (std::size_t j = 0; j < n_columns; ++j) {
+        expected += double{product.weights()[i * n_columns + j]} * double{product.input()[j]};
+      }
+      EXPECT_NEAR(double{out[i]}, expected, 1e-4);
+      EXPECT_NEAR(double{portable[i]}, expected, 1e-4);
+    }
+    EXPECT_EQ(product.run(2).size(), 2U);
+  }
+}
+
+TEST(Yardsticks, RefuseImpossibleSizes) {
+  EXPECT_THROW(BufferRead(0), std::invalid_argument);
+  EXPECT_THROW(DenseProduct(0, 1, 1), std::invalid_argument);
+  EXPECT_THROW(DenseProduct(1, 0, 1), std::invalid_argument);
+  EXPECT_THROW(BufferRead(8).run(-1), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sdnn::benchmarks

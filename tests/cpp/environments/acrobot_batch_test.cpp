@@ -1,0 +1,230 @@
+#include "sdnn/environments/acrobot_batch.hpp"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "allocation_count.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::environments {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// Runs the rest of a test at one level, then goes back.
+class AtLevel {
+ public:
+  explicit AtLevel(core::InstructionSet level) : before_(core::instruction_set()) {
+    core::set_instruction_set(core::name_of(level));
+  }
+  ~AtLevel() { core::set_instruction_set(core::name_of(before_)); }
+
+ private:
+  core::InstructionSet before_;
+};
+
+std::vector<core::InstructionSet> offered_levels() {
+  std::vector<core::InstructionSet> levels;
+  for (const auto level : {core::InstructionSet::portable, core::InstructionSet::avx2,
+                           core::InstructionSet::avx512}) {
+    if (level <= core::best_instruction_set()) levels.push_back(level);
+  }
+  return levels;
+}
+
+bool same_bits(const Eigen::Vector4d& a, const Eigen::Vector4d& b) {
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    if (std::bit_cast<std::uint64_t>(a[i]) != std::bit_cast<std::uint64_t>(b[i])) return false;
+  }
+  return true;
+}
+
+/// What one batch step is given and gives, of the right sizes.
+struct Step {
+  explicit Step(std::size_t n) : torques(n), lambdas(n, 1.0), moving(n, 1), results(n) {}
+  void of(AcrobotBatch& batch) { batch.step(torques, lambdas, moving, results); }
+
+  std::vector<double> torques, lambdas;
+  std::vector<std::uint8_t> moving;
+  std::vector<StepResult> results;
+};
+
+// Random starts, torques and lambdas; some acrobots stand still, ended ones begin anew. Returns the
+// number of episodes and adds the goals to `n_goals`.
+int compare_with_single(const AcrobotConfig& config, std::size_t n, int n_steps,
+                        std::uint64_t seed, int& n_goals) {
+  core::Random random(seed, core::Stream::exploration);
+  AcrobotBatch batch(config, n);
+  std::vector<Acrobot> singles(n, Acrobot(config));
+  Step step(n);
+  int n_episodes = 0;
+  const auto begin = [&](std::size_t i) {
+    Eigen::Vector4d state = Eigen::Vector4d::Zero();
+    if (random.uniform() < 0.7) {
+      for (double& value : state) value = 8.0 * random.uniform() - 4.0;
+    }
+    singles[i].set_state(state);
+    batch.set_state(i, state);
+    step.lambdas[i] = random.uniform();
+    ++n_episodes;
+  };
+  for (std::size_t i = 0; i < n; ++i) begin(i);
+  for (int s = 0; s < n_steps; ++s) {
+    for (std::size_t i = 0; i < n; ++i) {
+      step.moving[i] = random.uniform() < 0.9;
+      step.torques[i] = step.moving[i] ? 20.0 * random.uniform() - 10.0 : kNaN;
+    }
+    step.of(batch);
+    for (std::size_t i = 0; i < n; ++i) {
+      StepResult expected{0.0, false, false};
+      if (step.moving[i]) expected = singles[i].step(step.torques[i], step.lambdas[i]);
+      const StepResult& got = step.results[i];
+      const bool same = got.reward == expected.reward && got.terminated == expected.terminated &&
+                        got.truncated == expected.truncated &&
+                        same_bits(batch.state(i), singles[i].state()) &&
+                        batch.tip_height(i) == singles[i].tip_height() &&
+                        batch.decisions(i) == singles[i].decisions();
+      EXPECT_TRUE(same) << "acrobot " << i << " of " << n << ", step " << s;
+      if (!same) return 0;
+      n_goals += got.terminated;
+      if (got.terminated || got.truncated) begin(i);
+    }
+  }
+  return n_episodes;
+}
+
+TEST(AcrobotBatch, KeepsTheBitsOfASingleOneAtEveryLevel) {
+  for (const auto level : offered_levels()) {
+    const AtLevel at(level);
+    int n_episodes = 0, n_goals = 0;
+    for (const std::size_t n : {1u, 2u, 3u, 4u, 5u, 7u, 8u, 9u, 15u, 16u, 17u, 61u}) {
+      n_episodes += compare_with_single({}, n, 300, n, n_goals);
+    }
+    EXPECT_GT(n_episodes, 1500) << core::name_of(level);
+    EXPECT_GT(n_goals, 750);
+  }
+}
+
+TEST(AcrobotBatch, KeepsTheBitsWithOtherConfigurations) {
+  AcrobotConfig config;
+  config.goal_test = GoalTest::decision_instant;
+  config.link_mass_2 = 1.25;
+  config.link_length_2 = 0.75;
+  config.gravity = 9.81;
+  config.decision_interval = 0.3;
+  config.integration_step = 0.1;
+  config.max_decisions = 7;
+  config.goal_height = 1.0;
+  config.idle_angle = 0.5;
+  for (const auto level : offered_levels()) {
+    const AtLevel at(level);
+    int n_goals = 0;
+    EXPECT_GT(compare_with_single(config, 37, 200, 2, n_goals), 1000);
+    EXPECT_GT(n_goals, 100);
+    config.goal_test = GoalTest::every_step;
+    EXPECT_GT(compare_with_single(config, 37, 200, 2, n_goals), 1000);
+  }
+}
+
+// The angle of a fast acrobot leaves the range of sin_cos in one lane only.
+TEST(AcrobotBatch, OneOverflowLeavesTheOthersAlone) {
+  for (const auto level : offered_levels()) {
+    const AtLevel at(level);
+    AcrobotBatch batch({}, 5);
+    batch.set_state(3, {0.0, 0.0, 1e300, 0.0});
+    batch.set_state(4, {1.0, 2.0, 3.0, 4.0});
+    Acrobot single;
+    single.set_state({1.0, 2.0, 3.0, 4.0});
+    Step step(5);
+    step.torques.assign(5, 2.5);
+    single.step(2.5, 1.0);
+    try {
+      step.of(batch);
+      FAIL();
+    } catch (const std::overflow_error& error) {
+      EXPECT_STREQ(error.what(), "the speed of acrobot 3 is too high for this integration_step");
+    }
+    EXPECT_TRUE(same_bits(batch.state(4), single.state()));
+    EXPECT_EQ(batch.decisions(4), 1);
+    EXPECT_THROW(step.of(batch), std::logic_error);  // 3 is over
+    batch.reset(3);
+    EXPECT_NO_THROW(step.of(batch));
+  }
+}
+
+TEST(AcrobotBatch, RejectsBadArgumentsBeforeAnythingMoves) {
+  AcrobotBatch batch({}, 3);
+  const auto message = [&batch](const Step& wrong) {
+    Step step = wrong;
+    try {
+      step.of(batch);
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  Step step(3);
+  step.torques[2] = 10.5;
+  EXPECT_EQ(message(step), "torques[2] must be in [-10, 10], got 10.5");
+  step.torques[2] = kNaN;
+  EXPECT_EQ(message(step), "torques[2] must be in [-10, 10], got nan");
+  step.moving[2] = 0;
+  EXPECT_EQ(message(step), "");
+  step.lambdas[1] = -1.0;
+  EXPECT_EQ(message(step), "lambdas[1] must be at least 0, got -1");
+  step.lambdas[1] = 1.0;
+  step.torques.pop_back();
+  EXPECT_EQ(message(step), "torques must be of 3 items, got 2");
+  EXPECT_EQ(batch.decisions(0), 1);
+  EXPECT_EQ(batch.decisions(2), 0);
+  EXPECT_THROW(batch.set_state(0, {kNaN, 0.0, 0.0, 0.0}), std::invalid_argument);
+  EXPECT_THROW(batch.reset(3), std::out_of_range);
+  EXPECT_THROW(batch.state(3), std::out_of_range);
+  EXPECT_THROW(batch.tip_height(3), std::out_of_range);
+  EXPECT_THROW(batch.decisions(3), std::out_of_range);
+  EXPECT_THROW(AcrobotBatch({}, 0), std::invalid_argument);
+  EXPECT_THROW(AcrobotBatch({}, kMaxAcrobots + 1), std::invalid_argument);
+  AcrobotConfig config;
+  config.max_decisions = 0;
+  EXPECT_THROW(AcrobotBatch(config, 1), std::invalid_argument);
+}
+
+TEST(AcrobotBatch, EndsEpisodesOneByOne) {
+  AcrobotConfig config;
+  config.max_decisions = 2;
+  AcrobotBatch batch(config, 2);
+  EXPECT_EQ(batch.size(), 2u);
+  batch.set_state(0, {2.0, 0.0, 2.0, 0.0});
+  Step step(2);
+  step.of(batch);
+  EXPECT_TRUE(step.results[0].terminated);
+  EXPECT_EQ(step.results[0].reward, 10.0);
+  EXPECT_FALSE(step.results[1].terminated || step.results[1].truncated);
+  EXPECT_THROW(step.of(batch), std::logic_error);
+  batch.reset(0);
+  EXPECT_EQ(batch.state(0), Eigen::Vector4d::Zero());
+  step.of(batch);
+  EXPECT_FALSE(step.results[0].truncated);
+  EXPECT_TRUE(step.results[1].truncated);
+  batch.reset();
+  EXPECT_EQ(batch.decisions(0), 0);
+  EXPECT_EQ(batch.decisions(1), 0);
+}
+
+TEST(AcrobotBatch, AStepAllocatesNothing) {
+  AcrobotBatch batch({}, 21);
+  Step step(21);
+  step.of(batch);
+  const std::size_t before = testing::allocation_count();
+  step.of(batch);
+  EXPECT_EQ(testing::allocation_count(), before);
+}
+
+}  // namespace
+}  // namespace sdnn::environments

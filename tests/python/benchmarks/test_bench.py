@@ -1,0 +1,182 @@
+"""What is measured and how it is written down; never how quick anything is."""
+
+import doctest
+import importlib.util
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from sdnn import _core
+from sdnn.benchmarks import BenchmarkError, machine, measurements, report, results, run
+from sdnn.cli import main
+from sdnn.instruction_sets import available_instruction_sets, instruction_set
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture(scope="module")
+def quick():
+    """The results of one quick run of the command."""
+    done = CliRunner().invoke(main, ["bench", "--quick", "--json"], catch_exceptions=False)
+    assert done.exit_code == 0
+    assert done.stderr == ""
+    return json.loads(done.stdout)
+
+
+def check_shape(value, shape, path):
+    """``value`` has exactly the fields of a TypedDict, whose numbers are positive and finite."""
+    assert set(value) == set(shape.__annotations__), path
+    for name, item in value.items():
+        if isinstance(item, float):
+            assert math.isfinite(item), (path, name)
+            assert item > 0 or name == "noise", (path, name)
+        elif isinstance(item, int):
+            assert item > 0, (path, name)
+
+
+def check_spread(value, path):
+    check_shape(value, results.Spread, path)
+    assert value["lower"] <= value["median"] <= value["upper"], path
+
+
+def test_quick_run_has_all_fields(quick):
+    check_shape(quick, results.Results, "results")
+    assert quick["quick"] is True
+    assert quick["sdnn"] == _core.__version__
+    check_shape(quick["machine"], results.Machine, "machine")
+    levels = list(available_instruction_sets())
+    assert quick["instruction_sets"] == levels
+    assert quick["best_instruction_set"] == levels[-1]
+    assert quick["instruction_set"] == instruction_set()
+    assert [network["n_inputs"] for network in quick["networks"]] == [4, 6]
+    assert [network["n_columns"] for network in quick["networks"]] == [2400, 6000]
+    for network in quick["networks"]:
+        check_shape(network, results.NetworkResult, "network")
+        assert (network["n_hidden_units"], network["n_actions"]) == (900, 601)
+        for name in ("values", "ratio_to_dense", "share_of_limit"):
+            assert list(network[name]) == levels
+        for name in ("values", "dense"):
+            for who, times in network[name].items():
+                check_spread(times, (name, who))
+        assert set(network["dense"]) == {"numpy", "core"}
+        for name in ("remembered_values", "correction", "selection", "read"):
+            check_spread(network[name], name)
+        assert network["pass_bytes"] < network["weight_bytes"]
+    check_shape(quick["acrobot"], results.AcrobotResult, "acrobot")
+    check_spread(quick["acrobot"]["decision"], "acrobot")
+    assert quick["acrobot"]["n_integration_steps"] == 50
+    assert [(d["n_inputs"], d["noise"]) for d in quick["decisions"]] == [
+        (4, 0.0),
+        (4, 0.02),
+        (6, 0.02),
+    ]
+    for decisions in quick["decisions"]:
+        check_shape(decisions, results.DecisionsResult, "decisions")
+        assert decisions["p50"] <= decisions["p99"] <= decisions["max"]
+        assert decisions["max"] <= decisions["max_of_all_runs"]
+    check_shape(quick["threads"], results.ThreadsResult, "threads")
+
+
+def test_tables_are_on_the_screen_and_in_markdown(quick, monkeypatch):
+    monkeypatch.setattr("sdnn.benchmarks.run_benchmarks", lambda *, quick: given)
+    given = quick
+    done = CliRunner().invoke(main, ["bench", "--quick"], catch_exceptions=False)
+    assert done.exit_code == 0
+    text = report.to_markdown(quick)
+    for table in report.tables(quick):
+        assert table.title in text
+        assert all(len(row) == len(table.header) for row in table.rows)
+        for row in table.rows:
+            assert f"| {' | '.join(row)} |" in text
+            assert row[0].split(",")[0] in done.stdout
+    assert report.QUICK_WARNING in text
+    assert report.QUICK_WARNING in done.stdout
+    assert report.QUICK_WARNING not in report.to_markdown({**quick, "quick": False})
+
+
+def test_a_failing_process_is_one_clear_line(monkeypatch):
+    monkeypatch.setenv("SDNN_INSTRUCTION_SET", "sse9")
+    done = CliRunner().invoke(main, ["bench", "--quick"])
+    assert done.exit_code == 1
+    assert done.stderr.count("\n") == 1
+    assert "instruction set must be portable, avx2 or avx512, got sse9" in done.stderr
+    with pytest.raises(BenchmarkError, match="sse9"):
+        run.run_benchmarks(quick=True)
+
+
+def test_wrong_usage():
+    assert CliRunner().invoke(main, ["bench", "--long"]).exit_code == 2
+
+
+def test_turns_alternate_and_drop_their_cold_repetitions():
+    calls = []
+
+    def recorded(name):
+        def repeat(n):
+            calls.append((name, n))
+            return np.arange(n, dtype=np.int64)
+
+        return repeat
+
+    effort = measurements.Effort(n_rounds=2, n_repetitions=3)
+    times = measurements.in_turns({"a": recorded("a"), "b": recorded("b")}, effort)
+    n = measurements.N_COLD + 3
+    assert calls == [("a", n), ("b", n), ("a", n), ("b", n)]
+    kept = list(range(measurements.N_COLD, n))
+    assert times["a"].tolist() == kept + kept
+
+
+def test_times_of_the_core_are_nanoseconds_per_repetition():
+    trial = measurements._short_trial(4, 0.0, 5)
+    times = _core.time_decisions(trial, 3)
+    assert times.dtype == np.int64
+    assert times.size == trial.n_decisions
+    parts = _core.NetworkParts(trial, 1)
+    assert (parts.time_values(3) > 0).all()
+    assert _core.BufferRead(10_000).run(4).shape == (4,)
+    assert _core.DenseProduct(5, 7, 1).run(0).size == 0
+    with pytest.raises(ValueError, match="n_repetitions"):
+        parts.time_values(-1)
+    with pytest.raises(ValueError, match="n_corrected"):
+        parts.time_corrections(1, 0)
+
+
+def test_machines_that_tell_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(machine, "_PROCESSOR_FILE", tmp_path / "none")
+    monkeypatch.setattr(machine, "_CACHE_FOLDER", tmp_path / "none")
+    described = machine.describe_machine()
+    assert described["processor"]
+    assert described["caches"] == {}
+
+
+def test_caches_are_read(tmp_path):
+    for index, (level, kind, size) in enumerate(
+        [("1", "Data", "32K"), ("1", "Instruction", "64K"), ("3", "Unified", "8M")]
+    ):
+        folder = tmp_path / f"index{index}"
+        folder.mkdir()
+        for name, text in (("level", level), ("type", kind), ("size", size)):
+            (folder / name).write_text(text + "\n")
+    assert machine._caches(tmp_path) == {"L1d": 32 * 2**10, "L3": 8 * 2**20}
+
+
+def test_the_page_shows_the_stored_run():
+    path = ROOT / "bench" / "performance_tables.py"
+    spec = importlib.util.spec_from_file_location("performance_tables", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    page = module.PAGE.read_text()
+    stored = json.loads(module.RESULTS.read_text())
+    assert stored["quick"] is False
+    profile = json.loads(module.PROFILE.read_text())
+    assert module.with_tables(page, stored, profile) == page, (
+        "docs/performance.md is not what performance.json says: run bench/performance_tables.py"
+    )
+
+
+def test_examples():
+    assert doctest.testmod(measurements).failed == 0

@@ -1,0 +1,113 @@
+import doctest
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import sdnn
+from sdnn import _core, instruction_sets
+from sdnn.instruction_sets import (
+    INSTRUCTION_SETS,
+    available_instruction_sets,
+    best_instruction_set,
+    instruction_set,
+    set_instruction_set,
+)
+
+
+@pytest.fixture
+def restore():
+    before = instruction_set()
+    yield
+    set_instruction_set(before)
+
+
+def short_trial(n_inputs, noise):
+    return _core.AcrobotTrial(
+        network=_core.SdnnCConfig(n_inputs=n_inputs),
+        learning=_core.QLearningConfig(),
+        acrobot=_core.AcrobotConfig(),
+        goal=_core.GoalScheduleConfig(),
+        sensors=_core.SensorConfig(n_sensors=n_inputs, noise=noise),
+        protocol=_core.ProtocolConfig(n_learning_episodes=60, test_interval=5),
+        seed=3,
+    )
+
+
+@pytest.mark.usefixtures("restore")
+@pytest.mark.parametrize(("n_inputs", "noise"), [(4, 0.0), (4, 0.02), (6, 0.02)])
+def test_a_trial_has_the_same_bits_on_all_levels(n_inputs, noise):
+    rows = {}
+    for level in available_instruction_sets():
+        set_instruction_set(level)
+        trial = short_trial(n_inputs, noise)
+        trial.advance(60)
+        rows[level] = (trial.n_decisions, trial.test_rows())
+    n_decisions, expected = rows["portable"]
+    assert len(expected["steps"]) == 12
+    for level, (count, columns) in rows.items():
+        assert count == n_decisions, level
+        for name, column in columns.items():
+            assert column.tobytes() == expected[name].tobytes(), (level, name)
+
+
+@pytest.mark.usefixtures("restore")
+def test_a_learned_network_has_the_same_bits_on_all_levels():
+    networks = {}
+    for level in available_instruction_sets():
+        set_instruction_set(level)
+        network = _core.SdnnC(_core.SdnnCConfig(n_inputs=4), 1)
+        rng = np.random.default_rng(1)
+        for _ in range(300):
+            network.correct(rng.random(4), int(rng.integers(601)), float(rng.uniform(-20, 20)))
+        networks[level] = (network.weights(), network.thresholds(), network.values([0.5] * 4))
+    for level, arrays in networks.items():
+        for array, expected in zip(arrays, networks["portable"], strict=True):
+            assert np.array_equal(array, expected), level
+
+
+@pytest.mark.usefixtures("restore")
+def test_levels_can_be_chosen():
+    assert best_instruction_set() in INSTRUCTION_SETS
+    for level in available_instruction_sets():
+        sdnn.set_instruction_set(level)
+        assert sdnn.instruction_set() == level
+
+
+@pytest.mark.parametrize("name", ["", "sse9", "AVX2", "avx2 "])
+def test_bad_names(name):
+    before = instruction_set()
+    with pytest.raises(ValueError, match="instruction set must be portable, avx2 or avx512, got"):
+        set_instruction_set(name)
+    assert instruction_set() == before
+    with pytest.raises(TypeError):
+        set_instruction_set(2)
+
+
+def test_levels_beyond_the_processor():
+    for name in set(INSTRUCTION_SETS) - set(available_instruction_sets()):
+        with pytest.raises(ValueError, match="one that this processor offers"):
+            set_instruction_set(name)
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [("portable", "portable"), ("sse9", "instruction set must be portable, avx2 or avx512")],
+)
+def test_the_environment_variable_chooses(value, said):
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join(p for p in sys.path if p),
+        "SDNN_INSTRUCTION_SET": value,
+    }
+    code = "import sdnn; print(sdnn.instruction_set())"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False
+    )
+    assert said in done.stdout + done.stderr
+    assert (done.returncode == 0) == (value == "portable")
+
+
+def test_examples():
+    assert doctest.testmod(instruction_sets).failed == 0

@@ -1,0 +1,301 @@
+"""Many acrobots at once: the same as so many single ones."""
+
+import doctest
+import importlib
+import re
+import threading
+import time
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
+
+from sdnn import _core
+from sdnn.environments import (
+    AcrobotConfig,
+    AcrobotSwingUpEnv,
+    AcrobotSwingUpVectorEnv,
+    GoalSchedule,
+    GoalScheduleConfig,
+)
+
+ID = "sdnn/AcrobotSwingUp-v0"
+EASY = AcrobotConfig(goal_height=0.5, max_decisions=12)
+LEVELS = ("portable", "avx2", "avx512")
+
+
+@pytest.fixture(params=LEVELS)
+def instruction_set(request):
+    before = _core.instruction_set()
+    try:
+        _core.set_instruction_set(request.param)
+    except ValueError:
+        pytest.skip(f"this processor has no {request.param}")
+    yield request.param
+    _core.set_instruction_set(before)
+
+
+def assert_same(got, expected):
+    """Nested tuples and dicts of arrays: equal types, shapes and bits."""
+    assert type(got) is type(expected)
+    if isinstance(expected, dict):
+        assert got.keys() == expected.keys()
+        for key, value in expected.items():
+            assert_same(got[key], value)
+    elif isinstance(expected, tuple):
+        assert len(got) == len(expected)
+        for one, other in zip(got, expected, strict=True):
+            assert_same(one, other)
+    else:
+        assert got.dtype == expected.dtype
+        assert got.shape == expected.shape
+        assert got.tobytes() == expected.tobytes()
+
+
+def pair(num_envs, **kwargs):
+    return [
+        gym.make_vec(ID, num_envs=num_envs, vectorization_mode=mode, **kwargs)
+        for mode in ("vector_entry_point", "sync")
+    ]
+
+
+def test_make_vec_makes_it():
+    envs = gym.make_vec(f"sdnn:{ID}", num_envs=5)
+    assert isinstance(envs, AcrobotSwingUpVectorEnv)
+    assert envs.num_envs == 5
+    assert envs.metadata["autoreset_mode"] == gym.vector.AutoresetMode.NEXT_STEP
+    assert envs.spec.id == ID
+    sync = gym.make_vec(ID, num_envs=5, vectorization_mode="sync")
+    for name in ("action_space", "observation_space"):
+        assert getattr(envs, name) == getattr(sync, name)
+        assert getattr(envs, f"single_{name}") == getattr(sync, f"single_{name}")
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("num_envs", [1, 3, 8, 13])
+def test_equals_single_environments(instruction_set, num_envs, dtype):
+    envs, sync = pair(num_envs, config=EASY, dtype=dtype)
+    random = np.random.default_rng(num_envs)
+    assert_same(envs.reset(seed=3), sync.reset(seed=3))
+    n_terminated = n_truncated = 0
+    for _ in range(150):
+        actions = random.uniform(-1.0, 1.0, (num_envs, 1)).astype(dtype)
+        got, expected = envs.step(actions), sync.step(actions)
+        assert_same(got, expected)
+        n_terminated += got[2].sum()
+        n_truncated += got[3].sum()
+    assert n_terminated >= num_envs
+    assert n_truncated >= num_envs
+    assert (envs.episodes > 5).all()
+
+
+def test_equals_single_environments_with_the_papers_task():
+    envs, sync = pair(10)
+    random = np.random.default_rng(1)
+    assert_same(envs.reset(), sync.reset())
+    for _ in range(120):
+        actions = random.choice(np.array([-1.0, 0.0, 1.0], np.float32), (10, 1))
+        assert_same(envs.step(actions), sync.step(actions))
+
+
+def test_resets_like_single_environments():
+    envs, sync = pair(4, config=EASY)
+    random = np.random.default_rng(2)
+    mask = np.array([True, False, True, False])
+    resets = [
+        {},
+        {"seed": 7},
+        {"seed": [None, 1, None, 2]},
+        {"options": {"episode": 100}},
+        {"options": {"reset_mask": mask}},
+        {"options": {"reset_mask": ~mask, "episode": 40}},
+        {"seed": [1, None, None, None], "options": {"reset_mask": mask}},
+        {"seed": 3, "options": {"episode": 300}},
+    ]
+    for _ in range(3):
+        for arguments in resets:
+            theirs = {
+                key: dict(value) if key == "options" else value for key, value in arguments.items()
+            }
+            assert_same(envs.reset(**arguments), sync.reset(**theirs))
+            for _ in range(random.integers(15)):
+                actions = random.uniform(-1.0, 1.0, (4, 1)).astype(np.float32)
+                assert_same(envs.step(actions), sync.step(actions))
+    assert "reset_mask" in resets[4]["options"]  # what was given stays as it was
+
+
+def test_counts_episodes_for_each_environment():
+    envs = AcrobotSwingUpVectorEnv(3, config=AcrobotConfig(max_decisions=2))
+    schedule = GoalSchedule()
+    assert envs.episodes.tolist() == [0, 0, 0]
+    envs.reset()
+    envs.reset(options={"reset_mask": np.array([False, True, False])})
+    assert envs.episodes.tolist() == [1, 2, 1]
+    still = np.zeros((3, 1))
+    assert envs.step(still)[3].tolist() == [False] * 3
+    assert envs.step(still)[3].tolist() == [True] * 3
+    *_, truncated, infos = envs.step(np.full((3, 1), np.nan))  # the actions are ignored
+    assert truncated.tolist() == [False] * 3
+    assert envs.episodes.tolist() == [2, 3, 2]
+    assert infos["lambda"].tolist() == [schedule(k) for k in (2, 3, 2)]
+    assert infos["state"].tolist() == np.zeros((3, 4)).tolist()
+
+
+def test_goal_schedule_is_any_function_of_the_episode():
+    envs = AcrobotSwingUpVectorEnv(2, goal_schedule=lambda episode: 0.5**episode)
+    assert [envs.reset()[1]["lambda"].tolist() for _ in range(2)] == [[0.5] * 2, [0.25] * 2]
+    constant = GoalSchedule(GoalScheduleConfig(kind="constant", constant_value=0.3))
+    envs = AcrobotSwingUpVectorEnv(2, goal_schedule=constant)
+    assert envs.reset()[1]["lambda"].tolist() == [0.3] * 2
+
+
+def test_what_it_returns_is_the_callers():
+    envs = AcrobotSwingUpVectorEnv(2)
+    first = envs.reset()
+    kept = [first[0].copy(), first[1]["state"].copy(), first[1]["lambda"].copy()]
+    for array in (first[0], *first[1].values()):
+        array[:] = 1
+    second = envs.reset(seed=0)
+    np.testing.assert_array_equal(second[0], kept[0])
+    np.testing.assert_array_equal(second[1]["state"], kept[1])
+    np.testing.assert_array_equal(second[1]["lambda"], kept[2])
+
+
+def test_bad_actions_name_the_argument_and_move_nothing():
+    envs = AcrobotSwingUpVectorEnv(3)
+    with pytest.raises(gym.error.ResetNeeded):
+        envs.step(np.zeros((3, 1)))
+    envs.reset(options={"reset_mask": np.array([True, True, False])})
+    with pytest.raises(gym.error.ResetNeeded):
+        envs.step(np.zeros((3, 1)))
+    envs.reset()
+    for bad in (np.nan, np.inf, -np.inf, 1.01, -1.01):
+        actions = np.ones((3, 1))
+        actions[1] = bad
+        message = f"actions[1] must be one number in [-1, 1], got {bad}"
+        with pytest.raises(ValueError, match=re.escape(message)):
+            envs.step(actions)
+    for shape in ((2, 1), (3, 2), (1, 3), ()):
+        with pytest.raises(ValueError, match=re.escape(f"(3, 1), got shape {shape}")):
+            envs.step(np.zeros(shape))
+    observations = envs.step(np.zeros(3))[0]
+    np.testing.assert_array_equal(observations, np.full((3, 4), 0.5))
+
+
+def test_bad_arguments():
+    with pytest.raises(ValueError, match="num_envs must be at least 1, got 0"):
+        AcrobotSwingUpVectorEnv(0)
+    with pytest.raises(TypeError):
+        AcrobotSwingUpVectorEnv(2.5)
+    with pytest.raises(ValueError, match="dtype must be one of"):
+        AcrobotSwingUpVectorEnv(1, dtype="float16")
+    with pytest.raises(ValueError, match="render_mode"):
+        AcrobotSwingUpVectorEnv(1, render_mode="human")
+    with pytest.raises(ValueError, match="integration_step"):
+        AcrobotSwingUpVectorEnv(1, config=AcrobotConfig(integration_step=0.03))
+    envs = AcrobotSwingUpVectorEnv(2)
+    with pytest.raises(ValueError, match="seed must have num_envs=2 items, got 3"):
+        envs.reset(seed=[1, 2, 3])
+    with pytest.raises(ValueError, match="episode must be at least 1, got 0"):
+        envs.reset(options={"episode": 0})
+    with pytest.raises(ValueError, match="'epsiode'"):
+        envs.reset(options={"epsiode": 3})
+    for mask in (np.zeros(2, bool), np.ones(3, bool), np.ones(2), "yes"):
+        with pytest.raises(ValueError, match="reset_mask"):
+            envs.reset(options={"reset_mask": mask})
+    assert envs.episodes.tolist() == [0, 0]
+
+
+def test_core_batch_checks_its_arguments():
+    batch = _core.AcrobotBatch(AcrobotConfig().to_core(), 3)
+    assert len(batch) == 3
+    every = np.ones(3, bool)
+    good = np.zeros(3)
+    with pytest.raises(ValueError, match=re.escape("torques[2] must be in [-10, 10], got 11")):
+        batch.step([0.0, 0.0, 11.0], good, every)
+    with pytest.raises(ValueError, match=re.escape("lambdas[0] must be at least 0, got -1")):
+        batch.step(good, [-1.0, 0.0, 0.0], every)
+    with pytest.raises(ValueError, match="torques must be of 3 items, got 2"):
+        batch.step(good[:2], good, every)
+    with pytest.raises(ValueError, match="moving must be of 3 items, got 1"):
+        batch.step(good, good, every[:1])
+    with pytest.raises(ValueError, match="mask must be of 3 items, got 4"):
+        batch.reset(np.ones(4, bool))
+    with pytest.raises(IndexError):
+        batch.decisions(3)
+    with pytest.raises(ValueError, match="n_acrobots must be in"):
+        _core.AcrobotBatch(AcrobotConfig().to_core(), 0)
+    batch.set_state(1, [0.0, 0.0, 1e300, 0.0])
+    with pytest.raises(OverflowError, match="speed of acrobot 1"):
+        batch.step(good, good, every)
+    assert [batch.decisions(i) for i in range(3)] == [1, 0, 1]
+
+
+def test_steps_without_the_global_lock():
+    config = AcrobotConfig(integration_step=1e-4)
+    batch = _core.AcrobotBatch(config.to_core(), 400)
+    done = threading.Event()
+
+    def step():
+        batch.step(np.zeros(400), np.zeros(400), np.ones(400, bool))
+        done.set()
+
+    thread = threading.Thread(target=step)
+    longest = 0.0
+    before = time.perf_counter()
+    start = before
+    thread.start()
+    while not done.is_set():
+        time.sleep(0.0)
+        now = time.perf_counter()
+        longest, before = max(longest, now - before), now
+    thread.join()
+    assert longest < 0.8 * (time.perf_counter() - start)
+
+
+def test_works_under_gymnasiums_vector_wrappers():
+    envs = RecordEpisodeStatistics(gym.make_vec(ID, num_envs=2, config=EASY))
+    envs.reset()
+    lengths = []
+    for _ in range(30):
+        *_, infos = envs.step(np.zeros((2, 1), np.float32))
+        if "episode" in infos:
+            lengths += infos["episode"]["l"].tolist()
+    assert lengths == [12] * 4
+
+
+def test_renders_every_environment(monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    envs, sync = pair(2, render_mode="rgb_array")
+    actions = np.array([[1.0], [-0.5]], np.float32)
+    for each in (envs, sync):
+        each.reset(seed=1)
+        each.step(actions)
+    assert_same(envs.render(), sync.render())
+    envs.close()
+    sync.close()
+    silent = AcrobotSwingUpVectorEnv(1)
+    silent.reset()
+    with pytest.warns(UserWarning, match="render_mode"):
+        assert silent.render() is None
+    silent.close()
+
+
+def test_takes_actions_as_lists_and_keeps_double_precision():
+    envs = AcrobotSwingUpVectorEnv(1, dtype="float64")
+    env = AcrobotSwingUpEnv(dtype="float64")
+    assert envs.reset()[0][0].tolist() == env.reset()[0].tolist()
+    for share in np.linspace(-1.0, 1.0, 40):
+        observations, *_, infos = envs.step([[share]])
+        observation, _, terminated, _, info = env.step([share])
+        assert observations[0].tobytes() == observation.tobytes()
+        assert infos["tip_height"][0] == info["tip_height"]
+        if terminated:
+            break
+
+
+def test_doctests():
+    result = doctest.testmod(importlib.import_module("sdnn.environments.vector_env"))
+    assert result.attempted > 0
+    assert result.failed == 0
