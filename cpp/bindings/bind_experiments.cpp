@@ -32,6 +32,17 @@ py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
   return rows;
 }
 
+py::dict memory_counts(const Trial& trial) {
+  return trial.agent().action_value().visit([](const auto& network) {
+    const auto& counts = network.memory().counts();
+    py::dict out;
+    out["full"] = counts.full;
+    out["neighbour"] = counts.neighbour;
+    out["columns"] = counts.columns;
+    return out;
+  });
+}
+
 }  // namespace
 
 void bind_experiments(py::module_& module) {
@@ -64,5 +75,7 @@ void bind_experiments(py::module_& module) {
       .def("advance", [](Trial& trial, int n_episodes) { trial.advance(n_episodes); },
            py::arg("n_episodes"), py::call_guard<py::gil_scoped_release>(),
            "Runs up to n more learning episodes")
+      .def("memory_counts", &memory_counts,
+           "How potentials came about so far: full passes, derived from neighbours, columns added")
       .def("test_rows", &test_rows, "Columns of the test episodes so far");
 }

@@ -694,6 +694,10 @@ class AcrobotTrial:
         """
         Runs up to n more learning episodes
         """
+    def memory_counts(self) -> dict:
+        """
+        How potentials came about so far: full passes, derived from neighbours, columns added
+        """
     def test_rows(self) -> dict[str, numpy.ndarray]:
         """
         Columns of the test episodes so far

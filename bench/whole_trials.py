@@ -1,0 +1,90 @@
+"""Whole trials of 15,000 episodes against dense products: the table in docs/performance.md.
+
+python bench/whole_trials.py [trials per case], about five minutes for 4; rows go to
+docs/whole-trials.csv. Processor time of the trial's own thread, two trials at a time; the dense
+product of each network's size is measured between the trials, in the same process.
+"""
+
+from __future__ import annotations
+
+import csv
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from sdnn import _core
+from sdnn.approximators import SDNNCConfig
+from sdnn.environments import SensorConfig
+from sdnn.experiments.config import TrialConfig, trial_seed
+from sdnn.experiments.trial import make_core_trial
+
+CASES = (("s4", 4, 0.0), ("s6", 6, 0.0), ("s4-noise", 4, 0.02), ("s6-noise", 6, 0.02))
+ROWS = Path(__file__).parents[1] / "docs" / "whole-trials.csv"
+
+
+def dense_microseconds(n_inputs: int) -> float:
+    product = _core.DenseProduct(900, 200 * n_inputs * (n_inputs - 1), 1)
+    return float(np.median(product.run(40)[10:])) / 1000
+
+
+def run(task: tuple[str, int, float, int]) -> dict[str, object]:
+    case, n_inputs, noise, number = task
+    dense = dense_microseconds(n_inputs)
+    config = TrialConfig(
+        network=SDNNCConfig(n_inputs=n_inputs),
+        sensors=SensorConfig(n_sensors=n_inputs, noise=noise),
+    )
+    trial = make_core_trial(config, trial_seed(0, case, number))
+    start = time.thread_time()
+    trial.advance(15_000)
+    seconds = time.thread_time() - start
+    dense = float(np.median([dense, dense_microseconds(n_inputs)]))
+    counts = trial.memory_counts()
+    n = trial.n_decisions
+    return {
+        "case": case,
+        "trial": number,
+        "decisions": n,
+        "seconds": round(seconds, 3),
+        "us_per_decision": round(seconds / n * 1e6, 2),
+        "dense_us": round(dense, 1),
+        "dense_over_decision": round(dense * n / seconds / 1e6, 2),
+        "full_passes": round(counts["full"] / n, 3),
+        "from_neighbours": round(counts["neighbour"] / n, 3),
+        "columns_per_decision": round(counts["columns"] / n),
+    }
+
+
+def main(n_trials: int) -> None:
+    tasks = [(*case, number) for number in range(n_trials) for case in CASES]
+    with ThreadPoolExecutor(2) as pool:
+        rows = list(pool.map(run, tasks))
+    rows.sort(key=lambda row: ([case[0] for case in CASES].index(row["case"]), row["trial"]))
+    with ROWS.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+    for case, *_ in CASES:
+        of = [row for row in rows if row["case"] == case]
+        ratio = [row["dense_over_decision"] for row in of]
+        seconds = [row["seconds"] for row in of]
+        per_decision = {
+            key: np.average([row[key] for row in of], weights=[row["decisions"] for row in of])
+            for key in ("us_per_decision", "full_passes", "columns_per_decision")
+        }
+        print(
+            f"| {case} | {len(of)} | {sum(row['decisions'] for row in of):,}",
+            f"{np.median(seconds):.1f} ({min(seconds):.1f} - {max(seconds):.1f})",
+            f"{per_decision['us_per_decision']:.1f}",
+            f"{np.median(ratio):.1f} ({min(ratio):.1f} - {max(ratio):.1f})",
+            f"{per_decision['full_passes']:.2f}",
+            f"{per_decision['columns_per_decision']:.0f} |",
+            sep=" | ",
+        )
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 4)
