@@ -5,12 +5,13 @@
 
 #include <cstdint>
 
+#include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/dynamic_sdnn_c.hpp"
 
 namespace {
 
 using namespace sdnn;
-using Trial = experiments::AcrobotTrial<approximators::DynamicSdnnC>;
+using Trial = experiments::AcrobotTrial<agents::QLearning<approximators::DynamicSdnnC>>;
 
 /// Arguments: inputs, noise in per cent, learning episodes.
 void trial(benchmark::State& state) {

@@ -4,10 +4,16 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "sdnn/approximators/dynamic_sdnn_c.hpp"
+#include "sdnn/approximators/fuzzy_rules.hpp"
+#include "sdnn/approximators/rbf_network.hpp"
 
 namespace py = pybind11;
 using namespace sdnn;
 using approximators::DynamicSdnnC;
+using approximators::FuzzyRules;
+using approximators::FuzzyRulesConfig;
+using approximators::RbfNetwork;
+using approximators::RbfNetworkConfig;
 using approximators::SdnnCConfig;
 using bindings::ArrayArgument;
 
@@ -55,6 +61,106 @@ py::array_t<std::int32_t> thresholds(const DynamicSdnnC& network) {
     out.mutable_at(static_cast<py::ssize_t>(i)) = perceptron.threshold(i);
   }
   return out;
+}
+
+void bind_fuzzy_rules(py::module_& module) {
+  const FuzzyRulesConfig defaults;
+  py::class_<FuzzyRulesConfig>(module, "FuzzyRulesConfig", "The sizes of a table of fuzzy rules")
+      .def(py::init([](int n_inputs, int n_sets, int n_actions, std::uint64_t max_table_bytes) {
+             return FuzzyRulesConfig{n_inputs, n_sets, n_actions, max_table_bytes};
+           }),
+           py::kw_only(), py::arg("n_inputs") = defaults.n_inputs,
+           py::arg("n_sets") = defaults.n_sets, py::arg("n_actions") = defaults.n_actions,
+           py::arg("max_table_bytes") = defaults.max_table_bytes)
+      .def_readonly("n_inputs", &FuzzyRulesConfig::n_inputs)
+      .def_readonly("n_sets", &FuzzyRulesConfig::n_sets)
+      .def_readonly("n_actions", &FuzzyRulesConfig::n_actions)
+      .def_readonly("max_table_bytes", &FuzzyRulesConfig::max_table_bytes);
+
+  py::class_<FuzzyRules>(module, "FuzzyRules", "Rules over a grid of triangular sets")
+      .def(py::init<const FuzzyRulesConfig&>(), py::arg("config"))
+      .def_property_readonly("config", [](const FuzzyRules& rules) { return rules.config(); })
+      .def_property_readonly("n_rules", &FuzzyRules::n_rules)
+      .def("fire",
+           [](const FuzzyRules& rules, const ArrayArgument<double>& state) {
+             approximators::FiredRules fired;
+             rules.fire(bindings::vector(state, "state"), fired);
+             const auto n = static_cast<py::ssize_t>(fired.size());
+             return std::pair(py::array_t<std::size_t>(n, fired.rules.data()),
+                              py::array_t<double>(n, fired.truth_values.data()));
+           },
+           py::arg("state"), "The rules that fire and their truth values")
+      .def("values",
+           [](const FuzzyRules& rules, std::size_t rule) {
+             core::require(rule < rules.n_rules(), "rule",
+                           "less than " + std::to_string(rules.n_rules()), rule);
+             const auto row = rules.values(rule);
+             return py::array_t<float>(static_cast<py::ssize_t>(row.size()), row.data());
+           },
+           py::arg("rule"), "A copy of v(rule, a) for every action: (n_actions,)");
+}
+
+void bind_rbf_network(py::module_& module) {
+  const RbfNetworkConfig defaults;
+  py::class_<RbfNetworkConfig>(module, "RbfNetworkConfig", "The sizes of an RBF network")
+      .def(py::init([](int n_inputs, int n_bases, int n_actions, double width,
+                       double gradient_rate, std::uint64_t max_table_bytes) {
+             return RbfNetworkConfig{n_inputs, n_bases, n_actions, width, gradient_rate,
+                                     max_table_bytes};
+           }),
+           py::kw_only(), py::arg("n_inputs") = defaults.n_inputs,
+           py::arg("n_bases") = defaults.n_bases, py::arg("n_actions") = defaults.n_actions,
+           py::arg("width") = defaults.width, py::arg("gradient_rate") = defaults.gradient_rate,
+           py::arg("max_table_bytes") = defaults.max_table_bytes)
+      .def_readonly("n_inputs", &RbfNetworkConfig::n_inputs)
+      .def_readonly("n_bases", &RbfNetworkConfig::n_bases)
+      .def_readonly("n_actions", &RbfNetworkConfig::n_actions)
+      .def_readonly("width", &RbfNetworkConfig::width)
+      .def_readonly("gradient_rate", &RbfNetworkConfig::gradient_rate)
+      .def_readonly("max_table_bytes", &RbfNetworkConfig::max_table_bytes);
+
+  py::class_<RbfNetwork>(module, "RbfNetwork", "Q(s, a) linear in normalized Gaussian bases")
+      .def(py::init<const RbfNetworkConfig&>(), py::arg("config"))
+      .def_property_readonly("config", [](const RbfNetwork& net) { return net.config(); })
+      .def_property_readonly("n_inputs", &RbfNetwork::n_inputs)
+      .def_property_readonly("n_actions", &RbfNetwork::n_actions)
+      .def_property_readonly("n_joint_bases", &RbfNetwork::n_joint_bases)
+      .def("values",
+           [](RbfNetwork& net, const ArrayArgument<double>& state) {
+             py::array_t<double> out(static_cast<py::ssize_t>(net.n_actions()));
+             net.values(bindings::vector(state, "state"), {out.mutable_data(), net.n_actions()});
+             return out;
+           },
+           py::arg("state"), "Q(state, a) for every action; shapes (d,) -> (n_actions,)")
+      .def("values_plainly",
+           [](RbfNetwork& net, const ArrayArgument<double>& state) {
+             py::array_t<double> out(static_cast<py::ssize_t>(net.n_actions()));
+             net.values_plainly(bindings::vector(state, "state"),
+                                {out.mutable_data(), net.n_actions()});
+             return out;
+           },
+           py::arg("state"), "The same as values, from every joint basis of every action")
+      .def("value",
+           [](RbfNetwork& net, const ArrayArgument<double>& state, std::size_t action) {
+             return net.value(bindings::vector(state, "state"), action);
+           },
+           py::arg("state"), py::arg("action"))
+      .def("correct",
+           [](RbfNetwork& net, const ArrayArgument<double>& state, std::size_t action,
+              double target) { net.correct(bindings::vector(state, "state"), action, target); },
+           py::arg("state"), py::arg("action"), py::arg("target"),
+           "One gradient step of Q(state, action) towards target")
+      .def("weights",
+           [](const RbfNetwork& net) {
+             return py::array_t<double>(static_cast<py::ssize_t>(net.n_joint_bases()),
+                                        net.weights().data());
+           },
+           "A copy, row-major over inputs and action: (n_bases^(d+1),)")
+      .def("set_weights",
+           [](RbfNetwork& net, const ArrayArgument<double>& new_weights) {
+             net.set_weights(bindings::vector(new_weights, "weights"));
+           },
+           py::arg("weights"));
 }
 
 }  // namespace
@@ -169,4 +275,7 @@ void bind_approximators(py::module_& module) {
              net.set_parameters(bindings::flat(new_weights), bindings::flat(new_thresholds));
            },
            py::arg("weights"), py::arg("thresholds"));
+
+  bind_fuzzy_rules(module);
+  bind_rbf_network(module);
 }

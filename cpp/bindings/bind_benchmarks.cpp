@@ -1,6 +1,7 @@
 #include <pybind11/numpy.h>
 
 #include "bindings.hpp"
+#include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/dynamic_sdnn_c.hpp"
 #include "sdnn/benchmarks/decisions.hpp"
 #include "sdnn/benchmarks/network_parts.hpp"
@@ -14,7 +15,7 @@ using benchmarks::AcrobotDecisions;
 using benchmarks::BufferRead;
 using benchmarks::DenseProduct;
 using benchmarks::NetworkParts;
-using Trial = experiments::AcrobotTrial<approximators::DynamicSdnnC>;
+using Trial = experiments::AcrobotTrial<agents::QLearning<approximators::DynamicSdnnC>>;
 
 namespace {
 

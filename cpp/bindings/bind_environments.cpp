@@ -47,6 +47,7 @@ void bind_elementary(py::module_& module) {
                return py::make_tuple(sin, cos);
              },
              py::arg("x"), "(sin x, cos x), item by item");
+  module.def("exp", py::vectorize([](double x) { return core::exp(x); }), py::arg("x"));
   module.def("log", py::vectorize([](double x) { return core::log(x); }), py::arg("x"));
   module.def("normal_quantile", py::vectorize([](double p) { return core::normal_quantile(p); }),
              py::arg("p"));

@@ -2,18 +2,28 @@
 #include <pybind11/typing.h>
 
 #include "bindings.hpp"
+#include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/dynamic_sdnn_c.hpp"
+#include "sdnn/approximators/fuzzy_rules.hpp"
+#include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/experiments/trial.hpp"
 
 namespace py = pybind11;
 using namespace sdnn;
 using approximators::DynamicSdnnC;
 using experiments::ProtocolConfig;
-using Trial = experiments::AcrobotTrial<DynamicSdnnC>;
+using agents::FuzzyQLearning;
+using agents::QLearning;
+using approximators::FuzzyRules;
+using approximators::RbfNetwork;
+using environments::AcrobotConfig;
+using environments::GoalScheduleConfig;
+using environments::SensorConfig;
 
 namespace {
 
-template <class Value, class Read>
+template <class Value, class Trial, class Read>
 py::array_t<Value> column(const Trial& trial, Read read) {
   py::array_t<Value> out(static_cast<py::ssize_t>(trial.rows().size()));
   Value* item = out.mutable_data();
@@ -21,6 +31,7 @@ py::array_t<Value> column(const Trial& trial, Read read) {
   return out;
 }
 
+template <class Trial>
 py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
   using experiments::TestRow;
   py::typing::Dict<py::str, py::array> rows;
@@ -32,7 +43,9 @@ py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
   return rows;
 }
 
-py::dict memory_counts(const Trial& trial) {
+using SdnnTrial = experiments::AcrobotTrial<QLearning<DynamicSdnnC>>;
+
+py::dict memory_counts(const SdnnTrial& trial) {
   return trial.agent().action_value().visit([](const auto& network) {
     const auto& counts = network.memory().counts();
     py::dict out;
@@ -41,6 +54,18 @@ py::dict memory_counts(const Trial& trial) {
     out["columns"] = counts.columns;
     return out;
   });
+}
+
+/// What the trials of all agents have in common.
+template <class Trial>
+void def_trial(py::class_<Trial> trial) {
+  trial.def_property_readonly("episode", &Trial::episode)
+      .def_property_readonly("finished", &Trial::finished)
+      .def_property_readonly("n_decisions", &Trial::n_decisions)
+      .def("advance", [](Trial& self, int n_episodes) { self.advance(n_episodes); },
+           py::arg("n_episodes"), py::call_guard<py::gil_scoped_release>(),
+           "Runs up to n more learning episodes")
+      .def("test_rows", &test_rows<Trial>, "Columns of the test episodes so far");
 }
 
 }  // namespace
@@ -56,26 +81,46 @@ void bind_experiments(py::module_& module) {
       .def_readonly("n_learning_episodes", &ProtocolConfig::n_learning_episodes)
       .def_readonly("test_interval", &ProtocolConfig::test_interval);
 
-  py::class_<Trial>(module, "AcrobotTrial", "SDNN-C learns the acrobot swing-up")
-      .def(py::init([](const approximators::SdnnCConfig& network,
-                       const agents::QLearningConfig& learning,
-                       const environments::AcrobotConfig& acrobot,
-                       const environments::GoalScheduleConfig& goal,
-                       const environments::SensorConfig& sensors, const ProtocolConfig& protocol,
-                       std::uint64_t seed) {
-             return Trial(
-                 agents::QLearning<DynamicSdnnC>(DynamicSdnnC(network, seed), learning, seed),
-                 acrobot, goal, sensors, protocol, seed);
-           }),
-           py::kw_only(), py::arg("network"), py::arg("learning"), py::arg("acrobot"),
-           py::arg("goal"), py::arg("sensors"), py::arg("protocol"), py::arg("seed"))
-      .def_property_readonly("episode", &Trial::episode)
-      .def_property_readonly("finished", &Trial::finished)
-      .def_property_readonly("n_decisions", &Trial::n_decisions)
-      .def("advance", [](Trial& trial, int n_episodes) { trial.advance(n_episodes); },
-           py::arg("n_episodes"), py::call_guard<py::gil_scoped_release>(),
-           "Runs up to n more learning episodes")
-      .def("memory_counts", &memory_counts,
-           "How potentials came about so far: full passes, derived from neighbours, columns added")
-      .def("test_rows", &test_rows, "Columns of the test episodes so far");
+  def_trial(
+      py::class_<SdnnTrial>(module, "AcrobotTrial", "SDNN-C learns the acrobot swing-up")
+          .def(py::init([](const approximators::SdnnCConfig& network,
+                           const agents::QLearningConfig& learning, const AcrobotConfig& acrobot,
+                           const GoalScheduleConfig& goal, const SensorConfig& sensors,
+                           const ProtocolConfig& protocol, std::uint64_t seed) {
+                 return SdnnTrial({DynamicSdnnC(network, seed), learning, seed}, acrobot, goal,
+                                  sensors, protocol, seed);
+               }),
+               py::kw_only(), py::arg("network"), py::arg("learning"), py::arg("acrobot"),
+               py::arg("goal"), py::arg("sensors"), py::arg("protocol"), py::arg("seed"))
+          .def("memory_counts", &memory_counts,
+               "How potentials came about so far: full passes, from neighbours, columns added"));
+
+  using FuzzyTrial = experiments::AcrobotTrial<FuzzyQLearning>;
+  def_trial(
+      py::class_<FuzzyTrial>(module, "FuzzyAcrobotTrial",
+                             "Fuzzy Q-learning learns the acrobot swing-up")
+          .def(py::init([](const approximators::FuzzyRulesConfig& rules,
+                           const agents::FuzzyQLearningConfig& learning,
+                           const AcrobotConfig& acrobot, const GoalScheduleConfig& goal,
+                           const SensorConfig& sensors, const ProtocolConfig& protocol,
+                           std::uint64_t seed) {
+                 return FuzzyTrial({FuzzyRules(rules), learning, seed}, acrobot, goal, sensors,
+                                   protocol, seed);
+               }),
+               py::kw_only(), py::arg("rules"), py::arg("learning"), py::arg("acrobot"),
+               py::arg("goal"), py::arg("sensors"), py::arg("protocol"), py::arg("seed")));
+
+  using RbfTrial = experiments::AcrobotTrial<QLearning<RbfNetwork>>;
+  def_trial(
+      py::class_<RbfTrial>(module, "RbfAcrobotTrial",
+                           "Q-learning with an RBF network learns the acrobot swing-up")
+          .def(py::init([](const approximators::RbfNetworkConfig& network,
+                           const agents::QLearningConfig& learning, const AcrobotConfig& acrobot,
+                           const GoalScheduleConfig& goal, const SensorConfig& sensors,
+                           const ProtocolConfig& protocol, std::uint64_t seed) {
+                 return RbfTrial({RbfNetwork(network), learning, seed}, acrobot, goal, sensors,
+                                 protocol, seed);
+               }),
+               py::kw_only(), py::arg("network"), py::arg("learning"), py::arg("acrobot"),
+               py::arg("goal"), py::arg("sensors"), py::arg("protocol"), py::arg("seed")));
 }

@@ -261,6 +261,106 @@ class SdnnC:
     @property
     def u_low(self) -> int:
         ...
+class FuzzyRulesConfig:
+    """
+    The sizes of a table of fuzzy rules
+    """
+    def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_sets: typing.SupportsInt | typing.SupportsIndex = 9, n_actions: typing.SupportsInt | typing.SupportsIndex = 21, max_table_bytes: typing.SupportsInt | typing.SupportsIndex = 1073741824) -> None:
+        ...
+    @property
+    def max_table_bytes(self) -> int:
+        ...
+    @property
+    def n_actions(self) -> int:
+        ...
+    @property
+    def n_inputs(self) -> int:
+        ...
+    @property
+    def n_sets(self) -> int:
+        ...
+class FuzzyRules:
+    """
+    Rules over a grid of triangular sets
+    """
+    def __init__(self, config: FuzzyRulesConfig) -> None:
+        ...
+    def fire(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.uint64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        The rules that fire and their truth values
+        """
+    def values(self, rule: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float32]:
+        """
+        A copy of v(rule, a) for every action: (n_actions,)
+        """
+    @property
+    def config(self) -> FuzzyRulesConfig:
+        ...
+    @property
+    def n_rules(self) -> int:
+        ...
+class RbfNetworkConfig:
+    """
+    The sizes of an RBF network
+    """
+    def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_bases: typing.SupportsInt | typing.SupportsIndex = 4, n_actions: typing.SupportsInt | typing.SupportsIndex = 601, width: typing.SupportsFloat | typing.SupportsIndex = 1.0, gradient_rate: typing.SupportsFloat | typing.SupportsIndex = 3.0, max_table_bytes: typing.SupportsInt | typing.SupportsIndex = 1073741824) -> None:
+        ...
+    @property
+    def gradient_rate(self) -> float:
+        ...
+    @property
+    def max_table_bytes(self) -> int:
+        ...
+    @property
+    def n_actions(self) -> int:
+        ...
+    @property
+    def n_bases(self) -> int:
+        ...
+    @property
+    def n_inputs(self) -> int:
+        ...
+    @property
+    def width(self) -> float:
+        ...
+class RbfNetwork:
+    """
+    Q(s, a) linear in normalized Gaussian bases
+    """
+    def __init__(self, config: RbfNetworkConfig) -> None:
+        ...
+    def correct(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        One gradient step of Q(state, action) towards target
+        """
+    def set_weights(self, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def value(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex) -> float:
+        ...
+    def values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Q(state, a) for every action; shapes (d,) -> (n_actions,)
+        """
+    def values_plainly(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The same as values, from every joint basis of every action
+        """
+    def weights(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        A copy, row-major over inputs and action: (n_bases^(d+1),)
+        """
+    @property
+    def config(self) -> RbfNetworkConfig:
+        ...
+    @property
+    def n_actions(self) -> int:
+        ...
+    @property
+    def n_inputs(self) -> int:
+        ...
+    @property
+    def n_joint_bases(self) -> int:
+        ...
 class GoalScheduleKind:
     """
     The formula of lambda(k)
@@ -657,6 +757,30 @@ class QLearningConfig:
     @property
     def tie_rule(self) -> TieRule:
         ...
+class FuzzyQLearningConfig:
+    """
+    The parameters of fuzzy Q-learning
+    """
+    def __init__(self, *, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, trace_decay: typing.SupportsFloat | typing.SupportsIndex = 0.0, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform) -> None:
+        ...
+    @property
+    def discount(self) -> float:
+        ...
+    @property
+    def epsilon(self) -> float:
+        ...
+    @property
+    def learning_coefficient(self) -> float:
+        ...
+    @property
+    def n_greedy_steps(self) -> int:
+        ...
+    @property
+    def tie_rule(self) -> TieRule:
+        ...
+    @property
+    def trace_decay(self) -> float:
+        ...
 class SdnnQLearning:
     """
     Q-learning with SDNN-C
@@ -671,6 +795,40 @@ class SdnnQLearning:
         ...
     @property
     def network(self) -> SdnnC:
+        ...
+class RbfQLearning:
+    """
+    Q-learning with an RBF network
+    """
+    def __init__(self, *, network: RbfNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> int:
+        ...
+    def begin_episode(self) -> None:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
+        ...
+    @property
+    def network(self) -> RbfNetwork:
+        ...
+class FuzzyQLearning:
+    """
+    Fuzzy Q-learning; actions are numbers in [-1, 1]
+    """
+    def __init__(self, *, rules: FuzzyRulesConfig, learning: FuzzyQLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> float:
+        ...
+    def begin_episode(self) -> None:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsFloat | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
+        ...
+    def value(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> float:
+        """
+        V(state)
+        """
+    @property
+    def rules(self) -> FuzzyRules:
         ...
 class ProtocolConfig:
     """
@@ -696,7 +854,53 @@ class AcrobotTrial:
         """
     def memory_counts(self) -> dict:
         """
-        How potentials came about so far: full passes, derived from neighbours, columns added
+        How potentials came about so far: full passes, from neighbours, columns added
+        """
+    def test_rows(self) -> dict[str, numpy.ndarray]:
+        """
+        Columns of the test episodes so far
+        """
+    @property
+    def episode(self) -> int:
+        ...
+    @property
+    def finished(self) -> bool:
+        ...
+    @property
+    def n_decisions(self) -> int:
+        ...
+class FuzzyAcrobotTrial:
+    """
+    Fuzzy Q-learning learns the acrobot swing-up
+    """
+    def __init__(self, *, rules: FuzzyRulesConfig, learning: FuzzyQLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Runs up to n more learning episodes
+        """
+    def test_rows(self) -> dict[str, numpy.ndarray]:
+        """
+        Columns of the test episodes so far
+        """
+    @property
+    def episode(self) -> int:
+        ...
+    @property
+    def finished(self) -> bool:
+        ...
+    @property
+    def n_decisions(self) -> int:
+        ...
+class RbfAcrobotTrial:
+    """
+    Q-learning with an RBF network learns the acrobot swing-up
+    """
+    def __init__(self, *, network: RbfNetworkConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Runs up to n more learning episodes
         """
     def test_rows(self) -> dict[str, numpy.ndarray]:
         """
@@ -795,6 +999,8 @@ def best_instruction_set() -> str:
     The best instruction set that this machine offers
     """
 def energy_sensor(s3: typing.SupportsFloat | typing.SupportsIndex, s4: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    ...
+def exp(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
 def height_sensor(s1: typing.SupportsFloat | typing.SupportsIndex, s2: typing.SupportsFloat | typing.SupportsIndex) -> float:
     ...

@@ -1,15 +1,19 @@
 /// Everything at once.
 #pragma once
 
+#include "sdnn/agents/agent.hpp"
 #include "sdnn/agents/epsilon_greedy.hpp"
+#include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/action_value.hpp"
 #include "sdnn/approximators/column_sums.hpp"
 #include "sdnn/approximators/dynamic_sdnn_c.hpp"
 #include "sdnn/approximators/error_correction.hpp"
+#include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/output_scale.hpp"
 #include "sdnn/approximators/parallel_perceptron.hpp"
 #include "sdnn/approximators/potential_memory.hpp"
+#include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 #include "sdnn/benchmarks/decisions.hpp"
 #include "sdnn/benchmarks/network_parts.hpp"
@@ -24,6 +28,7 @@
 #include "sdnn/core/capacity.hpp"
 #include "sdnn/core/check.hpp"
 #include "sdnn/core/elementary.hpp"
+#include "sdnn/core/grid_cells.hpp"
 #include "sdnn/core/instruction_set.hpp"
 #include "sdnn/core/lanes.hpp"
 #include "sdnn/core/random.hpp"

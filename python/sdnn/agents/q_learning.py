@@ -1,4 +1,4 @@
-"""Q-learning with SDNN-C, for any Gymnasium environment with one action dimension."""
+"""Q-learning, for any Gymnasium environment with one action dimension."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
+from sdnn.agents.spaces import DiscreteActions, EvenActions, UnitObservations, discrete_actions
 from sdnn.agents.transition import Transition
+from sdnn.approximators.rbf_network import RBFNetworkConfig
 from sdnn.approximators.sdnn_c import SDNNCConfig
 from sdnn.choices import choice
 
-__all__ = ["QLearningConfig", "SDNNQLearning"]
+__all__ = ["QLearningConfig", "RBFQLearning", "SDNNQLearning"]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -49,7 +51,73 @@ class QLearningConfig:
         return _core.QLearningConfig(**fields)
 
 
-class SDNNQLearning:
+class _QLearning:
+    """What Q-learning with any approximator has in common: spaces in, spaces out."""
+
+    action_space: gym.Space[Any]
+    learning: QLearningConfig
+    _core: _core.SdnnQLearning | _core.RbfQLearning
+    _scaled: UnitObservations
+    _actions: DiscreteActions | EvenActions
+
+    @property
+    def n_actions(self) -> int:
+        """Number of actions the agent chooses from."""
+        return self._core.network.n_actions
+
+    @property
+    def actions(self) -> NDArray[Any]:
+        """The actions in order, shape (n_actions,): what ``q_values`` are the values of."""
+        return self._actions.values
+
+    def begin_episode(self) -> None:
+        """Start counting steps anew, for the greedy first steps of an episode."""
+        self._core.begin_episode()
+
+    def act(self, observation: ArrayLike, explore: bool = True) -> Any:
+        """Choose the action to take, an element of the action space.
+
+        Parameters
+        ----------
+        observation : array_like, shape (l,)
+        explore : bool
+            False: always a best action, and no effect on the agent's later learning.
+
+        Raises
+        ------
+        ValueError
+            If the observation has another shape or holds NaN.
+        """
+        return self._actions.action(
+            self._core.act(self._scaled("observation", observation), explore)
+        )
+
+    def learn(self, transition: Transition) -> None:
+        """Learn one transition by Eq. (1).
+
+        Raises
+        ------
+        ValueError
+            If an observation, the action or the reward is not usable; nothing is learned then.
+        OverflowError
+            If a weight would leave its range; nothing is learned then.
+        """
+        self._core.learn(
+            self._scaled("observation", transition.observation),
+            self._actions.index(transition.action),
+            float(transition.reward),
+            self._scaled("next_observation", transition.next_observation),
+            bool(transition.terminated),
+        )
+        if transition.terminated:
+            self.begin_episode()
+
+    def q_values(self, observation: ArrayLike) -> NDArray[np.float64]:
+        """Q(observation, a) of every action, shape (n_actions,)."""
+        return self._core.network.values(self._scaled("observation", observation))
+
+
+class SDNNQLearning(_QLearning):
     """An agent that learns Q(s, a) with SDNN-C, one transition at a time.
 
     Observations are scaled to [0, 1] by the bounds of the observation space; values outside
@@ -100,121 +168,80 @@ class SDNNQLearning:
         learning: QLearningConfig | None = None,
         seed: int = 0,
     ) -> None:
-        self._low, self._high = _finite_bounds("observation_space", observation_space)
-        network = dataclasses.replace(network or SDNNCConfig(), n_inputs=self._low.size)
-        self.action_space = action_space
+        self._scaled = UnitObservations(observation_space)
+        network = dataclasses.replace(network or SDNNCConfig(), n_inputs=self._scaled.n_inputs)
         if isinstance(action_space, gym.spaces.Discrete):
             network = dataclasses.replace(network, n_actions=int(action_space.n))
-        else:
-            low, high = _finite_bounds("action_space", action_space)
-            if low.size != 1:
-                raise ValueError(f"action_space must have 1 dimension, got {low.size}")
-            self._action_low, self._action_high = float(low[0]), float(high[0])
+        self.action_space = action_space
         self.network = network
         self.learning = learning or QLearningConfig()
+        n_windows = network.n_hidden_units - network.n_active_units + 1
+        self._actions = discrete_actions(action_space, network.n_actions or n_windows)
         self._core = _core.SdnnQLearning(
             network=self.network.to_core(), learning=self.learning.to_core(), seed=seed
         )
 
-    @property
-    def n_actions(self) -> int:
-        """Number of actions the agent chooses from."""
-        return self._core.network.n_actions
 
-    @property
-    def actions(self) -> NDArray[Any]:
-        """The actions in order, shape (n_actions,): what ``q_values`` are the values of."""
-        if isinstance(self.action_space, gym.spaces.Discrete):
-            return np.arange(self.n_actions) + int(self.action_space.start)
-        return np.array([self._torque(index) for index in range(self.n_actions)])
+class RBFQLearning(_QLearning):
+    """An agent that learns Q(s, a) with an RBF network, one transition at a time.
 
-    def begin_episode(self) -> None:
-        """Start counting steps anew, for the greedy first steps of an episode."""
-        self._core.begin_episode()
+    It is the baseline whose cost the paper quotes: normalized Gaussians on an even grid over state
+    and action, linear weights, gradient Q-learning. Observations and actions are treated as by
+    `SDNNQLearning`; the actions of a ``Discrete`` space are taken as evenly spaced.
 
-    def act(self, observation: ArrayLike, explore: bool = True) -> Any:
-        """Choose the action to take, an element of the action space.
+    Parameters
+    ----------
+    observation_space : gymnasium.spaces.Box, shape (d,)
+        Finite bounds.
+    action_space : gymnasium.spaces.Box of shape (1,) or gymnasium.spaces.Discrete
+    network : RBFNetworkConfig, optional
+        ``n_inputs`` (and ``n_actions``, for a Discrete space) are taken from the spaces.
+    learning : QLearningConfig, optional
+    seed : int
+        The root of every random stream of the agent.
 
-        Parameters
-        ----------
-        observation : array_like, shape (l,)
-        explore : bool
-            False: always a best action, and no effect on the agent's later learning.
+    Raises
+    ------
+    TypeError
+        For spaces of another kind.
+    ValueError
+        For spaces of another shape or without finite bounds, impossible settings, or more weights
+        than ``network.max_table_bytes`` allows.
 
-        Raises
-        ------
-        ValueError
-            If the observation has another shape or holds NaN.
-        """
-        index = self._core.act(self._scaled("observation", observation), explore)
-        if isinstance(self.action_space, gym.spaces.Discrete):
-            return self.action_space.start + index
-        return np.array([self._torque(index)], dtype=self.action_space.dtype)
+    Examples
+    --------
+    >>> import gymnasium as gym, sdnn
+    >>> from sdnn.agents import RBFQLearning, Transition
+    >>> env = gym.make("sdnn/AcrobotSwingUp-v0")
+    >>> agent = RBFQLearning(env.observation_space, env.action_space, seed=1)
+    >>> observation, _ = env.reset(seed=1)
+    >>> agent.begin_episode()
+    >>> for _ in range(3):
+    ...     action = agent.act(observation)
+    ...     following, reward, terminated, truncated, _ = env.step(action)
+    ...     agent.learn(Transition(observation, action, reward, following, terminated))
+    ...     observation = following
+    >>> agent.q_values(observation).shape
+    (601,)
+    """
 
-    def learn(self, transition: Transition) -> None:
-        """Learn one transition by Eq. (1).
-
-        Raises
-        ------
-        ValueError
-            If an observation, the action or the reward is not usable; nothing is learned then.
-        OverflowError
-            If a weight would leave its range; nothing is learned then.
-        """
-        self._core.learn(
-            self._scaled("observation", transition.observation),
-            self._index(transition.action),
-            float(transition.reward),
-            self._scaled("next_observation", transition.next_observation),
-            bool(transition.terminated),
+    def __init__(
+        self,
+        observation_space: gym.Space[Any],
+        action_space: gym.Space[Any],
+        *,
+        network: RBFNetworkConfig | None = None,
+        learning: QLearningConfig | None = None,
+        seed: int = 0,
+    ) -> None:
+        self._scaled = UnitObservations(observation_space)
+        network = dataclasses.replace(network or RBFNetworkConfig(), n_inputs=self._scaled.n_inputs)
+        if isinstance(action_space, gym.spaces.Discrete):
+            network = dataclasses.replace(network, n_actions=int(action_space.n))
+        self.action_space = action_space
+        self.network = network
+        self.learning = learning or QLearningConfig()
+        self._actions = discrete_actions(action_space, network.n_actions)
+        self._core = _core.RbfQLearning(
+            network=self.network.to_core(), learning=self.learning.to_core(), seed=seed
         )
-        if transition.terminated:
-            self.begin_episode()
-
-    def q_values(self, observation: ArrayLike) -> NDArray[np.float64]:
-        """Q(observation, a) of every action, shape (n_actions,)."""
-        return self._core.network.values(self._scaled("observation", observation))
-
-    def _scaled(self, name: str, observation: ArrayLike) -> NDArray[np.float64]:
-        values = np.asarray(observation, dtype=np.float64)
-        if values.shape != self._low.shape:
-            raise ValueError(f"{name} must have shape {self._low.shape}, got {values.shape}")
-        if np.isnan(values).any():
-            raise ValueError(f"{name} must not hold NaN, got {values}")
-        return np.clip((values - self._low) / (self._high - self._low), 0.0, 1.0)
-
-    def _torque(self, index: int) -> float:
-        return _core.action_value(index, self.n_actions, self._action_low, self._action_high)
-
-    def _index(self, action: Any) -> int:
-        if isinstance(self.action_space, gym.spaces.Discrete):
-            index = int(action) - int(self.action_space.start)
-            if not 0 <= index < self.n_actions:
-                raise ValueError(f"action must be in {self.action_space}, got {action}")
-            return index
-        value = np.asarray(action, dtype=np.float64)
-        if value.size != 1 or not self._action_low <= value.item() <= self._action_high:
-            raise ValueError(
-                f"action must be one number in [{self._action_low}, {self._action_high}], "
-                f"got {action}"
-            )
-        share = (value.item() - self._action_low) / (self._action_high - self._action_low)
-        return round(share * (self.n_actions - 1))
-
-
-def _finite_bounds(
-    name: str, space: gym.Space[Any]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Read a one-dimensional Box's bounds as doubles; an error that names the argument if not."""
-    if not isinstance(space, gym.spaces.Box):
-        allowed = "Box or Discrete" if name == "action_space" else "Box"
-        raise TypeError(f"{name} must be a {allowed}, got {type(space).__name__}")
-    if len(space.shape) != 1:
-        raise ValueError(f"{name} must have shape (n,), got {space.shape}")
-    low, high = space.low.astype(np.float64), space.high.astype(np.float64)
-    if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
-        raise ValueError(
-            f"{name} must have finite bounds, low < high, got {low} to {high}; "
-            "pass a Box with the range that matters: values outside saturate"
-        )
-    return low, high

@@ -121,11 +121,10 @@ TEST(QLearning, EvaluationDoesNotDisturbLearning) {
   Agent evaluated = alone;
   core::Random world(1, core::Stream::weights);
   for (int episode = 0; episode < 100; ++episode) {
-    evaluated.begin_episode();
-    for (int i = 0; i < episode % 7; ++i) (void)evaluated.act(cell(i % 5), false);
     alone.begin_episode();
     evaluated.begin_episode();
     for (int step = 0; step < 6; ++step) {
+      for (int i = 0; i < episode % 3; ++i) (void)evaluated.act(cell(i % 5), false);
       const State state = cell(static_cast<int>(world.below(5)));
       const State next = cell(static_cast<int>(world.below(5)));
       const std::size_t action = alone.act(state);

@@ -5,12 +5,13 @@
 #include <stdexcept>
 
 #include "approximators/lookup_table.hpp"
+#include "sdnn/agents/q_learning.hpp"
 
 namespace sdnn::benchmarks {
 namespace {
 
 using Table = testing::LookupTable;
-using Trial = experiments::AcrobotTrial<Table>;
+using Trial = experiments::AcrobotTrial<agents::QLearning<Table>>;
 
 Trial table_trial() {
   return Trial(agents::QLearning<Table>(Table(4, 8, 21), {}, 1), {}, {}, {},

@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace {
 
@@ -49,6 +50,17 @@ TEST(RequireFinite, RejectsNonFinite) {
   for (const double bad : {kInfinity, -kInfinity, kNaN}) {
     EXPECT_THROW(require_finite("x", bad), std::invalid_argument) << bad;
   }
+}
+
+TEST(RequireUnitValues, NamesTheFirstBadOne) {
+  const auto message = [](std::vector<double> values) {
+    return message_of([&] { require_unit_values("state", values, 2); });
+  };
+  EXPECT_EQ(message({0.0, 1.0}), "no error");
+  EXPECT_EQ(message({0.5}), "state must be 2 values, got 1");
+  EXPECT_EQ(message({0.5, 1.5}), "state[1] must be in [0, 1], got 1.5");
+  EXPECT_EQ(message({kNaN, 2.0}), "state[0] must be in [0, 1], got nan");
+  EXPECT_EQ(message({0.5, -kInfinity}), "state[1] must be in [0, 1], got -inf");
 }
 
 }  // namespace

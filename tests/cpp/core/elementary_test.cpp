@@ -120,6 +120,50 @@ TEST(Log, HandlesTheEndsOfItsRange) {
   EXPECT_TRUE(std::isnan(sdnn::core::log(kNaN)));
 }
 
+TEST(Exp, IsWithinOneUlpAtRepresentativeAndHardPoints) {
+  constexpr std::pair<double, double> kRows[] = {
+      {1.0, 0x1.5bf0a8b145769p+1},       {-1.0, 0x1.78b56362cef38p-2},
+      {0.5, 0x1.a61298e1e069cp+0},       {-0.5, 0x1.368b2fc6f960ap-1},
+      {10.0, 0x1.5829dcf950560p+14},     {-10.0, 0x1.7cd79b5647c9bp-15},
+      {100.0, 0x1.3494a9b171bf5p+144},   {-700.0, 0x1.14f2b0fb9307fp-1010},
+      {0.34657359, 0x1.6a09e66640654p+0}, {1e-09, 0x1.000000044b830p+0},
+  };
+  for (const auto& [x, expected] : kRows) {
+    EXPECT_TRUE(adjacent(sdnn::core::exp(x), expected)) << x;
+  }
+}
+
+TEST(Exp, UndoesTheLogarithm) {
+  for (double x = 1e-300; x < 1e300; x *= 7.3) {
+    const double y = sdnn::core::log(x);  // an error in y is one of x times |y|
+    EXPECT_NEAR(sdnn::core::exp(y) / x, 1.0, (std::abs(y) + 2.0) * 2e-16) << x;
+  }
+}
+
+TEST(Exp, HandlesTheEndsOfItsRange) {
+  EXPECT_EQ(sdnn::core::exp(0.0), 1.0);
+  EXPECT_EQ(sdnn::core::exp(-0.0), 1.0);
+  EXPECT_EQ(sdnn::core::exp(5e-324), 1.0);
+  EXPECT_EQ(sdnn::core::exp(709.782712893384), 0x1.fffffffffff2ap+1023);
+  EXPECT_EQ(sdnn::core::exp(709.7827128933841), kInfinity);
+  EXPECT_EQ(sdnn::core::exp(kInfinity), kInfinity);
+  EXPECT_EQ(sdnn::core::exp(-745.1332191019411), 5e-324);
+  EXPECT_EQ(sdnn::core::exp(-745.1332191019412), 0.0);
+  EXPECT_EQ(sdnn::core::exp(-1.7e308), 0.0);
+  EXPECT_EQ(sdnn::core::exp(-kInfinity), 0.0);
+  EXPECT_TRUE(std::isnan(sdnn::core::exp(kNaN)));
+  EXPECT_TRUE(std::isnan(sdnn::core::exp(-kNaN)));
+}
+
+// The bits are the same with every compiler and optimization level.
+TEST(Exp, KeepsItsBits) {
+  std::uint64_t digest = 0;
+  for (int i = -50000; i < 50000; ++i) {
+    digest = digest * 31 + std::bit_cast<std::uint64_t>(sdnn::core::exp(0.0149 * i + 0.001));
+  }
+  EXPECT_EQ(digest, 2816221857222245310U);
+}
+
 TEST(NormalQuantile, AgreesWithTheInvertedDistributionFunction) {
   constexpr std::pair<double, double> kRows[] = {
       {0.5, 0.0},

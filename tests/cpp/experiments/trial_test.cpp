@@ -9,6 +9,10 @@
 
 #include "allocation_count.hpp"
 #include "approximators/lookup_table.hpp"
+#include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/q_learning.hpp"
+#include "sdnn/approximators/fuzzy_rules.hpp"
+#include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 
 namespace sdnn::experiments {
@@ -25,19 +29,31 @@ struct Setting {
   std::uint64_t seed = 1;
 };
 
+template <class Agent>
+AcrobotTrial<Agent> agent_trial(Agent agent, const Setting& setting) {
+  return {std::move(agent), setting.acrobot, {}, setting.sensors, setting.protocol, setting.seed};
+}
+
 template <class Q>
-AcrobotTrial<Q> trial(Q q, const Setting& setting) {
-  return AcrobotTrial<Q>(agents::QLearning<Q>(std::move(q), {}, setting.seed), setting.acrobot, {},
-                         setting.sensors, setting.protocol, setting.seed);
+AcrobotTrial<agents::QLearning<Q>> trial(Q q, const Setting& setting) {
+  return agent_trial(agents::QLearning<Q>(std::move(q), {}, setting.seed), setting);
 }
 
 /// A cheap learner for what does not depend on the approximator.
-AcrobotTrial<LookupTable> table_trial(const Setting& setting) {
+auto table_trial(const Setting& setting) {
   return trial(LookupTable(static_cast<std::size_t>(setting.sensors.n_sensors), 8, 21), setting);
 }
 
-AcrobotTrial<Network> network_trial(const Setting& setting) {
+auto network_trial(const Setting& setting) {
   return trial(Network({.n_inputs = setting.sensors.n_sensors}, setting.seed), setting);
+}
+
+agents::FuzzyQLearning fuzzy_agent(const Setting& setting) {
+  return {approximators::FuzzyRules({.n_inputs = setting.sensors.n_sensors}), {}, setting.seed};
+}
+
+auto rbf_trial(const Setting& setting) {
+  return trial(approximators::RbfNetwork({.n_inputs = setting.sensors.n_sensors}), setting);
 }
 
 /// FNV-1a over the rows, returns by their bits.
@@ -72,6 +88,67 @@ TEST(AcrobotTrial, GoldenTraceWithNoisyRedundantSensors) {
   ASSERT_EQ(run.rows().size(), 6U);
   EXPECT_EQ(run.n_decisions(), 1125);
   EXPECT_EQ(digest(run.rows()), 899986753393664466U);
+}
+
+TEST(AcrobotTrial, GoldenTracesOfFuzzyQLearning) {
+  auto plain = agent_trial(fuzzy_agent({}), {.protocol = {.n_learning_episodes = 200}});
+  plain.advance(200);
+  EXPECT_EQ(plain.n_decisions(), 973);
+  EXPECT_EQ(digest(plain.rows()), 16274018572413670715U);
+  const Setting setting{.sensors = {.n_sensors = 6, .noise = 0.02}, .seed = 2};
+  auto noisy = agent_trial(fuzzy_agent(setting), setting);
+  noisy.advance(100);
+  EXPECT_EQ(noisy.n_decisions(), 2674);
+  EXPECT_EQ(digest(noisy.rows()), 1660777440214468387U);
+}
+
+TEST(AcrobotTrial, GoldenTracesOfTheRbfNetwork) {
+  auto plain = rbf_trial({.protocol = {.n_learning_episodes = 200}});
+  plain.advance(200);
+  EXPECT_EQ(plain.n_decisions(), 940);
+  EXPECT_EQ(digest(plain.rows()), 6814087891175944941U);
+  auto noisy = rbf_trial({.sensors = {.n_sensors = 5, .noise = 0.02}, .seed = 2});
+  noisy.advance(100);
+  EXPECT_EQ(noisy.n_decisions(), 986);
+  EXPECT_EQ(digest(noisy.rows()), 7920621632295173362U);
+}
+
+/// Lives as `Agent` does, but applies no torque, so that all agents move alike; keeps what it saw.
+template <class Agent>
+struct Idle : Agent {
+  using Agent::Agent;
+  explicit Idle(Agent agent) : Agent(std::move(agent)) {}
+
+  auto act(std::span<const double> state, bool explore) {
+    observed.insert(observed.end(), state.begin(), state.end());
+    return Agent::act(state, explore);
+  }
+  template <class Action>
+  double share(Action) const {
+    return 0.0;
+  }
+
+  std::vector<double> observed;
+};
+
+template <class Agent>
+std::vector<double> observed_by(Agent agent, const Setting& setting) {
+  auto run = agent_trial(Idle<Agent>(std::move(agent)), setting);
+  run.advance(20);
+  return run.agent().observed;
+}
+
+TEST(AcrobotTrial, TheSameSeedGivesEveryAgentTheSameNoise) {
+  const Setting setting{.sensors = {.n_sensors = 5, .noise = 0.02}, .seed = 9};
+  const auto fuzzy = observed_by(fuzzy_agent(setting), setting);
+  EXPECT_EQ(fuzzy.size(), 22U * 50U * 5U);
+  EXPECT_EQ(fuzzy, observed_by(agents::QLearning<LookupTable>(LookupTable(5, 4, 7), {}, 9),
+                               setting));
+  EXPECT_EQ(fuzzy, observed_by(agents::QLearning<approximators::RbfNetwork>(
+                                   approximators::RbfNetwork({.n_inputs = 5}), {}, 9),
+                               setting));
+  EXPECT_EQ(fuzzy, observed_by(agents::QLearning<Network>(Network({.n_inputs = 5}, 9), {}, 9),
+                               setting));
 }
 
 TEST(AcrobotTrial, PiecesEqualTheWhole) {
@@ -141,11 +218,18 @@ TEST(AcrobotTrial, ASolvedTestEpisodeEndsAtTheGoal) {
   EXPECT_EQ(run.n_decisions(), 11);
 }
 
-TEST(AcrobotTrial, AnEpisodeAllocatesNothing) {
-  auto run = network_trial({.sensors = {.noise = 0.02}, .protocol = {.n_learning_episodes = 10}});
+template <class Trial>
+void expect_no_allocation(Trial run) {
   const std::size_t before = testing::allocation_count();
   run.advance(10);
   EXPECT_EQ(testing::allocation_count(), before);
+}
+
+TEST(AcrobotTrial, AnEpisodeAllocatesNothing) {
+  const Setting setting{.sensors = {.noise = 0.02}, .protocol = {.n_learning_episodes = 10}};
+  expect_no_allocation(network_trial(setting));
+  expect_no_allocation(rbf_trial(setting));
+  expect_no_allocation(agent_trial(fuzzy_agent(setting), setting));
 }
 
 template <class Make>

@@ -266,7 +266,7 @@ def test_every_action_of_a_box_is_learned_as_itself():
     agent = small_agent()
     for index, torque in enumerate(agent.actions):
         for told in (np.array([torque], dtype=np.float32), [torque], torque):
-            agent_index = agent._index(np.clip(told, -1.0, 3.0))
+            agent_index = agent._actions.index(np.clip(told, -1.0, 3.0))
             assert agent_index == index
 
 

@@ -64,6 +64,23 @@ def test_log_is_within_its_error():
     assert worst_ulp(_core.log(x), [mpmath.log(mpmath.mpf(float(v))) for v in x]) < 0.85
 
 
+def test_exp_is_within_its_error():
+    rng = np.random.default_rng(4)
+    x = np.concatenate(
+        [rng.uniform(-708.0, 709.7, 3000), rng.uniform(-1.0, 1.0, 4000), rng.uniform(-30, 0, 3000)]
+    )
+    assert worst_ulp(_core.exp(x), [mpmath.exp(mpmath.mpf(float(v))) for v in x]) < 0.7
+    subnormal = rng.uniform(-745.0, -708.5, 500)
+    exact = [mpmath.exp(mpmath.mpf(float(v))) for v in subnormal]
+    assert worst_ulp(_core.exp(subnormal), exact) < 1.0
+
+
+def test_exp_of_bad_and_far_numbers():
+    x = np.array([-np.inf, -800.0, -0.0, 0.0, 710.0, np.inf])
+    np.testing.assert_array_equal(_core.exp(x), [0, 0, 1, 1, np.inf, np.inf])
+    assert np.isnan(_core.exp(np.nan))
+
+
 def test_normal_quantile_inverts_the_distribution_function():
     rng = np.random.default_rng(3)
     p = np.concatenate([rng.uniform(0.0, 1.0, 300), 10.0 ** rng.uniform(-300.0, 0.0, 200)])

@@ -10,6 +10,7 @@
 
 #include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/approximators/action_value.hpp"
+#include "sdnn/coding/action_code.hpp"
 #include "sdnn/core/check.hpp"
 
 namespace sdnn::agents {
@@ -43,13 +44,21 @@ class QLearning {
   Q& action_value() noexcept { return action_value_; }
   const Q& action_value() const noexcept { return action_value_; }
 
+  std::size_t n_inputs() const { return action_value_.n_inputs(); }
+
   /// Starts counting the steps of an episode anew (for the greedy first steps).
   void begin_episode() noexcept { step_ = 0; }
 
   /// The action to take in `state`; without `explore` a best one. Shape: state (l,) in [0, 1].
   std::size_t act(std::span<const double> state, bool explore = true) {
     action_value_.values(state, values_);
-    return policy_.select(values_, step_++, explore);
+    // Evaluating is no step of the episode: it must not move the end of the greedy phase.
+    return policy_.select(values_, explore ? step_++ : 0, explore);
+  }
+
+  /// The action as a number in [-1, 1]: actions cut the range evenly.
+  double share(std::size_t action) const {
+    return coding::action_value(action, action_value_.n_actions(), -1.0, 1.0);
   }
 
   /// Learns one transition. Throws std::invalid_argument for a reward that is not finite, and as

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "sdnn/agents/agent.hpp"
 #include "sdnn/benchmarks/stopwatch.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/environments/acrobot.hpp"
@@ -16,8 +17,8 @@ namespace sdnn::benchmarks {
 ///
 /// The same trial makes the same decisions whenever it is run, so several runs can be compared
 /// decision by decision. Throws as the trial's advance does.
-template <approximators::ActionValue Q>
-Times time_decisions(experiments::AcrobotTrial<Q>& trial, int n_episodes) {
+template <agents::Agent Agent>
+Times time_decisions(experiments::AcrobotTrial<Agent>& trial, int n_episodes) {
   Times times;
   std::int64_t before = now();
   trial.advance(n_episodes, [&] {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
+#include <span>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -37,6 +39,16 @@ inline void require_positive(std::string_view name, double value) {
 /// Throws std::invalid_argument unless `value` is a finite number.
 inline void require_finite(std::string_view name, double value) {
   require(std::isfinite(value), name, "finite", value);
+}
+
+/// Throws std::invalid_argument unless `values` are `size` numbers in [0, 1].
+inline void require_unit_values(std::string_view name, std::span<const double> values,
+                                std::size_t size) {
+  if (values.size() != size) require(false, name, std::to_string(size) + " values", values.size());
+  for (std::size_t i = 0; i < size; ++i) {
+    if (values[i] >= 0.0 && values[i] <= 1.0) continue;  // only a bad one's name costs memory
+    require_in_range(std::string(name) + '[' + std::to_string(i) + ']', values[i], 0.0, 1.0);
+  }
 }
 
 }  // namespace sdnn::core

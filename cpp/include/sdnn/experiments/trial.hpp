@@ -5,11 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
-#include "sdnn/agents/q_learning.hpp"
-#include "sdnn/coding/action_code.hpp"
+#include "sdnn/agents/agent.hpp"
 #include "sdnn/core/check.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/environments/acrobot.hpp"
@@ -34,13 +34,15 @@ struct TestRow {
 
 /// A learning agent on the acrobot swing-up; the same configs and seed give the same rows.
 ///
+/// The agent's action is its share of the largest torque. The sensors' noise has streams of its
+/// own, so that the same seed gives every agent the same noise, observation by observation.
 /// Source: spec section 5. A test episode is greedy, learns nothing, uses the current lambda, and
 /// draws from random streams of its own.
-template <approximators::ActionValue Q>
+template <agents::Agent Agent>
 class AcrobotTrial {
  public:
   /// Throws std::invalid_argument if a config is impossible or agent and sensors do not fit.
-  AcrobotTrial(agents::QLearning<Q> agent, const environments::AcrobotConfig& acrobot,
+  AcrobotTrial(Agent agent, const environments::AcrobotConfig& acrobot,
                const environments::GoalScheduleConfig& goal,
                const environments::SensorConfig& sensors, const ProtocolConfig& protocol,
                std::uint64_t seed)
@@ -55,9 +57,9 @@ class AcrobotTrial {
         next_observed_(observed_.size()) {
     core::require_in_range("n_learning_episodes", protocol.n_learning_episodes, 1, 1 << 30);
     core::require_in_range("test_interval", protocol.test_interval, 1, 1 << 30);
-    core::require(agent_.action_value().n_inputs() == observed_.size(), "n_inputs",
+    core::require(agent_.n_inputs() == observed_.size(), "n_inputs",
                   "n_sensors of the sensors (" + std::to_string(observed_.size()) + ")",
-                  agent_.action_value().n_inputs());
+                  agent_.n_inputs());
     rows_.reserve(
         static_cast<std::size_t>(protocol.n_learning_episodes / protocol.test_interval));
   }
@@ -67,7 +69,7 @@ class AcrobotTrial {
   /// Decisions made so far, in learning and test episodes.
   std::int64_t n_decisions() const noexcept { return n_decisions_; }
   std::span<const TestRow> rows() const noexcept { return rows_; }
-  const agents::QLearning<Q>& agent() const noexcept { return agent_; }
+  const Agent& agent() const noexcept { return agent_; }
 
   /// Runs up to `n_episodes` more learning episodes, with the test episodes that fall due.
   void advance(int n_episodes) {
@@ -98,11 +100,8 @@ class AcrobotTrial {
     agent_.begin_episode();
     sensors.observe(acrobot_.state(), observed_);
     for (bool truncated = false; !row.solved && !truncated;) {
-      const std::size_t action = agent_.act(observed_, learning);
-      const auto result = acrobot_.step(
-          max_torque_ *
-              coding::action_value(action, agent_.action_value().n_actions(), -1.0, 1.0),
-          lambda);
+      const auto action = agent_.act(observed_, learning);
+      const auto result = acrobot_.step(max_torque_ * agent_.share(action), lambda);
       sensors.observe(acrobot_.state(), next_observed_);
       if (learning) {
         agent_.learn(observed_, action, result.reward, next_observed_, result.terminated);
@@ -118,7 +117,7 @@ class AcrobotTrial {
     return row;
   }
 
-  agents::QLearning<Q> agent_;
+  Agent agent_;
   double max_torque_;
   environments::Acrobot acrobot_;
   environments::GoalSchedule goal_;

@@ -1,0 +1,221 @@
+/// Fuzzy Q-learning: every fired rule picks an action, the mean of the picks is taken.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "sdnn/agents/epsilon_greedy.hpp"
+#include "sdnn/approximators/fuzzy_rules.hpp"
+#include "sdnn/coding/action_code.hpp"
+#include "sdnn/core/check.hpp"
+#include "sdnn/core/elementary.hpp"
+
+namespace sdnn::agents {
+
+/// The agent's parameters; the defaults are the paper's (spec sections 3 and 5).
+struct FuzzyQLearningConfig {
+  double learning_coefficient = 0.5;  ///< c_fql, in (0, 1] (reading)
+  double discount = 0.9;              ///< gamma, in [0, 1]
+  double trace_decay = 0.0;           ///< lambda of the eligibility traces, in [0, 1]; 0: none
+  EpsilonGreedyConfig policy = {};    ///< of every fired rule for itself
+};
+
+/// An agent with a continuous action in [-1, 1], learned by Jouffe's fuzzy Q-learning.
+///
+/// Every fired rule i picks one of its actions a_i by the epsilon-greedy policy, all rules drawing
+/// from the same streams in the order of FuzzyRules::fire. The action taken is the mean of the
+/// picks, weighted by the truth values alpha_i. Then, with
+///   Q = sum v_i[a_i] alpha_i / sum alpha_i,  V = sum max_a v_i[a] alpha_i / sum alpha_i in s',
+///   v_i[a_i] += c_fql (r + gamma V - Q) alpha_i.
+/// A terminated transition has target r alone. A time limit is no termination: it bootstraps.
+/// Sums are in doubles and in the order of the rules; values are rounded to floats when written.
+///
+/// Eligibility traces (trace_decay = lambda > 0; not used in the paper): e(i, a) *= gamma lambda for
+/// all, e(i, a_i) += alpha_i for the picks, then v += c_fql (r + gamma V - Q) e everywhere. Traces
+/// accumulate, a random pick does not cut them, they end with the episode, and one below
+/// kForgottenTrace is forgotten.
+///
+/// Source: Jouffe, L. (1998). Fuzzy inference system learning by reinforcement methods. IEEE
+/// Transactions on Systems, Man, and Cybernetics C 28(3), 338-355; spec section 3.
+class FuzzyQLearning {
+ public:
+  /// Smaller eligibilities count as 0.
+  static constexpr double kForgottenTrace = 1e-3;
+
+  /// Throws std::invalid_argument naming the field that is out of range.
+  FuzzyQLearning(approximators::FuzzyRules rules, const FuzzyQLearningConfig& config,
+                 std::uint64_t seed)
+      : config_(config),
+        rules_(std::move(rules)),
+        policy_(config.policy, seed),
+        row_(rules_.n_actions()),
+        state_(rules_.n_inputs()),
+        fired_(rules_.no_rules()),
+        other_fired_(rules_.no_rules()) {
+    core::require(config.learning_coefficient > 0.0 && config.learning_coefficient <= 1.0,
+                  "learning_coefficient", "in (0, 1]", config.learning_coefficient);
+    core::require_in_range("discount", config.discount, 0.0, 1.0);
+    core::require_in_range("trace_decay", config.trace_decay, 0.0, 1.0);
+    core::require(fading() <= kSlowestFading, "trace_decay", "at most 0.99 / discount",
+                  config.trace_decay);
+    for (std::size_t action = 0; action < row_.size(); ++action) {
+      shares_.push_back(coding::action_value(action, row_.size(), -1.0, 1.0));
+    }
+    picked_.reserve(rules_.max_fired());
+    traces_.reserve((trace_lifetime() + 1) * rules_.max_fired());
+  }
+
+  const FuzzyQLearningConfig& config() const noexcept { return config_; }
+  const approximators::FuzzyRules& rules() const noexcept { return rules_; }
+  approximators::FuzzyRules& rules() noexcept { return rules_; }
+  std::size_t n_inputs() const noexcept { return rules_.n_inputs(); }
+
+  /// The rules that fired in the last exploring act, and the actions they picked.
+  const approximators::FiredRules& fired() const noexcept { return fired_; }
+  std::span<const std::size_t> picked() const noexcept { return picked_; }
+
+  /// Starts counting the steps of an episode anew and forgets the traces.
+  void begin_episode() noexcept {
+    step_ = 0;
+    traces_.clear();
+  }
+
+  /// The action to take in `state`, in [-1, 1]. Without `explore` every rule picks a best action
+  /// and nothing is remembered: the learning step goes on with the last exploring act.
+  ///
+  /// Shape: state (d,) in [0, 1]. Throws std::invalid_argument otherwise, and nothing has changed.
+  double act(std::span<const double> state, bool explore = true) {
+    auto& fired = explore ? fired_ : other_fired_;
+    rules_.fire(state, fired);
+    if (explore) {
+      std::copy(state.begin(), state.end(), state_.begin());
+      picked_.clear();
+    }
+    double weighted = 0.0, total = 0.0;
+    for (std::size_t i = 0; i < fired.size(); ++i) {
+      const auto values = rules_.values(fired.rules[i]);
+      std::copy(values.begin(), values.end(), row_.begin());
+      const std::size_t action = policy_.select(row_, step_, explore);
+      if (explore) picked_.push_back(action);
+      weighted += shares_[action] * fired.truth_values[i];
+      total += fired.truth_values[i];
+    }
+    const double action = std::clamp(weighted / total, -1.0, 1.0);
+    if (explore) {
+      ++step_;
+      action_ = action;
+    }
+    return action;
+  }
+
+  /// The action itself: act gives a share of the range.
+  double share(double action) const noexcept { return action; }
+
+  /// The value of `state`, sum max_a v_i[a] alpha_i / sum alpha_i. Throws as act does.
+  double value(std::span<const double> state) {
+    rules_.fire(state, other_fired_);
+    double weighted = 0.0, total = 0.0;
+    for (std::size_t i = 0; i < other_fired_.size(); ++i) {
+      const auto values = rules_.values(other_fired_.rules[i]);
+      weighted += static_cast<double>(*std::max_element(values.begin(), values.end())) *
+                  other_fired_.truth_values[i];
+      total += other_fired_.truth_values[i];
+    }
+    return weighted / total;
+  }
+
+  /// Learns the transition that began with the last exploring act.
+  ///
+  /// Throws std::invalid_argument if `state` and `action` are not those of that act (which rule
+  /// picked what is known of no other), for a bad next state or a reward that is not finite;
+  /// std::overflow_error if a value would leave the floats. The table is unchanged then.
+  void learn(std::span<const double> state, double action, double reward,
+             std::span<const double> next_state, bool terminated) {
+    core::require(!picked_.empty() && std::equal(state.begin(), state.end(), state_.begin(),
+                                                 state_.end()),
+                  "state", "that of the last exploring act", "another");
+    core::require(action == action_, "action", "that of the last exploring act", action);
+    core::require_finite("reward", reward);
+    const double target = terminated ? reward : reward + config_.discount * value(next_state);
+    double weighted = 0.0, total = 0.0;
+    for (std::size_t i = 0; i < fired_.size(); ++i) {
+      const double picked = rules_.table()[rules_.cell(fired_.rules[i], picked_[i])];
+      weighted += picked * fired_.truth_values[i];
+      total += fired_.truth_values[i];
+    }
+    const double step = config_.learning_coefficient * (target - weighted / total);
+    renew_traces();
+    for (const Trace& trace : traces_) {
+      if (!(std::abs(moved(trace, step)) <= kLargest)) {
+        throw std::overflow_error("a value of a fuzzy rule would leave the range of floats");
+      }
+    }
+    for (const Trace& trace : traces_) {
+      rules_.table()[trace.cell] = static_cast<float>(moved(trace, step));
+    }
+    if (terminated) traces_.clear();
+  }
+
+ private:
+  struct Trace {
+    std::size_t cell;  // of the table
+    double eligibility;
+  };
+
+  static constexpr double kSlowestFading = 0.99;  // bounds the room for traces
+  static constexpr double kLargest = std::numeric_limits<float>::max();
+
+  double fading() const noexcept { return config_.discount * config_.trace_decay; }
+
+  // Steps after which the largest possible eligibility, 1 / (1 - fading), is forgotten.
+  std::size_t trace_lifetime() const noexcept {
+    if (fading() == 0.0) return 0;
+    return static_cast<std::size_t>(
+        std::ceil(core::log(kForgottenTrace * (1.0 - fading())) / core::log(fading())));
+  }
+
+  double moved(const Trace& trace, double step) const noexcept {
+    return static_cast<double>(rules_.table()[trace.cell]) +
+           step * trace.eligibility;
+  }
+
+  // Fades the old traces and adds those of the picks, which are of different rules.
+  void renew_traces() {
+    for (Trace& trace : traces_) trace.eligibility *= fading();
+    std::erase_if(traces_, [](const Trace& t) { return !(t.eligibility >= kForgottenTrace); });
+    const std::size_t n_old = traces_.size();
+    for (std::size_t i = 0; i < fired_.size(); ++i) {
+      const std::size_t cell = rules_.cell(fired_.rules[i], picked_[i]);
+      const auto old_end = traces_.begin() + static_cast<std::ptrdiff_t>(n_old);
+      const auto old = std::find_if(traces_.begin(), old_end,
+                                    [cell](const Trace& trace) { return trace.cell == cell; });
+      if (old != old_end) {
+        old->eligibility += fired_.truth_values[i];
+      } else {
+        traces_.push_back({cell, fired_.truth_values[i]});
+      }
+    }
+  }
+
+  FuzzyQLearningConfig config_;
+  approximators::FuzzyRules rules_;
+  EpsilonGreedy policy_;
+  std::vector<double> shares_;  // of every discrete action
+  std::vector<double> row_;     // values of one rule
+  std::vector<double> state_;   // of the last exploring act, with all below
+  approximators::FiredRules fired_;
+  std::vector<std::size_t> picked_;
+  double action_ = 0.0;
+  approximators::FiredRules other_fired_;  // of evaluation and of the next state
+  std::vector<Trace> traces_;
+  int step_ = 0;
+};
+
+}  // namespace sdnn::agents

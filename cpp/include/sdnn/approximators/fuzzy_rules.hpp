@@ -1,0 +1,123 @@
+/// Fuzzy rules over a grid of triangular sets, each with a value for every discrete action.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sdnn/core/aligned_buffer.hpp"
+#include "sdnn/core/check.hpp"
+#include "sdnn/core/grid_cells.hpp"
+
+namespace sdnn::approximators {
+
+/// The sizes of a rule table; the defaults are the paper's (spec section 3).
+struct FuzzyRulesConfig {
+  int n_inputs = 4;    ///< d
+  int n_sets = 9;      ///< triangular sets per input, centres 0, 1 / (n_sets - 1), ..., 1
+  int n_actions = 21;  ///< discrete actions that every rule has values of
+  std::uint64_t max_table_bytes = core::kDefaultMaxTableBytes;  ///< larger tables are refused
+};
+
+/// The rules that fire in a state, and how true each is.
+struct FiredRules {
+  std::vector<std::size_t> rules;
+  std::vector<double> truth_values;  ///< of `rules`; their sum is 1 up to rounding
+
+  std::size_t size() const noexcept { return rules.size(); }
+};
+
+/// n_sets^d rules, one per cell of the grid of sets, with v(rule, action) in 32-bit floats.
+///
+/// A rule's truth value is the product of the memberships of the inputs in its sets. Neighbouring
+/// triangles overlap by one half, so an input belongs to two sets, or to one at a centre: at most
+/// 2^d rules fire, and only they are ever read or written. All values start at 0; rules that never
+/// fire cost no memory where the operating system hands out zero pages lazily.
+/// Source: spec section 3. The table has 4 n_actions n_sets^d bytes: 45 MB at d = 6.
+class FuzzyRules {
+ public:
+  /// Throws std::invalid_argument naming the size that is impossible; std::length_error naming
+  /// rules, bytes and limit, before any memory is asked for; std::bad_alloc.
+  explicit FuzzyRules(const FuzzyRulesConfig& config)
+      : config_(checked(config)),
+        n_rules_(core::grid_cells("rules", static_cast<std::size_t>(config.n_sets), n_inputs(),
+                                  n_actions() * sizeof(float), config.max_table_bytes)),
+        table_(n_rules_ * n_actions()) {}
+
+  const FuzzyRulesConfig& config() const noexcept { return config_; }
+  std::size_t n_inputs() const noexcept { return static_cast<std::size_t>(config_.n_inputs); }
+  std::size_t n_sets() const noexcept { return static_cast<std::size_t>(config_.n_sets); }
+  std::size_t n_actions() const noexcept { return static_cast<std::size_t>(config_.n_actions); }
+  std::size_t n_rules() const noexcept { return n_rules_; }
+  std::size_t max_fired() const noexcept { return std::size_t{1} << n_inputs(); }
+
+  /// Writes the rules that fire in `state`. Rule numbers are row-major in the sets (last input
+  /// fastest); where an input lies between two centres the rules of the lower one come first, and
+  /// the first input is the fastest to alternate.
+  ///
+  /// Shape: state (d,) in [0, 1]. Throws std::invalid_argument otherwise; then `fired` is
+  /// unchanged. Allocates nothing once `fired` has room for max_fired().
+  void fire(std::span<const double> state, FiredRules& fired) const {
+    core::require_unit_values("state", state, n_inputs());
+    fired.rules.assign(1, 0);
+    fired.truth_values.assign(1, 1.0);
+    const double n_gaps = static_cast<double>(n_sets() - 1);
+    for (const double x : state) {
+      const double position = x * n_gaps;
+      const std::size_t lower = std::min(static_cast<std::size_t>(position), n_sets() - 2);
+      const double membership = position - static_cast<double>(lower);  // in the upper set
+      for (std::size_t& rule : fired.rules) rule = rule * n_sets() + lower;
+      if (membership == 0.0) continue;
+      if (membership == 1.0) {  // x = 1
+        for (std::size_t& rule : fired.rules) ++rule;
+        continue;
+      }
+      const std::size_t n = fired.size();
+      for (std::size_t i = 0; i < n; ++i) {
+        fired.rules.push_back(fired.rules[i] + 1);
+        fired.truth_values.push_back(fired.truth_values[i] * membership);
+        fired.truth_values[i] *= 1.0 - membership;
+      }
+    }
+  }
+
+  /// An empty list with room for every rule that can fire at once.
+  FiredRules no_rules() const {
+    FiredRules fired;
+    fired.rules.reserve(max_fired());
+    fired.truth_values.reserve(max_fired());
+    return fired;
+  }
+
+  /// Where v(rule, action) is in `table`.
+  std::size_t cell(std::size_t rule, std::size_t action) const noexcept {
+    assert(rule < n_rules_ && action < n_actions());
+    return rule * n_actions() + action;
+  }
+
+  /// v(rule, a) for every action. Shape: (n_actions,).
+  std::span<const float> values(std::size_t rule) const noexcept {
+    return table_.span().subspan(cell(rule, 0), n_actions());
+  }
+
+  /// All values, rule by rule. Shape: (n_rules * n_actions,).
+  std::span<float> table() noexcept { return table_.span(); }
+  std::span<const float> table() const noexcept { return table_.span(); }
+
+ private:
+  static const FuzzyRulesConfig& checked(const FuzzyRulesConfig& config) {
+    core::require_in_range("n_inputs", config.n_inputs, 1, 62);
+    core::require_in_range("n_sets", config.n_sets, 2, 1 << 20);
+    core::require_in_range("n_actions", config.n_actions, 1, 1 << 20);
+    return config;
+  }
+
+  FuzzyRulesConfig config_;
+  std::size_t n_rules_;
+  core::AlignedBuffer<float> table_;
+};
+
+}  // namespace sdnn::approximators

@@ -1,0 +1,47 @@
+/// How many cells a grid has, and the refusal of tables that are too large.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+#include <string_view>
+
+namespace sdnn::core {
+
+/// The default of every max_table_bytes: 1 GiB.
+inline constexpr std::uint64_t kDefaultMaxTableBytes = std::uint64_t{1} << 30;
+
+/// n_per_dimension ^ n_dimensions, when a table with `bytes_per_cell` for each is allowed.
+///
+/// A grid grows exponentially with its dimensions; asked before memory is requested, so that the
+/// answer is a message and not an exhausted machine. Requires n_per_dimension, bytes_per_cell > 0.
+/// Throws std::length_error naming the number of `cells` ("rules"), the bytes and max_table_bytes.
+inline std::size_t grid_cells(std::string_view cells, std::size_t n_per_dimension,
+                              std::size_t n_dimensions, std::size_t bytes_per_cell,
+                              std::uint64_t max_table_bytes) {
+  constexpr auto kMost = std::numeric_limits<std::size_t>::max();
+  std::size_t n = 1;
+  bool countable = true;
+  for (std::size_t i = 0; i < n_dimensions && countable; ++i) {
+    countable = n <= kMost / n_per_dimension;
+    if (countable) n *= n_per_dimension;
+  }
+  const bool sized = countable && n <= kMost / bytes_per_cell;
+  if (sized && n * bytes_per_cell <= max_table_bytes) return n;
+
+  std::ostringstream message;
+  message << "a table of " << n_per_dimension << '^' << n_dimensions;
+  if (countable) message << " = " << n;
+  message << ' ' << cells << " needs ";
+  if (sized) {
+    message << n * bytes_per_cell << " bytes";
+  } else {
+    message << "2^64 bytes or more";
+  }
+  message << ", but max_table_bytes is " << max_table_bytes;
+  throw std::length_error(message.str());
+}
+
+}  // namespace sdnn::core

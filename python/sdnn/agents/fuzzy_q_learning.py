@@ -1,0 +1,184 @@
+"""Fuzzy Q-learning, for any Gymnasium environment with one continuous action."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Literal
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sdnn import _core
+from sdnn.agents.spaces import BoxRange, UnitObservations
+from sdnn.agents.transition import Transition
+from sdnn.approximators.fuzzy_rules import FuzzyRulesConfig
+from sdnn.choices import choice
+
+__all__ = ["FuzzyQLearning", "FuzzyQLearningConfig"]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FuzzyQLearningConfig:
+    """The parameters of fuzzy Q-learning; the defaults are the paper's (section 4.3).
+
+    Attributes
+    ----------
+    learning_coefficient : float
+        c_fql, in (0, 1]. A reading: the paper does not give it; 0.1 and 1.0 are alternatives.
+    discount : float
+        gamma, in [0, 1].
+    trace_decay : float
+        lambda of accumulating eligibility traces, in [0, 1]; 0: none, as in the paper.
+    epsilon : float
+        Probability that a fired rule picks a random action, each rule for itself, in [0, 1].
+    n_greedy_steps : int
+        First steps of an episode in which epsilon is 0.
+    tie_rule : {"uniform", "lowest", "middle"}
+        Which of several best actions a rule picks; see `QLearningConfig`. A reading.
+    """
+
+    learning_coefficient: float = 0.5
+    discount: float = 0.9
+    trace_decay: float = 0.0
+    epsilon: float = 0.1
+    n_greedy_steps: int = 10
+    tie_rule: Literal["uniform", "lowest", "middle"] = "uniform"
+
+    def to_core(self) -> _core.FuzzyQLearningConfig:
+        """Make the core's struct of the same values; ValueError for an unknown ``tie_rule``."""
+        fields = dataclasses.asdict(self)
+        fields["tie_rule"] = choice(_core.TieRule.__members__, "tie_rule", self.tie_rule)
+        return _core.FuzzyQLearningConfig(**fields)
+
+
+class FuzzyQLearning:
+    """An agent that learns by Jouffe's fuzzy Q-learning, one transition at a time.
+
+    Every fired rule picks one of its discrete actions; the action taken is their mean, weighted by
+    the truth values, hence continuous. Observations are scaled to [0, 1] by the bounds of the
+    observation space; values outside saturate.
+
+    Parameters
+    ----------
+    observation_space : gymnasium.spaces.Box, shape (d,)
+        Finite bounds.
+    action_space : gymnasium.spaces.Box, shape (1,)
+        Finite bounds.
+    rules : FuzzyRulesConfig, optional
+        ``n_inputs`` is taken from the observation space.
+    learning : FuzzyQLearningConfig, optional
+    seed : int
+        The root of every random stream of the agent.
+
+    Raises
+    ------
+    TypeError
+        For spaces of another kind.
+    ValueError
+        For spaces of another shape or without finite bounds, impossible settings, or a larger table
+        than ``rules.max_table_bytes`` allows.
+
+    Examples
+    --------
+    >>> import gymnasium as gym, sdnn
+    >>> from sdnn.agents import FuzzyQLearning, Transition
+    >>> env = gym.make("sdnn/AcrobotSwingUp-v0")
+    >>> agent = FuzzyQLearning(env.observation_space, env.action_space, seed=1)
+    >>> observation, _ = env.reset(seed=1)
+    >>> agent.begin_episode()
+    >>> for _ in range(3):
+    ...     action = agent.act(observation)
+    ...     following, reward, terminated, truncated, _ = env.step(action)
+    ...     agent.learn(Transition(observation, action, reward, following, terminated))
+    ...     observation = following
+    >>> agent.n_rules
+    6561
+    """
+
+    def __init__(
+        self,
+        observation_space: gym.Space[Any],
+        action_space: gym.Space[Any],
+        *,
+        rules: FuzzyRulesConfig | None = None,
+        learning: FuzzyQLearningConfig | None = None,
+        seed: int = 0,
+    ) -> None:
+        self._scaled = UnitObservations(observation_space)
+        self._range = BoxRange(action_space)
+        self.action_space = action_space
+        self.rules = dataclasses.replace(
+            rules or FuzzyRulesConfig(), n_inputs=self._scaled.n_inputs
+        )
+        self.learning = learning or FuzzyQLearningConfig()
+        self._core = _core.FuzzyQLearning(
+            rules=self.rules.to_core(), learning=self.learning.to_core(), seed=seed
+        )
+        self._taken: tuple[float, float] | None = None  # the action as given away, and its share
+
+    @property
+    def n_rules(self) -> int:
+        """Number of rules, ``n_sets ** n_inputs``."""
+        return self._core.rules.n_rules
+
+    def begin_episode(self) -> None:
+        """Start counting steps anew, for the greedy first steps of an episode; forget traces."""
+        self._core.begin_episode()
+
+    def act(self, observation: ArrayLike, explore: bool = True) -> NDArray[Any]:
+        """Choose the action to take, an element of the action space.
+
+        Parameters
+        ----------
+        observation : array_like, shape (d,)
+        explore : bool
+            False: every rule picks a best action, and nothing is remembered: `learn` still waits
+            for the transition of the last exploring act.
+
+        Raises
+        ------
+        ValueError
+            If the observation has another shape or holds NaN.
+        """
+        share = self._core.act(self._scaled("observation", observation), explore)
+        low, high = self._range.low, self._range.high
+        value = 0.5 * (low + high) + 0.5 * (high - low) * share
+        action = self._range.action(min(max(value, low), high))
+        if explore:
+            self._taken = (float(action[0]), share)
+        return action
+
+    def learn(self, transition: Transition) -> None:
+        """Learn the transition that began with the last exploring `act`.
+
+        Other transitions cannot be learned: which rule picked what is known of that act only.
+
+        Raises
+        ------
+        ValueError
+            If observation and action are not those of the last exploring act, or the next
+            observation or the reward is not usable; nothing is learned then.
+        OverflowError
+            If a value would leave the range of 32-bit floats; nothing is learned then.
+        """
+        value = self._range.number(transition.action)
+        if self._taken is None or value != self._taken[0]:
+            raise ValueError(f"action must be that of the last exploring act, got {value}")
+        self._core.learn(
+            self._scaled("observation", transition.observation),
+            self._taken[1],
+            float(transition.reward),
+            self._scaled("next_observation", transition.next_observation),
+            bool(transition.terminated),
+        )
+        if transition.terminated:
+            self.begin_episode()
+
+    def value(self, observation: ArrayLike) -> float:
+        """V(observation): the truth-weighted mean of every fired rule's best value."""
+        return self._core.value(self._scaled("observation", observation))
+
+    def rule_values(self, rule: int) -> NDArray[np.float32]:
+        """v(rule, a) of every discrete action, shape (n_actions,)."""
+        return self._core.rules.values(rule)

@@ -1,0 +1,238 @@
+#include "sdnn/agents/fuzzy_q_learning.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "allocation_count.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::agents {
+namespace {
+
+using approximators::FuzzyRules;
+using State = std::vector<double>;
+
+constexpr EpsilonGreedyConfig kGreedy{.epsilon = 0.0, .tie_rule = TieRule::lowest};
+
+std::vector<float> table(const FuzzyQLearning& agent) {
+  return {agent.rules().table().begin(), agent.rules().table().end()};
+}
+
+// One input, sets at 0, 1/2, 1; actions -1, 0, 1. At 0.125 rules 0 and 1 are true 3/4 and 1/4.
+TEST(FuzzyQLearning, OneStepByHand) {
+  FuzzyRules rules({.n_inputs = 1, .n_sets = 3, .n_actions = 3});
+  rules.table()[rules.cell(0, 2)] = 4.0F;  // rule 0 picks +1
+  rules.table()[rules.cell(1, 0)] = 2.0F;  // rule 1 picks -1
+  rules.table()[rules.cell(2, 1)] = 8.0F;
+  FuzzyQLearning agent(rules, {.policy = kGreedy}, 1);
+  const State state = {0.125}, next = {0.75};
+  EXPECT_EQ(agent.act(state), 0.5);  // 3/4 (+1) + 1/4 (-1)
+  EXPECT_EQ(agent.value(next), 5.0);  // (2 + 8) / 2
+  // Q = 3/4 4 + 1/4 2 = 3.5; step = 0.5 (1 + 0.9 5 - 3.5) = 1.
+  agent.learn(state, 0.5, 1.0, next, false);
+  EXPECT_EQ(agent.rules().values(0)[2], 4.75F);
+  EXPECT_EQ(agent.rules().values(1)[0], 2.25F);
+  EXPECT_EQ(agent.rules().values(2)[1], 8.0F);
+  // Terminated: step = 0.5 (10 - (3/4 4.75 + 1/4 2.25)) = 2.9375.
+  agent.learn(state, 0.5, 10.0, next, true);
+  EXPECT_EQ(agent.rules().values(0)[2], 4.75F + 0.75F * 2.9375F);
+  EXPECT_EQ(agent.rules().values(1)[0], 2.25F + 0.25F * 2.9375F);
+  for (const std::size_t untouched : {0U, 1U}) EXPECT_EQ(agent.rules().values(0)[untouched], 0.0F);
+}
+
+TEST(FuzzyQLearning, OnlyFiredRulesAreTouched) {
+  FuzzyQLearning agent(FuzzyRules({.n_inputs = 3}), {}, 1);
+  const State state = {0.3, 0.5, 0.9};
+  const double action = agent.act(state);
+  agent.learn(state, action, 1.0, {{0.4, 0.5, 0.6}}, false);
+  EXPECT_EQ(agent.fired().size(), 4U);  // 0.5 is a centre
+  std::size_t touched = 0;
+  for (const float value : agent.rules().table()) touched += value != 0.0F;
+  EXPECT_EQ(touched, 4U);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(agent.rules().values(agent.fired().rules[i])[agent.picked()[i]],
+              static_cast<float>(0.5 * agent.fired().truth_values[i]));
+  }
+}
+
+TEST(FuzzyQLearning, ActionsAreContinuousAndStayInTheRange) {
+  FuzzyQLearning agent(FuzzyRules({.n_inputs = 2}), {}, 3);
+  core::Random world(1, core::Stream::ties);
+  int between = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const double action = agent.act(State{world.uniform(), world.uniform()});
+    EXPECT_GE(action, -1.0);
+    EXPECT_LE(action, 1.0);
+    between += std::abs(action * 10.0 - std::round(action * 10.0)) > 1e-6;
+  }
+  EXPECT_GT(between, 900);
+}
+
+// Every rule explores for itself: with 16 rules and epsilon 0.1 most late steps hold a random pick.
+TEST(FuzzyQLearning, RulesExploreIndependentlyAfterTheGreedyFirstSteps) {
+  FuzzyRules rules({.n_inputs = 4});
+  for (std::size_t rule = 0; rule < rules.n_rules(); ++rule) {
+    rules.table()[rules.cell(rule, 7)] = 1.0F;
+  }
+  FuzzyQLearning agent(rules, {}, 5);
+  const State state = {0.3, 0.3, 0.3, 0.3};
+  int random_picks = 0;
+  for (int episode = 0; episode < 500; ++episode) {
+    agent.begin_episode();
+    for (int step = 0; step < 20; ++step) {
+      agent.act(state);
+      int others = 0;
+      for (const std::size_t action : agent.picked()) others += action != 7;
+      if (step < 10) {
+        EXPECT_EQ(others, 0);
+      }
+      random_picks += others;
+    }
+  }
+  const double n = 500 * 10 * 16, p = 0.1 * 20 / 21;
+  EXPECT_NEAR(random_picks, n * p, 5 * std::sqrt(n * p * (1 - p)));
+}
+
+TEST(FuzzyQLearning, ATerminatedTransitionDoesNotBootstrapATruncatedOneDoes) {
+  FuzzyRules rules({.n_inputs = 1, .n_sets = 3, .n_actions = 2});
+  rules.table()[rules.cell(2, 0)] = 20.0F;
+  for (const bool terminated : {true, false}) {
+    FuzzyQLearning agent(rules, {.policy = kGreedy}, 1);
+    agent.learn(State{0.0}, agent.act(State{0.0}), 1.0, State{1.0}, terminated);
+    EXPECT_EQ(agent.rules().values(0)[0], terminated ? 0.5F : 9.5F);
+  }
+}
+
+// At a centre one rule fires: fuzzy Q-learning is Q-learning on a table there.
+TEST(FuzzyQLearning, AtTheCentresItIsTabularQLearning) {
+  FuzzyQLearning agent(FuzzyRules({.n_inputs = 1, .n_sets = 5, .n_actions = 2}),
+                       {.policy = {.epsilon = 0.5, .n_greedy_steps = 0}}, 9);
+  for (int episode = 0; episode < 2000; ++episode) {  // a corridor of four cells, then the goal
+    agent.begin_episode();
+    for (int s = 0; s < 4;) {
+      const State state = {s / 4.0};
+      const double action = agent.act(state);
+      const int next = action > 0.0 ? s + 1 : (s > 0 ? s - 1 : 0);
+      agent.learn(state, action, next == 4 ? 1.0 : 0.0, State{next / 4.0}, next == 4);
+      s = next;
+    }
+  }
+  for (int s = 0; s < 4; ++s) {
+    EXPECT_NEAR(agent.value(State{s / 4.0}), std::pow(0.9, 3 - s), 1e-5);
+    EXPECT_EQ(agent.act(State{s / 4.0}, false), 1.0);
+  }
+}
+
+TEST(FuzzyQLearning, EvaluationDoesNotDisturbLearning) {
+  FuzzyQLearning alone(FuzzyRules({.n_inputs = 2}), {.trace_decay = 0.5}, 8);
+  FuzzyQLearning evaluated(FuzzyRules({.n_inputs = 2}), {.trace_decay = 0.5}, 8);
+  core::Random world(2, core::Stream::sensor_noise);
+  State state = {0.5, 0.5};
+  for (int i = 0; i < 2000; ++i) {
+    if (i % 25 == 0) {
+      alone.begin_episode();
+      evaluated.begin_episode();
+    }
+    const State next = {world.uniform(), world.uniform()};
+    const double action = alone.act(state);
+    ASSERT_EQ(action, evaluated.act(state));
+    for (int j = 0; j < i % 3; ++j) (void)evaluated.act(next, false);
+    (void)evaluated.value(next);
+    const double reward = world.uniform();
+    alone.learn(state, action, reward, next, i % 25 == 24);
+    evaluated.learn(state, action, reward, next, i % 25 == 24);
+    state = next;
+  }
+  EXPECT_EQ(table(alone), table(evaluated));
+}
+
+// Traces by hand: one input at centres, so truth values are 1. gamma lambda = 0.45.
+TEST(FuzzyQLearning, TracesByHand) {
+  FuzzyQLearning agent(FuzzyRules({.n_inputs = 1, .n_sets = 3, .n_actions = 1}),
+                       {.trace_decay = 0.5, .policy = kGreedy}, 1);
+  const auto live = [&agent](double s, double reward, double next, bool terminated = false) {
+    agent.learn(State{s}, agent.act(State{s}), reward, State{next}, terminated);
+  };
+  const auto v = [&agent](std::size_t rule) { return agent.rules().values(rule)[0]; };
+  live(0.0, 0.0, 0.5);
+  EXPECT_EQ(v(0), 0.0F);
+  live(0.5, 2.0, 1.0);  // step = 0.5 2; e = 0.45, 1
+  EXPECT_EQ(v(0), 0.45F);
+  EXPECT_EQ(v(1), 1.0F);
+  live(0.0, 1.0, 1.0);  // step = 0.5 (1 - 0.45F); e = 0.45^2 + 1, 0.45
+  const double step = 0.5 * (1.0 - static_cast<double>(0.45F));
+  EXPECT_FLOAT_EQ(v(0), static_cast<float>(0.45 + step * 1.2025));
+  EXPECT_FLOAT_EQ(v(1), static_cast<float>(1.0 + step * 0.45));
+  live(1.0, 4.0, 1.0, true);  // the traces end with the episode
+  const float v1 = v(1);
+  EXPECT_EQ(v(2), 2.0F);
+  live(1.0, 4.0, 1.0, true);
+  EXPECT_EQ(v(1), v1);
+}
+
+TEST(FuzzyQLearning, AStepAllocatesNothingWithAndWithoutTraces) {
+  for (const double trace_decay : {0.0, 1.0}) {
+    FuzzyQLearning agent(FuzzyRules({.n_inputs = 4}), {.trace_decay = trace_decay}, 1);
+    core::Random world(3, core::Stream::ties);
+    State state(4), next(4);
+    const std::size_t before = testing::allocation_count();
+    for (int i = 0; i < 1000; ++i) {
+      for (double& x : next) x = world.uniform();
+      const double action = agent.act(state);
+      agent.learn(state, action, 1e-3 * world.uniform(), next, false);
+      state.swap(next);
+    }
+    EXPECT_EQ(testing::allocation_count(), before);
+  }
+}
+
+template <class Call>
+std::string message(Call call) {
+  try {
+    call();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(FuzzyQLearning, NamesWhatIsImpossible) {
+  const auto of = [](const FuzzyQLearningConfig& config) {
+    return message([&] { FuzzyQLearning(FuzzyRules({.n_inputs = 1}), config, 1); });
+  };
+  EXPECT_EQ(of({.learning_coefficient = 0.0}), "learning_coefficient must be in (0, 1], got 0");
+  EXPECT_EQ(of({.discount = 1.5}), "discount must be in [0, 1], got 1.5");
+  EXPECT_EQ(of({.trace_decay = -0.5}), "trace_decay must be in [0, 1], got -0.5");
+  EXPECT_EQ(of({.discount = 1.0, .trace_decay = 1.0}),
+            "trace_decay must be at most 0.99 / discount, got 1");
+  EXPECT_EQ(of({.policy = {.epsilon = 2.0}}), "epsilon must be in [0, 1], got 2");
+}
+
+TEST(FuzzyQLearning, ABadTransitionTeachesNothing) {
+  FuzzyQLearning agent(FuzzyRules({.n_inputs = 2}), {}, 1);
+  const State state = {0.3, 0.6}, other = {0.3, 0.7}, bad = {0.3, 1.7};
+  const auto learn = [&agent](const State& s, double a, double r, const State& next) {
+    return message([&] { agent.learn(s, a, r, next, false); });
+  };
+  EXPECT_EQ(learn(state, 0.0, 1.0, other),
+            "state must be that of the last exploring act, got another");
+  const double action = agent.act(state);
+  (void)agent.act(other, false);
+  EXPECT_EQ(learn(other, action, 1.0, state),
+            "state must be that of the last exploring act, got another");
+  EXPECT_EQ(learn(state, 2.0, 1.0, other), "action must be that of the last exploring act, got 2");
+  EXPECT_EQ(learn(state, action, std::nan(""), other), "reward must be finite, got nan");
+  EXPECT_EQ(learn(state, action, 1.0, bad), "state[1] must be in [0, 1], got 1.7");
+  EXPECT_THROW(agent.learn(state, action, 1e300, other, false), std::overflow_error);
+  EXPECT_THROW((void)agent.act(bad), std::invalid_argument);
+  for (const float value : table(agent)) EXPECT_EQ(value, 0.0F);
+  EXPECT_EQ(learn(state, action, 1.0, other), "no error");
+}
+
+}  // namespace
+}  // namespace sdnn::agents

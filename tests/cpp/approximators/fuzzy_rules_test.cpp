@@ -1,0 +1,144 @@
+#include "sdnn/approximators/fuzzy_rules.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "allocation_count.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::approximators {
+namespace {
+
+FiredRules fire(const FuzzyRules& rules, const std::vector<double>& state) {
+  FiredRules fired;
+  rules.fire(state, fired);
+  return fired;
+}
+
+TEST(FuzzyRules, TruthValuesByHand) {
+  const FuzzyRules rules({.n_inputs = 2, .n_sets = 5, .n_actions = 3});
+  EXPECT_EQ(rules.n_rules(), 25U);
+  // 0.25 (n_sets - 1) = 1: the centre of set 1. 0.8125 * 4 = 3.25: sets 3 and 4.
+  const FiredRules one = fire(rules, {0.25, 0.8125});
+  EXPECT_EQ(one.rules, (std::vector<std::size_t>{8, 9}));
+  EXPECT_EQ(one.truth_values, (std::vector<double>{0.75, 0.25}));
+  // 0.125 * 4 = 0.5: sets 0 and 1.
+  const FiredRules two = fire(rules, {0.125, 0.8125});
+  EXPECT_EQ(two.rules, (std::vector<std::size_t>{3, 8, 4, 9}));
+  EXPECT_EQ(two.truth_values, (std::vector<double>{0.375, 0.375, 0.125, 0.125}));
+}
+
+TEST(FuzzyRules, AtTheCentresOneRuleIsTrue) {
+  const FuzzyRules rules({.n_inputs = 3});
+  for (int i = 0; i <= 8; ++i) {
+    const FiredRules fired = fire(rules, {i / 8.0, 0.0, 1.0});
+    ASSERT_EQ(fired.size(), 1U);
+    EXPECT_EQ(fired.rules[0], static_cast<std::size_t>(i) * 81 + 8);
+    EXPECT_EQ(fired.truth_values[0], 1.0);
+  }
+}
+
+TEST(FuzzyRules, TruthValuesArePartsOfOneAndTheRulesDiffer) {
+  core::Random random(3, core::Stream::ties);
+  for (const int d : {1, 2, 3, 4, 6}) {
+    const FuzzyRules rules({.n_inputs = d, .n_sets = 2 + d, .n_actions = 2});
+    for (int trial = 0; trial < 300; ++trial) {
+      std::vector<double> state(static_cast<std::size_t>(d));
+      for (double& x : state) x = random.uniform();
+      FiredRules fired = fire(rules, state);
+      EXPECT_EQ(fired.size(), rules.max_fired());
+      double total = 0.0;
+      for (const double truth : fired.truth_values) {
+        EXPECT_GT(truth, 0.0);
+        total += truth;
+      }
+      EXPECT_NEAR(total, 1.0, 1e-15 * d);
+      std::sort(fired.rules.begin(), fired.rules.end());
+      EXPECT_EQ(std::adjacent_find(fired.rules.begin(), fired.rules.end()), fired.rules.end());
+      EXPECT_LT(fired.rules.back(), rules.n_rules());
+    }
+  }
+}
+
+// The triangles written down: max(0, 1 - |x - centre| / spacing), multiplied over the inputs.
+TEST(FuzzyRules, AgreesWithTheTrianglesOfAllRules) {
+  const FuzzyRules rules({.n_inputs = 3, .n_sets = 4, .n_actions = 1});
+  core::Random random(4, core::Stream::ties);
+  for (int trial = 0; trial < 200; ++trial) {
+    const std::vector<double> state = {random.uniform(), random.uniform(), random.uniform()};
+    std::vector<double> truth(rules.n_rules(), 0.0);
+    const FiredRules fired = fire(rules, state);
+    for (std::size_t i = 0; i < fired.size(); ++i) truth[fired.rules[i]] = fired.truth_values[i];
+    for (std::size_t rule = 0; rule < rules.n_rules(); ++rule) {
+      const std::array<std::size_t, 3> sets = {rule / 16, rule / 4 % 4, rule % 4};
+      double expected = 1.0;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const double distance = std::abs(state[i] - static_cast<double>(sets[i]) / 3.0);
+        expected *= std::max(0.0, 1.0 - distance * 3.0);
+      }
+      EXPECT_NEAR(truth[rule], expected, 1e-15) << rule;
+    }
+  }
+}
+
+TEST(FuzzyRules, ValuesStartAtZeroAndEachHasItsPlace) {
+  FuzzyRules rules({.n_inputs = 2, .n_sets = 3, .n_actions = 4});
+  EXPECT_EQ(rules.table().size(), 36U);
+  for (const float value : rules.table()) EXPECT_EQ(value, 0.0F);
+  rules.table()[rules.cell(5, 2)] = 1.5F;
+  EXPECT_EQ(rules.values(5)[2], 1.5F);
+  EXPECT_EQ(std::accumulate(rules.table().begin(), rules.table().end(), 0.0F), 1.5F);
+}
+
+TEST(FuzzyRules, FiringAllocatesNothing) {
+  const FuzzyRules rules({.n_inputs = 6});
+  FiredRules fired = rules.no_rules();
+  const std::vector<double> state = {0.1, 0.2, 0.3, 0.4, 0.7, 0.9};
+  const std::size_t before = testing::allocation_count();
+  rules.fire(state, fired);
+  EXPECT_EQ(testing::allocation_count(), before);
+  EXPECT_EQ(fired.size(), 64U);
+}
+
+template <class Error>
+std::string message(const FuzzyRulesConfig& config) {
+  try {
+    FuzzyRules rules(config);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(FuzzyRules, TooLargeATableIsRefusedBeforeMemoryIsAskedFor) {
+  EXPECT_EQ(message<std::length_error>({.n_inputs = 9}),
+            "a table of 9^9 = 387420489 rules needs 32543321076 bytes, but max_table_bytes is "
+            "1073741824");
+  EXPECT_EQ(message<std::length_error>({.n_inputs = 2, .max_table_bytes = 81 * 84 - 1}),
+            "a table of 9^2 = 81 rules needs 6804 bytes, but max_table_bytes is 6803");
+  EXPECT_EQ(message<std::length_error>({.n_inputs = 2, .max_table_bytes = 81 * 84}), "no error");
+}
+
+TEST(FuzzyRules, NamesWhatIsImpossible) {
+  using Error = std::invalid_argument;
+  EXPECT_EQ(message<Error>({.n_inputs = 0}), "n_inputs must be in [1, 62], got 0");
+  EXPECT_EQ(message<Error>({.n_sets = 1}), "n_sets must be in [2, 1048576], got 1");
+  EXPECT_EQ(message<Error>({.n_actions = 0}), "n_actions must be in [1, 1048576], got 0");
+  const FuzzyRules rules({.n_inputs = 2});
+  FiredRules fired = fire(rules, {0.3, 0.4});
+  const auto before = fired.rules;
+  for (const auto& bad : {std::vector<double>{0.5}, {0.5, 1.1}, {std::nan(""), 0.0}}) {
+    EXPECT_THROW(rules.fire(bad, fired), Error);
+    EXPECT_EQ(fired.rules, before);
+  }
+}
+
+}  // namespace
+}  // namespace sdnn::approximators

@@ -1,0 +1,218 @@
+#include "sdnn/approximators/rbf_network.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "allocation_count.hpp"
+#include "sdnn/approximators/action_value.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::approximators {
+namespace {
+
+static_assert(ActionValue<RbfNetwork>);
+
+std::vector<double> random_state(core::Random& random, std::size_t d) {
+  std::vector<double> state(d);
+  for (double& x : state) x = random.uniform();
+  return state;
+}
+
+/// A network with weights of several sizes and signs, learned from random targets.
+RbfNetwork taught(const RbfNetworkConfig& config, int n_corrections) {
+  RbfNetwork network(config);
+  core::Random random(7, core::Stream::weights);
+  for (int i = 0; i < n_corrections; ++i) {
+    const auto state = random_state(random, network.n_inputs());
+    const auto action = static_cast<std::size_t>(random.below(network.n_actions()));
+    network.correct(state, action, 20.0 * random.uniform() - 10.0);
+  }
+  return network;
+}
+
+double largest_weight(const RbfNetwork& network) {
+  double largest = 0.0;
+  for (const double w : network.weights()) largest = std::max(largest, std::abs(w));
+  return largest;
+}
+
+// d = 1, two bases at 0 and 1, width 1: at x = 0 Gaussians 1 and e^-1/2, at 1/2 equal ones.
+TEST(RbfNetwork, OneGradientStepByHand) {
+  RbfNetwork network({.n_inputs = 1, .n_bases = 2, .n_actions = 3, .gradient_rate = 0.5});
+  EXPECT_EQ(network.n_joint_bases(), 4U);
+  const std::vector<double> state = {0.5};
+  network.correct(state, 0, 8.0);  // phi = (1/2, 1/2) o (p, 1 - p), p = 1 / (1 + e^-1/2)
+  const double p = 1.0 / (1.0 + std::exp(-0.5));
+  const std::vector<double> expected = {2.0 * p, 2.0 * (1.0 - p), 2.0 * p, 2.0 * (1.0 - p)};
+  for (std::size_t j = 0; j < 4; ++j) EXPECT_NEAR(network.weights()[j], expected[j], 1e-15);
+  // Q(x, a) does not depend on x, the action's bases mix (2 p, 2 (1 - p)).
+  for (const double x : {0.0, 0.3, 1.0}) {
+    const std::vector<double> at = {x};
+    EXPECT_NEAR(network.value(at, 0), 2.0 * (p * p + (1.0 - p) * (1.0 - p)), 1e-15);
+    EXPECT_NEAR(network.value(at, 1), 1.0, 1e-15);
+    EXPECT_NEAR(network.value(at, 2), 4.0 * p * (1.0 - p), 1e-15);
+  }
+}
+
+TEST(RbfNetwork, StartsAtZeroForEveryAction) {
+  RbfNetwork network({});
+  EXPECT_EQ(network.n_joint_bases(), 1024U);
+  std::vector<double> out(601, 1.0);
+  network.values(std::vector<double>{0.1, 0.9, 0.0, 1.0}, out);
+  for (const double value : out) EXPECT_EQ(value, 0.0);
+}
+
+// Normalized bases: equal weights give that weight everywhere.
+TEST(RbfNetwork, TheBasesSumToOne) {
+  for (const double width : {0.1, 1.0, 100.0}) {
+    RbfNetwork network({.n_inputs = 3, .n_actions = 11, .width = width});
+    network.set_weights(std::vector<double>(256, 5.0));
+    core::Random random(1, core::Stream::ties);
+    std::vector<double> out(11);
+    for (int i = 0; i < 100; ++i) {
+      const auto state = random_state(random, 3);
+      network.values(state, out);
+      for (const double value : out) EXPECT_NEAR(value, 5.0, 1e-13);
+      network.values_plainly(state, out);
+      for (const double value : out) EXPECT_NEAR(value, 5.0, 1e-13);
+    }
+  }
+}
+
+TEST(RbfNetwork, ThePlainEvaluationAgreesWithTheFactoredOne) {
+  for (const int d : {1, 2, 3, 4}) {
+    for (const RbfNetworkConfig& config :
+         {RbfNetworkConfig{.n_inputs = d, .n_actions = 17},
+          RbfNetworkConfig{.n_inputs = d, .n_bases = 3, .n_actions = 5, .width = 0.4},
+          RbfNetworkConfig{.n_inputs = d, .n_bases = 5, .n_actions = 2, .width = 0.1,
+                           .gradient_rate = 1.0}}) {
+      RbfNetwork network = taught(config, 300);
+      const double tolerance = 1e-12 * largest_weight(network);
+      ASSERT_GT(tolerance, 0.0);
+      core::Random random(2, core::Stream::ties);
+      std::vector<double> factored(network.n_actions()), plain(network.n_actions());
+      for (int i = 0; i < 20; ++i) {
+        const auto state = random_state(random, network.n_inputs());
+        network.values(state, factored);
+        network.values_plainly(state, plain);
+        for (std::size_t a = 0; a < plain.size(); ++a) {
+          EXPECT_NEAR(plain[a], factored[a], tolerance);
+          EXPECT_EQ(network.value(state, a), factored[a]);
+        }
+      }
+    }
+  }
+}
+
+TEST(RbfNetwork, WhatIsRememberedNeverChangesWhatIsReturned) {
+  RbfNetwork used = taught({.n_inputs = 2, .n_actions = 7}, 50);
+  RbfNetwork fresh = used;
+  const std::vector<double> a = {0.2, 0.8}, b = {0.6, 0.1};
+  std::vector<double> out(7), expected(7);
+  for (int i = 0; i < 20; ++i) {
+    fresh.values(b, expected);  // the other state in between
+    fresh.values(a, expected);
+    used.values(a, out);
+    if (i % 3 == 1) used.values_plainly(i % 2 == 0 ? a : b, out);
+    used.values(a, out);
+    EXPECT_EQ(out, expected);
+    used.correct(a, 3, i);
+    fresh.values(b, expected);
+    fresh.correct(a, 3, i);
+    ASSERT_TRUE(std::ranges::equal(used.weights(), fresh.weights()));
+  }
+}
+
+TEST(RbfNetwork, AGradientStepGoesTheRightWayAndNotTooFar) {
+  RbfNetwork network = taught({.gradient_rate = 50.0}, 100);  // |phi|^2 is at most 0.019
+  core::Random random(5, core::Stream::ties);
+  for (int i = 0; i < 200; ++i) {
+    const auto state = random_state(random, 4);
+    const auto action = static_cast<std::size_t>(random.below(601));
+    const double before = network.value(state, action);
+    network.correct(state, action, 30.0);
+    const double after = network.value(state, action);
+    EXPECT_LT(std::abs(30.0 - after), std::abs(30.0 - before));
+    EXPECT_EQ(after > 30.0, before > 30.0);
+  }
+}
+
+// The bits are the same with every compiler and optimization level.
+TEST(RbfNetwork, KeepsItsBits) {
+  RbfNetwork network = taught({}, 200);
+  std::uint64_t digest = 0;
+  for (const double w : network.weights()) digest = digest * 31 + std::bit_cast<std::uint64_t>(w);
+  std::vector<double> out(601);
+  network.values_plainly(std::vector<double>{0.3, 0.1, 0.7, 0.5}, out);
+  for (const double q : out) digest = digest * 31 + std::bit_cast<std::uint64_t>(q);
+  EXPECT_EQ(digest, 9187274102790421898U);
+}
+
+TEST(RbfNetwork, AStepAllocatesNothing) {
+  RbfNetwork network({.n_inputs = 5});
+  const std::vector<double> state = {0.1, 0.2, 0.3, 0.4, 0.5};
+  std::vector<double> out(601);
+  const std::size_t before = testing::allocation_count();
+  network.values(state, out);
+  network.correct(state, 7, 1.0);
+  (void)network.value(state, 7);
+  network.values_plainly(state, out);
+  EXPECT_EQ(testing::allocation_count(), before);
+}
+
+template <class Error>
+std::string message(const RbfNetworkConfig& config) {
+  try {
+    RbfNetwork network(config);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(RbfNetwork, TooManyBasesAreRefusedBeforeMemoryIsAskedFor) {
+  EXPECT_EQ(message<std::length_error>({.n_inputs = 13}),
+            "a table of 4^14 = 268435456 joint bases needs 2147483648 bytes, but "
+            "max_table_bytes is 1073741824");
+  EXPECT_EQ(message<std::length_error>({.n_inputs = 62, .max_table_bytes = UINT64_MAX}),
+            "a table of 4^63 joint bases needs 2^64 bytes or more, but max_table_bytes is "
+            "18446744073709551615");
+}
+
+TEST(RbfNetwork, NamesWhatIsImpossible) {
+  using Error = std::invalid_argument;
+  EXPECT_EQ(message<Error>({.n_inputs = 0}), "n_inputs must be in [1, 62], got 0");
+  EXPECT_EQ(message<Error>({.n_bases = 1}), "n_bases must be in [2, 1048576], got 1");
+  EXPECT_EQ(message<Error>({.n_actions = 0}), "n_actions must be in [1, 1048576], got 0");
+  EXPECT_EQ(message<Error>({.width = 0.0}), "width must be in [0.1, 100], got 0");
+  EXPECT_EQ(message<Error>({.gradient_rate = -1.0}),
+            "gradient_rate must be a finite number greater than 0, got -1");
+}
+
+TEST(RbfNetwork, BadArgumentsChangeNothing) {
+  RbfNetwork network = taught({.n_inputs = 2, .n_actions = 3}, 10);
+  const std::vector<double> weights(network.weights().begin(), network.weights().end());
+  const std::vector<double> good = {0.1, 0.2};
+  const std::vector<double> big = {0.1, 1.2};
+  std::vector<double> out(3), short_out(2);
+  EXPECT_THROW(network.set_weights(std::vector<double>(63)), std::invalid_argument);
+  EXPECT_THROW(network.values(big, out), std::invalid_argument);
+  EXPECT_THROW(network.values_plainly(big, out), std::invalid_argument);
+  EXPECT_THROW(network.values(good, short_out), std::invalid_argument);
+  EXPECT_THROW((void)network.value(good, 3), std::invalid_argument);
+  EXPECT_THROW(network.correct(big, 0, 1.0), std::invalid_argument);
+  EXPECT_THROW(network.correct(good, 3, 1.0), std::invalid_argument);
+  EXPECT_THROW(network.correct(good, 0, std::nan("")), std::invalid_argument);
+  EXPECT_THROW(network.correct(good, 0, std::numeric_limits<double>::infinity()),
+               std::overflow_error);
+  EXPECT_TRUE(std::ranges::equal(network.weights(), weights));
+}
+
+}  // namespace
+}  // namespace sdnn::approximators

@@ -1,0 +1,328 @@
+import dataclasses
+import doctest
+import importlib
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import grid_transcription as paper
+from sdnn import _core
+from sdnn.agents import FuzzyQLearning, FuzzyQLearningConfig, QLearningConfig, Transition
+from sdnn.agents.q_learning import RBFQLearning
+from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig
+from sdnn.environments import (
+    AcrobotConfig,
+    AcrobotSwingUpEnv,
+    GoalScheduleConfig,
+    NoisySensors,
+    RedundantSensors,
+    SensorConfig,
+)
+from sdnn.environments.goal_schedule import GoalSchedule
+
+OBSERVATIONS = gym.spaces.Box(-2.0, 2.0, (3,), np.float64)
+TORQUES = gym.spaces.Box(-1.0, 3.0, (1,), np.float32)
+BUTTONS = gym.spaces.Discrete(4, start=2)
+
+
+# Against the transcription.
+
+
+def positions(rng, d):
+    """A walk in [0, 1]^d that also meets ends and centres."""
+    state = np.full(d, 0.5)
+    while True:
+        yield state
+        kind = rng.integers(10)
+        if kind == 0:
+            state = rng.integers(0, 9, d) / 8.0
+        else:
+            state = np.clip(state + 0.1 * rng.standard_normal(d), 0.0, 1.0)
+
+
+@pytest.mark.parametrize(("d", "n_steps"), [(2, 5000), (3, 3000), (4, 3000), (6, 1000)])
+@pytest.mark.parametrize("tie_rule", ["uniform", "middle"])
+def test_learning_agrees_with_its_definition_bit_for_bit(d, n_steps, tie_rule):
+    learning = FuzzyQLearningConfig(tie_rule=tie_rule)
+    rules = FuzzyRulesConfig(n_inputs=d)
+    agent = _core.FuzzyQLearning(rules=rules.to_core(), learning=learning.to_core(), seed=6)
+    slow = paper.FuzzyQLearning(
+        d,
+        n_sets=rules.n_sets,
+        n_actions=rules.n_actions,
+        coefficient=learning.learning_coefficient,
+        discount=learning.discount,
+    )
+    policy = _core.EpsilonGreedy(tie_rule=_core.TieRule.__members__[tie_rule], seed=6)
+    rng = np.random.default_rng(d)
+    walk = positions(rng, d)
+    state = next(walk)
+    for step in range(n_steps):
+        in_episode = step % 50
+        if in_episode == 0:
+            agent.begin_episode()
+        following = next(walk)
+        action, picked = slow.act(
+            state, lambda values, at=in_episode: policy.select(values, at, True)
+        )
+        assert agent.act(state) == action, step
+        reward, terminated = float(rng.integers(-5, 11)), bool(rng.integers(20) == 0)
+        agent.learn(state, action, reward, following, terminated)
+        slow.learn(state, picked, reward, following, terminated)
+        state = following
+        if step % 100 == 0:
+            assert agent.value(state) == slow.value(state)
+    table = slow.v.reshape(-1, rules.n_actions)
+    touched = np.flatnonzero(table.any(axis=1))
+    assert touched.size > 50
+    for rule in touched:
+        assert np.array_equal(agent.rules.values(rule), table[rule])
+
+
+# A loop in Python lives the compiled trial.
+
+
+def python_trial(make_agent, *, n_sensors, noise, n_episodes, seed):
+    """The paper's protocol written with the Python rooms; rows as the trial gives them."""
+
+    def make_env(stream):
+        env = AcrobotSwingUpEnv(
+            config=AcrobotConfig(), goal_schedule=GoalSchedule(), dtype="float64"
+        )
+        env = RedundantSensors(env, ("energy", "height")[: n_sensors - 4])
+        return NoisySensors(env, sigma=noise, seed=seed, stream=stream)
+
+    learning_env, test_env = make_env("sensor_noise"), make_env("evaluation_sensor_noise")
+    agent = make_agent(learning_env.observation_space, learning_env.action_space)
+
+    def run(env, episode, learning):
+        observation, _ = env.reset(options={"episode": episode})
+        agent.begin_episode()
+        steps, total, over = 0, 0.0, False
+        while not over:
+            action = agent.act(observation, explore=learning)
+            following, reward, terminated, truncated, _ = env.step(action)
+            if learning:
+                agent.learn(Transition(observation, action, reward, following, terminated))
+            observation = following
+            steps, total, over = steps + 1, total + reward, terminated or truncated
+        return steps, total, terminated
+
+    rows = []
+    for episode in range(1, n_episodes + 1):
+        run(learning_env, episode, True)
+        if episode % 5 == 0:
+            rows.append((episode, *run(test_env, episode, False)))
+    return rows
+
+
+@pytest.mark.parametrize(("n_sensors", "noise"), [(4, 0.0), (6, 0.02)])
+@pytest.mark.parametrize("kind", ["fuzzy", "rbf"])
+def test_a_python_loop_reproduces_the_compiled_trial(kind, n_sensors, noise):
+    n_episodes, seed = 60, 11
+    common = {
+        "acrobot": AcrobotConfig().to_core(),
+        "goal": GoalScheduleConfig().to_core(),
+        "sensors": SensorConfig(n_sensors=n_sensors, noise=noise).to_core(),
+        "protocol": _core.ProtocolConfig(n_learning_episodes=n_episodes, test_interval=5),
+        "seed": seed,
+    }
+    if kind == "fuzzy":
+        trial = _core.FuzzyAcrobotTrial(
+            rules=FuzzyRulesConfig(n_inputs=n_sensors).to_core(),
+            learning=FuzzyQLearningConfig().to_core(),
+            **common,
+        )
+    else:
+        trial = _core.RbfAcrobotTrial(
+            network=RBFNetworkConfig(n_inputs=n_sensors).to_core(),
+            learning=QLearningConfig().to_core(),
+            **common,
+        )
+    trial.advance(n_episodes)
+    columns = trial.test_rows()
+    names = ("episode", "steps", "episode_return", "solved")
+    expected = list(zip(*(columns[name].tolist() for name in names), strict=True))
+    agent = FuzzyQLearning if kind == "fuzzy" else RBFQLearning
+    rows = python_trial(
+        lambda observations, actions: agent(observations, actions, seed=seed),
+        n_sensors=n_sensors,
+        noise=noise,
+        n_episodes=n_episodes,
+        seed=seed,
+    )
+    assert rows == expected
+    assert trial.finished
+
+
+# The Python faces.
+
+
+def test_the_defaults_are_those_of_the_core():
+    core = _core.FuzzyQLearningConfig()
+    names = {name for name in dir(core) if not name.startswith("_")}
+    values = {name: getattr(core, name) for name in names}
+    values["tie_rule"] = values["tie_rule"].name
+    assert values == dataclasses.asdict(FuzzyQLearningConfig())
+
+
+def test_every_field_reaches_the_core():
+    other = FuzzyQLearningConfig(
+        learning_coefficient=0.25,
+        discount=0.5,
+        trace_decay=0.125,
+        epsilon=0.75,
+        n_greedy_steps=3,
+        tie_rule="lowest",
+    )
+    core = other.to_core()
+    for field in dataclasses.fields(FuzzyQLearningConfig):
+        value = getattr(core, field.name)
+        value = value.name if field.name == "tie_rule" else value
+        assert getattr(other, field.name) == value != field.default, field.name
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"tie_rule": "first"}, "tie_rule must be one of 'uniform', 'lowest', 'middle'"),
+        ({"learning_coefficient": 0.0}, r"learning_coefficient must be in \(0, 1\], got 0"),
+        ({"discount": 1.5}, r"discount must be in \[0, 1\], got 1.5"),
+        ({"trace_decay": 2.0}, r"trace_decay must be in \[0, 1\], got 2"),
+        ({"epsilon": -0.1}, r"epsilon must be in \[0, 1\], got -0.1"),
+    ],
+)
+def test_impossible_settings_are_named(change, message):
+    with pytest.raises(ValueError, match=message):
+        FuzzyQLearning(OBSERVATIONS, TORQUES, learning=FuzzyQLearningConfig(**change))
+
+
+@pytest.mark.parametrize(
+    ("observations", "actions", "error", "message"),
+    [
+        (gym.spaces.Discrete(3), TORQUES, TypeError, "observation_space must be a Box"),
+        (gym.spaces.Box(-np.inf, np.inf, (2,)), TORQUES, ValueError, "finite bounds"),
+        (OBSERVATIONS, BUTTONS, TypeError, "action_space must be a Box, got Discrete"),
+        (OBSERVATIONS, gym.spaces.Box(0, 1, (2,)), ValueError, "action_space must have 1 dim"),
+        (gym.spaces.Box(0, 1, (9,)), TORQUES, ValueError, r"9\^9 = 387420489 rules"),
+    ],
+)
+def test_spaces_that_do_not_fit_are_named(observations, actions, error, message):
+    with pytest.raises(error, match=message):
+        FuzzyQLearning(observations, actions)
+
+
+def test_actions_are_elements_of_the_space():
+    agent = FuzzyQLearning(OBSERVATIONS, TORQUES, seed=1)
+    assert agent.n_rules == 729
+    rng = np.random.default_rng(1)
+    actions = [agent.act(rng.uniform(-2, 2, 3)) for _ in range(100)]
+    assert all(action in TORQUES for action in actions)
+    assert len({float(action[0]) for action in actions}) > 90
+
+
+def test_one_transition_by_hand():
+    learning = FuzzyQLearningConfig(tie_rule="lowest", learning_coefficient=1.0)
+    agent = FuzzyQLearning(OBSERVATIONS, TORQUES, learning=learning)
+    centre, beside = [0.0, 0.0, 0.0], [0.25, 0.0, 0.0]
+    action = agent.act(centre)
+    assert action.tolist() == [-1.0]
+    agent.learn(Transition(centre, action, 8.0, beside, True))
+    assert agent.value(centre) == 8.0
+    assert agent.value(beside) == 4.0
+    assert agent.rule_values(4 * 81 + 4 * 9 + 4).tolist() == [8.0] + [0.0] * 20
+    agent.act(beside)
+    agent.learn(Transition(beside, [-1.0], 0.0, centre, False))  # 0.5 (0.9 8 - 4) more
+    assert agent.value(centre) == pytest.approx(9.6)
+
+
+def test_only_the_transition_of_the_last_exploring_act_is_learned():
+    agent = FuzzyQLearning(OBSERVATIONS, TORQUES, seed=2)
+    here, there = [0.1, 0.2, 0.3], [0.4, 0.5, 0.6]
+    with pytest.raises(ValueError, match="action must be that of the last exploring act"):
+        agent.learn(Transition(here, [0.0], 1.0, there, False))
+    action = agent.act(here)
+    agent.act(there, explore=False)
+    for transition, message in [
+        (Transition(there, action, 1.0, here, False), "state must be that of the last exploring"),
+        (Transition(here, action + 0.5, 1.0, there, False), "action must be"),
+        (Transition(here, [7.0], 1.0, there, False), "action must be one number in"),
+        (Transition(here, action, np.nan, there, False), "reward must be finite"),
+        (Transition(here, action, 1.0, [0.0], False), "next_observation must have shape"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            agent.learn(transition)
+    with pytest.raises(OverflowError, match="range of floats"):
+        agent.learn(Transition(here, action, 1e300, there, False))
+    assert agent.value(here) == 0.0
+    agent.learn(Transition(here, action, 1.0, there, False))
+    assert agent.value(here) > 0.0
+
+
+def live(env, agent, n_steps):
+    observation, _ = env.reset(seed=1)
+    agent.begin_episode()
+    actions = []
+    for _ in range(n_steps):
+        action = agent.act(observation)
+        following, reward, terminated, truncated, _ = env.step(action)
+        agent.learn(Transition(observation, action, float(reward), following, terminated))
+        observation = following
+        actions.append(np.asarray(action).tolist())
+        if terminated or truncated:
+            observation, _ = env.reset()
+            agent.begin_episode()
+    return actions
+
+
+@pytest.mark.parametrize("kind", [FuzzyQLearning, RBFQLearning])
+def test_it_lives_in_pendulum(kind):
+    env = gym.make("Pendulum-v1")
+    agents = [kind(env.observation_space, env.action_space, seed=3) for _ in range(2)]
+    first, second = (live(env, agent, 450) for agent in agents)
+    assert first == second, "the same seeds live the same life"
+    assert first != live(env, kind(env.observation_space, env.action_space, seed=4), 450)
+
+
+def test_an_rbf_network_learns_discrete_actions_too():
+    network = RBFNetworkConfig(n_bases=4, width=0.5)
+    agent = RBFQLearning(OBSERVATIONS, BUTTONS, network=network, seed=2)
+    assert agent.n_actions == 4
+    assert agent.actions.tolist() == [2, 3, 4, 5]
+    observation = [0.5, -0.5, 0.0]
+    for _ in range(300):
+        agent.learn(Transition(observation, 4, 10.0, observation, True))
+    values = agent.q_values(observation)
+    assert values[2] == pytest.approx(10.0)
+    assert values.argmax() == 2
+    assert agent.act(observation, explore=False) == 4
+    with pytest.raises(ValueError, match="action must be in"):
+        agent.learn(Transition(observation, 1, 10.0, observation, True))
+
+
+def test_an_rbf_network_cuts_a_box_evenly():
+    agent = RBFQLearning(OBSERVATIONS, TORQUES)
+    assert np.allclose(agent.actions, np.linspace(-1, 3, 601), rtol=0, atol=1e-12)
+    assert agent.q_values([0.0, 0.0, 0.0]).tolist() == [0.0] * 601
+
+
+# A figure of the paper's: it is learned within about 100 episodes without noise.
+def test_fuzzy_q_learning_swings_up_without_noise():
+    trial = _core.FuzzyAcrobotTrial(
+        rules=_core.FuzzyRulesConfig(),
+        learning=_core.FuzzyQLearningConfig(),
+        acrobot=_core.AcrobotConfig(),
+        goal=_core.GoalScheduleConfig(),
+        sensors=_core.SensorConfig(),
+        protocol=_core.ProtocolConfig(n_learning_episodes=300),
+        seed=1,
+    )
+    trial.advance(300)
+    assert trial.test_rows()["solved"][10:].mean() > 0.8
+
+
+def test_the_examples_run():
+    module = importlib.import_module("sdnn.agents.fuzzy_q_learning")
+    assert doctest.testmod(module).failed == 0
+    assert doctest.testmod(module).attempted > 0

@@ -1,0 +1,118 @@
+"""Fuzzy rules and the RBF network against their transcription; their settings."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from grid_transcription import FuzzyQLearning, RbfNetwork
+from sdnn import _core
+from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig
+
+CONFIGS = [
+    (FuzzyRulesConfig, _core.FuzzyRulesConfig),
+    (RBFNetworkConfig, _core.RbfNetworkConfig),
+]
+
+
+def walk(rng, state):
+    """Mostly near, sometimes far, sometimes at the very ends and centres."""
+    kind = rng.integers(10)
+    if kind == 0:
+        return rng.random(state.size)
+    if kind == 1:
+        return rng.integers(0, 9, state.size) / 8.0
+    return np.clip(state + 0.05 * rng.standard_normal(state.size), 0.0, 1.0)
+
+
+@pytest.mark.parametrize(("d", "n_sets"), [(1, 9), (2, 2), (3, 7), (4, 9), (6, 5)])
+def test_rules_fire_as_triangles_say(d, n_sets):
+    rules = _core.FuzzyRules(_core.FuzzyRulesConfig(n_inputs=d, n_sets=n_sets))
+    slow = FuzzyQLearning(d, n_sets=n_sets, n_actions=2, coefficient=1.0, discount=1.0)
+    rng = np.random.default_rng(d)
+    state = rng.random(d)
+    for _ in range(300):
+        fired, truth = rules.fire(state)
+        expected = slow.fired(state)
+        numbers = [int(np.ravel_multi_index(sets, [n_sets] * d)) for sets, _ in expected]
+        assert fired.tolist() == numbers
+        assert truth.tolist() == [value for _, value in expected]
+        assert abs(truth.sum() - 1.0) < 1e-15 * d
+        state = walk(rng, state)
+
+
+@pytest.mark.parametrize(("d", "n_steps"), [(2, 3000), (3, 2000), (4, 2000), (6, 150)])
+def test_the_rbf_network_agrees_with_its_definition_bit_for_bit(d, n_steps):
+    net = _core.RbfNetwork(_core.RbfNetworkConfig(n_inputs=d))
+    config = net.config
+    slow = RbfNetwork(
+        d,
+        n_bases=config.n_bases,
+        n_actions=config.n_actions,
+        width=config.width,
+        rate=config.gradient_rate,
+        exp=_core.exp,
+    )
+    rng = np.random.default_rng(d)
+    state = rng.random(d)
+    for step in range(n_steps):
+        action = int(rng.integers(net.n_actions))
+        target = float(rng.uniform(-20, 20))
+        if step % 5 == 0:
+            assert np.array_equal(net.values(state), slow.values(state)), step
+        net.correct(state, action, target)
+        slow.correct(state, action, target)
+        state = walk(rng, state)
+    assert np.array_equal(net.weights(), slow.w.ravel())
+    assert net.n_joint_bases == slow.w.size
+
+
+@pytest.mark.parametrize(
+    ("d", "change"),
+    [(2, {}), (4, {}), (3, {"n_bases": 5, "width": 0.3}), (2, {"n_bases": 3, "n_actions": 7})],
+)
+def test_the_plain_evaluation_agrees_within_its_tolerance(d, change):
+    net = _core.RbfNetwork(_core.RbfNetworkConfig(n_inputs=d, **change))
+    rng = np.random.default_rng(5)
+    net.set_weights(rng.uniform(-20.0, 20.0, net.n_joint_bases))
+    for _ in range(10):
+        state = rng.random(d)
+        assert np.abs(net.values_plainly(state) - net.values(state)).max() < 20.0 * 1e-12
+
+
+def test_the_exponential_of_the_core_is_the_one_of_numpy_up_to_rounding():
+    x = np.linspace(-30.0, 0.0, 1000)
+    np.testing.assert_allclose(_core.exp(x), np.exp(x), rtol=4e-16, atol=0)
+
+
+@pytest.mark.parametrize(("python", "core"), CONFIGS)
+def test_defaults_equal_the_cores(python, core):
+    names = {name for name in dir(core) if not name.startswith("_")}
+    assert {name: getattr(core(), name) for name in names} == dataclasses.asdict(python())
+
+
+@pytest.mark.parametrize("python", [pair[0] for pair in CONFIGS])
+def test_every_number_arrives_in_the_core(python):
+    numbers = {
+        field.name: type(field.default)(i + 7) for i, field in enumerate(dataclasses.fields(python))
+    }
+    core = python(**numbers).to_core()
+    assert {name: getattr(core, name) for name in numbers} == numbers
+
+
+def test_tables_that_are_too_large_are_refused():
+    with pytest.raises(ValueError, match=r"9\^9 = 387420489 rules needs 32543321076 bytes"):
+        _core.FuzzyRules(FuzzyRulesConfig(n_inputs=9).to_core())
+    with pytest.raises(ValueError, match=r"4\^14 = 268435456 joint bases needs 2147483648 bytes"):
+        _core.RbfNetwork(RBFNetworkConfig(n_inputs=13).to_core())
+
+
+@pytest.mark.parametrize("size", [1, 3])
+def test_bad_states_are_named(size):
+    rules = _core.FuzzyRules(_core.FuzzyRulesConfig(n_inputs=2))
+    net = _core.RbfNetwork(_core.RbfNetworkConfig(n_inputs=2))
+    for use in (rules.fire, net.values, net.values_plainly):
+        with pytest.raises(ValueError, match=f"state must be 2 values, got {size}"):
+            use(np.zeros(size))
+        with pytest.raises(ValueError, match=r"state\[1\] must be in \[0, 1\], got 1.5"):
+            use(np.array([0.0, 1.5]))
