@@ -34,7 +34,7 @@ def run(task: tuple[str, int, float, int]) -> dict[str, object]:
     case, n_inputs, noise, number = task
     dense = dense_microseconds(n_inputs)
     config = TrialConfig(
-        network=SDNNCConfig(n_inputs=n_inputs),
+        approximator=SDNNCConfig(n_inputs=n_inputs),
         sensors=SensorConfig(n_sensors=n_inputs, noise=noise),
     )
     trial = make_core_trial(config, trial_seed(0, case, number))

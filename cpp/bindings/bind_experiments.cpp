@@ -83,14 +83,14 @@ void bind_experiments(py::module_& module) {
 
   def_trial(
       py::class_<SdnnTrial>(module, "AcrobotTrial", "SDNN-C learns the acrobot swing-up")
-          .def(py::init([](const approximators::SdnnCConfig& network,
+          .def(py::init([](const approximators::SdnnCConfig& approximator,
                            const agents::QLearningConfig& learning, const AcrobotConfig& acrobot,
                            const GoalScheduleConfig& goal, const SensorConfig& sensors,
                            const ProtocolConfig& protocol, std::uint64_t seed) {
-                 return SdnnTrial({DynamicSdnnC(network, seed), learning, seed}, acrobot, goal,
+                 return SdnnTrial({DynamicSdnnC(approximator, seed), learning, seed}, acrobot, goal,
                                   sensors, protocol, seed);
                }),
-               py::kw_only(), py::arg("network"), py::arg("learning"), py::arg("acrobot"),
+               py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("acrobot"),
                py::arg("goal"), py::arg("sensors"), py::arg("protocol"), py::arg("seed"))
           .def("memory_counts", &memory_counts,
                "How potentials came about so far: full passes, from neighbours, columns added"));
@@ -99,28 +99,28 @@ void bind_experiments(py::module_& module) {
   def_trial(
       py::class_<FuzzyTrial>(module, "FuzzyAcrobotTrial",
                              "Fuzzy Q-learning learns the acrobot swing-up")
-          .def(py::init([](const approximators::FuzzyRulesConfig& rules,
+          .def(py::init([](const approximators::FuzzyRulesConfig& approximator,
                            const agents::FuzzyQLearningConfig& learning,
                            const AcrobotConfig& acrobot, const GoalScheduleConfig& goal,
                            const SensorConfig& sensors, const ProtocolConfig& protocol,
                            std::uint64_t seed) {
-                 return FuzzyTrial({FuzzyRules(rules), learning, seed}, acrobot, goal, sensors,
+                 return FuzzyTrial({FuzzyRules(approximator), learning, seed}, acrobot, goal, sensors,
                                    protocol, seed);
                }),
-               py::kw_only(), py::arg("rules"), py::arg("learning"), py::arg("acrobot"),
+               py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("acrobot"),
                py::arg("goal"), py::arg("sensors"), py::arg("protocol"), py::arg("seed")));
 
   using RbfTrial = experiments::AcrobotTrial<QLearning<RbfNetwork>>;
   def_trial(
       py::class_<RbfTrial>(module, "RbfAcrobotTrial",
                            "Q-learning with an RBF network learns the acrobot swing-up")
-          .def(py::init([](const approximators::RbfNetworkConfig& network,
+          .def(py::init([](const approximators::RbfNetworkConfig& approximator,
                            const agents::QLearningConfig& learning, const AcrobotConfig& acrobot,
                            const GoalScheduleConfig& goal, const SensorConfig& sensors,
                            const ProtocolConfig& protocol, std::uint64_t seed) {
-                 return RbfTrial({RbfNetwork(network), learning, seed}, acrobot, goal, sensors,
+                 return RbfTrial({RbfNetwork(approximator), learning, seed}, acrobot, goal, sensors,
                                  protocol, seed);
                }),
-               py::kw_only(), py::arg("network"), py::arg("learning"), py::arg("acrobot"),
+               py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("acrobot"),
                py::arg("goal"), py::arg("sensors"), py::arg("protocol"), py::arg("seed")));
 }

@@ -264,7 +264,7 @@ def measure_threads(n_inputs: int, noise: float, effort: Effort) -> ThreadsResul
 def _short_trial(n_inputs: int, noise: float, n_episodes: int) -> Trial:
     """Make a trial of learning episodes only: its test episodes would not learn."""
     config = TrialConfig(
-        network=replace(SDNNCConfig(), n_inputs=n_inputs),
+        approximator=replace(SDNNCConfig(), n_inputs=n_inputs),
         sensors=SensorConfig(n_sensors=n_inputs, noise=noise),
         protocol=ProtocolConfig(n_learning_episodes=n_episodes, test_interval=n_episodes + 1),
     )

@@ -10,37 +10,48 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sdnn.experiments.cases import EXPERIMENTS, Case, Experiment, select_experiments
+    from sdnn.experiments.claims import CLAIMS, Claim, judge_claims
     from sdnn.experiments.config import ProtocolConfig, TrialConfig, case_config, trial_seed
+    from sdnn.experiments.cost import CostConfig, CostRecord
     from sdnn.experiments.engine import Observer, run_trials
     from sdnn.experiments.errors import ExperimentError, PlotUnavailableError, StoreError
-    from sdnn.experiments.figures import draw_experiment, save_figure
+    from sdnn.experiments.figures import draw_cost, draw_experiment, save_figure
+    from sdnn.experiments.measures import MeasureConfig
     from sdnn.experiments.plan import PlannedTrial, plan_trials
     from sdnn.experiments.records import TrialKey, TrialRecord, TrialRows
     from sdnn.experiments.results import CaseResult, CaseSummary, collect, summarize
-    from sdnn.experiments.statistics import MeasureConfig
+    from sdnn.experiments.statistics import Estimate
     from sdnn.experiments.store import ResultStore
     from sdnn.experiments.trial import Trial, make_core_trial
 
 _HOMES = {
     "cases": ("EXPERIMENTS", "Case", "Experiment", "select_experiments"),
+    "claims": ("CLAIMS", "Claim", "judge_claims"),
     "config": ("ProtocolConfig", "TrialConfig", "case_config", "trial_seed"),
+    "cost": ("CostConfig", "CostRecord"),
     "engine": ("Observer", "run_trials"),
     "errors": ("ExperimentError", "PlotUnavailableError", "StoreError"),
-    "figures": ("draw_experiment", "save_figure"),
+    "figures": ("draw_cost", "draw_experiment", "save_figure"),
+    "measures": ("MeasureConfig",),
     "plan": ("PlannedTrial", "plan_trials"),
     "records": ("TrialKey", "TrialRecord", "TrialRows"),
     "results": ("CaseResult", "CaseSummary", "collect", "summarize"),
-    "statistics": ("MeasureConfig",),
+    "statistics": ("Estimate",),
     "store": ("ResultStore",),
     "trial": ("Trial", "make_core_trial"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "CLAIMS",
     "EXPERIMENTS",
     "Case",
     "CaseResult",
     "CaseSummary",
+    "Claim",
+    "CostConfig",
+    "CostRecord",
+    "Estimate",
     "Experiment",
     "ExperimentError",
     "MeasureConfig",
@@ -57,7 +68,9 @@ __all__ = [
     "TrialRows",
     "case_config",
     "collect",
+    "draw_cost",
     "draw_experiment",
+    "judge_claims",
     "make_core_trial",
     "plan_trials",
     "run_trials",

@@ -1,21 +1,21 @@
 """The paper's experiments as data: which case, which agents, which figure.
 
-Source: spec section 5 (the table of experiments and the list of claims); the paper's sections
-4.2 and 4.3. This module imports nothing heavy, so that the command line may read it at start.
+Source: spec section 5 (the table of experiments); the paper's sections 4.2 and 4.3. This module
+imports nothing heavy, so that the command line may read it at start.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
-
-MeasureName = Literal["episodes_to_learn", "final_steps", "final_share_solved"]
 
 PAPER_TRIALS = 10
 """Trials per case in the paper; fewer support no conclusion."""
 
 PAPER_EPISODES = 15_000
 """Learning episodes per trial in the paper."""
+
+SENSOR_NOISE = 0.02
+"""Standard deviation of the noise in the paper's Cases II to IV."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Agent:
     Parameters
     ----------
     id
-        The word used on the command line and in the result file.
+        The word used in the result file.
     title
         The word used in figures and tables.
     """
@@ -65,30 +65,8 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Claim:
-    """A claim of the paper that says: this measure is at most that large.
-
-    Parameters
-    ----------
-    number
-        Number in the spec's list of claims.
-    text
-        What the paper says.
-    measure
-        Which of our measures speaks about it.
-    limit
-        The claim holds where the median of the measure over trials is at most this.
-    """
-
-    number: int
-    text: str
-    measure: MeasureName
-    limit: float
-
-
-@dataclass(frozen=True)
 class Experiment:
-    """One figure: its cases side by side, and the claims drawn from it.
+    """One figure: its cases side by side.
 
     Parameters
     ----------
@@ -98,8 +76,6 @@ class Experiment:
         Title of the figure.
     cases
         One panel each, in order.
-    claims
-        What the paper concludes from the figure.
     start_panels
         Whether a small panel below each case shows its first episodes again.
     """
@@ -107,11 +83,12 @@ class Experiment:
     id: str
     title: str
     cases: tuple[Case, ...]
-    claims: tuple[Claim, ...]
     start_panels: bool = False
 
 
-AGENTS = (Agent("sdnn-c", "SDNN-C"),)
+AGENTS = (Agent("sdnn-c", "SDNN-C"), Agent("fql", "FQL"), Agent("rbfn", "RBFN"))
+
+BOTH = ("sdnn-c", "fql")
 
 EXPERIMENTS = (
     Experiment(
@@ -121,13 +98,26 @@ EXPERIMENTS = (
             Case("s4", "4 inputs", 4, 0.0, ("sdnn-c",), "Fig. 4a"),
             Case("s6", "6 inputs, 2 of them redundant", 6, 0.0, ("sdnn-c",), "Fig. 4b"),
         ),
-        claims=(
-            Claim(1, "learns within about 150 learning episodes", "episodes_to_learn", 150.0),
-            Claim(2, "at the end reaches the goal within 10 steps", "final_steps", 10.0),
+        start_panels=True,
+    ),
+    Experiment(
+        id="b",
+        title="Experiment B: noisy and redundant inputs",
+        cases=(
+            Case("s4", "Case I: 4 inputs, no noise", 4, 0.0, BOTH, "Fig. 5"),
+            Case("s4-noise", "Case II: 4 noisy inputs", 4, SENSOR_NOISE, BOTH, "Fig. 6a"),
+            Case("s5-noise", "Case III: 5 noisy inputs", 5, SENSOR_NOISE, BOTH, "Fig. 6b"),
+            Case("s6-noise", "Case IV: 6 noisy inputs", 6, SENSOR_NOISE, BOTH, "Fig. 6c"),
         ),
         start_panels=True,
     ),
 )
+
+COST = "cost"
+"""The word on the command line for the measurement of costs, which has no trials."""
+
+WORDS = (*(experiment.id for experiment in EXPERIMENTS), COST, "all")
+"""What may be reproduced."""
 
 
 def agent_title(agent_id: str) -> str:
@@ -149,17 +139,19 @@ def agent_title(agent_id: str) -> str:
     raise ValueError(f"agent must be one of {[a.id for a in AGENTS]}, got {agent_id!r}")
 
 
-def select_experiments(name: str) -> tuple[Experiment, ...]:
-    """Experiments a command-line word stands for: one of them, or all for ``"all"``.
+def select_experiments(word: str) -> tuple[Experiment, ...]:
+    """Experiments that one of `WORDS` stands for; none for ``"cost"``.
 
     Raises
     ------
     ValueError
-        If no experiment has that id.
+        If it is another word.
     """
-    chosen = tuple(e for e in EXPERIMENTS if name in (e.id, "all"))
-    if not chosen:
-        raise ValueError(
-            f"experiment must be one of {[e.id for e in EXPERIMENTS]} or 'all', got {name!r}"
-        )
-    return chosen
+    if word not in WORDS:
+        raise ValueError(f"experiment must be one of {list(WORDS)}, got {word!r}")
+    return tuple(e for e in EXPERIMENTS if word in (e.id, "all"))
+
+
+def includes_cost(word: str) -> bool:
+    """Whether one of `WORDS` asks for the measurement of costs."""
+    return word in (COST, "all")

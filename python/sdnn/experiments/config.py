@@ -6,13 +6,13 @@ import hashlib
 import json
 import zlib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from sdnn.agents import QLearningConfig
-from sdnn.approximators import SDNNCConfig
+from sdnn.agents import FuzzyQLearningConfig, QLearningConfig
+from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.environments import AcrobotConfig, GoalScheduleConfig, SensorConfig
 
 if TYPE_CHECKING:
@@ -47,6 +47,16 @@ class ProtocolConfig:
         )
 
 
+ApproximatorConfig: TypeAlias = SDNNCConfig | FuzzyRulesConfig | RBFNetworkConfig
+LearningConfig: TypeAlias = QLearningConfig | FuzzyQLearningConfig
+
+_AGENT_CONFIGS: dict[str, tuple[type[ApproximatorConfig], type[LearningConfig]]] = {
+    "sdnn-c": (SDNNCConfig, QLearningConfig),
+    "fql": (FuzzyRulesConfig, FuzzyQLearningConfig),
+    "rbfn": (RBFNetworkConfig, QLearningConfig),
+}
+
+
 @dataclass(frozen=True, kw_only=True)
 class TrialConfig:
     """Everything that fixes the outcome of a trial but its seed.
@@ -55,10 +65,10 @@ class TrialConfig:
     ----------
     agent
         Id of the agent.
-    network
-        Sizes and start of SDNN-C.
+    approximator
+        Sizes and start of what the agent learns with.
     learning
-        Q-learning and its exploration.
+        How the agent learns and explores.
     acrobot
         Physics, goal and reward.
     goal
@@ -68,6 +78,13 @@ class TrialConfig:
     protocol
         Learning and test episodes.
 
+    Raises
+    ------
+    ValueError
+        If no agent has that id.
+    TypeError
+        If approximator or learning are those of another agent.
+
     Examples
     --------
     >>> TrialConfig().config_hash == TrialConfig(agent="sdnn-c").config_hash
@@ -75,12 +92,22 @@ class TrialConfig:
     """
 
     agent: str = "sdnn-c"
-    network: SDNNCConfig = field(default_factory=SDNNCConfig)
-    learning: QLearningConfig = field(default_factory=QLearningConfig)
+    approximator: ApproximatorConfig = field(default_factory=SDNNCConfig)
+    learning: LearningConfig = field(default_factory=QLearningConfig)
     acrobot: AcrobotConfig = field(default_factory=AcrobotConfig)
     goal: GoalScheduleConfig = field(default_factory=GoalScheduleConfig)
     sensors: SensorConfig = field(default_factory=SensorConfig)
     protocol: ProtocolConfig = field(default_factory=ProtocolConfig)
+
+    def __post_init__(self) -> None:
+        expected = _configs_of(self.agent)
+        for name, kind in zip(("approximator", "learning"), expected, strict=True):
+            value = getattr(self, name)
+            if not isinstance(value, kind):
+                raise TypeError(
+                    f"{name} of {self.agent} must be a {kind.__name__},"
+                    f" got a {type(value).__name__}"
+                )
 
     def canonical_json(self) -> str:
         """All values as one line of JSON: keys sorted, no spaces, 1.0 written as 1.
@@ -96,6 +123,12 @@ class TrialConfig:
         """First 16 hexadecimal digits of the SHA-256 of `canonical_json`."""
         digest = hashlib.sha256(self.canonical_json().encode()).hexdigest()
         return digest[:CONFIG_HASH_DIGITS]
+
+
+def _configs_of(agent: str) -> tuple[type[ApproximatorConfig], type[LearningConfig]]:
+    if agent not in _AGENT_CONFIGS:
+        raise ValueError(f"agent must be one of {list(_AGENT_CONFIGS)}, got {agent!r}")
+    return _AGENT_CONFIGS[agent]
 
 
 def _canonical(value: Any) -> Any:
@@ -129,9 +162,11 @@ def case_config(case: Case, agent: str, protocol: ProtocolConfig | None = None) 
     """
     if agent not in case.agents:
         raise ValueError(f"agent must be one of {case.agents} in case {case.id}, got {agent!r}")
+    approximator, learning = _configs_of(agent)
     return TrialConfig(
         agent=agent,
-        network=replace(SDNNCConfig(), n_inputs=case.n_sensors),
+        approximator=approximator(n_inputs=case.n_sensors),
+        learning=learning(),
         sensors=SensorConfig(n_sensors=case.n_sensors, noise=case.noise),
         protocol=ProtocolConfig() if protocol is None else protocol,
     )
@@ -139,6 +174,8 @@ def case_config(case: Case, agent: str, protocol: ProtocolConfig | None = None) 
 
 def trial_seed(root_seed: int, case_id: str, trial: int) -> int:
     """Seed of a trial, the same for every agent, order of execution and number of jobs.
+
+    All agents thus meet the same sensor noise in the same trial of a case.
 
     It is the first 64-bit word of ``SeedSequence(root_seed, spawn_key=(crc32(case_id), trial))``
     without its lowest bit, because the result file's integers have a sign.

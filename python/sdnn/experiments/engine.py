@@ -89,6 +89,12 @@ class Observer:
     def failed(self, planned: PlannedTrial, error: Exception) -> None:
         """Note that a trial raised."""
 
+    def costs_begun(self, n_missing: int) -> None:
+        """Note that the measurement of costs begins, with `n_missing` of them before it."""
+
+    def cost_measured(self, description: str) -> None:
+        """Note that a cost is measured, and of what."""
+
 
 @dataclass(frozen=True)
 class _Started:

@@ -10,10 +10,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.experiments import statistics
-from sdnn.experiments.cases import Case, Experiment, MeasureName
+from sdnn.experiments import measures, statistics
+from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, Case, Experiment
+from sdnn.experiments.measures import DEFAULT_MEASURES, MeasureConfig, MeasureName
 from sdnn.experiments.records import TrialKey, TrialRecord
-from sdnn.experiments.statistics import DEFAULT_MEASURES, Curve, Estimate, MeasureConfig
+from sdnn.experiments.statistics import Curve, Estimate
 from sdnn.experiments.store import ResultStore
 
 
@@ -63,6 +64,16 @@ class CaseResult:
         """Learning episodes done before each test, (n_tests,)."""
         return self.records[0].rows.episode
 
+    @property
+    def last_episode(self) -> int:
+        """Learning episodes of a trial."""
+        return int(self.episode[-1])
+
+    @property
+    def is_paper_scale(self) -> bool:
+        """Whether there are as many trials and episodes as in the paper: else nothing is judged."""
+        return self.n_trials >= PAPER_TRIALS and self.last_episode >= PAPER_EPISODES
+
     @cached_property
     def steps(self) -> NDArray[np.int32]:
         """Steps of the test episodes, (n_trials, n_tests)."""
@@ -100,8 +111,6 @@ class CaseSummary:
         Measures of each trial, arrays (n_trials,).
     medians
         Their medians over trials.
-    iqms
-        Their interquartile means over trials.
     median_curve_episodes_to_learn
         `episodes_to_learn` of the median curve: what a reader sees in the paper's figure.
     """
@@ -109,8 +118,11 @@ class CaseSummary:
     result: CaseResult
     values: dict[MeasureName, NDArray[np.float64]]
     medians: dict[MeasureName, Estimate]
-    iqms: dict[MeasureName, Estimate]
     median_curve_episodes_to_learn: float
+
+    def uncensored(self, measure: MeasureName) -> NDArray[np.float64]:
+        """Return a measure of each trial, (n_trials,), infinite ones as the last episode."""
+        return np.minimum(self.values[measure], self.result.last_episode)
 
 
 def collect(
@@ -141,22 +153,32 @@ def collect(
 
 
 def summarize(result: CaseResult, config: MeasureConfig = DEFAULT_MEASURES) -> CaseSummary:
-    """Measure every trial of a result, then take statistics over trials."""
+    """Measure every trial of a result, then take medians over trials."""
+    episode = result.episode
     values: dict[MeasureName, NDArray[np.float64]] = {
-        "episodes_to_learn": np.array(
-            [statistics.episodes_to_learn(result.episode, steps, config) for steps in result.steps]
+        "episodes_to_learn": _of_all(
+            measures.episodes_to_learn(episode, steps, config) for steps in result.steps
         ),
-        "final_steps": np.array([statistics.final_steps(s, config) for s in result.steps]),
-        "final_share_solved": np.array(
-            [statistics.final_share_solved(r.rows.solved, config) for r in result.records]
+        "early_steps": _of_all(
+            measures.early_steps(episode, steps, config) for steps in result.steps
+        ),
+        "episode_of_collapse": _of_all(
+            measures.episode_of_collapse(episode, steps, config) for steps in result.steps
+        ),
+        "final_steps": _of_all(measures.final_steps(steps, config) for steps in result.steps),
+        "final_share_solved": _of_all(
+            measures.final_share_solved(record.rows.solved, config) for record in result.records
         ),
     }
     return CaseSummary(
         result=result,
         values=values,
-        medians={n: statistics.estimate(v, "median", config) for n, v in values.items()},
-        iqms={n: statistics.estimate(v, "iqm", config) for n, v in values.items()},
-        median_curve_episodes_to_learn=statistics.episodes_to_learn(
-            result.episode, result.curve.median, config
+        medians={name: statistics.estimate_median(v) for name, v in values.items()},
+        median_curve_episodes_to_learn=measures.episodes_to_learn(
+            episode, result.curve.median, config
         ),
     )
+
+
+def _of_all(values: Iterable[float]) -> NDArray[np.float64]:
+    return np.fromiter(values, np.float64)

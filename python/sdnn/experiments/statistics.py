@@ -1,4 +1,4 @@
-"""Measures of a trial and statistics over trials.
+"""Statistics over trials.
 
 The spread that matters is the one between trials, so every interval here is a bootstrap over
 whole trials. Arrays of curves have the shape (n_trials, n_tests).
@@ -7,44 +7,35 @@ whole trials. Arrays of curves have the shape (n_trials, n_tests).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeasureConfig:
-    """Constants of the measures and intervals.
+class BootstrapConfig:
+    """Constants of the intervals.
 
     Parameters
     ----------
-    learned_steps
-        A test episode of at most this many steps is good: the paper's "within 10 steps".
-    learned_window
-        Consecutive test episodes whose median must be good for the task to count as learned.
-    final_window
-        Test episodes at the end of a trial over which its final state is measured.
     confidence
         Share of the bootstrap distribution inside an interval.
     n_resamples
         Resamples of the bootstrap.
-    bootstrap_seed
+    seed
         Seed of the bootstrap's own generator.
     """
 
-    learned_steps: float = 10.0
-    learned_window: int = 10
-    final_window: int = 50
     confidence: float = 0.95
     n_resamples: int = 10_000
-    bootstrap_seed: int = 2015
+    seed: int = 2015
 
 
-DEFAULT_MEASURES = MeasureConfig()
+DEFAULT_BOOTSTRAP = BootstrapConfig()
 
 
 @dataclass(frozen=True)
@@ -103,126 +94,8 @@ def learning_curve(episode: NDArray[np.int32], steps: ArrayLike) -> Curve:
     return Curve(episode, median, lower, upper)
 
 
-def episodes_to_learn(
-    episode: ArrayLike, steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES
-) -> float:
-    """Learning episodes until the task is learned; infinite if it never is (censored).
-
-    The task is learned at the first test episode that (1) takes at most `learned_steps` steps
-    and (2) begins `learned_window` consecutive test episodes whose median is at most
-    `learned_steps`. The result is the number of learning episodes done before that test.
-
-    (1) keeps failed tests just before the first good one from counting as learned already;
-    (2) keeps a single lucky test from counting. A later relapse does not undo learning. A window
-    that the trial's end cuts off does not count. The median of an even number of steps is the
-    mean of the middle two.
-
-    Parameters
-    ----------
-    episode : (n_tests,)
-        Learning episodes done before each test.
-    steps : (n_tests,)
-        Steps of each test episode.
-    config
-        Constants.
-
-    Examples
-    --------
-    >>> episode = 10 * np.arange(1, 13)
-    >>> episodes_to_learn(episode, [50, 50] + 10 * [7])
-    30.0
-    >>> episodes_to_learn(episode, 12 * [50])
-    inf
-    """
-    taken = np.asarray(steps, np.float64)
-    if taken.size < config.learned_window:
-        return math.inf
-    windows = sliding_window_view(taken, config.learned_window)
-    good = (np.median(windows, axis=1) <= config.learned_steps) & (
-        windows[:, 0] <= config.learned_steps
-    )
-    return float(np.asarray(episode)[int(np.argmax(good))]) if good.any() else math.inf
-
-
-def final_steps(steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES) -> float:
-    """Median steps over the last `final_window` test episodes, or over all if there are fewer.
-
-    Parameters
-    ----------
-    steps : (n_tests,)
-        Steps of each test episode.
-    config
-        Constants.
-
-    Examples
-    --------
-    >>> final_steps(100 * [50] + 50 * [4])
-    4.0
-    """
-    return float(np.median(np.asarray(steps, np.float64)[-config.final_window :]))
-
-
-def final_share_solved(solved: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES) -> float:
-    """Share solved of the last `final_window` test episodes, or of all if there are fewer.
-
-    Parameters
-    ----------
-    solved : (n_tests,)
-        Whether each test episode reached the goal.
-    config
-        Constants.
-
-    Examples
-    --------
-    >>> final_share_solved([False, True, True, True])
-    0.75
-    """
-    return float(np.mean(np.asarray(solved, np.float64)[-config.final_window :]))
-
-
-def interquartile_mean(values: ArrayLike, axis: int = -1) -> FloatArray:
-    """Mean of the middle half: floor(n / 4) values are dropped at each end.
-
-    Source: Agarwal et al. 2021; equal to ``scipy.stats.trim_mean(values, 0.25)``.
-
-    Parameters
-    ----------
-    values : (..., n)
-        One value per trial.
-    axis
-        Axis of the trials.
-
-    Examples
-    --------
-    >>> float(interquartile_mean([1, 2, 4, 1000]))
-    3.0
-    """
-    ordered = np.sort(np.moveaxis(np.asarray(values, np.float64), axis, -1), axis=-1)
-    n_values = ordered.shape[-1]
-    n_cut = n_values // 4
-    return np.asarray(ordered[..., n_cut : n_values - n_cut].mean(axis=-1))
-
-
-def median(values: ArrayLike, axis: int = -1) -> FloatArray:
-    """Median, the mean of the middle two for an even number of values.
-
-    Parameters
-    ----------
-    values : (..., n)
-        One value per trial; infinite values are allowed.
-    axis
-        Axis of the trials.
-    """
-    return np.asarray(np.median(np.asarray(values, np.float64), axis=axis))
-
-
-_STATISTICS = {"median": median, "iqm": interquartile_mean}
-
-
-def estimate(
-    values: ArrayLike, statistic: str = "median", config: MeasureConfig = DEFAULT_MEASURES
-) -> Estimate:
-    """Return a statistic over trials with its percentile bootstrap interval.
+def estimate_median(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTRAP) -> Estimate:
+    """Return the median over trials with its percentile bootstrap interval.
 
     Trials are drawn with replacement `n_resamples` times by a generator of its own, seeded anew
     at each call, so the interval depends on the values and `config` alone. Its ends are values
@@ -232,32 +105,87 @@ def estimate(
     ----------
     values : (n_trials,)
         One value per trial.
-    statistic
-        ``"median"`` or ``"iqm"``.
     config
         Constants.
 
     Raises
     ------
     ValueError
-        If there are no values or the statistic is unknown.
+        If there are no values.
 
     Examples
     --------
-    >>> estimate([4.0, 4.0, 4.0])
+    >>> estimate_median([4.0, 4.0, 4.0])
     Estimate(value=4.0, lower=4.0, upper=4.0)
     """
+    sample = _sample(values)
+    value = float(_median(sample))
+    if sample.size == 1:
+        return Estimate(value, math.nan, math.nan)
+    generator = np.random.default_rng(config.seed)
+    return _with_interval(value, _median(_resampled(sample, generator, config)), config)
+
+
+def estimate_contrast(
+    values: ArrayLike,
+    others: ArrayLike,
+    contrast: Callable[[FloatArray, FloatArray], FloatArray] = np.subtract,
+    config: BootstrapConfig = DEFAULT_BOOTSTRAP,
+) -> Estimate:
+    """Compare the medians of two groups of trials; both are resampled, each for itself.
+
+    Parameters
+    ----------
+    values : (n_trials,)
+        One finite value per trial of the first group.
+    others : (n_other_trials,)
+        One finite value per trial of the second group.
+    contrast
+        What is made of both medians: their difference, or another function of two arrays.
+    config
+        Constants.
+
+    Raises
+    ------
+    ValueError
+        If a group has no values or one that is not finite.
+
+    Examples
+    --------
+    >>> estimate_contrast([7.0, 7.0], [4.0, 4.0, 4.0])
+    Estimate(value=3.0, lower=3.0, upper=3.0)
+    """
+    first, second = _sample(values), _sample(others)
+    if not (np.isfinite(first).all() and np.isfinite(second).all()):
+        raise ValueError("compared values must be finite; cap censored ones first")
+    value = float(contrast(_median(first), _median(second)))
+    if min(first.size, second.size) == 1:
+        return Estimate(value, math.nan, math.nan)
+    generator = np.random.default_rng(config.seed)
+    resampled = [_median(_resampled(sample, generator, config)) for sample in (first, second)]
+    return _with_interval(value, contrast(*resampled), config)
+
+
+def _sample(values: ArrayLike) -> FloatArray:
     sample = np.asarray(values, np.float64)
     if sample.ndim != 1 or sample.size == 0:
         raise ValueError(f"values must be one per trial, got shape {sample.shape}")
-    if statistic not in _STATISTICS:
-        raise ValueError(f"statistic must be one of {list(_STATISTICS)}, got {statistic!r}")
-    function = _STATISTICS[statistic]
-    value = float(function(sample))
-    if sample.size == 1:
-        return Estimate(value, math.nan, math.nan)
-    generator = np.random.default_rng(config.bootstrap_seed)
-    chosen = generator.integers(sample.size, size=(config.n_resamples, sample.size))
+    return sample
+
+
+def _median(values: FloatArray) -> FloatArray:
+    """Medians over the last axis, the mean of the middle two for an even number of values."""
+    return np.asarray(np.median(values, axis=-1))
+
+
+def _resampled(
+    sample: FloatArray, generator: np.random.Generator, config: BootstrapConfig
+) -> FloatArray:
+    """Resamples of a group, (n_resamples, n_trials)."""
+    return sample[generator.integers(sample.size, size=(config.n_resamples, sample.size))]
+
+
+def _with_interval(value: float, distribution: FloatArray, config: BootstrapConfig) -> Estimate:
     tail = (1 - config.confidence) / 2
-    lower, upper = np.quantile(function(sample[chosen]), (tail, 1 - tail), method="inverted_cdf")
+    lower, upper = np.quantile(distribution, (tail, 1 - tail), method="inverted_cdf")
     return Estimate(value, float(lower), float(upper))

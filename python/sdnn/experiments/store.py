@@ -1,4 +1,4 @@
-"""One SQLite file that holds every finished trial, each written in one transaction.
+"""One SQLite file that holds every finished trial and measurement, each in one transaction.
 
 The file survives a kill at any instant (write-ahead log, full synchronization): a trial is in it
 as a whole or not at all. Trials under different settings live side by side under different keys.
@@ -6,6 +6,7 @@ as a whole or not at all. Trials under different settings live side by side unde
 
 from __future__ import annotations
 
+import json
 import sqlite3
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -14,11 +15,12 @@ from types import TracebackType
 
 import numpy as np
 
+from sdnn.experiments.cost import CostKey, CostRecord, StepTimes
 from sdnn.experiments.errors import StoreError
 from sdnn.experiments.records import TrialKey, TrialRecord, TrialRows, records_digest
 
 STORE_NAME = "results.sqlite"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 APPLICATION_ID = int.from_bytes(b"sdnn", "big")
 """Marks a SQLite file as ours (SQLite's header field of that name)."""
 BUSY_SECONDS = 60.0
@@ -43,6 +45,12 @@ CREATE VIEW labelled_rows AS
   SELECT case_id, agent, trial, seed, config_hash, version,
          episode, steps, episode_return, solved
   FROM rows JOIN trials ON trials.id = rows.trial_id;
+CREATE TABLE costs (
+  series TEXT NOT NULL, n_inputs INTEGER NOT NULL, config_hash TEXT NOT NULL,
+  version TEXT NOT NULL, machine TEXT NOT NULL, finished_at TEXT NOT NULL,
+  n_steps INTEGER NOT NULL, table_bytes INTEGER NOT NULL, microseconds TEXT NOT NULL,
+  PRIMARY KEY (series, n_inputs, config_hash)
+) WITHOUT ROWID;
 """
 
 
@@ -57,8 +65,8 @@ class ResultStore:
     Raises
     ------
     StoreError
-        If the folder is a file, or the file in it is damaged, of another program or of a newer
-        version of this one. Such a file is left as it is.
+        If the folder is a file, or the file in it is damaged, of another program or of another
+        version of this one's schema. Such a file is left as it is.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -208,6 +216,42 @@ class ResultStore:
             rows=rows,
         )
 
+    def add_cost(self, record: CostRecord) -> None:
+        """Store a measurement; one that another process stored first stays.
+
+        Raises
+        ------
+        StoreError
+            If the file cannot be written.
+        """
+        times = record.times
+        with _as_store_error(self.path), self._connection as connection:
+            connection.execute(
+                "INSERT OR IGNORE INTO costs (series, n_inputs, config_hash, version, machine,"
+                " finished_at, n_steps, table_bytes, microseconds)"
+                " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                (
+                    *record.key,
+                    record.version,
+                    record.machine,
+                    record.finished_at,
+                    times.n_steps,
+                    times.table_bytes,
+                    json.dumps(times.microseconds.tolist()),
+                ),
+            )
+
+    def load_costs(self, config_hash: str) -> tuple[CostRecord, ...]:
+        """Return the measurements under the given settings, sorted by key."""
+        with _as_store_error(self.path):
+            found = self._connection.execute(
+                "SELECT series, n_inputs, config_hash, version, machine, finished_at, n_steps,"
+                " table_bytes, microseconds FROM costs WHERE config_hash = ?"
+                " ORDER BY series, n_inputs",
+                (config_hash,),
+            ).fetchall()
+            return tuple(_cost_record(*row) for row in found)
+
     def content_digest(self, keys: Iterable[TrialKey] | None = None) -> str:
         """SHA-256 of the stored results, to compare runs.
 
@@ -215,6 +259,24 @@ class ResultStore:
         the version, so runs with other jobs, interruptions or order agree.
         """
         return records_digest(self.load(keys))
+
+
+def _cost_record(
+    series: str, n_inputs: int, config_hash: str, version: str, machine: str, finished_at: str,
+    n_steps: int, table_bytes: int, microseconds: str,
+) -> CostRecord:  # fmt: skip
+    times = StepTimes(
+        microseconds=np.array(json.loads(microseconds), np.float64),
+        n_steps=n_steps,
+        table_bytes=table_bytes,
+    )
+    return CostRecord(
+        key=CostKey(series, n_inputs, config_hash),
+        version=version,
+        machine=machine,
+        finished_at=finished_at,
+        times=times,
+    )
 
 
 @contextmanager
@@ -254,10 +316,11 @@ def _inspect(path: Path) -> bool:
             raise StoreError(
                 f"{path} is a SQLite file of another program; choose another output folder"
             )
-        if version > SCHEMA_VERSION:
+        if version != SCHEMA_VERSION:
+            age = "a newer" if version > SCHEMA_VERSION else "an older"
             raise StoreError(
-                f"{path} has schema version {version}, written by a newer sdnn;"
-                f" this one reads up to {SCHEMA_VERSION}"
+                f"{path} has schema version {version}, written by {age} sdnn;"
+                f" this one reads {SCHEMA_VERSION}: choose another output folder"
             )
         findings = connection.execute("PRAGMA integrity_check").fetchall()
         if findings != [("ok",)]:

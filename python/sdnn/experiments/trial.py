@@ -47,8 +47,13 @@ def make_core_trial(config: TrialConfig, seed: int) -> Trial:
     """
     from sdnn import _core
 
-    trial: Trial = _core.AcrobotTrial(
-        network=config.network.to_core(),
+    kind = {
+        "sdnn-c": _core.AcrobotTrial,
+        "fql": _core.FuzzyAcrobotTrial,
+        "rbfn": _core.RbfAcrobotTrial,
+    }[config.agent]
+    trial: Trial = kind(
+        approximator=config.approximator.to_core(),
         learning=config.learning.to_core(),
         acrobot=config.acrobot.to_core(),
         goal=config.goal.to_core(),

@@ -130,13 +130,13 @@ def test_a_python_loop_reproduces_the_compiled_trial(kind, n_sensors, noise):
     }
     if kind == "fuzzy":
         trial = _core.FuzzyAcrobotTrial(
-            rules=FuzzyRulesConfig(n_inputs=n_sensors).to_core(),
+            approximator=FuzzyRulesConfig(n_inputs=n_sensors).to_core(),
             learning=FuzzyQLearningConfig().to_core(),
             **common,
         )
     else:
         trial = _core.RbfAcrobotTrial(
-            network=RBFNetworkConfig(n_inputs=n_sensors).to_core(),
+            approximator=RBFNetworkConfig(n_inputs=n_sensors).to_core(),
             learning=QLearningConfig().to_core(),
             **common,
         )
@@ -310,7 +310,7 @@ def test_an_rbf_network_cuts_a_box_evenly():
 # A figure of the paper's: it is learned within about 100 episodes without noise.
 def test_fuzzy_q_learning_swings_up_without_noise():
     trial = _core.FuzzyAcrobotTrial(
-        rules=_core.FuzzyRulesConfig(),
+        approximator=_core.FuzzyRulesConfig(),
         learning=_core.FuzzyQLearningConfig(),
         acrobot=_core.AcrobotConfig(),
         goal=_core.GoalScheduleConfig(),

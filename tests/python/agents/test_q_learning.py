@@ -167,7 +167,7 @@ def python_trial(*, n_sensors, noise, n_episodes, test_interval, seed):
 def test_a_python_loop_reproduces_the_compiled_trial(n_sensors, noise):
     n_episodes, test_interval, seed = 60, 5, 11
     trial = _core.AcrobotTrial(
-        network=SDNNCConfig(n_inputs=n_sensors).to_core(),
+        approximator=SDNNCConfig(n_inputs=n_sensors).to_core(),
         learning=QLearningConfig().to_core(),
         acrobot=AcrobotConfig().to_core(),
         goal=GoalScheduleConfig().to_core(),

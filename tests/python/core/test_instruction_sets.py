@@ -26,7 +26,7 @@ def restore():
 
 def short_trial(n_inputs, noise):
     return _core.AcrobotTrial(
-        network=_core.SdnnCConfig(n_inputs=n_inputs),
+        approximator=_core.SdnnCConfig(n_inputs=n_inputs),
         learning=_core.QLearningConfig(),
         acrobot=_core.AcrobotConfig(),
         goal=_core.GoalScheduleConfig(),

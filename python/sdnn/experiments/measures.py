@@ -1,0 +1,189 @@
+"""Measures of one trial: a number for each, from its test episodes alone.
+
+Arrays hold one value per test episode, (n_tests,). The measures were fixed before the data of the
+noisy cases were seen.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import ArrayLike, NDArray
+
+MeasureName = Literal[
+    "episodes_to_learn", "early_steps", "episode_of_collapse", "final_steps", "final_share_solved"
+]
+
+@dataclass(frozen=True, kw_only=True)
+class MeasureConfig:
+    """Constants of the measures.
+
+    Parameters
+    ----------
+    good_steps
+        A test episode of at most this many steps is good: the paper's "within 10 steps".
+    learned_window
+        Consecutive test episodes whose median must be good for the task to count as learned.
+    early_episodes
+        Learning episodes that count as early: a third of the way to the paper's 7,500.
+    stable_window
+        Consecutive test episodes whose median must be good for the task to count as mastered.
+    final_window
+        Test episodes at the end of a trial over which its final state is measured.
+    """
+
+    good_steps: float = 10.0
+    learned_window: int = 10
+    early_episodes: int = 2_500
+    stable_window: int = 50
+    final_window: int = 50
+
+
+DEFAULT_MEASURES = MeasureConfig()
+
+
+def _medians_of_windows(steps: ArrayLike, window: int) -> NDArray[np.float64]:
+    """Medians of all runs of `window` tests, (n_tests - window + 1,), or (0,) if there are none."""
+    taken = np.asarray(steps, np.float64)
+    if taken.size < window:
+        return np.empty(0)
+    return np.asarray(np.median(sliding_window_view(taken, window), axis=1))
+
+
+def episodes_to_learn(
+    episode: ArrayLike, steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES
+) -> float:
+    """Learning episodes until the task is learned; infinite if it never is (censored).
+
+    The task is learned at the first test episode that (1) takes at most `good_steps` steps
+    and (2) begins `learned_window` consecutive test episodes whose median is at most
+    `good_steps`. The result is the number of learning episodes done before that test.
+
+    (1) keeps failed tests just before the first good one from counting as learned already;
+    (2) keeps a single lucky test from counting. A later relapse does not undo learning. A window
+    that the trial's end cuts off does not count. The median of an even number of steps is the
+    mean of the middle two.
+
+    Parameters
+    ----------
+    episode : (n_tests,)
+        Learning episodes done before each test.
+    steps : (n_tests,)
+        Steps of each test episode.
+    config
+        Constants.
+
+    Examples
+    --------
+    >>> episode = 10 * np.arange(1, 13)
+    >>> episodes_to_learn(episode, [50, 50] + 10 * [7])
+    30.0
+    >>> episodes_to_learn(episode, 12 * [50])
+    inf
+    """
+    medians = _medians_of_windows(steps, config.learned_window)
+    first = np.asarray(steps, np.float64)[: medians.size]
+    good = (medians <= config.good_steps) & (first <= config.good_steps)
+    return float(np.asarray(episode)[int(np.argmax(good))]) if good.any() else math.inf
+
+
+def early_steps(
+    episode: ArrayLike, steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES
+) -> float:
+    """Median steps over the test episodes after at most `early_episodes` learning episodes.
+
+    Parameters
+    ----------
+    episode : (n_tests,)
+        Learning episodes done before each test.
+    steps : (n_tests,)
+        Steps of each test episode.
+    config
+        Constants.
+
+    Examples
+    --------
+    >>> early_steps([1000, 2000, 3000], [4, 6, 50])
+    5.0
+    """
+    early = np.asarray(episode) <= config.early_episodes
+    return float(np.median(np.asarray(steps, np.float64)[early]))
+
+
+def episode_of_collapse(
+    episode: ArrayLike, steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES
+) -> float:
+    """Learning episodes after which the task is not mastered any more; infinite if it still is.
+
+    The task is mastered in every run of `stable_window` consecutive test episodes whose median is
+    at most `good_steps`. The result is the number of learning episodes done before the last test of
+    the last such run. It is infinite (censored) if that is the trial's last test: the trial ended
+    before a collapse. It is 0 if there is no such run: there was nothing to collapse. Relapses that
+    are mended later do not count, so the measure is the time until which the agent can do the task.
+
+    Parameters
+    ----------
+    episode : (n_tests,)
+        Learning episodes done before each test.
+    steps : (n_tests,)
+        Steps of each test episode.
+    config
+        Constants.
+
+    Examples
+    --------
+    >>> episode = 10 * np.arange(1, 201)
+    >>> episode_of_collapse(episode, 100 * [4] + 100 * [50])
+    1240.0
+    >>> episode_of_collapse(episode, 100 * [50] + 100 * [4])
+    inf
+    >>> episode_of_collapse(episode, 200 * [50])
+    0.0
+    """
+    mastered = _medians_of_windows(steps, config.stable_window) <= config.good_steps
+    if not mastered.any():
+        return 0.0
+    last = int(np.flatnonzero(mastered)[-1])
+    if last == mastered.size - 1:
+        return math.inf
+    return float(np.asarray(episode)[last + config.stable_window - 1])
+
+
+def final_steps(steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES) -> float:
+    """Median steps over the last `final_window` test episodes, or over all if there are fewer.
+
+    Parameters
+    ----------
+    steps : (n_tests,)
+        Steps of each test episode.
+    config
+        Constants.
+
+    Examples
+    --------
+    >>> final_steps(100 * [50] + 50 * [4])
+    4.0
+    """
+    return float(np.median(np.asarray(steps, np.float64)[-config.final_window :]))
+
+
+def final_share_solved(solved: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES) -> float:
+    """Share solved of the last `final_window` test episodes, or of all if there are fewer.
+
+    Parameters
+    ----------
+    solved : (n_tests,)
+        Whether each test episode reached the goal.
+    config
+        Constants.
+
+    Examples
+    --------
+    >>> final_share_solved([False, True, True, True])
+    0.75
+    """
+    return float(np.mean(np.asarray(solved, np.float64)[-config.final_window :]))
