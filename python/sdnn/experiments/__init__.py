@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from sdnn.experiments.cost import CostConfig, CostRecord
     from sdnn.experiments.engine import Observer, run_trials
     from sdnn.experiments.errors import ExperimentError, PlotUnavailableError, StoreError
-    from sdnn.experiments.figures import draw_cost, draw_experiment, save_figure
+    from sdnn.experiments.cost_figure import draw_cost
+    from sdnn.experiments.figures import draw_experiment
     from sdnn.experiments.measures import MeasureConfig
     from sdnn.experiments.plan import PlannedTrial, plan_trials
     from sdnn.experiments.records import TrialKey, TrialRecord, TrialRows
@@ -31,7 +32,8 @@ _HOMES = {
     "cost": ("CostConfig", "CostRecord"),
     "engine": ("Observer", "run_trials"),
     "errors": ("ExperimentError", "PlotUnavailableError", "StoreError"),
-    "figures": ("draw_cost", "draw_experiment", "save_figure"),
+    "cost_figure": ("draw_cost",),
+    "figures": ("draw_experiment",),
     "measures": ("MeasureConfig",),
     "plan": ("PlannedTrial", "plan_trials"),
     "records": ("TrialKey", "TrialRecord", "TrialRows"),
@@ -74,7 +76,6 @@ __all__ = [
     "make_core_trial",
     "plan_trials",
     "run_trials",
-    "save_figure",
     "select_experiments",
     "summarize",
     "trial_seed",

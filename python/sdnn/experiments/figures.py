@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib.util import find_spec
-from pathlib import Path
+from io import BytesIO
 from typing import TYPE_CHECKING
 
 from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, Experiment, agent_title
@@ -28,10 +28,10 @@ START_EPISODES = 500
 _PANEL_HEIGHT = 3.3
 _START_HEIGHT = 1.9
 
-_AGENT_COLORS = ("#1f5a96", "#c2542d", "#3c7d4b")
-_WARNING_COLOR = "#a31515"
-_INK = "#2b2b2b"
-_FAINT = "#6f6f6f"
+SERIES_COLORS = ("#1f5a96", "#c2542d", "#3c7d4b", "#7a5195")
+WARNING_COLOR = "#a31515"
+INK = "#2b2b2b"
+FAINT = "#6f6f6f"
 
 
 def require_matplotlib() -> None:
@@ -44,7 +44,7 @@ def require_matplotlib() -> None:
     """
     if find_spec("matplotlib") is None:
         raise PlotUnavailableError(
-            'figures need matplotlib, which is not installed: pip install "sdnn[plot]"'
+            'figures need matplotlib, which is not installed: pip install "sdnn[reproduce]"'
         )
 
 
@@ -87,19 +87,18 @@ def draw_experiment(
     panels = grid[:: len(heights)].ravel()
     starts = grid[1::2].ravel() if with_start else None
     agents = list(dict.fromkeys(result.agent for result in results))
-    colors = {agent: _AGENT_COLORS[i % len(_AGENT_COLORS)] for i, agent in enumerate(agents)}
+    colors = {agent: SERIES_COLORS[i % len(SERIES_COLORS)] for i, agent in enumerate(agents)}
     for number, (case, axes) in enumerate(zip(experiment.cases, panels, strict=False)):
         shown = [result for result in results if result.case == case]
-        letter = f"({'abcdefgh'[number]})  " if len(experiment.cases) > 1 else ""
-        axes.set_title(f"{letter}{case.title}", fontsize=10.5, loc="left", color=_INK)
-        axes.set_title(f"paper: {case.paper_figure}", fontsize=8, loc="right", color=_FAINT)
+        axes.set_title(case.title, fontsize=10.5, loc="left", color=INK)
+        axes.set_title(f"paper: {case.paper_figure}", fontsize=8, loc="right", color=FAINT)
         _draw_case(axes, shown, colors)
         if number % n_columns == 0:
             axes.set_ylabel("steps per test episode")
         if with_start or number >= len(experiment.cases) - n_columns:
             axes.set_xlabel("learning episodes")
         if quick:
-            _watermark(axes)
+            watermark(axes)
         if starts is not None:
             _draw_start(starts[number], shown, colors)
         if len(agents) > 1:
@@ -111,28 +110,15 @@ def draw_experiment(
     return figure
 
 
-def save_figure(figure: Figure, stem: Path) -> tuple[Path, Path]:
-    """Write a figure as PNG and SVG; the same rows give the same bytes.
-
-    Parameters
-    ----------
-    figure
-        What to write.
-    stem
-        Path without suffix.
-
-    Returns
-    -------
-    tuple of Path
-        The PNG and the SVG.
-    """
+def figure_bytes(figure: Figure) -> tuple[bytes, bytes]:
+    """Return a figure as PNG and as SVG; the same rows give the same bytes."""
     from matplotlib import rc_context
 
-    png, svg = stem.with_name(stem.name + ".png"), stem.with_name(stem.name + ".svg")
+    png, svg = BytesIO(), BytesIO()
     with rc_context({"svg.hashsalt": "sdnn"}):
-        figure.savefig(png, dpi=200, metadata={"Software": None})
-        figure.savefig(svg, metadata={"Date": None})
-    return png, svg
+        figure.savefig(png, format="png", dpi=200, metadata={"Software": None})
+        figure.savefig(svg, format="svg", metadata={"Date": None})
+    return png.getvalue(), svg.getvalue()
 
 
 def _draw_curves(axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str]) -> None:
@@ -156,7 +142,7 @@ def _draw_case(axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str]) 
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
     axes.grid(axis="y", color="#e4e4e4", linewidth=0.7)
     axes.set_axisbelow(True)
-    axes.tick_params(colors=_INK, labelsize=8.5)
+    axes.tick_params(colors=INK, labelsize=8.5)
     axes.spines[["top", "right"]].set_visible(False)
 
 
@@ -164,7 +150,7 @@ def _draw_start(axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str])
     _draw_case(axes, shown, colors)
     axes.set_xlim(0, START_EPISODES)
     axes.set_title(
-        f"the first {START_EPISODES} learning episodes", fontsize=8.5, loc="left", color=_FAINT
+        f"the first {START_EPISODES} learning episodes", fontsize=8.5, loc="left", color=FAINT
     )
 
 
@@ -173,10 +159,11 @@ def _is_long(results: Sequence[CaseResult]) -> bool:
     return max(int(result.episode[-1]) for result in results) >= 4 * START_EPISODES
 
 
-def _watermark(axes: Axes) -> None:
+def watermark(axes: Axes) -> None:
+    """Write across a panel that it is a quick look."""
     axes.text(
         0.5, 0.6, "quick", transform=axes.transAxes, ha="center", va="center",
-        fontsize=44, color=_WARNING_COLOR, alpha=0.13, weight="bold", zorder=0,
+        fontsize=44, color=WARNING_COLOR, alpha=0.13, weight="bold", zorder=0,
     )  # fmt: skip
 
 
@@ -190,18 +177,19 @@ def _label(
     n_episodes = max(int(result.episode[-1]) for result in results)
     scale = f"{trials} {'trial' if trials == '1' else 'trials'} x {n_episodes:,} episodes"
     paper_scale = f"{PAPER_TRIALS} x {PAPER_EPISODES:,}"
-    figure.text(0.012, 1 - 0.13 / height, experiment.title, fontsize=12, va="top", color=_INK)
+    figure.text(0.012, 1 - 0.13 / height, experiment.title, fontsize=12, va="top", color=INK)
     if quick or counts[0] < PAPER_TRIALS or n_episodes < PAPER_EPISODES:
         what = "QUICK LOOK, not the result" if quick else "smaller than the paper's experiment"
         figure.text(
             0.012, 1 - 0.36 / height, f"{what}: {scale} instead of {paper_scale}",
-            fontsize=9, va="top", color=_WARNING_COLOR,
+            fontsize=9, va="top", color=WARNING_COLOR,
         )  # fmt: skip
-    hashes = ", ".join(f"{r.case.id}/{r.agent} {r.config_hash[:8]}" for r in results)
+    hashes = [f"{r.case.id}/{r.agent} {r.config_hash[:8]}" for r in results]
+    lines = [", ".join(hashes[i : i + 4]) for i in range(0, len(hashes), 4)]
     versions = ", ".join(sorted({rec.version for res in results for rec in res.records}))
     figure.text(
         0.012, 0.07 / height,
         f"Line: median over trials; band: quartiles. {scale} per case and agent."
-        f"\nsdnn {versions}; configuration {hashes}",
-        fontsize=6.5, va="bottom", color=_FAINT, linespacing=1.4,
+        f"\nsdnn {versions}; configuration " + ",\n".join(lines),
+        fontsize=6.5, va="bottom", color=FAINT, linespacing=1.4,
     )  # fmt: skip

@@ -1,43 +1,48 @@
-"""Tables of measures beside the paper's claims: on the screen, as Markdown and as JSON."""
+"""What a run gave, as tables: on the screen, as Markdown and as JSON."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from sdnn.experiments.cases import (
-    PAPER_EPISODES,
-    PAPER_TRIALS,
-    Claim,
-    Experiment,
-    MeasureName,
-    agent_title,
-)
+from sdnn.experiments.cases import PAPER_EPISODES, Experiment
+from sdnn.experiments.claims import ClaimOutcome, describe, judge_claims
+from sdnn.experiments.cost import CostRecord
+from sdnn.experiments.measures import MeasureName
+from sdnn.experiments.records import TrialRecord
 from sdnn.experiments.results import CaseSummary
 from sdnn.experiments.statistics import Estimate
+from sdnn.experiments.tables import (
+    CASE_HEADER,
+    CLAIM_HEADER,
+    COST_NOTE,
+    MEASURES,
+    NOTE,
+    case_rows,
+    claim_rows,
+    cost_header,
+    cost_rows,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-HOLDS = "holds"
-OPEN = "open: the interval includes the limit"
-FAILS = "not supported"
-NOT_JUDGED = f"not judged: needs {PAPER_TRIALS} trials x {PAPER_EPISODES:,} episodes"
+QUICK_WARNING = "A quick look at a fraction of the experiments, not their result."
 
-CASE_HEADER = (
-    "case",
-    "agent",
-    "trials",
-    "episodes to learn",
-    "of the median curve",
-    "final steps",
-    "final solved",
-    "decisions",
-    "us/decision",
-)
-CLAIM_HEADER = ("claim", "the paper says", "case", "agent", "ours", "verdict")
+
+ROW_HEADER = (
+    "case", "agent", "trial", "seed", "config_hash", "version", "episode", "steps",
+    "episode_return", "solved",
+)  # fmt: skip
+"""Columns of the file of all test episodes."""
+
+COST_ROW_HEADER = (
+    "series", "n_inputs", "round", "microseconds", "n_steps", "table_bytes", "version", "machine"
+)  # fmt: skip
+"""Columns of the file of all rounds of cost measurements."""
 
 
 @dataclass(frozen=True)
@@ -56,162 +61,195 @@ class ExperimentReport:
     summaries: tuple[CaseSummary, ...]
 
 
-def format_estimate(estimate: Estimate, measure: MeasureName, n_episodes: int) -> str:
-    """Write an estimate with its interval; what is censored becomes ``>n_episodes``.
+@dataclass(frozen=True)
+class Report:
+    """Everything that tables and pages are made of.
 
-    Examples
-    --------
-    >>> format_estimate(Estimate(120.0, 90.0, math.inf), "episodes_to_learn", 15000)
-    '120 [90, >15000]'
+    Parameters
+    ----------
+    experiments
+        Those of which every trial is there.
+    costs
+        Measured costs; none if they were not measured.
+    quick
+        Whether this is a look at a fraction.
+    seed
+        Root of all seeds.
+    version
+        Version of the library that made the report.
+    digest
+        Digest of the experiments' rows.
     """
 
-    def number(value: float) -> str:
-        if math.isinf(value):
-            return f">{n_episodes}"
-        return f"{100 * value:.0f} %" if measure == "final_share_solved" else f"{value:g}"
+    experiments: tuple[ExperimentReport, ...]
+    costs: tuple[CostRecord, ...]
+    quick: bool
+    seed: int
+    version: str
+    digest: str
 
-    if math.isnan(estimate.lower):
-        return number(estimate.value)
-    return f"{number(estimate.value)} [{number(estimate.lower)}, {number(estimate.upper)}]"
+    @cached_property
+    def claims(self) -> tuple[ClaimOutcome, ...]:
+        """The claims that these results speak about."""
+        return judge_claims([s for e in self.experiments for s in e.summaries], self.costs)
 
+    @property
+    def last_episode(self) -> int:
+        """Learning episodes of a trial."""
+        episodes = [s.result.last_episode for e in self.experiments for s in e.summaries]
+        return max(episodes, default=PAPER_EPISODES)
 
-def is_paper_scale(summary: CaseSummary) -> bool:
-    """Whether there are as many trials and episodes as in the paper, so that claims are judged."""
-    return summary.result.n_trials >= PAPER_TRIALS and summary.result.episode[-1] >= PAPER_EPISODES
+    def tables(self) -> list[tuple[str, Sequence[str], Sequence[Sequence[str]]]]:
+        """Title, header and rows of every table."""
+        tables: list[tuple[str, Sequence[str], Sequence[Sequence[str]]]] = [
+            (report.experiment.title, CASE_HEADER, case_rows(report.summaries))
+            for report in self.experiments
+        ]
+        if self.costs:
+            tables.append(("Cost of a step", cost_header(), cost_rows(self.costs)))
+        claims = claim_rows(self.claims, self.last_episode)
+        return [*tables, ("Beside the paper's claims", CLAIM_HEADER, claims)]
 
-
-def judge(claim: Claim, summary: CaseSummary) -> str:
-    """Say whether a case supports a claim.
-
-    It holds if the whole interval is at most the limit, is not supported if the whole interval is
-    above it, and is open otherwise. Runs smaller than the paper's are not judged.
-    """
-    if not is_paper_scale(summary):
-        return NOT_JUDGED
-    estimate = summary.medians[claim.measure]
-    if estimate.upper <= claim.limit:
-        return HOLDS
-    return FAILS if estimate.lower > claim.limit else OPEN
-
-
-def case_rows(report: ExperimentReport) -> list[tuple[str, ...]]:
-    """Rows of the table of measures, under `CASE_HEADER`."""
-    rows: list[tuple[str, ...]] = []
-    for summary in report.summaries:
-        result = summary.result
-        last = int(result.episode[-1])
-        on_curve = Estimate(summary.median_curve_episodes_to_learn, math.nan, math.nan)
-        rows.append(
-            (
-                result.case.title,
-                agent_title(result.agent),
-                str(result.n_trials),
-                format_estimate(summary.medians["episodes_to_learn"], "episodes_to_learn", last),
-                format_estimate(on_curve, "episodes_to_learn", last),
-                format_estimate(summary.medians["final_steps"], "final_steps", last),
-                format_estimate(summary.medians["final_share_solved"], "final_share_solved", last),
-                f"{result.n_decisions:,}",
-                f"{result.microseconds_per_decision:.1f}",
-            )
-        )
-    return rows
+    def notes(self) -> list[str]:
+        """What the tables mean."""
+        notes = []
+        if self.experiments:
+            notes += [NOTE, *(f"{n.replace('_', ' ')}: {text}." for n, text in MEASURES.items())]
+        return [*notes, COST_NOTE] if self.costs else notes
 
 
-def claim_rows(report: ExperimentReport) -> list[tuple[str, ...]]:
-    """Rows of the table of claims, under `CLAIM_HEADER`."""
-    return [
-        (
-            str(claim.number),
-            claim.text,
-            summary.result.case.title,
-            agent_title(summary.result.agent),
-            format_estimate(
-                summary.medians[claim.measure], claim.measure, int(summary.result.episode[-1])
-            ),
-            judge(claim, summary),
-        )
-        for claim in report.experiment.claims
-        for summary in report.summaries
-    ]
-
-
-NOTES = (
-    "Medians over trials with 95 % bootstrap intervals over trials. Episodes to learn: first test"
-    " episode of at most 10 steps that begins ten tests in a row with a median of at most 10."
-    " Final: over the last 50 test episodes. us/decision: processor time of sensing, choosing,"
-    " physics and learning."
-)
-
-
-def print_report(reports: Sequence[ExperimentReport], console: Console, *, quick: bool) -> None:
+def print_report(report: Report, console: Console) -> None:
     """Print the tables."""
     from rich import box
     from rich.table import Table
 
-    for report in reports:
-        title = report.experiment.title + (" (QUICK LOOK, not the result)" if quick else "")
-        for name, header, rows in (
-            (title, CASE_HEADER, case_rows(report)),
-            ("Beside the paper's claims", CLAIM_HEADER, claim_rows(report)),
-        ):
-            table = Table(title=name, title_justify="left", box=box.SIMPLE_HEAD)
-            for column in header:
-                table.add_column(column)
-            for row in rows:
-                table.add_row(*row)
-            console.print(table)
-    console.print(NOTES, style="dim", highlight=False)
+    for title, header, rows in report.tables():
+        mark = " (QUICK LOOK, not the result)" if report.quick else ""
+        table = Table(title=title + mark, title_justify="left", box=box.SIMPLE_HEAD)
+        for column in header:
+            table.add_column(column)
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
+    for note in report.notes():
+        console.print(note, style="dim", highlight=False)
 
 
-def to_markdown(reports: Sequence[ExperimentReport], *, quick: bool, footer: str) -> str:
+def to_markdown(report: Report) -> str:
     """Write the tables as Markdown."""
 
-    def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-        lines = ["| " + " | ".join(row) + " |" for row in (header, *rows)]
-        return [lines[0], "|" + "---|" * len(header), *lines[1:], ""]
+    def line(cells: Sequence[str]) -> str:
+        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
-    lines = []
-    for report in reports:
-        lines += [f"# {report.experiment.title}", ""]
-        if quick:
-            lines += ["**A quick look at a fraction of the experiment, not its result.**", ""]
-        lines += table(CASE_HEADER, case_rows(report))
-        lines += ["Beside the paper's claims:", "", *table(CLAIM_HEADER, claim_rows(report))]
-    return "\n".join([*lines, NOTES, "", footer, ""])
+    lines = ["# The paper's experiments", ""]
+    if report.quick:
+        lines += [f"**{QUICK_WARNING}**", ""]
+    for title, header, rows in report.tables():
+        lines += [f"## {title}", "", line(header), "|" + "---|" * len(header)]
+        lines += [*map(line, rows), ""]
+    lines += [f"- {note}" for note in report.notes()]
+    lines += [
+        "",
+        f"Root seed {report.seed}; digest of the rows {report.digest[:16]}; sdnn {report.version}.",
+        "",
+    ]
+    return "\n".join(lines)
 
 
-def to_json(reports: Sequence[ExperimentReport], *, quick: bool) -> dict[str, Any]:
+def trial_rows(records: Iterable[TrialRecord]) -> Iterator[tuple[object, ...]]:
+    """All test episodes of trials, each once, under `ROW_HEADER`."""
+    for record in records:
+        key, rows = record.key, record.rows
+        start = (key.case_id, key.agent, key.trial, key.seed, key.config_hash, record.version)
+        columns = (rows.episode, rows.steps, rows.episode_return, rows.solved.astype(int))
+        for row in zip(*(column.tolist() for column in columns), strict=True):
+            yield (*start, *row)
+
+
+def round_rows(costs: Iterable[CostRecord]) -> Iterator[tuple[object, ...]]:
+    """All rounds of cost measurements under `COST_ROW_HEADER`."""
+    for cost in costs:
+        end = (cost.times.n_steps, cost.times.table_bytes, cost.version, cost.machine)
+        for number, microseconds in enumerate(cost.microseconds.tolist()):
+            yield (cost.key.series, cost.key.n_inputs, number, microseconds, *end)
+
+
+def to_json(report: Report) -> dict[str, Any]:
     """Return the tables as values that JSON can hold.
 
     A censored value is the text ``">n"`` with n the last episode; an interval that one trial
     cannot give is null.
     """
+    last = report.last_episode
     return {
-        "quick": quick,
+        "quick": report.quick,
+        "seed": report.seed,
+        "version": report.version,
+        "digest": report.digest,
         "experiments": [
             {
-                "id": report.experiment.id,
-                "title": report.experiment.title,
-                "cases": [_summary_json(summary) for summary in report.summaries],
-                "claims": [dict(zip(CLAIM_HEADER, row, strict=True)) for row in claim_rows(report)],
+                "id": one.experiment.id,
+                "title": one.experiment.title,
+                "cases": [_summary_json(summary) for summary in one.summaries],
             }
-            for report in reports
+            for one in report.experiments
+        ],
+        "costs": [
+            {
+                "series": cost.key.series,
+                "n_inputs": cost.key.n_inputs,
+                "microseconds": cost.microseconds.tolist(),
+                "n_steps": cost.times.n_steps,
+                "table_bytes": cost.times.table_bytes,
+                "machine": cost.machine,
+                "version": cost.version,
+            }
+            for cost in report.costs
+        ],
+        "claims": [
+            {
+                "number": outcome.claim.number,
+                "text": outcome.claim.text,
+                "verdict": outcome.verdict.value,
+                "checks": [
+                    {
+                        "measured": describe(checked.check.quantity),
+                        "paper": checked.check.paper,
+                        "at_least": _number(checked.check.at_least, None),
+                        "at_most": _number(checked.check.at_most, None),
+                        "ours": None
+                        if checked.estimate is None
+                        else _estimate_json(checked.estimate, last),
+                        "verdict": checked.verdict.value,
+                    }
+                    for checked in outcome.checks
+                ],
+            }
+            for outcome in report.claims
         ],
     }
 
 
+def _number(value: float, last_episode: int | None) -> float | str | None:
+    if math.isnan(value) or (math.isinf(value) and last_episode is None):
+        return None
+    return f">{last_episode}" if math.isinf(value) else value
+
+
+def _estimate_json(estimate: Estimate, last_episode: int) -> dict[str, float | str | None]:
+    ends = {"value": estimate.value, "lower": estimate.lower, "upper": estimate.upper}
+    return {name: _number(value, last_episode) for name, value in ends.items()}
+
+
 def _summary_json(summary: CaseSummary) -> dict[str, Any]:
     result = summary.result
-    last = int(result.episode[-1])
+    last = result.last_episode
 
-    def number(value: float) -> float | str | None:
-        if math.isnan(value):
-            return None
-        return f">{last}" if math.isinf(value) else value
-
-    def numbers(estimate: Estimate) -> dict[str, float | str | None]:
-        ends = {"value": estimate.value, "lower": estimate.lower, "upper": estimate.upper}
-        return {name: number(value) for name, value in ends.items()}
+    def measure(name: MeasureName) -> dict[str, Any]:
+        return {
+            "trials": [_number(float(value), last) for value in summary.values[name]],
+            "median": _estimate_json(summary.medians[name], last),
+        }
 
     return {
         "case": result.case.id,
@@ -223,15 +261,8 @@ def _summary_json(summary: CaseSummary) -> dict[str, Any]:
         "seeds": [record.key.seed for record in result.records],
         "n_trials": result.n_trials,
         "last_episode": last,
-        "measures": {
-            name: {
-                "trials": [number(float(value)) for value in summary.values[name]],
-                "median": numbers(summary.medians[name]),
-                "iqm": numbers(summary.iqms[name]),
-            }
-            for name in summary.values
-        },
-        "median_curve_episodes_to_learn": number(summary.median_curve_episodes_to_learn),
+        "measures": {name: measure(name) for name in summary.values},
+        "median_curve_episodes_to_learn": _number(summary.median_curve_episodes_to_learn, last),
         "n_decisions": result.n_decisions,
-        "microseconds_per_decision": number(result.microseconds_per_decision),
+        "microseconds_per_decision": _number(result.microseconds_per_decision, None),
     }

@@ -1,0 +1,175 @@
+"""The report as one self-contained HTML page: figures, tables, settings and seeds.
+
+Jinja is an extra and is imported when it is needed.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+
+from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, agent_title
+from sdnn.experiments.claims import Verdict
+from sdnn.experiments.errors import PlotUnavailableError
+from sdnn.experiments.report import QUICK_WARNING, Report
+from sdnn.experiments.tables import (
+    CASE_HEADER,
+    CLAIM_HEADER,
+    COST_NOTE,
+    MEASURES,
+    NOTE,
+    case_rows,
+    claim_rows,
+    cost_header,
+    cost_rows,
+)
+
+_TEMPLATE = "report.html.jinja"
+
+_KINDS = {
+    Verdict.HOLDS: "good",
+    Verdict.FAILS: "bad",
+    Verdict.UNDECIDED: "open",
+    Verdict.NOT_JUDGED: "none",
+    Verdict.NOT_RUN: "none",
+}
+"""How the page shows a verdict."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Call:
+    """The call of the command that made the page.
+
+    Parameters
+    ----------
+    machine
+        Processor and instruction set.
+    seconds
+        Wall time.
+    n_run
+        Trials it ran.
+    n_planned
+        Trials it needed.
+    processor_seconds
+        Processor time of all trials on the page.
+    """
+
+    machine: str
+    seconds: float
+    n_run: int
+    n_planned: int
+    processor_seconds: float
+
+    def describe(self) -> str:
+        """Say how long it took."""
+        of_trials = f"Processor time of the trials shown: {_duration(self.processor_seconds)}."
+        if self.n_run < self.n_planned:
+            return (
+                f"{of_trials} {self.n_planned - self.n_run} of {self.n_planned} trials were stored"
+                " before the call that made this page."
+            )
+        return f"Everything asked for was run in {_duration(self.seconds)}. {of_trials}"
+
+
+def require_jinja() -> None:
+    """Check that the page can be made.
+
+    Raises
+    ------
+    PlotUnavailableError
+        If Jinja is not installed.
+    """
+    if find_spec("jinja2") is None:
+        raise PlotUnavailableError(
+            'the report needs Jinja, which is not installed: pip install "sdnn[reproduce]"'
+        )
+
+
+def to_html(report: Report, pictures: Mapping[str, bytes], call: Call) -> str:
+    """Make the page.
+
+    Parameters
+    ----------
+    report
+        The results.
+    pictures
+        SVG of each figure, by the name of its file without suffix.
+    call
+        How it came about.
+
+    Raises
+    ------
+    PlotUnavailableError
+        If Jinja is not installed.
+    """
+    require_jinja()
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("sdnn.experiments", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    summaries = [summary for one in report.experiments for summary in one.summaries]
+    verdicts = {verdict.value: kind for verdict, kind in _KINDS.items()}
+    return environment.get_template(_TEMPLATE).render(
+        report=report,
+        call=call,
+        warning=QUICK_WARNING,
+        is_paper_scale=all(summary.result.is_paper_scale for summary in summaries),
+        paper_scale=f"{PAPER_TRIALS} trials x {PAPER_EPISODES:,} episodes",
+        n_claims={
+            kind: sum(_KINDS[outcome.verdict] == kind for outcome in report.claims)
+            for kind in ("good", "bad", "open", "none")
+        },
+        sections=[
+            {
+                "title": one.experiment.title,
+                "picture": _data_url(pictures[f"experiment-{one.experiment.id}"]),
+                "rows": case_rows(one.summaries),
+            }
+            for one in report.experiments
+        ],
+        cost_picture=_data_url(pictures["cost"]) if report.costs else None,
+        cost_header=cost_header(),
+        cost_rows=cost_rows(report.costs),
+        case_header=CASE_HEADER,
+        claim_header=CLAIM_HEADER,
+        claim_rows=claim_rows(report.claims, report.last_episode),
+        kind_of=verdicts,
+        measures={name.replace("_", " "): text for name, text in MEASURES.items()},
+        note=NOTE,
+        cost_note=COST_NOTE,
+        settings=[
+            {
+                "title": f"{agent_title(summary.result.agent)}, {summary.result.case.title}",
+                "hash": summary.result.config_hash,
+                "seeds": [record.key.seed for record in summary.result.records],
+                "versions": sorted({record.version for record in summary.result.records}),
+                "config": json.dumps(json.loads(summary.result.records[0].config), indent=2),
+            }
+            for summary in summaries
+        ],
+    )
+
+
+def _data_url(svg: bytes) -> str:
+    """Put a picture into the page: its names then cannot clash with those of another."""
+    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode()
+
+
+def _duration(seconds: float) -> str:
+    """Write a time for a reader.
+
+    Examples
+    --------
+    >>> _duration(61.4)
+    '1 min 1 s'
+    """
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"

@@ -1,0 +1,182 @@
+"""Rows of the tables, the same for screen, Markdown, JSON and HTML: every cell is a text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from sdnn.experiments.cases import agent_title
+from sdnn.experiments.claims import ClaimOutcome, Growth, Quantity, describe
+from sdnn.experiments.cost import SERIES, CostRecord
+from sdnn.experiments.measures import DEFAULT_MEASURES, MeasureName
+from sdnn.experiments.results import CaseSummary
+from sdnn.experiments.statistics import DEFAULT_BOOTSTRAP, Estimate
+
+CASE_HEADER = (
+    "case",
+    "agent",
+    "trials",
+    "episodes to learn",
+    "early steps",
+    "episode of collapse",
+    "final steps",
+    "final share solved",
+    "decisions",
+    "us/decision",
+)
+CLAIM_HEADER = ("claim", "the paper says", "measured", "paper", "ours", "verdict")
+
+MEASURES: dict[MeasureName, str] = {
+    "episodes_to_learn": (
+        f"learning episodes before the first test of at most {DEFAULT_MEASURES.good_steps:g} steps"
+        f" that begins {DEFAULT_MEASURES.learned_window} tests in a row with a median of at most"
+        f" {DEFAULT_MEASURES.good_steps:g}"
+    ),
+    "early_steps": (
+        "median steps of the tests in the first"
+        f" {DEFAULT_MEASURES.early_episodes:,} learning episodes"
+    ),
+    "episode_of_collapse": (
+        f"learning episodes before the end of the last {DEFAULT_MEASURES.stable_window} tests in a"
+        f" row with a median of at most {DEFAULT_MEASURES.good_steps:g} steps: until then the agent"
+        " can do the task; censored (> the last episode) if it still can at the end"
+    ),
+    "final_steps": f"median steps of the last {DEFAULT_MEASURES.final_window} tests",
+    "final_share_solved": (
+        f"share of the last {DEFAULT_MEASURES.final_window} tests that reach the goal"
+    ),
+}
+"""What the measures mean, for a reader."""
+
+NOTE = (
+    f"Medians over trials with {100 * DEFAULT_BOOTSTRAP.confidence:.0f} % bootstrap intervals over"
+    " trials. us/decision: processor time of sensing, choosing, physics and learning."
+)
+
+COST_NOTE = (
+    "Median time of a step (acting in a new random state and learning the transition to it, without"
+    " the environment) with the quartiles of rounds, and how often longer than with one input less."
+)
+
+
+def format_estimate(estimate: Estimate, measure: MeasureName, last_episode: int) -> str:
+    """Write an estimate with its interval; what is censored becomes ``>last_episode``.
+
+    Examples
+    --------
+    >>> format_estimate(Estimate(120.0, 90.0, math.inf), "episodes_to_learn", 15000)
+    '120 [90, >15000]'
+    """
+
+    def number(value: float) -> str:
+        if math.isinf(value):
+            return f">{last_episode}"
+        return f"{100 * value:.0f} %" if measure == "final_share_solved" else f"{value:g}"
+
+    if math.isnan(estimate.lower):
+        return number(estimate.value)
+    return f"{number(estimate.value)} [{number(estimate.lower)}, {number(estimate.upper)}]"
+
+
+def case_rows(summaries: Sequence[CaseSummary]) -> list[tuple[str, ...]]:
+    """Rows of the table of measures, under `CASE_HEADER`."""
+    rows: list[tuple[str, ...]] = []
+    for summary in summaries:
+        result = summary.result
+        measured = (
+            format_estimate(summary.medians[name], name, result.last_episode) for name in MEASURES
+        )
+        rows.append(
+            (
+                result.case.title,
+                agent_title(result.agent),
+                str(result.n_trials),
+                *measured,
+                f"{result.n_decisions:,}",
+                f"{result.microseconds_per_decision:.1f}",
+            )
+        )
+    return rows
+
+
+def claim_rows(outcomes: Sequence[ClaimOutcome], last_episode: int) -> list[tuple[str, ...]]:
+    """Rows of the table of claims, under `CLAIM_HEADER`.
+
+    A claim of several checks has a row of its own, with the verdict about all, before theirs.
+    """
+    rows: list[tuple[str, ...]] = []
+    for outcome in outcomes:
+        start: tuple[str, str] = (str(outcome.claim.number), outcome.claim.text)
+        if len(outcome.checks) > 1:
+            rows.append((*start, "", "", "", outcome.verdict.value))
+            start = ("", "")
+        for checked in outcome.checks:
+            quantity = checked.check.quantity
+            ours = (
+                "-"
+                if checked.estimate is None
+                else _format_quantity(quantity, checked.estimate, last_episode)
+            )
+            rows.append(
+                (*start, describe(quantity), checked.check.paper, ours, checked.verdict.value)
+            )
+    return rows
+
+
+def _format_quantity(quantity: Quantity, estimate: Estimate, last_episode: int) -> str:
+    if isinstance(quantity, Growth):
+        return _growth(estimate.value) + (
+            "" if math.isnan(estimate.lower)
+            else f" [{_growth(estimate.lower)}, {_growth(estimate.upper)}]"
+        )  # fmt: skip
+    return format_estimate(estimate, quantity.measure, last_episode)
+
+
+def _growth(ratio: float) -> str:
+    return f"{ratio:.1f}x" if ratio < 100 else f"{ratio:,.0f}x"
+
+
+def cost_header() -> tuple[str, ...]:
+    """Header of the table of costs: a column for each series."""
+    return ("inputs", *(series.title for series in SERIES), "FQL's table")
+
+
+def cost_rows(costs: Sequence[CostRecord]) -> list[tuple[str, ...]]:
+    """Rows of the table of costs, one for each number of inputs, under `cost_header`."""
+    by_key = {(cost.key.series, cost.key.n_inputs): cost for cost in costs}
+    rows: list[tuple[str, ...]] = []
+    for n_inputs in sorted({cost.key.n_inputs for cost in costs}):
+        cells = [str(n_inputs)]
+        for series in SERIES:
+            cost = by_key.get((series.id, n_inputs))
+            cells.append(
+                "-" if cost is None else _cost(cost, by_key.get((series.id, n_inputs - 1)))
+            )
+        table = by_key.get(("fql", n_inputs))
+        cells.append("-" if table is None else _size(table.times.table_bytes))
+        rows.append(tuple(cells))
+    return rows
+
+
+def _cost(cost: CostRecord, with_one_less: CostRecord | None) -> str:
+    lower, middle, upper = np.percentile(cost.microseconds, (25, 50, 75))
+    text = f"{_time(middle)} [{_time(lower)}, {_time(upper)}]"
+    if with_one_less is None:
+        return text
+    return f"{text}, {_growth(middle / float(np.median(with_one_less.microseconds)))}"
+
+
+def _time(microseconds: float) -> str:
+    for unit, size in (("s", 1e6), ("ms", 1e3)):
+        if microseconds >= size:
+            return f"{microseconds / size:.3g} {unit}"
+    return f"{microseconds:.3g} us"
+
+
+def _size(n_bytes: int) -> str:
+    for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if n_bytes >= size:
+            return f"{n_bytes / size:.3g} {unit}"
+    return f"{n_bytes} B"
