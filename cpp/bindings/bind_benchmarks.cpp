@@ -1,10 +1,14 @@
 #include <pybind11/numpy.h>
 
 #include "bindings.hpp"
+#include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/dynamic_sdnn_c.hpp"
+#include "sdnn/approximators/rbf_network.hpp"
+#include "sdnn/benchmarks/agent_steps.hpp"
 #include "sdnn/benchmarks/decisions.hpp"
 #include "sdnn/benchmarks/network_parts.hpp"
+#include "sdnn/benchmarks/plain_rbf_network.hpp"
 #include "sdnn/benchmarks/stopwatch.hpp"
 #include "sdnn/benchmarks/yardsticks.hpp"
 #include "sdnn/experiments/trial.hpp"
@@ -15,6 +19,7 @@ using benchmarks::AcrobotDecisions;
 using benchmarks::BufferRead;
 using benchmarks::DenseProduct;
 using benchmarks::NetworkParts;
+using benchmarks::PlainRbfNetwork;
 using Trial = experiments::AcrobotTrial<agents::QLearning<approximators::DynamicSdnnC>>;
 
 namespace {
@@ -28,6 +33,17 @@ py::array_t<std::int64_t> times_of(Measure&& measure) {
     times = measure();
   }
   return py::array_t<std::int64_t>(static_cast<py::ssize_t>(times.size()), times.data());
+}
+
+template <class Agent>
+void def_time_agent_steps(py::module_& module) {
+  module.def("time_agent_steps",
+             [](Agent& agent, int n_repetitions, std::uint64_t seed) {
+               return times_of(
+                   [&] { return benchmarks::time_agent_steps(agent, n_repetitions, seed); });
+             },
+             py::arg("agent"), py::arg("n_repetitions"), py::arg("seed"),
+             "The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)");
 }
 
 }  // namespace
@@ -88,4 +104,22 @@ void bind_benchmarks(py::module_& module) {
              },
              py::arg("trial"), py::arg("n_episodes"),
              "Advances a trial; nanoseconds of every decision in it");
+
+  using PlainRbfAgent = agents::QLearning<PlainRbfNetwork>;
+  py::class_<PlainRbfAgent>(module, "PlainRbfQLearning",
+                            "Q-learning with an RBF network evaluated without its product "
+                            "structure; only to be timed")
+      .def(py::init([](const approximators::RbfNetworkConfig& network,
+                       const agents::QLearningConfig& learning, std::uint64_t seed) {
+             return PlainRbfAgent(PlainRbfNetwork(network), learning, seed);
+           }),
+           py::kw_only(), py::arg("network"), py::arg("learning"), py::arg("seed"))
+      .def_property_readonly(
+          "network",
+          [](const PlainRbfAgent& agent) { return agent.action_value().network(); },
+          "A copy of the network");
+  def_time_agent_steps<agents::QLearning<approximators::DynamicSdnnC>>(module);
+  def_time_agent_steps<agents::FuzzyQLearning>(module);
+  def_time_agent_steps<agents::QLearning<approximators::RbfNetwork>>(module);
+  def_time_agent_steps<PlainRbfAgent>(module);
 }

@@ -986,6 +986,17 @@ class AcrobotDecisions:
     @property
     def n_integration_steps(self) -> int:
         ...
+class PlainRbfQLearning:
+    """
+    Q-learning with an RBF network evaluated without its product structure; only to be timed
+    """
+    def __init__(self, *, network: RbfNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def network(self) -> RbfNetwork:
+        """
+        A copy of the network
+        """
 def action_value(action: typing.SupportsInt | typing.SupportsIndex, n_actions: typing.SupportsInt | typing.SupportsIndex, low: typing.SupportsFloat | typing.SupportsIndex, high: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     The value of an action in a range cut evenly
@@ -1019,6 +1030,26 @@ def set_instruction_set(name: str) -> None:
 def sin_cos(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     (sin x, cos x), item by item
+    """
+@typing.overload
+def time_agent_steps(agent: SdnnQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
+    """
+@typing.overload
+def time_agent_steps(agent: FuzzyQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
+    """
+@typing.overload
+def time_agent_steps(agent: RbfQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
+    """
+@typing.overload
+def time_agent_steps(agent: PlainRbfQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """
 def time_decisions(trial: AcrobotTrial, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """

@@ -145,6 +145,44 @@ def test_times_of_the_core_are_nanoseconds_per_repetition():
         parts.time_corrections(1, 0)
 
 
+def make_agents(n_inputs, seed):
+    """One agent of every bound kind, by name."""
+    learning = _core.QLearningConfig()
+    rbf = _core.RbfNetworkConfig(n_inputs=n_inputs, n_actions=21)
+    rules = _core.FuzzyRulesConfig(n_inputs=n_inputs)
+    fuzzy = _core.FuzzyQLearningConfig()
+    network = _core.SdnnCConfig(n_inputs=n_inputs)
+    return {
+        "sdnn": _core.SdnnQLearning(network=network, learning=learning, seed=seed),
+        "fuzzy": _core.FuzzyQLearning(rules=rules, learning=fuzzy, seed=seed),
+        "rbf": _core.RbfQLearning(network=rbf, learning=learning, seed=seed),
+        "plain rbf": _core.PlainRbfQLearning(network=rbf, learning=learning, seed=seed),
+    }
+
+
+@pytest.mark.parametrize("kind", ["sdnn", "fuzzy", "rbf", "plain rbf"])
+def test_steps_of_every_agent_are_timed(kind):
+    agent = make_agents(3, 1)[kind]
+    times = _core.time_agent_steps(agent, 12, seed=1)
+    assert times.dtype == np.int64
+    assert times.shape == (12,)
+    assert (times > 0).all()
+    assert _core.time_agent_steps(agent, 0, seed=1).size == 0
+    with pytest.raises(ValueError, match="n_repetitions"):
+        _core.time_agent_steps(agent, -1, seed=1)
+
+
+def test_the_seed_decides_what_the_timed_agent_learns():
+    def weights(kind, seed):
+        agent = make_agents(2, 5)[kind]
+        _core.time_agent_steps(agent, 40, seed)
+        return agent.network.weights()
+
+    np.testing.assert_array_equal(weights("rbf", 1), weights("rbf", 1))
+    assert (weights("rbf", 1) != weights("rbf", 2)).any()
+    np.testing.assert_allclose(weights("plain rbf", 1), weights("rbf", 1), rtol=0, atol=1e-10)
+
+
 def test_machines_that_tell_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(machine, "_PROCESSOR_FILE", tmp_path / "none")
     monkeypatch.setattr(machine, "_CACHE_FOLDER", tmp_path / "none")

@@ -1,0 +1,126 @@
+#include "sdnn/benchmarks/agent_steps.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/q_learning.hpp"
+#include "sdnn/approximators/dynamic_sdnn_c.hpp"
+#include "sdnn/approximators/rbf_network.hpp"
+#include "sdnn/benchmarks/plain_rbf_network.hpp"
+
+namespace sdnn::benchmarks {
+namespace {
+
+using agents::FuzzyQLearning;
+using agents::QLearning;
+using approximators::DynamicSdnnC;
+using approximators::FuzzyRules;
+using approximators::RbfNetwork;
+using approximators::RbfNetworkConfig;
+
+/// Writes down what it is asked; its action is the number of acts before.
+class Witness {
+ public:
+  struct Learned {
+    std::vector<double> state;
+    int action;
+    double reward;
+    std::vector<double> next_state;
+  };
+
+  std::size_t n_inputs() const { return 2; }
+  void begin_episode() { calls += 'b'; }
+  int act(std::span<const double> state, bool explore) {
+    calls += explore ? 'a' : 'g';
+    states.emplace_back(state.begin(), state.end());
+    return static_cast<int>(states.size()) - 1;
+  }
+  double share(int) const { return 0.0; }
+  void learn(std::span<const double> state, int action, double reward,
+             std::span<const double> next_state, bool terminated) {
+    calls += terminated ? 't' : 'l';
+    learned.push_back({{state.begin(), state.end()}, action, reward,
+                       {next_state.begin(), next_state.end()}});
+  }
+
+  std::string calls;
+  std::vector<std::vector<double>> states;  ///< acted in
+  std::vector<Learned> learned;
+};
+
+TEST(TimeAgentSteps, AStepLearnsTheTransitionToANewStateAndActsThere) {
+  Witness witness;
+  const Times times = time_agent_steps(witness, 3, 5);
+  EXPECT_EQ(times.size(), 3U);
+  EXPECT_EQ(witness.calls, "balalala");
+  ASSERT_EQ(witness.learned.size(), 3U);
+  core::Random random(5, core::Stream::exploration);
+  for (double& value : witness.states[0]) EXPECT_EQ(value, random.uniform());
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto& learned = witness.learned[i];
+    EXPECT_EQ(learned.state, witness.states[i]);
+    EXPECT_EQ(learned.action, static_cast<int>(i));
+    EXPECT_EQ(learned.next_state, witness.states[i + 1]);
+    EXPECT_NE(learned.next_state, learned.state);
+    for (const double value : learned.next_state) EXPECT_EQ(value, random.uniform());
+    EXPECT_EQ(learned.reward, 2.0 * random.uniform() - 1.0);
+  }
+}
+
+TEST(TimeAgentSteps, ImpossibleNumbersAndNoRepetitionsLeaveTheAgentAlone) {
+  Witness witness;
+  EXPECT_THROW(time_agent_steps(witness, -1, 1), std::invalid_argument);
+  EXPECT_THROW(time_agent_steps(witness, kMaxRepetitions + 1, 1), std::invalid_argument);
+  EXPECT_TRUE(time_agent_steps(witness, 0, 1).empty());
+  EXPECT_EQ(witness.calls, "");
+}
+
+template <class Agent>
+void expect_times(Agent agent) {
+  const Times times = time_agent_steps(agent, 20, 1);
+  EXPECT_EQ(times.size(), 20U);
+  for (const auto time : times) EXPECT_GT(time, 0);
+}
+
+TEST(TimeAgentSteps, TimesEveryAgent) {
+  const RbfNetworkConfig rbf = {.n_inputs = 2, .n_actions = 21};
+  expect_times(QLearning<DynamicSdnnC>(
+      DynamicSdnnC({.n_inputs = 2, .n_pattern_units = 40, .n_hidden_units = 100,
+                    .n_active_units = 30}, 1), {}, 1));
+  expect_times(FuzzyQLearning(FuzzyRules({.n_inputs = 2}), {}, 1));
+  expect_times(QLearning<RbfNetwork>(RbfNetwork(rbf), {}, 1));
+  expect_times(QLearning<PlainRbfNetwork>(PlainRbfNetwork(rbf), {}, 1));
+}
+
+// Otherwise the memory of potentials would be what is timed.
+TEST(TimeAgentSteps, EveryStepOfALargeNetworkTakesAFullPass) {
+  QLearning<DynamicSdnnC> agent(DynamicSdnnC({.n_inputs = 6}, 1), {}, 1);
+  time_agent_steps(agent, 100, 1);
+  agent.action_value().visit([](const auto& network) {
+    EXPECT_GE(network.memory().counts().full, 98U);
+    EXPECT_LE(network.memory().counts().full, 101U);
+  });
+}
+
+TEST(TimeAgentSteps, PlainAndFactoredAgentsLearnTheSame) {
+  const RbfNetworkConfig rbf = {.n_inputs = 3};
+  QLearning<RbfNetwork> factored(RbfNetwork(rbf), {}, 1);
+  QLearning<PlainRbfNetwork> plain(PlainRbfNetwork(rbf), {}, 1);
+  time_agent_steps(factored, 200, 1);
+  time_agent_steps(plain, 200, 1);
+  const auto expected = factored.action_value().weights();
+  const auto weights = plain.action_value().network().weights();
+  EXPECT_GT(*std::ranges::max_element(expected), 0.1);
+  ASSERT_EQ(weights.size(), expected.size());
+  for (std::size_t j = 0; j < weights.size(); ++j) EXPECT_NEAR(weights[j], expected[j], 1e-10);
+}
+
+}  // namespace
+}  // namespace sdnn::benchmarks
