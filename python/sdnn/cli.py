@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
-from sdnn.experiments.cases import EXPERIMENTS, select_experiments
+from sdnn.experiments.cases import WORDS, includes_cost, select_experiments
 
 if TYPE_CHECKING:
     from sdnn.experiments.reproduce import ReproduceRequest, Reproduction
@@ -69,7 +69,7 @@ def main() -> None:
 
 
 @main.command()
-@click.argument("experiment", type=click.Choice([*(e.id for e in EXPERIMENTS), "all"]))
+@click.argument("experiment", type=click.Choice(WORDS), default="all")
 @click.option(
     "--trials",
     type=click.IntRange(min=1),
@@ -93,7 +93,7 @@ def main() -> None:
     type=click.Path(file_okay=False, path_type=Path),
     default=Path("results"),
     show_default=True,
-    help="Folder for the result file, figures and tables.",
+    help="Folder for the result file, figures, tables and report.html.",
 )
 @click.option(
     "--quick",
@@ -115,7 +115,10 @@ def reproduce(
     as_json: bool,
     dry_run: bool,
 ) -> None:
-    """Run one of the paper's experiments and draw its figure.
+    """Run the paper's experiments and write a report with its figures and claims.
+
+    a: redundant inputs. b: noisy inputs, against fuzzy Q-learning. cost: time of a step against the
+    number of inputs. all: everything, which is the default.
 
     Finished trials are kept in OUT/results.sqlite; the same command goes on where it stopped.
     """
@@ -124,6 +127,7 @@ def reproduce(
 
     request = ReproduceRequest(
         experiments=select_experiments(experiment),
+        cost=includes_cost(experiment),
         out=out,
         n_trials=trials,
         n_episodes=episodes,
@@ -139,7 +143,7 @@ def reproduce(
         if dry_run:
             _print_plan(request, as_json)
         else:
-            _finish(context, _run(request), out, quick, as_json)
+            _finish(context, _run(request), out, as_json)
     except (ExperimentError, OSError) as error:
         raise click.ClickException(str(error)) from error
     except KeyboardInterrupt:
@@ -172,12 +176,22 @@ def bench(quick: bool, as_json: bool) -> None:
 def _run(request: ReproduceRequest) -> Reproduction:
     from rich.console import Console
 
+    from sdnn.benchmarks.agent_cost import measure_steps
+    from sdnn.benchmarks.machine import processor
     from sdnn.experiments import trial
     from sdnn.experiments.progress import ProgressObserver
     from sdnn.experiments.reproduce import reproduce as run
+    from sdnn.instruction_sets import instruction_set
 
     with ProgressObserver(Console(stderr=True)) as observer:
-        return run(request, trial.make_core_trial, version=_library_version(), observer=observer)
+        return run(
+            request,
+            trial.make_core_trial,
+            measure_steps,
+            version=_library_version(),
+            machine=f"{processor()}, {instruction_set()}",
+            observer=observer,
+        )
 
 
 def _print_plan(request: ReproduceRequest, as_json: bool) -> None:
@@ -187,7 +201,7 @@ def _print_plan(request: ReproduceRequest, as_json: bool) -> None:
         {"case": case, "agent": agent, "planned": planned, "stored": stored}
         for (case, agent), (planned, stored) in count_stored(request).items()
     ]
-    n_episodes = request.plan()[0].config.protocol.n_learning_episodes
+    n_episodes = request.protocol().n_learning_episodes
     if as_json:
         click.echo(json.dumps({"n_learning_episodes": n_episodes, "trials": counts}, indent=2))
         return
@@ -198,9 +212,7 @@ def _print_plan(request: ReproduceRequest, as_json: bool) -> None:
         )
 
 
-def _finish(
-    context: click.Context, done: Reproduction, out: Path, quick: bool, as_json: bool
-) -> None:
+def _finish(context: click.Context, done: Reproduction, out: Path, as_json: bool) -> None:
     from rich.console import Console
 
     from sdnn.experiments.progress import describe
@@ -220,9 +232,10 @@ def _finish(
     if as_json:
         click.echo(json.dumps(done.table, indent=2))
         return
-    console = Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
-    print_report(done.reports, console, quick=quick)
-    click.echo(f"{stored} ({outcome.n_run} run now); wrote {', '.join(map(str, done.files))}")
+    if done.report is not None:
+        print_report(done.report, Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH))
+    page = next(str(file) for file in done.files if file.suffix == ".html")
+    click.echo(f"{stored} ({outcome.n_run} run now); wrote {len(done.files)} files: see {page}")
 
 
 def _exit_interrupted(context: click.Context, message: str) -> NoReturn:

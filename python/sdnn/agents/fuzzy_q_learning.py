@@ -118,6 +118,11 @@ class FuzzyQLearning:
         self._taken: tuple[float, float] | None = None  # the action as given away, and its share
 
     @property
+    def core(self) -> _core.FuzzyQLearning:
+        """The compiled agent, which shares all that is learned: states [0, 1], actions [-1, 1]."""
+        return self._core
+
+    @property
     def n_rules(self) -> int:
         """Number of rules, ``n_sets ** n_inputs``."""
         return self._core.rules.n_rules

@@ -61,6 +61,11 @@ class _QLearning:
     _actions: DiscreteActions | EvenActions
 
     @property
+    def core(self) -> _core.SdnnQLearning | _core.RbfQLearning:
+        """The compiled agent, which shares all that is learned: states in [0, 1], action indices."""
+        return self._core
+
+    @property
     def n_actions(self) -> int:
         """Number of actions the agent chooses from."""
         return self._core.network.n_actions

@@ -20,7 +20,7 @@ _MULTIPLES = {"K": 2**10, "M": 2**20, "G": 2**30}
 def describe_machine() -> Machine:
     """Describe this machine; what cannot be found out is "unknown" or left out."""
     return {
-        "processor": _processor(),
+        "processor": processor(),
         "system": f"{platform.system()} {platform.machine()}",
         "n_cores": _n_cores(),
         "caches": _caches(_CACHE_FOLDER),
@@ -30,7 +30,8 @@ def describe_machine() -> Machine:
     }
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Name of the processor, or "unknown"."""
     try:
         for line in _PROCESSOR_FILE.read_text().splitlines():
             name, _, value = line.partition(":")

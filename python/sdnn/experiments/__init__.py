@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from sdnn.experiments.claims import CLAIMS, Claim, judge_claims
     from sdnn.experiments.config import ProtocolConfig, TrialConfig, case_config, trial_seed
     from sdnn.experiments.cost import CostConfig, CostRecord
+    from sdnn.experiments.cost_figure import draw_cost
     from sdnn.experiments.engine import Observer, run_trials
     from sdnn.experiments.errors import ExperimentError, PlotUnavailableError, StoreError
-    from sdnn.experiments.cost_figure import draw_cost
     from sdnn.experiments.figures import draw_experiment
     from sdnn.experiments.measures import MeasureConfig
     from sdnn.experiments.plan import PlannedTrial, plan_trials

@@ -18,6 +18,7 @@ MeasureName = Literal[
     "episodes_to_learn", "early_steps", "episode_of_collapse", "final_steps", "final_share_solved"
 ]
 
+
 @dataclass(frozen=True, kw_only=True)
 class MeasureConfig:
     """Constants of the measures.
@@ -122,8 +123,9 @@ def episode_of_collapse(
     The task is mastered in every run of `stable_window` consecutive test episodes whose median is
     at most `good_steps`. The result is the number of learning episodes done before the last test of
     the last such run. It is infinite (censored) if that is the trial's last test: the trial ended
-    before a collapse. It is 0 if there is no such run: there was nothing to collapse. Relapses that
-    are mended later do not count, so the measure is the time until which the agent can do the task.
+    before a collapse. It is 0 if there is no such run: there was nothing to collapse; NaN if there are fewer
+    tests than in a run. Relapses that are mended later do not count, so the measure is the time
+    until which the agent can do the task.
 
     Parameters
     ----------
@@ -145,6 +147,8 @@ def episode_of_collapse(
     0.0
     """
     mastered = _medians_of_windows(steps, config.stable_window) <= config.good_steps
+    if mastered.size == 0:
+        return math.nan
     if not mastered.any():
         return 0.0
     last = int(np.flatnonzero(mastered)[-1])

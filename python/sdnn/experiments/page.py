@@ -21,6 +21,7 @@ from sdnn.experiments.tables import (
     COST_NOTE,
     MEASURES,
     NOTE,
+    RULE_NOTE,
     case_rows,
     claim_rows,
     cost_header,
@@ -144,6 +145,7 @@ def to_html(report: Report, pictures: Mapping[str, bytes], call: Call) -> str:
         kind_of=verdicts,
         measures={name.replace("_", " "): text for name, text in MEASURES.items()},
         note=NOTE,
+        rule_note=RULE_NOTE,
         cost_note=COST_NOTE,
         settings=[
             {

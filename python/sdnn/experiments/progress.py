@@ -54,6 +54,7 @@ class ProgressObserver(Observer):
         self._tasks: dict[TrialKey, TaskID] = {}
         self._done: dict[TrialKey, int] = {}
         self._total: TaskID | None = None
+        self._costs: TaskID | None = None
         self._n_open = 0
 
     def __enter__(self) -> ProgressObserver:
@@ -95,6 +96,16 @@ class ProgressObserver(Observer):
         """Close a trial's bar and count its episodes as passed."""
         self.advanced(planned, planned.config.protocol.n_learning_episodes)
         self._close(planned)
+
+    def costs_begun(self, n_missing: int) -> None:
+        """Open the bar of the costs."""
+        if n_missing:
+            self._costs = self._progress.add_task("cost of a step", total=n_missing)
+
+    def cost_measured(self, description: str) -> None:
+        """Move the bar of the costs."""
+        if self._costs is not None:
+            self._progress.update(self._costs, advance=1, description=f"cost: {description}")
 
     def _close(self, planned: PlannedTrial) -> None:
         self._progress.remove_task(self._tasks.pop(planned.key))

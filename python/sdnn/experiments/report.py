@@ -21,6 +21,7 @@ from sdnn.experiments.tables import (
     COST_NOTE,
     MEASURES,
     NOTE,
+    RULE_NOTE,
     case_rows,
     claim_rows,
     cost_header,
@@ -111,8 +112,8 @@ class Report:
         return [*tables, ("Beside the paper's claims", CLAIM_HEADER, claims)]
 
     def notes(self) -> list[str]:
-        """What the tables mean."""
-        notes = []
+        """Say what the tables mean."""
+        notes = [RULE_NOTE]
         if self.experiments:
             notes += [NOTE, *(f"{n.replace('_', ' ')}: {text}." for n, text in MEASURES.items())]
         return [*notes, COST_NOTE] if self.costs else notes

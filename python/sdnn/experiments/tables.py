@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sdnn.experiments.cases import agent_title
+from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, agent_title
 from sdnn.experiments.claims import ClaimOutcome, Growth, Quantity, describe
 from sdnn.experiments.cost import SERIES, CostRecord
 from sdnn.experiments.measures import DEFAULT_MEASURES, MeasureName
@@ -55,6 +55,13 @@ NOTE = (
     " trials. us/decision: processor time of sensing, choosing, physics and learning."
 )
 
+RULE_NOTE = (
+    "A line about a claim holds if the whole interval lies in the range that was written down before"
+    " the trials were run, does not hold if the whole interval lies outside on one side, and is"
+    f" undecided otherwise. Runs smaller than {PAPER_TRIALS} trials x {PAPER_EPISODES:,} episodes"
+    " are not judged."
+)
+
 COST_NOTE = (
     "Median time of a step (acting in a new random state and learning the transition to it, without"
     " the environment) with the quartiles of rounds, and how often longer than with one input less."
@@ -68,16 +75,19 @@ def format_estimate(estimate: Estimate, measure: MeasureName, last_episode: int)
     --------
     >>> format_estimate(Estimate(120.0, 90.0, math.inf), "episodes_to_learn", 15000)
     '120 [90, >15000]'
+    >>> format_estimate(Estimate(0.9, 0.8, 1.0), "final_share_solved", 15000)
+    '90 % [80, 100]'
     """
+    scale, unit = (100, " %") if measure == "final_share_solved" else (1, "")
 
     def number(value: float) -> str:
-        if math.isinf(value):
-            return f">{last_episode}"
-        return f"{100 * value:.0f} %" if measure == "final_share_solved" else f"{value:g}"
+        return f">{last_episode}" if math.isinf(value) else f"{round(scale * value, 1):g}"
 
+    if math.isnan(estimate.value):
+        return "-"
     if math.isnan(estimate.lower):
-        return number(estimate.value)
-    return f"{number(estimate.value)} [{number(estimate.lower)}, {number(estimate.upper)}]"
+        return number(estimate.value) + unit
+    return f"{number(estimate.value)}{unit} [{number(estimate.lower)}, {number(estimate.upper)}]"
 
 
 def case_rows(summaries: Sequence[CaseSummary]) -> list[tuple[str, ...]]:
