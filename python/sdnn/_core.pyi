@@ -846,7 +846,7 @@ class AcrobotTrial:
     """
     SDNN-C learns the acrobot swing-up
     """
-    def __init__(self, *, network: SdnnCConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, *, approximator: SdnnCConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
@@ -873,7 +873,7 @@ class FuzzyAcrobotTrial:
     """
     Fuzzy Q-learning learns the acrobot swing-up
     """
-    def __init__(self, *, rules: FuzzyRulesConfig, learning: FuzzyQLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, *, approximator: FuzzyRulesConfig, learning: FuzzyQLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
@@ -896,7 +896,7 @@ class RbfAcrobotTrial:
     """
     Q-learning with an RBF network learns the acrobot swing-up
     """
-    def __init__(self, *, network: RbfNetworkConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, *, approximator: RbfNetworkConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
         """

@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -44,7 +45,6 @@ def test_help_and_version(invoke):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["reproduce"], "Missing argument"),
         (["reproduce", "z"], "'z' is not one of"),
         (["reproduce", "a", "--trials", 0], "--trials"),
         (["reproduce", "a", "--trials", "many"], "--trials"),
@@ -70,6 +70,8 @@ def test_quick_run_writes_marked_files_and_one_summary_line(invoke, tmp_path):
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
         "experiment-a-quick.png",
         "experiment-a-quick.svg",
+        "report-quick.html",
+        "results-quick.csv",
         "results-quick.md",
         "results.sqlite",
         "table-quick.json",
@@ -79,6 +81,47 @@ def test_quick_run_writes_marked_files_and_one_summary_line(invoke, tmp_path):
     assert "not judged" in result.stdout
     assert "4 of 4 trials are stored in out (4 run now)" in result.stdout.splitlines()[-1]
     assert "(0 run now)" in invoke("reproduce", "a", "--quick", "--out", "out").stdout
+
+
+@pytest.fixture
+def no_costs(monkeypatch):
+    """Costs that take no time, and a list of what was asked."""
+    from sdnn.benchmarks import agent_cost
+    from sdnn.experiments.cost import StepTimes
+
+    asked = []
+
+    def measure(series, n_inputs, config):
+        asked.append((series.id, n_inputs))
+        times = float(n_inputs) * np.ones(config.n_rounds)
+        return StepTimes(microseconds=times, n_steps=1, table_bytes=1)
+
+    monkeypatch.setattr(agent_cost, "measure_steps", measure)
+    return asked
+
+
+def test_all_is_the_default_and_reuses_what_is_stored(invoke, tmp_path, no_costs):
+    invoke("reproduce", "a", "--quick", "--out", "out")
+    assert no_costs == []
+    result = invoke("reproduce", "--quick", "--out", "out")
+    assert "18 of 18 trials are stored in out (14 run now)" in result.stdout.splitlines()[-1]
+    assert len(no_costs) == 4 * 7
+    names = {p.name for p in (tmp_path / "out").iterdir()}
+    assert names >= {"experiment-b-quick.svg", "cost-quick.png", "cost-quick.csv"}
+    assert "(0 run now)" in invoke("reproduce", "--quick", "--out", "out").stdout
+    assert len(no_costs) == 4 * 7
+
+
+def test_report_covers_what_is_stored_not_only_what_was_asked(invoke, tmp_path, no_costs):
+    invoke("reproduce", "b", "--quick")
+    table = json.loads(invoke("reproduce", "cost", "--quick", "--json").stdout)
+    assert [experiment["id"] for experiment in table["experiments"]] == ["b"]
+    assert len(table["costs"]) == 4 * 7
+    assert [claim["number"] for claim in table["claims"]] == [1, 2, 3, 4, 5, 6, 7, 8, 9]
+    page = (tmp_path / "results" / "report-quick.html").read_text()
+    assert "Case IV" in page
+    rows = (tmp_path / "results" / "results-quick.csv").read_text().splitlines()
+    assert len(rows) == 1 + 4 * 2 * 2 * 30
 
 
 def test_results_do_not_depend_on_jobs(invoke):
@@ -137,7 +180,7 @@ def test_missing_matplotlib_is_one_clear_line(invoke, tmp_path, monkeypatch):
     monkeypatch.setattr("sdnn.experiments.figures.find_spec", lambda name: None)
     result = invoke("reproduce", "a", "--quick")
     assert result.exit_code == 1
-    assert 'pip install "sdnn[plot]"' in result.stderr
+    assert 'pip install "sdnn[reproduce]"' in result.stderr
     assert list(tmp_path.iterdir()) == []
 
 

@@ -62,7 +62,7 @@ class _QLearning:
 
     @property
     def core(self) -> _core.SdnnQLearning | _core.RbfQLearning:
-        """The compiled agent, which shares all that is learned: states in [0, 1], action indices."""
+        """The compiled agent, which shares all that is learned: states in [0, 1], indices."""
         return self._core
 
     @property

@@ -123,9 +123,9 @@ def episode_of_collapse(
     The task is mastered in every run of `stable_window` consecutive test episodes whose median is
     at most `good_steps`. The result is the number of learning episodes done before the last test of
     the last such run. It is infinite (censored) if that is the trial's last test: the trial ended
-    before a collapse. It is 0 if there is no such run: there was nothing to collapse; NaN if there are fewer
-    tests than in a run. Relapses that are mended later do not count, so the measure is the time
-    until which the agent can do the task.
+    before a collapse. It is 0 if there is no such run: there was nothing to collapse; NaN if there
+    are fewer tests than in a run. Relapses that are mended later do not count, so the measure is
+    the time until which the agent can do the task.
 
     Parameters
     ----------

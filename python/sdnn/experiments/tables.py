@@ -56,10 +56,10 @@ NOTE = (
 )
 
 RULE_NOTE = (
-    "A line about a claim holds if the whole interval lies in the range that was written down before"
-    " the trials were run, does not hold if the whole interval lies outside on one side, and is"
-    f" undecided otherwise. Runs smaller than {PAPER_TRIALS} trials x {PAPER_EPISODES:,} episodes"
-    " are not judged."
+    "A line about a claim holds if the whole interval lies in the range that was written down"
+    " before the trials were run, does not hold if the whole interval lies outside on one side, and"
+    " is undecided otherwise. Runs smaller than"
+    f" {PAPER_TRIALS} trials x {PAPER_EPISODES:,} episodes are not judged."
 )
 
 COST_NOTE = (

@@ -4,11 +4,16 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from sdnn.agents import FuzzyQLearningConfig
+from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig
+from sdnn.environments import SensorConfig
 from sdnn.experiments import (
     EXPERIMENTS,
+    Case,
     ProtocolConfig,
     TrialConfig,
     case_config,
+    make_core_trial,
     plan_trials,
     select_experiments,
     trial_seed,
@@ -23,7 +28,34 @@ def test_experiment_a_is_the_one_of_the_paper():
         ("s6", 6, 0.0),
     ]
     assert all(case.agents == ("sdnn-c",) for case in experiment.cases)
-    assert [claim.number for claim in experiment.claims] == [1, 2]
+
+
+def test_experiment_b_is_the_one_of_the_paper():
+    (experiment,) = select_experiments("b")
+    assert [(c.id, c.n_sensors, c.noise, c.paper_figure) for c in experiment.cases] == [
+        ("s4", 4, 0.0, "Fig. 5"),
+        ("s4-noise", 4, 0.02, "Fig. 6a"),
+        ("s5-noise", 5, 0.02, "Fig. 6b"),
+        ("s6-noise", 6, 0.02, "Fig. 6c"),
+    ]
+    assert all(case.agents == ("sdnn-c", "fql") for case in experiment.cases)
+    assert [e.id for e in select_experiments("all")] == ["a", "b"]
+    assert select_experiments("cost") == ()
+
+
+def test_all_of_the_paper_is_ninety_trials():
+    cases = [case for experiment in EXPERIMENTS for case in experiment.cases]
+    plan = plan_trials(cases, 10, 0)
+    # 20 of Experiment A and 80 of Experiment B, which share the 10 of SDNN-C in Case I.
+    assert len(plan) == 20 + 80 - 10
+
+
+def test_agents_of_a_case_meet_the_same_seeds():
+    (experiment,) = select_experiments("b")
+    seeds = {}
+    for planned in plan_trials(experiment.cases, 3, 0):
+        seeds.setdefault((planned.key.case_id, planned.key.trial), set()).add(planned.key.seed)
+    assert {len(found) for found in seeds.values()} == {1}
 
 
 def test_rows_that_share_an_id_observe_the_same():
@@ -66,8 +98,8 @@ def test_canonical_json_is_sorted_and_does_not_depend_on_how_numbers_are_typed()
 def test_config_hash_sees_every_room():
     base = TrialConfig()
     others = [
-        replace(base, agent="other"),
-        replace(base, network=replace(base.network, n_inputs=5)),
+        TrialConfig(agent="rbfn", approximator=RBFNetworkConfig(), learning=base.learning),
+        replace(base, approximator=replace(base.approximator, n_inputs=5)),
         replace(base, learning=replace(base.learning, discount=0.8)),
         replace(base, acrobot=replace(base.acrobot, gravity=9.81)),
         replace(base, goal=replace(base.goal, scale=50.0)),
@@ -81,10 +113,37 @@ def test_config_hash_sees_every_room():
 def test_case_config_fits_network_to_sensors():
     (experiment,) = select_experiments("a")
     config = case_config(experiment.cases[1], "sdnn-c")
-    assert config.network.n_inputs == config.sensors.n_sensors == 6
+    assert config.approximator.n_inputs == config.sensors.n_sensors == 6
     assert config.protocol == ProtocolConfig()
     with pytest.raises(ValueError, match="'fql'"):
         case_config(experiment.cases[1], "fql")
+
+
+def test_case_config_gives_every_agent_its_own_settings():
+    (experiment,) = select_experiments("b")
+    config = case_config(experiment.cases[2], "fql")
+    assert config.approximator == FuzzyRulesConfig(n_inputs=5)
+    assert config.learning == FuzzyQLearningConfig()
+    assert config.sensors == SensorConfig(n_sensors=5, noise=0.02)
+
+
+def test_settings_of_another_agent_are_refused():
+    with pytest.raises(ValueError, match="got 'dqn'"):
+        TrialConfig(agent="dqn")
+    with pytest.raises(TypeError, match="approximator of fql must be a FuzzyRulesConfig"):
+        TrialConfig(agent="fql")
+    with pytest.raises(TypeError, match="learning of fql must be a FuzzyQLearningConfig"):
+        TrialConfig(agent="fql", approximator=FuzzyRulesConfig())
+
+
+@pytest.mark.parametrize("agent", ["sdnn-c", "fql", "rbfn"])
+def test_every_agent_has_a_trial(agent):
+    case = Case("s5-noise", "", 5, 0.02, (agent,), "")
+    config = case_config(case, agent, ProtocolConfig(n_learning_episodes=10))
+    trial = make_core_trial(config, 1)
+    trial.advance(10)
+    assert trial.finished
+    assert trial.test_rows()["episode"].tolist() == [10]
 
 
 def test_trial_seed_follows_its_definition():

@@ -1,7 +1,9 @@
+import base64
 import json
 import math
 import re
 from dataclasses import replace
+from html import escape
 
 import numpy as np
 import pytest
@@ -12,24 +14,22 @@ from sdnn.experiments import (
     ResultStore,
     collect,
     draw_experiment,
-    save_figure,
     select_experiments,
     summarize,
 )
+from sdnn.experiments.figures import figure_bytes
+from sdnn.experiments.page import Call, to_html
 from sdnn.experiments.report import (
-    FAILS,
-    HOLDS,
-    NOT_JUDGED,
-    OPEN,
+    ROW_HEADER,
     ExperimentReport,
-    claim_rows,
-    format_estimate,
-    judge,
+    Report,
     to_json,
     to_markdown,
+    trial_rows,
 )
 from sdnn.experiments.reproduce import ReproduceRequest, reproduce
 from sdnn.experiments.statistics import Estimate
+from sdnn.experiments.tables import format_estimate
 
 (EXPERIMENT,) = select_experiments("a")
 
@@ -94,25 +94,23 @@ def test_figure_says_what_it_is(results):
     assert quick.count("quick") == 2  # a watermark in each panel
 
 
-def test_figure_files_are_whole_and_repeatable(results, tmp_path):
-    files = save_figure(draw_experiment(EXPERIMENT, results), tmp_path / "one.v1")
-    again = save_figure(draw_experiment(EXPERIMENT, results), tmp_path / "two")
-    assert [file.name for file in files] == ["one.v1.png", "one.v1.svg"]
-    assert files[0].read_bytes().startswith(b"\x89PNG")
-    assert files[1].read_text().rstrip().endswith("</svg>")
-    for first, second in zip(files, again, strict=True):
-        assert first.read_bytes() == second.read_bytes()
+def test_figures_are_repeatable_to_the_byte(results):
+    png, svg = figure_bytes(draw_experiment(EXPERIMENT, results))
+    assert png.startswith(b"\x89PNG")
+    assert svg.rstrip().endswith(b"</svg>")
+    assert (png, svg) == figure_bytes(draw_experiment(EXPERIMENT, results))
 
 
-def test_missing_matplotlib_is_told_before_any_trial(monkeypatch, tmp_path, fake):
-    monkeypatch.setattr("sdnn.experiments.figures.find_spec", lambda name: None)
+@pytest.mark.parametrize("module", ["figures", "page"])
+def test_missing_extra_is_told_before_any_trial(monkeypatch, tmp_path, module):
+    monkeypatch.setattr(f"sdnn.experiments.{module}.find_spec", lambda name: None)
 
     def make(config, seed):
         raise AssertionError("a trial was made")
 
     request = ReproduceRequest(experiments=(EXPERIMENT,), out=tmp_path / "out", quick=True)
-    with pytest.raises(PlotUnavailableError, match=re.escape('pip install "sdnn[plot]"')):
-        reproduce(request, make, version="0")
+    with pytest.raises(PlotUnavailableError, match=re.escape('pip install "sdnn[reproduce]"')):
+        reproduce(request, make, make, version="0", machine="m")
     assert not (tmp_path / "out").exists()
 
 
@@ -132,6 +130,8 @@ def test_summary_of_hand_made_trials(results):
     assert summary.values["episodes_to_learn"].tolist() == first_good
     assert summary.medians["episodes_to_learn"].value == np.median(first_good)
     assert summary.medians["final_share_solved"] == Estimate(1.0, 1.0, 1.0)
+    assert summary.medians["episode_of_collapse"] == Estimate(math.inf, math.inf, math.inf)
+    assert summary.uncensored("episode_of_collapse").tolist() == [3000.0] * 3
     assert summary.median_curve_episodes_to_learn == np.median(first_good)
     assert results[0].n_decisions == 3 * 7 * 3000
     assert results[0].microseconds_per_decision == pytest.approx(
@@ -139,36 +139,10 @@ def test_summary_of_hand_made_trials(results):
     )
 
 
-def scaled(summary, value, lower, upper, n_trials=10, last=15000):
-    """The same summary as if it came from trials of the paper's number and length."""
-    records = tuple(
-        replace(r, rows=replace(r.rows, episode=np.append(r.rows.episode[:-1], np.int32(last))))
-        for r in (summary.result.records * n_trials)[:n_trials]
-    )
-    medians = summary.medians | {"episodes_to_learn": Estimate(value, lower, upper)}
-    return replace(summary, result=replace(summary.result, records=records), medians=medians)
-
-
-@pytest.mark.parametrize(
-    ("interval", "verdict"),
-    [
-        ((100, 80, 150), HOLDS),
-        ((140, 120, 160), OPEN),
-        ((300, 160, math.inf), FAILS),
-    ],
-)
-def test_claims_are_judged_by_the_interval(results, interval, verdict):
-    claim = EXPERIMENT.claims[0]
-    summary = summarize(results[0])
-    assert judge(claim, scaled(summary, *interval)) == verdict
-    assert judge(claim, scaled(summary, *interval, n_trials=9)) == NOT_JUDGED
-    assert judge(claim, scaled(summary, *interval, last=14990)) == NOT_JUDGED
-
-
 def test_estimates_as_text():
     assert format_estimate(Estimate(4.0, 3.5, 5.0), "final_steps", 100) == "4 [3.5, 5]"
     assert format_estimate(Estimate(0.98, 0.9, 1.0), "final_share_solved", 100) == (
-        "98 % [90 %, 100 %]"
+        "98 % [90, 100]"
     )
     assert format_estimate(Estimate(math.inf, 90, math.inf), "episodes_to_learn", 15000) == (
         ">15000 [90, >15000]"
@@ -176,21 +150,77 @@ def test_estimates_as_text():
     assert format_estimate(Estimate(4.0, math.nan, math.nan), "final_steps", 100) == "4"
 
 
-def test_tables_hold_the_claims_and_valid_json(results):
-    report = ExperimentReport(EXPERIMENT, tuple(summarize(result) for result in results))
-    rows = claim_rows(report)
-    assert [(row[0], row[2]) for row in rows] == [
-        (number, case.title) for number in "12" for case in EXPERIMENT.cases
-    ]
-    never = replace(
-        report.summaries[0],
-        values=report.summaries[0].values | {"episodes_to_learn": np.array([math.inf])},
+@pytest.fixture
+def report(results):
+    summaries = tuple(summarize(result) for result in results)
+    return Report(
+        experiments=(ExperimentReport(EXPERIMENT, summaries),),
+        costs=(),
+        quick=False,
+        seed=0,
+        version="0.0.test",
+        digest="d" * 64,
     )
-    table = to_json([ExperimentReport(EXPERIMENT, (never,))], quick=True)
+
+
+def test_tables_hold_cases_and_claims(report):
+    (title, header, rows), (_, claim_header, claims) = report.tables()
+    assert title == EXPERIMENT.title
+    assert [row[0] for row in rows] == [case.title for case in EXPERIMENT.cases]
+    assert {len(row) for row in rows} == {len(header)}
+    assert {len(row) for row in claims} == {len(claim_header)}
+    assert [row[0] for row in claims if row[0]] == ["1", "2", "8"]
+    assert {row[-1] for row in claims} == {"not judged", "not run"}
+
+
+def test_json_is_valid_and_marks_what_is_censored(report):
+    (one,) = report.experiments
+    never = replace(
+        one.summaries[0],
+        values=one.summaries[0].values | {"episodes_to_learn": np.array([math.inf])},
+    )
+    table = to_json(replace(report, experiments=(replace(one, summaries=(never,)),)))
     text = json.dumps(table, allow_nan=False)
     (case,) = json.loads(text)["experiments"][0]["cases"]
     assert case["measures"]["episodes_to_learn"]["trials"] == [">3000"]
-    markdown = to_markdown([report], quick=True, footer="seed 0")
-    assert "not its result" in markdown
-    tables = [line for line in markdown.splitlines() if line.startswith("|")]
-    assert len(tables) == 2 * 2 + 2 + 4
+    assert json.loads(text)["claims"][0]["checks"][0]["at_most"] == 150
+    assert json.loads(text)["claims"][0]["checks"][0]["at_least"] is None
+
+
+def test_markdown_holds_the_tables(report):
+    markdown = to_markdown(replace(report, quick=True))
+    assert "not their result" in markdown
+    lines = [line for line in markdown.splitlines() if line.startswith("|")]
+    assert len(lines) == sum(2 + len(rows) for _, _, rows in report.tables())
+    assert "digest of the rows dddddddddddddddd" in markdown
+
+
+def test_row_files_hold_every_test_episode_once(report, results):
+    records = [record for result in results for record in result.records]
+    rows = [dict(zip(ROW_HEADER, row, strict=True)) for row in trial_rows(records)]
+    assert len(rows) == 2 * 3 * 300
+    assert len({(row["case"], row["trial"], row["episode"]) for row in rows}) == len(rows)
+    first = records[0].rows
+    assert rows[0]["steps"] == first.steps[0]
+    assert rows[0]["episode_return"] == first.episode_return[0]
+    assert rows[0]["solved"] in (0, 1)
+
+
+def test_page_is_one_file_with_everything(report):
+    picture = b"<svg xmlns='http://www.w3.org/2000/svg'/>"
+    call = Call(machine="a <machine>", seconds=61, n_run=6, n_planned=6, processor_seconds=7)
+    html = to_html(report, {"experiment-a": picture}, call)
+    assert html.startswith("<!doctype html>")
+    assert "data:image/svg+xml;base64," + base64.b64encode(picture).decode() in html
+    assert not re.search(r'(src|href)="(?!data:)', html)
+    assert "a &lt;machine&gt;" in html
+    assert "Everything asked for was run in 1 min 1 s" in html
+    assert "Smaller than the paper" in html
+    for _, header, rows in report.tables():
+        for cell in (*header, *(cell for row in rows for cell in row)):
+            assert escape(cell, quote=False).replace("&gt;", "&gt;") in html
+    for summary in report.experiments[0].summaries:
+        assert summary.result.config_hash in html
+        assert all(str(record.key.seed) in html for record in summary.result.records)
+    later = to_html(report, {"experiment-a": picture}, replace(call, n_run=2))
+    assert "4 of 6 trials were stored before" in later

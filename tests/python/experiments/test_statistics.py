@@ -3,65 +3,13 @@ import math
 import numpy as np
 import pytest
 
-from sdnn.experiments import MeasureConfig
 from sdnn.experiments.statistics import (
+    BootstrapConfig,
     Estimate,
-    episodes_to_learn,
-    estimate,
-    final_share_solved,
-    final_steps,
-    interquartile_mean,
+    estimate_contrast,
+    estimate_median,
     learning_curve,
 )
-
-
-def learned(steps):
-    return episodes_to_learn(10 * np.arange(1, len(steps) + 1), steps)
-
-
-def test_learned_at_the_first_test():
-    assert learned([10] * 10) == 10.0
-
-
-def test_never_learned_is_infinite():
-    assert learned([50] * 100) == math.inf
-    assert learned([11] * 100) == math.inf
-
-
-def test_failed_tests_before_the_first_good_one_do_not_count():
-    # From the third test on: 6 good of the 10 that begin there is enough for the median, but
-    # the windows that begin at failed tests do not count although their medians are good.
-    assert learned([50] * 4 + [7] * 20) == 50.0
-
-
-def test_median_of_an_even_window_is_the_mean_of_the_middle_two():
-    # 5 good and 5 failed: median (7 + 50) / 2 = 28.5; 6 good and 4 failed: 7.
-    assert learned([7] * 5 + [50] * 5) == math.inf
-    assert learned([7] * 6 + [50] * 4) == 10.0
-    assert learned([7] + [50] * 4 + [7] * 5) == 10.0
-
-
-def test_lucky_test_does_not_count_and_relapse_does_not_undo():
-    assert learned([50, 3] + [50] * 8 + [6] * 10 + [50] * 80) == 110.0
-
-
-def test_window_cut_off_by_the_end_does_not_count():
-    assert learned([50] * 5 + [5] * 9) == math.inf
-    assert learned([5] * 9) == math.inf
-
-
-def test_final_measures_use_the_last_fifty_tests():
-    steps = [3] * 100 + [50] * 24 + [4] * 26
-    assert final_steps(steps) == 4.0
-    assert final_share_solved([s < 50 for s in steps]) == 0.52
-    assert final_steps([8, 9]) == 8.5
-
-
-def test_interquartile_mean_drops_a_quarter_at_each_end():
-    assert interquartile_mean([100, 1, 2, 3, 4, 5, 6, -100]) == 3.5
-    assert interquartile_mean(range(10)) == np.mean([2, 3, 4, 5, 6, 7])
-    assert interquartile_mean([1.0, 5.0]) == 3.0
-    np.testing.assert_array_equal(interquartile_mean([[0, 1, 2, 9], [4, 4, 4, 4]]), [1.5, 4.0])
 
 
 def test_learning_curve_by_hand():
@@ -73,42 +21,62 @@ def test_learning_curve_by_hand():
 
 def test_bootstrap_of_two_values_is_exact():
     # Resamples of {0, 1}: medians 0, 1/2, 1 with probabilities 1/4, 1/2, 1/4.
-    assert estimate([0.0, 1.0]) == Estimate(0.5, 0.0, 1.0)
-    narrow = MeasureConfig(confidence=0.4)
-    assert estimate([0.0, 1.0], config=narrow) == Estimate(0.5, 0.5, 0.5)
+    assert estimate_median([0.0, 1.0]) == Estimate(0.5, 0.0, 1.0)
+    narrow = BootstrapConfig(confidence=0.4)
+    assert estimate_median([0.0, 1.0], narrow) == Estimate(0.5, 0.5, 0.5)
 
 
-def test_bootstrap_of_the_mean_agrees_with_the_normal_interval():
-    # The IQM of two values is their mean; of constants it has no spread.
-    assert estimate([7.0] * 10, "iqm") == Estimate(7.0, 7.0, 7.0)
+def test_bootstrap_of_the_median_agrees_with_the_asymptotic_interval():
     values = np.random.default_rng(0).normal(size=1000)
-    found = estimate(values, "iqm", MeasureConfig(n_resamples=2000))
-    # Asymptotic standard deviation of the 25 % trimmed normal mean is 1.0926 / sqrt(n).
-    half = 1.96 * 1.0926 / math.sqrt(1000)
-    assert found.upper - found.lower == pytest.approx(2 * half, rel=0.15)
+    found = estimate_median(values, BootstrapConfig(n_resamples=2000))
+    # The standard deviation of the median of normal values is sqrt(pi / 2 / n).
+    half = 1.96 * math.sqrt(math.pi / 2 / 1000)
+    assert found.upper - found.lower == pytest.approx(2 * half, rel=0.25)
     assert found.lower < found.value < found.upper
 
 
 def test_bootstrap_is_its_own_and_repeatable():
     state = np.random.get_state()[1].copy()  # noqa: NPY002
     values = [120.0, 90.0, 150.0, math.inf]
-    assert estimate(values) == estimate(values)
+    assert estimate_median(values) == estimate_median(values)
     np.testing.assert_array_equal(np.random.get_state()[1], state)  # noqa: NPY002
 
 
 def test_censored_trials_stay_censored():
-    assert estimate([math.inf] * 10) == Estimate(math.inf, math.inf, math.inf)
-    mostly = estimate([100.0] * 7 + [math.inf] * 3)
+    assert estimate_median([math.inf] * 10) == Estimate(math.inf, math.inf, math.inf)
+    mostly = estimate_median([100.0] * 7 + [math.inf] * 3)
     assert mostly.value == 100.0
     assert mostly.lower == 100.0
     assert mostly.upper == math.inf
 
 
 def test_one_trial_has_no_interval_and_none_is_an_error():
-    one = estimate([4.0])
+    one = estimate_median([4.0])
     assert one.value == 4.0
     assert math.isnan(one.lower)
     with pytest.raises(ValueError, match=r"shape \(0,\)"):
-        estimate([])
-    with pytest.raises(ValueError, match="'mean'"):
-        estimate([1.0], "mean")
+        estimate_median([])
+
+
+def test_contrast_of_two_values_each_is_exact():
+    # Differences of the medians 0, 1/2, 1 and 10, 11, 12: the ends have probability 1/16 each.
+    found = estimate_contrast([0.0, 1.0], [10.0, 12.0])
+    assert found == Estimate(-10.5, -12.0, -9.0)
+    assert estimate_contrast([8.0, 8.0], [2.0, 2.0], np.divide) == Estimate(4.0, 4.0, 4.0)
+
+
+def test_contrast_agrees_with_the_normal_interval():
+    rng = np.random.default_rng(1)
+    found = estimate_contrast(rng.normal(1.0, 1.0, 800), rng.normal(0.0, 2.0, 800))
+    half = 1.96 * math.sqrt(math.pi / 2 / 800 * (1 + 4))
+    assert found.value == pytest.approx(1.0, abs=2 * half)
+    assert found.upper - found.lower == pytest.approx(2 * half, rel=0.25)
+
+
+def test_contrast_wants_values_that_are_not_infinite():
+    assert math.isnan(estimate_contrast([1.0], [2.0, 3.0]).lower)
+    assert math.isnan(estimate_contrast([math.nan, 1.0], [2.0, 3.0]).value)
+    with pytest.raises(ValueError, match="infinite"):
+        estimate_contrast([1.0, math.inf], [2.0, 3.0])
+    with pytest.raises(ValueError, match=r"shape \(0,\)"):
+        estimate_contrast([1.0], [])

@@ -140,12 +140,17 @@ def test_foreign_sqlite_file_is_named_and_kept(tmp_path):
     assert os.listdir(tmp_path) == ["results.sqlite"]
 
 
-def test_newer_schema_is_refused(tmp_path):
+def test_other_schema_is_refused(tmp_path):
     path, _ = filled(tmp_path, 1)
     with sqlite3.connect(path) as connection:
         connection.execute("PRAGMA user_version = 99")
     connection.close()
     with pytest.raises(StoreError, match=r"schema version 99"):
+        ResultStore(tmp_path)
+    with sqlite3.connect(path) as connection:
+        connection.execute("PRAGMA user_version = 1")
+    connection.close()
+    with pytest.raises(StoreError, match=r"version 1, written by an older sdnn"):
         ResultStore(tmp_path)
 
 

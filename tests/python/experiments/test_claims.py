@@ -1,0 +1,180 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdnn.experiments import CaseResult, Estimate, TrialKey, TrialRecord, TrialRows, summarize
+from sdnn.experiments.cases import EXPERIMENTS
+from sdnn.experiments.claims import (
+    CLAIMS,
+    Check,
+    CheckOutcome,
+    Claim,
+    ClaimOutcome,
+    Difference,
+    Growth,
+    Median,
+    Subject,
+    Verdict,
+    describe,
+    judge_claims,
+)
+from sdnn.experiments.cost import SERIES, CostKey, CostRecord, StepTimes
+
+CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
+
+
+def result(case_id, agent, steps, n_trials=10, n_tests=1500):
+    """Trials that take the given steps in every test episode; one value, or one per trial."""
+    per_trial = np.broadcast_to(steps, (n_trials,))
+    records = tuple(
+        TrialRecord(
+            key=TrialKey(case_id, agent, trial, trial, "hash"),
+            config="{}",
+            version="0",
+            n_decisions=1,
+            seconds=1.0,
+            finished_at="",
+            rows=TrialRows(
+                episode=10 * np.arange(1, n_tests + 1, dtype=np.int32),
+                steps=np.full(n_tests, taken, np.int32),
+                episode_return=np.zeros(n_tests),
+                solved=np.full(n_tests, taken < 50),
+            ),
+        )
+        for trial, taken in enumerate(per_trial)
+    )
+    return summarize(CaseResult(CASES[case_id], agent, records))
+
+
+def cost(series, n_inputs, microseconds):
+    times = StepTimes(microseconds=np.array(microseconds, float), n_steps=1, table_bytes=1)
+    return CostRecord(
+        key=CostKey(series, n_inputs, "hash"), version="0", machine="m", finished_at="", times=times
+    )
+
+
+def verdicts(summaries, costs=()):
+    return {o.claim.number: o.verdict for o in judge_claims(summaries, costs)}
+
+
+@pytest.mark.parametrize(
+    ("interval", "verdict"),
+    [
+        ((100, 80, 150), Verdict.HOLDS),
+        ((140, 120, 160), Verdict.UNDECIDED),
+        ((300, 160, math.inf), Verdict.FAILS),
+        ((math.inf, math.inf, math.inf), Verdict.FAILS),
+        ((10, math.nan, math.nan), Verdict.UNDECIDED),
+    ],
+)
+def test_a_check_is_judged_by_the_whole_interval(interval, verdict):
+    check = Check(Median("episodes_to_learn", Subject("s4")), "about 150", at_most=150)
+    assert check.verdict(Estimate(*interval)) == verdict
+
+
+def test_a_range_has_two_ends():
+    check = Check(Median("final_steps", Subject("s4")), "", at_least=3, at_most=5)
+    assert check.verdict(Estimate(4, 3, 5)) == Verdict.HOLDS
+    assert check.verdict(Estimate(2, 1, 2.5)) == Verdict.FAILS
+    assert check.verdict(Estimate(7, 6, 8)) == Verdict.FAILS
+    assert check.verdict(Estimate(4, 2, 8)) == Verdict.UNDECIDED
+
+
+@pytest.mark.parametrize(
+    ("parts", "whole"),
+    [
+        (("holds", "holds"), "holds"),
+        (("holds", "does not hold", "undecided"), "does not hold"),
+        (("holds", "undecided"), "undecided"),
+        (("holds", "not run", "undecided"), "not run"),
+        (("not judged", "not judged"), "not judged"),
+    ],
+)
+def test_a_claim_is_as_good_as_its_checks(parts, whole):
+    check = CLAIMS[0].checks[0]
+    outcomes = tuple(CheckOutcome(check, None, Verdict(part)) for part in parts)
+    assert ClaimOutcome(Claim(1, "", ()), outcomes).verdict == Verdict(whole)
+
+
+def test_the_claims_are_the_nine_of_the_paper_and_know_their_subjects():
+    assert [claim.number for claim in CLAIMS] == list(range(1, 10))
+    planned = {(case.id, agent) for e in EXPERIMENTS for case in e.cases for agent in case.agents}
+    series = {series.id for series in SERIES}
+    for check in (check for claim in CLAIMS for check in claim.checks):
+        quantity = check.quantity
+        if isinstance(quantity, Growth):
+            assert quantity.series in series
+            continue
+        for name in ("subject", "other"):
+            subject = getattr(quantity, name, None)
+            assert subject is None or (subject.case_id, subject.agent) in planned
+        assert describe(quantity)
+        assert check.at_least > -math.inf or check.at_most < math.inf
+
+
+def test_good_data_support_claims_and_bad_data_do_not():
+    good = verdicts([result("s4", "sdnn-c", 4), result("s6", "sdnn-c", 4)])
+    assert good[1] == good[2] == Verdict.HOLDS
+    assert good[8] == Verdict.NOT_RUN  # the noisy cases are missing
+    assert 3 not in good
+    bad = verdicts([result("s4", "sdnn-c", 50), result("s6", "sdnn-c", 4)])
+    assert bad[1] == bad[2] == Verdict.FAILS
+
+
+def test_fuzzy_q_learning_is_judged_by_the_end():
+    cases = ("s4-noise", "s5-noise", "s6-noise")
+    assert verdicts([result(case, "fql", 50) for case in cases])[4] == Verdict.HOLDS
+    assert verdicts([result(case, "fql", 7) for case in cases])[4] == Verdict.FAILS
+
+
+def test_differences_count_censored_values_as_the_last_episode():
+    late, early = result("s5-noise", "sdnn-c", 4), result("s4-noise", "sdnn-c", 50)
+    (outcome,) = (o for o in judge_claims([late, early], ()) if o.claim.number == 6)
+    assert outcome.checks[0].estimate == Estimate(15000.0, 15000.0, 15000.0)
+    assert outcome.verdict == Verdict.HOLDS
+    same = judge_claims([late, result("s4-noise", "sdnn-c", 4)], ())
+    assert next(o for o in same if o.claim.number == 6).verdict == Verdict.FAILS
+
+
+def test_trials_that_disagree_leave_a_claim_undecided():
+    split = [4] * 5 + [50] * 5
+    found = verdicts([result("s4", "sdnn-c", split), result("s6", "sdnn-c", 4)])
+    assert found[2] == Verdict.UNDECIDED
+
+
+@pytest.mark.parametrize("size", [{"n_trials": 9}, {"n_tests": 1499}])
+def test_less_than_the_papers_scale_is_not_judged(size):
+    found = verdicts([result("s4", "sdnn-c", 4, **size), result("s6", "sdnn-c", 4)])
+    assert found[1] == found[2] == Verdict.NOT_JUDGED
+
+
+def test_growth_is_a_ratio_of_medians():
+    costs = [
+        cost("sdnn-c", 4, [10, 10, 10]), cost("sdnn-c", 8, [50, 50, 50]),
+        cost("rbfn", 4, [1, 1, 1]), cost("rbfn", 8, [200, 220, 210]),
+    ]  # fmt: skip
+    (outcome,) = judge_claims([], costs)
+    assert outcome.claim.number == 9
+    growths = [checked.estimate for checked in outcome.checks]
+    assert growths[0] == Estimate(5.0, 5.0, 5.0)
+    assert (growths[1].value, growths[1].lower, growths[1].upper) == (210.0, 200.0, 220.0)
+    assert growths[2] is None
+    assert [c.verdict for c in outcome.checks] == [Verdict.HOLDS, Verdict.HOLDS, Verdict.NOT_RUN]
+    assert outcome.verdict == Verdict.NOT_RUN
+    polynomial = [*costs[:2], cost("rbfn", 4, [1, 1]), cost("rbfn", 8, [4, 4])]
+    assert judge_claims([], polynomial)[0].verdict == Verdict.FAILS
+
+
+def test_descriptions_name_both_sides():
+    quantity = Difference("final_steps", Subject("s6-noise"), Subject("s4"))
+    assert describe(quantity) == "final steps: SDNN-C, 6 noisy inputs less 4 inputs"
+    assert describe(Median("early_steps", Subject("s4", "fql"))) == "early steps: FQL, 4 inputs"
+
+
+def test_summaries_do_not_mix_measures():
+    summary = result("s4", "sdnn-c", [3] * 5 + [50] * 5)
+    np.testing.assert_array_equal(summary.uncensored("episode_of_collapse"), [15000] * 5 + [0] * 5)
+    assert summary.medians["final_share_solved"].value == 0.5
+    assert replace(summary, values=summary.values).result.is_paper_scale
