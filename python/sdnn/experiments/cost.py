@@ -73,7 +73,7 @@ class CostConfig:
     """
 
     n_inputs: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 8)
-    n_rounds: int = 7
+    n_rounds: int = 5
     round_seconds: float = 0.1
     min_steps: int = 2
     n_learned: int = 500

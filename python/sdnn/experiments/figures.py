@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, Experiment, agent_title
 from sdnn.experiments.errors import PlotUnavailableError
 from sdnn.experiments.results import CaseResult
+from sdnn.experiments.statistics import running_median
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,6 +25,9 @@ MAX_STEPS = 50
 
 START_EPISODES = 500
 """Learning episodes shown in the panels of the start."""
+
+SMOOTHED_TESTS = 25
+"""Test episodes in the running median of a long run, which lies over the thin median curve."""
 
 _PANEL_HEIGHT = 3.3
 _START_HEIGHT = 1.9
@@ -72,7 +76,8 @@ def draw_experiment(
 
     n_columns = min(2, len(experiment.cases))
     n_rows = -(-len(experiment.cases) // n_columns)
-    with_start = experiment.start_panels and _is_long(results)
+    smooth = _is_long(results)
+    with_start = experiment.start_panels and smooth
     heights = (_PANEL_HEIGHT, _START_HEIGHT) if with_start else (_PANEL_HEIGHT,)
     height = 1.1 + n_rows * sum(heights)
     figure = Figure(figsize=(5.4 * n_columns, height))
@@ -92,7 +97,7 @@ def draw_experiment(
         shown = [result for result in results if result.case == case]
         axes.set_title(case.title, fontsize=10.5, loc="left", color=INK)
         axes.set_title(f"paper: {case.paper_figure}", fontsize=8, loc="right", color=FAINT)
-        _draw_case(axes, shown, colors)
+        _draw_case(axes, shown, colors, smooth)
         if number % n_columns == 0:
             axes.set_ylabel("steps per test episode")
         if with_start or number >= len(experiment.cases) - n_columns:
@@ -101,11 +106,15 @@ def draw_experiment(
             watermark(axes)
         if starts is not None:
             _draw_start(starts[number], shown, colors)
-        if len(agents) > 1:
-            axes.legend(frameon=False, fontsize=8.5, loc="upper right")
     for row in (panels, starts if starts is not None else ()):
         for axes in row[len(experiment.cases) :]:
             axes.set_visible(False)
+    if len(agents) > 1:
+        lines, titles = panels[0].get_legend_handles_labels()
+        figure.legend(
+            lines[::-1], titles[::-1], frameon=False, fontsize=9.5, loc="upper right",
+            bbox_to_anchor=(0.975, 1 - 0.08 / height), ncols=len(agents),
+        )  # fmt: skip
     _label(figure, experiment, results, quick)
     return figure
 
@@ -121,21 +130,35 @@ def figure_bytes(figure: Figure) -> tuple[bytes, bytes]:
     return png.getvalue(), svg.getvalue()
 
 
-def _draw_curves(axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str]) -> None:
-    for result in shown:
+def _draw_curves(
+    axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str], smooth: bool
+) -> None:
+    """Draw the curves, the first agent on top; `smooth` puts running medians over them."""
+    for depth, result in enumerate(reversed(shown)):
         curve, color = result.curve, colors[result.agent]
-        axes.fill_between(
-            curve.episode, curve.lower, curve.upper, color=color, alpha=0.22, linewidth=0
-        )
+        lower, upper = curve.lower, curve.upper
+        title = agent_title(result.agent)
+        if smooth:
+            lower, middle, upper = (
+                running_median(values, SMOOTHED_TESTS) for values in (lower, curve.median, upper)
+            )
+            axes.plot(
+                curve.episode, middle, color=color, linewidth=1.6, zorder=4 + depth, label=title
+            )
         axes.plot(
-            curve.episode, curve.median, color=color, linewidth=0.9, label=agent_title(result.agent)
-        )
+            curve.episode, curve.median, color=color, zorder=2 + depth,
+            linewidth=0.4 if smooth else 0.9, alpha=0.45 if smooth else 1.0,
+            label=None if smooth else title,
+        )  # fmt: skip
+        axes.fill_between(curve.episode, lower, upper, color=color, alpha=0.2, linewidth=0)
 
 
-def _draw_case(axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str]) -> None:
+def _draw_case(
+    axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str], smooth: bool
+) -> None:
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-    _draw_curves(axes, shown, colors)
+    _draw_curves(axes, shown, colors, smooth)
     axes.set_xlim(0, max(int(result.episode[-1]) for result in shown))
     axes.set_ylim(0, MAX_STEPS)
     axes.xaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
@@ -147,7 +170,7 @@ def _draw_case(axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str]) 
 
 
 def _draw_start(axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str]) -> None:
-    _draw_case(axes, shown, colors)
+    _draw_case(axes, shown, colors, smooth=False)
     axes.set_xlim(0, START_EPISODES)
     axes.set_title(
         f"the first {START_EPISODES} learning episodes", fontsize=8.5, loc="left", color=FAINT
@@ -186,10 +209,16 @@ def _label(
         )  # fmt: skip
     hashes = [f"{r.case.id}/{r.agent} {r.config_hash[:8]}" for r in results]
     lines = [", ".join(hashes[i : i + 4]) for i in range(0, len(hashes), 4)]
+    lines_are = "Line: median over trials; band: quartiles."
+    if _is_long(results):
+        lines_are = (
+            "Thin line: median over trials; thick line and band: its running median and that of the"
+            f" quartiles over {SMOOTHED_TESTS} tests."
+        )
     versions = ", ".join(sorted({rec.version for res in results for rec in res.records}))
     figure.text(
         0.012, 0.07 / height,
-        f"Line: median over trials; band: quartiles. {scale} per case and agent."
+        f"{lines_are} {scale} per case and agent."
         f"\nsdnn {versions}; configuration " + ",\n".join(lines),
         fontsize=6.5, va="bottom", color=FAINT, linespacing=1.4,
     )  # fmt: skip

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
@@ -92,6 +93,26 @@ def learning_curve(episode: NDArray[np.int32], steps: ArrayLike) -> Curve:
     """
     lower, median, upper = np.percentile(np.asarray(steps, np.float64), (25, 50, 75), axis=0)
     return Curve(episode, median, lower, upper)
+
+
+def running_median(values: ArrayLike, window: int) -> FloatArray:
+    """Median of each value with its neighbours, `window` of them in all; fewer at both ends.
+
+    Parameters
+    ----------
+    values : (n,)
+        A curve.
+    window
+        Odd number of values.
+
+    Examples
+    --------
+    >>> running_median([1, 9, 2, 3, 8], 3)
+    array([5. , 2. , 3. , 3. , 5.5])
+    """
+    half = window // 2
+    padded = np.pad(np.asarray(values, np.float64), half, constant_values=np.nan)
+    return np.asarray(np.nanmedian(sliding_window_view(padded, window), axis=1))
 
 
 def estimate_median(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTRAP) -> Estimate:

@@ -17,7 +17,7 @@ from sdnn.experiments import (
     select_experiments,
     summarize,
 )
-from sdnn.experiments.figures import figure_bytes
+from sdnn.experiments.figures import SMOOTHED_TESTS, figure_bytes
 from sdnn.experiments.page import Call, to_html
 from sdnn.experiments.report import (
     ROW_HEADER,
@@ -28,7 +28,7 @@ from sdnn.experiments.report import (
     trial_rows,
 )
 from sdnn.experiments.reproduce import ReproduceRequest, reproduce
-from sdnn.experiments.statistics import Estimate
+from sdnn.experiments.statistics import Estimate, running_median
 from sdnn.experiments.tables import format_estimate
 
 (EXPERIMENT,) = select_experiments("a")
@@ -51,20 +51,39 @@ def all_text(figure):
     return "\n".join(texts)
 
 
+def curves_of(axes):
+    """The lines of a panel as (x, y), the thick one before the thin one."""
+    lines = sorted(axes.get_lines(), key=lambda line: -line.get_linewidth())
+    return [(line.get_xdata(), line.get_ydata()) for line in lines]
+
+
 def test_panels_hold_the_stored_rows(results):
     figure = draw_experiment(EXPERIMENT, results)
     for axes, result in zip(figure.axes[:2], results, strict=True):
-        (line,) = axes.get_lines()
-        np.testing.assert_array_equal(line.get_xdata(), 10 * np.arange(1, 301))
-        np.testing.assert_array_equal(line.get_ydata(), np.median(result.steps, axis=0))
+        (_, smooth), (x, thin) = curves_of(axes)
+        np.testing.assert_array_equal(x, 10 * np.arange(1, 301))
+        np.testing.assert_array_equal(thin, np.median(result.steps, axis=0))
+        np.testing.assert_array_equal(smooth, running_median(thin, SMOOTHED_TESTS))
         (band,) = axes.collections
         (path,) = band.get_paths()
         drawn = {(float(x), float(y)) for x, y in path.vertices}
-        lower, upper = np.percentile(result.steps, (25, 75), axis=0)
+        lower, upper = (
+            running_median(q, SMOOTHED_TESTS) for q in np.percentile(result.steps, (25, 75), axis=0)
+        )
         for i in (0, 5, 120, 299):
             assert {(10.0 * (i + 1), lower[i]), (10.0 * (i + 1), upper[i])} <= drawn
         assert axes.get_ylim() == (0, 50)
         assert axes.get_xlim() == (0, 3000)
+
+
+def test_short_runs_are_drawn_as_they_are(tmp_path, fake, run):
+    plan = fake.make_plan(2, 300)
+    run(tmp_path, plan)
+    with ResultStore(tmp_path) as store:
+        results = collect(EXPERIMENT, [p.key for p in plan], store)
+    for axes, result in zip(draw_experiment(EXPERIMENT, results).axes, results, strict=True):
+        ((_, line),) = curves_of(axes)
+        np.testing.assert_array_equal(line, np.median(result.steps, axis=0))
 
 
 def test_start_has_panels_of_its_own_in_long_runs(results):
@@ -72,9 +91,7 @@ def test_start_has_panels_of_its_own_in_long_runs(results):
     assert len(figure.axes) == 4
     for axes, start in zip(figure.axes[:2], figure.axes[2:], strict=True):
         assert start.get_xlim() == (0, 500)
-        np.testing.assert_array_equal(
-            start.get_lines()[0].get_ydata(), axes.get_lines()[0].get_ydata()
-        )
+        np.testing.assert_array_equal(curves_of(start)[0][1], curves_of(axes)[-1][1])
     without = replace(EXPERIMENT, start_panels=False)
     assert len(draw_experiment(without, results).axes) == 2
 

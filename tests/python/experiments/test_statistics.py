@@ -9,6 +9,7 @@ from sdnn.experiments.statistics import (
     estimate_contrast,
     estimate_median,
     learning_curve,
+    running_median,
 )
 
 
@@ -56,6 +57,14 @@ def test_one_trial_has_no_interval_and_none_is_an_error():
     assert math.isnan(one.lower)
     with pytest.raises(ValueError, match=r"shape \(0,\)"):
         estimate_median([])
+
+
+def test_running_median_of_a_curve():
+    curve = np.random.default_rng(3).normal(size=40)
+    found = running_median(curve, 5)
+    for i in range(40):
+        assert found[i] == np.median(curve[max(0, i - 2) : i + 3])
+    np.testing.assert_array_equal(running_median(curve, 1), curve)
 
 
 def test_contrast_of_two_values_each_is_exact():
