@@ -45,10 +45,10 @@ py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
 
 using SdnnTrial = experiments::AcrobotTrial<QLearning<DynamicSdnnC>>;
 
-py::dict memory_counts(const SdnnTrial& trial) {
+py::typing::Dict<py::str, py::int_> memory_counts(const SdnnTrial& trial) {
   return trial.agent().action_value().visit([](const auto& network) {
     const auto& counts = network.memory().counts();
-    py::dict out;
+    py::typing::Dict<py::str, py::int_> out;
     out["full"] = counts.full;
     out["neighbour"] = counts.neighbour;
     out["columns"] = counts.columns;

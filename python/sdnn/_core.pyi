@@ -852,7 +852,7 @@ class AcrobotTrial:
         """
         Runs up to n more learning episodes
         """
-    def memory_counts(self) -> dict:
+    def memory_counts(self) -> dict[str, int]:
         """
         How potentials came about so far: full passes, from neighbours, columns added
         """

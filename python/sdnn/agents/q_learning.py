@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import gymnasium as gym
 import numpy as np
@@ -51,17 +51,21 @@ class QLearningConfig:
         return _core.QLearningConfig(**fields)
 
 
+CoreAgent: TypeAlias = _core.SdnnQLearning | _core.RbfQLearning
+"""The agents of the C++ core."""
+
+
 class _QLearning:
     """What Q-learning with any approximator has in common: spaces in, spaces out."""
 
     action_space: gym.Space[Any]
     learning: QLearningConfig
-    _core: _core.SdnnQLearning | _core.RbfQLearning
+    _core: CoreAgent
     _scaled: UnitObservations
     _actions: DiscreteActions | EvenActions
 
     @property
-    def core(self) -> _core.SdnnQLearning | _core.RbfQLearning:
+    def core(self) -> CoreAgent:
         """The compiled agent, which shares all that is learned: states in [0, 1], indices."""
         return self._core
 

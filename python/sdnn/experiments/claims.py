@@ -319,16 +319,17 @@ def _judge(
             return CheckOutcome(check, None, Verdict.NOT_RUN)
         growth = estimate_contrast(times[quantity.n_inputs], times[quantity.n_fewer], np.divide)
         return CheckOutcome(check, growth, check.verdict(growth))
-    subjects = (quantity.subject,)
+    subjects = [quantity.subject]
     if isinstance(quantity, Difference):
-        subjects = (quantity.subject, quantity.other)
-    if not set(subjects) <= summaries.keys():
+        subjects.append(quantity.other)
+    if not summaries.keys() >= set(subjects):
         return CheckOutcome(check, None, Verdict.NOT_RUN)
     found = [summaries[subject] for subject in subjects]
     if len(found) == 1:
         estimate = found[0].medians[quantity.measure]
     else:
-        estimate = estimate_contrast(*(s.uncensored(quantity.measure) for s in found))
+        values, others = (summary.uncensored(quantity.measure) for summary in found)
+        estimate = estimate_contrast(values, others)
     judged = all(summary.result.is_paper_scale for summary in found)
     return CheckOutcome(check, estimate, check.verdict(estimate) if judged else Verdict.NOT_JUDGED)
 

@@ -205,8 +205,7 @@ def _results(
     for experiment in EXPERIMENTS:
         wanted = [planned.key for planned in request.plan_of((experiment,))]
         if stored.issuperset(wanted):
-            results = collect(experiment, wanted, store)
-            summaries = tuple(summarize(result) for result in results)
+            summaries = tuple(summarize(r) for r in collect(experiment, wanted, store))
             reports.append(report.ExperimentReport(experiment, summaries))
             keys += wanted
     results = report.Report(
