@@ -41,8 +41,7 @@ def measure_steps(series: Series, n_inputs: int, config: CostConfig) -> StepTime
     Returns
     -------
     StepTimes or None
-        None where a step takes longer than the configuration allows, or where there is no memory
-        for the agent.
+        None where there is no memory for the agent.
 
     Raises
     ------
@@ -54,8 +53,6 @@ def measure_steps(series: Series, n_inputs: int, config: CostConfig) -> StepTime
     except MemoryError:
         return None
     step_seconds = float(_core.time_agent_steps(agent, 1, SEED)[0]) / 1e9
-    if step_seconds > config.longest_step_seconds:
-        return None
     in_a_round = int(config.round_seconds / step_seconds)
     n_learned = min(config.n_learned, in_a_round)
     learning = _core.time_agent_steps(agent, n_learned, SEED + 1)

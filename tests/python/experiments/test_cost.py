@@ -40,6 +40,9 @@ def test_keys_are_all_series_in_ascending_inputs():
         (series.id, n) for series in SERIES for n in (2, 3)
     ]
     assert {key.config_hash for key in keys} == {SMALL.config_hash}
+    quick = cost_keys(QUICK_COST)
+    assert max(key.n_inputs for key in quick if key.series == "rbfn-plain") == 5
+    assert len(quick) == 3 * 7 + 4
     assert replace(SMALL, n_rounds=4).config_hash != SMALL.config_hash
     assert CostConfig().n_inputs == tuple(range(2, 9))
     assert asdict(QUICK_COST)["n_inputs"] == asdict(CostConfig())["n_inputs"]
@@ -116,7 +119,14 @@ def test_real_agents_are_measured(series):
     assert times.table_bytes == sizes[series.agent]
 
 
-def test_a_series_ends_where_its_steps_are_too_slow():
-    assert measure_steps(SERIES[3], 3, replace(SMALL, longest_step_seconds=1e-6)) is None
+def test_what_there_is_no_memory_for_is_left_out(monkeypatch):
+    def refuse(*_arguments, **_options):
+        raise MemoryError
+
+    monkeypatch.setattr("sdnn.benchmarks.agent_cost.FuzzyQLearning", refuse)
+    assert measure_steps(SERIES[1], 2, SMALL) is None
+
+
+def test_unknown_series_is_named():
     with pytest.raises(ValueError, match="got 'tiles'"):
         measure_steps(replace(SERIES[0], id="tiles"), 2, SMALL)
