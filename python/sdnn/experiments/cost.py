@@ -35,7 +35,7 @@ class Series:
     agent
         Id of the agent.
     growth
-        What the number of operations is proportional to, for a reader.
+        What the number of operations is proportional to, for a reader (mathtext).
     """
 
     id: str
@@ -45,10 +45,10 @@ class Series:
 
 
 SERIES = (
-    Series("sdnn-c", "SDNN-C", "sdnn-c", "d (d - 1) groups of columns"),
-    Series("fql", "FQL", "fql", "2^d fired rules (of 9^d in the table)"),
-    Series("rbfn", "RBFN, factored", "rbfn", "4^(d+1) weights"),
-    Series("rbfn-plain", "RBFN, plain", "rbfn", "601 x 4^(d+1) basis values"),
+    Series("sdnn-c", "SDNN-C", "sdnn-c", "$d(d-1)$ groups of columns"),
+    Series("fql", "FQL", "fql", "$2^d$ fired rules of $9^d$"),
+    Series("rbfn", "RBFN, factored", "rbfn", "$4^{d+1}$ weights"),
+    Series("rbfn-plain", "RBFN, plain", "rbfn", "$601 \\cdot 4^{d+1}$ basis values"),
 )
 
 

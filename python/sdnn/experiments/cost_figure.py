@@ -37,8 +37,8 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
     require_matplotlib()
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.4, 4.9))
-    figure.subplots_adjust(left=0.11, right=0.97, top=0.88, bottom=0.19)
+    figure = Figure(figsize=(9.4, 4.7))
+    figure.subplots_adjust(left=0.085, right=0.7, top=0.9, bottom=0.2)
     axes = figure.add_subplot()
     for number, series in enumerate(SERIES):
         own = sorted((c for c in costs if c.key.series == series.id), key=lambda c: c.key.n_inputs)
@@ -51,14 +51,14 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
         axes.errorbar(
             x, middle, (middle - lower, upper - middle), color=SERIES_COLORS[number],
             marker=_MARKERS[number], markersize=5, capsize=3, linewidth=1.2,
-            label=f"{series.title}: {series.growth}",
+            label=f"{series.title}\n{series.growth}",
         )  # fmt: skip
         if series.id == "sdnn-c" and 4 in x:
             fine = np.linspace(x[0], x[-1], 100)
             scale = middle[x.index(4)] / (4 * 3)
             axes.plot(
                 fine, scale * fine * (fine - 1), ":", color=SERIES_COLORS[number], linewidth=1.2,
-                label="proportional to d (d - 1)",
+                label="proportional to $d(d-1)$",
             )  # fmt: skip
     axes.set_yscale("log")
     axes.set_xticks(sorted({cost.key.n_inputs for cost in costs}))
@@ -68,7 +68,9 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
     axes.set_axisbelow(True)
     axes.tick_params(colors=INK, labelsize=8.5)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, fontsize=8.5, loc="upper left")
+    axes.legend(
+        frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.01, 1.02), labelspacing=1.0
+    )  # fmt: skip
     axes.set_title("Cost of a step against the number of inputs", loc="left", color=INK)
     if quick:
         watermark(axes)
