@@ -5,8 +5,9 @@ where those of a stage that is run replace its old ones. Trials of 15,000 learni
 
 The criterion was fixed before any trial of this file was run: a trial's score is the mean of two
 shares of solved test episodes, EARLY and END, and a setting's is the median over its trials. The
-settings of the stages "grid", "ties" and "bases" are compared on the seeds 100 to 103; what is
-reported of the chosen one and the one before it (stage "report") comes from ten other seeds.
+settings of all stages but the last are compared on the seeds 100 to 103. The best of "grid" is
+chosen; "fine", "ties" and "bases" show how much it matters to move away from it. What is reported of
+it and of the setting before (stage "report") comes from ten other seeds.
 
 The learning rate alpha is not varied: it only ever multiplies the gradient rate.
 """
@@ -32,6 +33,7 @@ from sdnn.experiments.config import trial_seed
 
 ROWS = Path(__file__).parents[1] / "docs" / "rbf-tuning.csv"
 
+STAGES = ("grid", "fine", "ties", "bases", "report")
 N_EPISODES = 15_000
 TEST_INTERVAL = 10
 EARLY = (1_000, 3_000)
@@ -73,6 +75,9 @@ GRID = [
     for width, rate in itertools.product((0.25, 0.35, 0.5, 0.7, 1.0), (1.0, 3.0, 10.0, 30.0, 100.0))
     if rate < stability_limit(setting := Setting(width, rate))
 ]
+FINE_WIDTHS = (0.4, 0.45, 0.55, 0.6)
+FINE_RATES = (0.6, 1.7)
+"""Of the best rate of the grid."""
 BEFORE = Setting(1.0, 3.0)
 
 
@@ -148,6 +153,11 @@ def chosen(rows: list[dict[str, object]]) -> Setting:
 def tasks_of(stage: str, rows: list[dict[str, object]]) -> list[tuple[str, Setting, int]]:
     if stage == "grid":
         settings, seeds = GRID, SEARCH_SEEDS
+    elif stage == "fine":
+        best = chosen(rows)
+        settings = [Setting(width, best.gradient_rate) for width in FINE_WIDTHS]
+        settings += [Setting(best.width, best.gradient_rate * part) for part in FINE_RATES]
+        seeds = SEARCH_SEEDS
     elif stage == "ties":
         best = chosen(rows)
         settings, seeds = (
@@ -163,7 +173,7 @@ def tasks_of(stage: str, rows: list[dict[str, object]]) -> list[tuple[str, Setti
     elif stage == "report":
         settings, seeds = list(dict.fromkeys((BEFORE, chosen(rows)))), REPORT_SEEDS
     else:
-        raise SystemExit(f"no stage {stage}: it is one of grid, ties, bases, report")
+        raise SystemExit(f"no stage {stage}: it is one of {', '.join(STAGES)}")
     return [(stage, setting, seed) for setting in settings for seed in seeds]
 
 
@@ -172,7 +182,7 @@ def main(stages: list[str]) -> None:
     if ROWS.exists():
         with ROWS.open() as file:
             rows = list(csv.DictReader(file))
-    for stage in stages or ["grid", "ties", "bases", "report"]:
+    for stage in stages or STAGES:
         tasks = tasks_of(stage, rows)
         rows = [row for row in rows if row["stage"] != stage]
         with ThreadPoolExecutor(2) as pool:
