@@ -6,8 +6,8 @@ where those of a stage that is run replace its old ones. Trials of 15,000 learni
 The criterion was fixed before any trial of this file was run: a trial's score is the mean of two
 shares of solved test episodes, EARLY and END, and a setting's is the median over its trials. The
 settings of all stages but the last are compared on the seeds 100 to 103. The best of "grid" is
-chosen; "fine", "ties" and "bases" show how much it matters to move away from it. What is reported of
-it and of the setting before (stage "report") comes from ten other seeds.
+chosen; "fine", "ties" and "bases" show how much it matters to move away from it. What is reported
+of it and of the setting before (stage "report") comes from ten other seeds.
 
 The learning rate alpha is not varied: it only ever multiplies the gradient rate.
 """
@@ -76,8 +76,7 @@ GRID = [
     if rate < stability_limit(setting := Setting(width, rate))
 ]
 FINE_WIDTHS = (0.4, 0.45, 0.55, 0.6)
-FINE_RATES = (0.6, 1.7)
-"""Of the best rate of the grid."""
+FINE_RATES = (2.0, 5.0)
 BEFORE = Setting(1.0, 3.0)
 
 
@@ -156,7 +155,7 @@ def tasks_of(stage: str, rows: list[dict[str, object]]) -> list[tuple[str, Setti
     elif stage == "fine":
         best = chosen(rows)
         settings = [Setting(width, best.gradient_rate) for width in FINE_WIDTHS]
-        settings += [Setting(best.width, best.gradient_rate * part) for part in FINE_RATES]
+        settings += [Setting(best.width, rate) for rate in FINE_RATES]
         seeds = SEARCH_SEEDS
     elif stage == "ties":
         best = chosen(rows)
