@@ -303,7 +303,7 @@ class RbfNetworkConfig:
     """
     The sizes of an RBF network
     """
-    def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_bases: typing.SupportsInt | typing.SupportsIndex = 4, n_actions: typing.SupportsInt | typing.SupportsIndex = 601, width: typing.SupportsFloat | typing.SupportsIndex = 1.0, gradient_rate: typing.SupportsFloat | typing.SupportsIndex = 3.0, max_table_bytes: typing.SupportsInt | typing.SupportsIndex = 1073741824) -> None:
+    def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_bases: typing.SupportsInt | typing.SupportsIndex = 4, n_actions: typing.SupportsInt | typing.SupportsIndex = 601, width: typing.SupportsFloat | typing.SupportsIndex = 0.5, gradient_rate: typing.SupportsFloat | typing.SupportsIndex = 3.0, max_table_bytes: typing.SupportsInt | typing.SupportsIndex = 1073741824) -> None:
         ...
     @property
     def gradient_rate(self) -> float:

@@ -36,7 +36,7 @@ class RBFNetworkConfig:
     n_inputs: int = 4
     n_bases: int = 4
     n_actions: int = 601
-    width: float = 1.0
+    width: float = 0.5
     gradient_rate: float = 3.0
     max_table_bytes: int = 2**30
 

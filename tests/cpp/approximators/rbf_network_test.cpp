@@ -44,7 +44,8 @@ double largest_weight(const RbfNetwork& network) {
 
 // d = 1, two bases at 0 and 1, width 1: at x = 0 Gaussians 1 and e^-1/2, at 1/2 equal ones.
 TEST(RbfNetwork, OneGradientStepByHand) {
-  RbfNetwork network({.n_inputs = 1, .n_bases = 2, .n_actions = 3, .gradient_rate = 0.5});
+  RbfNetwork network(
+      {.n_inputs = 1, .n_bases = 2, .n_actions = 3, .width = 1.0, .gradient_rate = 0.5});
   EXPECT_EQ(network.n_joint_bases(), 4U);
   const std::vector<double> state = {0.5};
   network.correct(state, 0, 8.0);  // phi = (1/2, 1/2) o (p, 1 - p), p = 1 / (1 + e^-1/2)
@@ -130,7 +131,7 @@ TEST(RbfNetwork, WhatIsRememberedNeverChangesWhatIsReturned) {
 }
 
 TEST(RbfNetwork, AGradientStepGoesTheRightWayAndNotTooFar) {
-  RbfNetwork network = taught({.gradient_rate = 50.0}, 100);  // |phi|^2 is at most 0.019
+  RbfNetwork network = taught({.width = 1.0, .gradient_rate = 50.0}, 100);  // |phi|^2 <= 0.019
   core::Random random(5, core::Stream::ties);
   for (int i = 0; i < 200; ++i) {
     const auto state = random_state(random, 4);
@@ -145,7 +146,7 @@ TEST(RbfNetwork, AGradientStepGoesTheRightWayAndNotTooFar) {
 
 // The bits are the same with every compiler and optimization level.
 TEST(RbfNetwork, KeepsItsBits) {
-  RbfNetwork network = taught({}, 200);
+  RbfNetwork network = taught({.width = 1.0}, 200);
   std::uint64_t digest = 0;
   for (const double w : network.weights()) digest = digest * 31 + std::bit_cast<std::uint64_t>(w);
   std::vector<double> out(601);

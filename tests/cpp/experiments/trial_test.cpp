@@ -53,7 +53,8 @@ agents::FuzzyQLearning fuzzy_agent(const Setting& setting) {
 }
 
 auto rbf_trial(const Setting& setting) {
-  return trial(approximators::RbfNetwork({.n_inputs = setting.sensors.n_sensors}), setting);
+  return trial(
+      approximators::RbfNetwork({.n_inputs = setting.sensors.n_sensors, .width = 1.0}), setting);
 }
 
 /// FNV-1a over the rows, returns by their bits.

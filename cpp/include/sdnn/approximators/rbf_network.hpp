@@ -24,7 +24,7 @@ struct RbfNetworkConfig {
   int n_inputs = 4;              ///< d
   int n_bases = 4;               ///< per dimension, of the state and of the action
   int n_actions = 601;           ///< evenly spaced over the action's range
-  double width = 1.0;            ///< of a Gaussian, in units of the spacing of the centres
+  double width = 0.5;            ///< of a Gaussian, in units of the spacing of the centres
   double gradient_rate = 3.0;    ///< of the gradient step in correct; stable below 2 / |phi|^2
   std::uint64_t max_table_bytes = core::kDefaultMaxTableBytes;  ///< more weights are refused
 };
