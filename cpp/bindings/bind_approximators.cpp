@@ -43,15 +43,18 @@ py::array_t<std::uint32_t> permutation(const DynamicSdnnC& network, std::size_t 
 }
 
 py::array_t<std::int32_t> weights(const DynamicSdnnC& network) {
-  const auto& perceptron = network.perceptron();
-  py::array_t<std::int32_t> out({perceptron.n_units(), perceptron.n_columns()});
-  auto view = out.mutable_unchecked<2>();
-  for (std::size_t i = 0; i < perceptron.n_units(); ++i) {
-    for (std::size_t j = 0; j < perceptron.n_columns(); ++j) {
-      view(static_cast<py::ssize_t>(i), static_cast<py::ssize_t>(j)) = perceptron.weight(i, j);
+  return network.visit([](const auto& net) {
+    const std::size_t n_units = net.perceptron().n_units();
+    const std::size_t n_columns = net.perceptron().n_columns();
+    py::array_t<std::int32_t> out({n_units, n_columns});
+    auto view = out.mutable_unchecked<2>();
+    for (std::size_t i = 0; i < n_units; ++i) {
+      for (std::size_t j = 0; j < n_columns; ++j) {
+        view(static_cast<py::ssize_t>(i), static_cast<py::ssize_t>(j)) = net.weight(i, j);
+      }
     }
-  }
-  return out;
+    return out;
+  });
 }
 
 py::array_t<std::int32_t> thresholds(const DynamicSdnnC& network) {

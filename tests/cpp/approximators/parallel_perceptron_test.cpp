@@ -30,6 +30,27 @@ TEST(ParallelPerceptron, PotentialsAndCorrectionByHand) {
   EXPECT_EQ(p.threshold(1), 3);
 }
 
+// A column that is half of a sum of two inputs: both weights move by the step, their sum by two.
+TEST(ParallelPerceptron, DoubleColumnsMoveByTwiceTheStep) {
+  ParallelPerceptron p(70, 4, 2);
+  const coding::SignedColumns x{.positive = {0, 3}, .negative = {1, 2}};
+  for (const auto& units : {std::vector<std::uint32_t>{5}, {5, 6}, {5, 69}}) p.correct(units, x, 3);
+  p.correct(std::vector<std::uint32_t>{6}, x, -64);
+  const auto row = [&](std::size_t unit) {
+    std::vector<std::int32_t> weights;
+    for (std::size_t j = 0; j < 4; ++j) weights.push_back(p.weight(unit, j));
+    return weights;
+  };
+  EXPECT_EQ(row(5), (std::vector<std::int32_t>{18, -18, -9, 9}));
+  EXPECT_EQ(row(6), (std::vector<std::int32_t>{-122, 122, 61, -61}));
+  EXPECT_EQ(row(69), (std::vector<std::int32_t>{6, -6, -3, 3}));
+  EXPECT_EQ(p.threshold(5), -9);
+  p.correct(std::vector<std::uint32_t>{6, 7}, x, -64);  // the one is carried, the other is not
+  EXPECT_EQ(row(6), (std::vector<std::int32_t>{-250, 250, 125, -125}));
+  EXPECT_EQ(row(7), (std::vector<std::int32_t>{-128, 128, 64, -64}));
+  EXPECT_THROW(ParallelPerceptron(1, 3, 4), std::invalid_argument);
+}
+
 // Random problems of many shapes, with weights on both sides of one byte, against plain sums.
 TEST(ParallelPerceptron, EqualsPlainSumsOnRandomProblems) {
   core::Random random(11, core::Stream::weights);

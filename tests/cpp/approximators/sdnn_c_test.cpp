@@ -65,7 +65,7 @@ void expect_equal_parameters(const Network& a, const Network& b) {
   std::size_t n_different = 0;
   for (std::size_t i = 0; i < p.n_units(); ++i) {
     n_different += p.threshold(i) != q.threshold(i);
-    for (std::size_t j = 0; j < p.n_columns(); ++j) n_different += p.weight(i, j) != q.weight(i, j);
+    for (std::size_t j = 0; j < p.n_columns(); ++j) n_different += a.weight(i, j) != b.weight(i, j);
   }
   EXPECT_EQ(n_different, 0U);
 }
@@ -91,7 +91,7 @@ TEST(SdnnC, ThresholdsAlternateAndWeightsAreTernaryAtTheStart) {
   std::array<double, 3> count{};
   for (std::size_t i = 0; i < p.n_units(); ++i) {
     for (std::size_t j = 0; j < p.n_columns(); ++j) {
-      ++count.at(static_cast<std::size_t>(p.weight(i, j) + 1));
+      ++count.at(static_cast<std::size_t>(network.weight(i, j) + 1));
     }
   }
   const double n = 900.0 * 2400.0;
@@ -123,7 +123,7 @@ TEST(SdnnC, UniformInitialWeightsStayWithinTheirLimitOnTheLattice) {
   for (std::size_t i = 0; i < 200; ++i) {
     EXPECT_EQ(network.perceptron().threshold(i), i % 2 == 0 ? -80 : 80);
     for (std::size_t j = 0; j < network.perceptron().n_columns(); ++j) {
-      largest = std::max(largest, std::abs(network.perceptron().weight(i, j)));
+      largest = std::max(largest, std::abs(network.weight(i, j)));
     }
   }
   EXPECT_EQ(largest, 4);
@@ -310,7 +310,7 @@ TEST(SdnnC, ParametersCanBeMovedToAnotherNetworkOfTheSameWiring) {
   std::vector<std::int32_t> thresholds;
   for (std::size_t i = 0; i < p.n_units(); ++i) {
     thresholds.push_back(p.threshold(i));
-    for (std::size_t j = 0; j < p.n_columns(); ++j) weights.push_back(p.weight(i, j));
+    for (std::size_t j = 0; j < p.n_columns(); ++j) weights.push_back(teacher.weight(i, j));
   }
   pupil.set_parameters(weights, thresholds);
   expect_equal_parameters(pupil, teacher);

@@ -54,11 +54,11 @@ TEST(NetworkParts, NewStatesOfThePapersSizesTakeFullPasses) {
   });
 }
 
-// 100 units are padded to 128; half of the 240 columns are neutral with balanced anchors.
+// 100 units are padded to 128; of 120 modifiers half are active, and each takes one column of two.
 TEST(NetworkParts, BytesOfThePass) {
   NetworkParts parts(small_network(), 1);
   EXPECT_EQ(parts.weight_bytes(), 128U * 240U);
-  EXPECT_NEAR(parts.mean_bytes_of_pass(50), 128.0 * 120.0, 128.0 * 6.0);
+  EXPECT_NEAR(parts.mean_bytes_of_pass(50), 128.0 * 60.0, 128.0 * 3.0);
 }
 
 TEST(NetworkParts, RefusesImpossibleNumbers) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -22,23 +23,44 @@ StateCode<64> small_code(std::size_t l, int m, std::uint64_t seed) {
   return {std::move(books), std::move(permutations)};
 }
 
-std::vector<int> dense(const StateCode<64>& code, std::span<const Bin> bins) {
-  SignedColumns columns;
-  code.columns(bins, columns);
-  std::vector<int> x(code.n_columns(), 0);
+std::vector<int> dense(std::size_t n_columns, const SignedColumns& columns) {
+  std::vector<int> x(n_columns, 0);
   for (const auto j : columns.positive) x[j] += 1;
   for (const auto j : columns.negative) x[j] -= 1;
   return x;
 }
 
-TEST(StateCode, ColumnsFollowTheEquationOfLayer3) {
-  const auto code = small_code(3, 37, 5);
-  EXPECT_EQ(code.n_columns(), 37U * 6U);
-  const std::vector<Bin> bins = {17, 200, 359};
-  const auto x = dense(code, bins);
+std::vector<int> paired(const StateCode<64>& code, std::span<const Bin> bins) {
+  SignedColumns columns;
+  code.columns(bins, columns);
+  return dense(code.n_columns(), columns);
+}
+
+/// x_SD in the paper's order, from the paired code.
+std::vector<int> x_sd(const StateCode<64>& code, std::span<const Bin> bins) {
+  const std::vector<int> stored = paired(code, bins);
+  std::vector<int> x(code.n_columns());
+  for (std::size_t j = 0; j < x.size(); ++j) {
+    const auto place = code.place(j);
+    x[j] = stored[place.first] + (place.paired ? place.sign * stored[place.second] : 0);
+  }
+  return x;
+}
+
+// With an even number of inputs some columns are left without a partner.
+class StateCodeOfInputs : public ::testing::TestWithParam<std::size_t> {};
+INSTANTIATE_TEST_SUITE_P(Inputs, StateCodeOfInputs, ::testing::Values(2, 3, 4, 5, 6));
+
+TEST_P(StateCodeOfInputs, TheCodeFollowsTheEquationOfLayer3) {
+  const std::size_t l = GetParam();
+  const auto code = small_code(l, 37, 5);
+  EXPECT_EQ(code.n_columns(), 37U * l * (l - 1));
+  std::vector<Bin> bins = {17, 200, 359, 0, 90, 123};
+  bins.resize(l);
+  const auto x = x_sd(code, bins);
   std::size_t j = 0;
-  for (std::size_t mu = 0; mu < 3; ++mu) {
-    for (std::size_t nu = 0; nu < 3; ++nu) {
+  for (std::size_t mu = 0; mu < l; ++mu) {
+    for (std::size_t nu = 0; nu < l; ++nu) {
       if (nu == mu) continue;
       const auto& sigma = code.permutation(mu, nu);
       const auto pattern = code.group(mu, nu, bins);
@@ -53,16 +75,73 @@ TEST(StateCode, ColumnsFollowTheEquationOfLayer3) {
   }
 }
 
-TEST(StateCode, TheInnerProductIsThatOfTheDenseCodes) {
-  const auto code = small_code(4, 50, 6);
+// Half a sum and half a difference: one of the two is neutral, whatever the signs.
+TEST_P(StateCodeOfInputs, HalfAsManyPairedColumnsAreActive) {
+  const std::size_t l = GetParam();
+  const auto code = small_code(l, 37, 5);
+  EXPECT_EQ(code.n_double_columns(), 37U * l * (l - 1 - (l - 1) % 2));
+  std::vector<Bin> bins = {17, 200, 359, 0, 90, 123};
+  bins.resize(l);
+  const auto x = x_sd(code, bins);
+  SignedColumns columns;
+  code.columns(bins, columns);
+  std::size_t n_active = 0;
+  std::size_t n_listed = 0;
+  for (std::size_t j = 0; j < x.size(); ++j) {
+    if (x[j] != 0) n_active += code.place(j).paired ? 1 : 2;
+  }
+  for (const auto* list : {&columns.positive, &columns.negative}) {
+    n_listed += list->size();
+    EXPECT_TRUE(std::ranges::is_partitioned(
+        *list, [&](std::uint32_t j) { return j < code.n_double_columns(); }));
+  }
+  EXPECT_EQ(2 * n_listed, n_active);
+}
+
+TEST_P(StateCodeOfInputs, EveryColumnOfThePairedCodeHasItsPlace) {
+  const auto code = small_code(GetParam(), 13, 5);
+  std::vector<int> taken(code.n_columns(), 0);
+  for (std::size_t j = 0; j < taken.size(); ++j) {
+    const auto place = code.place(j);
+    EXPECT_EQ(place.paired, place.first < code.n_double_columns());
+    ++taken[place.first];
+    if (place.paired) ++taken[place.second];
+  }
+  for (std::size_t j = 0; j < taken.size(); ++j) {
+    EXPECT_EQ(taken[j], j < code.n_double_columns() ? 2 : 1);
+  }
+  EXPECT_THROW(static_cast<void>(code.place(taken.size())), std::invalid_argument);
+}
+
+TEST_P(StateCodeOfInputs, TheDifferenceIsThatOfThePairedCodes) {
+  const std::size_t l = GetParam();
+  const auto code = small_code(l, 50, 6);
+  core::Random random(2, core::Stream::ties);
+  SignedColumns columns;
+  for (int trial = 0; trial < 100; ++trial) {
+    std::vector<Bin> from(l);
+    std::vector<Bin> to(l);
+    for (auto& bin : from) bin = static_cast<Bin>(random.below(360));
+    for (auto& bin : to) bin = static_cast<Bin>(random.below(360));
+    code.difference(from, to, columns);
+    const auto change = dense(code.n_columns(), columns);
+    const auto before = paired(code, from);
+    const auto after = paired(code, to);
+    for (std::size_t j = 0; j < change.size(); ++j) ASSERT_EQ(change[j], after[j] - before[j]);
+  }
+}
+
+TEST_P(StateCodeOfInputs, TheInnerProductIsThatOfTheDenseCodes) {
+  const std::size_t l = GetParam();
+  const auto code = small_code(l, 50, 6);
   core::Random random(1, core::Stream::ties);
   for (int trial = 0; trial < 200; ++trial) {
-    std::vector<Bin> a(4);
-    std::vector<Bin> b(4);
+    std::vector<Bin> a(l);
+    std::vector<Bin> b(l);
     for (auto& bin : a) bin = static_cast<Bin>(random.below(360));
     for (auto& bin : b) bin = static_cast<Bin>(random.below(360));
-    const auto x = dense(code, a);
-    const auto y = dense(code, b);
+    const auto x = x_sd(code, a);
+    const auto y = x_sd(code, b);
     int expected = 0;
     for (std::size_t j = 0; j < x.size(); ++j) expected += x[j] * y[j];
     EXPECT_EQ(code.inner_product(a, b), expected);

@@ -32,11 +32,14 @@ namespace sdnn::approximators {
 /// Source: section 3.1 (layer 4, z) and Eqs. (2), (3).
 class ParallelPerceptron {
  public:
-  /// All weights and thresholds zero. Throws std::invalid_argument, std::bad_alloc.
-  ParallelPerceptron(std::size_t n_units, std::size_t n_columns)
-      : n_units_(n_units), n_columns_(n_columns) {
+  /// All weights and thresholds zero. The first `n_double` columns stand for two inputs each, half
+  /// whose sum or difference they are: a correction moves their weights by twice its step. Throws
+  /// std::invalid_argument, std::bad_alloc.
+  ParallelPerceptron(std::size_t n_units, std::size_t n_columns, std::size_t n_double = 0)
+      : n_units_(n_units), n_columns_(n_columns), n_double_(n_double) {
     core::require_in_range("n_units", n_units, 1, std::size_t{1} << 20);
     core::require_in_range("n_columns", n_columns, 1, std::size_t{1} << 27);
+    core::require_in_range("n_double", n_double, 0, n_columns);
     weight_limit_ = static_cast<std::int32_t>(
         std::min<std::size_t>(kWeightLimit, kThresholdLimit / n_columns));
     n_blocks_ = core::round_up(n_units, kBlockUnits) / kBlockUnits;
@@ -51,6 +54,7 @@ class ParallelPerceptron {
 
   std::size_t n_units() const noexcept { return n_units_; }
   std::size_t n_columns() const noexcept { return n_columns_; }
+  std::size_t n_double_columns() const noexcept { return n_double_; }
   /// How many weights outside one byte are listed.
   std::size_t n_carries() const noexcept { return carries_.size(); }
   /// Whether every weight has a second byte.
@@ -109,37 +113,39 @@ class ParallelPerceptron {
     for (const Carry& c : carries_) out[c.unit] += c.amount * values[c.column];
   }
 
-  /// w_i += step * x and w_i0 -= step for every i in `units`; no unit or column may come twice.
+  /// w_i += step * x, twice that in double columns, and w_i0 -= step for every i in `units`. No
+  /// unit or column may come twice, and double columns come first in the input's lists.
   ///
   /// Source: Eqs. (2), (3). Throws std::overflow_error before any change if a weight or threshold
-  /// would leave its range. Requires |step| <= 127. Quickest for `units` in rising order.
+  /// would leave its range. Requires |step| <= 64. Quickest for `units` in rising order.
   void correct(std::span<const std::uint32_t> units, const coding::SignedColumns& input,
                std::int32_t step) {
-    for (const std::uint32_t unit : units) require_room(unit, input, step);
+    const std::array<Part, 4> parts = parts_of(input, step);
+    for (const std::uint32_t unit : units) require_room(unit, parts, step);
     for (std::size_t k = 0; k < units.size();) {  // neighbours in a block share its cache lines
       const std::size_t block = units[k] / kBlockUnits;
-      alignas(core::kCacheLine) std::array<std::int8_t, kBlockUnits> change{};
+      alignas(core::kCacheLine) std::array<std::int8_t, kBlockUnits> mask{};
       std::size_t n_changed = 0;
       std::size_t changed = 0;
       for (; k < units.size() && units[k] / kBlockUnits == block; ++k) {
         const std::size_t unit = units[k];
-        raise_bound(unit, std::abs(step));
+        raise_bound(unit, growth(step));
         thresholds_[unit] -= step;
         if (largest_weight_[unit] <= kByteLimit) {
-          change[unit % kBlockUnits] = static_cast<std::int8_t>(step);
+          mask[unit % kBlockUnits] = -1;
           changed = unit;
           ++n_changed;
         } else {
-          for (const auto j : input.positive) store(unit, j, bytes_[byte_index(unit, j)] + step);
-          for (const auto j : input.negative) store(unit, j, bytes_[byte_index(unit, j)] - step);
+          for (const Part& part : parts) {
+            for (const auto j : part.columns) {
+              store(unit, j, bytes_[byte_index(unit, j)] + part.change);
+            }
+          }
         }
       }
-      if (n_changed == 1) {
-        add_to_unit(changed, input.positive, step);
-        add_to_unit(changed, input.negative, -step);
-      } else if (n_changed > 1) {
-        add_to_block<+1>(block, input.positive, change);
-        add_to_block<-1>(block, input.negative, change);
+      for (const Part& part : parts) {
+        if (n_changed == 1) add_to_unit(changed, part);
+        if (n_changed > 1) add_to_block(block, part, mask);
       }
     }
   }
@@ -163,22 +169,52 @@ class ParallelPerceptron {
     return (unit / kBlockUnits * n_columns_ + column) * kBlockUnits + unit % kBlockUnits;
   }
 
-  void add_to_unit(std::size_t unit, const std::vector<std::uint32_t>& columns,
-                   std::int32_t change) noexcept {
+  /// Columns of an input whose weights a correction changes alike.
+  struct Part {
+    std::span<const std::uint32_t> columns;
+    std::int32_t change;
+  };
+
+  std::array<Part, 4> parts_of(const coding::SignedColumns& input, std::int32_t step) const {
+    const auto split = [this](std::span<const std::uint32_t> columns) {
+      const auto end = std::partition_point(columns.begin(), columns.end(),
+                                            [this](std::uint32_t j) { return j < n_double_; });
+      return static_cast<std::size_t>(end - columns.begin());
+    };
+    const std::span<const std::uint32_t> positive = input.positive;
+    const std::span<const std::uint32_t> negative = input.negative;
+    const std::size_t n_positive = split(positive);
+    const std::size_t n_negative = split(negative);
+    return {{{positive.first(n_positive), 2 * step},
+             {negative.first(n_negative), -2 * step},
+             {positive.subspan(n_positive), step},
+             {negative.subspan(n_negative), -step}}};
+  }
+
+  /// What a correction can add to the largest weight of a unit.
+  std::int32_t growth(std::int32_t step) const noexcept {
+    return std::abs(step) * (n_double_ > 0 ? 2 : 1);
+  }
+
+  void add_to_unit(std::size_t unit, const Part& part) noexcept {
     std::int8_t* const lane = bytes_.data() + byte_index(unit, 0);
-    for (const std::uint32_t column : columns) {
+    for (const std::uint32_t column : part.columns) {
       std::int8_t& weight = lane[std::size_t{column} * kBlockUnits];
-      weight = static_cast<std::int8_t>(weight + change);
+      weight = static_cast<std::int8_t>(weight + part.change);
     }
   }
 
-  template <int Sign>
-  void add_to_block(std::size_t block, const std::vector<std::uint32_t>& columns,
-                    const std::array<std::int8_t, kBlockUnits>& change) noexcept {
-    for (const std::uint32_t column : columns) {
+  /// Adds to the units of the block whose mask is -1, modulo 256: the result fits by the bounds.
+  void add_to_block(std::size_t block, const Part& part,
+                    const std::array<std::int8_t, kBlockUnits>& mask) noexcept {
+    std::array<std::int8_t, kBlockUnits> change;
+    for (std::size_t i = 0; i < kBlockUnits; ++i) {
+      change[i] = static_cast<std::int8_t>(mask[i] & part.change);
+    }
+    for (const std::uint32_t column : part.columns) {
       std::int8_t* const line = bytes_.data() + (block * n_columns_ + column) * kBlockUnits;
       for (std::size_t i = 0; i < kBlockUnits; ++i) {
-        line[i] = static_cast<std::int8_t>(line[i] + Sign * change[i]);
+        line[i] = static_cast<std::int8_t>(line[i] + change[i]);
       }
     }
   }
@@ -261,12 +297,10 @@ class ParallelPerceptron {
   /// Throws unless the correction keeps the unit in range. The bound kept per unit only grows, so
   /// the true maximum is looked up when the bound gets there, and the corrected weights themselves
   /// when that is at the limit: going back is always possible.
-  void require_room(std::size_t unit, const coding::SignedColumns& input, std::int32_t step) {
-    const std::int32_t growth = std::abs(step);
-    if (largest_weight_[unit] > weight_limit_ - growth) {
-      largest_weight_[unit] = largest_weight(unit);
-    }
-    if ((largest_weight_[unit] > weight_limit_ - growth && !fits(unit, input, step)) ||
+  void require_room(std::size_t unit, std::span<const Part> parts, std::int32_t step) {
+    const std::int32_t room = weight_limit_ - growth(step);
+    if (largest_weight_[unit] > room) largest_weight_[unit] = largest_weight(unit);
+    if ((largest_weight_[unit] > room && !fits(unit, parts)) ||
         std::abs(thresholds_[unit] - step) > kThresholdLimit) {
       throw std::overflow_error("a weight or threshold of hidden unit " + std::to_string(unit) +
                                 " would exceed its range (|weight| <= " +
@@ -274,13 +308,12 @@ class ParallelPerceptron {
     }
   }
 
-  bool fits(std::size_t unit, const coding::SignedColumns& input, std::int32_t step) const {
-    const auto stays = [&](const std::vector<std::uint32_t>& columns, std::int32_t change) {
-      return std::all_of(columns.begin(), columns.end(), [&](std::uint32_t j) {
-        return std::abs(weight(unit, j) + change) <= weight_limit_;
+  bool fits(std::size_t unit, std::span<const Part> parts) const {
+    return std::ranges::all_of(parts, [&](const Part& part) {
+      return std::ranges::all_of(part.columns, [&](std::uint32_t j) {
+        return std::abs(weight(unit, j) + part.change) <= weight_limit_;
       });
-    };
-    return stays(input.positive, step) && stays(input.negative, -step);
+    });
   }
 
   /// Raises the unit's bound by `growth`. Where the bound would cost speed, the true maximum is
@@ -300,6 +333,7 @@ class ParallelPerceptron {
 
   std::size_t n_units_;
   std::size_t n_columns_;
+  std::size_t n_double_;
   std::size_t n_blocks_ = 0;
   std::int32_t weight_limit_;
   core::AlignedBuffer<std::int8_t> bytes_;  ///< [block][column][unit in block]

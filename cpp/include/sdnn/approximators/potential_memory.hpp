@@ -54,15 +54,18 @@ class PotentialMemory {
         log_bins_(kLogSize * n_inputs_),
         log_units_(kLogSize * max_corrected),
         log_(kLogSize) {
-    // Neighbouring bins differ in about m / 2 / 45 units of each pattern; each is a column of
-    // l - 1 groups as modified (half of them active, counted twice: +1 to -1) and as modifier.
+    // A unit of a modifier switches l - 1 inputs, which are about half as many columns: half the
+    // modifiers are active. Neighbouring bins differ in `differing` units of each pattern (about
+    // m / 2 / 45); where it is modified, in each of l - 1 groups, half of them are active and move
+    // two columns, or one twice.
     const double l = static_cast<double>(code.n_inputs());
     const double differing =
         static_cast<double>((code.book(0)[0] ^ code.book(0)[static_cast<coding::Bin>(std::min<
             std::size_t>(10, code.book(0).n_bins() - 1))]).count()) / 10.0;
-    columns_per_bin_ = 2.0 * (l - 1.0) * std::max(differing, 0.05);
-    columns_per_correction_ = 0.3 * l * (l - 1.0);
-    columns_of_pass_ = 0.5 * static_cast<double>(code.n_columns());
+    const double columns_of_modifier = static_cast<double>(code.n_inputs() / 2);
+    columns_per_bin_ = (l - 1.0 + columns_of_modifier) * std::max(differing, 0.05);
+    columns_per_correction_ = 0.15 * l * (l - 1.0);
+    columns_of_pass_ = 0.5 * l * static_cast<double>(code.n_pattern_units()) * columns_of_modifier;
   }
 
   const Counts& counts() const noexcept { return counts_; }

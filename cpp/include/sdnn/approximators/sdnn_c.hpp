@@ -70,7 +70,7 @@ class SdnnC {
         code_(make_code(config, seed)),
         actions_(config.n_hidden_units, config.n_active_units, config.n_actions),
         scale_(make_scale(config)),
-        perceptron_(actions_.n_hidden_units(), code_->n_columns()),
+        perceptron_(actions_.n_hidden_units(), code_->n_columns(), code_->n_double_columns()),
         memory_(*code_, actions_.n_hidden_units(), actions_.n_active_units()) {
     core::require_positive("learning_coefficient", config.learning_coefficient);
     core::require_in_range("lattice", config.lattice, 1, 64);
@@ -94,6 +94,13 @@ class SdnnC {
   const PotentialMemory<Capacity>& memory() const noexcept { return memory_; }
   std::size_t n_inputs() const noexcept { return code_->n_inputs(); }
   std::size_t n_actions() const noexcept { return actions_.n_actions(); }
+
+  /// The weight of a hidden unit for a unit of x_SD, in the paper's order, in lattice steps.
+  std::int32_t weight(std::size_t unit, std::size_t j) const {
+    const auto place = code_->place(j);
+    const std::int32_t first = perceptron_.weight(unit, place.first);
+    return place.paired ? (first + place.sign * perceptron_.weight(unit, place.second)) / 2 : first;
+  }
 
   /// Q(state, a) for every action. Shapes: state (l,) in [0, 1], out (n_actions,).
   ///
@@ -157,11 +164,18 @@ class SdnnC {
                   "n_hidden_units x D values", weights.size());
     core::require(thresholds.size() == perceptron_.n_units(), "thresholds",
                   "n_hidden_units values", thresholds.size());
-    ParallelPerceptron replaced(perceptron_.n_units(), n_columns);
-    for (std::size_t unit = 0; unit < perceptron_.n_units(); ++unit) {
-      for (std::size_t j = 0; j < n_columns; ++j) {
-        replaced.set_weight(unit, j, weights[unit * n_columns + j]);
+    for (const std::int32_t weight : weights) {
+      core::require_in_range("weight", weight, -largest_initial_weight(),
+                             largest_initial_weight());
+    }
+    ParallelPerceptron replaced(perceptron_.n_units(), n_columns, perceptron_.n_double_columns());
+    for (std::size_t j = 0; j < n_columns; ++j) {
+      const auto place = code_->place(j);
+      for (std::size_t unit = 0; unit < perceptron_.n_units(); ++unit) {
+        add_weight(replaced, unit, place, weights[unit * n_columns + j]);
       }
+    }
+    for (std::size_t unit = 0; unit < perceptron_.n_units(); ++unit) {
       replaced.set_threshold(unit, thresholds[unit]);
     }
     perceptron_ = std::move(replaced);
@@ -206,25 +220,40 @@ class SdnnC {
     return {u_low, u_high, config.q_low, config.q_high};
   }
 
+  /// Two weights make a sum that has to fit.
+  std::int32_t largest_initial_weight() const noexcept { return perceptron_.weight_limit() / 2; }
+
+  /// Adds to the weight of a unit of x_SD, where the paired code keeps it.
+  static void add_weight(ParallelPerceptron& perceptron, std::size_t unit,
+                         const typename coding::StateCode<Capacity>::Place& place,
+                         std::int32_t weight) {
+    const auto add = [&](std::size_t column, std::int32_t change) {
+      perceptron.set_weight(unit, column, perceptron.weight(unit, column) + change);
+    };
+    add(place.first, weight);
+    if (place.paired) add(place.second, place.sign * weight);
+  }
+
   void initialize_weights(std::uint64_t seed) {
     core::require(std::isfinite(config_.initial_weight_limit) && config_.initial_weight_limit >= 0,
                   "initial_weight_limit", "finite and not negative", config_.initial_weight_limit);
     const double limit = config_.initial_weight_limit * config_.lattice;
-    core::require(limit <= perceptron_.weight_limit(), "initial_weight_limit",
-                  "at most " + std::to_string(perceptron_.weight_limit()) + " / lattice",
+    core::require(limit <= largest_initial_weight(), "initial_weight_limit",
+                  "at most " + std::to_string(largest_initial_weight()) + " / lattice",
                   config_.initial_weight_limit);
     core::Random random(seed, core::Stream::weights);
     for (std::size_t j = 0; j < perceptron_.n_columns(); ++j) {
+      const auto place = code_->place(j);
       std::uint64_t bits = 0;
       for (std::size_t i = 0; i < perceptron_.n_units(); ++i) {
         if (config_.initial_weights == InitialWeights::ternary) {
           if (i % 32 == 0) bits = random.bits();  // two bits a weight
-          perceptron_.set_weight(i, j, static_cast<std::int32_t>(bits & 1) -
-                                           static_cast<std::int32_t>(bits >> 1 & 1));
+          add_weight(perceptron_, i, place, static_cast<std::int32_t>(bits & 1) -
+                                                static_cast<std::int32_t>(bits >> 1 & 1));
           bits >>= 2;
         } else {
           const double drawn = limit * (2.0 * random.uniform() - 1.0);
-          perceptron_.set_weight(i, j, static_cast<std::int32_t>(std::floor(drawn + 0.5)));
+          add_weight(perceptron_, i, place, static_cast<std::int32_t>(std::floor(drawn + 0.5)));
         }
       }
     }

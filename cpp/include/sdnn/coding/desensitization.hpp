@@ -45,6 +45,15 @@ core::BitLayer<Capacity> permute(const core::BitLayer<Capacity>& pattern,
   return permuted;
 }
 
+/// The permutation that undoes `permutation`.
+inline Permutation inverse(const Permutation& permutation) {
+  Permutation result(permutation.size());
+  for (std::size_t k = 0; k < permutation.size(); ++k) {
+    result[permutation[k]] = static_cast<std::uint32_t>(k);
+  }
+  return result;
+}
+
 /// A uniformly random permutation of `n` units.
 inline Permutation random_permutation(std::size_t n, core::Random& random) {
   Permutation permutation(n);

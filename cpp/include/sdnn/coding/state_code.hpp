@@ -18,7 +18,7 @@
 
 namespace sdnn::coding {
 
-/// The columns (units of layer 3) whose value is not 0, by sign; one of value 2 comes twice.
+/// The columns whose value is not 0, by sign; one of value 2 comes twice.
 struct SignedColumns {
   std::vector<std::uint32_t> positive;
   std::vector<std::uint32_t> negative;
@@ -41,8 +41,15 @@ struct SignedColumns {
 
 /// Layers 2 and 3 as fixed wiring: from a state to its ternary code x_SD.
 ///
-/// Group (mu, nu), nu != mu, has number mu * (l - 1) + (nu < mu ? nu : nu - 1), and holds the
-/// columns [number * m, (number + 1) * m). Permuted patterns are looked up, not computed.
+/// In the paper's order group (mu, nu), nu != mu, has number mu * (l - 1) + (nu < mu ? nu : nu - 1)
+/// and its unit k is unit number * m + k of x_SD.
+///
+/// The l - 1 units that unit q of x^nu modifies, one in each group (mu, nu), are neutral together.
+/// Two of them, x_j and x_k, are stored as (x_j + x_k) / 2 and (x_j - x_k) / 2. One of these is
+/// always neutral, so whoever reads or corrects the columns that are not has half as many of them.
+/// This is the *paired code*. Its first n_double_columns() columns are such halves: for each nu and
+/// each two of its groups m half sums, then m half differences, in the order of q. If l is even,
+/// the group of the last mu is left over for each nu and follows as it is, also in the order of q.
 template <std::size_t Capacity>
 class StateCode {
  public:
@@ -63,13 +70,17 @@ class StateCode {
                   "n_inputs * (n_inputs - 1)", permutations_.size());
     for (const auto& permutation : permutations_) require_permutation(permutation);
 
-    permuted_.resize(n_groups());
-    for_each_group([&](std::size_t group, std::size_t, std::size_t nu) {
-      for (std::size_t bin = 0; bin < books_[nu].n_bins(); ++bin) {
-        permuted_[group].push_back(
-            permute(books_[nu][static_cast<Bin>(bin)], permutations_[group]));
+    in_order_of_modifier_.resize(n_groups());
+    for (std::size_t mu = 0; mu < n_inputs(); ++mu) {
+      for (std::size_t nu = 0; nu < n_inputs(); ++nu) {
+        if (nu == mu) continue;
+        const Permutation modified = inverse(permutations_[group_of(mu, nu)]);
+        auto& patterns = in_order_of_modifier_[group_of(mu, nu)];
+        for (std::size_t bin = 0; bin < books_[mu].n_bins(); ++bin) {
+          patterns.push_back(permute(books_[mu][static_cast<Bin>(bin)], modified));
+        }
       }
-    });
+    }
   }
 
   std::size_t n_inputs() const noexcept { return books_.size(); }
@@ -100,43 +111,90 @@ class StateCode {
     }
   }
 
-  /// The ternary pattern of one group for a coded state.
+  /// The ternary pattern of one group for a coded state, in the paper's order.
   TernaryPattern<Capacity> group(std::size_t mu, std::size_t nu, std::span<const Bin> bins) const {
-    return desensitize(books_[mu][bins[mu]], permuted_[group_of(mu, nu)][bins[nu]]);
+    return desensitize(books_[mu][bins[mu]], permute(books_[nu][bins[nu]], permutation(mu, nu)));
   }
 
-  /// Lists the columns of x_SD that are +1 and -1.
+  /// Where a unit of x_SD is in the paired code: x = first + sign * second, or, unless it is
+  /// paired, first alone; and its weight is half of that sum of their weights, or the weight alone.
+  struct Place {
+    bool paired;
+    std::size_t first;
+    std::size_t second;
+    int sign;
+  };
+
+  /// Throws std::invalid_argument if there is no such unit.
+  Place place(std::size_t unit) const {
+    core::require(unit < n_columns(), "unit", "less than " + std::to_string(n_columns()), unit);
+    const std::size_t m = n_pattern_units();
+    const std::size_t group = unit / m;
+    const std::size_t mu = group / (n_inputs() - 1);
+    const std::size_t nu = group % (n_inputs() - 1) + (group % (n_inputs() - 1) >= mu ? 1 : 0);
+    const std::size_t modifier = permutations_[group][unit % m];
+    const std::size_t among = mu < nu ? mu : mu - 1;  // of the groups that nu modifies
+    const std::size_t pair = among / 2;
+    if (pair == n_pairs()) return {false, n_double_columns() + nu * m + modifier, 0, 0};
+    const std::size_t first = 2 * (nu * n_pairs() + pair) * m + modifier;
+    return {true, first, first + m, among % 2 == 0 ? 1 : -1};
+  }
+
+  /// How many columns of the paired code are half a sum or difference; they come first.
+  std::size_t n_double_columns() const noexcept {
+    return 2 * n_inputs() * n_pairs() * n_pattern_units();
+  }
+
+  /// Lists the columns of the paired code that are +1 and -1, double columns first.
   void columns(std::span<const Bin> bins, SignedColumns& out) const {
     out.clear();
-    for_each_group([&](std::size_t group, std::size_t mu, std::size_t nu) {
-      const auto active = permuted_[group][bins[nu]].words();
-      const auto positive = books_[mu][bins[mu]].words();
-      for (std::size_t w = 0; w < active.size(); ++w) {
-        const std::size_t first = group * n_pattern_units() + w * 64;
+    for_each_pair([&](std::size_t first, std::size_t nu, std::size_t mu_1, std::size_t mu_2) {
+      const PairWords x(pattern(nu, bins), signs(mu_1, nu, bins), signs(mu_2, nu, bins));
+      for (std::size_t w = 0; w < Pattern::kWords; ++w, first += 64) {
+        append(x.sum_plus[w], first, out.positive);
+        append(x.sum_minus[w], first, out.negative);
+        append(x.difference_plus[w], first + n_pattern_units(), out.positive);
+        append(x.difference_minus[w], first + n_pattern_units(), out.negative);
+      }
+    });
+    for_each_single([&](std::size_t first, std::size_t nu, std::size_t mu) {
+      const auto active = pattern(nu, bins).words();
+      const auto positive = signs(mu, nu, bins).words();
+      for (std::size_t w = 0; w < Pattern::kWords; ++w, first += 64) {
         append(active[w] & positive[w], first, out.positive);
         append(active[w] & ~positive[w], first, out.negative);
       }
     });
   }
 
-  /// Lists the columns of x_SD(to) - x_SD(from), those that change by 2 twice.
+  /// Lists the columns in which the paired codes of two states differ, x(to) - x(from); those that
+  /// change by 2 twice.
   void difference(std::span<const Bin> from, std::span<const Bin> to, SignedColumns& out) const {
     out.clear();
-    for_each_group([&](std::size_t group, std::size_t mu, std::size_t nu) {
-      const auto active_from = permuted_[group][from[nu]].words();
-      const auto active_to = permuted_[group][to[nu]].words();
-      const auto x_from = books_[mu][from[mu]].words();
-      const auto x_to = books_[mu][to[mu]].words();
-      for (std::size_t w = 0; w < active_to.size(); ++w) {
-        const std::size_t first = group * n_pattern_units() + w * 64;
-        const std::uint64_t plus_from = active_from[w] & x_from[w];
-        const std::uint64_t minus_from = active_from[w] & ~x_from[w];
-        const std::uint64_t plus_to = active_to[w] & x_to[w];
-        const std::uint64_t minus_to = active_to[w] & ~x_to[w];
-        append(plus_to & ~plus_from, first, out.positive);
-        append(minus_from & ~minus_to, first, out.positive);
-        append(minus_to & ~minus_from, first, out.negative);
-        append(plus_from & ~plus_to, first, out.negative);
+    const auto change = [&out](std::uint64_t plus_from, std::uint64_t minus_from,
+                               std::uint64_t plus_to, std::uint64_t minus_to, std::size_t first) {
+      append(plus_to & ~plus_from, first, out.positive);
+      append(minus_from & ~minus_to, first, out.positive);
+      append(minus_to & ~minus_from, first, out.negative);
+      append(plus_from & ~plus_to, first, out.negative);
+    };
+    for_each_pair([&](std::size_t first, std::size_t nu, std::size_t mu_1, std::size_t mu_2) {
+      const PairWords a(pattern(nu, from), signs(mu_1, nu, from), signs(mu_2, nu, from));
+      const PairWords b(pattern(nu, to), signs(mu_1, nu, to), signs(mu_2, nu, to));
+      for (std::size_t w = 0; w < Pattern::kWords; ++w, first += 64) {
+        change(a.sum_plus[w], a.sum_minus[w], b.sum_plus[w], b.sum_minus[w], first);
+        change(a.difference_plus[w], a.difference_minus[w], b.difference_plus[w],
+               b.difference_minus[w], first + n_pattern_units());
+      }
+    });
+    for_each_single([&](std::size_t first, std::size_t nu, std::size_t mu) {
+      const auto active_from = pattern(nu, from).words();
+      const auto active_to = pattern(nu, to).words();
+      const auto x_from = signs(mu, nu, from).words();
+      const auto x_to = signs(mu, nu, to).words();
+      for (std::size_t w = 0; w < Pattern::kWords; ++w, first += 64) {
+        change(active_from[w] & x_from[w], active_from[w] & ~x_from[w], active_to[w] & x_to[w],
+               active_to[w] & ~x_to[w], first);
       }
     });
   }
@@ -150,13 +208,51 @@ class StateCode {
   }
 
  private:
+  /// Two groups with one modifier as half their sum and half their difference.
+  struct PairWords {
+    PairWords(const Pattern& modifier, const Pattern& x_1, const Pattern& x_2) noexcept
+        : sum_plus((modifier & x_1 & x_2).words()),
+          sum_minus((modifier & ~(x_1 | x_2)).words()),
+          difference_plus((modifier & x_1 & ~x_2).words()),
+          difference_minus((modifier & x_2 & ~x_1).words()) {}
+
+    typename Pattern::Words sum_plus;
+    typename Pattern::Words sum_minus;
+    typename Pattern::Words difference_plus;
+    typename Pattern::Words difference_minus;
+  };
+
+  /// How often two of the groups that one input modifies are taken together.
+  std::size_t n_pairs() const noexcept { return (n_inputs() - 1) / 2; }
+
+  const Pattern& pattern(std::size_t input, std::span<const Bin> bins) const noexcept {
+    return books_[input][bins[input]];
+  }
+
+  /// x^mu in the order of the units of x^nu that modify it.
+  const Pattern& signs(std::size_t mu, std::size_t nu, std::span<const Bin> bins) const noexcept {
+    return in_order_of_modifier_[group_of(mu, nu)][bins[mu]];
+  }
+
+  /// Calls visit(first column of the sums, nu, mu_1, mu_2).
   template <class Visit>
-  void for_each_group(Visit&& visit) const {
-    std::size_t group = 0;
-    for (std::size_t mu = 0; mu < n_inputs(); ++mu) {
-      for (std::size_t nu = 0; nu < n_inputs(); ++nu) {
-        if (nu != mu) visit(group++, mu, nu);
+  void for_each_pair(Visit&& visit) const {
+    std::size_t first = 0;
+    for (std::size_t nu = 0; nu < n_inputs(); ++nu) {
+      for (std::size_t among = 0; among < 2 * n_pairs(); among += 2) {
+        visit(first, nu, among + (among >= nu), among + 1 + (among + 1 >= nu));
+        first += 2 * n_pattern_units();
       }
+    }
+  }
+
+  /// Calls visit(first column, nu, mu) for the groups that are left over.
+  template <class Visit>
+  void for_each_single(Visit&& visit) const {
+    if (n_inputs() % 2 != 0) return;
+    std::size_t first = n_double_columns();
+    for (std::size_t nu = 0; nu < n_inputs(); ++nu, first += n_pattern_units()) {
+      visit(first, nu, nu + 1 < n_inputs() ? n_inputs() - 1 : n_inputs() - 2);
     }
   }
 
@@ -164,18 +260,19 @@ class StateCode {
                                                              std::span<const Bin> b) const noexcept {
     int sum = 0;
     const std::size_t l = n_inputs();
-    for (std::size_t mu = 0, group = 0; mu < l; ++mu) {
-      const auto differing = (books_[mu][a[mu]] ^ books_[mu][b[mu]]).words();
-      for (std::size_t nu = 0; nu < l; ++nu) {
-        if (nu == mu) continue;
-        const auto active_a = permuted_[group][a[nu]].words();
-        const auto active_b = permuted_[group][b[nu]].words();
-        for (std::size_t w = 0; w < differing.size(); ++w) {
-          const std::uint64_t both = active_a[w] & active_b[w];
-          sum += std::popcount(both) - 2 * std::popcount(both & differing[w]);
+    for (std::size_t nu = 0; nu < l; ++nu) {
+      const auto active = (books_[nu][a[nu]] & books_[nu][b[nu]]).words();
+      int n_active = 0;
+      for (const std::uint64_t word : active) n_active += std::popcount(word);
+      int n_differing = 0;
+      for (std::size_t mu = 0; mu < l; ++mu) {
+        if (mu == nu) continue;
+        const auto differing = (signs(mu, nu, a) ^ signs(mu, nu, b)).words();
+        for (std::size_t w = 0; w < active.size(); ++w) {
+          n_differing += std::popcount(active[w] & differing[w]);
         }
-        ++group;
       }
+      sum += static_cast<int>(l - 1) * n_active - 2 * n_differing;
     }
     return sum;
   }
@@ -212,7 +309,7 @@ class StateCode {
 
   std::vector<CodeBook<Capacity>> books_;
   std::vector<Permutation> permutations_;
-  std::vector<std::vector<Pattern>> permuted_;  ///< [group][bin of nu]
+  std::vector<std::vector<Pattern>> in_order_of_modifier_;  ///< [group][bin of mu]
 };
 
 }  // namespace sdnn::coding
