@@ -1,0 +1,269 @@
+/// The inner loops of training and prediction, for each instruction set.
+///
+/// Each loop is written once, over vector registers of 32 bytes, and compiled once per instruction
+/// set. All sums are exact integers, so that every version gives the same result.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+
+#include "sdnn/core/aligned_buffer.hpp"
+#include "sdnn/core/instruction_set.hpp"
+#include "sdnn/core/lanes.hpp"
+
+namespace sdnn::estimators {
+
+/// Units whose weights lie side by side: the width of a full tile.
+inline constexpr std::size_t kTileUnits = 64;
+/// The widths of tiles are multiples of this.
+inline constexpr std::size_t kTileStep = 16;
+
+namespace internal {
+
+#if SDNN_LANES
+/// 32 bytes of integers. GCC's ABI note is about calls, and there are none.
+#if !defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpsabi"
+#endif
+template <class Weight>
+struct Register {
+  typedef Weight Vector __attribute__((vector_size(32)));
+  static constexpr std::size_t kSize = 32 / sizeof(Weight);
+  Vector v;
+  SDNN_INLINE void clear() noexcept { v = Vector{}; }
+  SDNN_INLINE void add(const Weight* from) noexcept {
+    Vector other;
+    std::memcpy(&other, from, sizeof other);
+    v += other;
+  }
+  SDNN_INLINE void subtract(const Weight* from) noexcept {
+    Vector other;
+    std::memcpy(&other, from, sizeof other);
+    v -= other;
+  }
+  SDNN_INLINE void store(Weight* to) const noexcept { std::memcpy(to, &v, sizeof v); }
+};
+#if !defined(__clang__)
+#pragma GCC diagnostic pop
+#endif
+#else
+template <class Weight>
+struct Register {
+  static constexpr std::size_t kSize = 16;
+  Weight v[kSize];
+  void clear() noexcept { std::fill_n(v, kSize, Weight{0}); }
+  void add(const Weight* from) noexcept {
+    for (std::size_t i = 0; i < kSize; ++i) v[i] = static_cast<Weight>(v[i] + from[i]);
+  }
+  void subtract(const Weight* from) noexcept {
+    for (std::size_t i = 0; i < kSize; ++i) v[i] = static_cast<Weight>(v[i] - from[i]);
+  }
+  void store(Weight* to) const noexcept { std::copy_n(v, kSize, to); }
+};
+#endif
+
+/// sums[0 .. Width) += the rows `plus` of a tile, -= its rows `minus`; at most `n_per_sum` rows are
+/// added before the sum is widened.
+template <class Weight, std::size_t Width>
+SDNN_INLINE void add_rows_of_width(const Weight* tile, const std::uint32_t* plus,
+                                   std::size_t n_plus, const std::uint32_t* minus,
+                                   std::size_t n_minus, std::size_t n_per_sum,
+                                   std::int32_t* sums) noexcept {
+  using Lane = Register<Weight>;
+  constexpr std::size_t kRegisters = Width / Lane::kSize;
+  while (n_plus + n_minus > 0) {
+    const std::size_t some_plus = std::min(n_plus, n_per_sum);
+    const std::size_t some_minus = std::min(n_minus, n_per_sum - some_plus);
+    Lane sum[kRegisters];
+    core::unrolled<kRegisters>([&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].clear(); });
+    for (std::size_t c = 0; c < some_plus; ++c) {
+      const Weight* const row = tile + std::size_t{plus[c]} * Width;
+      core::unrolled<kRegisters>(
+          [&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].add(row + r * Lane::kSize); });
+    }
+    for (std::size_t c = 0; c < some_minus; ++c) {
+      const Weight* const row = tile + std::size_t{minus[c]} * Width;
+      core::unrolled<kRegisters>(
+          [&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].subtract(row + r * Lane::kSize); });
+    }
+    alignas(core::kCacheLine) Weight narrow[Width];
+    core::unrolled<kRegisters>(
+        [&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].store(narrow + r * Lane::kSize); });
+    for (std::size_t i = 0; i < Width; ++i) sums[i] += narrow[i];
+    plus += some_plus, n_plus -= some_plus;
+    minus += some_minus, n_minus -= some_minus;
+  }
+}
+
+template <class Weight>
+SDNN_INLINE void add_rows_body(const Weight* tile, std::size_t width, const std::uint32_t* plus,
+                               std::size_t n_plus, const std::uint32_t* minus, std::size_t n_minus,
+                               std::size_t n_per_sum, std::int32_t* sums) noexcept {
+  switch (width) {
+    case 16: return add_rows_of_width<Weight, 16>(tile, plus, n_plus, minus, n_minus, n_per_sum, sums);
+    case 32: return add_rows_of_width<Weight, 32>(tile, plus, n_plus, minus, n_minus, n_per_sum, sums);
+    case 48: return add_rows_of_width<Weight, 48>(tile, plus, n_plus, minus, n_minus, n_per_sum, sums);
+    default: return add_rows_of_width<Weight, 64>(tile, plus, n_plus, minus, n_minus, n_per_sum, sums);
+  }
+}
+
+/// to[i] += sum of plus[k][i] - sum of minus[k][i], a cache line of results at a time.
+template <class Entry>
+SDNN_INLINE void add_products_body(std::int32_t* to, std::size_t size, const Entry* const* plus,
+                                   std::size_t n_plus, const Entry* const* minus,
+                                   std::size_t n_minus) noexcept {
+  for (std::size_t k = 0; k < n_plus; ++k) {
+    const Entry* const row = plus[k];
+    for (std::size_t i = 0; i < size; ++i) to[i] += row[i];
+  }
+  for (std::size_t k = 0; k < n_minus; ++k) {
+    const Entry* const row = minus[k];
+    for (std::size_t i = 0; i < size; ++i) to[i] -= row[i];
+  }
+}
+
+SDNN_INLINE std::int32_t count_firing_body(const std::int32_t* potentials,
+                                           std::size_t size) noexcept {
+  std::int32_t count = 0;
+  for (std::size_t i = 0; i < size; ++i) count += potentials[i] > 0 ? 1 : 0;
+  return count;
+}
+
+/// Distances to the threshold of the units that fire (`firing`) or do not; INT32_MAX of the others.
+/// Returns the least.
+SDNN_INLINE std::int32_t distances_body(const std::int32_t* potentials, std::size_t size,
+                                        bool firing, std::int32_t* distances) noexcept {
+  constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::max();
+  std::int32_t least = kNone;
+  if (firing) {
+    for (std::size_t i = 0; i < size; ++i) {
+      distances[i] = potentials[i] > 0 ? potentials[i] : kNone;
+      least = std::min(least, distances[i]);
+    }
+  } else {
+    for (std::size_t i = 0; i < size; ++i) {
+      distances[i] = potentials[i] > 0 ? kNone : -potentials[i];
+      least = std::min(least, distances[i]);
+    }
+  }
+  return least;
+}
+
+SDNN_INLINE std::int32_t least_body(const std::int32_t* values, std::size_t size) noexcept {
+  std::int32_t least = std::numeric_limits<std::int32_t>::max();
+  for (std::size_t i = 0; i < size; ++i) least = std::min(least, values[i]);
+  return least;
+}
+
+/// The inner product of two codes with entries +1, 0, -1.
+SDNN_INLINE std::int32_t inner_product_body(const std::uint64_t* active,
+                                            const std::uint64_t* positive,
+                                            const std::uint64_t* other_active,
+                                            const std::uint64_t* other_positive,
+                                            std::size_t n_words) noexcept {
+  std::int32_t both = 0;
+  std::int32_t unlike = 0;
+  for (std::size_t w = 0; w < n_words; ++w) {
+    const std::uint64_t shared = active[w] & other_active[w];
+    both += std::popcount(shared);
+    unlike += std::popcount(shared & (positive[w] ^ other_positive[w]));
+  }
+  return both - 2 * unlike;
+}
+
+}  // namespace internal
+
+/// One version of each loop.
+struct UnitKernels {
+  void (*add_rows_16)(const std::int16_t* tile, std::size_t width, const std::uint32_t* plus,
+                      std::size_t n_plus, const std::uint32_t* minus, std::size_t n_minus,
+                      std::size_t n_per_sum, std::int32_t* sums);
+  void (*add_rows_32)(const std::int32_t* tile, std::size_t width, const std::uint32_t* plus,
+                      std::size_t n_plus, const std::uint32_t* minus, std::size_t n_minus,
+                      std::size_t n_per_sum, std::int32_t* sums);
+  void (*add_products_16)(std::int32_t* to, std::size_t size, const std::int16_t* const* plus,
+                          std::size_t n_plus, const std::int16_t* const* minus,
+                          std::size_t n_minus);
+  void (*add_products_32)(std::int32_t* to, std::size_t size, const std::int32_t* const* plus,
+                          std::size_t n_plus, const std::int32_t* const* minus,
+                          std::size_t n_minus);
+  std::int32_t (*count_firing)(const std::int32_t* potentials, std::size_t size);
+  std::int32_t (*distances)(const std::int32_t* potentials, std::size_t size, bool firing,
+                            std::int32_t* distances);
+  std::int32_t (*least)(const std::int32_t* values, std::size_t size);
+  std::int32_t (*inner_product)(const std::uint64_t* active, const std::uint64_t* positive,
+                                const std::uint64_t* other_active,
+                                const std::uint64_t* other_positive, std::size_t n_words);
+
+  void add_rows(const std::int16_t* tile, std::size_t width, const std::uint32_t* plus,
+                std::size_t n_plus, const std::uint32_t* minus, std::size_t n_minus,
+                std::size_t n_per_sum, std::int32_t* sums) const {
+    add_rows_16(tile, width, plus, n_plus, minus, n_minus, n_per_sum, sums);
+  }
+  void add_rows(const std::int32_t* tile, std::size_t width, const std::uint32_t* plus,
+                std::size_t n_plus, const std::uint32_t* minus, std::size_t n_minus,
+                std::size_t n_per_sum, std::int32_t* sums) const {
+    add_rows_32(tile, width, plus, n_plus, minus, n_minus, n_per_sum, sums);
+  }
+  void add_products(std::int32_t* to, std::size_t size, const std::int16_t* const* plus,
+                    std::size_t n_plus, const std::int16_t* const* minus,
+                    std::size_t n_minus) const {
+    add_products_16(to, size, plus, n_plus, minus, n_minus);
+  }
+  void add_products(std::int32_t* to, std::size_t size, const std::int32_t* const* plus,
+                    std::size_t n_plus, const std::int32_t* const* minus,
+                    std::size_t n_minus) const {
+    add_products_32(to, size, plus, n_plus, minus, n_minus);
+  }
+};
+
+// The loops are templates' bodies, inlined into lambdas that carry the instruction set.
+#define SDNN_UNIT_KERNELS(...)                                                                    \
+  UnitKernels {                                                                                   \
+    [](const std::int16_t* t, std::size_t w, const std::uint32_t* p, std::size_t np,              \
+       const std::uint32_t* m, std::size_t nm, std::size_t s, std::int32_t* o) __VA_ARGS__ {      \
+      internal::add_rows_body(t, w, p, np, m, nm, s, o);                                          \
+    },                                                                                            \
+        [](const std::int32_t* t, std::size_t w, const std::uint32_t* p, std::size_t np,          \
+           const std::uint32_t* m, std::size_t nm, std::size_t s, std::int32_t* o) __VA_ARGS__ {  \
+          internal::add_rows_body(t, w, p, np, m, nm, s, o);                                      \
+        },                                                                                        \
+        [](std::int32_t* o, std::size_t n, const std::int16_t* const* p, std::size_t np,          \
+           const std::int16_t* const* m, std::size_t nm) __VA_ARGS__ {                            \
+          internal::add_products_body(o, n, p, np, m, nm);                                        \
+        },                                                                                        \
+        [](std::int32_t* o, std::size_t n, const std::int32_t* const* p, std::size_t np,          \
+           const std::int32_t* const* m, std::size_t nm) __VA_ARGS__ {                            \
+          internal::add_products_body(o, n, p, np, m, nm);                                        \
+        },                                                                                        \
+        [](const std::int32_t* p, std::size_t n)                                                  \
+            __VA_ARGS__ { return internal::count_firing_body(p, n); },                            \
+        [](const std::int32_t* p, std::size_t n, bool f, std::int32_t* d)                         \
+            __VA_ARGS__ { return internal::distances_body(p, n, f, d); },                         \
+        [](const std::int32_t* v, std::size_t n)                                                  \
+            __VA_ARGS__ { return internal::least_body(v, n); },                                   \
+        [](const std::uint64_t* a, const std::uint64_t* p, const std::uint64_t* oa,               \
+           const std::uint64_t* op, std::size_t n)                                                \
+            __VA_ARGS__ { return internal::inner_product_body(a, p, oa, op, n); }                 \
+  }
+
+/// The loops of the instruction set in use.
+inline UnitKernels unit_kernels() {
+#if SDNN_X86_KERNELS
+  switch (core::instruction_set()) {
+    case core::InstructionSet::avx512:
+      return SDNN_UNIT_KERNELS(__attribute__((target("avx512f,avx512bw,avx2,popcnt"))));
+    case core::InstructionSet::avx2:
+      return SDNN_UNIT_KERNELS(__attribute__((target("avx2,popcnt"))));
+    default: break;
+  }
+#endif
+  return SDNN_UNIT_KERNELS();
+}
+
+}  // namespace sdnn::estimators
