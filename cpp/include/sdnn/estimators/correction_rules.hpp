@@ -80,8 +80,9 @@ class PDeltaRule {
     };
     if (n_corrected <= kScans) {  // one scan per unit; equals are taken in index order
       for (std::size_t left = n_corrected;;) {
-        for (std::size_t i = 0; i < group_size_; ++i) {
-          if (distances_[i] != least) continue;
+        std::size_t i = kernels_.find(distances_.data(), group_size_, 0, least);
+        for (; i < group_size_;
+             i = kernels_.find(distances_.data(), group_size_, i + 1, least)) {
           add(i);
           distances_[i] = std::numeric_limits<std::int32_t>::max();
           if (--left == 0) return;

@@ -22,7 +22,8 @@ struct TrainingCount {
 /// The reference for the other forms: works on the layer's weights directly. Needs no memory.
 class PlainTraining {
  public:
-  PlainTraining(std::shared_ptr<PerceptronLayer> layer, std::span<const std::int32_t> bins)
+  PlainTraining(std::shared_ptr<PerceptronLayer> layer, std::span<const std::int32_t> bins,
+                int /*n_threads*/)
       : layer_(std::move(layer)), bins_(bins.begin(), bins.end()), kernels_(unit_kernels()),
         words_(2 * layer_->code().n_words()), potentials_(layer_->n_padded_units()) {}
 

@@ -13,7 +13,9 @@
 #include <variant>
 
 #include "sdnn/core/check.hpp"
+#include "sdnn/estimators/block_training.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
+#include "sdnn/estimators/dual_training.hpp"
 #include "sdnn/estimators/perceptron_layer.hpp"
 #include "sdnn/estimators/plain_training.hpp"
 #include "sdnn/estimators/training_form.hpp"
@@ -81,7 +83,8 @@ class Trainer {
   }
 
  private:
-  using Training = std::variant<PlainTraining>;
+  using Training = std::variant<PlainTraining, BlockTraining, DualTraining<std::int16_t>,
+                                DualTraining<std::int32_t>>;
 
   /// A presentation raises a unit's norm by at most one per active column and one for the threshold.
   void renew_headroom() {
@@ -93,8 +96,19 @@ class Trainer {
     }
   }
 
-  void make_training(std::span<const std::int32_t> bins, int) {
-    training_ = std::make_unique<Training>(std::in_place_type<PlainTraining>, layer_, bins);
+  void make_training(std::span<const std::int32_t> bins, int n_threads) {
+    const auto make = [&]<class Form>(std::in_place_type_t<Form> type) {
+      training_ = std::make_unique<Training>(type, layer_, bins, n_threads);
+    };
+    switch (form_) {
+      case TrainingForm::dual:
+        if (product_bytes(layer_->code()) == sizeof(std::int16_t)) {
+          return make(std::in_place_type<DualTraining<std::int16_t>>);
+        }
+        return make(std::in_place_type<DualTraining<std::int32_t>>);
+      case TrainingForm::block: return make(std::in_place_type<BlockTraining>);
+      default: return make(std::in_place_type<PlainTraining>);
+    }
   }
 
   std::shared_ptr<PerceptronLayer> layer_;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -127,6 +128,23 @@ SDNN_INLINE void add_products_body(std::int32_t* to, std::size_t size, const Ent
   }
 }
 
+/// Adds the coefficients to the rows of the set bits of `positive`, subtracts them from those of the
+/// other bits of `active`. 64 rows of `width` units.
+SDNN_INLINE void add_outer_body(std::int32_t* rows, std::size_t width,
+                                const std::int16_t* coefficients, std::uint64_t active,
+                                std::uint64_t positive) noexcept {
+  alignas(core::kCacheLine) std::int32_t wide[kTileUnits];
+  for (std::size_t i = 0; i < width; ++i) wide[i] = coefficients[i];
+  for (std::uint64_t bits = positive; bits != 0; bits &= bits - 1) {
+    std::int32_t* const row = rows + static_cast<std::size_t>(std::countr_zero(bits)) * width;
+    for (std::size_t i = 0; i < width; ++i) row[i] += wide[i];
+  }
+  for (std::uint64_t bits = active & ~positive; bits != 0; bits &= bits - 1) {
+    std::int32_t* const row = rows + static_cast<std::size_t>(std::countr_zero(bits)) * width;
+    for (std::size_t i = 0; i < width; ++i) row[i] -= wide[i];
+  }
+}
+
 SDNN_INLINE std::int32_t count_firing_body(const std::int32_t* potentials,
                                            std::size_t size) noexcept {
   std::int32_t count = 0;
@@ -140,24 +158,52 @@ SDNN_INLINE std::int32_t distances_body(const std::int32_t* potentials, std::siz
                                         bool firing, std::int32_t* distances) noexcept {
   constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::max();
   std::int32_t least = kNone;
-  if (firing) {
-    for (std::size_t i = 0; i < size; ++i) {
-      distances[i] = potentials[i] > 0 ? potentials[i] : kNone;
-      least = std::min(least, distances[i]);
-    }
-  } else {
-    for (std::size_t i = 0; i < size; ++i) {
-      distances[i] = potentials[i] > 0 ? kNone : -potentials[i];
-      least = std::min(least, distances[i]);
-    }
+  std::size_t i = 0;
+#if SDNN_LANES
+  using Vector = Register<std::int32_t>::Vector;
+  constexpr std::size_t kSize = Register<std::int32_t>::kSize;
+  const Vector none = Vector{} + kNone;
+  const Vector flip = Vector{} - (firing ? 0 : 1);  // all ones to negate and to invert the mask
+  Vector lowest = none;
+  for (; i + kSize <= size; i += kSize) {
+    Vector p;
+    std::memcpy(&p, potentials + i, sizeof p);
+    const Vector asked = (Vector)(p > 0) ^ flip;
+    const Vector distance = (((p ^ flip) - flip) & asked) | (none & ~asked);
+    std::memcpy(distances + i, &distance, sizeof distance);
+    const Vector lower = (Vector)(distance < lowest);
+    lowest = (distance & lower) | (lowest & ~lower);
+  }
+  for (std::size_t k = 0; k < kSize; ++k) least = lowest[k] < least ? lowest[k] : least;
+#endif
+  for (; i < size; ++i) {
+    distances[i] = (potentials[i] > 0) != firing ? kNone : firing ? potentials[i] : -potentials[i];
+    least = distances[i] < least ? distances[i] : least;
   }
   return least;
 }
 
 SDNN_INLINE std::int32_t least_body(const std::int32_t* values, std::size_t size) noexcept {
   std::int32_t least = std::numeric_limits<std::int32_t>::max();
-  for (std::size_t i = 0; i < size; ++i) least = std::min(least, values[i]);
+  for (std::size_t i = 0; i < size; ++i) least = values[i] < least ? values[i] : least;
   return least;
+}
+
+/// The first place of `wanted` at or after `begin`, `size` if there is none.
+SDNN_INLINE std::size_t find_body(const std::int32_t* values, std::size_t size, std::size_t begin,
+                                  std::int32_t wanted) noexcept {
+#if SDNN_LANES
+  using Vector = Register<std::int32_t>::Vector;
+  constexpr std::size_t kSize = Register<std::int32_t>::kSize;
+  for (; begin + kSize <= size; begin += kSize) {
+    Vector v;
+    std::memcpy(&v, values + begin, sizeof v);
+    const auto equal = std::bit_cast<std::array<std::uint64_t, 4>>((Vector)(v == wanted));
+    if ((equal[0] | equal[1] | equal[2] | equal[3]) != 0) break;
+  }
+#endif
+  while (begin < size && values[begin] != wanted) ++begin;
+  return begin;
 }
 
 /// The inner product of two codes with entries +1, 0, -1.
@@ -192,10 +238,14 @@ struct UnitKernels {
   void (*add_products_32)(std::int32_t* to, std::size_t size, const std::int32_t* const* plus,
                           std::size_t n_plus, const std::int32_t* const* minus,
                           std::size_t n_minus);
+  void (*add_outer)(std::int32_t* rows, std::size_t width, const std::int16_t* coefficients,
+                    std::uint64_t active, std::uint64_t positive);
   std::int32_t (*count_firing)(const std::int32_t* potentials, std::size_t size);
   std::int32_t (*distances)(const std::int32_t* potentials, std::size_t size, bool firing,
                             std::int32_t* distances);
   std::int32_t (*least)(const std::int32_t* values, std::size_t size);
+  std::size_t (*find)(const std::int32_t* values, std::size_t size, std::size_t begin,
+                      std::int32_t wanted);
   std::int32_t (*inner_product)(const std::uint64_t* active, const std::uint64_t* positive,
                                 const std::uint64_t* other_active,
                                 const std::uint64_t* other_positive, std::size_t n_words);
@@ -241,12 +291,16 @@ struct UnitKernels {
            const std::int32_t* const* m, std::size_t nm) __VA_ARGS__ {                            \
           internal::add_products_body(o, n, p, np, m, nm);                                        \
         },                                                                                        \
+        [](std::int32_t* r, std::size_t w, const std::int16_t* c, std::uint64_t a,                \
+           std::uint64_t p) __VA_ARGS__ { internal::add_outer_body(r, w, c, a, p); },             \
         [](const std::int32_t* p, std::size_t n)                                                  \
             __VA_ARGS__ { return internal::count_firing_body(p, n); },                            \
         [](const std::int32_t* p, std::size_t n, bool f, std::int32_t* d)                         \
             __VA_ARGS__ { return internal::distances_body(p, n, f, d); },                         \
         [](const std::int32_t* v, std::size_t n)                                                  \
             __VA_ARGS__ { return internal::least_body(v, n); },                                   \
+        [](const std::int32_t* v, std::size_t n, std::size_t b, std::int32_t w)                   \
+            __VA_ARGS__ { return internal::find_body(v, n, b, w); },                              \
         [](const std::uint64_t* a, const std::uint64_t* p, const std::uint64_t* oa,               \
            const std::uint64_t* op, std::size_t n)                                                \
             __VA_ARGS__ { return internal::inner_product_body(a, p, oa, op, n); }                 \
