@@ -1,11 +1,16 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <optional>
+#include <utility>
+#include <vector>
+
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "sdnn/coding/correlation_matrix.hpp"
 #include "sdnn/coding/random_inverse.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
+#include "sdnn/estimators/libsdnn.hpp"
 #include "sdnn/estimators/perceptron_layer.hpp"
 #include "sdnn/estimators/trainer.hpp"
 
@@ -44,10 +49,7 @@ py::array_t<std::int8_t> signs_of(const coding::PatternTable& table) {
   return signs;
 }
 
-std::shared_ptr<coding::SelectiveDesensitization> make_code(
-    const std::vector<ArrayArgument<std::int8_t>>& modified,
-    const std::vector<ArrayArgument<std::int8_t>>& modifiers,
-    const ArrayArgument<std::int32_t>& pairs) {
+std::vector<coding::InputPair> pairs_of(const ArrayArgument<std::int32_t>& pairs) {
   const auto inputs = matrix(pairs, "pairs", 2);
   std::vector<coding::InputPair> input_pairs;
   for (std::size_t p = 0; p < inputs.size(); p += 2) {
@@ -56,12 +58,19 @@ std::shared_ptr<coding::SelectiveDesensitization> make_code(
     input_pairs.push_back(
         {static_cast<std::size_t>(inputs[p]), static_cast<std::size_t>(inputs[p + 1])});
   }
+  return input_pairs;
+}
+
+std::shared_ptr<coding::SelectiveDesensitization> make_code(
+    const std::vector<ArrayArgument<std::int8_t>>& modified,
+    const std::vector<ArrayArgument<std::int8_t>>& modifiers,
+    const ArrayArgument<std::int32_t>& pairs) {
   std::vector<coding::PatternTable> modified_tables;
   std::vector<coding::PatternTable> modifier_tables;
   for (const auto& table : modified) modified_tables.push_back(table_of(table));
   for (const auto& table : modifiers) modifier_tables.push_back(table_of(table));
   return std::make_shared<coding::SelectiveDesensitization>(
-      std::move(modified_tables), std::move(modifier_tables), std::move(input_pairs));
+      std::move(modified_tables), std::move(modifier_tables), pairs_of(pairs));
 }
 
 py::array_t<std::int8_t> transform(const coding::SelectiveDesensitization& code, const Bins& bins) {
@@ -148,6 +157,39 @@ Matrix counts_of(const PerceptronLayer& layer, const Bins& bins, std::size_t n_g
   const py::gil_scoped_release release;
   layer.counts(values, n_groups, n_threads, items);
   return out;
+}
+
+estimators::LibsdnnRandom libsdnn_random(const std::vector<std::uint32_t>& seed,
+                                         const std::string& library) {
+  core::require(library == "libstdc++" || library == "msvc", "library", "libstdc++ or msvc",
+                library);
+  return {seed, library == "msvc" ? estimators::StandardLibrary::msvc
+                                  : estimators::StandardLibrary::libstdcxx};
+}
+
+py::tuple libsdnn_tables(int n_units, const std::vector<std::pair<int, int>>& inputs,
+                         const ArrayArgument<std::int32_t>& pairs,
+                         const std::vector<std::uint32_t>& seed, const std::string& library) {
+  auto random = libsdnn_random(seed, library);
+  std::vector<coding::RandomInverseConfig> configs;
+  for (const auto& [n_bins, n_flipped] : inputs) configs.push_back({n_units, n_bins, n_flipped});
+  const auto tables = estimators::libsdnn_tables(configs, pairs_of(pairs), random);
+  py::list modified;
+  py::list modifiers;
+  for (const auto& table : tables.modified) modified.append(signs_of(table));
+  for (const auto& table : tables.modifiers) modifiers.append(signs_of(table));
+  return py::make_tuple(modified, modifiers);
+}
+
+py::tuple libsdnn_weights(std::size_t n_units, std::size_t n_columns, int low, int high,
+                          const std::vector<std::uint32_t>& seed, const std::string& library) {
+  auto random = libsdnn_random(seed, library);
+  const auto drawn = estimators::libsdnn_weights(n_units, n_columns, low, high, random);
+  Matrix weights({n_units, n_columns});
+  std::copy(drawn.weights.begin(), drawn.weights.end(), weights.mutable_data());
+  return py::make_tuple(weights,
+                        py::array_t<std::int32_t>(static_cast<py::ssize_t>(n_units),
+                                                  drawn.thresholds.data()));
 }
 
 template <class Trainer>
@@ -269,11 +311,16 @@ void bind_estimators(py::module_& module) {
              py::arg("circular"), py::arg("seed"));
   module.def("correlation_matrix_patterns",
              [](int n_units, const ArrayArgument<double>& correlations, std::uint64_t seed) {
-               const auto values = matrix(correlations, "correlations",
-                                          static_cast<std::size_t>(correlations.shape(0)));
+               const auto values = matrix(correlations, "correlations");
                core::Random random(seed, core::Stream::code_books);
                return signs_of(coding::correlation_matrix_patterns(
                    n_units, values, static_cast<std::size_t>(correlations.shape(0)), random));
              },
              py::arg("n_units"), py::arg("correlations"), py::arg("seed"));
+  module.def("libsdnn_tables", &libsdnn_tables, py::arg("n_units"), py::arg("inputs"),
+             py::arg("pairs"), py::arg("seed"), py::arg("library") = "libstdc++",
+             "LIBSDNN's code tables, (modified, modifiers); inputs are (n_bins, n_flipped)");
+  module.def("libsdnn_weights", &libsdnn_weights, py::arg("n_units"), py::arg("n_columns"),
+             py::arg("low"), py::arg("high"), py::arg("seed"), py::arg("library") = "libstdc++",
+             "LIBSDNN's first (weights, thresholds)");
 }

@@ -37,6 +37,7 @@ class BlockTraining {
     for (Block* const block : {&now_, &before_}) {
       for (Sample& sample : block->samples) {
         sample.words.resize(2 * layer_->code().n_words());
+        sample.plus = sample.minus = SlotList(layer_->code().n_slots());
         sample.plus_ends.resize(n_chunks + 1);
         sample.minus_ends.resize(n_chunks + 1);
       }
@@ -83,7 +84,7 @@ class BlockTraining {
   /// A sample's code: its words, and its slots with where those of each chunk end.
   struct Sample {
     std::vector<std::uint64_t> words;
-    std::vector<std::uint32_t> plus, minus;
+    SlotList plus{0}, minus{0};
     std::vector<std::size_t> plus_ends, minus_ends;
   };
   struct BlockCorrection {
@@ -111,8 +112,8 @@ class BlockTraining {
       sample.plus.clear();
       sample.minus.clear();
       for (std::size_t w = 0; w < n_words; ++w) {
-        internal::append_slots(positive[w], w, sample.plus);
-        internal::append_slots(active[w] & ~positive[w], w, sample.minus);
+        sample.plus.append(positive[w], w);
+        sample.minus.append(active[w] & ~positive[w], w);
         sample.plus_ends[w / kChunkWords + 1] = sample.plus.size();
         sample.minus_ends[w / kChunkWords + 1] = sample.minus.size();
       }
@@ -168,10 +169,10 @@ class BlockTraining {
         if (made.what.unit / kTileUnits != tile) continue;
         const Sample& sample = before_.samples[made.place];
         Weight* const unit = weights + made.what.unit % kTileUnits;
-        const auto add = [&](const std::vector<std::uint32_t>& slots, std::size_t begin,
+        const auto add = [&](const SlotList& slots, std::size_t begin,
                              std::size_t end, std::int32_t by) {
           for (std::size_t k = begin; k < end; ++k) {
-            Weight& weight = unit[slots[k] * width];
+            Weight& weight = unit[slots.data()[k] * width];
             weight = static_cast<Weight>(weight + by);
             low = std::min(low, weight);
             high = std::max(high, weight);

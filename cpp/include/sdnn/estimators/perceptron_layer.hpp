@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -24,28 +25,55 @@
 
 namespace sdnn::estimators {
 
-/// Rows of a tile to add and to subtract: the columns of a code, or what differs between two.
-struct SignedSlots {
-  std::vector<std::uint32_t> plus;
-  std::vector<std::uint32_t> minus;
+/// Numbers of slots, in a store whose size is fixed before.
+class SlotList {
+ public:
+  explicit SlotList(std::size_t capacity) : slots_(capacity) {}
 
+  void clear() noexcept { size_ = 0; }
+  /// Appends the slots of the set bits of a word.
+  void append(std::uint64_t bits, std::size_t word) noexcept {
+    std::size_t size = size_;
+    for (; bits != 0; bits &= bits - 1) {
+      assert(size < slots_.size());
+      slots_[size++] = static_cast<std::uint32_t>(64 * word) +
+                       static_cast<std::uint32_t>(std::countr_zero(bits));
+    }
+    size_ = size;
+  }
+  std::size_t size() const noexcept { return size_; }
+  const std::uint32_t* data() const noexcept { return slots_.data(); }
+  const std::uint32_t* begin() const noexcept { return data(); }
+  const std::uint32_t* end() const noexcept { return data() + size_; }
+
+ private:
+  std::vector<std::uint32_t> slots_;
+  std::size_t size_ = 0;
+};
+
+/// Rows of a tile to add and to subtract: the columns of a code, or twice at most what differs
+/// between two.
+struct SignedSlots {
+  explicit SignedSlots(std::size_t n_slots) : plus(2 * n_slots), minus(2 * n_slots) {}
+
+  /// Overwrites them with the columns of a code.
+  void read(const std::uint64_t* active, const std::uint64_t* positive,
+            std::size_t n_words) noexcept {
+    clear();
+    for (std::size_t w = 0; w < n_words; ++w) {
+      plus.append(positive[w], w);
+      minus.append(active[w] & ~positive[w], w);
+    }
+  }
   void clear() noexcept {
     plus.clear();
     minus.clear();
   }
   std::size_t size() const noexcept { return plus.size() + minus.size(); }
+
+  SlotList plus;
+  SlotList minus;
 };
-
-namespace internal {
-
-inline void append_slots(std::uint64_t bits, std::size_t word, std::vector<std::uint32_t>& slots) {
-  for (; bits != 0; bits &= bits - 1) {
-    slots.push_back(static_cast<std::uint32_t>(64 * word) +
-                    static_cast<std::uint32_t>(std::countr_zero(bits)));
-  }
-}
-
-}  // namespace internal
 
 /// `n_units` units over the columns of a code: potential = weights . x_SD - threshold, firing if > 0.
 ///
@@ -226,30 +254,26 @@ class PerceptronLayer {
     std::uint64_t* before = now + 2 * n_words;
     std::vector<std::int32_t> values(n_padded_units());
     for (std::size_t i = 0; i < n_units(); ++i) values[i] = -thresholds_[i];  // of the code 0
-    SignedSlots afresh;
-    SignedSlots changes;
+    SignedSlots afresh(code_->n_slots());
+    SignedSlots changes(code_->n_slots());
     for (const std::uint32_t query : order) {
       code_->encode(bins.subspan(query * code_->n_inputs(), code_->n_inputs()), now,
                     now + n_words);
       changes.clear();
       for (std::size_t w = 0; w < n_words; ++w) {
         const std::uint64_t plus = now[n_words + w];
-        const std::uint64_t minus = now[w] & ~plus;
         const std::uint64_t old_plus = before[n_words + w];
+        if (((now[w] ^ before[w]) | (plus ^ old_plus)) == 0) continue;
+        const std::uint64_t minus = now[w] & ~plus;
         const std::uint64_t old_minus = before[w] & ~old_plus;
-        if (((plus ^ old_plus) | (minus ^ old_minus)) == 0) continue;
-        internal::append_slots(plus & ~old_plus, w, changes.plus);
-        internal::append_slots(old_minus & ~minus, w, changes.plus);
-        internal::append_slots(minus & ~old_minus, w, changes.minus);
-        internal::append_slots(old_plus & ~plus, w, changes.minus);
+        changes.plus.append(plus & ~old_plus, w);
+        changes.plus.append(old_minus & ~minus, w);
+        changes.minus.append(minus & ~old_minus, w);
+        changes.minus.append(old_plus & ~plus, w);
       }
       const SignedSlots* slots = &changes;
       if (changes.size() > code_->max_active() / 2) {
-        afresh.clear();
-        for (std::size_t w = 0; w < n_words; ++w) {
-          internal::append_slots(now[n_words + w], w, afresh.plus);
-          internal::append_slots(now[w] & ~now[n_words + w], w, afresh.minus);
-        }
+        afresh.read(now, now + n_words, n_words);
         if (afresh.size() < changes.size()) {
           for (std::size_t i = 0; i < n_units(); ++i) values[i] = -thresholds_[i];
           slots = &afresh;

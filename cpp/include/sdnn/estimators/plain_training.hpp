@@ -25,7 +25,8 @@ class PlainTraining {
   PlainTraining(std::shared_ptr<PerceptronLayer> layer, std::span<const std::int32_t> bins,
                 int /*n_threads*/)
       : layer_(std::move(layer)), bins_(bins.begin(), bins.end()), kernels_(unit_kernels()),
-        words_(2 * layer_->code().n_words()), potentials_(layer_->n_padded_units()) {}
+        words_(2 * layer_->code().n_words()), potentials_(layer_->n_padded_units()),
+        slots_(layer_->code().n_slots()) {}
 
   /// Presents samples in the given order.
   template <class Rule>
@@ -38,11 +39,7 @@ class PlainTraining {
       const auto sample = static_cast<std::size_t>(index);
       code.encode(std::span(bins_).subspan(sample * code.n_inputs(), code.n_inputs()), active,
                   positive);
-      slots_.clear();
-      for (std::size_t w = 0; w < code.n_words(); ++w) {
-        internal::append_slots(positive[w], w, slots_.plus);
-        internal::append_slots(active[w] & ~positive[w], w, slots_.minus);
-      }
+      slots_.read(active, positive, code.n_words());
       sum_potentials();
       rule(sample, potentials_.data(), corrections_);
       for (const Correction& correction : corrections_) correct(correction);

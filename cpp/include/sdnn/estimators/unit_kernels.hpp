@@ -16,6 +16,10 @@
 #include "sdnn/core/instruction_set.hpp"
 #include "sdnn/core/lanes.hpp"
 
+#if SDNN_X86_KERNELS
+#include <immintrin.h>
+#endif
+
 namespace sdnn::estimators {
 
 /// Units whose weights lie side by side: the width of a full tile.
@@ -195,10 +199,13 @@ SDNN_INLINE std::size_t find_body(const std::int32_t* values, std::size_t size, 
 #if SDNN_LANES
   using Vector = Register<std::int32_t>::Vector;
   constexpr std::size_t kSize = Register<std::int32_t>::kSize;
-  for (; begin + kSize <= size; begin += kSize) {
-    Vector v;
-    std::memcpy(&v, values + begin, sizeof v);
-    const auto equal = std::bit_cast<std::array<std::uint64_t, 4>>((Vector)(v == wanted));
+  const Vector asked = Vector{} + wanted;
+  for (; begin + 4 * kSize <= size; begin += 4 * kSize) {
+    Vector some[4];
+    std::memcpy(some, values + begin, sizeof some);
+    const auto equal = std::bit_cast<std::array<std::uint64_t, 4>>(
+        (Vector)(some[0] == asked) | (Vector)(some[1] == asked) | (Vector)(some[2] == asked) |
+        (Vector)(some[3] == asked));
     if ((equal[0] | equal[1] | equal[2] | equal[3]) != 0) break;
   }
 #endif
@@ -221,6 +228,52 @@ SDNN_INLINE std::int32_t inner_product_body(const std::uint64_t* active,
   }
   return both - 2 * unlike;
 }
+
+#if SDNN_X86_KERNELS
+
+[[gnu::target("avx2"), gnu::always_inline]] inline __m256i load_avx2(const std::uint64_t* from) {
+  return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
+}
+
+/// The same, 256 bits at a time: the counts of all 4-bit parts are looked up in a register, +1 per
+/// bit in `active` parts and -2 per bit in unlike ones.
+[[gnu::target("avx2,popcnt")]] inline std::int32_t inner_product_avx2(
+    const std::uint64_t* active, const std::uint64_t* positive, const std::uint64_t* other_active,
+    const std::uint64_t* other_positive, std::size_t n_words) {
+  const __m256i counts = _mm256_setr_epi8(0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4,  //
+                                          0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4);
+  const __m256i minus_two = _mm256_sub_epi8(_mm256_setzero_si256(), _mm256_add_epi8(counts, counts));
+  const __m256i low = _mm256_set1_epi8(15);
+  const __m256i bytes_of_one = _mm256_set1_epi8(1);
+  const __m256i shorts_of_one = _mm256_set1_epi16(1);
+  __m256i total = _mm256_setzero_si256();
+  std::size_t w = 0;
+  while (w + 4 <= n_words) {
+    __m256i bytes = _mm256_setzero_si256();
+    for (int k = 0; k < 7 && w + 4 <= n_words; ++k, w += 4) {  // 7 * -16 still fits a byte
+      const __m256i shared = _mm256_and_si256(load_avx2(active + w), load_avx2(other_active + w));
+      const __m256i unlike = _mm256_and_si256(
+          shared, _mm256_xor_si256(load_avx2(positive + w), load_avx2(other_positive + w)));
+      const __m256i of_shared = _mm256_add_epi8(
+          _mm256_shuffle_epi8(counts, _mm256_and_si256(shared, low)),
+          _mm256_shuffle_epi8(counts, _mm256_and_si256(_mm256_srli_epi16(shared, 4), low)));
+      const __m256i of_unlike = _mm256_add_epi8(
+          _mm256_shuffle_epi8(minus_two, _mm256_and_si256(unlike, low)),
+          _mm256_shuffle_epi8(minus_two, _mm256_and_si256(_mm256_srli_epi16(unlike, 4), low)));
+      bytes = _mm256_add_epi8(bytes, _mm256_add_epi8(of_shared, of_unlike));
+    }
+    total = _mm256_add_epi32(
+        total, _mm256_madd_epi16(_mm256_maddubs_epi16(bytes_of_one, bytes), shorts_of_one));
+  }
+  alignas(32) std::int32_t parts[8];
+  _mm256_store_si256(reinterpret_cast<__m256i*>(parts), total);
+  std::int32_t result = inner_product_body(active + w, positive + w, other_active + w,
+                                           other_positive + w, n_words - w);
+  for (const std::int32_t part : parts) result += part;
+  return result;
+}
+
+#endif  // SDNN_X86_KERNELS
 
 }  // namespace internal
 
@@ -306,8 +359,9 @@ struct UnitKernels {
             __VA_ARGS__ { return internal::inner_product_body(a, p, oa, op, n); }                 \
   }
 
-/// The loops of the instruction set in use.
-inline UnitKernels unit_kernels() {
+namespace internal {
+
+inline UnitKernels unit_kernels_by_compiler() {
 #if SDNN_X86_KERNELS
   switch (core::instruction_set()) {
     case core::InstructionSet::avx512:
@@ -318,6 +372,21 @@ inline UnitKernels unit_kernels() {
   }
 #endif
   return SDNN_UNIT_KERNELS();
+}
+
+}  // namespace internal
+
+#undef SDNN_UNIT_KERNELS
+
+/// The loops of the instruction set in use.
+inline UnitKernels unit_kernels() {
+  UnitKernels kernels = internal::unit_kernels_by_compiler();
+#if SDNN_X86_KERNELS
+  if (core::instruction_set() != core::InstructionSet::portable) {
+    kernels.inner_product = internal::inner_product_avx2;
+  }
+#endif
+  return kernels;
 }
 
 }  // namespace sdnn::estimators
