@@ -7,8 +7,6 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
-#include "sdnn/coding/correlation_matrix.hpp"
-#include "sdnn/coding/random_inverse.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/estimators/libsdnn.hpp"
 #include "sdnn/estimators/perceptron_layer.hpp"
@@ -17,36 +15,18 @@
 namespace py = pybind11;
 using namespace sdnn;
 using bindings::ArrayArgument;
+using bindings::matrix;
+using bindings::signs_of;
 
 namespace {
 
 using Bins = ArrayArgument<std::int32_t>;
 using Matrix = py::array_t<std::int32_t>;
 
-/// The items of a two-dimensional array. Throws std::invalid_argument naming the argument.
-template <class T>
-std::span<const T> matrix(const ArrayArgument<T>& array, const char* name,
-                          std::size_t n_columns = 0) {
-  core::require(array.ndim() == 2, name, "an array of two dimensions", array.ndim());
-  core::require(n_columns == 0 || static_cast<std::size_t>(array.shape(1)) == n_columns, name,
-                "an array of " + std::to_string(n_columns) + " columns", array.shape(1));
-  return bindings::flat(array);
-}
-
 coding::PatternTable table_of(const ArrayArgument<std::int8_t>& signs) {
   const auto values = matrix(signs, "patterns");
   return coding::PatternTable::from_signs(values, static_cast<std::size_t>(signs.shape(0)),
                                           static_cast<std::size_t>(signs.shape(1)));
-}
-
-py::array_t<std::int8_t> signs_of(const coding::PatternTable& table) {
-  py::array_t<std::int8_t> signs({table.n_bins(), table.n_units()});
-  for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {
-    for (std::size_t k = 0; k < table.n_units(); ++k) {
-      signs.mutable_at(bin, k) = static_cast<std::int8_t>(table.sign(bin, k));
-    }
-  }
-  return signs;
 }
 
 std::vector<coding::InputPair> pairs_of(const ArrayArgument<std::int32_t>& pairs) {
@@ -293,30 +273,6 @@ void bind_estimators(py::module_& module) {
              },
              py::arg("code"), py::arg("n_units"), py::arg("n_samples"), py::arg("form"),
              "Bytes that a form of training needs beside the layer");
-  module.def("random_inverse_patterns",
-             [](int n_units, int n_bins, int n_flipped, std::uint64_t seed) {
-               core::Random random(seed, core::Stream::code_books);
-               return signs_of(
-                   coding::random_inverse_patterns({n_units, n_bins, n_flipped}, random));
-             },
-             py::arg("n_units"), py::arg("n_bins"), py::arg("n_flipped"), py::arg("seed"));
-  module.def("anchor_patterns",
-             [](int n_units, int n_anchor_patterns, int n_interpolated, bool circular,
-                std::uint64_t seed) {
-               core::Random random(seed, core::Stream::code_books);
-               return signs_of(coding::anchor_patterns(
-                   {n_units, n_anchor_patterns, n_interpolated, circular}, random));
-             },
-             py::arg("n_units"), py::arg("n_anchor_patterns"), py::arg("n_interpolated"),
-             py::arg("circular"), py::arg("seed"));
-  module.def("correlation_matrix_patterns",
-             [](int n_units, const ArrayArgument<double>& correlations, std::uint64_t seed) {
-               const auto values = matrix(correlations, "correlations");
-               core::Random random(seed, core::Stream::code_books);
-               return signs_of(coding::correlation_matrix_patterns(
-                   n_units, values, static_cast<std::size_t>(correlations.shape(0)), random));
-             },
-             py::arg("n_units"), py::arg("correlations"), py::arg("seed"));
   module.def("libsdnn_tables", &libsdnn_tables, py::arg("n_units"), py::arg("inputs"),
              py::arg("pairs"), py::arg("seed"), py::arg("library") = "libstdc++",
              "LIBSDNN's code tables, (modified, modifiers); inputs are (n_bins, n_flipped)");
