@@ -163,7 +163,7 @@ def test_python_arrows_point_down():
     [
         ("core", "coding"),
         ("approximators", "agents"),
-        ("agents", "environments", "estimators"),
+        ("agents", "environments"),
         ("environments", "agents"),
         ("environments", "approximators"),
         ("environments", "coding"),
