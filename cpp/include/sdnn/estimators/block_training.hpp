@@ -31,10 +31,13 @@ class BlockTraining {
                 int n_threads)
       : layer_(std::move(layer)), bins_(bins.begin(), bins.end()), kernels_(unit_kernels()),
         team_(static_cast<std::size_t>(n_threads)),
-        potentials_(kBlock * layer_->n_padded_units()), largest_(team_.size()),
-        wide_(layer_->tiles().largest() > kLargestNarrow) {
+        potentials_(kBlock * layer_->n_padded_units()),
+        largest_when_read_(layer_->tiles().largest()), largest_(largest_when_read_),
+        wide_(largest_when_read_ > kLargestNarrow) {
     const std::size_t n_chunks = (layer_->code().n_words() + kChunkWords - 1) / kChunkWords;
     for (Block* const block : {&now_, &before_}) {
+      block->plus.resize(layer_->code().n_slots());
+      block->minus.resize(layer_->code().n_slots());
       for (Sample& sample : block->samples) {
         sample.words.resize(2 * layer_->code().n_words());
         sample.plus = sample.minus = SlotList(layer_->code().n_slots());
@@ -46,7 +49,6 @@ class BlockTraining {
       wide_weights_ = layer_->tiles();
     } else {
       weights_ = WeightTiles<std::int16_t>(layer_->tiles());
-      std::fill(largest_.begin(), largest_.end(), layer_->tiles().largest());
     }
   }
 
@@ -80,6 +82,7 @@ class BlockTraining {
   static constexpr std::size_t kBlock = 32;
   static constexpr std::size_t kChunkWords = 2;  // 128 slots of 64 units in 16 bits: 16 KB
   static constexpr std::int64_t kLargestNarrow = 8000;
+  static constexpr std::int64_t kLooseness = 256;
 
   /// A sample's code: its words, and its slots with where those of each chunk end.
   struct Sample {
@@ -95,6 +98,7 @@ class BlockTraining {
     std::array<Sample, kBlock> samples;
     std::size_t size = 0;
     std::vector<BlockCorrection> corrections;
+    std::vector<std::uint32_t> plus, minus;  // of every slot, bit b: +1 or -1 in sample b
   };
 
   void read(std::span<const std::int32_t> order) {
@@ -102,6 +106,8 @@ class BlockTraining {
     const std::size_t n_words = code.n_words();
     now_.size = order.size();
     now_.corrections.clear();
+    std::fill(now_.plus.begin(), now_.plus.end(), 0);
+    std::fill(now_.minus.begin(), now_.minus.end(), 0);
     for (std::size_t b = 0; b < order.size(); ++b) {
       Sample& sample = now_.samples[b];
       std::uint64_t* const active = sample.words.data();
@@ -117,6 +123,8 @@ class BlockTraining {
         sample.plus_ends[w / kChunkWords + 1] = sample.plus.size();
         sample.minus_ends[w / kChunkWords + 1] = sample.minus.size();
       }
+      for (const std::uint32_t slot : sample.plus) now_.plus[slot] |= std::uint32_t{1} << b;
+      for (const std::uint32_t slot : sample.minus) now_.minus[slot] |= std::uint32_t{1} << b;
       for (std::size_t e = 0; e < b; ++e) {
         const Sample& earlier = now_.samples[e];
         products_[b][e] = 1 + kernels_.inner_product(active, positive, earlier.words.data(),
@@ -126,31 +134,34 @@ class BlockTraining {
   }
 
   void pass() {
-    const std::int64_t largest = *std::max_element(largest_.begin(), largest_.end());
-    if (!wide_ && largest > kLargestNarrow) {
-      wide_weights_ = WeightTiles<std::int32_t>(weights_);
-      weights_ = {};
-      wide_ = true;
+    // A block corrects a unit at most once per sample. The bound is loose; at times it is renewed.
+    largest_ += wide_ ? 0 : static_cast<std::int64_t>(kBlock);
+    if (!wide_ && largest_ > largest_when_read_ + kLooseness) {
+      largest_when_read_ = weights_.largest();
+      largest_ = largest_when_read_ + static_cast<std::int64_t>(kBlock);
+      if (largest_ > kLargestNarrow) {
+        wide_weights_ = WeightTiles<std::int32_t>(weights_);
+        weights_ = {};
+        wide_ = true;
+      }
     }
-    // A block corrects a unit at most once per sample.
-    const auto reach = static_cast<std::size_t>(largest) + kBlock;
-    const std::size_t n_per_sum =
-        wide_ ? std::size_t{1} << 30 : std::numeric_limits<std::int16_t>::max() / reach;
+    const auto n_per_sum = wide_ ? std::size_t{1} << 30
+                                 : static_cast<std::size_t>(std::numeric_limits<std::int16_t>::max() /
+                                                            largest_);
     team_.run([&](std::size_t part) {
       const std::size_t n_tiles = layer_->tiles().n_tiles();
       for (std::size_t tile = part; tile < n_tiles; tile += team_.size()) {
         if (wide_) {
-          pass_tile(wide_weights_, tile, n_per_sum, largest_[part]);
+          pass_tile(wide_weights_, tile, n_per_sum);
         } else {
-          pass_tile(weights_, tile, n_per_sum, largest_[part]);
+          pass_tile(weights_, tile, n_per_sum);
         }
       }
     });
   }
 
   template <class Weight>
-  void pass_tile(WeightTiles<Weight>& tiles, std::size_t tile, std::size_t n_per_sum,
-                 std::int64_t& largest) {
+  void pass_tile(WeightTiles<Weight>& tiles, std::size_t tile, std::size_t n_per_sum) {
     const std::size_t first_unit = tile * kTileUnits;
     const std::size_t width = tiles.width(tile);
     const std::size_t n_real = std::min(width, layer_->n_units() - first_unit);
@@ -160,28 +171,23 @@ class BlockTraining {
         potentials_[b * n_padded + first_unit + i] = -layer_->thresholds()[first_unit + i];
       }
     }
-    Weight low = 0;
-    Weight high = 0;
+    alignas(core::kCacheLine) std::array<Weight, kBlock * kTileUnits> coefficients{};
+    std::uint32_t corrected = 0;  // samples of the block before that corrected units of this tile
+    for (const BlockCorrection& made : before_.corrections) {
+      if (made.what.unit / kTileUnits != tile) continue;
+      corrected |= std::uint32_t{1} << made.place;
+      coefficients[made.place * width + made.what.unit % kTileUnits] =
+          static_cast<Weight>(made.what.direction);
+    }
     Weight* const weights = tiles.tile(tile);
     const std::size_t n_chunks = now_.samples[0].plus_ends.size() - 1;
     for (std::size_t chunk = 0; chunk < n_chunks; ++chunk) {
-      for (const BlockCorrection& made : before_.corrections) {
-        if (made.what.unit / kTileUnits != tile) continue;
-        const Sample& sample = before_.samples[made.place];
-        Weight* const unit = weights + made.what.unit % kTileUnits;
-        const auto add = [&](const SlotList& slots, std::size_t begin,
-                             std::size_t end, std::int32_t by) {
-          for (std::size_t k = begin; k < end; ++k) {
-            Weight& weight = unit[slots.data()[k] * width];
-            weight = static_cast<Weight>(weight + by);
-            low = std::min(low, weight);
-            high = std::max(high, weight);
-          }
-        };
-        add(sample.plus, sample.plus_ends[chunk], sample.plus_ends[chunk + 1],
-            made.what.direction);
-        add(sample.minus, sample.minus_ends[chunk], sample.minus_ends[chunk + 1],
-            -made.what.direction);
+      if (corrected != 0) {
+        const std::size_t slot = 64 * kChunkWords * chunk;
+        kernels_.correct_rows(weights + slot * width, width,
+                              std::min(64 * kChunkWords, tiles.n_slots() - slot),
+                              before_.plus.data() + slot, before_.minus.data() + slot, corrected,
+                              coefficients.data());
       }
       for (std::size_t b = 0; b < now_.size; ++b) {
         const Sample& sample = now_.samples[b];
@@ -193,7 +199,6 @@ class BlockTraining {
                           &potentials_[b * n_padded + first_unit]);
       }
     }
-    largest = std::max({largest, -std::int64_t{low}, std::int64_t{high}});
   }
 
   template <class Rule>
@@ -223,7 +228,8 @@ class BlockTraining {
   Block before_;  // its corrections are not in the weights yet
   std::array<std::array<std::int32_t, kBlock>, kBlock> products_{};  // 1 added to each
   std::vector<Correction> corrections_;
-  std::vector<std::int64_t> largest_;  // |weight| so far, per thread
+  std::int64_t largest_when_read_;  // |weight|, when last looked at
+  std::int64_t largest_;            // no |weight| exceeds it
   bool wide_;
   WeightTiles<std::int16_t> weights_;
   WeightTiles<std::int32_t> wide_weights_;

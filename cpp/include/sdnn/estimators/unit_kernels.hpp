@@ -117,6 +117,50 @@ SDNN_INLINE void add_rows_body(const Weight* tile, std::size_t width, const std:
   }
 }
 
+/// rows[slot] += the samples' coefficients of the bits of `plus[slot] & samples`, -= of `minus`.
+template <class Weight, std::size_t Width>
+SDNN_INLINE void correct_rows_of_width(Weight* rows, std::size_t n_rows, const std::uint32_t* plus,
+                                       const std::uint32_t* minus, std::uint32_t samples,
+                                       const Weight* coefficients) noexcept {
+  using Lane = Register<Weight>;
+  constexpr std::size_t kRegisters = Width / Lane::kSize;
+  for (std::size_t slot = 0; slot < n_rows; ++slot) {
+    std::uint32_t more = plus[slot] & samples;
+    std::uint32_t less = minus[slot] & samples;
+    if ((more | less) == 0) continue;
+    Weight* const row = rows + slot * Width;
+    Lane sum[kRegisters];
+    core::unrolled<kRegisters>([&](std::size_t r) SDNN_INLINE_LAMBDA {
+      sum[r].clear();
+      sum[r].add(row + r * Lane::kSize);
+    });
+    for (; more != 0; more &= more - 1) {
+      const Weight* const c = coefficients + static_cast<std::size_t>(std::countr_zero(more)) * Width;
+      core::unrolled<kRegisters>(
+          [&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].add(c + r * Lane::kSize); });
+    }
+    for (; less != 0; less &= less - 1) {
+      const Weight* const c = coefficients + static_cast<std::size_t>(std::countr_zero(less)) * Width;
+      core::unrolled<kRegisters>(
+          [&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].subtract(c + r * Lane::kSize); });
+    }
+    core::unrolled<kRegisters>(
+        [&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].store(row + r * Lane::kSize); });
+  }
+}
+
+template <class Weight>
+SDNN_INLINE void correct_rows_body(Weight* rows, std::size_t width, std::size_t n_rows,
+                                   const std::uint32_t* plus, const std::uint32_t* minus,
+                                   std::uint32_t samples, const Weight* coefficients) noexcept {
+  switch (width) {
+    case 16: return correct_rows_of_width<Weight, 16>(rows, n_rows, plus, minus, samples, coefficients);
+    case 32: return correct_rows_of_width<Weight, 32>(rows, n_rows, plus, minus, samples, coefficients);
+    case 48: return correct_rows_of_width<Weight, 48>(rows, n_rows, plus, minus, samples, coefficients);
+    default: return correct_rows_of_width<Weight, 64>(rows, n_rows, plus, minus, samples, coefficients);
+  }
+}
+
 /// to[i] += sum of plus[k][i] - sum of minus[k][i], a cache line of results at a time.
 template <class Entry>
 SDNN_INLINE void add_products_body(std::int32_t* to, std::size_t size, const Entry* const* plus,
@@ -285,6 +329,12 @@ struct UnitKernels {
   void (*add_rows_32)(const std::int32_t* tile, std::size_t width, const std::uint32_t* plus,
                       std::size_t n_plus, const std::uint32_t* minus, std::size_t n_minus,
                       std::size_t n_per_sum, std::int32_t* sums);
+  void (*correct_rows_16)(std::int16_t* rows, std::size_t width, std::size_t n_rows,
+                          const std::uint32_t* plus, const std::uint32_t* minus,
+                          std::uint32_t samples, const std::int16_t* coefficients);
+  void (*correct_rows_32)(std::int32_t* rows, std::size_t width, std::size_t n_rows,
+                          const std::uint32_t* plus, const std::uint32_t* minus,
+                          std::uint32_t samples, const std::int32_t* coefficients);
   void (*add_products_16)(std::int32_t* to, std::size_t size, const std::int16_t* const* plus,
                           std::size_t n_plus, const std::int16_t* const* minus,
                           std::size_t n_minus);
@@ -313,6 +363,16 @@ struct UnitKernels {
                 std::size_t n_per_sum, std::int32_t* sums) const {
     add_rows_32(tile, width, plus, n_plus, minus, n_minus, n_per_sum, sums);
   }
+  void correct_rows(std::int16_t* rows, std::size_t width, std::size_t n_rows,
+                    const std::uint32_t* plus, const std::uint32_t* minus, std::uint32_t samples,
+                    const std::int16_t* coefficients) const {
+    correct_rows_16(rows, width, n_rows, plus, minus, samples, coefficients);
+  }
+  void correct_rows(std::int32_t* rows, std::size_t width, std::size_t n_rows,
+                    const std::uint32_t* plus, const std::uint32_t* minus, std::uint32_t samples,
+                    const std::int32_t* coefficients) const {
+    correct_rows_32(rows, width, n_rows, plus, minus, samples, coefficients);
+  }
   void add_products(std::int32_t* to, std::size_t size, const std::int16_t* const* plus,
                     std::size_t n_plus, const std::int16_t* const* minus,
                     std::size_t n_minus) const {
@@ -335,6 +395,14 @@ struct UnitKernels {
         [](const std::int32_t* t, std::size_t w, const std::uint32_t* p, std::size_t np,          \
            const std::uint32_t* m, std::size_t nm, std::size_t s, std::int32_t* o) __VA_ARGS__ {  \
           internal::add_rows_body(t, w, p, np, m, nm, s, o);                                      \
+        },                                                                                        \
+        [](std::int16_t* r, std::size_t w, std::size_t n, const std::uint32_t* p,                  \
+           const std::uint32_t* m, std::uint32_t s, const std::int16_t* c) __VA_ARGS__ {           \
+          internal::correct_rows_body(r, w, n, p, m, s, c);                                       \
+        },                                                                                        \
+        [](std::int32_t* r, std::size_t w, std::size_t n, const std::uint32_t* p,                  \
+           const std::uint32_t* m, std::uint32_t s, const std::int32_t* c) __VA_ARGS__ {           \
+          internal::correct_rows_body(r, w, n, p, m, s, c);                                       \
         },                                                                                        \
         [](std::int32_t* o, std::size_t n, const std::int16_t* const* p, std::size_t np,          \
            const std::int16_t* const* m, std::size_t nm) __VA_ARGS__ {                            \
