@@ -38,7 +38,7 @@ def fitted(coding: str | Coding, n_units: int) -> Coding:
 
 
 def correlations(coding: str | Coding, n_units: int = N_UNITS) -> NDArray[np.float64]:
-    """Expected correlation of the patterns of each two bins.
+    """Return the expected correlation of the patterns of each two bins.
 
     Parameters
     ----------

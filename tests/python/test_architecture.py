@@ -31,6 +31,7 @@ PYTHON_MODULES = {
     "__main__": "sdnn",
     "cli": "sdnn",
     "choices": "core",
+    "kernel": "coding",
     "instruction_sets": "core",
 }
 """The room of every module at the top of the Python package."""

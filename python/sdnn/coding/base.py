@@ -56,7 +56,7 @@ class Coding(abc.ABC):
 
     @abc.abstractmethod
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        """The bin of each value, for a fitted coding; shapes (n_samples,) to (n_samples,)."""
+        """Return the bin of each value of a column, shape (n_samples,), for a fitted coding."""
 
     @abc.abstractmethod
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
@@ -64,7 +64,7 @@ class Coding(abc.ABC):
 
     @abc.abstractmethod
     def correlations(self, n_units: int) -> NDArray[np.float64]:
-        """Expected correlation of the patterns of each two bins, shape (n_bins, n_bins)."""
+        """Return the expected correlations of patterns, shape (n_bins, n_bins)."""
 
 
 def known(value: Value | None) -> Value:

@@ -27,7 +27,7 @@ FINE = 1000
 
 
 def numbers(column: NDArray[Any]) -> NDArray[np.float64]:
-    """The column as numbers.
+    """Return the column as numbers.
 
     Raises
     ------
@@ -111,7 +111,7 @@ class RandomInverse(Coding):
         return known(self.n_bins)
 
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        """The bin of each value; see `Coding.bins`."""
+        """Return the bin of each value; see `Coding.bins`."""
         where = positions(numbers(column), known(self.low), known(self.high), self.knots)
         return bins_of_positions(where, self.size)
 
@@ -128,7 +128,7 @@ class RandomInverse(Coding):
 def interpolated_correlations(
     n_stretches: int, n_portions: int, circular: bool
 ) -> NDArray[np.float64]:
-    """Expected correlations of interpolated patterns, whose anchors are independent.
+    """Return the expected correlations of interpolated patterns, whose anchors are independent.
 
     Within a stretch between two anchors they fall linearly; in neighbouring stretches they are
     the product of the shares that both patterns have of the anchor between them.
@@ -184,7 +184,7 @@ class Anchor(Coding):
         return (self.n_anchor_patterns - 1) * (self.n_interpolated + 1)
 
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        """The bin of each value; see `Coding.bins`."""
+        """Return the bin of each value; see `Coding.bins`."""
         where = positions(numbers(column), known(self.low), known(self.high), None)
         return bins_of_positions(where, self.size)
 
@@ -241,7 +241,7 @@ class Circular(Coding):
         return (self.n_anchor_patterns - 1) * (self.n_interpolated + 1)
 
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        """The bin of each value; see `Coding.bins`."""
+        """Return the bin of each value; see `Coding.bins`."""
         turns = (numbers(column) - self.origin) / self.period
         return bins_of_positions(turns - np.floor(turns), self.size)
 

@@ -19,7 +19,7 @@ Knots = tuple[tuple[float, float], ...]
 def learned_range(
     column: NDArray[Any], low: float | None, high: float | None
 ) -> tuple[float, float]:
-    """The given ends, or the column's where they are None.
+    """Return the given ends, or the column's where they are None.
 
     Raises
     ------
@@ -67,9 +67,10 @@ def positions(
         return np.interp(column, *np.array(knots).T)
     # Halves, so that the width of the widest range is still a number.
     inside = np.clip(column, low, high)
-    return (inside / 2 - low / 2) / (high / 2 - low / 2)
+    where: NDArray[np.float64] = (inside / 2 - low / 2) / (high / 2 - low / 2)
+    return where
 
 
 def bins_of_positions(where: NDArray[np.float64], n_bins: int) -> NDArray[np.int32]:
-    """The bin among equal half-open parts of [0, 1]; 1 falls into the last."""
+    """Return the bin among equal half-open parts of [0, 1]; 1 falls into the last."""
     return np.minimum((where * n_bins).astype(np.int32), np.int32(n_bins - 1))

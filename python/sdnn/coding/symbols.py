@@ -17,7 +17,7 @@ Category = str | float | int | bool
 
 
 def learned_categories(column: NDArray[Any]) -> tuple[Category, ...]:
-    """The different values of a column, in order, as plain Python values.
+    """Return the different values of a column, in order, as plain Python values.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def learned_categories(column: NDArray[Any]) -> tuple[Category, ...]:
 
 
 def bins_of_categories(column: NDArray[Any], categories: tuple[Category, ...]) -> NDArray[np.int32]:
-    """The place of each value among the categories.
+    """Return the place of each value among the categories.
 
     Raises
     ------
@@ -88,7 +88,7 @@ class Symbolic(Coding):
         return len(known(self.categories))
 
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        """The place of each category; see `Coding.bins`."""
+        """Return the place of each category; see `Coding.bins`."""
         return bins_of_categories(column, known(self.categories))
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
@@ -166,7 +166,7 @@ class CorrelationMatrix(Coding):
         return len(self.matrix)
 
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        """The place of each category; see `Coding.bins`."""
+        """Return the place of each category; see `Coding.bins`."""
         return bins_of_categories(column, known(self.categories))
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
@@ -174,5 +174,5 @@ class CorrelationMatrix(Coding):
         return _core.correlation_matrix_patterns(n_units, np.array(self.matrix), seed)
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
-        """The matrix itself; see `Coding.correlations`."""
+        """Return the matrix itself; see `Coding.correlations`."""
         return np.array(self.matrix)

@@ -108,7 +108,7 @@ class BaseSDNN(BaseEstimator):
         fitted = [
             coding.fit(table[:, index], n_pattern_units) for index, coding in enumerate(codings)
         ]
-        random = check_random_state(self.random_state)
+        random: np.random.RandomState = check_random_state(self.random_state)
         code_seed, weight_seed = (int(seed) for seed in random.randint(2**31 - 1, size=2))
         code = draw_input_code(fitted, pairs, n_pattern_units, self.tables, code_seed)
         self.network_ = Network(code, n_units, seed=weight_seed)

@@ -245,7 +245,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         return self._start(X, table, n_classes if one_vs_rest else n_classes * (n_classes - 1) // 2)
 
     def _numbers_of(self, y: NDArray[Any]) -> NDArray[np.int32]:
-        """The places of labels among the classes; ValueError for one that is not there."""
+        """Return the places of labels among the classes; ValueError for one that is not there."""
         unseen = np.setdiff1d(y, self.classes_)
         if len(unseen):
             raise ValueError(f"y has labels {unseen.tolist()} that are not in classes")
@@ -276,7 +276,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             votes[np.arange(len(table)), np.where(leaning[:, unit] > 0, i, j)] += 1
             sums[:, i] += leaning[:, unit]
             sums[:, j] -= leaning[:, unit]
-        return votes + sums / (3 * (np.abs(sums) + 1))
+        decision: NDArray[np.float64] = votes + sums / (3 * (np.abs(sums) + 1))
+        return decision
 
     def _winners(self, decision: NDArray[np.float64]) -> NDArray[np.int64]:
         if decision.ndim == 1:

@@ -9,7 +9,7 @@ import numpy as np
 
 from sdnn.coding import Coding, coding_named
 
-__all__ = ["Columns", "column_indices", "codings_of_columns", "input_pairs"]
+__all__ = ["Columns", "codings_of_columns", "column_indices", "input_pairs"]
 
 Columns = int | str | slice | Sequence[int] | Sequence[str] | Sequence[bool] | Callable[[Any], Any]
 

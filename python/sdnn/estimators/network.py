@@ -45,7 +45,7 @@ class Network:
         )
 
     def __getstate__(self) -> dict[str, Any]:
-        """The weights instead of the core's object."""
+        """Keep the weights instead of the core's object."""
         return {
             "input_code": self.input_code,
             "n_units": self.n_units,

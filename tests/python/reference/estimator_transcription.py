@@ -8,11 +8,13 @@ over, or drawn from NumPy's generator where no agreement is asked for.
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 
 class SelectiveDesensitization:
-    """x_SD: for each pair (mu, nu), the pattern of input mu where that of input nu is +1, else 0."""
+    """x_SD: per pair (mu, nu), the pattern of input mu where that of nu is +1, elsewhere 0."""
 
     def __init__(self, modified, modifiers, pairs):
         self.modified = [np.asarray(table, dtype=np.int8) for table in modified]
@@ -164,7 +166,7 @@ def anchor_patterns(n_units, n_anchor_patterns, n_interpolated, circular, seed):
     if circular:
         anchors[-1] = anchors[0]
     patterns = []
-    for one, other in zip(anchors[:-1], anchors[1:], strict=True):
+    for one, other in itertools.pairwise(anchors):
         differing = random.permutation(np.flatnonzero(one != other))
         for j in range(n_interpolated + 1):
             pattern = one.copy()
