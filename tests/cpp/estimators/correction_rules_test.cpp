@@ -44,6 +44,14 @@ TEST(PDeltaRule, GroupsDoNotMix) {
   EXPECT_EQ(apply(rule, 0, {1, -1, 1, -1}), (Pairs{{1, 1}, {2, -1}}));
 }
 
+TEST(PDeltaRule, TellsFarUnitsApart) {
+  const std::int32_t far = 2000000000;
+  estimators::PDeltaRule rule(3, std::vector<double>{1.0, 2.0}, 1);
+  EXPECT_EQ(apply(rule, 0, {-far, 1 - far, -far}), (Pairs{{1, 1}}));
+  EXPECT_EQ(apply(rule, 1, {-far, 1 - far, -far}), (Pairs{{0, 1}, {1, 1}}));
+  EXPECT_EQ(apply(rule, 0, {far, far, 7}), (Pairs{{0, -1}, {2, -1}}));
+}
+
 TEST(PDeltaRule, AgreesWithSorting) {
   core::Random random(1, core::Stream::exploration);
   for (int trial = 0; trial < 500; ++trial) {

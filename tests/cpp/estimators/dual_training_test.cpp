@@ -37,6 +37,22 @@ TEST(DualTraining, HasThemOnEveryInstructionSet) {
   core::set_instruction_set(before);
 }
 
+TEST(DualTraining, HasThemInDataOrder) {  // where corrections wait for each other
+  for (std::uint64_t seed = 300; seed < 340; ++seed) {
+    auto problem = testing::random_problem(seed);
+    const std::size_t n_samples = problem.bins.size() / problem.code->n_inputs();
+    for (auto& order : problem.orders) {
+      order.clear();
+      for (std::size_t t = 0; t < 20 * n_samples; ++t) {
+        order.push_back(static_cast<std::int32_t>(t % n_samples));
+      }
+    }
+    testing::compare_with_plain(problem, estimators::TrainingForm::dual,
+                                1 + static_cast<int>(seed % 3),
+                                [&](bool same) { ASSERT_TRUE(same) << "problem " << seed; });
+  }
+}
+
 TEST(DualTraining, AgreesOverManyPresentationsOfFewSamples) {
   auto problem = testing::random_problem(3);
   const auto one = testing::layer_for(problem);

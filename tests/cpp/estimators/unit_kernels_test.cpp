@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <limits>
 #include <string>
 #include <vector>
@@ -67,36 +69,73 @@ TEST(UnitKernels, AddProductsExactly) {
   const std::int16_t* const minus[] = {other.data()};
   on_every_level([&](const estimators::UnitKernels& kernels) {
     std::vector<std::int32_t> to{100, 100, 100, 100, 100};
-    kernels.add_products(to.data(), to.size(), plus, 2, minus, 1);
+    kernels.add_products(to.data(), to.size(), plus, 2, minus, 1, 1);
     EXPECT_EQ(to, (std::vector<std::int32_t>{92, 76, 76, 65594, -65486}));
+    kernels.add_products(to.data(), to.size(), plus, 0, minus, 1, 1);
+    EXPECT_EQ(to, (std::vector<std::int32_t>{82, 56, 46, 65554, -65536}));
   });
 }
 
-TEST(UnitKernels, CountAndFindUnits) {
+TEST(UnitKernels, AddManyProductsExactly) {
+  core::Random random(4, core::Stream::weights);
+  for (const std::size_t size : {1U, 64U, 100U, 200U}) {
+    std::vector<std::vector<std::int16_t>> rows(21, std::vector<std::int16_t>(size));
+    std::vector<std::int32_t> expected(size, 3);
+    std::vector<const std::int16_t*> plus;
+    std::vector<const std::int16_t*> minus;
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      for (auto& entry : rows[k]) entry = static_cast<std::int16_t>(random.below(4001));
+      (k % 3 == 0 ? minus : plus).push_back(rows[k].data());
+      for (std::size_t i = 0; i < size; ++i) expected[i] += k % 3 == 0 ? -rows[k][i] : rows[k][i];
+    }
+    on_every_level([&](const estimators::UnitKernels& kernels) {
+      std::vector<std::int32_t> to(size, 3);
+      kernels.add_products(to.data(), size, plus.data(), plus.size(), minus.data(), minus.size(), 8);
+      EXPECT_EQ(to, expected) << size;
+    });
+  }
+}
+
+TEST(UnitKernels, CorrectRowsByTheSamplesAskedFor) {
+  std::vector<std::int16_t> coefficients(32 * 16);
+  for (std::size_t b = 0; b < 32; ++b) coefficients[b * 16 + 3] = static_cast<std::int16_t>(b + 1);
+  const std::vector<std::uint32_t> plus{0b1011, 0, 1U << 31};
+  const std::vector<std::uint32_t> minus{0b0100, 0b1, 0};
+  on_every_level([&](const estimators::UnitKernels& kernels) {
+    std::vector<std::int16_t> rows(3 * 16, 10);
+    kernels.correct_rows(rows.data(), 16, 3, plus.data(), minus.data(), 0x80000006, coefficients.data());
+    EXPECT_EQ(rows[3], 10 + 2 - 3);   // samples 1 and 2; 0 and 3 are masked
+    EXPECT_EQ(rows[16 + 3], 10);
+    EXPECT_EQ(rows[32 + 3], 10 + 32);
+    EXPECT_EQ(rows[32 + 4], 10);
+  });
+}
+
+TEST(UnitKernels, CountAndRankUnits) {
   core::Random random(2, core::Stream::weights);
   constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::max();
   for (std::size_t size = 0; size < 90; ++size) {
     std::vector<std::int32_t> potentials(size);
     for (auto& p : potentials) p = static_cast<std::int32_t>(random.below(9)) - 4;
     for (const bool firing : {false, true}) {
-      std::vector<std::int32_t> expected(size);
-      std::int32_t least = kNone;
+      std::vector<std::int32_t> expected(size, kNone);
       std::int32_t n_firing = 0;
       for (std::size_t i = 0; i < size; ++i) {
         n_firing += potentials[i] > 0 ? 1 : 0;
-        expected[i] = (potentials[i] > 0) == firing ? std::abs(potentials[i]) : kNone;
-        least = std::min(least, expected[i]);
+        if ((potentials[i] > 0) != firing) continue;
+        expected[i] = std::min(std::abs(potentials[i]), 3) * 128 + static_cast<std::int32_t>(i);
       }
-      const auto first = static_cast<std::size_t>(
-          std::find(expected.begin(), expected.end(), least) - expected.begin());
+      auto sorted = expected;
+      std::sort(sorted.begin(), sorted.end());
+      sorted.push_back(kNone);
       on_every_level([&](const estimators::UnitKernels& kernels) {
         EXPECT_EQ(kernels.count_firing(potentials.data(), size), n_firing);
-        std::vector<std::int32_t> distances(size);
-        EXPECT_EQ(kernels.distances(potentials.data(), size, firing, distances.data()), least);
-        EXPECT_EQ(distances, expected);
-        EXPECT_EQ(kernels.least(distances.data(), size), least);
-        EXPECT_EQ(kernels.find(distances.data(), size, 0, least), first);
-        EXPECT_EQ(kernels.find(distances.data(), size, 0, -5), size);
+        std::vector<std::int32_t> keys(size);
+        EXPECT_EQ(kernels.rank(potentials.data(), size, firing, 7, 3, keys.data()), sorted[0]);
+        EXPECT_EQ(keys, expected);
+        for (std::size_t k = 0; k + 1 < sorted.size() && sorted[k] != kNone; ++k) {
+          EXPECT_EQ(kernels.least_above(keys.data(), size, sorted[k]), sorted[k + 1]);
+        }
       });
     }
   }

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <limits>
 #include <span>
 #include <string>
@@ -51,7 +53,9 @@ class PDeltaRule {
       targets_.push_back(static_cast<std::int32_t>(
           std::clamp(0.5 + targets[i], 0.0, static_cast<double>(group_size_))));
     }
-    distances_.resize(group_size_);
+    keys_.resize(group_size_);
+    n_index_bits_ = static_cast<int>(std::bit_width(group_size_ - 1));
+    distance_limit_ = std::numeric_limits<std::int32_t>::max() >> n_index_bits_;
   }
 
   std::size_t n_samples() const noexcept { return targets_.size() / n_groups_; }
@@ -73,27 +77,24 @@ class PDeltaRule {
                      std::vector<Correction>& corrections) {
     const std::int32_t direction = deficit > 0 ? 1 : -1;
     const auto n_corrected = static_cast<std::size_t>(std::abs(deficit));
-    std::int32_t least =
-        kernels_.distances(potentials, group_size_, deficit < 0, distances_.data());
     const auto add = [&](std::size_t i) {
       corrections.push_back({static_cast<std::uint32_t>(first_unit + i), direction});
     };
-    if (n_corrected <= kScans) {  // one scan per unit; equals are taken in index order
-      for (std::size_t left = n_corrected;;) {
-        std::size_t i = kernels_.find(distances_.data(), group_size_, 0, least);
-        for (; i < group_size_;
-             i = kernels_.find(distances_.data(), group_size_, i + 1, least)) {
-          add(i);
-          distances_[i] = std::numeric_limits<std::int32_t>::max();
-          if (--left == 0) return;
-        }
-        least = kernels_.least(distances_.data(), group_size_);
+    if (n_corrected <= kScans) {  // the least key, then the next one, ...
+      const std::size_t n_before = corrections.size();
+      std::int32_t key = kernels_.rank(potentials, group_size_, deficit < 0, n_index_bits_,
+                                       distance_limit_, keys_.data());
+      for (std::size_t left = n_corrected; key >> n_index_bits_ < distance_limit_;) {
+        add(static_cast<std::size_t>(key & ((1 << n_index_bits_) - 1)));
+        if (--left == 0) return;
+        key = kernels_.least_above(keys_.data(), group_size_, key);
       }
+      corrections.resize(n_before);  // too far for a key
     }
     ranked_.clear();
     for (std::size_t i = 0; i < group_size_; ++i) {
-      if (distances_[i] != std::numeric_limits<std::int32_t>::max()) {
-        ranked_.emplace_back(distances_[i], static_cast<std::uint32_t>(i));
+      if ((potentials[i] > 0) == (deficit < 0)) {
+        ranked_.emplace_back(std::abs(potentials[i]), static_cast<std::uint32_t>(i));
       }
     }
     const auto end = ranked_.begin() + static_cast<std::ptrdiff_t>(n_corrected);
@@ -101,13 +102,15 @@ class PDeltaRule {
     std::for_each(ranked_.begin(), end, [&](const auto& ranked) { add(ranked.second); });
   }
 
-  static constexpr std::size_t kScans = 6;
+  static constexpr std::size_t kScans = 12;
 
   std::size_t n_groups_;
   std::size_t group_size_ = 0;
   std::vector<std::int32_t> targets_;
   UnitKernels kernels_;
-  std::vector<std::int32_t> distances_;
+  std::vector<std::int32_t> keys_;
+  int n_index_bits_ = 0;
+  std::int32_t distance_limit_ = 0;  // at which keys stop telling distances apart
   std::vector<std::pair<std::int32_t, std::uint32_t>> ranked_;
 };
 

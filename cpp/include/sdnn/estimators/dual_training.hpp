@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -26,14 +27,15 @@ namespace sdnn::estimators {
 /// Correcting a unit by x_SD(t) and its threshold by 1 moves its potential for sample s by
 /// <x_SD(t), x_SD(s)> + 1, so a correction adds one row of the table of these products. Samples are
 /// presented in blocks: inside a block corrections are applied to the block's own potentials one by
-/// one, and to all others at its end. `Product` is an integer that holds every product.
+/// one, and to those of all samples some blocks later, many corrections of a unit in one pass. `Product` is an integer that holds every product.
 template <class Product>
 class DualTraining {
  public:
   DualTraining(std::shared_ptr<PerceptronLayer> layer, std::span<const std::int32_t> bins,
                int n_threads)
       : layer_(std::move(layer)), coded_(layer_->code(), bins),
-        row_size_(core::round_up(coded_.size(), 32)), kernels_(unit_kernels()),
+        row_size_(core::round_up(coded_.size(), 32)),
+        n_per_sum_(std::numeric_limits<Product>::max() / (layer_->code().max_active() + 1)), kernels_(unit_kernels()),
         team_(static_cast<std::size_t>(n_threads)), products_(coded_.size() * row_size_),
         potentials_(layer_->n_units() * row_size_),
         coefficients_(coded_.size() * layer_->n_padded_units()),
@@ -54,15 +56,13 @@ class DualTraining {
   template <class Rule>
   TrainingCount present(std::span<const std::int32_t> order, Rule& rule) {
     TrainingCount count;
-    std::span<const std::int32_t> before;
     while (!order.empty()) {
       const auto now = order.first(std::min(order.size(), kBlock));
-      turn(before, now);
+      turn(now);
       present_block(now, rule, count);
       order = order.subspan(now.size());
-      before = now;
     }
-    turn(before, {});
+    turn({});
     if (full_) synchronize();
     return count;
   }
@@ -99,7 +99,7 @@ class DualTraining {
 
  private:
   struct BlockCorrection {
-    std::uint32_t place;  // in the block
+    std::size_t sample;
     Correction what;
   };
 
@@ -117,48 +117,88 @@ class DualTraining {
     }
   }
 
-  /// Ends the block `before` (its corrections reach all samples) and begins the block `now` (its
-  /// potentials side by side, sample by sample).
-  void turn(std::span<const std::int32_t> before, std::span<const std::int32_t> now) {
-    std::fill(first_of_unit_.begin(), first_of_unit_.end(), 0);
-    for (const auto& correction : made_) ++first_of_unit_[correction.what.unit + 1];
-    for (std::size_t i = 0; i < layer_->n_units(); ++i) first_of_unit_[i + 1] += first_of_unit_[i];
-    by_unit_.resize(made_.size());
-    std::vector<std::size_t>& next = next_of_unit_;
-    next.assign(first_of_unit_.begin(), first_of_unit_.end());
-    for (const auto& correction : made_) by_unit_[next[correction.what.unit]++] = correction;
-    made_.clear();
-
-    const std::size_t n_padded = layer_->n_padded_units();
-    team_.run_over(layer_->n_units(), [&](std::size_t i) {
-      std::int32_t* const row = &potentials_[i * row_size_];
-      for (std::size_t c = first_of_unit_[i]; c < first_of_unit_[i + 1]; ++c) {
-        const auto sample = static_cast<std::size_t>(before[by_unit_[c].place]);
-        const Product* const product = &products_[sample * row_size_];
-        const bool plus = by_unit_[c].what.direction > 0;
-        kernels_.add_products(row, row_size_, &product, plus ? 1 : 0, &product, plus ? 0 : 1);
-      }
-      for (std::size_t b = 0; b < now.size(); ++b) {
-        block_[b * n_padded + i] = row[static_cast<std::size_t>(now[b])];
+  /// Begins the block `now`: its potentials, side by side sample by sample, with all corrections made
+  /// so far. These reach all other samples once there are enough of them to share the way; until then
+  /// they are applied to the samples asked for, which is cheap if those are neighbours in memory.
+  void turn(std::span<const std::int32_t> now) {
+    ++n_pending_blocks_;
+    const bool in_a_row = std::adjacent_find(now.begin(), now.end(), [](auto one, auto next) {
+                            return next != one + 1;
+                          }) == now.end();
+    const bool flush = now.empty() || !in_a_row || n_pending_blocks_ >= kPendingBlocks;
+    sort_pending_by_unit();
+    team_.run([&](std::size_t part) {
+      std::vector<const Product*> plus;
+      std::vector<const Product*> minus;
+      alignas(core::kCacheLine) std::array<std::int32_t, kBlock> some;
+      const std::size_t end = (part + 1) * layer_->n_units() / team_.size();
+      for (std::size_t i = part * layer_->n_units() / team_.size(); i < end; ++i) {
+        std::int32_t* const row = &potentials_[i * row_size_];
+        const std::size_t begin = flush || now.empty() ? 0 : static_cast<std::size_t>(now[0]);
+        plus.clear();
+        minus.clear();
+        for (std::size_t c = first_of_unit_[i]; c < first_of_unit_[i + 1]; ++c) {
+          const Product* const products = &products_[by_unit_[c].sample * row_size_ + begin];
+          (by_unit_[c].what.direction > 0 ? plus : minus).push_back(products);
+        }
+        if (flush) {
+          add_products(row, row_size_, plus, minus);
+          gather(row, now, i);
+        } else {
+          std::copy_n(row + begin, now.size(), some.begin());
+          add_products(some.data(), now.size(), plus, minus);
+          for (std::size_t b = 0; b < now.size(); ++b) {
+            block_[b * layer_->n_padded_units() + i] = some[b];
+          }
+        }
       }
     });
+    if (flush) {
+      pending_.clear();
+      n_pending_blocks_ = 0;
+    }
+  }
+
+  void sort_pending_by_unit() {
+    std::fill(first_of_unit_.begin(), first_of_unit_.end(), 0);
+    for (const auto& correction : pending_) ++first_of_unit_[correction.what.unit + 1];
+    for (std::size_t i = 0; i < layer_->n_units(); ++i) first_of_unit_[i + 1] += first_of_unit_[i];
+    by_unit_.resize(pending_.size());
+    next_of_unit_.assign(first_of_unit_.begin(), first_of_unit_.end());
+    for (const auto& correction : pending_) {
+      by_unit_[next_of_unit_[correction.what.unit]++] = correction;
+    }
+  }
+
+  void add_products(std::int32_t* to, std::size_t size, const std::vector<const Product*>& plus,
+                    const std::vector<const Product*>& minus) const noexcept {
+    if (plus.empty() && minus.empty()) return;
+    kernels_.add_products(to, size, plus.data(), plus.size(), minus.data(), minus.size(),
+                          n_per_sum_);
+  }
+
+  void gather(const std::int32_t* row, std::span<const std::int32_t> now, std::size_t unit) noexcept {
+    for (std::size_t b = 0; b < now.size(); ++b) {
+      block_[b * layer_->n_padded_units() + unit] = row[static_cast<std::size_t>(now[b])];
+    }
   }
 
   template <class Rule>
   void present_block(std::span<const std::int32_t> samples, Rule& rule, TrainingCount& count) {
     const std::size_t n_padded = layer_->n_padded_units();
+    const std::size_t n_before = pending_.size();  // what the block began with
     for (std::size_t b = 0; b < samples.size(); ++b) {
       const auto sample = static_cast<std::size_t>(samples[b]);
       std::int32_t* const values = &block_[b * n_padded];
       const Product* const products = &products_[sample * row_size_];
-      for (const BlockCorrection& made : made_) {
-        values[made.what.unit] +=
-            made.what.direction * products[static_cast<std::size_t>(samples[made.place])];
+      for (std::size_t c = n_before; c < pending_.size(); ++c) {
+        const BlockCorrection& made = pending_[c];
+        values[made.what.unit] += made.what.direction * products[made.sample];
       }
       rule(sample, values, corrections_);
       std::int16_t* const coefficients = &coefficients_[sample * n_padded];
       for (const Correction& correction : corrections_) {
-        made_.push_back({static_cast<std::uint32_t>(b), correction});
+        pending_.push_back({sample, correction});
         std::int16_t& coefficient = coefficients[correction.unit];
         coefficient = static_cast<std::int16_t>(coefficient + correction.direction);
         full_ = full_ || std::abs(coefficient) == std::numeric_limits<std::int16_t>::max();
@@ -170,10 +210,12 @@ class DualTraining {
 
   static constexpr std::size_t kBlock = 64;
   static constexpr std::size_t kRows = 8;
+  static constexpr std::size_t kPendingBlocks = 8;
 
   std::shared_ptr<PerceptronLayer> layer_;
   coding::CodedSamples coded_;
   std::size_t row_size_;
+  std::size_t n_per_sum_;  // products whose sum a Product holds
   UnitKernels kernels_;
   core::WorkerTeam team_;
   core::AlignedBuffer<Product> products_;            // (n_samples, row_size), 1 added to each
@@ -181,7 +223,8 @@ class DualTraining {
   core::AlignedBuffer<std::int16_t> coefficients_;   // (n_samples, n_padded_units)
   core::AlignedBuffer<std::int32_t> block_;          // (kBlock, n_padded_units)
   std::vector<Correction> corrections_;
-  std::vector<BlockCorrection> made_;                // in the block, in order
+  std::vector<BlockCorrection> pending_;             // not yet in all potentials, in order
+  std::size_t n_pending_blocks_ = 0;
   std::vector<BlockCorrection> by_unit_;
   std::vector<std::size_t> first_of_unit_;
   std::vector<std::size_t> next_of_unit_;

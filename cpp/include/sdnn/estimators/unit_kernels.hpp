@@ -161,18 +161,51 @@ SDNN_INLINE void correct_rows_body(Weight* rows, std::size_t width, std::size_t 
   }
 }
 
-/// to[i] += sum of plus[k][i] - sum of minus[k][i], a cache line of results at a time.
+/// to[i] += sum of plus[k][i] - sum of minus[k][i]; at most `n_per_sum` entries are added before their
+/// sum is widened.
 template <class Entry>
 SDNN_INLINE void add_products_body(std::int32_t* to, std::size_t size, const Entry* const* plus,
                                    std::size_t n_plus, const Entry* const* minus,
-                                   std::size_t n_minus) noexcept {
-  for (std::size_t k = 0; k < n_plus; ++k) {
-    const Entry* const row = plus[k];
-    for (std::size_t i = 0; i < size; ++i) to[i] += row[i];
+                                   std::size_t n_minus, std::size_t n_per_sum) noexcept {
+  using Lane = Register<Entry>;
+  constexpr std::size_t kRegisters = 4;
+  constexpr std::size_t kSize = kRegisters * Lane::kSize;
+  if (n_plus + n_minus == 1) {
+    const Entry* const row = n_plus == 1 ? plus[0] : minus[0];
+    if (n_plus == 1) {
+      for (std::size_t i = 0; i < size; ++i) to[i] += row[i];
+    } else {
+      for (std::size_t i = 0; i < size; ++i) to[i] -= row[i];
+    }
+    return;
   }
-  for (std::size_t k = 0; k < n_minus; ++k) {
-    const Entry* const row = minus[k];
-    for (std::size_t i = 0; i < size; ++i) to[i] -= row[i];
+  for (std::size_t p = 0, m = 0; p < n_plus || m < n_minus;) {
+    const std::size_t p_end = std::min(n_plus, p + n_per_sum);
+    const std::size_t m_end = std::min(n_minus, m + (n_per_sum - (p_end - p)));
+    std::size_t i = 0;
+    for (; i + kSize <= size; i += kSize) {
+      Lane sum[kRegisters];
+      core::unrolled<kRegisters>([&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].clear(); });
+      for (std::size_t k = p; k < p_end; ++k) {
+        core::unrolled<kRegisters>(
+            [&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].add(plus[k] + i + r * Lane::kSize); });
+      }
+      for (std::size_t k = m; k < m_end; ++k) {
+        core::unrolled<kRegisters>([&](std::size_t r) SDNN_INLINE_LAMBDA {
+          sum[r].subtract(minus[k] + i + r * Lane::kSize);
+        });
+      }
+      alignas(core::kCacheLine) Entry narrow[kSize];
+      core::unrolled<kRegisters>(
+          [&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].store(narrow + r * Lane::kSize); });
+      for (std::size_t k = 0; k < kSize; ++k) to[i + k] += narrow[k];
+    }
+    for (; i < size; ++i) {
+      for (std::size_t k = p; k < p_end; ++k) to[i] += plus[k][i];
+      for (std::size_t k = m; k < m_end; ++k) to[i] -= minus[k][i];
+    }
+    p = p_end;
+    m = m_end;
   }
 }
 
@@ -200,10 +233,10 @@ SDNN_INLINE std::int32_t count_firing_body(const std::int32_t* potentials,
   return count;
 }
 
-/// Distances to the threshold of the units that fire (`firing`) or do not; INT32_MAX of the others.
-/// Returns the least.
-SDNN_INLINE std::int32_t distances_body(const std::int32_t* potentials, std::size_t size,
-                                        bool firing, std::int32_t* distances) noexcept {
+/// keys[i] = (distance to the threshold) << n_bits | i of the units that fire (`firing`) or do not,
+/// INT32_MAX of the others; distances of `limit` and more are all `limit`. Returns the least key.
+SDNN_INLINE std::int32_t rank_body(const std::int32_t* potentials, std::size_t size, bool firing,
+                                   int n_bits, std::int32_t limit, std::int32_t* keys) noexcept {
   constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::max();
   std::int32_t least = kNone;
   std::size_t i = 0;
@@ -211,50 +244,56 @@ SDNN_INLINE std::int32_t distances_body(const std::int32_t* potentials, std::siz
   using Vector = Register<std::int32_t>::Vector;
   constexpr std::size_t kSize = Register<std::int32_t>::kSize;
   const Vector none = Vector{} + kNone;
+  const Vector limits = Vector{} + limit;
   const Vector flip = Vector{} - (firing ? 0 : 1);  // all ones to negate and to invert the mask
   Vector lowest = none;
+  Vector index{};
+  for (std::size_t k = 0; k < kSize; ++k) index[k] = static_cast<std::int32_t>(k);
   for (; i + kSize <= size; i += kSize) {
     Vector p;
     std::memcpy(&p, potentials + i, sizeof p);
     const Vector asked = (Vector)(p > 0) ^ flip;
-    const Vector distance = (((p ^ flip) - flip) & asked) | (none & ~asked);
-    std::memcpy(distances + i, &distance, sizeof distance);
-    const Vector lower = (Vector)(distance < lowest);
-    lowest = (distance & lower) | (lowest & ~lower);
+    Vector distance = (p ^ flip) - flip;
+    const Vector near = (Vector)(distance < limits);
+    distance = (distance & near) | (limits & ~near);
+    const Vector key = (((distance << n_bits) | index) & asked) | (none & ~asked);
+    std::memcpy(keys + i, &key, sizeof key);
+    const Vector lower = (Vector)(key < lowest);
+    lowest = (key & lower) | (lowest & ~lower);
+    index += static_cast<std::int32_t>(kSize);
   }
   for (std::size_t k = 0; k < kSize; ++k) least = lowest[k] < least ? lowest[k] : least;
 #endif
   for (; i < size; ++i) {
-    distances[i] = (potentials[i] > 0) != firing ? kNone : firing ? potentials[i] : -potentials[i];
-    least = distances[i] < least ? distances[i] : least;
+    const std::int32_t distance = std::min(firing ? potentials[i] : -potentials[i], limit);
+    keys[i] = (potentials[i] > 0) == firing ? distance << n_bits | static_cast<std::int32_t>(i)
+                                            : kNone;
+    least = keys[i] < least ? keys[i] : least;
   }
   return least;
 }
 
-SDNN_INLINE std::int32_t least_body(const std::int32_t* values, std::size_t size) noexcept {
-  std::int32_t least = std::numeric_limits<std::int32_t>::max();
-  for (std::size_t i = 0; i < size; ++i) least = values[i] < least ? values[i] : least;
-  return least;
-}
-
-/// The first place of `wanted` at or after `begin`, `size` if there is none.
-SDNN_INLINE std::size_t find_body(const std::int32_t* values, std::size_t size, std::size_t begin,
-                                  std::int32_t wanted) noexcept {
+/// The least of the values above `floor`, INT32_MAX if there is none.
+SDNN_INLINE std::int32_t least_above_body(const std::int32_t* values, std::size_t size,
+                                          std::int32_t floor) noexcept {
+  constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::max();
+  std::int32_t least = kNone;
+  std::size_t i = 0;
 #if SDNN_LANES
   using Vector = Register<std::int32_t>::Vector;
   constexpr std::size_t kSize = Register<std::int32_t>::kSize;
-  const Vector asked = Vector{} + wanted;
-  for (; begin + 4 * kSize <= size; begin += 4 * kSize) {
-    Vector some[4];
-    std::memcpy(some, values + begin, sizeof some);
-    const auto equal = std::bit_cast<std::array<std::uint64_t, 4>>(
-        (Vector)(some[0] == asked) | (Vector)(some[1] == asked) | (Vector)(some[2] == asked) |
-        (Vector)(some[3] == asked));
-    if ((equal[0] | equal[1] | equal[2] | equal[3]) != 0) break;
+  const Vector floors = Vector{} + floor;
+  Vector lowest = Vector{} + kNone;
+  for (; i + kSize <= size; i += kSize) {
+    Vector v;
+    std::memcpy(&v, values + i, sizeof v);
+    const Vector lower = (Vector)(v < lowest) & (Vector)(v > floors);
+    lowest = (v & lower) | (lowest & ~lower);
   }
+  for (std::size_t k = 0; k < kSize; ++k) least = lowest[k] < least ? lowest[k] : least;
 #endif
-  while (begin < size && values[begin] != wanted) ++begin;
-  return begin;
+  for (; i < size; ++i) least = values[i] > floor && values[i] < least ? values[i] : least;
+  return least;
 }
 
 /// The inner product of two codes with entries +1, 0, -1.
@@ -337,18 +376,16 @@ struct UnitKernels {
                           std::uint32_t samples, const std::int32_t* coefficients);
   void (*add_products_16)(std::int32_t* to, std::size_t size, const std::int16_t* const* plus,
                           std::size_t n_plus, const std::int16_t* const* minus,
-                          std::size_t n_minus);
+                          std::size_t n_minus, std::size_t n_per_sum);
   void (*add_products_32)(std::int32_t* to, std::size_t size, const std::int32_t* const* plus,
                           std::size_t n_plus, const std::int32_t* const* minus,
-                          std::size_t n_minus);
+                          std::size_t n_minus, std::size_t n_per_sum);
   void (*add_outer)(std::int32_t* rows, std::size_t width, const std::int16_t* coefficients,
                     std::uint64_t active, std::uint64_t positive);
   std::int32_t (*count_firing)(const std::int32_t* potentials, std::size_t size);
-  std::int32_t (*distances)(const std::int32_t* potentials, std::size_t size, bool firing,
-                            std::int32_t* distances);
-  std::int32_t (*least)(const std::int32_t* values, std::size_t size);
-  std::size_t (*find)(const std::int32_t* values, std::size_t size, std::size_t begin,
-                      std::int32_t wanted);
+  std::int32_t (*rank)(const std::int32_t* potentials, std::size_t size, bool firing, int n_bits,
+                       std::int32_t limit, std::int32_t* keys);
+  std::int32_t (*least_above)(const std::int32_t* values, std::size_t size, std::int32_t floor);
   std::int32_t (*inner_product)(const std::uint64_t* active, const std::uint64_t* positive,
                                 const std::uint64_t* other_active,
                                 const std::uint64_t* other_positive, std::size_t n_words);
@@ -375,13 +412,13 @@ struct UnitKernels {
   }
   void add_products(std::int32_t* to, std::size_t size, const std::int16_t* const* plus,
                     std::size_t n_plus, const std::int16_t* const* minus,
-                    std::size_t n_minus) const {
-    add_products_16(to, size, plus, n_plus, minus, n_minus);
+                    std::size_t n_minus, std::size_t n_per_sum) const {
+    add_products_16(to, size, plus, n_plus, minus, n_minus, n_per_sum);
   }
   void add_products(std::int32_t* to, std::size_t size, const std::int32_t* const* plus,
                     std::size_t n_plus, const std::int32_t* const* minus,
-                    std::size_t n_minus) const {
-    add_products_32(to, size, plus, n_plus, minus, n_minus);
+                    std::size_t n_minus, std::size_t n_per_sum) const {
+    add_products_32(to, size, plus, n_plus, minus, n_minus, n_per_sum);
   }
 };
 
@@ -405,23 +442,21 @@ struct UnitKernels {
           internal::correct_rows_body(r, w, n, p, m, s, c);                                       \
         },                                                                                        \
         [](std::int32_t* o, std::size_t n, const std::int16_t* const* p, std::size_t np,          \
-           const std::int16_t* const* m, std::size_t nm) __VA_ARGS__ {                            \
-          internal::add_products_body(o, n, p, np, m, nm);                                        \
+           const std::int16_t* const* m, std::size_t nm, std::size_t s) __VA_ARGS__ {             \
+          internal::add_products_body(o, n, p, np, m, nm, s);                                     \
         },                                                                                        \
         [](std::int32_t* o, std::size_t n, const std::int32_t* const* p, std::size_t np,          \
-           const std::int32_t* const* m, std::size_t nm) __VA_ARGS__ {                            \
-          internal::add_products_body(o, n, p, np, m, nm);                                        \
+           const std::int32_t* const* m, std::size_t nm, std::size_t s) __VA_ARGS__ {             \
+          internal::add_products_body(o, n, p, np, m, nm, s);                                     \
         },                                                                                        \
         [](std::int32_t* r, std::size_t w, const std::int16_t* c, std::uint64_t a,                \
            std::uint64_t p) __VA_ARGS__ { internal::add_outer_body(r, w, c, a, p); },             \
         [](const std::int32_t* p, std::size_t n)                                                  \
             __VA_ARGS__ { return internal::count_firing_body(p, n); },                            \
-        [](const std::int32_t* p, std::size_t n, bool f, std::int32_t* d)                         \
-            __VA_ARGS__ { return internal::distances_body(p, n, f, d); },                         \
-        [](const std::int32_t* v, std::size_t n)                                                  \
-            __VA_ARGS__ { return internal::least_body(v, n); },                                   \
-        [](const std::int32_t* v, std::size_t n, std::size_t b, std::int32_t w)                   \
-            __VA_ARGS__ { return internal::find_body(v, n, b, w); },                              \
+        [](const std::int32_t* p, std::size_t n, bool f, int b, std::int32_t l, std::int32_t* k)  \
+            __VA_ARGS__ { return internal::rank_body(p, n, f, b, l, k); },                        \
+        [](const std::int32_t* v, std::size_t n, std::int32_t f)                                  \
+            __VA_ARGS__ { return internal::least_above_body(v, n, f); },                          \
         [](const std::uint64_t* a, const std::uint64_t* p, const std::uint64_t* oa,               \
            const std::uint64_t* op, std::size_t n)                                                \
             __VA_ARGS__ { return internal::inner_product_body(a, p, oa, op, n); }                 \
