@@ -1103,6 +1103,14 @@ def instruction_set() -> str:
     """
     The instruction set in use
     """
+def libsdnn_tables(n_units: typing.SupportsInt | typing.SupportsIndex, inputs: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]], pairs: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], seed: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], library: str = 'libstdc++') -> tuple:
+    """
+    LIBSDNN's code tables, (modified, modifiers); inputs are (n_bins, n_flipped)
+    """
+def libsdnn_weights(n_units: typing.SupportsInt | typing.SupportsIndex, n_columns: typing.SupportsInt | typing.SupportsIndex, low: typing.SupportsInt | typing.SupportsIndex, high: typing.SupportsInt | typing.SupportsIndex, seed: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], library: str = 'libstdc++') -> tuple:
+    """
+    LIBSDNN's first (weights, thresholds)
+    """
 def log(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
 def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:

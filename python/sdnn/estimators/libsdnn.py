@@ -69,7 +69,7 @@ class LibsdnnParameters:
         return self.n_classes * (self.n_classes - 1) // 2
 
     def bins(self, inputs: npt.ArrayLike) -> npt.NDArray[np.int32]:
-        """The bins of samples: ``int(n_bins * x)``, or ``int(x)`` of a symbol, clipped.
+        """Return the bins of samples: ``int(n_bins * x)``, or ``int(x)`` of a symbol, clipped.
 
         Parameters
         ----------
@@ -88,10 +88,13 @@ class LibsdnnParameters:
             raise ValueError("inputs must be finite, got NaN or infinity")
         factors = np.array([1 if one.symbolic else one.n_bins for one in self.inputs])
         highest = np.array([one.n_bins - 1 for one in self.inputs])
-        return np.clip(np.trunc(values * factors), 0, highest).astype(np.int32)
+        bins: npt.NDArray[np.int32] = np.clip(np.trunc(values * factors), 0, highest).astype(
+            np.int32
+        )
+        return bins
 
     def make_code(self, library: Library = "msvc") -> _core.SelectiveDesensitization:
-        """The code with LIBSDNN's own tables; needs a seed in the file."""
+        """Return the code with LIBSDNN's own tables; needs a seed in the file."""
         if self.pattern_seed is None:
             raise ValueError("random_seed of PC must be a list of numbers, got hardware_entropy")
         sizes = [(one.n_bins, one.n_flipped) for one in self.inputs]
@@ -102,7 +105,7 @@ class LibsdnnParameters:
         return _core.SelectiveDesensitization(modified, modifiers, pairs)
 
     def make_layer(self, library: Library = "msvc") -> _core.PerceptronLayer:
-        """The untrained network, bit for bit; needs seeds in the file."""
+        """Return the untrained network, bit for bit; needs seeds in the file."""
         if self.weight_seed is None:
             raise ValueError("random_seed of NN must be a list of numbers, got hardware_entropy")
         code = self.make_code(library)
@@ -118,7 +121,7 @@ class LibsdnnParameters:
     def make_trainer(
         self, layer: _core.PerceptronLayer, inputs: npt.ArrayLike, targets: npt.ArrayLike
     ) -> _core.PDeltaTrainer | _core.ErrorCorrectionTrainer:
-        """A trainer whose ``epoch(np.arange(n_samples))`` is one iteration of LIBSDNN."""
+        """Return a trainer whose ``epoch(np.arange(n_samples))`` is one iteration of LIBSDNN."""
         bins = self.bins(inputs)
         if self.task == "regression":
             low = self.output_range[0]
@@ -151,10 +154,12 @@ class LibsdnnModel:
         bins = given.bins(inputs)
         if given.task == "regression":
             counts = self.layer.counts(bins, n_threads=n_threads)[:, 0]
-            return given.step_size * counts + given.output_range[0]
+            outputs: npt.NDArray[Any] = given.step_size * counts + given.output_range[0]
+            return outputs
         potentials = self.layer.potentials(bins, n_threads=n_threads)
         if given.scheme == "one_vs_rest":  # class 0 if no unit fires
-            return np.maximum(potentials, 0).argmax(axis=1)
+            classes: npt.NDArray[Any] = np.maximum(potentials, 0).argmax(axis=1)
+            return classes
         votes = np.zeros((len(bins), given.n_classes), dtype=np.int64)
         first, second = np.triu_indices(given.n_classes, 1)
         for unit, (i, j) in enumerate(zip(first, second, strict=True)):
@@ -170,8 +175,8 @@ def read_parameter_file(path: str | Path) -> LibsdnnParameters:
     Raises
     ------
     ValueError
-        If it is not one, lacks an entry, or asks for what cannot be reproduced (codes by correlation
-        matrix).
+        If it is not one, lacks an entry, or asks for codes by correlation matrix, which cannot be
+        reproduced.
     """
     path = Path(path)
     return _parameters(_entries(path.read_text("latin-1"), path), path)
@@ -218,7 +223,7 @@ def read_model_file(path: str | Path, library: Library = "msvc") -> LibsdnnModel
 
 
 def _entries(text: str, path: Path) -> dict[str, str]:
-    """The entries by their full names, such as ``SDNN/PC/n``."""
+    """Return the entries by their full names, such as ``SDNN/PC/n``."""
     tags: list[str] = []
     entries: dict[str, str] = {}
     for number, line in enumerate(text.splitlines(), start=1):
@@ -238,11 +243,11 @@ def _entries(text: str, path: Path) -> dict[str, str]:
 
 
 def _number(text: str, what: str) -> float:
-    """The value of a formula of numbers, ``+ - * / ^`` and parentheses."""
+    """Return the value of a formula of numbers, ``+ - * / ^`` and parentheses."""
 
     def value(node: ast.expr) -> float:
-        if isinstance(node, ast.Constant) and type(node.value) in (int, float):
-            return node.value
+        if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+            return float(node.value)
         if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATORS:
             return _OPERATORS[type(node.op)](value(node.operand))
         if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
@@ -262,7 +267,7 @@ def _number(text: str, what: str) -> float:
 
 
 def _items(text: str, what: str) -> list[str]:
-    """The items of ``[a, b:3]``, which is ``[a, b, b, b]``; commas in parentheses do not count."""
+    """Return the items of ``[a, b:3]``, that is ``[a, b, b, b]``; not cut in parentheses."""
     if not (text.startswith("[") and text.endswith("]")):
         raise ValueError(f"{what} must be a list in brackets, got {text[:80]!r}")
     items: list[str] = []

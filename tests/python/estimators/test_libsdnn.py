@@ -1,9 +1,10 @@
 """The same numbers as LIBSDNN, and readers of its files.
 
-Hashes and model files were made by LIBSDNN itself (commit 5a862cc, g++ 12, -O3), from the parameters
-and samples below; the hash is of the thresholds and weights as its model file holds them.
+Hashes and model files were made by LIBSDNN itself (commit 5a862cc, g++ 12, -O3), from the
+parameters and samples below; the hash is of thresholds and weights as its model file has them.
 """
 
+import contextlib
 import hashlib
 import math
 from pathlib import Path
@@ -121,21 +122,26 @@ def test_the_two_libraries_draw_different_weights(parameter_file):
 def test_a_classifiers_model_file_is_read_and_trained_again(name, expected):
     model = libsdnn.read_model_file(FILES / f"{name}.bin", "libstdc++")
     assert model.parameters.scheme == name
-    assert model.parameters.inputs == (
-        libsdnn.LibsdnnInput(symbolic=False, n_bins=51, n_flipped=3),
-    ) * 2
+    assert (
+        model.parameters.inputs
+        == (libsdnn.LibsdnnInput(symbolic=False, n_bins=51, n_flipped=3),) * 2
+    )
     assert model.parameters.pairs == ((0, 1), (1, 0))
     assert model.parameters.pattern_seed == (7, 8, 9)
     assert digest(model.layer).startswith(expected)
-    lattice = np.array([(x / 1000, y / 1000) for x in range(0, 1001, 25) for y in range(0, 1001, 25)])
+    lattice = np.array(
+        [(x / 1000, y / 1000) for x in range(0, 1001, 25) for y in range(0, 1001, 25)]
+    )
     predicted = model.predict(lattice)
     truth = np.minimum((lattice[:, 0] * 2).astype(int) + 2 * (lattice[:, 1] * 2).astype(int), 3)
     assert np.mean(predicted == truth) > 0.8
 
 
 def test_bins_are_cut_as_libsdnn_cuts_them(parameter_file):
-    symbols = ("[NUMERICAL(RANDOM_INVERSE(1001,5)):2]",
-               "[NUMERICAL(RANDOM_INVERSE(10,5)), SYMBOLIC(RANDOM_INVERSE(4,5))]")
+    symbols = (
+        "[NUMERICAL(RANDOM_INVERSE(1001,5)):2]",
+        "[NUMERICAL(RANDOM_INVERSE(10,5)), SYMBOLIC(RANDOM_INVERSE(4,5))]",
+    )
     parameters = libsdnn.read_parameter_file(parameter_file(symbols))
     given = [(0.0, 0), (0.0999, 1), (0.1, 3), (1.0, 4), (-3.0, -2), (2.0, 9)]
     expected = [(0, 0), (0, 1), (1, 3), (9, 3), (0, 0), (9, 3)]
@@ -190,7 +196,5 @@ def test_broken_model_files_are_refused(tmp_path):
         changed = bytearray(content)
         changed[random.integers(600)] = random.integers(256)
         path.write_bytes(changed)
-        try:
+        with contextlib.suppress(ValueError, OverflowError):
             libsdnn.read_model_file(path)
-        except (ValueError, OverflowError):
-            pass
