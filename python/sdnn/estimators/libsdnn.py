@@ -166,7 +166,8 @@ class LibsdnnModel:
             firing = potentials[:, unit] > 0
             votes[:, i] += firing
             votes[:, j] += ~firing
-        return votes.argmax(axis=1)
+        winners: npt.NDArray[Any] = votes.argmax(axis=1)
+        return winners
 
 
 def read_parameter_file(path: str | Path) -> LibsdnnParameters:
