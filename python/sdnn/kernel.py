@@ -3,14 +3,15 @@
 After training on one sample, the network's answer to another one changes with the inner product
 of their codes. For long codes it approaches a kernel that follows from the codings alone: for each
 pair, ``(1 + rho_modifier) / 2 * rho_modified``, where rho is the correlation of the patterns of
-two values, averaged over the pairs. It is 1 for equal samples.
+two values, averaged over the pairs. A plain pattern has no modifier and counts twice, because
+all of its units are active. The kernel of a sample with itself is 1.
 
 >>> import numpy as np
 >>> from sdnn import kernel
 >>> from sdnn.coding import RandomInverse
 >>> one = kernel.AnalyticKernel(RandomInverse(length_scale=0.2, low=0.0, high=1.0), n_inputs=2)
 >>> one(np.array([[0.5, 0.5]]), np.array([[0.5, 0.5], [0.7, 0.5], [0.7, 0.9]])).round(2)
-array([[1.  , 0.53, 0.17]])
+array([[1.  , 0.52, 0.15]])
 """
 
 from __future__ import annotations
@@ -135,8 +136,8 @@ class AnalyticKernel:
         ]
         total = np.zeros((len(one), len(other)))
         for mu, nu in self.pairs:
-            total += rho[mu] if mu == nu else (1 + rho[nu]) / 2 * rho[mu]
-        return total / len(self.pairs)
+            total += 2 * rho[mu] if mu == nu else (1 + rho[nu]) / 2 * rho[mu]
+        return total / sum(2 if mu == nu else 1 for mu, nu in self.pairs)
 
 
 def plot_similarity(

@@ -64,7 +64,9 @@ def positions(
     if not low < high:
         return np.zeros(len(column))
     if knots is not None:
-        return np.interp(column, *np.array(knots).T)
+        values, levels = np.array(knots).T
+        between: NDArray[np.float64] = np.interp(column, values, levels)
+        return between
     # Halves, so that the width of the widest range is still a number.
     inside = np.clip(column, low, high)
     where: NDArray[np.float64] = (inside / 2 - low / 2) / (high / 2 - low / 2)

@@ -131,8 +131,8 @@ class CorrelationMatrix(Coding):
     categories: tuple[Category, ...] | None = None
 
     def __post_init__(self) -> None:
-        rows = tuple(map(tuple, np.asarray(self.matrix, dtype=np.float64).tolist()))
-        object.__setattr__(self, "matrix", rows)
+        matrix = np.atleast_2d(np.asarray(self.matrix, dtype=np.float64))
+        object.__setattr__(self, "matrix", tuple(map(tuple, matrix.tolist())))
         if self.categories is not None:
             object.__setattr__(self, "categories", tuple(self.categories))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,7 +12,6 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
-from sdnn._core import __version__
 from sdnn.coding import Coding, from_dict, to_dict
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.input_code import InputCode
@@ -91,7 +91,7 @@ def save(estimator: BaseSDNN, path: str | Path) -> None:
     held = vars(estimator)
     metadata = {
         "format": FORMAT,
-        "version": __version__,
+        "version": version("sdnn"),
         "class": type(estimator).__name__,
         "parameters": {
             name: plain(value) for name, value in estimator.get_params(deep=False).items()

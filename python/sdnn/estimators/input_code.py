@@ -53,11 +53,8 @@ class InputCode:
         # Inputs that no pair mentions are validated and then ignored.
         self.used = sorted({index for pair in self.pairs for index in pair})
         place = {index: number for number, index in enumerate(self.used)}
-        self.core = _core.SelectiveDesensitization(
-            modified,
-            modifiers,
-            np.array([(place[mu], place[nu]) for mu, nu in self.pairs], dtype=np.int32),
-        )
+        self.core_pairs = np.array([(place[mu], place[nu]) for mu, nu in self.pairs], np.int32)
+        self.core = _core.SelectiveDesensitization(modified, modifiers, self.core_pairs)
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the core's object, which follows from it."""

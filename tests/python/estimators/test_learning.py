@@ -1,5 +1,7 @@
 """What the estimators learn: order, options, forms of training, both schemes, several outputs."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -50,7 +52,7 @@ def test_partial_fit_in_any_portions_is_one_pass_of_fit(portions, regression):
     if regression:
         whole = SDNNRegressor(**REGRESSOR, max_iter=1, shuffle=False).fit(X[:n], Y[:n])
         parts = SDNNRegressor(**REGRESSOR)
-        for a, b in zip(bounds[:-1], bounds[1:], strict=True):
+        for a, b in itertools.pairwise(bounds):
             parts.partial_fit(X[a:b], Y[a:b])
     else:
         y = LABELS[:n].copy()
@@ -60,7 +62,7 @@ def test_partial_fit_in_any_portions_is_one_pass_of_fit(portions, regression):
         if n >= 3:
             same(whole, SDNNClassifier(**GIVEN, max_iter=1, shuffle=False).fit(X[:n], y))
         parts = SDNNClassifier(**GIVEN)
-        for a, b in zip(bounds[:-1], bounds[1:], strict=True):
+        for a, b in itertools.pairwise(bounds):
             parts.partial_fit(X[a:b], y[a:b], classes=classes)
     same(whole, parts)
     assert parts.n_iter_ == len(portions)

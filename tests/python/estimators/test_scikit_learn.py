@@ -101,10 +101,10 @@ def test_bad_samples_are_refused_as_scikit_learn_does(estimator, bad, error):
 
 
 def test_sparse_samples_are_refused(estimator):
-    with pytest.raises(TypeError, match="[Ss]parse data was passed"):
+    with pytest.raises(TypeError, match=r"[Ss]parse data was passed"):
         estimator.fit(sparse.csr_matrix(X), targets_of(estimator))
     estimator.fit(X, targets_of(estimator))
-    with pytest.raises(TypeError, match="[Ss]parse data was passed"):
+    with pytest.raises(TypeError, match=r"[Ss]parse data was passed"):
         estimator.predict(sparse.csr_matrix(X))
 
 
@@ -112,7 +112,7 @@ def test_prediction_checks_its_samples(estimator):
     with pytest.raises(NotFittedError):
         estimator.predict(X)
     estimator.fit(X, targets_of(estimator))
-    with pytest.raises(ValueError, match="X has 2 features, but .* is expecting 3 features"):
+    with pytest.raises(ValueError, match=r"X has 2 features, but .* is expecting 3 features"):
         estimator.predict(X[:, :2])
     with pytest.raises(ValueError, match="contains NaN"):
         estimator.predict(np.full((1, 3), np.nan))
