@@ -10,11 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sdnn.estimators.classifier import SDNNClassifier
+    from sdnn.estimators.libsdnn import read_model_file, read_parameter_file
     from sdnn.estimators.regressor import SDNNRegressor
 
-_HOME_OF = {"SDNNClassifier": "classifier", "SDNNRegressor": "regressor"}
+_HOME_OF = {
+    "SDNNClassifier": "classifier",
+    "SDNNRegressor": "regressor",
+    "read_model_file": "libsdnn",
+    "read_parameter_file": "libsdnn",
+}
 
-__all__ = ["SDNNClassifier", "SDNNRegressor"]
+__all__ = ["SDNNClassifier", "SDNNRegressor", "read_model_file", "read_parameter_file"]
 
 
 def __getattr__(name: str) -> Any:
