@@ -78,9 +78,7 @@ def kernel_figure():
         ("anchor", Anchor(), 0.5),
         ("circular", Circular(period=1.0), 0.1),
     )
-    for axes, (title, coding, at) in zip(
-        figure.subplots(1, 3, sharey=True), codings, strict=True
-    ):
+    for axes, (title, coding, at) in zip(figure.subplots(1, 3, sharey=True), codings, strict=True):
         drawn, expected = kernel.similarity(coding), kernel.correlations(coding)
         row = int(at * len(drawn))
         x = (np.arange(len(drawn)) + 0.5) / len(drawn)
@@ -119,7 +117,8 @@ def useless_figure(rows):
 
 
 def demonstration_table(rows):
-    print("\n| system | train, s | predict, s | RMSE all | data | blank |\n|---|---|---|---|---|---|")
+    print("\n| system | train, s | predict, s | RMSE all | data | blank |")
+    print("|---|---|---|---|---|---|")
     found = defaultdict(list)
     for row in rows:
         found[row["system"]].append(row)
@@ -164,7 +163,8 @@ def real_table(rows):
             variance = scores.var(ddof=1) * (1 / len(scores) + 1 / 4)
             half = stats.t.ppf(0.975, len(scores) - 1) * np.sqrt(variance)
             mean = scores.mean()
-            print(f"| {name} | {mean:.3f} | {mean - half:.3f} to {mean + half:.3f} | {len(scores)} |")
+            interval = f"{mean - half:.3f} to {mean + half:.3f}"
+            print(f"| {name} | {mean:.3f} | {interval} | {len(scores)} |")
 
 
 if __name__ == "__main__":

@@ -127,7 +127,7 @@ SHIPPED = (
     r"cpp/include/sdnn/([a-z_]+/)?[a-z0-9_]+\.hpp",
     r"cpp/bindings/([a-z_]+\.[ch]pp|CMakeLists\.txt)",
     r"python/sdnn/([a-z_]+/)?[a-z_]+\.pyi?|python/sdnn/py\.typed",
-    r"(tests|bench|docs)/.*\.(py|cpp|hpp|txt|md|json|csv|png|svg|ipynb)",
+    r"(tests|bench|docs)/.*\.(py|cpp|hpp|txt|md|json|csv|png|svg|ipynb|bin)",
 )
 """Every file of a source distribution matches one of these."""
 
