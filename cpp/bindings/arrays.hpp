@@ -9,6 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "sdnn/coding/pattern_table.hpp"
+#include "sdnn/core/check.hpp"
+
 namespace sdnn::bindings {
 
 /// An argument that becomes a C-contiguous array of `T`, converted if need be.
@@ -29,6 +32,27 @@ std::span<const T> vector(const ArrayArgument<T>& array, const char* name) {
                                 std::to_string(array.ndim()));
   }
   return flat(array);
+}
+
+/// The items of a two-dimensional array. Throws std::invalid_argument naming the argument.
+template <class T>
+std::span<const T> matrix(const ArrayArgument<T>& array, const char* name,
+                          std::size_t n_columns = 0) {
+  core::require(array.ndim() == 2, name, "an array of two dimensions", array.ndim());
+  core::require(n_columns == 0 || static_cast<std::size_t>(array.shape(1)) == n_columns, name,
+                "an array of " + std::to_string(n_columns) + " columns", array.shape(1));
+  return bindings::flat(array);
+}
+
+/// The patterns of a table, +1 and -1. Shapes: (n_bins, n_units).
+inline pybind11::array_t<std::int8_t> signs_of(const coding::PatternTable& table) {
+  pybind11::array_t<std::int8_t> signs({table.n_bins(), table.n_units()});
+  for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {
+    for (std::size_t k = 0; k < table.n_units(); ++k) {
+      signs.mutable_at(bin, k) = static_cast<std::int8_t>(table.sign(bin, k));
+    }
+  }
+  return signs;
 }
 
 }  // namespace sdnn::bindings

@@ -6,6 +6,7 @@
 void bind_core(pybind11::module_& module);
 void bind_coding(pybind11::module_& module);
 void bind_approximators(pybind11::module_& module);
+void bind_estimators(pybind11::module_& module);
 void bind_agents(pybind11::module_& module);
 void bind_environments(pybind11::module_& module);
 void bind_experiments(pybind11::module_& module);

@@ -8,6 +8,7 @@ PYBIND11_MODULE(_core, module) {
   bind_coding(module);
   bind_approximators(module);
   bind_environments(module);
+  bind_estimators(module);
   bind_agents(module);
   bind_experiments(module);
   bind_benchmarks(module);

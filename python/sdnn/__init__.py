@@ -4,6 +4,9 @@ Rooms, from the network up (each is imported when first used):
 
 - ``sdnn.approximators``: SDNN-C, a network that gives Q(s, a) for every action at once
 - ``sdnn.agents``: Q-learning with it, for any Gymnasium environment
+- ``sdnn.SDNNRegressor``, ``sdnn.SDNNClassifier``: the network as scikit-learn estimators
+  (room ``sdnn.estimators``, needs ``sdnn[sklearn]``); ``sdnn.coding``: how inputs become patterns;
+  ``sdnn.kernel``: what generalizes to what
 - ``sdnn.environments``: the acrobot swing-up, redundant and noisy sensors
 - ``sdnn.experiments``: the paper's experiments, also as the command ``sdnn reproduce``
 - ``sdnn.benchmarks``: how quick all this is here, also as the command ``sdnn bench``
@@ -15,29 +18,36 @@ core uses.
 from __future__ import annotations
 
 import importlib
-from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sdnn import environments
 from sdnn._core import __version__
 from sdnn.instruction_sets import instruction_set, set_instruction_set
 
 if TYPE_CHECKING:
-    from sdnn import agents, approximators, benchmarks, experiments
+    from sdnn import agents, approximators, benchmarks, coding, estimators, experiments, kernel
+    from sdnn.estimators import SDNNClassifier, SDNNRegressor
 
 __all__ = [
+    "SDNNClassifier",
+    "SDNNRegressor",
     "__version__",
     "agents",
     "approximators",
     "benchmarks",
+    "coding",
     "environments",
+    "estimators",
     "experiments",
     "instruction_set",
+    "kernel",
     "set_instruction_set",
 ]
 
 
-def __getattr__(name: str) -> ModuleType:
+def __getattr__(name: str) -> Any:
+    if name in ("SDNNClassifier", "SDNNRegressor"):
+        return getattr(importlib.import_module("sdnn.estimators"), name)
     if name in __all__:
         return importlib.import_module(f"sdnn.{name}")
     raise AttributeError(f"module 'sdnn' has no attribute {name!r}")

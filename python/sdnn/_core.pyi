@@ -678,6 +678,97 @@ class AcrobotSensors:
         ...
     def observe(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         ...
+class SelectiveDesensitization:
+    """
+    The desensitized code of a sample, from its bins
+    """
+    def __init__(self, modified: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]], modifiers: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]], pairs: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> None:
+        ...
+    def gram(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], other_bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        Inner products of codes
+        """
+    def transform(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> numpy.typing.NDArray[numpy.int8]:
+        """
+        Entries +1, 0, -1, sample by sample
+        """
+    @property
+    def n_columns(self) -> int:
+        ...
+    @property
+    def n_inputs(self) -> int:
+        ...
+    @property
+    def n_pairs(self) -> int:
+        ...
+    @property
+    def n_units(self) -> int:
+        ...
+class PerceptronLayer:
+    """
+    Units over a code, with integer weights
+    """
+    def __init__(self, code: SelectiveDesensitization, n_units: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex = 0, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, thresholds: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, initial_range: typing.SupportsInt | typing.SupportsIndex = 5) -> None:
+        ...
+    def counts(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_groups: typing.SupportsInt | typing.SupportsIndex = 1, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        How many units of each group fire
+        """
+    def potentials(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.int32]:
+        ...
+    @property
+    def n_units(self) -> int:
+        ...
+    @property
+    def thresholds(self) -> numpy.typing.NDArray[numpy.int32]:
+        ...
+    @property
+    def weights(self) -> numpy.typing.NDArray[numpy.int32]:
+        ...
+class PDeltaTrainer:
+    """
+    Trains groups of units to fire in given numbers
+    """
+    def __init__(self, layer: PerceptronLayer, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
+        ...
+    def epoch(self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> tuple[int, int]:
+        """
+        Presents samples in that order; returns how many corrected something, and how many units were corrected
+        """
+    def synchronize(self) -> None:
+        """
+        Brings the layer's weights to those of plain training in the same order
+        """
+    @property
+    def form(self) -> str:
+        ...
+    @property
+    def memory(self) -> int:
+        """
+        Bytes beside the layer
+        """
+class ErrorCorrectionTrainer:
+    """
+    Trains units to tell classes apart
+    """
+    def __init__(self, layer: PerceptronLayer, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], scheme: str, form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
+        ...
+    def epoch(self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> tuple[int, int]:
+        """
+        Presents samples in that order; returns how many corrected something, and how many units were corrected
+        """
+    def synchronize(self) -> None:
+        """
+        Brings the layer's weights to those of plain training in the same order
+        """
+    @property
+    def form(self) -> str:
+        ...
+    @property
+    def memory(self) -> int:
+        """
+        Bytes beside the layer
+        """
 class TieRule:
     """
     Which of several best actions is taken
@@ -1001,6 +1092,8 @@ def action_value(action: typing.SupportsInt | typing.SupportsIndex, n_actions: t
     """
     The value of an action in a range cut evenly
     """
+def anchor_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex, n_interpolated: typing.SupportsInt | typing.SupportsIndex, circular: bool, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
+    ...
 def basic_observation(state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
     s1..s4 of a state
@@ -1009,6 +1102,8 @@ def best_instruction_set() -> str:
     """
     The best instruction set that this machine offers
     """
+def correlation_matrix_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, correlations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
+    ...
 def energy_sensor(s3: typing.SupportsFloat | typing.SupportsIndex, s4: typing.SupportsFloat | typing.SupportsIndex) -> float:
     ...
 def exp(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
@@ -1019,9 +1114,19 @@ def instruction_set() -> str:
     """
     The instruction set in use
     """
+def libsdnn_tables(n_units: typing.SupportsInt | typing.SupportsIndex, inputs: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]], pairs: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], seed: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], library: str = 'libstdc++') -> tuple:
+    """
+    LIBSDNN's code tables, (modified, modifiers); inputs are (n_bins, n_flipped)
+    """
+def libsdnn_weights(n_units: typing.SupportsInt | typing.SupportsIndex, n_columns: typing.SupportsInt | typing.SupportsIndex, low: typing.SupportsInt | typing.SupportsIndex, high: typing.SupportsInt | typing.SupportsIndex, seed: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], library: str = 'libstdc++') -> tuple:
+    """
+    LIBSDNN's first (weights, thresholds)
+    """
 def log(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
 def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    ...
+def random_inverse_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, n_bins: typing.SupportsInt | typing.SupportsIndex, n_flipped: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
     ...
 def set_instruction_set(name: str) -> None:
     """
@@ -1054,5 +1159,9 @@ def time_agent_steps(agent: PlainRbfQLearning, n_repetitions: typing.SupportsInt
 def time_decisions(trial: AcrobotTrial, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     Advances a trial; nanoseconds of every decision in it
+    """
+def training_memory(code: SelectiveDesensitization, n_units: typing.SupportsInt | typing.SupportsIndex, n_samples: typing.SupportsInt | typing.SupportsIndex, form: str) -> int:
+    """
+    Bytes that a form of training needs beside the layer
     """
 __version__: str

@@ -16,7 +16,7 @@ FLOORS = (
     ("core",),
     ("coding",),
     ("approximators",),
-    ("agents", "environments"),
+    ("agents", "environments", "estimators"),
     ("experiments",),
     ("benchmarks",),
     ("sdnn",),
@@ -31,6 +31,7 @@ PYTHON_MODULES = {
     "__main__": "sdnn",
     "cli": "sdnn",
     "choices": "core",
+    "kernel": "coding",
     "instruction_sets": "core",
 }
 """The room of every module at the top of the Python package."""
@@ -167,6 +168,8 @@ def test_python_arrows_point_down():
         ("environments", "agents"),
         ("environments", "approximators"),
         ("environments", "coding"),
+        ("agents", "estimators"),
+        ("estimators", "agents"),
         ("agents", "experiments"),
         ("experiments", "benchmarks"),
         ("agents", "sdnn"),

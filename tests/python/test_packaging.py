@@ -91,6 +91,7 @@ def test_no_build_is_tied_to_the_machine_it_ran_on():
 
 def test_importing_sdnn_is_light():
     heavy = {"matplotlib", "scipy", "pygame", "rich", "click", "sklearn", "pandas"}
+    heavy |= {"joblib", "safetensors"}
     code = "import sys, sdnn; print(*{name.partition('.')[0] for name in sys.modules})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(done.stdout.split())
@@ -127,7 +128,7 @@ SHIPPED = (
     r"cpp/bindings/([a-z_]+\.[ch]pp|CMakeLists\.txt)",
     r"python/sdnn/([a-z_]+/)?[a-z_]+\.pyi?|python/sdnn/py\.typed",
     r"python/sdnn/experiments/report\.html\.jinja",
-    r"(tests|bench|docs)/.*\.(py|cpp|hpp|txt|md|json|csv|png|svg|ipynb)",
+    r"(tests|bench|docs)/.*\.(py|cpp|hpp|txt|md|json|csv|png|svg|ipynb|bin)",
 )
 """Every file of a source distribution matches one of these."""
 

@@ -1,0 +1,151 @@
+"""The systems of the comparisons, each with a small grid that cross-validation chooses from."""
+
+from __future__ import annotations
+
+import numpy as np
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.ensemble import (
+    HistGradientBoostingClassifier,
+    HistGradientBoostingRegressor,
+    RandomForestClassifier,
+    RandomForestRegressor,
+)
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+from sklearn.kernel_ridge import KernelRidge
+from sklearn.linear_model import LogisticRegression, Ridge
+from sklearn.model_selection import GridSearchCV
+from sklearn.neural_network import MLPClassifier, MLPRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.svm import SVC, SVR
+
+from sdnn import SDNNClassifier, SDNNRegressor
+from sdnn.coding import RandomInverse
+from sdnn.kernel import AnalyticKernel
+
+INNER_FOLDS = 3
+
+
+class AnalyticKernelRidge(RegressorMixin, BaseEstimator):
+    """Kernel ridge regression with the network's kernel for infinitely long codes."""
+
+    def __init__(self, length_scale=0.1, alpha=1e-3):
+        self.length_scale = length_scale
+        self.alpha = alpha
+
+    def fit(self, X, y):
+        n_bins = 1000
+        coding = RandomInverse(length_scale=self.length_scale, n_bins=n_bins)
+        codings = [coding.fit(column, 100_000) for column in X.T]
+        self.kernel_ = AnalyticKernel(codings, n_units=100_000)
+        self.X_, self.mean_ = X, y.mean()
+        self.ridge_ = KernelRidge(kernel="precomputed", alpha=self.alpha)
+        self.ridge_.fit(self.kernel_(X), y - self.mean_)
+        return self
+
+    def predict(self, X):
+        parts = np.array_split(X, max(1, len(X) // 20000))
+        return self.mean_ + np.concatenate(
+            [self.ridge_.predict(self.kernel_(part, self.X_)) for part in parts]
+        )
+
+
+def codings(*length_scales):
+    return [RandomInverse(length_scale=length_scale) for length_scale in length_scales]
+
+
+def gaussian_process(n_inputs, noise):
+    scales = np.ones(n_inputs)
+    kernel = ConstantKernel() * Matern(scales, (1e-2, 1e3), nu=1.5)
+    kernel += WhiteKernel(noise, (1e-8, 1e1))
+    return make_pipeline(
+        StandardScaler(), GaussianProcessRegressor(kernel, normalize_y=True, random_state=0)
+    )
+
+
+def scaled(model):
+    return make_pipeline(StandardScaler(), model)
+
+
+def tuned(model, grid):
+    """The model with the best of a grid by cross-validation, refitted on everything."""
+    return GridSearchCV(model, grid, cv=INNER_FOLDS) if grid else model
+
+
+def regressors(n_inputs, noisy, seed):
+    """Name to (model, grid). ``noisy``: whether targets have noise, so grids look elsewhere."""
+    lengths = (0.25, 0.5, 1.0) if noisy else (0.05, 0.1, 0.2)
+    epochs = (5, 10) if noisy else (300,)
+    mlp = MLPRegressor(
+        hidden_layer_sizes=(256, 256),
+        max_iter=300 if noisy else 2000,
+        n_iter_no_change=20 if noisy else 100,
+        tol=1e-4 if noisy else 1e-6,
+        random_state=seed,
+    )
+    return {
+        "SDNN (ours)": (
+            SDNNRegressor(random_state=seed),
+            {"coding": codings(*lengths), "max_iter": epochs},
+        ),
+        "kernel ridge, analytic SDNN kernel": (
+            AnalyticKernelRidge(),
+            {
+                "length_scale": lengths,
+                "alpha": (0.1, 0.3, 1.0, 3.0) if noisy else (1e-4, 1e-3, 1e-2),
+            },
+        ),
+        "SVR (RBF)": (
+            scaled(SVR(epsilon=0.1 if noisy else 0.005)),
+            {
+                "svr__C": (10, 30, 100, 300) if noisy else (1, 10, 100),
+                "svr__gamma": (0.003, 0.01, 0.03) if noisy else (1, 3, 10),
+            },
+        ),
+        "Gaussian process (Matern 3/2)": (gaussian_process(n_inputs, 1.0 if noisy else 1e-4), {}),
+        "MLP 256-256": (
+            scaled(mlp),
+            # Without noise it is given more iterations instead of a grid.
+            {"mlpregressor__alpha": (1.0, 10.0, 100.0)} if noisy else {},
+        ),
+        "random forest": (
+            RandomForestRegressor(300, random_state=seed),
+            {"min_samples_leaf": (1, 3, 10) if noisy else (1,), "max_features": (0.3, 1.0)},
+        ),
+        "gradient boosting": (
+            HistGradientBoostingRegressor(random_state=seed),
+            {"learning_rate": (0.03, 0.1), "max_leaf_nodes": (4, 15) if noisy else (15, 31)},
+        ),
+        "linear ridge": (scaled(Ridge()), {"ridge__alpha": (1, 10, 100)}),
+    }
+
+
+def classifiers(seed):
+    """Name to (model, grid)."""
+    return {
+        "SDNN (ours)": (
+            SDNNClassifier(random_state=seed),
+            {"coding": codings(0.25, 0.5, 1.0), "scheme": ("one_vs_rest", "one_vs_one")},
+        ),
+        "SVM (RBF)": (
+            scaled(SVC()),
+            {"svc__C": (1, 10, 100), "svc__gamma": (0.003, 0.01, 0.03)},
+        ),
+        "MLP 256-256": (
+            scaled(MLPClassifier(hidden_layer_sizes=(256, 256), max_iter=300, random_state=seed)),
+            {"mlpclassifier__alpha": (1e-3, 0.1, 1.0)},
+        ),
+        "random forest": (
+            RandomForestClassifier(300, random_state=seed),
+            {"min_samples_leaf": (1, 3), "max_features": ("sqrt", 0.3)},
+        ),
+        "gradient boosting": (
+            HistGradientBoostingClassifier(random_state=seed),
+            {"learning_rate": (0.03, 0.1), "max_leaf_nodes": (4, 15)},
+        ),
+        "logistic regression": (
+            scaled(LogisticRegression(max_iter=1000)),
+            {"logisticregression__C": (0.03, 0.1, 1.0)},
+        ),
+    }

@@ -1,0 +1,282 @@
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "sdnn/coding/selective_desensitization.hpp"
+#include "sdnn/estimators/libsdnn.hpp"
+#include "sdnn/estimators/perceptron_layer.hpp"
+#include "sdnn/estimators/trainer.hpp"
+
+namespace py = pybind11;
+using namespace sdnn;
+using bindings::ArrayArgument;
+using bindings::matrix;
+using bindings::signs_of;
+
+namespace {
+
+using Bins = ArrayArgument<std::int32_t>;
+using Matrix = py::array_t<std::int32_t>;
+
+coding::PatternTable table_of(const ArrayArgument<std::int8_t>& signs) {
+  const auto values = matrix(signs, "patterns");
+  return coding::PatternTable::from_signs(values, static_cast<std::size_t>(signs.shape(0)),
+                                          static_cast<std::size_t>(signs.shape(1)));
+}
+
+std::vector<coding::InputPair> pairs_of(const ArrayArgument<std::int32_t>& pairs) {
+  const auto inputs = matrix(pairs, "pairs", 2);
+  std::vector<coding::InputPair> input_pairs;
+  for (std::size_t p = 0; p < inputs.size(); p += 2) {
+    core::require(inputs[p] >= 0 && inputs[p + 1] >= 0, "pairs", "inputs of 0 or more",
+                  std::min(inputs[p], inputs[p + 1]));
+    input_pairs.push_back(
+        {static_cast<std::size_t>(inputs[p]), static_cast<std::size_t>(inputs[p + 1])});
+  }
+  return input_pairs;
+}
+
+std::shared_ptr<coding::SelectiveDesensitization> make_code(
+    const std::vector<ArrayArgument<std::int8_t>>& modified,
+    const std::vector<ArrayArgument<std::int8_t>>& modifiers,
+    const ArrayArgument<std::int32_t>& pairs) {
+  std::vector<coding::PatternTable> modified_tables;
+  std::vector<coding::PatternTable> modifier_tables;
+  for (const auto& table : modified) modified_tables.push_back(table_of(table));
+  for (const auto& table : modifiers) modifier_tables.push_back(table_of(table));
+  return std::make_shared<coding::SelectiveDesensitization>(
+      std::move(modified_tables), std::move(modifier_tables), pairs_of(pairs));
+}
+
+py::array_t<std::int8_t> transform(const coding::SelectiveDesensitization& code, const Bins& bins) {
+  const auto values = matrix(bins, "bins", code.n_inputs());
+  code.check_bins(values);
+  py::array_t<std::int8_t> out({static_cast<std::size_t>(bins.shape(0)), code.n_columns()});
+  const coding::CodedSamples coded(code, values);
+  for (std::size_t t = 0; t < coded.size(); ++t) {
+    for (std::size_t j = 0; j < code.n_columns(); ++j) {
+      const std::size_t slot = code.slot_of(j);
+      const bool active = (coded.active(t)[slot / 64] >> slot % 64 & 1) != 0;
+      const bool positive = (coded.positive(t)[slot / 64] >> slot % 64 & 1) != 0;
+      out.mutable_at(t, j) = static_cast<std::int8_t>(active ? (positive ? 1 : -1) : 0);
+    }
+  }
+  return out;
+}
+
+Matrix gram(const coding::SelectiveDesensitization& code, const Bins& bins,
+            const std::optional<Bins>& other_bins) {
+  const auto values = matrix(bins, "bins", code.n_inputs());
+  const auto others = other_bins ? matrix(*other_bins, "other_bins", code.n_inputs()) : values;
+  code.check_bins(values);
+  code.check_bins(others);
+  Matrix out({values.size() / code.n_inputs(), others.size() / code.n_inputs()});
+  std::int32_t* const items = out.mutable_data();
+  const py::gil_scoped_release release;
+  const coding::CodedSamples one(code, values);
+  const coding::CodedSamples other(code, others);
+  const auto kernels = estimators::unit_kernels();
+  for (std::size_t t = 0; t < one.size(); ++t) {
+    for (std::size_t s = 0; s < other.size(); ++s) {
+      items[t * other.size() + s] =
+          kernels.inner_product(one.active(t), one.positive(t), other.active(s), other.positive(s),
+                                code.n_words());
+    }
+  }
+  return out;
+}
+
+using estimators::PerceptronLayer;
+
+std::shared_ptr<PerceptronLayer> make_layer(
+    const std::shared_ptr<coding::SelectiveDesensitization>& code, std::size_t n_units,
+    std::uint64_t seed, const std::optional<ArrayArgument<std::int32_t>>& weights,
+    const std::optional<ArrayArgument<std::int32_t>>& thresholds, int initial_range) {
+  core::require(weights.has_value() == thresholds.has_value(), "weights and thresholds",
+                "given together or not at all", weights.has_value() ? "weights" : "thresholds");
+  if (!weights) return std::make_shared<PerceptronLayer>(code, n_units, seed, initial_range);
+  return std::make_shared<PerceptronLayer>(code, n_units,
+                                           matrix(*weights, "weights", code->n_columns()),
+                                           bindings::vector(*thresholds, "thresholds"));
+}
+
+Matrix weights_of(const PerceptronLayer& layer) {
+  const std::size_t n_columns = layer.code().n_columns();
+  Matrix out({layer.n_units(), n_columns});
+  std::int32_t* const items = out.mutable_data();
+  for (std::size_t i = 0; i < layer.n_units(); ++i) {
+    for (std::size_t j = 0; j < n_columns; ++j) items[i * n_columns + j] = layer.weight(i, j);
+  }
+  return out;
+}
+
+py::array_t<std::int32_t> thresholds_of(const PerceptronLayer& layer) {
+  return py::array_t<std::int32_t>(static_cast<py::ssize_t>(layer.n_units()),
+                                   layer.thresholds().data());
+}
+
+Matrix potentials_of(const PerceptronLayer& layer, const Bins& bins, int n_threads) {
+  const auto values = matrix(bins, "bins", layer.code().n_inputs());
+  Matrix out({static_cast<std::size_t>(bins.shape(0)), layer.n_units()});
+  const std::span items(out.mutable_data(), static_cast<std::size_t>(out.size()));
+  const py::gil_scoped_release release;
+  layer.potentials(values, n_threads, items);
+  return out;
+}
+
+Matrix counts_of(const PerceptronLayer& layer, const Bins& bins, std::size_t n_groups,
+                 int n_threads) {
+  const auto values = matrix(bins, "bins", layer.code().n_inputs());
+  Matrix out({static_cast<std::size_t>(bins.shape(0)), n_groups});
+  const std::span items(out.mutable_data(), static_cast<std::size_t>(out.size()));
+  const py::gil_scoped_release release;
+  layer.counts(values, n_groups, n_threads, items);
+  return out;
+}
+
+estimators::LibsdnnRandom libsdnn_random(const std::vector<std::uint32_t>& seed,
+                                         const std::string& library) {
+  core::require(library == "libstdc++" || library == "msvc", "library", "libstdc++ or msvc",
+                library);
+  return {seed, library == "msvc" ? estimators::StandardLibrary::msvc
+                                  : estimators::StandardLibrary::libstdcxx};
+}
+
+py::tuple libsdnn_tables(int n_units, const std::vector<std::pair<int, int>>& inputs,
+                         const ArrayArgument<std::int32_t>& pairs,
+                         const std::vector<std::uint32_t>& seed, const std::string& library) {
+  auto random = libsdnn_random(seed, library);
+  std::vector<coding::RandomInverseConfig> configs;
+  for (const auto& [n_bins, n_flipped] : inputs) configs.push_back({n_units, n_bins, n_flipped});
+  const auto tables = estimators::libsdnn_tables(configs, pairs_of(pairs), random);
+  py::list modified;
+  py::list modifiers;
+  for (const auto& table : tables.modified) modified.append(signs_of(table));
+  for (const auto& table : tables.modifiers) modifiers.append(signs_of(table));
+  return py::make_tuple(modified, modifiers);
+}
+
+py::tuple libsdnn_weights(std::size_t n_units, std::size_t n_columns, int low, int high,
+                          const std::vector<std::uint32_t>& seed, const std::string& library) {
+  auto random = libsdnn_random(seed, library);
+  const auto drawn = estimators::libsdnn_weights(n_units, n_columns, low, high, random);
+  Matrix weights({n_units, n_columns});
+  std::copy(drawn.weights.begin(), drawn.weights.end(), weights.mutable_data());
+  return py::make_tuple(weights,
+                        py::array_t<std::int32_t>(static_cast<py::ssize_t>(n_units),
+                                                  drawn.thresholds.data()));
+}
+
+template <class Trainer>
+void bind_trainer_methods(py::class_<Trainer, std::shared_ptr<Trainer>>& trainer) {
+  trainer
+      .def_property_readonly(
+          "form", [](const Trainer& self) { return std::string(estimators::name_of(self.form())); })
+      .def_property_readonly("memory", &Trainer::memory, "Bytes beside the layer")
+      .def("epoch",
+           [](Trainer& self, const ArrayArgument<std::int32_t>& order) {
+             const auto items = bindings::vector(order, "order");
+             const py::gil_scoped_release release;
+             const auto count = self.present(items);
+             return std::pair(count.n_samples, count.n_units);
+           },
+           py::arg("order"),
+           "Presents samples in that order; returns how many corrected something, and how many "
+           "units were corrected")
+      .def("synchronize", &Trainer::synchronize, py::call_guard<py::gil_scoped_release>(),
+           "Brings the layer's weights to those of plain training in the same order");
+}
+
+}  // namespace
+
+void bind_estimators(py::module_& module) {
+  using Code = coding::SelectiveDesensitization;
+  py::class_<Code, std::shared_ptr<Code>>(module, "SelectiveDesensitization",
+                                          "The desensitized code of a sample, from its bins")
+      .def(py::init(&make_code), py::arg("modified"), py::arg("modifiers"), py::arg("pairs"))
+      .def_property_readonly("n_inputs", &Code::n_inputs)
+      .def_property_readonly("n_pairs", &Code::n_pairs)
+      .def_property_readonly("n_units", &Code::n_units)
+      .def_property_readonly("n_columns", &Code::n_columns)
+      .def("transform", &transform, py::arg("bins"), "Entries +1, 0, -1, sample by sample")
+      .def("gram", &gram, py::arg("bins"), py::arg("other_bins") = py::none(),
+           "Inner products of codes");
+
+  py::class_<PerceptronLayer, std::shared_ptr<PerceptronLayer>>(
+      module, "PerceptronLayer", "Units over a code, with integer weights")
+      .def(py::init(&make_layer), py::arg("code"), py::arg("n_units"), py::arg("seed") = 0,
+           py::arg("weights") = py::none(), py::arg("thresholds") = py::none(),
+           py::arg("initial_range") = 5)
+      .def_property_readonly("n_units", &PerceptronLayer::n_units)
+      .def_property_readonly("weights", &weights_of)
+      .def_property_readonly("thresholds", &thresholds_of)
+      .def("potentials", &potentials_of, py::arg("bins"), py::arg("n_threads") = 1)
+      .def("counts", &counts_of, py::arg("bins"), py::arg("n_groups") = 1,
+           py::arg("n_threads") = 1, "How many units of each group fire");
+
+  constexpr std::size_t kMemoryLimit = std::size_t{1} << 30;
+  using estimators::PDeltaTrainer;
+  py::class_<PDeltaTrainer, std::shared_ptr<PDeltaTrainer>> p_delta(
+      module, "PDeltaTrainer", "Trains groups of units to fire in given numbers");
+  p_delta.def(
+      py::init([](std::shared_ptr<PerceptronLayer> layer, const Bins& bins,
+                  const ArrayArgument<double>& targets, const std::string& form,
+                  std::size_t memory_limit, int n_threads) {
+        const auto values = matrix(bins, "bins", layer->code().n_inputs());
+        estimators::PDeltaRule rule(layer->n_units(), matrix(targets, "targets"),
+                                    static_cast<std::size_t>(targets.shape(1)));
+        const auto chosen = estimators::training_form_named(form);
+        const py::gil_scoped_release release;
+        return std::make_shared<PDeltaTrainer>(std::move(layer), values, std::move(rule), chosen,
+                                               memory_limit, n_threads);
+      }),
+      py::arg("layer"), py::arg("bins"), py::arg("targets"), py::arg("form") = "auto",
+      py::arg("memory_limit") = kMemoryLimit, py::arg("n_threads") = 1);
+  bind_trainer_methods(p_delta);
+
+  using estimators::ErrorCorrectionTrainer;
+  py::class_<ErrorCorrectionTrainer, std::shared_ptr<ErrorCorrectionTrainer>> error_correction(
+      module, "ErrorCorrectionTrainer", "Trains units to tell classes apart");
+  error_correction.def(
+      py::init([](std::shared_ptr<PerceptronLayer> layer, const Bins& bins,
+                  const ArrayArgument<std::int32_t>& labels, const std::string& scheme,
+                  const std::string& form, std::size_t memory_limit, int n_threads) {
+        const auto values = matrix(bins, "bins", layer->code().n_inputs());
+        const auto rest = scheme == "one_vs_rest";
+        core::require(rest || scheme == "one_vs_one", "scheme", "one_vs_rest or one_vs_one",
+                      scheme);
+        const auto class_scheme =
+            rest ? estimators::ClassScheme::one_vs_rest : estimators::ClassScheme::one_vs_one;
+        std::size_t n_classes = 2;
+        while (estimators::n_units_for(class_scheme, n_classes) < layer->n_units()) ++n_classes;
+        estimators::ErrorCorrectionRule rule(layer->n_units(), bindings::vector(labels, "labels"),
+                                             n_classes, class_scheme);
+        const auto chosen = estimators::training_form_named(form);
+        const py::gil_scoped_release release;
+        return std::make_shared<ErrorCorrectionTrainer>(std::move(layer), values, std::move(rule),
+                                                        chosen, memory_limit, n_threads);
+      }),
+      py::arg("layer"), py::arg("bins"), py::arg("labels"), py::arg("scheme"),
+      py::arg("form") = "auto", py::arg("memory_limit") = kMemoryLimit, py::arg("n_threads") = 1);
+  bind_trainer_methods(error_correction);
+
+  module.def("training_memory",
+             [](const Code& code, std::size_t n_units, std::size_t n_samples,
+                const std::string& form) {
+               return estimators::form_memory(estimators::training_form_named(form), n_units, code,
+                                              n_samples);
+             },
+             py::arg("code"), py::arg("n_units"), py::arg("n_samples"), py::arg("form"),
+             "Bytes that a form of training needs beside the layer");
+  module.def("libsdnn_tables", &libsdnn_tables, py::arg("n_units"), py::arg("inputs"),
+             py::arg("pairs"), py::arg("seed"), py::arg("library") = "libstdc++",
+             "LIBSDNN's code tables, (modified, modifiers); inputs are (n_bins, n_flipped)");
+  module.def("libsdnn_weights", &libsdnn_weights, py::arg("n_units"), py::arg("n_columns"),
+             py::arg("low"), py::arg("high"), py::arg("seed"), py::arg("library") = "libstdc++",
+             "LIBSDNN's first (weights, thresholds)");
+}

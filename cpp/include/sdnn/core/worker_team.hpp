@@ -1,0 +1,77 @@
+/// Threads that stay ready for many short pieces of work.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <thread>
+#include <vector>
+
+namespace sdnn::core {
+
+/// `n_threads` threads, the caller's among them, that run one function at a time.
+///
+/// Starting a thread costs more than a block of training; waking one that waits does not. Not to be
+/// used from several threads at once.
+class WorkerTeam {
+ public:
+  explicit WorkerTeam(std::size_t n_threads) {
+    for (std::size_t part = 1; part < n_threads; ++part) {
+      threads_.emplace_back([this, part] { serve(part); });
+    }
+  }
+  WorkerTeam(const WorkerTeam&) = delete;
+  WorkerTeam& operator=(const WorkerTeam&) = delete;
+  ~WorkerTeam() {
+    work_ = nullptr;
+    start();
+  }
+
+  std::size_t size() const noexcept { return threads_.size() + 1; }
+
+  /// Calls work(part) for part = 0 .. size() - 1, each in a thread of its own, and waits for all.
+  /// `work` must not throw.
+  template <class Work>
+  void run(const Work& work) {
+    if (threads_.empty()) return work(std::size_t{0});
+    work_ = &work;
+    call_ = [](const void* what, std::size_t part) { (*static_cast<const Work*>(what))(part); };
+    n_busy_.store(threads_.size(), std::memory_order_relaxed);
+    start();
+    work(std::size_t{0});
+    for (std::size_t busy = n_busy_.load(); busy != 0; busy = n_busy_.load()) n_busy_.wait(busy);
+  }
+
+  /// Calls work(i) for i = 0 .. n - 1, each thread a contiguous part of them.
+  template <class Work>
+  void run_over(std::size_t n, const Work& work) {
+    run([&](std::size_t part) {
+      const std::size_t end = (part + 1) * n / size();
+      for (std::size_t i = part * n / size(); i < end; ++i) work(i);
+    });
+  }
+
+ private:
+  void start() {
+    round_.fetch_add(1, std::memory_order_release);
+    round_.notify_all();
+  }
+
+  void serve(std::size_t part) {
+    for (std::uint64_t seen = 0;;) {
+      round_.wait(seen, std::memory_order_acquire);
+      ++seen;
+      if (work_ == nullptr) return;
+      call_(work_, part);
+      if (n_busy_.fetch_sub(1) == 1) n_busy_.notify_one();
+    }
+  }
+
+  const void* work_ = nullptr;
+  void (*call_)(const void*, std::size_t) = nullptr;
+  std::atomic<std::uint64_t> round_{0};
+  std::atomic<std::size_t> n_busy_{0};
+  std::vector<std::jthread> threads_;  // last: joined before the rest goes
+};
+
+}  // namespace sdnn::core

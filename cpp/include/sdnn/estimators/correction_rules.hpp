@@ -1,0 +1,179 @@
+/// Which units a training sample corrects: the p-delta rule and error correction.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sdnn/core/check.hpp"
+#include "sdnn/estimators/unit_kernels.hpp"
+
+namespace sdnn::estimators {
+
+/// A unit to which direction * x_SD is added, and from whose threshold direction is taken.
+struct Correction {
+  std::uint32_t unit = 0;
+  std::int32_t direction = 0;  ///< +1 or -1
+};
+
+/// The p-delta rule: the number of firing units of each group is brought to its target.
+///
+/// If too few (many) units fire, that many of the silent (firing) ones that are nearest to their
+/// threshold are corrected, the lowest index first among equals. The target is
+/// int(0.5 + target), at least 0 and at most the group's size.
+///
+/// Source: Auer, Burgsteiner, Maass 2008; Nonaka, Tanaka, Morita 2011.
+class PDeltaRule {
+ public:
+  /// Targets in units of the firing count, not rounded: (t - b) / a.
+  ///
+  /// Shapes: targets (n_samples, n_groups). Throws std::invalid_argument if a target is not finite,
+  /// or if n_groups does not divide n_units.
+  PDeltaRule(std::size_t n_units, std::span<const double> targets, std::size_t n_groups)
+      : n_groups_(n_groups), kernels_(unit_kernels()) {
+    core::require(n_groups > 0 && n_units % n_groups == 0, "n_groups",
+                  "a divisor of n_units = " + std::to_string(n_units), n_groups);
+    core::require(targets.size() % n_groups == 0, "targets", "n_groups values per sample",
+                  targets.size());
+    group_size_ = n_units / n_groups;
+    targets_.reserve(targets.size());
+    for (std::size_t i = 0; i < targets.size(); ++i) {
+      if (!std::isfinite(targets[i])) {
+        core::require_finite("targets[" + std::to_string(i / n_groups) + ", " +
+                                 std::to_string(i % n_groups) + "]", targets[i]);
+      }
+      targets_.push_back(static_cast<std::int32_t>(
+          std::clamp(0.5 + targets[i], 0.0, static_cast<double>(group_size_))));
+    }
+    keys_.resize(group_size_);
+    n_index_bits_ = static_cast<int>(std::bit_width(group_size_ - 1));
+    distance_limit_ = std::numeric_limits<std::int32_t>::max() >> n_index_bits_;
+  }
+
+  std::size_t n_samples() const noexcept { return targets_.size() / n_groups_; }
+
+  /// Overwrites `corrections` with those of a sample. Shapes: potentials (n_units,).
+  void operator()(std::size_t sample, const std::int32_t* potentials,
+                  std::vector<Correction>& corrections) {
+    corrections.clear();
+    for (std::size_t g = 0; g < n_groups_; ++g) {
+      const std::int32_t* const group = potentials + g * group_size_;
+      const std::int32_t deficit =
+          targets_[sample * n_groups_ + g] - kernels_.count_firing(group, group_size_);
+      if (deficit != 0) correct_group(group, g * group_size_, deficit, corrections);
+    }
+  }
+
+ private:
+  void correct_group(const std::int32_t* potentials, std::size_t first_unit, std::int32_t deficit,
+                     std::vector<Correction>& corrections) {
+    const std::int32_t direction = deficit > 0 ? 1 : -1;
+    const auto n_corrected = static_cast<std::size_t>(std::abs(deficit));
+    const auto add = [&](std::size_t i) {
+      corrections.push_back({static_cast<std::uint32_t>(first_unit + i), direction});
+    };
+    if (n_corrected <= kScans) {  // the least key, then the next one, ...
+      const std::size_t n_before = corrections.size();
+      std::int32_t key = kernels_.rank(potentials, group_size_, deficit < 0, n_index_bits_,
+                                       distance_limit_, keys_.data());
+      for (std::size_t left = n_corrected; key >> n_index_bits_ < distance_limit_;) {
+        add(static_cast<std::size_t>(key & ((1 << n_index_bits_) - 1)));
+        if (--left == 0) return;
+        key = kernels_.least_above(keys_.data(), group_size_, key);
+      }
+      corrections.resize(n_before);  // too far for a key
+    }
+    ranked_.clear();
+    for (std::size_t i = 0; i < group_size_; ++i) {
+      if ((potentials[i] > 0) == (deficit < 0)) {
+        ranked_.emplace_back(std::abs(potentials[i]), static_cast<std::uint32_t>(i));
+      }
+    }
+    const auto end = ranked_.begin() + static_cast<std::ptrdiff_t>(n_corrected);
+    std::nth_element(ranked_.begin(), end - 1, ranked_.end());
+    std::for_each(ranked_.begin(), end, [&](const auto& ranked) { add(ranked.second); });
+  }
+
+  static constexpr std::size_t kScans = 12;
+
+  std::size_t n_groups_;
+  std::size_t group_size_ = 0;
+  std::vector<std::int32_t> targets_;
+  UnitKernels kernels_;
+  std::vector<std::int32_t> keys_;
+  int n_index_bits_ = 0;
+  std::int32_t distance_limit_ = 0;  // at which keys stop telling distances apart
+  std::vector<std::pair<std::int32_t, std::uint32_t>> ranked_;
+};
+
+/// How several classes are told apart by units that know two sides each.
+enum class ClassScheme {
+  one_vs_rest,  ///< unit k fires for class k
+  one_vs_one,   ///< units (0,1), (0,2), ..., (1,2), ...: fires for the first, silent for the second
+};
+
+/// The units that a scheme needs. Throws std::invalid_argument if there are fewer than 2 classes.
+inline std::size_t n_units_for(ClassScheme scheme, std::size_t n_classes) {
+  core::require_in_range("n_classes", n_classes, 2, 1024);
+  return scheme == ClassScheme::one_vs_rest ? n_classes : n_classes * (n_classes - 1) / 2;
+}
+
+/// Perceptron error correction: every unit that is on the wrong side for the sample's class.
+///
+/// Source: the LIBSDNN manual (both schemes). A one-vs-one unit ignores the other classes.
+class ErrorCorrectionRule {
+ public:
+  /// Shapes: labels (n_samples,) in [0, n_classes). Throws std::invalid_argument otherwise, or if
+  /// n_units is not what the scheme needs.
+  ErrorCorrectionRule(std::size_t n_units, std::span<const std::int32_t> labels,
+                      std::size_t n_classes, ClassScheme scheme)
+      : labels_(labels.begin(), labels.end()) {
+    const std::size_t needed = n_units_for(scheme, n_classes);
+    core::require(n_units == needed, "n_units",
+                  std::to_string(needed) + " for " + std::to_string(n_classes) + " classes", n_units);
+    for (std::size_t t = 0; t < labels.size(); ++t) {
+      if (labels[t] >= 0 && static_cast<std::size_t>(labels[t]) < n_classes) continue;
+      core::require_in_range("labels[" + std::to_string(t) + "]", labels[t], 0,
+                             static_cast<std::int32_t>(n_classes) - 1);
+    }
+    wanted_.resize(n_classes);
+    std::uint32_t unit = 0;
+    for (std::size_t i = 0; i < n_classes; ++i) {
+      if (scheme == ClassScheme::one_vs_rest) {
+        for (std::size_t k = 0; k < n_classes; ++k) {
+          wanted_[i].push_back({static_cast<std::uint32_t>(k), k == i ? 1 : -1});
+        }
+        continue;
+      }
+      for (std::size_t j = i + 1; j < n_classes; ++j, ++unit) {
+        wanted_[i].push_back({unit, 1});
+        wanted_[j].push_back({unit, -1});
+      }
+    }
+  }
+
+  std::size_t n_samples() const noexcept { return labels_.size(); }
+
+  /// Overwrites `corrections` with those of a sample. Shapes: potentials (n_units,).
+  void operator()(std::size_t sample, const std::int32_t* potentials,
+                  std::vector<Correction>& corrections) {
+    corrections.clear();
+    for (const Correction& wanted : wanted_[static_cast<std::size_t>(labels_[sample])]) {
+      if ((potentials[wanted.unit] > 0) != (wanted.direction > 0)) corrections.push_back(wanted);
+    }
+  }
+
+ private:
+  std::vector<std::int32_t> labels_;
+  std::vector<std::vector<Correction>> wanted_;  // per class: what each of its units should do
+};
+
+}  // namespace sdnn::estimators

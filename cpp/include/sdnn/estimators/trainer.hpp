@@ -1,0 +1,126 @@
+/// Trains a layer by a correction rule, in the form that suits its size.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "sdnn/core/check.hpp"
+#include "sdnn/estimators/block_training.hpp"
+#include "sdnn/estimators/correction_rules.hpp"
+#include "sdnn/estimators/dual_training.hpp"
+#include "sdnn/estimators/perceptron_layer.hpp"
+#include "sdnn/estimators/plain_training.hpp"
+#include "sdnn/estimators/training_form.hpp"
+
+namespace sdnn::estimators {
+
+/// Presents training samples to a layer. All forms leave the same bits in it.
+///
+/// Between synchronize() calls the layer's weights may lag behind; nobody else may change them as
+/// long as a trainer is in use. After an exception from present() the layer is as of the last
+/// synchronization inside it, which is a state of plain training too.
+template <class Rule>
+class Trainer {
+ public:
+  /// Shapes: bins (n_samples, n_inputs). Throws std::invalid_argument for bins out of range or if
+  /// the rule knows another number of samples, std::length_error if `form` (other than automatic)
+  /// needs more than `memory_limit` bytes.
+  Trainer(std::shared_ptr<PerceptronLayer> layer, std::span<const std::int32_t> bins, Rule rule,
+          TrainingForm form, std::size_t memory_limit, int n_threads)
+      : layer_(std::move(layer)), rule_(std::move(rule)) {
+    core::require_in_range("n_threads", n_threads, 1, 4096);
+    layer_->code().check_bins(bins);
+    n_samples_ = bins.size() / layer_->code().n_inputs();
+    core::require(rule_.n_samples() == n_samples_, "targets or labels",
+                  std::to_string(n_samples_) + " samples as bins has", rule_.n_samples());
+    form_ = choose_form(form, layer_->n_units(), layer_->code(), n_samples_, memory_limit);
+    memory_ = form_memory(form_, layer_->n_units(), layer_->code(), n_samples_);
+    renew_headroom();
+    make_training(bins, n_threads);
+  }
+
+  TrainingForm form() const noexcept { return form_; }
+  /// Bytes that the form needs beside the layer.
+  std::size_t memory() const noexcept { return memory_; }
+  std::size_t n_samples() const noexcept { return n_samples_; }
+
+  /// Presents samples in the given order. Throws std::invalid_argument for an index out of range,
+  /// before anything is changed, and std::overflow_error before a potential could overflow.
+  TrainingCount present(std::span<const std::int32_t> order) {
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      if (order[i] >= 0 && static_cast<std::size_t>(order[i]) < n_samples_) continue;
+      core::require(false, "order[" + std::to_string(i) + "]",
+                    "in [0, " + std::to_string(n_samples_) + ")", order[i]);
+    }
+    TrainingCount total;
+    while (!order.empty()) {
+      if (headroom_ == 0) {
+        synchronize();
+        renew_headroom();
+      }
+      const auto some = order.first(std::min(order.size(), headroom_));
+      const TrainingCount count =
+          std::visit([&](auto& training) { return training.present(some, rule_); }, *training_);
+      total.n_samples += count.n_samples;
+      total.n_units += count.n_units;
+      headroom_ -= some.size();
+      order = order.subspan(some.size());
+    }
+    return total;
+  }
+
+  /// Brings the layer's weights and thresholds to what plain training would have made of them.
+  void synchronize() {
+    std::visit([](auto& training) { training.synchronize(); }, *training_);
+  }
+
+ private:
+  using Training = std::variant<PlainTraining, BlockTraining, DualTraining<std::int16_t>,
+                                DualTraining<std::int32_t>>;
+
+  /// A presentation raises a unit's norm by at most one per active column and one for the threshold.
+  void renew_headroom() {
+    const std::int64_t left = std::numeric_limits<std::int32_t>::max() - layer_->check_norms();
+    headroom_ = static_cast<std::size_t>(left) / (layer_->code().max_active() + 1);
+    if (headroom_ == 0) {
+      throw std::overflow_error("the weights have grown so large that a further correction could "
+                                "overflow a potential of 32 bits");
+    }
+  }
+
+  void make_training(std::span<const std::int32_t> bins, int n_threads) {
+    const auto make = [&]<class Form>(std::in_place_type_t<Form> type) {
+      training_ = std::make_unique<Training>(type, layer_, bins, n_threads);
+    };
+    switch (form_) {
+      case TrainingForm::dual:
+        if (product_bytes(layer_->code()) == sizeof(std::int16_t)) {
+          return make(std::in_place_type<DualTraining<std::int16_t>>);
+        }
+        return make(std::in_place_type<DualTraining<std::int32_t>>);
+      case TrainingForm::block: return make(std::in_place_type<BlockTraining>);
+      default: return make(std::in_place_type<PlainTraining>);
+    }
+  }
+
+  std::shared_ptr<PerceptronLayer> layer_;
+  Rule rule_;
+  std::size_t n_samples_ = 0;
+  TrainingForm form_ = TrainingForm::plain;
+  std::size_t memory_ = 0;
+  std::size_t headroom_ = 0;  // presentations that cannot overflow
+  std::unique_ptr<Training> training_;
+};
+
+using PDeltaTrainer = Trainer<PDeltaRule>;
+using ErrorCorrectionTrainer = Trainer<ErrorCorrectionRule>;
+
+}  // namespace sdnn::estimators

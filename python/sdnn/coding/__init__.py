@@ -1,0 +1,33 @@
+"""How the values of one input become binary patterns.
+
+A coding is a small frozen object. As it is made it says what the user wants; ``fit`` returns a
+copy in which everything is known (range, categories, number of bins).
+
+>>> import numpy as np
+>>> from sdnn.coding import RandomInverse
+>>> coding = RandomInverse(length_scale=0.5).fit(np.array([3.0, 7.0, 5.0]), n_units=200)
+>>> coding.low, coding.high, coding.n_bins
+(3.0, 7.0, 100)
+>>> coding.bins(np.array([2.0, 3.0, 5.0, 7.0]))
+array([ 0,  0, 50, 99], dtype=int32)
+>>> coding.patterns(200, seed=1).shape
+(100, 200)
+"""
+
+from sdnn.coding.base import Coding
+from sdnn.coding.names import CODINGS, coding_named, from_dict, to_dict
+from sdnn.coding.numeric import Anchor, Circular, RandomInverse
+from sdnn.coding.symbols import CorrelationMatrix, Symbolic
+
+__all__ = [
+    "CODINGS",
+    "Anchor",
+    "Circular",
+    "Coding",
+    "CorrelationMatrix",
+    "RandomInverse",
+    "Symbolic",
+    "coding_named",
+    "from_dict",
+    "to_dict",
+]

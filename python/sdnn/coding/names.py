@@ -1,0 +1,73 @@
+"""Codings by name, and as plain data for files."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+from sdnn.coding.base import Coding
+from sdnn.coding.numeric import Anchor, Circular, RandomInverse
+from sdnn.coding.symbols import CorrelationMatrix, Symbolic
+
+__all__ = ["CODINGS", "coding_named", "from_dict", "to_dict"]
+
+CODINGS: dict[str, type[Coding]] = {
+    coding.name: coding for coding in (RandomInverse, Anchor, Circular, Symbolic, CorrelationMatrix)
+}
+"""Every coding by its name."""
+
+
+def coding_named(coding: str | Coding) -> Coding:
+    """Return a coding given as such, or by its name with its default values.
+
+    Raises
+    ------
+    ValueError
+        If there is none of that name, or it cannot be made from a name alone.
+
+    Examples
+    --------
+    >>> coding_named("anchor").n_anchor_patterns
+    9
+    """
+    if isinstance(coding, Coding):
+        return coding
+    if coding == CorrelationMatrix.name:
+        raise ValueError("'correlation-matrix' needs a matrix: use CorrelationMatrix(matrix=...)")
+    if not isinstance(coding, str) or coding not in CODINGS:
+        names = ", ".join(map(repr, CODINGS))
+        raise ValueError(f"coding must be one of {names} or a Coding object, got {coding!r}")
+    return CODINGS[coding]()
+
+
+def to_dict(coding: Coding) -> dict[str, Any]:
+    """Describe a coding in plain data that JSON can hold.
+
+    >>> to_dict(Symbolic(categories=("a", "b")))
+    {'coding': 'symbolic', 'categories': ('a', 'b')}
+
+    Raises
+    ------
+    TypeError
+        If the coding is not one of this package.
+    """
+    if type(coding) is not CODINGS.get(coding.name):
+        raise TypeError(f"only codings of sdnn.coding can be described, got {coding!r}")
+    fields: dict[str, Any] = dataclasses.asdict(coding)  # type: ignore[call-overload]
+    return {"coding": coding.name, **fields}
+
+
+def from_dict(data: Mapping[str, Any]) -> Coding:
+    """Make the coding that `to_dict` described; lists count as tuples.
+
+    >>> from_dict({"coding": "circular", "period": 24.0}).period
+    24.0
+    """
+    fields = {name: tupled(value) for name, value in data.items() if name != "coding"}
+    return CODINGS[data["coding"]](**fields)
+
+
+def tupled(value: Any) -> Any:
+    """Replace lists by tuples, all the way down."""
+    return tuple(map(tupled, value)) if isinstance(value, list | tuple) else value

@@ -1,0 +1,178 @@
+"""Codings of categories: unrelated ones, and ones whose similarity the user knows."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn import _core
+from sdnn.coding.base import Coding, known
+
+__all__ = ["CorrelationMatrix", "Symbolic"]
+
+Category = str | float | int | bool
+
+
+def learned_categories(column: NDArray[Any]) -> tuple[Category, ...]:
+    """Return the different values of a column, in order, as plain Python values.
+
+    Raises
+    ------
+    ValueError
+        If values cannot be ordered (words and numbers), or one is missing.
+    """
+    values = column.tolist()
+    if any(value is None or value != value for value in values):
+        raise ValueError("Input contains NaN: a missing value is not a category")
+    try:
+        return tuple(sorted(set(values)))
+    except TypeError:
+        raise ValueError("the categories of an input must be all words or all numbers") from None
+
+
+def bins_of_categories(column: NDArray[Any], categories: tuple[Category, ...]) -> NDArray[np.int32]:
+    """Return the place of each value among the categories.
+
+    Raises
+    ------
+    ValueError
+        If a value is none of them.
+    """
+    places = {category: place for place, category in enumerate(categories)}
+    try:
+        return np.array([places[value] for value in column.tolist()], dtype=np.int32)
+    except (KeyError, TypeError):
+        unknown = [value for value in dict.fromkeys(map(repr, column.tolist()))]
+        unknown = [value for value in unknown if value not in set(map(repr, categories))]
+        raise ValueError(f"Found unknown categories [{', '.join(unknown)}]") from None
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Symbolic(Coding):
+    """Categories without any order or likeness: a random pattern each.
+
+    Attributes
+    ----------
+    categories : tuple, optional
+        All categories; learned from the sample, in sorted order, where None.
+    """
+
+    name: ClassVar[str] = "symbolic"
+    is_numeric: ClassVar[bool] = False
+    categories: tuple[Category, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if self.categories is not None:
+            object.__setattr__(self, "categories", tuple(self.categories))
+
+    def fit(self, column: NDArray[Any], n_units: int) -> Symbolic:
+        """Return a copy with the categories known; see `Coding.fit`."""
+        given = self.categories
+        if given is not None and (not given or len(set(given)) < len(given)):
+            raise ValueError(f"categories must be different and at least one, got {given!r}")
+        return dataclasses.replace(
+            self, categories=learned_categories(column) if given is None else given
+        )
+
+    @property
+    def learns(self) -> bool:
+        """Whether ``fit`` learns from the sample."""
+        return self.categories is None
+
+    @property
+    def size(self) -> int:
+        """The number of categories."""
+        return len(known(self.categories))
+
+    def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
+        """Return the place of each category; see `Coding.bins`."""
+        return bins_of_categories(column, known(self.categories))
+
+    def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
+        """Draw the patterns; see `Coding.patterns`."""
+        # Every anchor but the last is a pattern of its own when nothing lies between.
+        return _core.anchor_patterns(n_units, self.size + 1, 0, False, seed)
+
+    def correlations(self, n_units: int) -> NDArray[np.float64]:
+        """Zero but for a category with itself; see `Coding.correlations`."""
+        return np.eye(self.size)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class CorrelationMatrix(Coding):
+    """Categories whose likeness is given: pattern correlations approach a given matrix.
+
+    Attributes
+    ----------
+    matrix : array_like, shape (n_categories, n_categories)
+        Symmetric, ones on the diagonal, entries in [-1, 1].
+    categories : tuple, optional
+        The category of each row; those of the sample in sorted order where None.
+
+    Examples
+    --------
+    Weekdays, of which Sunday is as near to Monday as Monday to Tuesday:
+
+    >>> away = np.abs(np.subtract.outer(np.arange(7), np.arange(7)))
+    >>> week = CorrelationMatrix(
+    ...     matrix=0.8 ** np.minimum(away, 7 - away),
+    ...     categories=("Mon", "Tue", "Wed", "Thu", "Fri", "Sat", "Sun"),
+    ... )
+    >>> week.bins(np.array(["Sun", "Tue"]))
+    array([6, 1], dtype=int32)
+    """
+
+    name: ClassVar[str] = "correlation-matrix"
+    is_numeric: ClassVar[bool] = False
+    matrix: Any
+    categories: tuple[Category, ...] | None = None
+
+    def __post_init__(self) -> None:
+        matrix = np.atleast_2d(np.asarray(self.matrix, dtype=np.float64))
+        object.__setattr__(self, "matrix", tuple(map(tuple, matrix.tolist())))
+        if self.categories is not None:
+            object.__setattr__(self, "categories", tuple(self.categories))
+
+    def fit(self, column: NDArray[Any], n_units: int) -> CorrelationMatrix:
+        """Return a copy with the categories known; see `Coding.fit`."""
+        matrix = np.array(self.matrix)
+        if (
+            matrix.ndim != 2
+            or matrix.shape[0] != matrix.shape[1]
+            or not np.array_equal(matrix, matrix.T)
+            or not np.all(np.diag(matrix) == 1)
+            or not np.all(np.abs(matrix) <= 1)
+        ):
+            raise ValueError(
+                "matrix must be square and symmetric with ones on its diagonal and entries in "
+                f"[-1, 1], got shape {matrix.shape}"
+            )
+        names = learned_categories(column) if self.categories is None else self.categories
+        if len(set(names)) != len(matrix):
+            raise ValueError(f"matrix must have a row for each of {names!r}, got {len(matrix)}")
+        return dataclasses.replace(self, categories=names)
+
+    @property
+    def learns(self) -> bool:
+        """Whether ``fit`` learns from the sample."""
+        return self.categories is None
+
+    @property
+    def size(self) -> int:
+        """The number of categories."""
+        return len(self.matrix)
+
+    def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
+        """Return the place of each category; see `Coding.bins`."""
+        return bins_of_categories(column, known(self.categories))
+
+    def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
+        """Draw the patterns; see `Coding.patterns`."""
+        return _core.correlation_matrix_patterns(n_units, np.array(self.matrix), seed)
+
+    def correlations(self, n_units: int) -> NDArray[np.float64]:
+        """Return the matrix itself; see `Coding.correlations`."""
+        return np.array(self.matrix)

@@ -1,0 +1,226 @@
+"""What the regressor and the classifier share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from joblib import effective_n_jobs
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator
+from sklearn.utils import assert_all_finite, check_random_state
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from sdnn.coding import Coding, RandomInverse, coding_named
+from sdnn.coding.base import whole
+from sdnn.estimators.columns import codings_of_columns, input_pairs
+from sdnn.estimators.input_code import draw_input_code, pattern_units_for
+from sdnn.estimators.network import Network
+from sdnn.estimators.training import Trainer, run_epochs
+
+__all__ = ["BaseSDNN", "check_choice"]
+
+Self = TypeVar("Self", bound="BaseSDNN")
+TRAINING = ("auto", "dual", "block", "plain")
+LARGEST = 2**62
+
+
+def check_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:
+    """ValueError unless the value is one of the words."""
+    if value not in choices:
+        raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}")
+
+
+class BaseSDNN(BaseEstimator):
+    """Validation, the code of the inputs, the loop over epochs, files."""
+
+    coding: Any
+    n_pattern_units: int | None
+    pairs: Any
+    tables: str
+    max_iter: int
+    shuffle: bool
+    early_stopping: bool
+    validation_fraction: float
+    n_iter_no_change: int
+    training: str
+    memory_limit: int
+    random_state: Any
+    n_jobs: int | None
+    verbose: int
+
+    network_: Network
+    n_features_in_: int
+
+    def _check_parameters(self) -> None:
+        """ValueError for an impossible parameter; codings and pairs are checked with the data."""
+        whole("max_iter", self.max_iter, 1, LARGEST)
+        whole("n_iter_no_change", self.n_iter_no_change, 1, LARGEST)
+        whole("memory_limit", self.memory_limit, 0, LARGEST)
+        check_choice("training", self.training, TRAINING)
+        if not 0 < self.validation_fraction < 1:
+            raise ValueError(
+                f"validation_fraction must be between 0 and 1, got {self.validation_fraction!r}"
+            )
+        if self.n_pattern_units is not None:
+            whole("n_pattern_units", self.n_pattern_units, 2, 2**24)
+            if self.n_pattern_units % 2:
+                raise ValueError(f"n_pattern_units must be even, got {self.n_pattern_units}")
+
+    def _given_codings(self) -> list[Coding]:
+        """Every coding the parameter mentions, and the one of inputs that it leaves out."""
+        if isinstance(self.coding, list | tuple):
+            listed = [entry[0] for entry in self.coding if isinstance(entry, list | tuple)]
+            return [RandomInverse(), *map(coding_named, listed)]
+        return [coding_named(self.coding)]
+
+    def _learns(self) -> bool:
+        """Whether a first call has to learn ranges or categories, so one sample is too few."""
+        return any(coding.learns for coding in self._given_codings())
+
+    def _validated(self, X: Any, y: Any = "no_validation", **options: Any) -> Any:
+        """Check data by scikit-learn's rules; words are let through where a coding takes them."""
+        numeric = all(coding.is_numeric for coding in self._given_codings())
+        checks: dict[str, Any] = (
+            {"dtype": np.float64} if numeric else {"dtype": None, "ensure_all_finite": False}
+        )
+        return validate_data(self, X, y, **checks, **options)
+
+    def _finite(self, table: NDArray[Any], codings: Any) -> NDArray[Any]:
+        """Check the numbers of a table that also holds words."""
+        for index, coding in enumerate(codings):
+            if table.dtype != np.float64 and coding.is_numeric:
+                assert_all_finite(np.asarray(table[:, index], dtype=np.float64), input_name="X")
+        return table
+
+    def _start(self, X: Any, table: NDArray[Any], n_units: int) -> np.random.RandomState:
+        """Fit the codings, draw tables and first weights; returns the generator of orders."""
+        self._check_parameters()
+        names = getattr(self, "feature_names_in_", None)
+        listed = None if names is None else names.tolist()
+        n_inputs = table.shape[1]
+        codings = codings_of_columns(self.coding, RandomInverse(), listed, n_inputs, X)
+        self._finite(table, codings)
+        pairs = input_pairs(self.pairs, listed, n_inputs)
+        n_pattern_units = self.n_pattern_units or pattern_units_for(len(pairs))
+        fitted = [
+            coding.fit(table[:, index], n_pattern_units) for index, coding in enumerate(codings)
+        ]
+        random: np.random.RandomState = check_random_state(self.random_state)
+        code_seed, weight_seed = (int(seed) for seed in random.randint(2**31 - 1, size=2))
+        code = draw_input_code(fitted, pairs, n_pattern_units, self.tables, code_seed)
+        self.network_ = Network(code, n_units, seed=weight_seed)
+        return random
+
+    def _table(self, X: Any) -> NDArray[Any]:
+        """Check samples for prediction."""
+        check_is_fitted(self, "network_")
+        table: NDArray[Any] = self._validated(X, reset=False)
+        return self._finite(table, self.network_.input_code.codings)
+
+    def _n_threads(self) -> int:
+        return int(effective_n_jobs(self.n_jobs))
+
+    def _trainer_options(self) -> dict[str, Any]:
+        return {
+            "form": self.training,
+            "memory_limit": self.memory_limit,
+            "n_threads": self._n_threads(),
+        }
+
+    def _split(
+        self, random: np.random.RandomState, n_samples: int
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Numbers of the held out samples and of the others; none held out by default."""
+        if not self.early_stopping:
+            return np.empty(0, dtype=np.int64), np.arange(n_samples)
+        n_held = max(1, round(self.validation_fraction * n_samples))
+        if n_held >= n_samples:
+            raise ValueError(f"n_samples={n_samples} is too few for early stopping")
+        order = random.permutation(n_samples)
+        return np.sort(order[:n_held]), np.sort(order[n_held:])
+
+    def _run(
+        self,
+        trainer: Trainer,
+        n_samples: int,
+        random: np.random.RandomState,
+        score: Callable[[], float],
+    ) -> None:
+        """Train, and set the attributes that tell how it went."""
+        history = run_epochs(
+            self.network_,
+            trainer,
+            n_samples,
+            max_iter=self.max_iter,
+            random=random if self.shuffle else None,
+            score=score if self.early_stopping else None,
+            n_iter_no_change=self.n_iter_no_change,
+            verbose=self.verbose,
+        )
+        self.n_iter_ = len(history.n_corrected)
+        self.n_corrected_ = np.array(history.n_corrected, dtype=np.int64)
+        self.validation_scores_ = np.array(history.scores)
+        self.training_form_ = trainer.form
+        self.training_memory_ = trainer.memory
+
+    @property
+    def codings_(self) -> tuple[Coding, ...]:
+        """The fitted coding of each input."""
+        return self.network_.input_code.codings
+
+    @property
+    def pairs_(self) -> tuple[tuple[int, int], ...]:
+        """The pairs (modified, modifier) of inputs; equal numbers stand for the plain pattern."""
+        return self.network_.input_code.pairs
+
+    @property
+    def weights_(self) -> NDArray[np.int32]:
+        """The integer weights, shape (n_units, n_pairs * n_pattern_units)."""
+        return self.network_.weights
+
+    @property
+    def thresholds_(self) -> NDArray[np.int32]:
+        """The integer thresholds, shape (n_units,)."""
+        return self.network_.thresholds
+
+    def transform_code(self, X: ArrayLike) -> NDArray[np.int8]:
+        """Return the code of samples, entries +1, 0 and -1.
+
+        Parameters
+        ----------
+        X : array_like, shape (n_samples, n_features)
+
+        Returns
+        -------
+        ndarray, shape (n_samples, n_pairs * n_pattern_units)
+        """
+        code = self.network_.input_code
+        return code.core.transform(code.bins(self._table(X)))
+
+    def save(self, path: str | Path) -> None:
+        """Write the fitted estimator to a safetensors file with JSON metadata, without pickle.
+
+        Raises
+        ------
+        TypeError
+            If a parameter cannot be written as JSON, such as a coding of one's own.
+        """
+        from sdnn.estimators.files import save
+
+        save(self, path)
+
+    @classmethod
+    def load(cls: type[Self], path: str | Path) -> Self:
+        """Read an estimator that `save` has written.
+
+        Raises
+        ------
+        ValueError
+            If the file holds something else.
+        """
+        from sdnn.estimators.files import load
+
+        return load(path, cls)

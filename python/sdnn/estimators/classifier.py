@@ -1,0 +1,286 @@
+"""SDNNClassifier: selective desensitization and perceptrons with error correction."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import ClassifierMixin
+from sklearn.utils.multiclass import check_classification_targets, unique_labels
+
+from sdnn import _core
+from sdnn.estimators.base import BaseSDNN, check_choice
+from sdnn.estimators.training import Trainer
+
+__all__ = ["SDNNClassifier"]
+
+SCHEMES = ("one_vs_one", "one_vs_rest")
+
+Self = TypeVar("Self", bound="SDNNClassifier")
+
+
+class SDNNClassifier(ClassifierMixin, BaseSDNN):
+    """Classification by a selective desensitization neural network, exact and online.
+
+    Each input becomes a binary pattern, the patterns of each two inputs are combined by selective
+    desensitization, and over this code perceptrons with integer weights are trained, one per
+    class or one per pair of classes. Only units that answer wrongly are corrected.
+
+    Parameters
+    ----------
+    coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
+        How inputs become patterns: "random-inverse", "anchor", "circular", "symbolic", or an
+        object of `sdnn.coding`; for all inputs, or for columns given as to scikit-learn's
+        ColumnTransformer (inputs left out have "random-inverse").
+    n_pattern_units : int, optional
+        Units per pattern, even. None shares about 16,000 columns out among the pairs.
+    pairs : "all" or list of (modified, modifier), default="all"
+        Pairs of features, by number or name. A modifier of None leaves a pattern plain, which is
+        also what a single feature gets.
+    tables : {"shared", "separate"}, default="shared"
+        One table of patterns per input, permuted anew for each pair, or two tables per pair.
+    scheme : {"one_vs_rest", "one_vs_one"}, default="one_vs_rest"
+        One unit per class, the largest potential wins; or one per pair of classes, which vote.
+    max_iter : int, default=100
+        Largest number of epochs of `fit`, which ends earlier once nothing is corrected.
+    shuffle : bool, default=True
+        Whether each epoch has a new random order; otherwise it is the order of the sample.
+    early_stopping : bool, default=False
+        Whether to hold a share of the sample out, stop when its accuracy no longer rises, and
+        keep the best weights.
+    validation_fraction : float, default=0.1
+        The share that early stopping holds out.
+    n_iter_no_change : int, default=10
+        Epochs without improvement before early stopping.
+    training : {"auto", "dual", "block", "plain"}, default="auto"
+        Form of training; the result is the same to the last bit, time and memory differ.
+    memory_limit : int, default=2**30
+        Bytes that training may use beside the weights.
+    random_state : int, RandomState or None, default=None
+        Decides patterns, first weights, orders and the validation share.
+    n_jobs : int, optional
+        Threads; the result does not depend on it.
+    verbose : int, default=0
+        Whether to show a progress bar.
+
+    Attributes
+    ----------
+    classes_ : ndarray, shape (n_classes,)
+        The labels, sorted.
+    codings_ : tuple of Coding
+        The fitted coding of each input.
+    pairs_ : tuple of (int, int)
+        The pairs in use.
+    weights_ : ndarray of int32, shape (n_units, n_columns)
+    thresholds_ : ndarray of int32, shape (n_units,)
+    n_iter_ : int
+        Epochs of the last `fit`, or calls of `partial_fit`.
+    n_corrected_ : ndarray of int64, shape (n_iter_,)
+        Samples corrected in each epoch.
+    validation_scores_ : ndarray, shape (n_iter_,) or (0,)
+        With early stopping, the accuracy on what is held out.
+    training_form_, training_memory_ : str, int
+        The form of training that was chosen, and the bytes it used beside the weights.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        As everywhere in scikit-learn.
+
+    Examples
+    --------
+    >>> from sklearn.datasets import load_iris
+    >>> from sdnn import SDNNClassifier
+    >>> X, y = load_iris(return_X_y=True)
+    >>> model = SDNNClassifier(random_state=0).fit(X[::2], y[::2])
+    >>> bool(model.score(X[1::2], y[1::2]) > 0.9)
+    True
+    """
+
+    def __init__(
+        self,
+        coding: Any = "random-inverse",
+        *,
+        n_pattern_units: int | None = None,
+        pairs: Any = "all",
+        tables: str = "shared",
+        scheme: str = "one_vs_rest",
+        max_iter: int = 100,
+        shuffle: bool = True,
+        early_stopping: bool = False,
+        validation_fraction: float = 0.1,
+        n_iter_no_change: int = 10,
+        training: str = "auto",
+        memory_limit: int = 2**30,
+        random_state: Any = None,
+        n_jobs: int | None = None,
+        verbose: int = 0,
+    ) -> None:
+        self.coding = coding
+        self.n_pattern_units = n_pattern_units
+        self.pairs = pairs
+        self.tables = tables
+        self.scheme = scheme
+        self.max_iter = max_iter
+        self.shuffle = shuffle
+        self.early_stopping = early_stopping
+        self.validation_fraction = validation_fraction
+        self.n_iter_no_change = n_iter_no_change
+        self.training = training
+        self.memory_limit = memory_limit
+        self.random_state = random_state
+        self.n_jobs = n_jobs
+        self.verbose = verbose
+
+    def fit(self: Self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Learn ranges and classes, draw the network and train it.
+
+        Parameters
+        ----------
+        X : array_like, shape (n_samples, n_features)
+        y : array_like, shape (n_samples,)
+
+        Returns
+        -------
+        SDNNClassifier
+            Itself.
+        """
+        table, y = self._checked(X, y, reset=True)
+        random = self._begin(X, table, unique_labels(y))
+        labels = self._numbers_of(y)
+        held, kept = self._split(random, len(table))
+        trainer = self._trainer(table[kept], labels[kept])
+        held_table, held_labels = table[held], labels[held]
+
+        def score() -> float:
+            winners = self._winners(self._decide(held_table))
+            return float(np.mean(winners == held_labels))
+
+        self._run(trainer, len(kept), random, score)
+        return self
+
+    def partial_fit(
+        self: Self, X: ArrayLike, y: ArrayLike, classes: ArrayLike | None = None
+    ) -> Self:
+        """Go once through the samples, in their order.
+
+        Samples given one at a time, in any portions, or all at once give the same weights, which
+        are also those of `fit` with ``max_iter=1, shuffle=False``, provided that ranges and
+        categories are given. What is not given is learned from the samples of the first call.
+
+        Parameters
+        ----------
+        X : array_like, shape (n_samples, n_features)
+        y : array_like, shape (n_samples,)
+        classes : array_like, shape (n_classes,), optional
+            All labels that can occur; needed in the first call.
+
+        Returns
+        -------
+        SDNNClassifier
+            Itself.
+        """
+        first = not hasattr(self, "network_")
+        if first and classes is None:
+            raise ValueError("classes must be given in the first call of partial_fit")
+        table, y = self._checked(X, y, reset=first)
+        listed = None if classes is None else unique_labels(classes)
+        if first:
+            self._begin(X, table, listed)
+            self.n_iter_ = 0
+        elif listed is not None and not np.array_equal(listed, self.classes_):
+            raise ValueError(
+                f"classes={listed!r} are not those of the first call, {self.classes_!r}"
+            )
+        trainer = self._trainer(table, self._numbers_of(y))
+        trainer.epoch(np.arange(len(table), dtype=np.int32))
+        trainer.synchronize()
+        self.n_iter_ += 1
+        return self
+
+    def decision_function(self, X: ArrayLike) -> NDArray[np.float64]:
+        """Return how much speaks for each class.
+
+        One-versus-rest: the potentials. One-versus-one: votes, and a share of less than half a
+        vote by the potentials, which decides between classes of equal votes.
+
+        Parameters
+        ----------
+        X : array_like, shape (n_samples, n_features)
+
+        Returns
+        -------
+        ndarray, shape (n_samples, n_classes), or (n_samples,) for two classes
+            For two classes, positive values speak for ``classes_[1]``.
+        """
+        return self._decide(self._table(X))
+
+    def predict(self, X: ArrayLike) -> NDArray[Any]:
+        """Predict the labels of samples.
+
+        Parameters
+        ----------
+        X : array_like, shape (n_samples, n_features)
+
+        Returns
+        -------
+        ndarray, shape (n_samples,)
+        """
+        winners = self._winners(self.decision_function(X))
+        labels: NDArray[Any] = self.classes_[winners]
+        return labels
+
+    def _checked(self, X: Any, y: Any, reset: bool) -> tuple[NDArray[Any], NDArray[Any]]:
+        least = 2 if reset and self._learns() else 1
+        table, y = self._validated(X, y, reset=reset, ensure_min_samples=least)
+        check_classification_targets(y)
+        return table, y
+
+    def _begin(self, X: Any, table: NDArray[Any], classes: Any) -> np.random.RandomState:
+        check_choice("scheme", self.scheme, SCHEMES)
+        self.classes_ = classes
+        n_classes = len(self.classes_)
+        if n_classes < 2:
+            raise ValueError(f"at least two classes are needed, got one class: {classes!r}")
+        self._scheme = self.scheme
+        one_vs_rest = self.scheme == "one_vs_rest"
+        return self._start(X, table, n_classes if one_vs_rest else n_classes * (n_classes - 1) // 2)
+
+    def _numbers_of(self, y: NDArray[Any]) -> NDArray[np.int32]:
+        """Return the places of labels among the classes; ValueError for one that is not there."""
+        unseen = np.setdiff1d(y, self.classes_)
+        if len(unseen):
+            raise ValueError(f"y has labels {unseen.tolist()} that are not in classes")
+        return np.searchsorted(self.classes_, y).astype(np.int32)
+
+    def _trainer(self, table: NDArray[Any], labels: NDArray[np.int32]) -> Trainer:
+        self._finite(table, self.codings_)
+        return _core.ErrorCorrectionTrainer(
+            self.network_.layer,
+            self.network_.input_code.bins(table),
+            labels,
+            self._scheme,
+            **self._trainer_options(),
+        )
+
+    def _decide(self, table: NDArray[Any]) -> NDArray[np.float64]:
+        potentials = self.network_.potentials(table, self._n_threads()).astype(np.float64)
+        n_classes = len(self.classes_)
+        if self._scheme == "one_vs_rest":
+            return potentials[:, 1] - potentials[:, 0] if n_classes == 2 else potentials
+        # A unit that fires speaks for the first of its pair; a potential of 0 is silence.
+        leaning = potentials - 0.5
+        if n_classes == 2:
+            return -leaning[:, 0]
+        votes = np.zeros((len(table), n_classes))
+        sums = np.zeros((len(table), n_classes))
+        for unit, (i, j) in enumerate(zip(*np.triu_indices(n_classes, 1), strict=True)):
+            votes[np.arange(len(table)), np.where(leaning[:, unit] > 0, i, j)] += 1
+            sums[:, i] += leaning[:, unit]
+            sums[:, j] -= leaning[:, unit]
+        decision: NDArray[np.float64] = votes + sums / (3 * (np.abs(sums) + 1))
+        return decision
+
+    def _winners(self, decision: NDArray[np.float64]) -> NDArray[np.int64]:
+        if decision.ndim == 1:
+            return (decision > 0).astype(np.int64)
+        winners: NDArray[np.int64] = np.argmax(decision, axis=1)
+        return winners

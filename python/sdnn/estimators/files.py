@@ -1,0 +1,159 @@
+"""A fitted estimator in one safetensors file: arrays, and JSON metadata that says the rest."""
+
+from __future__ import annotations
+
+import json
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save_file
+
+from sdnn.coding import Coding, from_dict, to_dict
+from sdnn.estimators.base import BaseSDNN
+from sdnn.estimators.input_code import InputCode
+from sdnn.estimators.network import Network
+
+__all__ = ["load", "save"]
+
+Estimator = TypeVar("Estimator", bound=BaseSDNN)
+
+FORMAT = "sdnn-estimator-1"
+PLAIN = ("n_features_in_", "n_iter_", "n_outputs_", "training_form_", "training_memory_")
+PRIVATE = ("_flat", "_counts_of_range", "_scheme")
+ARRAYS = ("output_range_", "n_corrected_", "validation_scores_")
+NAMES = ("classes_", "feature_names_in_")
+
+
+def plain(value: Any) -> Any:
+    """Turn a parameter into data that JSON can hold.
+
+    Raises
+    ------
+    TypeError
+        For anything else than words, numbers, codings, and lists of them.
+    """
+    if isinstance(value, Coding):
+        return to_dict(value)
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, slice):
+        return {"slice": [value.start, value.stop, value.step]}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.random.RandomState):
+        return None  # a fitted model draws no more
+    if value is None or isinstance(value, str | int | float | bool):
+        return value
+    raise TypeError(f"a parameter cannot be saved: {value!r}")
+
+
+def restored(value: Any) -> Any:
+    """Undo `plain`."""
+    if isinstance(value, dict):
+        return slice(*value["slice"]) if "slice" in value else from_dict(value)
+    return [restored(item) for item in value] if isinstance(value, list) else value
+
+
+def narrowed(values: NDArray[np.int32]) -> NDArray[Any]:
+    """Hold whole numbers in the smallest type that has room for them."""
+    for kind in (np.int8, np.int16):
+        info = np.iinfo(kind)
+        if values.size == 0 or (values.min() >= info.min and values.max() <= info.max):
+            return values.astype(kind)
+    return values
+
+
+def named(values: NDArray[Any]) -> dict[str, Any]:
+    """Describe an array of labels or names, whose type matters."""
+    kind = "object" if values.dtype == object else values.dtype.str
+    return {"type": kind, "values": values.tolist()}
+
+
+def save(estimator: BaseSDNN, path: str | Path) -> None:
+    """Write a fitted estimator; see `BaseSDNN.save`."""
+    network = estimator.network_
+    code = network.input_code
+    unique = {id(table): table for table in (*code.modified, *code.modifiers)}
+    number_of = {key: number for number, key in enumerate(unique)}
+    tensors: dict[str, NDArray[Any]] = {
+        "weights": narrowed(network.weights),
+        "thresholds": narrowed(network.thresholds),
+    }
+    for number, table in enumerate(unique.values()):
+        tensors[f"table.{number}"] = np.packbits(table > 0, axis=1)
+    for name in ARRAYS:
+        if hasattr(estimator, name):
+            tensors[name] = np.ascontiguousarray(getattr(estimator, name))
+    held = vars(estimator)
+    metadata = {
+        "format": FORMAT,
+        "version": version("sdnn"),
+        "class": type(estimator).__name__,
+        "parameters": {
+            name: plain(value) for name, value in estimator.get_params(deep=False).items()
+        },
+        "plain": {name: held[name] for name in (*PLAIN, *PRIVATE) if name in held},
+        "names": {name: named(held[name]) for name in NAMES if name in held},
+        "codings": [to_dict(coding) for coding in code.codings],
+        "pairs": code.pairs,
+        "n_units": network.n_units,
+        "n_pattern_units": code.n_units,
+        "modified": [number_of[id(table)] for table in code.modified],
+        "modifiers": [number_of[id(table)] for table in code.modifiers],
+    }
+    save_file(tensors, path, metadata={"sdnn": json.dumps(metadata)})
+
+
+def load(path: str | Path, kind: type[Estimator]) -> Estimator:
+    """Read an estimator; see `BaseSDNN.load`."""
+    try:
+        with safe_open(path, framework="numpy") as file:
+            metadata = json.loads((file.metadata() or {}).get("sdnn", "{}"))
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    except SafetensorError as error:
+        raise ValueError(f"{path} is not a safetensors file: {error}") from None
+    if metadata.get("format") != FORMAT:
+        raise ValueError(f"{path} does not hold an estimator of this package ({FORMAT})")
+    if metadata["class"] != kind.__name__:
+        raise ValueError(f"{path} holds an {metadata['class']}, not an {kind.__name__}")
+    estimator = kind(**{name: restored(value) for name, value in metadata["parameters"].items()})
+    for name, value in metadata["plain"].items():
+        if name in (*PLAIN, *PRIVATE):
+            setattr(estimator, name, value)
+    for name, value in metadata["names"].items():
+        if name in NAMES:
+            setattr(estimator, name, np.array(value["values"], dtype=value["type"]))
+    for name in ARRAYS:
+        if name in tensors:
+            setattr(estimator, name, tensors[name])
+    estimator.network_ = read_network(metadata, tensors)
+    return estimator
+
+
+def read_network(metadata: dict[str, Any], tensors: dict[str, NDArray[Any]]) -> Network:
+    """Build the code and the layer; equal tables are shared again."""
+    n_units = metadata["n_pattern_units"]
+
+    def unpacked(number: int) -> NDArray[np.int8]:
+        bits = np.unpackbits(tensors[f"table.{number}"], axis=1, count=n_units)
+        return (2 * bits.astype(np.int8) - 1).astype(np.int8)
+
+    tables = {
+        number: unpacked(number) for number in {*metadata["modified"], *metadata["modifiers"]}
+    }
+    code = InputCode(
+        [from_dict(coding) for coding in metadata["codings"]],
+        [(mu, nu) for mu, nu in metadata["pairs"]],
+        [tables[number] for number in metadata["modified"]],
+        [tables[number] for number in metadata["modifiers"]],
+    )
+    return Network(
+        code,
+        metadata["n_units"],
+        weights=tensors["weights"].astype(np.int32),
+        thresholds=tensors["thresholds"].astype(np.int32),
+    )

@@ -1,0 +1,83 @@
+"""The code and the layer together: what a fitted estimator predicts with, and pickles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn import _core
+from sdnn.estimators.input_code import InputCode
+
+__all__ = ["Network"]
+
+LARGEST_SEED = 2**64 - 1
+
+
+class Network:
+    """N units over the code of the inputs; weights and thresholds are exact integers.
+
+    Parameters
+    ----------
+    input_code : InputCode
+        Gives the columns that the units read.
+    n_units : int
+        N, at least 1.
+    seed : int
+        First weights follow from it where none are given.
+    weights, thresholds : ndarray, shapes (n_units, n_columns) and (n_units,), optional
+        Both or neither.
+    """
+
+    def __init__(
+        self,
+        input_code: InputCode,
+        n_units: int,
+        seed: int = 0,
+        weights: NDArray[np.int32] | None = None,
+        thresholds: NDArray[np.int32] | None = None,
+    ) -> None:
+        self.input_code = input_code
+        self.n_units = n_units
+        self.layer = _core.PerceptronLayer(
+            input_code.core, n_units, seed=seed, weights=weights, thresholds=thresholds
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Keep the weights instead of the core's object."""
+        return {
+            "input_code": self.input_code,
+            "n_units": self.n_units,
+            "weights": self.weights,
+            "thresholds": self.thresholds,
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Build the core's object again."""
+        self.__init__(**state)  # type: ignore[misc]
+
+    @property
+    def weights(self) -> NDArray[np.int32]:
+        """Copy the weights, shape (n_units, n_columns)."""
+        return self.layer.weights
+
+    @property
+    def thresholds(self) -> NDArray[np.int32]:
+        """Copy the thresholds, shape (n_units,)."""
+        return self.layer.thresholds
+
+    def restore(self, weights: NDArray[np.int32], thresholds: NDArray[np.int32]) -> None:
+        """Go back to earlier weights and thresholds."""
+        self.layer = _core.PerceptronLayer(
+            self.input_code.core, self.n_units, weights=weights, thresholds=thresholds
+        )
+
+    def potentials(self, table: NDArray[Any], n_threads: int) -> NDArray[np.int32]:
+        """Potentials, (n_samples, n_inputs) to (n_samples, n_units)."""
+        return self.layer.potentials(self.input_code.bins(table), n_threads=n_threads)
+
+    def counts(self, table: NDArray[Any], n_groups: int, n_threads: int) -> NDArray[np.int32]:
+        """How many units fire, (n_samples, n_inputs) to (n_samples, n_groups)."""
+        bins = self.input_code.bins(table)
+        return self.layer.counts(bins, n_groups=n_groups, n_threads=n_threads)

@@ -1,0 +1,63 @@
+#include "sdnn/coding/correlation_matrix.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <stdexcept>
+#include <vector>
+
+namespace {
+
+using namespace sdnn;
+
+double correlation(const coding::PatternTable& table, std::size_t i, std::size_t j) {
+  int sum = 0;
+  for (std::size_t k = 0; k < table.n_units(); ++k) sum += table.sign(i, k) * table.sign(j, k);
+  return sum / static_cast<double>(table.n_units());
+}
+
+TEST(CorrelationMatrix, ApproachesTheCorrelationsOfAngles) {
+  constexpr std::size_t kBins = 12;
+  std::vector<double> wanted(kBins * kBins);
+  for (std::size_t i = 0; i < kBins; ++i) {
+    for (std::size_t j = 0; j < kBins; ++j) {
+      const std::size_t apart = i > j ? i - j : j - i;
+      wanted[i * kBins + j] = std::pow(0.9, static_cast<double>(std::min(apart, kBins - apart)));
+    }
+  }
+  core::Random random(2, core::Stream::code_books);
+  const auto table = coding::correlation_matrix_patterns(1000, wanted, kBins, random);
+  for (std::size_t i = 0; i < kBins; ++i) {
+    int n_on = 0;
+    for (std::size_t k = 0; k < 1000; ++k) n_on += table.sign(i, k) > 0 ? 1 : 0;
+    EXPECT_EQ(n_on, 500);
+    for (std::size_t j = 0; j < kBins; ++j) {
+      EXPECT_NEAR(correlation(table, i, j), wanted[i * kBins + j], 0.02) << i << ' ' << j;
+    }
+  }
+}
+
+TEST(CorrelationMatrix, MakesOppositeAndUnrelatedSymbols) {
+  const std::array<double, 9> wanted{1, -1, 0, -1, 1, 0, 0, 0, 1};
+  core::Random random(2, core::Stream::code_books);
+  const auto table = coding::correlation_matrix_patterns(200, wanted, 3, random);
+  EXPECT_DOUBLE_EQ(correlation(table, 0, 1), -1.0);
+  EXPECT_NEAR(correlation(table, 0, 2), 0.0, 0.021);
+}
+
+TEST(CorrelationMatrix, RefusesWhatIsNoCorrelationMatrix) {
+  core::Random random(2, core::Stream::code_books);
+  const auto make = [&](std::array<double, 4> wanted, int n_units) {
+    return coding::correlation_matrix_patterns(n_units, wanted, 2, random);
+  };
+  EXPECT_THROW(make({1, 0.5, 0.4, 1}, 100), std::invalid_argument);
+  EXPECT_THROW(make({0.9, 0.5, 0.5, 1}, 100), std::invalid_argument);
+  EXPECT_THROW(make({1, 1.5, 1.5, 1}, 100), std::invalid_argument);
+  EXPECT_THROW(make({1, std::nan(""), std::nan(""), 1}, 100), std::invalid_argument);
+  EXPECT_THROW(make({1, 0.5, 0.5, 1}, 101), std::invalid_argument);
+  EXPECT_THROW(coding::correlation_matrix_patterns(100, {}, 2, random), std::invalid_argument);
+}
+
+}  // namespace

@@ -1,0 +1,81 @@
+#include "sdnn/coding/random_inverse.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "sdnn/coding/pattern_code.hpp"
+
+namespace {
+
+using namespace sdnn;
+using coding::PatternTable;
+
+int product(const PatternTable& table, std::size_t one, std::size_t other) {
+  int sum = 0;
+  for (std::size_t k = 0; k < table.n_units(); ++k) sum += table.sign(one, k) * table.sign(other, k);
+  return sum;
+}
+
+TEST(RandomInverse, NeighboursDifferInTheAskedNumberOfEachSign) {
+  core::Random random(3, core::Stream::code_books);
+  const auto table = coding::random_inverse_patterns({40, 60, 3}, random);
+  for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {
+    int n_on = 0;
+    for (std::size_t k = 0; k < 40; ++k) n_on += table.sign(bin, k) > 0 ? 1 : 0;
+    EXPECT_EQ(n_on, 20) << bin;  // stays balanced
+    if (bin > 0) {
+      EXPECT_EQ(product(table, bin - 1, bin), 40 - 2 * 6) << bin;
+    }
+  }
+}
+
+TEST(RandomInverse, CorrelationFallsExponentially) {
+  core::Random random(5, core::Stream::code_books);
+  const auto table = coding::random_inverse_patterns({2000, 401, 5}, random);
+  for (const std::size_t distance : {10U, 50U, 100U}) {
+    double sum = 0.0;
+    std::size_t n = 0;
+    for (std::size_t bin = 0; bin + distance < table.n_bins(); bin += 7, ++n) {
+      sum += product(table, bin, bin + distance) / 2000.0;
+    }
+    EXPECT_NEAR(sum / static_cast<double>(n), std::pow(0.99, static_cast<double>(distance)), 0.05);
+  }
+}
+
+TEST(RandomInverse, FlipsEveryUnitWhenAllMayFlip) {
+  core::Random random(7, core::Stream::code_books);
+  const auto table = coding::random_inverse_patterns({10, 3, 5}, random);
+  EXPECT_EQ(product(table, 0, 1), -10);
+  EXPECT_EQ(product(table, 0, 2), 10);
+}
+
+TEST(AnchorPatterns, AreThoseOfTheCompiledCodeBook) {
+  for (const bool circular : {false, true}) {
+    core::Random one(11, core::Stream::code_books);
+    core::Random other(11, core::Stream::code_books);
+    const auto table = coding::anchor_patterns({130, 5, 6, circular}, one);
+    const auto book = coding::anchor_interpolation<256>(
+        {.n_pattern_units = 130, .n_anchor_patterns = 5, .n_interpolated = 6, .circular = circular},
+        other);
+    ASSERT_EQ(table.n_bins(), book.n_bins());
+    for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {
+      for (std::size_t k = 0; k < 130; ++k) {
+        ASSERT_EQ(table.sign(bin, k) > 0, book[static_cast<coding::Bin>(bin)][k]) << bin << ' ' << k;
+      }
+    }
+  }
+}
+
+TEST(RandomInverse, RefusesImpossibleSettings) {
+  core::Random random(1, core::Stream::code_books);
+  EXPECT_THROW(coding::random_inverse_patterns({41, 5, 1}, random), std::invalid_argument);
+  EXPECT_THROW(coding::random_inverse_patterns({40, 0, 1}, random), std::invalid_argument);
+  EXPECT_THROW(coding::random_inverse_patterns({40, 5, 21}, random), std::invalid_argument);
+  EXPECT_THROW(coding::random_inverse_patterns({40, 5, -1}, random), std::invalid_argument);
+  EXPECT_THROW(coding::anchor_patterns({40, 1, 5, false}, random), std::invalid_argument);
+  EXPECT_THROW(coding::anchor_patterns({1, 2, 5, false}, random), std::invalid_argument);
+}
+
+}  // namespace

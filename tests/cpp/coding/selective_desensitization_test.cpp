@@ -1,0 +1,76 @@
+#include "sdnn/coding/selective_desensitization.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdint>
+#include <stdexcept>
+#include <vector>
+
+namespace {
+
+using namespace sdnn;
+using coding::PatternTable;
+using coding::SelectiveDesensitization;
+
+PatternTable table(std::vector<std::int8_t> signs, std::size_t n_bins) {
+  return PatternTable::from_signs(signs, n_bins, signs.size() / n_bins);
+}
+
+TEST(SelectiveDesensitization, IsThePatternWhereTheModifierIsOn) {
+  // Pair (0, 1): pattern of input 0 where that of input 1 is +1; pair (1, 0) the other way round.
+  const SelectiveDesensitization code(
+      {table({1, -1, 1, -1}, 1), table({1, 1, -1, -1, -1, 1, 1, -1}, 2)},
+      {table({1, 1, -1, -1, -1, 1, 1, -1}, 2), table({-1, -1, 1, 1}, 1)}, {{0, 1}, {1, 0}});
+  EXPECT_EQ(code.n_inputs(), 2U);
+  EXPECT_EQ(code.n_columns(), 8U);
+  EXPECT_EQ(code.n_words(), 2U);
+  EXPECT_EQ(code.max_active(), 4U);
+  EXPECT_EQ(code.slot_of(5), 65U);
+  std::array<std::uint64_t, 2> active{};
+  std::array<std::uint64_t, 2> positive{};
+  const std::array<std::int32_t, 2> bins{0, 1};
+  code.encode(bins, active.data(), positive.data());
+  EXPECT_EQ(active[0], 0b0110U);    // modifier pattern -1 +1 +1 -1
+  EXPECT_EQ(positive[0], 0b0100U);  // 0 -1 +1 0
+  EXPECT_EQ(active[1], 0b1100U);
+  EXPECT_EQ(positive[1], 0b0100U);  // 0 0 +1 -1
+}
+
+TEST(SelectiveDesensitization, AllowsAnInputAlone) {
+  const SelectiveDesensitization code({table({1, -1}, 1)}, {table({1, 1}, 1)}, {{0, 0}});
+  std::uint64_t active = 0;
+  std::uint64_t positive = 0;
+  code.encode(std::array<std::int32_t, 1>{0}, &active, &positive);
+  EXPECT_EQ(active, 3U);
+  EXPECT_EQ(positive, 1U);
+}
+
+TEST(SelectiveDesensitization, NamesTheBadBin) {
+  const SelectiveDesensitization code({table({1, -1}, 1)}, {table({1, 1, 1, 1}, 2)}, {{0, 1}});
+  code.check_bins(std::array<std::int32_t, 4>{0, 1, 0, 0});
+  try {
+    code.check_bins(std::array<std::int32_t, 4>{0, 1, 0, 2});
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "bins[1, 1] must be in [0, 2), got 2");
+  }
+  EXPECT_THROW(code.check_bins(std::array<std::int32_t, 2>{-1, 0}), std::invalid_argument);
+  EXPECT_THROW(code.check_bins(std::array<std::int32_t, 3>{0, 0, 0}), std::invalid_argument);
+}
+
+TEST(SelectiveDesensitization, RefusesTablesThatDoNotFit) {
+  const auto make = [](std::vector<PatternTable> modified, std::vector<PatternTable> modifiers,
+                       std::vector<coding::InputPair> pairs) {
+    return SelectiveDesensitization(std::move(modified), std::move(modifiers), std::move(pairs));
+  };
+  const auto two = table({1, -1}, 1);
+  const auto three = table({1, -1, 1}, 1);
+  EXPECT_THROW(make({}, {}, {}), std::invalid_argument);
+  EXPECT_THROW(make({two}, {two, two}, {{0, 1}}), std::invalid_argument);
+  EXPECT_THROW(make({two}, {two}, {{0, 1}, {1, 0}}), std::invalid_argument);
+  EXPECT_THROW(make({two}, {three}, {{0, 1}}), std::invalid_argument);
+  EXPECT_THROW(make({two}, {table({1, 1, 1, 1}, 2)}, {{0, 0}}), std::invalid_argument);
+}
+
+}  // namespace

@@ -1,0 +1,108 @@
+#include "sdnn/estimators/correction_rules.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "sdnn/core/random.hpp"
+
+namespace {
+
+using namespace sdnn;
+using estimators::ClassScheme;
+using Pairs = std::vector<std::pair<std::uint32_t, std::int32_t>>;
+
+template <class Rule>
+Pairs apply(Rule& rule, std::size_t sample, const std::vector<std::int32_t>& potentials) {
+  std::vector<estimators::Correction> corrections;
+  rule(sample, potentials.data(), corrections);
+  Pairs pairs;
+  for (const auto& c : corrections) pairs.emplace_back(c.unit, c.direction);
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
+TEST(PDeltaRule, CorrectsTheNearestLowestIndexFirst) {
+  const std::vector<std::int32_t> potentials{5, -2, 0, 3, -2, -9};  // units 0 and 3 fire
+  estimators::PDeltaRule rule(6, std::vector<double>{2.0, 4.0, 1.0, 3.49, 3.5, 0.0, 99.0, -99.0}, 1);
+  EXPECT_EQ(apply(rule, 0, potentials), Pairs{});
+  EXPECT_EQ(apply(rule, 1, potentials), (Pairs{{1, 1}, {2, 1}}));  // 0, then -2 of unit 1
+  EXPECT_EQ(apply(rule, 2, potentials), (Pairs{{3, -1}}));
+  EXPECT_EQ(apply(rule, 3, potentials), (Pairs{{2, 1}}));          // rounds to 3
+  EXPECT_EQ(apply(rule, 4, potentials), (Pairs{{1, 1}, {2, 1}}));  // rounds to 4
+  EXPECT_EQ(apply(rule, 5, potentials), (Pairs{{0, -1}, {3, -1}}));
+  EXPECT_EQ(apply(rule, 6, potentials), (Pairs{{1, 1}, {2, 1}, {4, 1}, {5, 1}}));
+  EXPECT_EQ(apply(rule, 7, potentials), (Pairs{{0, -1}, {3, -1}}));
+}
+
+TEST(PDeltaRule, GroupsDoNotMix) {
+  estimators::PDeltaRule rule(4, std::vector<double>{2.0, 0.0}, 2);
+  EXPECT_EQ(apply(rule, 0, {1, -1, 1, -1}), (Pairs{{1, 1}, {2, -1}}));
+}
+
+TEST(PDeltaRule, TellsFarUnitsApart) {
+  const std::int32_t far = 2000000000;
+  estimators::PDeltaRule rule(3, std::vector<double>{1.0, 2.0}, 1);
+  EXPECT_EQ(apply(rule, 0, {-far, 1 - far, -far}), (Pairs{{1, 1}}));
+  EXPECT_EQ(apply(rule, 1, {-far, 1 - far, -far}), (Pairs{{0, 1}, {1, 1}}));
+  EXPECT_EQ(apply(rule, 0, {far, far, 7}), (Pairs{{0, -1}, {2, -1}}));
+}
+
+TEST(PDeltaRule, AgreesWithSorting) {
+  core::Random random(1, core::Stream::exploration);
+  for (int trial = 0; trial < 500; ++trial) {
+    const std::size_t n = 1 + random.below(120);
+    const double target = random.uniform() * static_cast<double>(n);
+    std::vector<std::int32_t> potentials(n);
+    for (auto& p : potentials) p = static_cast<std::int32_t>(random.below(21)) - 10;
+    const auto n_firing = std::count_if(potentials.begin(), potentials.end(), [](auto p) { return p > 0; });
+    const auto deficit = static_cast<std::int32_t>(target + 0.5) - static_cast<std::int32_t>(n_firing);
+    Pairs ranked;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      if ((potentials[i] > 0) == (deficit < 0)) {
+        ranked.emplace_back(static_cast<std::uint32_t>(std::abs(potentials[i])), static_cast<std::int32_t>(i));
+      }
+    }
+    std::sort(ranked.begin(), ranked.end());
+    Pairs expected;
+    for (int k = 0; k < std::abs(deficit); ++k) {
+      expected.emplace_back(static_cast<std::uint32_t>(ranked[static_cast<std::size_t>(k)].second), deficit > 0 ? 1 : -1);
+    }
+    std::sort(expected.begin(), expected.end());
+    estimators::PDeltaRule rule(n, std::vector<double>{target}, 1);
+    ASSERT_EQ(apply(rule, 0, potentials), expected) << trial;
+  }
+}
+
+TEST(ErrorCorrectionRule, OneVersusRest) {
+  estimators::ErrorCorrectionRule rule(3, std::vector<std::int32_t>{1}, 3, ClassScheme::one_vs_rest);
+  EXPECT_EQ(apply(rule, 0, {1, 0, -1}), (Pairs{{0, -1}, {1, 1}}));
+  EXPECT_EQ(apply(rule, 0, {0, 1, 0}), Pairs{});
+}
+
+TEST(ErrorCorrectionRule, OneVersusOne) {
+  // Units (0,1) (0,2) (0,3) (1,2) (1,3) (2,3).
+  const std::vector<std::int32_t> labels{0, 2, 3};
+  estimators::ErrorCorrectionRule rule(6, labels, 4, ClassScheme::one_vs_one);
+  EXPECT_EQ(apply(rule, 0, {0, 0, 0, 0, 0, 0}), (Pairs{{0, 1}, {1, 1}, {2, 1}}));
+  EXPECT_EQ(apply(rule, 1, {1, 1, 1, 1, 1, 0}), (Pairs{{1, -1}, {3, -1}, {5, 1}}));
+  EXPECT_EQ(apply(rule, 2, {1, 1, 1, 1, 1, 1}), (Pairs{{2, -1}, {4, -1}, {5, -1}}));
+}
+
+TEST(CorrectionRules, RefuseBadArguments) {
+  const std::vector<double> targets{1.0, std::nan("")};
+  EXPECT_THROW(estimators::PDeltaRule(4, targets, 1), std::invalid_argument);
+  EXPECT_THROW(estimators::PDeltaRule(3, std::vector<double>{1, 1}, 2), std::invalid_argument);
+  EXPECT_THROW(estimators::PDeltaRule(4, std::vector<double>{1}, 0), std::invalid_argument);
+  const std::vector<std::int32_t> labels{0, 3};
+  using estimators::ErrorCorrectionRule;
+  EXPECT_THROW(ErrorCorrectionRule(3, labels, 3, ClassScheme::one_vs_rest), std::invalid_argument);
+  EXPECT_THROW(ErrorCorrectionRule(3, labels, 4, ClassScheme::one_vs_rest), std::invalid_argument);
+  EXPECT_THROW(ErrorCorrectionRule(1, labels, 1, ClassScheme::one_vs_one), std::invalid_argument);
+}
+
+}  // namespace

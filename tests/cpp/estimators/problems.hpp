@@ -1,0 +1,110 @@
+/// Random training problems, and the weights that a form leaves.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "sdnn/estimators/trainer.hpp"
+
+namespace sdnn::testing {
+
+struct Problem {
+  std::shared_ptr<const coding::SelectiveDesensitization> code;
+  std::size_t n_units = 0;
+  std::size_t n_groups = 1;
+  std::vector<std::int32_t> bins;
+  std::vector<double> targets;
+  std::vector<std::vector<std::int32_t>> orders;
+};
+
+inline coding::PatternTable random_table(std::size_t n_bins, std::size_t n_units,
+                                         core::Random& random) {
+  coding::PatternTable table(n_bins, n_units);
+  for (std::size_t bin = 0; bin < n_bins; ++bin) {
+    for (std::size_t k = 0; k < n_units; ++k) {
+      if (random.below(2) == 1) table.flip(bin, k);
+    }
+  }
+  return table;
+}
+
+inline Problem random_problem(std::uint64_t seed) {
+  core::Random random(seed, core::Stream::exploration);
+  const std::size_t n_inputs = 1 + random.below(3);
+  const std::size_t n_bins = 1 + random.below(12);
+  const std::size_t n_pattern_units = 1 + random.below(150);
+  std::vector<coding::InputPair> pairs;
+  for (std::size_t i = 0; i < n_inputs; ++i) {
+    for (std::size_t j = 0; j < n_inputs; ++j) {
+      if (i != j || n_inputs == 1) pairs.push_back({i, j});
+    }
+  }
+  std::vector<coding::PatternTable> modified;
+  std::vector<coding::PatternTable> modifiers;
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    modified.push_back(random_table(n_bins, n_pattern_units, random));
+    modifiers.push_back(random_table(n_bins, n_pattern_units, random));
+  }
+  Problem problem;
+  problem.code = std::make_shared<coding::SelectiveDesensitization>(
+      std::move(modified), std::move(modifiers), std::move(pairs));
+  problem.n_groups = 1 + random.below(3);
+  const std::size_t group = 1 + random.below(70);
+  problem.n_units = problem.n_groups * group;
+  const std::size_t n_samples = 1 + random.below(150);
+  for (std::size_t i = 0; i < n_samples * n_inputs; ++i) {
+    problem.bins.push_back(static_cast<std::int32_t>(random.below(n_bins)));
+  }
+  for (std::size_t i = 0; i < n_samples * problem.n_groups; ++i) {
+    problem.targets.push_back(random.uniform() * (static_cast<double>(group) + 2.0) - 1.0);
+  }
+  for (int epoch = 0; epoch < 4; ++epoch) {
+    auto& order = problem.orders.emplace_back(1 + random.below(2 * n_samples));
+    for (auto& index : order) index = static_cast<std::int32_t>(random.below(n_samples));
+  }
+  return problem;
+}
+
+inline std::shared_ptr<estimators::PerceptronLayer> layer_for(const Problem& problem) {
+  return std::make_shared<estimators::PerceptronLayer>(problem.code, problem.n_units, 7);
+}
+
+inline estimators::PDeltaTrainer trainer_for(const Problem& problem,
+                                             std::shared_ptr<estimators::PerceptronLayer> layer,
+                                             estimators::TrainingForm form, int n_threads = 1) {
+  return {std::move(layer), problem.bins,
+          estimators::PDeltaRule(problem.n_units, problem.targets, problem.n_groups), form,
+          std::size_t{1} << 30, n_threads};
+}
+
+/// All thresholds and weights.
+inline std::vector<std::int32_t> bits_of(const estimators::PerceptronLayer& layer) {
+  std::vector<std::int32_t> bits(layer.thresholds().begin(), layer.thresholds().end());
+  for (std::size_t i = 0; i < layer.n_units(); ++i) {
+    for (std::size_t j = 0; j < layer.code().n_columns(); ++j) bits.push_back(layer.weight(i, j));
+  }
+  return bits;
+}
+
+/// Expects the form's bits and counts to be those of plain training, epoch by epoch.
+template <class Expect>
+void compare_with_plain(const Problem& problem, estimators::TrainingForm form, int n_threads,
+                        const Expect& expect) {
+  const auto plain_layer = layer_for(problem);
+  const auto layer = layer_for(problem);
+  auto plain = trainer_for(problem, plain_layer, estimators::TrainingForm::plain);
+  auto trainer = trainer_for(problem, layer, form, n_threads);
+  for (std::size_t epoch = 0; epoch < problem.orders.size(); ++epoch) {
+    const auto one = plain.present(problem.orders[epoch]);
+    const auto other = trainer.present(problem.orders[epoch]);
+    expect(one.n_samples == other.n_samples && one.n_units == other.n_units);
+    if (epoch % 2 == 0) continue;  // synchronized in the middle and at the end
+    trainer.synchronize();
+    expect(bits_of(*plain_layer) == bits_of(*layer));
+  }
+}
+
+}  // namespace sdnn::testing

@@ -1,0 +1,83 @@
+#include "sdnn/estimators/trainer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "estimators/problems.hpp"
+
+namespace sdnn {
+namespace {
+
+using estimators::TrainingForm;
+
+TEST(Trainer, ClassifiersHaveTheSameBitsInAllForms) {
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    auto problem = testing::random_problem(seed);
+    const std::size_t n_classes = 2 + seed % 11;
+    const auto scheme = seed % 2 == 0 ? estimators::ClassScheme::one_vs_one
+                                      : estimators::ClassScheme::one_vs_rest;
+    problem.n_units = estimators::n_units_for(scheme, n_classes);
+    const std::size_t n_samples = problem.bins.size() / problem.code->n_inputs();
+    std::vector<std::int32_t> labels;
+    for (std::size_t t = 0; t < n_samples; ++t) {
+      labels.push_back(static_cast<std::int32_t>(t * t % n_classes));
+    }
+    std::vector<std::vector<std::int32_t>> bits;
+    for (const auto form : {TrainingForm::plain, TrainingForm::dual, TrainingForm::block}) {
+      const auto layer = testing::layer_for(problem);
+      estimators::ErrorCorrectionTrainer trainer(
+          layer, problem.bins,
+          estimators::ErrorCorrectionRule(problem.n_units, labels, n_classes, scheme), form,
+          std::size_t{1} << 30, 1);
+      for (const auto& order : problem.orders) trainer.present(order);
+      trainer.synchronize();
+      bits.push_back(testing::bits_of(*layer));
+    }
+    ASSERT_EQ(bits[0], bits[1]) << seed;
+    ASSERT_EQ(bits[0], bits[2]) << seed;
+  }
+}
+
+TEST(Trainer, StopsBeforeAPotentialOverflows) {
+  auto problem = testing::random_problem(2);
+  std::fill(problem.targets.begin(), problem.targets.end(), 0.0);  // a silent unit stays as it is
+  const std::size_t n_columns = problem.code->n_columns();
+  std::vector<std::int32_t> weights(problem.n_units * n_columns);
+  std::vector<std::int32_t> thresholds(problem.n_units);
+  const auto reach = static_cast<std::int32_t>(problem.code->max_active()) + 1;
+  for (const auto form : {TrainingForm::plain, TrainingForm::dual, TrainingForm::block}) {
+    thresholds[0] = INT32_MAX - reach + 1;  // no room for a single correction
+    auto layer = std::make_shared<estimators::PerceptronLayer>(problem.code, problem.n_units,
+                                                               weights, thresholds);
+    EXPECT_THROW(testing::trainer_for(problem, layer, form), std::overflow_error);
+    thresholds[0] = INT32_MAX - 3 * reach;  // room for three
+    layer = std::make_shared<estimators::PerceptronLayer>(problem.code, problem.n_units, weights,
+                                                          thresholds);
+    auto trainer = testing::trainer_for(problem, layer, form);
+    for (const auto& order : problem.orders) trainer.present(order);
+    trainer.synchronize();
+    EXPECT_LE(layer->check_norms(), INT32_MAX);
+  }
+}
+
+TEST(Trainer, RefusesBadArgumentsAndKeepsTheLayer) {
+  const auto problem = testing::random_problem(1);
+  const auto layer = testing::layer_for(problem);
+  const auto before = testing::bits_of(*layer);
+  auto trainer = testing::trainer_for(problem, layer, TrainingForm::automatic);
+  EXPECT_NE(trainer.form(), TrainingForm::automatic);
+  EXPECT_THROW(trainer.present(std::vector<std::int32_t>{0, -1}), std::invalid_argument);
+  EXPECT_THROW(trainer.present(std::vector<std::int32_t>{0, 1000}), std::invalid_argument);
+  EXPECT_EQ(trainer.present({}).n_samples, 0U);
+  trainer.synchronize();
+  EXPECT_EQ(testing::bits_of(*layer), before);
+  EXPECT_THROW(testing::trainer_for(problem, layer, TrainingForm::plain, 0), std::invalid_argument);
+  auto fewer = problem;
+  fewer.targets.resize(fewer.targets.size() - fewer.n_groups);
+  EXPECT_THROW(testing::trainer_for(fewer, layer, TrainingForm::plain), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sdnn

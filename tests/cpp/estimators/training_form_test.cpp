@@ -1,0 +1,51 @@
+#include "sdnn/estimators/training_form.hpp"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <vector>
+
+namespace {
+
+using namespace sdnn;
+using estimators::TrainingForm;
+
+/// The demonstration problem's sizes: two pairs of n = 2000 units, half of them on.
+coding::SelectiveDesensitization demonstration_code() {
+  coding::PatternTable table(2, 2000);
+  for (std::size_t k = 0; k < 1000; ++k) table.flip(0, k);
+  const std::vector tables(2, table);
+  return {tables, tables, {{0, 1}, {1, 0}}};
+}
+
+TEST(TrainingForm, NamesGoBothWays) {
+  for (const auto form : {TrainingForm::automatic, TrainingForm::dual, TrainingForm::block,
+                          TrainingForm::plain}) {
+    EXPECT_EQ(estimators::training_form_named(estimators::name_of(form)), form);
+  }
+  EXPECT_THROW(estimators::training_form_named("primal"), std::invalid_argument);
+}
+
+TEST(TrainingForm, MemoryByHand) {
+  const auto code = demonstration_code();
+  EXPECT_EQ(estimators::product_bytes(code), 2U);
+  EXPECT_EQ(estimators::form_memory(TrainingForm::plain, 280, code, 2000), 0U);
+  EXPECT_EQ(estimators::form_memory(TrainingForm::block, 280, code, 2000), 4U * 288 * 4096);
+  EXPECT_EQ(estimators::form_memory(TrainingForm::dual, 280, code, 2000),
+            2000U * 2016 * 2 + 280U * 2016 * 4 + 2000U * 288 * 2 + 2000U * 2 * 64 * 8);
+}
+
+TEST(TrainingForm, SuitsTheSizeAndTheLimit) {
+  const auto code = demonstration_code();
+  const auto chosen = [&](std::size_t n_samples, std::size_t limit) {
+    return estimators::choose_form(TrainingForm::automatic, 280, code, n_samples, limit);
+  };
+  EXPECT_EQ(chosen(2000, 1 << 30), TrainingForm::dual);
+  EXPECT_EQ(chosen(2000, 10 << 20), TrainingForm::block);
+  EXPECT_EQ(chosen(2000, 1 << 20), TrainingForm::plain);
+  EXPECT_EQ(chosen(50000, std::size_t{64} << 30), TrainingForm::block);
+  EXPECT_THROW(estimators::choose_form(TrainingForm::dual, 280, code, 2000, 10 << 20),
+               std::length_error);
+}
+
+}  // namespace

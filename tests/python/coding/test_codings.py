@@ -1,0 +1,188 @@
+"""Codings: bins, patterns, and correlations as they should be."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sdnn.coding import (
+    CODINGS,
+    Anchor,
+    Circular,
+    CorrelationMatrix,
+    RandomInverse,
+    Symbolic,
+    coding_named,
+    from_dict,
+    to_dict,
+)
+from sdnn.coding.ranges import MAX_KNOTS, quantile_knots
+
+UNIT = np.array([0.0, 1.0])
+LETTERS = np.array(["c", "a", "b", "a"])
+LIKE = np.array([[1.0, 0.5, 0.0], [0.5, 1.0, 0.5], [0.0, 0.5, 1.0]])
+
+FITTED = {
+    "random-inverse": RandomInverse(length_scale=0.2).fit(UNIT, 400),
+    "quantile": RandomInverse(spacing="quantile").fit(np.arange(30.0) ** 2, 400),
+    "anchor": Anchor(n_anchor_patterns=5, n_interpolated=9).fit(UNIT, 400),
+    "circular": Circular(n_anchor_patterns=5, n_interpolated=9).fit(UNIT, 400),
+    "circular of two": Circular(n_anchor_patterns=3, n_interpolated=9).fit(UNIT, 400),
+    "circular of one": Circular(n_anchor_patterns=2, n_interpolated=9).fit(UNIT, 400),
+    "symbolic": Symbolic().fit(LETTERS, 400),
+    "correlation-matrix": CorrelationMatrix(matrix=LIKE).fit(LETTERS, 400),
+}
+
+
+@pytest.mark.parametrize("name", FITTED)
+def test_patterns_are_signs_and_follow_from_the_seed(name):
+    coding = FITTED[name]
+    patterns = coding.patterns(400, 7)
+    assert patterns.shape == (coding.size, 400)
+    assert set(np.unique(patterns)) == {-1, 1}
+    np.testing.assert_array_equal(patterns, coding.patterns(400, 7))
+    assert not np.array_equal(patterns, coding.patterns(400, 8))
+
+
+@pytest.mark.parametrize("name", FITTED)
+def test_drawn_patterns_scatter_about_the_expected_correlations(name):
+    n_units = 10000
+    coding = dataclasses.replace(FITTED[name])
+    if isinstance(coding, RandomInverse):
+        coding = dataclasses.replace(coding, n_flipped=100, n_bins=40)
+    drawn = coding.patterns(n_units, 3).astype(float)
+    expected = coding.correlations(n_units)
+    assert np.abs(drawn @ drawn.T / n_units - expected).max() < 0.05
+    np.testing.assert_allclose(np.diag(expected), 1)
+    assert np.linalg.eigvalsh(expected).min() > -1e-9
+
+
+def test_bins_by_hand():
+    anchor = Anchor(n_anchor_patterns=3, n_interpolated=1, low=0.0, high=4.0).fit(UNIT, 8)
+    column = np.array([-1, 0, 0.99, 1, 2.5, 3.999, 4, 99])
+    assert anchor.bins(column).tolist() == [0, 0, 0, 1, 2, 3, 3, 3]
+    circle = Circular(period=4.0, origin=1.0, n_anchor_patterns=5, n_interpolated=0).fit(UNIT, 8)
+    assert circle.bins(np.array([1, 2, 3, 4, 5, 0.99, -3, 1 - 1e-18])).tolist() == [
+        0, 1, 2, 3, 0, 3, 0, 0,
+    ]  # fmt: skip
+    assert FITTED["symbolic"].categories == ("a", "b", "c")
+    assert FITTED["symbolic"].bins(LETTERS).tolist() == [2, 0, 1, 0]
+
+
+def test_quantile_bins_hold_equal_shares():
+    column = np.random.RandomState(0).lognormal(0, 3, 4000)
+    coding = RandomInverse(spacing="quantile", n_bins=10).fit(column, 400)
+    shares = np.bincount(coding.bins(column), minlength=10) / 4000
+    np.testing.assert_allclose(shares, 0.1, atol=0.01)
+    assert len(coding.knots) <= MAX_KNOTS
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=30),
+    st.sampled_from(["even", "quantile", "anchor"]),
+)
+def test_bins_never_leave_the_table_and_keep_the_order(values, kind):
+    column = np.array(values)
+    coding = Anchor() if kind == "anchor" else RandomInverse(spacing=kind)
+    fitted = coding.fit(column, 64)
+    order = np.sort(np.concatenate([column, [-np.finfo(float).max, 0, np.finfo(float).max]]))
+    bins = fitted.bins(order)
+    assert bins.min() >= 0
+    assert bins.max() < fitted.size
+    assert np.all(np.diff(bins) >= 0)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.floats(-1e6, 1e6), st.integers(-5, 5))
+def test_a_period_away_is_the_same_angle(angle, turns):
+    circle = Circular(period=360.0, n_anchor_patterns=9, n_interpolated=44)
+    a, b = circle.bins(np.array([angle, angle + 360 * turns]))
+    assert min((a - b) % 360, (b - a) % 360) <= 1
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(1, 4000), st.floats(0.01, 3))
+def test_the_length_scale_is_where_the_correlation_is_one_over_e(half, length_scale):
+    n_units = 2 * half
+    coding = RandomInverse(length_scale=length_scale).fit(UNIT, n_units)
+    kept = 1 - 4 * coding.n_flipped / n_units
+    if kept > 0 and coding.size > 20 and length_scale < 1:
+        distance = length_scale * coding.size
+        assert abs(kept**distance - np.exp(-1)) < 0.1
+
+
+def test_neighbours_differ_in_the_flips():
+    patterns = RandomInverse(n_bins=50, n_flipped=3).fit(UNIT, 100).patterns(100, 0).astype(int)
+    assert np.all(np.sum(patterns, axis=1) == 0)
+    assert np.all(np.sum(patterns[1:] != patterns[:-1], axis=1) == 6)
+
+
+@pytest.mark.parametrize("name", FITTED)
+def test_codings_survive_json(name):
+    coding = FITTED[name]
+    assert from_dict(json.loads(json.dumps(to_dict(coding)))) == coding
+
+
+def test_names():
+    assert set(CODINGS) == {
+        "random-inverse", "anchor", "circular", "symbolic", "correlation-matrix",
+    }  # fmt: skip
+    assert coding_named("symbolic") == Symbolic()
+    assert coding_named(Anchor()) == Anchor()
+    with pytest.raises(ValueError, match="coding must be one of 'random-inverse'"):
+        coding_named("sine")
+
+
+@pytest.mark.parametrize(
+    ("coding", "error"),
+    [
+        (RandomInverse(length_scale=0.0), "length_scale must be positive"),
+        (RandomInverse(length_scale=np.inf), "length_scale must be positive"),
+        (RandomInverse(n_bins=1), "n_bins must be a whole number"),
+        (RandomInverse(n_bins=2.5), "n_bins must be a whole number"),
+        (RandomInverse(n_flipped=33), r"n_flipped must be a whole number in \[1, 32\], got 33"),
+        (RandomInverse(spacing="log"), "spacing must be"),
+        (RandomInverse(spacing="quantile", low=0.0), "cannot be given with"),
+        (RandomInverse(low=2.0, high=1.0), "low < high"),
+        (Anchor(low=np.nan), "must be finite"),
+        (Anchor(n_interpolated=-1), "n_interpolated"),
+        (Anchor(n_anchor_patterns=2000, n_interpolated=99), r"\(n_interpolated \+ 1\)"),
+        (Circular(period=0.0), "period must be positive"),
+        (Circular(n_anchor_patterns=1), "n_anchor_patterns"),
+        (Symbolic(categories=("a", "a")), "must be different"),
+        (Symbolic(categories=()), "at least one"),
+        (CorrelationMatrix(matrix=[[1, 0.5], [0.4, 1]]), "square and symmetric"),
+        (CorrelationMatrix(matrix=[[0.5]]), "ones on its diagonal"),
+        (CorrelationMatrix(matrix=[1.0, 2.0]), "square"),
+        (CorrelationMatrix(matrix=np.eye(3)), "a row for each"),
+        (CorrelationMatrix(matrix=np.eye(2), categories=("a", "b", "c")), "a row for each"),
+    ],
+)
+def test_impossible_arguments_are_named(coding, error):
+    with pytest.raises((ValueError, TypeError), match=error):
+        coding.fit(UNIT, 64)
+
+
+def test_symbols_are_checked():
+    with pytest.raises(ValueError, match="all words or all numbers"):
+        Symbolic().fit(np.array(["a", 1], dtype=object), 64)
+    with pytest.raises(ValueError, match="NaN"):
+        Symbolic().fit(np.array([1.0, np.nan]), 64)
+    with pytest.raises(ValueError, match=r"unknown categories \['d', 'e'\]"):
+        FITTED["symbolic"].bins(np.array(["a", "d", "e", "d"]))
+    with pytest.raises(ValueError, match="not fitted"):
+        RandomInverse().bins(UNIT)
+
+
+def test_knots_are_values_and_their_mean_ranks():
+    assert quantile_knots(np.array([5.0])) == ((5.0, 0.0),)
+    knots = quantile_knots(np.random.RandomState(0).normal(size=5000))
+    assert len(knots) <= MAX_KNOTS
+    values, levels = np.array(knots).T
+    assert np.all(np.diff(values) > 0)
+    assert np.all(np.diff(levels) > 0)
+    assert (levels[0], levels[-1]) == (0, 1)

@@ -1,0 +1,80 @@
+"""The kernel is the limit of the codes, and the pictures can be drawn."""
+
+import doctest
+import importlib
+import sys
+
+import numpy as np
+import pytest
+
+from sdnn import SDNNRegressor, kernel
+from sdnn.coding import Circular, RandomInverse, Symbolic
+
+RANDOM = np.random.RandomState(0)
+X = RANDOM.uniform(0, 1, (12, 3))
+
+
+@pytest.mark.parametrize("pairs", ["all", [(0, 1), (2, None)]])
+@pytest.mark.parametrize("coding", [RandomInverse(n_bins=40), Circular(period=1.0)])
+def test_long_codes_approach_it(coding, pairs):
+    n_units = 20000
+    model = SDNNRegressor(
+        coding, pairs=pairs, n_pattern_units=n_units, n_output_units=1, max_iter=1, random_state=0
+    )
+    model.fit(X, X[:, 0])
+    code = model.transform_code(X).astype(float)
+    # A pair gives half its units, a plain pattern all of them.
+    n_active = n_units / 2 * sum(2 if mu == nu else 1 for mu, nu in model.pairs_)
+    limit = kernel.AnalyticKernel(model.codings_, pairs=model.pairs_, n_units=n_units)(X)
+    assert np.abs(code @ code.T / n_active - limit).max() < 0.03
+    np.testing.assert_allclose(np.diag(limit), 1)
+    np.testing.assert_allclose(limit, limit.T)
+
+
+def test_by_hand():
+    coding = RandomInverse(n_bins=11, n_flipped=10, low=0.0, high=1.0)
+    rho = 1 - 4 * 10 / 100
+    one = kernel.AnalyticKernel(coding, n_inputs=2, n_units=100)
+    matrix = one(np.array([[0.05, 0.05]]), np.array([[0.15, 0.05], [0.15, 0.25]]))
+    expected = [((1 + rho) / 2 + rho) / 2, ((1 + rho) / 2 * rho**2 + (1 + rho**2) / 2 * rho) / 2]
+    np.testing.assert_allclose(matrix, [expected])
+    alone = kernel.AnalyticKernel(coding, n_inputs=1, n_units=100)
+    np.testing.assert_allclose(alone([[0.05]], [[0.25]]), [[rho**2]])
+    with pytest.raises(ValueError, match="n_inputs must be given"):
+        kernel.AnalyticKernel("anchor")
+
+
+def test_similarity_scatters_about_the_correlations():
+    for coding in ("random-inverse", "anchor", "circular", Symbolic(categories=("a", "b"))):
+        drawn, expected = kernel.similarity(coding, 4000, 1), kernel.correlations(coding, 4000)
+        assert drawn.shape == expected.shape
+        assert np.abs(drawn - expected).max() < 0.12
+
+
+@pytest.mark.parametrize("coding", ["random-inverse", Symbolic(categories=tuple("abc"))])
+def test_it_can_be_drawn(coding, tmp_path):
+    figure = kernel.plot_similarity(coding, n_units=200)
+    figure.savefig(tmp_path / "similarity.png")
+    assert (tmp_path / "similarity.png").stat().st_size > 5000
+
+
+DOCUMENTED = (
+    "sdnn.coding",
+    "sdnn.coding.base",
+    "sdnn.coding.names",
+    "sdnn.coding.numeric",
+    "sdnn.coding.ranges",
+    "sdnn.coding.symbols",
+    "sdnn.estimators.classifier",
+    "sdnn.estimators.columns",
+    "sdnn.estimators.input_code",
+    "sdnn.estimators.regressor",
+    "sdnn.kernel",
+)
+
+
+@pytest.mark.parametrize("name", DOCUMENTED)
+def test_examples_in_docstrings(name):
+    importlib.import_module(name)
+    result = doctest.testmod(sys.modules[name], optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert result.failed == 0

@@ -1,0 +1,140 @@
+"""The estimators over the core equal the slow transcription, bit for bit."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import estimator_transcription
+from sdnn import SDNNClassifier, SDNNRegressor, _core
+from sdnn.coding import RandomInverse
+
+
+def transcribed(model):
+    """The slow layer with the tables and first weights of the core's."""
+    code = model.network_.input_code
+    plain = estimator_transcription.SelectiveDesensitization(
+        code.modified, code.modifiers, code.core_pairs
+    )
+    return estimator_transcription.PerceptronLayer(
+        plain, model.network_.n_units, weights=model.weights_, thresholds=model.thresholds_
+    )
+
+
+def untrained(model, X, y):
+    """The model before its first sample, and its targets as the trainer has them."""
+    if isinstance(model, SDNNRegressor):
+        table, targets = model._checked(X, y, reset=True)
+        model._begin(X, table, targets)
+        return model, model._in_counts(targets)
+    table, labels = model._checked(X, y, reset=True)
+    model._begin(X, table, np.unique(labels))
+    return model, model._numbers_of(labels)
+
+
+@st.composite
+def problems(draw):
+    """Small samples with ties, constant inputs and coarse targets among them."""
+    n_inputs = draw(st.integers(1, 4))
+    n_samples = draw(st.integers(3, 14))
+    values = st.integers(0, draw(st.integers(1, 9)))
+    X = draw(
+        st.lists(
+            st.lists(values, min_size=n_inputs, max_size=n_inputs),
+            min_size=n_samples,
+            max_size=n_samples,
+        )
+    )
+    y = draw(st.lists(st.integers(0, 3), min_size=n_samples, max_size=n_samples))
+    y[:2] = [0, 3]
+    options = {
+        "coding": RandomInverse(n_bins=draw(st.integers(2, 20)), n_flipped=draw(st.integers(1, 4))),
+        "n_pattern_units": 2 * draw(st.integers(4, 40)),
+        "tables": draw(st.sampled_from(["shared", "separate"])),
+        "training": draw(st.sampled_from(["auto", "dual", "block", "plain"])),
+        "n_jobs": draw(st.integers(1, 2)),
+        "random_state": draw(st.integers(0, 2**31 - 1)),
+    }
+    orders = [draw(st.permutations(range(n_samples))) for _ in range(3)]
+    return np.array(X, dtype=float), np.array(y), options, orders
+
+
+def agree(model, layer, X):
+    np.testing.assert_array_equal(model.weights_, layer.weights)
+    np.testing.assert_array_equal(model.thresholds_, layer.thresholds)
+    bins = model.network_.input_code.bins(X)
+    np.testing.assert_array_equal(model.network_.potentials(X, 1), layer.potentials(bins))
+    np.testing.assert_array_equal(model.transform_code(X), layer.code.transform(bins))
+
+
+@settings(max_examples=100, deadline=None)
+@given(problems(), st.integers(1, 2), st.integers(1, 30))
+def test_regression(problem, n_outputs, n_output_units):
+    X, y, options, orders = problem
+    y = np.stack([y, 2 - y * y], axis=1)[:, :n_outputs]
+    model, counts = untrained(SDNNRegressor(n_output_units=n_output_units, **options), X, y)
+    layer = transcribed(model)
+    bins = model.network_.input_code.bins(X)
+    slow = estimator_transcription.PDeltaTrainer(layer, bins, counts)
+    fast = model._trainer(X, y.astype(float))
+    for order in orders:
+        assert tuple(fast.epoch(np.array(order, dtype=np.int32))) == slow.epoch(order)
+    fast.synchronize()
+    agree(model, layer, X)
+    low, step = model.output_range_[:, 0], model._step()
+    expected = step * layer.counts(bins, n_outputs) + low
+    np.testing.assert_array_equal(model.predict(X), expected)
+
+
+@settings(max_examples=100, deadline=None)
+@given(problems(), st.sampled_from(["one_vs_rest", "one_vs_one"]))
+def test_classification(problem, scheme):
+    X, y, options, orders = problem
+    model, labels = untrained(SDNNClassifier(scheme=scheme, **options), X, y)
+    layer = transcribed(model)
+    slow = estimator_transcription.ErrorCorrectionTrainer(
+        layer, model.network_.input_code.bins(X), labels, scheme
+    )
+    fast = model._trainer(X, labels)
+    for order in orders:
+        assert tuple(fast.epoch(np.array(order, dtype=np.int32))) == slow.epoch(order)
+    fast.synchronize()
+    agree(model, layer, X)
+
+
+@pytest.mark.parametrize("regression", [True, False])
+def test_fit_presents_the_orders_it_says(regression):
+    """A whole fit: seeds of code and weights first, then one permutation per epoch."""
+    random = np.random.RandomState(5)
+    X = random.uniform(size=(30, 2))
+    y = X[:, 0] if regression else np.digitize(X[:, 0], [0.3, 0.6])
+    kind = SDNNRegressor if regression else SDNNClassifier
+    options = {"n_pattern_units": 40, "random_state": 11, "max_iter": 7}
+    model = kind(**options).fit(X, y)
+
+    begun, targets = untrained(kind(**options), X, y)
+    layer = transcribed(begun)
+    bins = begun.network_.input_code.bins(X)
+    slow = (
+        estimator_transcription.PDeltaTrainer(layer, bins, targets)
+        if regression
+        else estimator_transcription.ErrorCorrectionTrainer(layer, bins, targets, "one_vs_rest")
+    )
+    orders = np.random.RandomState(11)
+    orders.randint(2**31 - 1, size=2)
+    corrected = [slow.epoch(orders.permutation(30))[0] for _ in range(model.n_iter_)]
+    assert model.n_corrected_.tolist() == corrected
+    agree(model, layer, X)
+
+
+def test_gram_matrix_is_that_of_the_code():
+    random = np.random.RandomState(0)
+    model, _ = untrained(
+        SDNNRegressor(n_pattern_units=100, random_state=0),
+        random.uniform(size=(20, 3)),
+        np.arange(20),
+    )
+    bins = model.network_.input_code.bins(random.uniform(size=(20, 3)))
+    code = model.network_.input_code.core.transform(bins).astype(int)
+    np.testing.assert_array_equal(model.network_.input_code.core.gram(bins), code @ code.T)
+    assert isinstance(model.network_.layer, _core.PerceptronLayer)

@@ -1,0 +1,102 @@
+"""A saved estimator comes back with every bit, and nothing but data is read."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from safetensors import safe_open
+from safetensors.numpy import save_file
+
+from sdnn import SDNNClassifier, SDNNRegressor
+from sdnn.coding import Circular, Coding, CorrelationMatrix, RandomInverse
+
+RANDOM = np.random.RandomState(0)
+X = RANDOM.uniform(0, 1, (60, 3))
+Y = X[:, 0] * X[:, 1] - X[:, 2]
+SMALL = {"n_pattern_units": 62, "max_iter": 3, "random_state": 0}
+
+MODELS = {
+    "regressor": (SDNNRegressor(**SMALL), X, Y),
+    "outputs": (SDNNRegressor(output_range=[(-2, 2), (0, 1)], **SMALL), X, np.stack([Y, Y], 1)),
+    "quantile": (SDNNRegressor(RandomInverse(spacing="quantile"), **SMALL), X, Y),
+    "separate": (SDNNRegressor(tables="separate", **SMALL), X, Y),
+    "plain": (SDNNRegressor(pairs=[(0, None), (1, 2)], **SMALL), X, Y),
+    "frame": (
+        SDNNRegressor([(Circular(period=1.0), ["a"]), ("anchor", slice(1, 2))], **SMALL),
+        pd.DataFrame(X, columns=["a", "b", "c"]),
+        Y,
+    ),
+    "classifier": (SDNNClassifier(**SMALL), X, np.digitize(Y, [-0.5, 0])),
+    "words": (
+        SDNNClassifier(
+            [(CorrelationMatrix(matrix=np.eye(2), categories=("u", "v")), 0)],
+            scheme="one_vs_one",
+            **SMALL,
+        ),
+        np.column_stack([np.where(X[:, 0] > 0.5, "u", "v").astype(object), X[:, 1:]]),
+        np.where(Y > 0, "yes", "no"),
+    ),
+}
+
+
+def in_lists(parameters):
+    """JSON knows no tuples: compare as if there were none."""
+    return str(parameters).translate(str.maketrans("()", "[]"))
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_what_is_loaded_is_what_was_saved(name, tmp_path):
+    model, samples, targets = MODELS[name]
+    model.fit(samples, targets)
+    path = tmp_path / "model.safetensors"
+    model.save(path)
+    same = type(model).load(path)
+    np.testing.assert_array_equal(same.predict(samples), model.predict(samples))
+    np.testing.assert_array_equal(same.weights_, model.weights_)
+    assert same.weights_.dtype == np.int32
+    assert same.codings_ == model.codings_
+    assert in_lists(same.get_params()) == in_lists(model.get_params())
+    assert set(vars(same)) == set(vars(model))
+    same.partial_fit(samples, targets)
+    model.partial_fit(samples, targets)
+    np.testing.assert_array_equal(same.weights_, model.weights_)
+
+
+def test_the_file_is_readable_by_others(tmp_path):
+    path = tmp_path / "model.safetensors"
+    SDNNClassifier(**SMALL).fit(X, Y > 0).save(path)
+    with safe_open(path, framework="numpy") as file:
+        metadata = json.loads(file.metadata()["sdnn"])
+        assert file.get_tensor("weights").shape == (2, 6 * 62)
+    assert metadata["class"] == "SDNNClassifier"
+    assert metadata["parameters"]["n_pattern_units"] == 62
+    assert metadata["codings"][0]["coding"] == "random-inverse"
+
+
+def test_other_files_are_refused(tmp_path):
+    path = tmp_path / "model.safetensors"
+    SDNNClassifier(**SMALL).fit(X, Y > 0).save(path)
+    with pytest.raises(ValueError, match="holds an SDNNClassifier, not an SDNNRegressor"):
+        SDNNRegressor.load(path)
+    save_file({"a": np.zeros(2)}, path)
+    with pytest.raises(ValueError, match="does not hold an estimator"):
+        SDNNRegressor.load(path)
+    path.write_bytes(b"no tensors")
+    with pytest.raises(ValueError, match="not a safetensors file"):
+        SDNNRegressor.load(path)
+    with pytest.raises(FileNotFoundError):
+        SDNNRegressor.load(tmp_path / "nothing")
+
+
+def test_what_cannot_be_written_as_data_is_refused(tmp_path):
+    class Own(RandomInverse):
+        """A coding of one's own."""
+
+    model = SDNNRegressor(Own(), **SMALL).fit(X, Y)
+    assert isinstance(model.codings_[0], Coding)
+    with pytest.raises(TypeError, match=r"only codings of sdnn\.coding"):
+        model.save(tmp_path / "model.safetensors")
+    model = SDNNRegressor([("anchor", lambda table: [0])], **SMALL).fit(X, Y)
+    with pytest.raises(TypeError, match="a parameter cannot be saved"):
+        model.save(tmp_path / "model.safetensors")

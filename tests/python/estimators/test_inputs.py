@@ -1,0 +1,148 @@
+"""Which input is coded how, pairs, tables, and inputs that are words."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sdnn import SDNNClassifier, SDNNRegressor
+from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic
+from sdnn.estimators.columns import codings_of_columns, column_indices, input_pairs
+from sdnn.estimators.input_code import draw_input_code
+
+RANDOM = np.random.RandomState(0)
+HOURS = RANDOM.uniform(0, 24, 200)
+COLORS = RANDOM.choice(["red", "green", "blue"], 200)
+SIZES = RANDOM.uniform(1, 9, 200)
+TABLE = pd.DataFrame({"hour": HOURS, "color": COLORS, "size": SIZES})
+TARGETS = np.cos(HOURS * np.pi / 12) * np.where(COLORS == "red", 2.0, 1.0) + SIZES / 9
+CODING = [(Circular(period=24.0), "hour"), ("symbolic", ["color"])]
+SMALL = {"n_pattern_units": 256, "random_state": 0}
+
+
+def test_columns_are_given_as_to_a_column_transformer():
+    names = ["a", "b", "c"]
+    for columns, expected in [
+        (1, [1]),
+        (-1, [2]),
+        ("b", [1]),
+        (["c", "a"], [2, 0]),
+        ([2, 0], [2, 0]),
+        (np.array([0, 2]), [0, 2]),
+        (slice(1, None), [1, 2]),
+        ([True, False, True], [0, 2]),
+        (lambda table: [table.shape[1] - 1], [2]),
+    ]:
+        assert column_indices(columns, names, 3, np.zeros((4, 3))) == expected
+    for bad, error in [(3, "no number 3"), ("d", "named 'd'"), (1.5, "name or number")]:
+        with pytest.raises(ValueError, match=error):
+            column_indices(bad, names, 3)
+    with pytest.raises(ValueError, match="a mask must have 3 entries"):
+        column_indices([True], names, 3)
+
+
+def test_inputs_left_out_have_the_usual_coding():
+    codings = codings_of_columns([("anchor", [1])], RandomInverse(), None, 3)
+    assert [coding.name for coding in codings] == ["random-inverse", "anchor", "random-inverse"]
+    with pytest.raises(ValueError, match=r"list of \(coding, columns\)"):
+        codings_of_columns([("anchor",)], RandomInverse(), None, 3)
+
+
+def test_pairs_are_ordered_and_named():
+    assert input_pairs("all", None, 3) == [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)]
+    assert input_pairs("all", None, 1) == [(0, 0)]
+    assert input_pairs([("b", "a"), (-1, None)], ["a", "b"], 2) == [(1, 0), (1, 1)]
+    with pytest.raises(ValueError, match=r"a pair is \(modified, modifier\)"):
+        input_pairs([(0, 1, 2)], None, 3)
+
+
+@pytest.mark.parametrize("tables", ["shared", "separate"])
+def test_mixed_inputs_are_learned(tables):
+    model = SDNNRegressor(CODING, tables=tables, max_iter=200, **SMALL)
+    model.fit(TABLE, TARGETS)
+    assert [coding.name for coding in model.codings_] == ["circular", "symbolic", "random-inverse"]
+    assert model.codings_[1].categories == ("blue", "green", "red")
+    assert model.score(TABLE, TARGETS) > 0.99
+    day_later = TABLE.assign(hour=TABLE["hour"] + 24)
+    np.testing.assert_allclose(model.predict(day_later), model.predict(TABLE), atol=0.1)
+
+
+def test_unknown_categories_and_missing_values_are_refused():
+    model = SDNNRegressor(CODING, **SMALL).fit(TABLE, TARGETS)
+    with pytest.raises(ValueError, match=r"unknown categories \['pink'\] in column 1"):
+        model.predict(TABLE.assign(color="pink"))
+    with pytest.raises(ValueError, match="NaN"):
+        model.predict(TABLE.assign(size=np.nan))
+    with pytest.raises(ValueError, match="NaN"):
+        model.fit(TABLE.assign(color=None), TARGETS)
+    with pytest.raises(ValueError, match="infinity"):
+        model.partial_fit(TABLE.assign(size=np.inf), TARGETS)
+
+
+def test_words_without_a_coding_are_refused():
+    with pytest.raises(ValueError, match="could not convert string to float"):
+        SDNNRegressor().fit(TABLE, TARGETS)
+    with pytest.raises(ValueError, match="could not convert string to float"):
+        SDNNRegressor([(Circular(period=24.0), "hour"), ("symbolic", ["size"])]).fit(TABLE, TARGETS)
+
+
+def test_likeness_of_categories_generalizes():
+    """A category that was hardly met is answered like the one it is said to be like."""
+    kinds = np.array(["crow"] * 60 + ["cat"] * 60)
+    light = RANDOM.uniform(0, 1, 120)
+    table = np.array([[kind, x] for kind, x in zip(kinds, light, strict=True)], dtype=object)
+    likeness = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.9], [0.0, 0.9, 1.0]]
+    coding = CorrelationMatrix(matrix=likeness, categories=("cat", "crow", "raven"))
+    model = SDNNClassifier([(coding, 0)], n_pattern_units=1000, random_state=0)
+    model.fit(table, kinds == "crow")
+    ravens = np.array([["raven", x] for x in np.linspace(0, 1, 20)], dtype=object)
+    assert model.predict(ravens).all()
+
+
+def test_one_input_alone_has_the_plain_pattern():
+    x = np.linspace(0, 1, 101)[:, None]
+    y = np.sin(7 * x[:, 0])
+    coding = RandomInverse(length_scale=0.1)
+    model = SDNNRegressor(coding, n_pattern_units=1000, max_iter=300, random_state=0)
+    model.fit(x[::2], y[::2])
+    assert model.pairs_ == ((0, 0),)
+    assert set(np.unique(model.transform_code(x))) == {-1, 1}
+    assert model.score(x[1::2], y[1::2]) > 0.97
+
+
+def test_inputs_in_no_pair_are_ignored():
+    x = np.random.RandomState(0).uniform(size=(50, 3))
+    model = SDNNRegressor(pairs=[(0, 1), (1, None)], max_iter=3, **SMALL).fit(x, x[:, 0])
+    other = x.copy()
+    other[:, 2] = 0.5
+    np.testing.assert_array_equal(model.predict(x), model.predict(other))
+    assert model.transform_code(x).shape == (50, 2 * 256)
+
+
+def test_shared_tables_are_permuted_and_separate_ones_are_fresh():
+    codings = [RandomInverse(low=0, high=1).fit(np.array([0.0, 1.0]), 64)] * 3
+    pairs = input_pairs("all", None, 3)
+    shared = draw_input_code(codings, pairs, 64, "shared", 1)
+    assert len({id(table) for table in shared.modified}) == 3
+    for (_, nu), modifier in zip(pairs, shared.modifiers, strict=True):
+        plain = shared.modified[next(k for k, (mu, _) in enumerate(pairs) if mu == nu)]
+        assert not np.array_equal(plain, modifier)
+        np.testing.assert_array_equal(
+            np.sort(plain.view("S1").reshape(plain.shape).T.tolist(), axis=0),
+            np.sort(modifier.view("S1").reshape(plain.shape).T.tolist(), axis=0),
+        )
+    separate = draw_input_code(codings, pairs, 64, "separate", 1)
+    tables = [*separate.modified, *separate.modifiers]
+    assert len({table.tobytes() for table in tables}) == 12
+
+
+def test_values_beyond_the_range_count_as_its_ends():
+    x = np.random.RandomState(0).uniform(size=(80, 2))
+    model = SDNNRegressor(Anchor(low=0.0, high=1.0), max_iter=3, **SMALL).fit(x, x.sum(axis=1))
+    np.testing.assert_array_equal(model.predict([[-5, 1e300]]), model.predict([[0, 1]]))
+
+
+def test_a_symbolic_input_alone_is_a_lookup_table():
+    words = np.array([["a"], ["b"], ["c"], ["d"]], dtype=object)
+    model = SDNNClassifier("symbolic", n_pattern_units=100, random_state=0).fit(words, [0, 1, 1, 0])
+    assert model.predict(words).tolist() == [0, 1, 1, 0]
+    assert Symbolic().fit(words[:, 0], 100).size == 4

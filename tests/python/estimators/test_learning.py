@@ -1,0 +1,190 @@
+"""What the estimators learn: order, options, forms of training, both schemes, several outputs."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sklearn.datasets import load_iris
+
+from sdnn import SDNNClassifier, SDNNRegressor
+from sdnn.coding import RandomInverse
+
+RANDOM = np.random.RandomState(0)
+X = RANDOM.uniform(0, 1, (150, 2))
+Y = np.sin(5 * X[:, 0]) * X[:, 1]
+LABELS = np.digitize(Y, [-0.3, 0.3])
+
+UNIT = RandomInverse(low=0.0, high=1.0, length_scale=0.2)
+GIVEN = {"coding": UNIT, "n_pattern_units": 128, "random_state": 3}
+REGRESSOR = {**GIVEN, "output_range": (-1.5, 1.5), "n_output_units": 60}
+
+
+def same(one, other):
+    np.testing.assert_array_equal(one.weights_, other.weights_)
+    np.testing.assert_array_equal(one.thresholds_, other.thresholds_)
+
+
+def test_a_function_is_learned():
+    model = SDNNRegressor(UNIT, max_iter=300, random_state=0).fit(X, Y)
+    assert model.score(X, Y) > 0.999
+    fresh = np.random.RandomState(1).uniform(0.05, 0.95, (500, 2))
+    assert model.score(fresh, np.sin(5 * fresh[:, 0]) * fresh[:, 1]) > 0.97
+
+
+@pytest.mark.parametrize("scheme", ["one_vs_rest", "one_vs_one"])
+def test_classes_are_learned(scheme):
+    points, labels = load_iris(return_X_y=True)
+    model = SDNNClassifier(scheme=scheme, n_pattern_units=256, random_state=0)
+    model.fit(points[::2], labels[::2])
+    assert model.score(points[::2], labels[::2]) == 1
+    assert model.score(points[1::2], labels[1::2]) > 0.9
+    assert model.n_corrected_[-1] == 0
+    assert model.n_iter_ < 100
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.integers(1, 20), min_size=1, max_size=6), st.booleans())
+def test_partial_fit_in_any_portions_is_one_pass_of_fit(portions, regression):
+    n = sum(portions)
+    bounds = np.cumsum([0, *portions])
+    if regression:
+        whole = SDNNRegressor(**REGRESSOR, max_iter=1, shuffle=False).fit(X[:n], Y[:n])
+        parts = SDNNRegressor(**REGRESSOR)
+        for a, b in itertools.pairwise(bounds):
+            parts.partial_fit(X[a:b], Y[a:b])
+    else:
+        y = LABELS[:n].copy()
+        y[: min(3, n)] = [0, 1, 2][: min(3, n)]
+        classes = np.arange(3)
+        whole = SDNNClassifier(**GIVEN).partial_fit(X[:n], y, classes=classes)
+        if n >= 3:
+            same(whole, SDNNClassifier(**GIVEN, max_iter=1, shuffle=False).fit(X[:n], y))
+        parts = SDNNClassifier(**GIVEN)
+        for a, b in itertools.pairwise(bounds):
+            parts.partial_fit(X[a:b], y[a:b], classes=classes)
+    same(whole, parts)
+    assert parts.n_iter_ == len(portions)
+
+
+def test_epochs_are_passes_of_partial_fit():
+    fitted = SDNNRegressor(**REGRESSOR, max_iter=4, shuffle=False).fit(X, Y)
+    online = SDNNRegressor(**REGRESSOR)
+    for _ in range(4):
+        for x, y in zip(X, Y, strict=True):
+            online.partial_fit([x], [y])
+    same(fitted, online)
+    online.partial_fit(X, Y)
+    same(SDNNRegressor(**REGRESSOR, max_iter=5, shuffle=False).fit(X, Y), online)
+
+
+def test_partial_fit_goes_on_after_fit():
+    model = SDNNClassifier(**GIVEN, max_iter=2, shuffle=False).fit(X, LABELS)
+    same(
+        model.partial_fit(X, LABELS),
+        SDNNClassifier(**GIVEN, max_iter=3, shuffle=False).fit(X, LABELS),
+    )
+
+
+def test_partial_fit_needs_ranges_for_a_single_sample_and_known_labels():
+    with pytest.raises(ValueError, match="minimum of 2 is required"):
+        SDNNRegressor(coding=UNIT).partial_fit(X[:1], Y[:1])
+    model = SDNNClassifier(**GIVEN)
+    with pytest.raises(ValueError, match="classes must be given in the first call"):
+        model.partial_fit(X, LABELS)
+    with pytest.raises(ValueError, match=r"labels \[2\] that are not in classes"):
+        model.partial_fit(X, LABELS, classes=[0, 1])
+    model = SDNNClassifier(**GIVEN).partial_fit(X, LABELS, classes=[0, 1, 2])
+    with pytest.raises(ValueError, match="not those of the first call"):
+        model.partial_fit(X, LABELS, classes=[0, 1, 2, 3])
+    with pytest.raises(ValueError, match=r"labels \[7\]"):
+        model.partial_fit(X[:1], [7])
+    regressor = SDNNRegressor(**REGRESSOR).partial_fit(X, Y)
+    with pytest.raises(ValueError, match="y must have 1 outputs, got 2"):
+        regressor.partial_fit(X, np.stack([Y, Y], axis=1))
+
+
+@pytest.mark.parametrize("training", ["dual", "block", "plain"])
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_forms_and_threads_change_no_bit(training, n_jobs):
+    options = {"training": training, "n_jobs": n_jobs, "max_iter": 6}
+    same(
+        SDNNRegressor(**REGRESSOR, max_iter=6).fit(X, Y),
+        SDNNRegressor(**REGRESSOR, **options).fit(X, Y),
+    )
+    one = SDNNClassifier(**GIVEN, max_iter=6).fit(X, LABELS)
+    other = SDNNClassifier(**GIVEN, **options).fit(X, LABELS)
+    same(one, other)
+    assert other.training_form_ == training
+    np.testing.assert_array_equal(one.decision_function(X), other.decision_function(X))
+
+
+def test_orders_follow_from_the_random_state():
+    first = SDNNRegressor(**REGRESSOR, max_iter=2).fit(X, Y)
+    same(first, SDNNRegressor(**REGRESSOR, max_iter=2).fit(X, Y))
+    unshuffled = SDNNRegressor(**REGRESSOR, max_iter=2, shuffle=False).fit(X, Y)
+    assert not np.array_equal(first.weights_, unshuffled.weights_)
+
+
+def test_several_outputs_are_networks_side_by_side():
+    targets = np.stack([Y, 3 - 2 * X[:, 0]], axis=1)
+    model = SDNNRegressor(UNIT, n_pattern_units=256, max_iter=100, random_state=0)
+    model.fit(X, targets)
+    assert model.n_outputs_ == 2
+    assert model.predict(X).shape == (150, 2)
+    assert model.score(X, targets) > 0.99
+    assert model.output_range_.shape == (2, 2)
+    column = SDNNRegressor(**REGRESSOR, max_iter=2).fit(X, Y[:, None])
+    assert column.predict(X).shape == (150, 1)
+    same(column, SDNNRegressor(**REGRESSOR, max_iter=2).fit(X, Y))
+
+
+def test_outputs_are_steps_within_the_range():
+    model = SDNNRegressor(**REGRESSOR, max_iter=20).fit(X, Y)
+    counts = (model.predict(X) + 1.5) / (3 / 60)
+    np.testing.assert_allclose(counts, np.round(counts), atol=1e-9)
+    far = SDNNRegressor(**REGRESSOR, max_iter=20).fit(X, Y + 100).predict(X)
+    assert far.max() == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("kind", [SDNNRegressor, SDNNClassifier])
+def test_early_stopping_keeps_the_best_weights(kind):
+    targets = Y + RANDOM.normal(0, 0.3, len(Y)) if kind is SDNNRegressor else LABELS
+    options = {"coding": UNIT, "n_pattern_units": 128, "random_state": 1, "shuffle": False}
+    model = kind(**options, early_stopping=True, n_iter_no_change=4, max_iter=60)
+    model.fit(X, targets)
+    best = int(np.argmax(model.validation_scores_))
+    assert model.n_iter_ == len(model.validation_scores_) <= 60
+    again = kind(**options, early_stopping=True, n_iter_no_change=4, max_iter=best + 1)
+    same(model, again.fit(X, targets))
+    with pytest.raises(ValueError, match="too few for early stopping"):
+        kind(early_stopping=True, validation_fraction=0.9).fit(X[:2], [0, 1])
+
+
+@pytest.mark.parametrize("scheme", ["one_vs_rest", "one_vs_one"])
+@pytest.mark.parametrize("n_classes", [2, 4])
+def test_the_largest_decision_wins(scheme, n_classes):
+    labels = np.digitize(Y, np.quantile(Y, np.arange(1, n_classes) / n_classes))
+    model = SDNNClassifier(**GIVEN, scheme=scheme, max_iter=1).fit(X, labels)
+    decision = model.decision_function(X)
+    if n_classes == 2:
+        assert decision.shape == (150,)
+        np.testing.assert_array_equal(model.predict(X), (decision > 0).astype(int))
+    else:
+        assert decision.shape == (150, n_classes)
+        np.testing.assert_array_equal(model.predict(X), decision.argmax(axis=1))
+    n_units = n_classes if scheme == "one_vs_rest" else n_classes * (n_classes - 1) // 2
+    assert len(model.thresholds_) == n_units
+
+
+def test_one_versus_one_counts_votes():
+    labels = np.digitize(Y, [-0.3, 0.1, 0.3])
+    model = SDNNClassifier(**GIVEN, scheme="one_vs_one", max_iter=1).fit(X, labels)
+    potentials = model.network_.potentials(X, 1)
+    pairs = [(i, j) for i in range(4) for j in range(i + 1, 4)]
+    votes = np.zeros((len(X), 4))
+    for unit, (i, j) in enumerate(pairs):
+        votes[:, i] += potentials[:, unit] > 0
+        votes[:, j] += potentials[:, unit] <= 0
+    np.testing.assert_array_equal(np.round(model.decision_function(X)), votes)

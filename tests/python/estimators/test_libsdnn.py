@@ -1,0 +1,200 @@
+"""The same numbers as LIBSDNN, and readers of its files.
+
+Hashes and model files were made by LIBSDNN itself (commit 5a862cc, g++ 12, -O3), from the
+parameters and samples below; the hash is of thresholds and weights as its model file has them.
+"""
+
+import contextlib
+import hashlib
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sdnn.estimators import libsdnn
+
+FILES = Path(__file__).parents[1] / "reference" / "libsdnn_files"
+
+BLANKS = ((400, 600, 400, 600), (200, 800, 100, 300), (100, 200, 300, 700), (800, 900, 300, 700))
+
+PARAMETERS = """<ISSUE> % what to learn
+{
+\ttype = function_approximation
+\t<FA>
+\t{
+\t\toutput_range = [-0.2, 1.2]
+\t\trequired_step_size = 0.01 / 2
+\t}
+\tinput_number = 2
+}
+<SDNN>
+{
+\t<PC>
+\t{
+\t\tn = 2000
+\t\tinput_type_and_creation_method = [NUMERICAL(RANDOM_INVERSE(1001,5)):2]
+\t\trandom_seed = [1]
+\t}
+\t<SD>
+\t{
+\t\tcombination_setting = mutual
+\t}
+\t<NN>
+\t{
+\t\trandom_seed = [1]
+\t\tinitial_value_range = [-5, 5]
+\t}
+}
+"""
+
+
+def demonstration_sample(n_samples, state=1):
+    """Points of the lattice outside the blanks, by a linear congruential generator."""
+    points = []
+    targets = []
+    while len(points) < n_samples:
+        drawn = []
+        for _ in range(2):
+            state = (state * 6364136223846793005 + 1442695040888963407) % 2**64
+            drawn.append((state >> 33) % 1001)
+        i, j = drawn
+        if any(a <= i <= b and c <= j <= d for a, b, c, d in BLANKS):
+            continue
+        x, y = i / 1000, j / 1000
+        wave = (1 + x) / 2 * math.sin(6 * math.pi * math.sqrt(x) * y**2) ** 2
+        points.append((x, y))
+        targets.append(1.0 if (i - 500) ** 2 + (j - 500) ** 2 <= 200**2 else round(wave, 6))
+    return np.array(points), np.array(targets)
+
+
+def digest(layer):
+    rows = np.column_stack([layer.thresholds, layer.weights])
+    return hashlib.sha256(np.ascontiguousarray(rows, dtype="<i4").tobytes()).hexdigest()
+
+
+@pytest.fixture
+def parameter_file(tmp_path):
+    def write(*changes):
+        text = PARAMETERS
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        path = tmp_path / "parameters.txt"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("n_epochs", "expected"),
+    [
+        (20, "5131552d0ca2e546a88a3c93d723fbe5d4ec81508c7af141e63e8deb6f9f1870"),
+        (300, "4f4ce621e58d75b8191d3d0e35acf67a41e5e325a8bc0a299bfb66717f99caa1"),
+    ],
+)
+def test_the_demonstration_problem_has_libsdnns_weights(parameter_file, n_epochs, expected):
+    parameters = libsdnn.read_parameter_file(parameter_file())
+    assert parameters.n_output_units == 280
+    points, targets = demonstration_sample(2000)
+    layer = parameters.make_layer("libstdc++")
+    trainer = parameters.make_trainer(layer, points, targets)
+    for _ in range(n_epochs):
+        trainer.epoch(np.arange(2000))
+    trainer.synchronize()
+    assert digest(layer) == expected
+
+
+def test_the_two_libraries_draw_different_weights(parameter_file):
+    parameters = libsdnn.read_parameter_file(parameter_file(("n = 2000", "n = 40")))
+    layers = [parameters.make_layer(library) for library in ("libstdc++", "msvc")]
+    assert digest(layers[0]) != digest(layers[1])
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("one_vs_one", "2a1aa1d6"),
+        ("one_vs_rest", "60d6ed36"),
+    ],
+)
+def test_a_classifiers_model_file_is_read_and_trained_again(name, expected):
+    model = libsdnn.read_model_file(FILES / f"{name}.bin", "libstdc++")
+    assert model.parameters.scheme == name
+    assert (
+        model.parameters.inputs
+        == (libsdnn.LibsdnnInput(symbolic=False, n_bins=51, n_flipped=3),) * 2
+    )
+    assert model.parameters.pairs == ((0, 1), (1, 0))
+    assert model.parameters.pattern_seed == (7, 8, 9)
+    assert digest(model.layer).startswith(expected)
+    lattice = np.array(
+        [(x / 1000, y / 1000) for x in range(0, 1001, 25) for y in range(0, 1001, 25)]
+    )
+    predicted = model.predict(lattice)
+    truth = np.minimum((lattice[:, 0] * 2).astype(int) + 2 * (lattice[:, 1] * 2).astype(int), 3)
+    assert np.mean(predicted == truth) > 0.8
+
+
+def test_bins_are_cut_as_libsdnn_cuts_them(parameter_file):
+    symbols = (
+        "[NUMERICAL(RANDOM_INVERSE(1001,5)):2]",
+        "[NUMERICAL(RANDOM_INVERSE(10,5)), SYMBOLIC(RANDOM_INVERSE(4,5))]",
+    )
+    parameters = libsdnn.read_parameter_file(parameter_file(symbols))
+    given = [(0.0, 0), (0.0999, 1), (0.1, 3), (1.0, 4), (-3.0, -2), (2.0, 9)]
+    expected = [(0, 0), (0, 1), (1, 3), (9, 3), (0, 0), (9, 3)]
+    assert parameters.bins(given).tolist() == [list(pair) for pair in expected]
+    for bad in ([0.5, 0.5], [[0.5]], [[np.nan, 0.0]]):
+        with pytest.raises(ValueError, match="inputs must"):
+            parameters.bins(bad)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("input_number = 2", "input_number = 3"), "input_number = 3 items, got 2"),
+        (("input_number = 2", "input_number = two"), "input_number must be a number"),
+        (("input_number = 2", "input_number = 9^9^9^9"), "input_number must be a number"),
+        (("input_number = 2", "% input_number"), "must have the entry ISSUE / input_number"),
+        (("n = 2000", "n = 2001"), "n must be even"),
+        (("n = 2000", "n = 8"), "r of RANDOM_INVERSE must be a whole number in"),
+        (("[NUMERICAL(RANDOM_INVERSE(1001,5)):2]", "[NUMERICAL(TREE(1)):2]"), "got TREE"),
+        (("[NUMERICAL(RANDOM_INVERSE(1001,5)):2]", "NUMERICAL"), "must be a list in brackets"),
+        (("function_approximation", "clustering"), "got 'clustering'"),
+        (("[-0.2, 1.2]", "[1.2, -0.2]"), "output_range must be"),
+        (("[-5, 5]", "[5, -5]"), "initial_value_range must rise"),
+        (("mutual", "nobody"), "combination_setting must be"),
+        (("mutual", "file"), "filename must be a file"),
+        (("<SD>", "SD"), "must be a tag or name = value"),
+        (("<ISSUE> % what", "}\n<ISSUE> % what"), "line 1: } without a tag"),
+    ],
+)
+def test_bad_parameter_files_are_named(parameter_file, change, message):
+    with pytest.raises(ValueError, match=message):
+        libsdnn.read_parameter_file(parameter_file(change))
+
+
+def test_seeds_are_needed_to_reproduce(parameter_file):
+    path = parameter_file(("random_seed = [1]", "random_seed = hardware_entropy"))
+    parameters = libsdnn.read_parameter_file(path)
+    assert parameters.pattern_seed is None
+    with pytest.raises(ValueError, match="got hardware_entropy"):
+        parameters.make_layer()
+
+
+def test_broken_model_files_are_refused(tmp_path):
+    content = (FILES / "one_vs_one.bin").read_bytes()
+    path = tmp_path / "model.bin"
+    for broken in (b"", content[:3], content[:100], content[:-1], content + b"1234"):
+        path.write_bytes(broken)
+        with pytest.raises(ValueError, match="must"):
+            libsdnn.read_model_file(path)
+    random = np.random.default_rng(1)
+    for _ in range(300):  # one byte of the parameters changed: read, or refused
+        changed = bytearray(content)
+        changed[random.integers(600)] = random.integers(256)
+        path.write_bytes(changed)
+        with contextlib.suppress(ValueError, OverflowError):
+            libsdnn.read_model_file(path)

@@ -1,0 +1,221 @@
+"""The estimators keep scikit-learn's rules."""
+
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import sparse
+from sklearn.base import clone
+from sklearn.exceptions import NotFittedError
+from sklearn.model_selection import GridSearchCV, cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.utils.estimator_checks import check_estimator
+
+import sdnn
+from sdnn import SDNNClassifier, SDNNRegressor
+from sdnn.coding import Anchor, RandomInverse
+
+RANDOM = np.random.RandomState(0)
+X = RANDOM.uniform(-2, 3, (120, 3))
+Y = np.sin(X[:, 0]) + X[:, 1] * X[:, 2]
+LABELS = np.array(["low", "middle", "high"])[np.digitize(Y, [-0.5, 1.0])]
+
+SMALL = {"n_pattern_units": 64, "max_iter": 5, "random_state": 0}
+
+
+@pytest.fixture(params=[SDNNRegressor, SDNNClassifier])
+def estimator(request):
+    return request.param(**SMALL)
+
+
+def targets_of(estimator):
+    return Y if isinstance(estimator, SDNNRegressor) else LABELS
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(
+    "made",
+    [
+        SDNNRegressor(),
+        SDNNClassifier(),
+        SDNNClassifier(scheme="one_vs_one"),
+        SDNNRegressor("anchor", early_stopping=True, tables="separate", n_pattern_units=100),
+        SDNNClassifier(RandomInverse(spacing="quantile"), early_stopping=True, n_pattern_units=100),
+    ],
+    ids=["regressor", "classifier", "one-versus-one", "regressor-options", "classifier-options"],
+)
+def test_check_estimator_finds_nothing(made):
+    results = check_estimator(made, on_skip=None, on_fail=None)
+    other = {r["check_name"]: r["status"] for r in results if r["status"] != "passed"}
+    # This one asks for an environment variable that is read when SciPy is imported.
+    assert set(other) <= {"check_array_api_input"}, other
+    assert set(other.values()) <= {"skipped"}
+    assert len(results) > 45
+
+
+def test_importing_sdnn_imports_no_scikit_learn():
+    code = (
+        "import sys, sdnn, sdnn.coding, sdnn.kernel, sdnn.estimators\n"
+        "assert not {'sklearn', 'joblib', 'safetensors', 'scipy', 'matplotlib'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_without_scikit_learn_the_message_says_what_to_install():
+    code = (
+        "import sys\nsys.modules['sklearn'] = None; sys.modules['joblib'] = None\nimport sdnn\n"
+        "try: sdnn.SDNNRegressor\n"
+        "except ImportError as error: print(error)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert 'pip install "sdnn[sklearn]"' in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("bad", "error"),
+    [
+        (np.where(X > 2.9, np.nan, X), "contains NaN"),
+        (np.where(X > 2.9, np.inf, X), "infinity"),
+        (X[:, 0], "Expected 2D array"),
+        (X[:1], "minimum of 2 is required"),
+        (X[:0], "0 sample"),
+        (X[:, :0], "0 feature"),
+        (np.full(X.shape, "word"), "could not convert string to float"),
+        (X + 1j, "Complex data not supported"),
+        (X[:50], "inconsistent numbers of samples"),
+    ],
+    ids=["nan", "inf", "1d", "one", "none", "no-feature", "words", "complex", "short"],
+)
+def test_bad_samples_are_refused_as_scikit_learn_does(estimator, bad, error):
+    targets = targets_of(estimator)
+    n = len(bad) if "inconsistent" not in error else len(targets)
+    with pytest.raises(ValueError, match=error):
+        estimator.fit(bad, targets[:n])
+    options = {"classes": np.unique(LABELS)} if isinstance(estimator, SDNNClassifier) else {}
+    with pytest.raises(ValueError, match=error):
+        estimator.partial_fit(bad, targets[:n], **options)
+
+
+def test_sparse_samples_are_refused(estimator):
+    with pytest.raises(TypeError, match=r"[Ss]parse data was passed"):
+        estimator.fit(sparse.csr_matrix(X), targets_of(estimator))
+    estimator.fit(X, targets_of(estimator))
+    with pytest.raises(TypeError, match=r"[Ss]parse data was passed"):
+        estimator.predict(sparse.csr_matrix(X))
+
+
+def test_prediction_checks_its_samples(estimator):
+    with pytest.raises(NotFittedError):
+        estimator.predict(X)
+    estimator.fit(X, targets_of(estimator))
+    with pytest.raises(ValueError, match=r"X has 2 features, but .* is expecting 3 features"):
+        estimator.predict(X[:, :2])
+    with pytest.raises(ValueError, match="contains NaN"):
+        estimator.predict(np.full((1, 3), np.nan))
+
+
+def test_targets_are_checked():
+    with pytest.raises(ValueError, match="contains NaN"):
+        SDNNRegressor(**SMALL).fit(X, np.full(len(X), np.nan))
+    with pytest.raises(ValueError, match="Unknown label type"):
+        SDNNClassifier(**SMALL).fit(X, Y)
+    with pytest.raises(ValueError, match="one class"):
+        SDNNClassifier(**SMALL).fit(X, np.zeros(len(X)))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "error"),
+    [
+        ({"max_iter": 0}, "max_iter must be a whole number"),
+        ({"n_pattern_units": 63}, "n_pattern_units must be even"),
+        ({"n_pattern_units": 1}, "n_pattern_units must be a whole number"),
+        ({"training": "fast"}, "training must be one of 'auto'"),
+        ({"tables": "both"}, "tables must be 'shared' or 'separate'"),
+        ({"pairs": "some"}, "pairs must be 'all'"),
+        ({"pairs": []}, "pairs must not be empty"),
+        ({"pairs": [(0, 0)]}, "cannot modify itself"),
+        ({"pairs": [(0, 3)]}, "there is no number 3"),
+        ({"pairs": [("a", "b")]}, "no feature names"),
+        ({"coding": "unheard"}, "coding must be one of"),
+        ({"coding": "correlation-matrix"}, "needs a matrix"),
+        ({"coding": 3}, "coding must be"),
+        ({"coding": [("anchor", [0, 1]), ("circular", 1)]}, "more than one coding"),
+        ({"validation_fraction": 1.0}, "between 0 and 1"),
+        ({"n_iter_no_change": 0}, "n_iter_no_change"),
+        ({"memory_limit": -1}, "memory_limit"),
+        ({"coding": RandomInverse(low=1.0, high=1.0)}, "low < high"),
+        ({"coding": Anchor(n_anchor_patterns=1)}, "n_anchor_patterns"),
+    ],
+)
+def test_impossible_parameters_are_named(estimator, parameters, error):
+    with pytest.raises(ValueError, match=error):
+        estimator.set_params(**parameters).fit(X, targets_of(estimator))
+
+
+def test_parameters_of_one_estimator_are_named():
+    with pytest.raises(ValueError, match="scheme must be one of"):
+        SDNNClassifier(scheme="all").fit(X, LABELS)
+    for bad in ((1, 1), (0, 1, 2), [(0, 1), (0, 1)]):
+        with pytest.raises(ValueError, match="output_range must be"):
+            SDNNRegressor(output_range=bad).fit(X, Y)
+    with pytest.raises(ValueError, match="n_output_units"):
+        SDNNRegressor(n_output_units=0).fit(X, Y)
+
+
+def test_too_little_memory_for_a_form_is_said(estimator):
+    with pytest.raises(ValueError, match="memory"):
+        estimator.set_params(training="dual", memory_limit=1000).fit(X, targets_of(estimator))
+
+
+def test_feature_names_are_kept_and_compared(estimator):
+    table = pd.DataFrame(X, columns=["a", "b", "c"])
+    estimator.fit(table, targets_of(estimator))
+    assert estimator.feature_names_in_.tolist() == ["a", "b", "c"]
+    assert estimator.n_features_in_ == 3
+    with pytest.raises(ValueError, match="feature names"):
+        estimator.predict(table[["c", "b", "a"]])
+
+
+def test_a_constant_feature_is_no_information(estimator):
+    table = np.column_stack([X, np.full(len(X), 7.0)])
+    estimator.fit(table, targets_of(estimator))
+    changed = table + np.array([0, 0, 0, 5.0])
+    np.testing.assert_array_equal(estimator.predict(table), estimator.predict(changed))
+
+
+def test_copies_and_pickles_predict_the_same(estimator):
+    estimator.fit(X, targets_of(estimator))
+    same = pickle.loads(pickle.dumps(estimator))
+    np.testing.assert_array_equal(same.predict(X), estimator.predict(X))
+    np.testing.assert_array_equal(same.weights_, estimator.weights_)
+    assert clone(estimator).get_params() == estimator.get_params()
+    np.testing.assert_array_equal(
+        clone(estimator).fit(X, targets_of(estimator)).weights_, estimator.weights_
+    )
+
+
+def test_it_works_where_scikit_learn_puts_it(estimator):
+    targets = targets_of(estimator)
+    pipeline = make_pipeline(StandardScaler(), estimator)
+    assert cross_val_score(pipeline, X, targets, cv=3).shape == (3,)
+    grid = {"coding": [RandomInverse(length_scale=0.5), "anchor"]}
+    assert GridSearchCV(estimator, grid, cv=3).fit(X, targets).best_params_["coding"] is not None
+
+
+def test_progress_is_shown_when_asked_for(estimator, capsys):
+    estimator.set_params(verbose=1).fit(X, targets_of(estimator))
+    assert "training" in capsys.readouterr().out
+    estimator.set_params(verbose=0).fit(X, targets_of(estimator))
+    assert capsys.readouterr().out == ""
+
+
+def test_the_rooms_name_what_they_hold():
+    assert set(sdnn.estimators.__all__) <= set(dir(sdnn.estimators))
+    for name in sdnn.estimators.__all__:
+        assert getattr(sdnn.estimators, name) is not None
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        _ = sdnn.estimators.nothing
