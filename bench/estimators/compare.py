@@ -71,7 +71,7 @@ def chosen(model):
 
 def demonstration(path, n_seeds):
     """One training sample, the full lattice."""
-    rows = Rows(path, ("system", "seed"), ("train", "predict", "all", "data", "blank", "chosen"))
+    rows = Rows(path, ("system", "seed"), ("all", "data", "blank", "chosen"))
     points = lattice()
     X = training_points(2000, seed=0)
     y = target(X)
@@ -91,19 +91,15 @@ def demonstration(path, n_seeds):
         for name, model in candidates.items():
             if rows.has(name, seed) or (seed > 0 and name in ONCE) or (seed > 0 and "MLP" in name):
                 continue
-            start = time.process_time()
             model.fit(X, y)
-            train = getattr(model, "refit_time_", time.process_time() - start)
-            start = time.process_time()
             predicted = np.concatenate(
                 [
                     model.predict(part)
                     for part in np.array_split(points, 1 if "SDNN," in name else 50)
                 ]
             )
-            predict = time.process_time() - start
             wrong = (round(value, 5) for value in errors(points, predicted))
-            rows.add(name, seed, round(train, 3), round(predict, 3), *wrong, chosen(model))
+            rows.add(name, seed, *wrong, chosen(model))
 
 
 def useless(path, n_seeds):

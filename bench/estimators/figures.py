@@ -104,6 +104,8 @@ def useless_figure(rows):
         axes.plot(numbers, means, color=color, marker=marker, markersize=5, label=name)
         for number in numbers:
             values = found[name][number]
+            if len(values) == 1:
+                continue
             offset = (shift - 2) * 0.07
             axes.plot([number + offset] * len(values), values, ".", color=color, markersize=4,
                       alpha=0.5)  # fmt: skip
@@ -117,15 +119,13 @@ def useless_figure(rows):
 
 
 def demonstration_table(rows):
-    print("\n| system | train, s | predict, s | RMSE all | data | blank |")
-    print("|---|---|---|---|---|---|")
+    print("\n| system | RMSE all | data | blank |\n|---|---|---|---|")
     found = defaultdict(list)
     for row in rows:
         found[row["system"]].append(row)
     for name, group in sorted(found.items(), key=lambda item: mean_of(item[1], "all")):
-        seconds = [f"{mean_of(group, key):.2g}" for key in ("train", "predict")]
         wrong = [spread_of(group, key) for key in ("all", "data", "blank")]
-        print("|", " | ".join([f"{name} ({len(group)})", *seconds, *wrong]), "|")
+        print("|", " | ".join([name, *wrong]), "|")
 
 
 def mean_of(group, key):

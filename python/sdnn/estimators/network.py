@@ -12,8 +12,6 @@ from sdnn.estimators.input_code import InputCode
 
 __all__ = ["Network"]
 
-LARGEST_SEED = 2**64 - 1
-
 
 class Network:
     """N units over the code of the inputs; weights and thresholds are exact integers.
