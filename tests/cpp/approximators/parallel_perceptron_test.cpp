@@ -122,6 +122,20 @@ TEST(ParallelPerceptron, AWeightOutsideAByteIsCarried) {
   EXPECT_EQ(p.weight(0, 0), 0);
 }
 
+// The list is kept as long as adding it is quicker than a second layer of bytes.
+TEST(ParallelPerceptron, ALargerNetworkListsMoreCarries) {
+  ParallelPerceptron p(64, 10000);  // 640,000 bytes: 5,000 carries
+  for (std::size_t j = 0; j < 5000; ++j) p.set_weight(7, j, 200);
+  EXPECT_EQ(p.n_carries(), 5000U);
+  EXPECT_FALSE(p.has_high_bytes());
+  p.set_weight(8, 0, -200);
+  EXPECT_TRUE(p.has_high_bytes());
+  coding::SignedColumns x{.positive = {0}, .negative = {9999, 4999}};
+  const auto h = potentials(p, x);
+  EXPECT_EQ(h[7], 0);
+  EXPECT_EQ(h[8], -200);
+}
+
 // Going to and fro never needs more than a byte, however often it happens.
 TEST(ParallelPerceptron, CorrectionsThatCancelStayInAByte) {
   ParallelPerceptron p(70, 5);

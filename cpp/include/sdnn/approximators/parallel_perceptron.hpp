@@ -45,7 +45,8 @@ class ParallelPerceptron {
     n_blocks_ = core::round_up(n_units, kBlockUnits) / kBlockUnits;
     bytes_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * n_columns * kBlockUnits);
     high_bytes_ = core::AlignedBuffer<std::int8_t>(bytes_.size());  // untouched until needed
-    carries_.reserve(kMostCarries);
+    most_carries_ = std::max(kFewCarries, bytes_.size() / kBytesPerCarry);
+    carries_.reserve(most_carries_);
     may_carry_.assign(n_units, 0);
     thresholds_.assign(n_units, 0);
     largest_weight_.assign(n_units, 0);
@@ -156,7 +157,9 @@ class ParallelPerceptron {
   static constexpr std::int32_t kCarry = 128;
   static constexpr std::int32_t kWeightLimit = kByteLimit * kCarry + kByteLimit;
   static constexpr int kLargestGroup = 4;
-  static constexpr std::size_t kMostCarries = 4096;
+  /// Adding a listed carry takes about as long as adding that many bytes of a second layer.
+  static constexpr std::size_t kBytesPerCarry = 128;
+  static constexpr std::size_t kFewCarries = 4096;
 
   /// What a weight exceeds its byte by: a multiple of kCarry, not 0.
   struct Carry {
@@ -251,7 +254,7 @@ class ParallelPerceptron {
   }
 
   void add_carry(std::size_t unit, std::size_t column, std::int32_t change) {
-    if (!has_high_bytes_ && carries_.size() == kMostCarries) spread_carries();
+    if (!has_high_bytes_ && carries_.size() == most_carries_) spread_carries();
     if (has_high_bytes_) {
       std::int8_t& high = high_bytes_[byte_index(unit, column)];
       high = static_cast<std::int8_t>(high + change);
@@ -339,6 +342,7 @@ class ParallelPerceptron {
   core::AlignedBuffer<std::int8_t> bytes_;  ///< [block][column][unit in block]
   core::AlignedBuffer<std::int8_t> high_bytes_;
   bool has_high_bytes_ = false;
+  std::size_t most_carries_ = 0;
   std::vector<Carry> carries_;              ///< sorted by unit and column
   std::vector<std::uint8_t> may_carry_;     ///< whether a unit ever had a carry
   std::vector<std::int32_t> thresholds_;

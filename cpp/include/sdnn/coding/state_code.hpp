@@ -210,11 +210,17 @@ class StateCode {
  private:
   /// Two groups with one modifier as half their sum and half their difference.
   struct PairWords {
-    PairWords(const Pattern& modifier, const Pattern& x_1, const Pattern& x_2) noexcept
-        : sum_plus((modifier & x_1 & x_2).words()),
-          sum_minus((modifier & ~(x_1 | x_2)).words()),
-          difference_plus((modifier & x_1 & ~x_2).words()),
-          difference_minus((modifier & x_2 & ~x_1).words()) {}
+    PairWords(const Pattern& modifier, const Pattern& x_1, const Pattern& x_2) noexcept {
+      const auto active = modifier.words();
+      const auto positive_1 = x_1.words();
+      const auto positive_2 = x_2.words();
+      for (std::size_t w = 0; w < active.size(); ++w) {
+        sum_plus[w] = active[w] & positive_1[w] & positive_2[w];
+        sum_minus[w] = active[w] & ~(positive_1[w] | positive_2[w]);
+        difference_plus[w] = active[w] & positive_1[w] & ~positive_2[w];
+        difference_minus[w] = active[w] & positive_2[w] & ~positive_1[w];
+      }
+    }
 
     typename Pattern::Words sum_plus;
     typename Pattern::Words sum_minus;
