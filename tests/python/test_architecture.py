@@ -30,7 +30,7 @@ PYTHON_MODULES = {
     "__init__": "sdnn",
     "__main__": "sdnn",
     "cli": "sdnn",
-    "choices": "core",
+    "arguments": "core",
     "kernel": "coding",
     "instruction_sets": "core",
 }

@@ -13,7 +13,7 @@ from sdnn import _core
 from sdnn.agents.spaces import BoxRange, UnitObservations
 from sdnn.agents.transition import Transition
 from sdnn.approximators.fuzzy_rules import FuzzyRulesConfig
-from sdnn.choices import choice
+from sdnn.arguments import choice, seed_of
 
 __all__ = ["FuzzyQLearning", "FuzzyQLearningConfig"]
 
@@ -48,7 +48,7 @@ class FuzzyQLearningConfig:
     def to_core(self) -> _core.FuzzyQLearningConfig:
         """Make the core's struct of the same values; ValueError for an unknown ``tie_rule``."""
         fields = dataclasses.asdict(self)
-        fields["tie_rule"] = choice(_core.TieRule.__members__, "tie_rule", self.tie_rule)
+        fields["tie_rule"] = choice("tie_rule", self.tie_rule, _core.TieRule.__members__)
         return _core.FuzzyQLearningConfig(**fields)
 
 
@@ -113,7 +113,7 @@ class FuzzyQLearning:
         )
         self.learning = learning or FuzzyQLearningConfig()
         self._core = _core.FuzzyQLearning(
-            rules=self.rules.to_core(), learning=self.learning.to_core(), seed=seed
+            rules=self.rules.to_core(), learning=self.learning.to_core(), seed=seed_of(seed)
         )
         self._taken: tuple[float, float] | None = None  # the action as given away, and its share
 

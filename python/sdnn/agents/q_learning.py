@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Literal, TypeAlias
+from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
 import gymnasium as gym
 import numpy as np
@@ -14,7 +14,7 @@ from sdnn.agents.spaces import DiscreteActions, EvenActions, UnitObservations, d
 from sdnn.agents.transition import Transition
 from sdnn.approximators.rbf_network import RBFNetworkConfig
 from sdnn.approximators.sdnn_c import SDNNCConfig
-from sdnn.choices import choice
+from sdnn.arguments import choice, seed_of
 
 __all__ = ["QLearningConfig", "RBFQLearning", "SDNNQLearning"]
 
@@ -47,22 +47,37 @@ class QLearningConfig:
     def to_core(self) -> _core.QLearningConfig:
         """Make the core's struct of the same values; ValueError for an unknown ``tie_rule``."""
         fields = dataclasses.asdict(self)
-        fields["tie_rule"] = choice(_core.TieRule.__members__, "tie_rule", self.tie_rule)
+        fields["tie_rule"] = choice("tie_rule", self.tie_rule, _core.TieRule.__members__)
         return _core.QLearningConfig(**fields)
 
 
 CoreAgent: TypeAlias = _core.SdnnQLearning | _core.RbfQLearning
 """The agents of the C++ core."""
 
+NetworkConfig = TypeVar("NetworkConfig", SDNNCConfig, RBFNetworkConfig)
 
-class _QLearning:
+
+class _QLearning(Generic[NetworkConfig]):
     """What Q-learning with any approximator has in common: spaces in, spaces out."""
 
-    action_space: gym.Space[Any]
-    learning: QLearningConfig
     _core: CoreAgent
-    _scaled: UnitObservations
     _actions: DiscreteActions | EvenActions
+
+    def _fit_to_spaces(
+        self,
+        observation_space: gym.Space[Any],
+        action_space: gym.Space[Any],
+        network: NetworkConfig,
+        learning: QLearningConfig | None,
+    ) -> None:
+        """Keep the configurations, of the size that the spaces ask for."""
+        self._scaled = UnitObservations(observation_space)
+        network = dataclasses.replace(network, n_inputs=self._scaled.n_inputs)
+        if isinstance(action_space, gym.spaces.Discrete):
+            network = dataclasses.replace(network, n_actions=int(action_space.n))
+        self.action_space = action_space
+        self.network: NetworkConfig = network
+        self.learning = learning or QLearningConfig()
 
     @property
     def core(self) -> CoreAgent:
@@ -126,7 +141,7 @@ class _QLearning:
         return self._core.network.values(self._scaled("observation", observation))
 
 
-class SDNNQLearning(_QLearning):
+class SDNNQLearning(_QLearning[SDNNCConfig]):
     """An agent that learns Q(s, a) with SDNN-C, one transition at a time.
 
     Observations are scaled to [0, 1] by the bounds of the observation space; values outside
@@ -177,21 +192,15 @@ class SDNNQLearning(_QLearning):
         learning: QLearningConfig | None = None,
         seed: int = 0,
     ) -> None:
-        self._scaled = UnitObservations(observation_space)
-        network = dataclasses.replace(network or SDNNCConfig(), n_inputs=self._scaled.n_inputs)
-        if isinstance(action_space, gym.spaces.Discrete):
-            network = dataclasses.replace(network, n_actions=int(action_space.n))
-        self.action_space = action_space
-        self.network = network
-        self.learning = learning or QLearningConfig()
-        n_windows = network.n_hidden_units - network.n_active_units + 1
-        self._actions = discrete_actions(action_space, network.n_actions or n_windows)
+        self._fit_to_spaces(observation_space, action_space, network or SDNNCConfig(), learning)
+        n_windows = self.network.n_hidden_units - self.network.n_active_units + 1
+        self._actions = discrete_actions(action_space, self.network.n_actions or n_windows)
         self._core = _core.SdnnQLearning(
-            network=self.network.to_core(), learning=self.learning.to_core(), seed=seed
+            network=self.network.to_core(), learning=self.learning.to_core(), seed=seed_of(seed)
         )
 
 
-class RBFQLearning(_QLearning):
+class RBFQLearning(_QLearning[RBFNetworkConfig]):
     """An agent that learns Q(s, a) with an RBF network, one transition at a time.
 
     It is the baseline whose cost the paper quotes: normalized Gaussians on an even grid over state
@@ -243,14 +252,10 @@ class RBFQLearning(_QLearning):
         learning: QLearningConfig | None = None,
         seed: int = 0,
     ) -> None:
-        self._scaled = UnitObservations(observation_space)
-        network = dataclasses.replace(network or RBFNetworkConfig(), n_inputs=self._scaled.n_inputs)
-        if isinstance(action_space, gym.spaces.Discrete):
-            network = dataclasses.replace(network, n_actions=int(action_space.n))
-        self.action_space = action_space
-        self.network = network
-        self.learning = learning or QLearningConfig()
-        self._actions = discrete_actions(action_space, network.n_actions)
+        self._fit_to_spaces(
+            observation_space, action_space, network or RBFNetworkConfig(), learning
+        )
+        self._actions = discrete_actions(action_space, self.network.n_actions)
         self._core = _core.RbfQLearning(
-            network=self.network.to_core(), learning=self.learning.to_core(), seed=seed
+            network=self.network.to_core(), learning=self.learning.to_core(), seed=seed_of(seed)
         )

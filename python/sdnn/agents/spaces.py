@@ -50,12 +50,13 @@ class BoxRange:
 
     def number(self, action: Any) -> float:
         """Read an action; ValueError unless it is one number in the range."""
-        value = np.asarray(action, dtype=np.float64)
-        if value.size != 1 or not self.low <= value.item() <= self.high:
+        value = np.asarray(action)
+        is_number = value.size == 1 and value.dtype.kind in "biuf"
+        if not is_number or not self.low <= value.item() <= self.high:
             raise ValueError(
-                f"action must be one number in [{self.low}, {self.high}], got {action}"
+                f"action must be one number in [{self.low}, {self.high}], got {action!r}"
             )
-        return value.item()
+        return float(value.item())
 
 
 class EvenActions:
@@ -103,10 +104,12 @@ class DiscreteActions:
 
     def index(self, action: Any) -> int:
         """Find the action's number; ValueError if the space does not hold it."""
-        index = int(action) - int(self._space.start)
-        if not 0 <= index < self.n_actions:
-            raise ValueError(f"action must be in {self._space}, got {action}")
-        return index
+        value = np.asarray(action)
+        start = int(self._space.start)
+        is_whole = value.size == 1 and value.dtype.kind in "biuf" and value.item() % 1 == 0
+        if not is_whole or not 0 <= int(value.item()) - start < self.n_actions:
+            raise ValueError(f"action must be in {self._space}, got {action!r}")
+        return int(value.item()) - start
 
 
 def discrete_actions(space: gym.Space[Any], n_actions: int) -> DiscreteActions | EvenActions:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.choices import choice
+from sdnn.arguments import choice, seed_of
 
 __all__ = ["SDNNC", "SDNNCConfig"]
 
@@ -92,7 +92,7 @@ class SDNNCConfig:
         fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         fields["circular"] = list(self.circular)
         fields["initial_weights"] = choice(
-            _core.InitialWeights.__members__, "initial_weights", self.initial_weights
+            "initial_weights", self.initial_weights, _core.InitialWeights.__members__
         )
         return _core.SdnnCConfig(**fields)
 
@@ -128,7 +128,7 @@ class SDNNC:
 
     def __init__(self, config: SDNNCConfig | None = None, *, seed: int = 0) -> None:
         self.config = config if config is not None else SDNNCConfig()
-        self._core = _core.SdnnC(self.config.to_core(), seed)
+        self._core = _core.SdnnC(self.config.to_core(), seed_of(seed))
 
     @property
     def _lattice_step(self) -> np.float64:

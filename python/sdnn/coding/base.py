@@ -1,4 +1,4 @@
-"""What every coding can do, and what its arguments have to satisfy."""
+"""What every coding can do."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Coding", "known", "whole"]
+__all__ = ["Coding", "known"]
 
 Value = TypeVar("Value")
 
@@ -78,16 +78,3 @@ def known(value: Value | None) -> Value:
     if value is None:
         raise ValueError("this coding is not fitted yet: call fit first")
     return value
-
-
-def whole(name: str, value: int, low: int, high: int) -> int:
-    """Check that an argument is a whole number within bounds.
-
-    >>> whole("n_bins", 1, 2, 65535)
-    Traceback (most recent call last):
-    ValueError: n_bins must be a whole number in [2, 65535], got 1
-    """
-    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not is_whole or not low <= value <= high:
-        raise ValueError(f"{name} must be a whole number in [{low}, {high}], got {value!r}")
-    return int(value)

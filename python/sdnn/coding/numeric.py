@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.coding.base import Coding, known, whole
+from sdnn.arguments import one_of, real, whole
+from sdnn.coding.base import Coding, known
 from sdnn.coding.ranges import (
     Knots,
     bins_of_positions,
@@ -71,11 +72,10 @@ class RandomInverse(Coding):
 
     def fit(self, column: NDArray[Any], n_units: int) -> RandomInverse:
         """Return a copy with range, ``n_bins`` and ``n_flipped`` known; see `Coding.fit`."""
-        if self.spacing not in ("even", "quantile"):
-            raise ValueError(f"spacing must be 'even' or 'quantile', got {self.spacing!r}")
+        one_of("spacing", self.spacing, ("even", "quantile"))
         if self.spacing == "quantile" and not (self.low is None and self.high is None):
             raise ValueError("low and high cannot be given with spacing='quantile'")
-        if not 0 < self.length_scale < math.inf:
+        if not 0 < real("length_scale", self.length_scale) < math.inf:
             raise ValueError(f"length_scale must be positive, got {self.length_scale!r}")
         values = numbers(column)
         low, high = learned_range(values, self.low, self.high)
@@ -223,7 +223,9 @@ class Circular(Coding):
         """Return itself, checked: nothing is learned; see `Coding.fit`."""
         check_anchors(self.n_anchor_patterns, self.n_interpolated)
         numbers(column)
-        if not 0 < self.period < math.inf or not math.isfinite(self.origin):
+        if not 0 < real("period", self.period) < math.inf or not math.isfinite(
+            real("origin", self.origin)
+        ):
             raise ValueError(
                 f"period must be positive and origin finite, got {self.period!r} and "
                 f"{self.origin!r}"

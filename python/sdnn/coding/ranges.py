@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.arguments import real
+
 __all__ = ["MAX_KNOTS", "bins_of_positions", "learned_range", "positions", "quantile_knots"]
 
 MAX_KNOTS = 129
@@ -27,8 +29,8 @@ def learned_range(
         If the ends are not finite or in the wrong order.
     """
     ends = (
-        float(np.min(column)) if low is None else float(low),
-        float(np.max(column)) if high is None else float(high),
+        float(np.min(column)) if low is None else real("low", low),
+        float(np.max(column)) if high is None else real("high", high),
     )
     given = low is not None and high is not None
     if not all(map(math.isfinite, ends)) or (given and ends[0] >= ends[1]):

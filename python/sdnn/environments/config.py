@@ -7,7 +7,7 @@ import math
 from typing import Literal
 
 from sdnn import _core
-from sdnn.choices import choice
+from sdnn.arguments import choice
 
 __all__ = ["AcrobotConfig", "GoalScheduleConfig", "SensorConfig"]
 
@@ -80,7 +80,7 @@ class AcrobotConfig:
     def to_core(self) -> _core.AcrobotConfig:
         """Make the core's struct of the same values; ValueError for an unknown ``goal_test``."""
         fields = dataclasses.asdict(self)
-        fields["goal_test"] = choice(_core.GoalTest.__members__, "goal_test", self.goal_test)
+        fields["goal_test"] = choice("goal_test", self.goal_test, _core.GoalTest.__members__)
         return _core.AcrobotConfig(**fields)
 
 
@@ -111,7 +111,7 @@ class GoalScheduleConfig:
     def to_core(self) -> _core.GoalScheduleConfig:
         """Make the core's struct of the same values; ValueError for an unknown ``kind``."""
         fields = dataclasses.asdict(self)
-        fields["kind"] = choice(_core.GoalScheduleKind.__members__, "kind", self.kind)
+        fields["kind"] = choice("kind", self.kind, _core.GoalScheduleKind.__members__)
         return _core.GoalScheduleConfig(**fields)
 
 

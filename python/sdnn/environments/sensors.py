@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.choices import choice
+from sdnn.arguments import choice, seed_of
 
 __all__ = ["NoisySensors", "RedundantSensors"]
 
@@ -64,7 +64,7 @@ class RedundantSensors(
         space = _vector_space(env)
         self.functions = tuple(functions)
         self._functions = tuple(
-            function if callable(function) else choice(_NAMED, "functions", function)
+            function if callable(function) else choice("functions", function, _NAMED)
             for function in functions
         )
         if bounds is None:
@@ -142,9 +142,9 @@ class NoisySensors(
         if len(words) != n_channels:
             raise ValueError(f"edge must have {n_channels} entries, got {len(words)}")
         self.sigma = sigma
-        self._edges = [choice(_core.SensorEdge.__members__, "edge", word) for word in words]
+        self._edges = [choice("edge", word, _core.SensorEdge.__members__) for word in words]
         self._stream = choice(
-            {name: _core.Stream.__members__[name] for name in _STREAMS}, "stream", stream
+            "stream", stream, {name: _core.Stream.__members__[name] for name in _STREAMS}
         )
         self._restart(seed)
         self.observation_space = gym.spaces.Box(0.0, 1.0, (n_channels,), _float_type(space))
@@ -163,9 +163,7 @@ class NoisySensors(
         return noisy.astype(observation.dtype)
 
     def _restart(self, seed: int) -> None:
-        if not 0 <= seed < 2**64:
-            raise ValueError(f"seed must be in [0, 2**64), got {seed}")
-        self._noise = _core.SensorNoise(self.sigma, self._edges, seed, self._stream)
+        self._noise = _core.SensorNoise(self.sigma, self._edges, seed_of(seed), self._stream)
 
 
 _STREAMS = ("sensor_noise", "evaluation_sensor_noise")

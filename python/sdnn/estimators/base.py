@@ -13,24 +13,19 @@ from sklearn.base import BaseEstimator
 from sklearn.utils import assert_all_finite, check_random_state
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from sdnn.arguments import one_of, real, whole
 from sdnn.coding import Coding, RandomInverse, coding_named
-from sdnn.coding.base import whole
 from sdnn.estimators.columns import codings_of_columns, input_pairs
 from sdnn.estimators.input_code import draw_input_code, pattern_units_for
 from sdnn.estimators.network import Network
 from sdnn.estimators.training import Trainer, run_epochs
 
-__all__ = ["BaseSDNN", "check_choice"]
+__all__ = ["BaseSDNN"]
 
 Self = TypeVar("Self", bound="BaseSDNN")
 TRAINING = ("auto", "dual", "block", "plain")
+TABLES = ("shared", "separate")
 LARGEST = 2**62
-
-
-def check_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:
-    """ValueError unless the value is one of the words."""
-    if value not in choices:
-        raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}")
 
 
 class BaseSDNN(BaseEstimator):
@@ -59,8 +54,9 @@ class BaseSDNN(BaseEstimator):
         whole("max_iter", self.max_iter, 1, LARGEST)
         whole("n_iter_no_change", self.n_iter_no_change, 1, LARGEST)
         whole("memory_limit", self.memory_limit, 0, LARGEST)
-        check_choice("training", self.training, TRAINING)
-        if not 0 < self.validation_fraction < 1:
+        one_of("training", self.training, TRAINING)
+        one_of("tables", self.tables, TABLES)
+        if not 0 < real("validation_fraction", self.validation_fraction) < 1:
             raise ValueError(
                 f"validation_fraction must be between 0 and 1, got {self.validation_fraction!r}"
             )

@@ -10,7 +10,8 @@ from sklearn.base import ClassifierMixin
 from sklearn.utils.multiclass import check_classification_targets, unique_labels
 
 from sdnn import _core
-from sdnn.estimators.base import BaseSDNN, check_choice
+from sdnn.arguments import one_of
+from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.training import Trainer
 
 __all__ = ["SDNNClassifier"]
@@ -235,7 +236,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         return table, y
 
     def _begin(self, X: Any, table: NDArray[Any], classes: Any) -> np.random.RandomState:
-        check_choice("scheme", self.scheme, SCHEMES)
+        one_of("scheme", self.scheme, SCHEMES)
         self.classes_ = classes
         n_classes = len(self.classes_)
         if n_classes < 2:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import RegressorMixin
 
 from sdnn import _core
-from sdnn.coding.base import whole
+from sdnn.arguments import whole
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.training import Trainer
 

@@ -326,8 +326,15 @@ def test_bad_observations_are_named_and_teach_nothing(observation, message):
         (TORQUES, [np.nan]),
         (TORQUES, [0.0, 0.0]),
         (TORQUES, []),
+        (TORQUES, "left"),
+        (TORQUES, None),
         (BUTTONS, 1),
         (BUTTONS, 6),
+        (BUTTONS, 2.7),
+        (BUTTONS, np.nan),
+        (BUTTONS, "left"),
+        (BUTTONS, None),
+        (BUTTONS, [2, 3]),
     ],
 )
 def test_bad_actions_are_named_and_teach_nothing(actions, action):

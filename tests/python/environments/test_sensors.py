@@ -114,7 +114,7 @@ def test_bad_arguments():
         NoisySensors(env, edge="clip")
     with pytest.raises(ValueError, match="edge must have 4 entries, got 2"):
         NoisySensors(env, edge=("wrap", "wrap"))
-    with pytest.raises(ValueError, match="seed must be in"):
+    with pytest.raises(ValueError, match=r"seed must be a whole number in \[0, 1\d+\], got -1"):
         NoisySensors(env, seed=-1)
     with pytest.raises(ValueError, match="stream must be one of"):
         NoisySensors(env, stream="weights")

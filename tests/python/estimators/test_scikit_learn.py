@@ -134,7 +134,7 @@ def test_targets_are_checked():
         ({"n_pattern_units": 63}, "n_pattern_units must be even"),
         ({"n_pattern_units": 1}, "n_pattern_units must be a whole number"),
         ({"training": "fast"}, "training must be one of 'auto'"),
-        ({"tables": "both"}, "tables must be 'shared' or 'separate'"),
+        ({"tables": "both"}, "tables must be one of 'shared', 'separate'"),
         ({"pairs": "some"}, "pairs must be 'all'"),
         ({"pairs": []}, "pairs must not be empty"),
         ({"pairs": [(0, 0)]}, "cannot modify itself"),
