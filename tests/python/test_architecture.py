@@ -33,6 +33,7 @@ PYTHON_MODULES = {
     "arguments": "core",
     "kernel": "coding",
     "instruction_sets": "core",
+    "whole_files": "core",
 }
 """The room of every module at the top of the Python package."""
 

@@ -36,7 +36,7 @@ def coding_named(coding: str | Coding) -> Coding:
     if coding == CorrelationMatrix.name:
         raise ValueError("'correlation-matrix' needs a matrix: use CorrelationMatrix(matrix=...)")
     if not isinstance(coding, str) or coding not in CODINGS:
-        names = ", ".join(map(repr, CODINGS))
+        names = ", ".join(repr(name) for name in CODINGS if name != CorrelationMatrix.name)
         raise ValueError(f"coding must be one of {names} or a Coding object, got {coding!r}")
     return CODINGS[coding]()
 

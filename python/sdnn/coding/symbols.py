@@ -139,20 +139,18 @@ class CorrelationMatrix(Coding):
     def fit(self, column: NDArray[Any], n_units: int) -> CorrelationMatrix:
         """Return a copy with the categories known; see `Coding.fit`."""
         matrix = np.array(self.matrix)
-        if (
-            matrix.ndim != 2
-            or matrix.shape[0] != matrix.shape[1]
-            or not np.array_equal(matrix, matrix.T)
-            or not np.all(np.diag(matrix) == 1)
-            or not np.all(np.abs(matrix) <= 1)
-        ):
+        if matrix.shape[0] != matrix.shape[1] or not np.array_equal(matrix, matrix.T):
+            raise ValueError(f"matrix must be square and symmetric, got {matrix.tolist()}")
+        if not np.all(np.diag(matrix) == 1) or not np.all(np.abs(matrix) <= 1):
             raise ValueError(
-                "matrix must be square and symmetric with ones on its diagonal and entries in "
-                f"[-1, 1], got shape {matrix.shape}"
+                "matrix must have ones on its diagonal and entries in [-1, 1], "
+                f"got {matrix.tolist()}"
             )
         names = learned_categories(column) if self.categories is None else self.categories
         if len(set(names)) != len(matrix):
-            raise ValueError(f"matrix must have a row for each of {names!r}, got {len(matrix)}")
+            raise ValueError(
+                f"matrix must have a row for each of {names!r}, got {len(matrix)} rows"
+            )
         return dataclasses.replace(self, categories=names)
 
     @property

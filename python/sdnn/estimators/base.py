@@ -15,7 +15,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from sdnn.arguments import one_of, real, whole
 from sdnn.coding import Coding, RandomInverse, coding_named
-from sdnn.estimators.columns import codings_of_columns, input_pairs
+from sdnn.estimators.columns import coding_entries, codings_of_columns, input_pairs
 from sdnn.estimators.input_code import draw_input_code, pattern_units_for
 from sdnn.estimators.network import Network
 from sdnn.estimators.training import Trainer, run_epochs
@@ -24,8 +24,8 @@ __all__ = ["BaseSDNN"]
 
 Self = TypeVar("Self", bound="BaseSDNN")
 TRAINING = ("auto", "dual", "block", "plain")
-TABLES = ("shared", "separate")
 LARGEST = 2**62
+WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
 
 
 class BaseSDNN(BaseEstimator):
@@ -55,7 +55,6 @@ class BaseSDNN(BaseEstimator):
         whole("n_iter_no_change", self.n_iter_no_change, 1, LARGEST)
         whole("memory_limit", self.memory_limit, 0, LARGEST)
         one_of("training", self.training, TRAINING)
-        one_of("tables", self.tables, TABLES)
         if not 0 < real("validation_fraction", self.validation_fraction) < 1:
             raise ValueError(
                 f"validation_fraction must be between 0 and 1, got {self.validation_fraction!r}"
@@ -65,30 +64,31 @@ class BaseSDNN(BaseEstimator):
             if self.n_pattern_units % 2:
                 raise ValueError(f"n_pattern_units must be even, got {self.n_pattern_units}")
 
-    def _given_codings(self) -> list[Coding]:
-        """Every coding the parameter mentions, and the one of inputs that it leaves out."""
-        if isinstance(self.coding, list | tuple):
-            listed = [entry[0] for entry in self.coding if isinstance(entry, list | tuple)]
-            return [RandomInverse(), *map(coding_named, listed)]
-        return [coding_named(self.coding)]
-
-    def _learns(self) -> bool:
-        """Whether a first call has to learn ranges or categories, so one sample is too few."""
-        return any(coding.learns for coding in self._given_codings())
-
     def _validated(self, X: Any, y: Any = "no_validation", **options: Any) -> Any:
         """Check data by scikit-learn's rules; words are let through where a coding takes them."""
-        numeric = all(coding.is_numeric for coding in self._given_codings())
+        if isinstance(self.coding, list | tuple):
+            numeric = all(coding.is_numeric for coding, _ in coding_entries(self.coding))
+        else:
+            numeric = coding_named(self.coding).is_numeric
         checks: dict[str, Any] = (
             {"dtype": np.float64} if numeric else {"dtype": None, "ensure_all_finite": False}
         )
-        return validate_data(self, X, y, **checks, **options)
+        try:
+            return validate_data(self, X, y, **checks, **options)
+        except ValueError as error:
+            if "could not convert string" in str(error) and np.asarray(X).dtype.kind in "OSU":
+                raise ValueError(f"{error}; {WORDS_HINT}") from None
+            raise
 
     def _finite(self, table: NDArray[Any], codings: Any) -> NDArray[Any]:
         """Check the numbers of a table that also holds words."""
         for index, coding in enumerate(codings):
             if table.dtype != np.float64 and coding.is_numeric:
-                assert_all_finite(np.asarray(table[:, index], dtype=np.float64), input_name="X")
+                try:
+                    numbers = np.asarray(table[:, index], dtype=np.float64)
+                except ValueError as error:
+                    raise ValueError(f"{error} in column {index}; {WORDS_HINT}") from None
+                assert_all_finite(numbers, input_name="X")
         return table
 
     def _start(self, X: Any, table: NDArray[Any], n_units: int) -> np.random.RandomState:
@@ -98,6 +98,8 @@ class BaseSDNN(BaseEstimator):
         listed = None if names is None else names.tolist()
         n_inputs = table.shape[1]
         codings = codings_of_columns(self.coding, RandomInverse(), listed, n_inputs, X)
+        if any(coding.learns for coding in codings):
+            self._need_two(table, "ranges and categories that are not given")
         self._finite(table, codings)
         pairs = input_pairs(self.pairs, listed, n_inputs)
         n_pattern_units = self.n_pattern_units or pattern_units_for(len(pairs))
@@ -110,11 +112,19 @@ class BaseSDNN(BaseEstimator):
         self.network_ = Network(code, n_units, seed=weight_seed)
         return random
 
+    def _need_two(self, samples: NDArray[Any], what: str) -> None:
+        """ValueError, in scikit-learn's words, if one sample has to teach what it cannot."""
+        if len(samples) < 2:
+            raise ValueError(
+                f"Found array with {len(samples)} sample(s) while a minimum of 2 is required by "
+                f"{type(self).__name__} to learn {what}"
+            )
+
     def _table(self, X: Any) -> NDArray[Any]:
         """Check samples for prediction."""
-        check_is_fitted(self, "network_")
+        codings = self.codings_
         table: NDArray[Any] = self._validated(X, reset=False)
-        return self._finite(table, self.network_.input_code.codings)
+        return self._finite(table, codings)
 
     def _n_threads(self) -> int:
         return int(effective_n_jobs(self.n_jobs))
@@ -137,6 +147,12 @@ class BaseSDNN(BaseEstimator):
             raise ValueError(f"n_samples={n_samples} is too few for early stopping")
         order = random.permutation(n_samples)
         return np.sort(order[:n_held]), np.sort(order[n_held:])
+
+    def _pass_once(self, trainer: Trainer, n_samples: int) -> None:
+        """Present every sample in its order."""
+        trainer.epoch(np.arange(n_samples, dtype=np.int32))
+        trainer.synchronize()
+        self.n_iter_ += 1
 
     def _run(
         self,
@@ -163,24 +179,29 @@ class BaseSDNN(BaseEstimator):
         self.training_memory_ = trainer.memory
 
     @property
+    def _fitted_network(self) -> Network:
+        check_is_fitted(self, "network_")
+        return self.network_
+
+    @property
     def codings_(self) -> tuple[Coding, ...]:
         """The fitted coding of each input."""
-        return self.network_.input_code.codings
+        return self._fitted_network.input_code.codings
 
     @property
     def pairs_(self) -> tuple[tuple[int, int], ...]:
         """The pairs (modified, modifier) of inputs; equal numbers stand for the plain pattern."""
-        return self.network_.input_code.pairs
+        return self._fitted_network.input_code.pairs
 
     @property
     def weights_(self) -> NDArray[np.int32]:
         """The integer weights, shape (n_units, n_pairs * n_pattern_units)."""
-        return self.network_.weights
+        return self._fitted_network.weights
 
     @property
     def thresholds_(self) -> NDArray[np.int32]:
         """The integer thresholds, shape (n_units,)."""
-        return self.network_.thresholds
+        return self._fitted_network.thresholds
 
     def transform_code(self, X: ArrayLike) -> NDArray[np.int8]:
         """Return the code of samples, entries +1, 0 and -1.
@@ -193,19 +214,25 @@ class BaseSDNN(BaseEstimator):
         -------
         ndarray, shape (n_samples, n_pairs * n_pattern_units)
         """
+        table = self._table(X)
         code = self.network_.input_code
-        return code.core.transform(code.bins(self._table(X)))
+        return code.core.transform(code.bins(table))
 
     def save(self, path: str | Path) -> None:
         """Write the fitted estimator to a safetensors file with JSON metadata, without pickle.
 
         Raises
         ------
+        NotFittedError
+            If there is nothing to write yet.
         TypeError
             If a parameter cannot be written as JSON, such as a coding of one's own.
+        OSError
+            If the file cannot be written; one that was there before stays as it was.
         """
         from sdnn.estimators.files import save
 
+        check_is_fitted(self, "network_")
         save(self, path)
 
     @classmethod
@@ -216,6 +243,8 @@ class BaseSDNN(BaseEstimator):
         ------
         ValueError
             If the file holds something else.
+        OSError
+            If the file cannot be read.
         """
         from sdnn.estimators.files import load
 

@@ -21,6 +21,16 @@ SCHEMES = ("one_vs_one", "one_vs_rest")
 Self = TypeVar("Self", bound="SDNNClassifier")
 
 
+def numbers_of(y: NDArray[Any], classes: NDArray[Any]) -> NDArray[np.int32]:
+    """Return the places of labels among the classes; ValueError for one that is not there."""
+    unseen = np.setdiff1d(y, classes)
+    if len(unseen):
+        raise ValueError(
+            f"y has labels {unseen.tolist()} that are not in classes, {classes.tolist()}"
+        )
+    return np.searchsorted(classes, y).astype(np.int32)
+
+
 class SDNNClassifier(ClassifierMixin, BaseSDNN):
     """Classification by a selective desensitization neural network, exact and online.
 
@@ -76,13 +86,13 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     weights_ : ndarray of int32, shape (n_units, n_columns)
     thresholds_ : ndarray of int32, shape (n_units,)
     n_iter_ : int
-        Epochs of the last `fit`, or calls of `partial_fit`.
-    n_corrected_ : ndarray of int64, shape (n_iter_,)
-        Samples corrected in each epoch.
-    validation_scores_ : ndarray, shape (n_iter_,) or (0,)
+        Epochs of the last `fit` and calls of `partial_fit` since.
+    n_corrected_ : ndarray of int64, shape (n_epochs,)
+        Samples corrected in each epoch of the last `fit`.
+    validation_scores_ : ndarray, shape (n_epochs,) or (0,)
         With early stopping, the accuracy on what is held out.
     training_form_, training_memory_ : str, int
-        The form of training that was chosen, and the bytes it used beside the weights.
+        The form of training that the last `fit` chose, and the bytes it used beside the weights.
     n_features_in_, feature_names_in_ : int, ndarray of str
         As everywhere in scikit-learn.
 
@@ -144,9 +154,9 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         SDNNClassifier
             Itself.
         """
-        table, y = self._checked(X, y, reset=True)
+        table, y = self._checked(X, y, reset=True, ensure_min_samples=2)
         random = self._begin(X, table, unique_labels(y))
-        labels = self._numbers_of(y)
+        labels = numbers_of(y, self.classes_)
         held, kept = self._split(random, len(table))
         trainer = self._trainer(table[kept], labels[kept])
         held_table, held_labels = table[held], labels[held]
@@ -183,18 +193,17 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         if first and classes is None:
             raise ValueError("classes must be given in the first call of partial_fit")
         table, y = self._checked(X, y, reset=first)
-        listed = None if classes is None else unique_labels(classes)
+        listed = self.classes_ if classes is None else unique_labels(classes)
+        labels = numbers_of(y, listed)
         if first:
             self._begin(X, table, listed)
             self.n_iter_ = 0
-        elif listed is not None and not np.array_equal(listed, self.classes_):
+        elif not np.array_equal(listed, self.classes_):
             raise ValueError(
                 f"classes={listed!r} are not those of the first call, {self.classes_!r}"
             )
-        trainer = self._trainer(table, self._numbers_of(y))
-        trainer.epoch(np.arange(len(table), dtype=np.int32))
-        trainer.synchronize()
-        self.n_iter_ += 1
+        trainer = self._trainer(table, labels)
+        self._pass_once(trainer, len(table))
         return self
 
     def decision_function(self, X: ArrayLike) -> NDArray[np.float64]:
@@ -229,9 +238,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         labels: NDArray[Any] = self.classes_[winners]
         return labels
 
-    def _checked(self, X: Any, y: Any, reset: bool) -> tuple[NDArray[Any], NDArray[Any]]:
-        least = 2 if reset and self._learns() else 1
-        table, y = self._validated(X, y, reset=reset, ensure_min_samples=least)
+    def _checked(self, X: Any, y: Any, **options: Any) -> tuple[NDArray[Any], NDArray[Any]]:
+        table, y = self._validated(X, y, **options)
         check_classification_targets(y)
         return table, y
 
@@ -244,13 +252,6 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         self._scheme = self.scheme
         one_vs_rest = self.scheme == "one_vs_rest"
         return self._start(X, table, n_classes if one_vs_rest else n_classes * (n_classes - 1) // 2)
-
-    def _numbers_of(self, y: NDArray[Any]) -> NDArray[np.int32]:
-        """Return the places of labels among the classes; ValueError for one that is not there."""
-        unseen = np.setdiff1d(y, self.classes_)
-        if len(unseen):
-            raise ValueError(f"y has labels {unseen.tolist()} that are not in classes")
-        return np.searchsorted(self.classes_, y).astype(np.int32)
 
     def _trainer(self, table: NDArray[Any], labels: NDArray[np.int32]) -> Trainer:
         self._finite(table, self.codings_)

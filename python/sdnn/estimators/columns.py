@@ -9,7 +9,7 @@ import numpy as np
 
 from sdnn.coding import Coding, coding_named
 
-__all__ = ["Columns", "codings_of_columns", "column_indices", "input_pairs"]
+__all__ = ["Columns", "coding_entries", "codings_of_columns", "column_indices", "input_pairs"]
 
 Columns = int | str | slice | Sequence[int] | Sequence[str] | Sequence[bool] | Callable[[Any], Any]
 
@@ -70,6 +70,27 @@ def column_indices(
     return [one_index(column, names, n_inputs) for column in listed]
 
 
+def coding_entries(listed: Iterable[Any]) -> list[tuple[Coding, Columns]]:
+    """Return the entries (coding, columns) of a list, names replaced by codings.
+
+    Raises
+    ------
+    ValueError
+        For an unknown coding, or an entry of another kind.
+
+    Examples
+    --------
+    >>> [coding.name for coding, _ in coding_entries([("anchor", [0, 1]), ("circular", "hour")])]
+    ['anchor', 'circular']
+    """
+    entries = []
+    for entry in listed:
+        if not isinstance(entry, list | tuple) or len(entry) != 2:
+            raise ValueError(f"coding must be a list of (coding, columns), got {entry!r} in it")
+        entries.append((coding_named(entry[0]), entry[1]))
+    return entries
+
+
 def codings_of_columns(
     coding: Any, default: Coding, names: Sequence[str] | None, n_inputs: int, table: Any = None
 ) -> list[Coding]:
@@ -89,16 +110,11 @@ def codings_of_columns(
     ValueError
         For an unknown coding or feature, or a feature that is named twice.
     """
-    if isinstance(coding, str | Coding):
-        return [coding_named(coding)] * n_inputs
     if not isinstance(coding, list | tuple):
-        raise ValueError(f"coding must be a name, a Coding or a list of pairs, got {coding!r}")
+        return [coding_named(coding)] * n_inputs
     found: dict[int, Coding] = {}
-    for entry in coding:
-        if not isinstance(entry, list | tuple) or len(entry) != 2:
-            raise ValueError(f"coding must be a list of (coding, columns), got {entry!r} in it")
-        one = coding_named(entry[0])
-        for index in column_indices(entry[1], names, n_inputs, table):
+    for one, columns in coding_entries(coding):
+        for index in column_indices(columns, names, n_inputs, table):
             if index in found:
                 raise ValueError(f"feature {index} has more than one coding")
             found[index] = one
@@ -123,14 +139,14 @@ def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int) -> list[
     >>> input_pairs([("a", "b"), ("a", None)], ["a", "b"], 2)
     [(0, 1), (0, 0)]
     """
-    if isinstance(pairs, str):
-        if pairs != "all":
-            raise ValueError(f"pairs must be 'all' or a list of pairs, got {pairs!r}")
+    if isinstance(pairs, str) and pairs == "all":
         everything = [(mu, nu) for mu in range(n_inputs) for nu in range(n_inputs) if mu != nu]
         return everything or [(0, 0)]
+    if isinstance(pairs, str) or not isinstance(pairs, Iterable):
+        raise ValueError(f"pairs must be 'all' or a list of (modified, modifier), got {pairs!r}")
     found = []
     for pair in pairs:
-        if isinstance(pair, str) or len(pair) != 2:
+        if not isinstance(pair, list | tuple | np.ndarray) or len(pair) != 2:
             raise ValueError(f"a pair is (modified, modifier), got {pair!r}")
         mu = one_index(pair[0], names, n_inputs)
         found.append((mu, mu if pair[1] is None else one_index(pair[1], names, n_inputs)))

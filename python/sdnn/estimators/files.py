@@ -10,12 +10,13 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save_file
+from safetensors.numpy import save as to_bytes
 
 from sdnn.coding import Coding, from_dict, to_dict
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.input_code import InputCode
 from sdnn.estimators.network import Network
+from sdnn.whole_files import write_whole
 
 __all__ = ["load", "save"]
 
@@ -105,21 +106,42 @@ def save(estimator: BaseSDNN, path: str | Path) -> None:
         "modified": [number_of[id(table)] for table in code.modified],
         "modifiers": [number_of[id(table)] for table in code.modifiers],
     }
-    save_file(tensors, path, metadata={"sdnn": json.dumps(metadata)})
+    write_whole(Path(path), to_bytes(tensors, metadata={"sdnn": json.dumps(metadata)}))
 
 
 def load(path: str | Path, kind: type[Estimator]) -> Estimator:
     """Read an estimator; see `BaseSDNN.load`."""
+    if Path(path).is_dir():
+        raise IsADirectoryError(f"{path} is a folder, not a file")
     try:
         with safe_open(path, framework="numpy") as file:
-            metadata = json.loads((file.metadata() or {}).get("sdnn", "{}"))
+            metadata = described((file.metadata() or {}).get("sdnn", "{}"))
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
     except SafetensorError as error:
         raise ValueError(f"{path} is not a safetensors file: {error}") from None
     if metadata.get("format") != FORMAT:
         raise ValueError(f"{path} does not hold an estimator of this package ({FORMAT})")
-    if metadata["class"] != kind.__name__:
-        raise ValueError(f"{path} holds an {metadata['class']}, not an {kind.__name__}")
+    if metadata.get("class") != kind.__name__:
+        raise ValueError(f"{path} holds an {metadata.get('class')}, not an {kind.__name__}")
+    try:
+        return read_estimator(metadata, tensors, kind)
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} is damaged: {error!r}") from error
+
+
+def described(text: str) -> dict[str, Any]:
+    """Return the metadata that a text holds; none if it is something else."""
+    try:
+        metadata = json.loads(text)
+    except ValueError:
+        return {}
+    return metadata if isinstance(metadata, dict) else {}
+
+
+def read_estimator(
+    metadata: dict[str, Any], tensors: dict[str, NDArray[Any]], kind: type[Estimator]
+) -> Estimator:
+    """Make the estimator with its parameters and all it has learned."""
     estimator = kind(**{name: restored(value) for name, value in metadata["parameters"].items()})
     for name, value in metadata["plain"].items():
         if name in (*PLAIN, *PRIVATE):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
+from sdnn.arguments import one_of
 from sdnn.coding import Coding
 
 __all__ = ["COLUMN_BUDGET", "InputCode", "draw_input_code", "pattern_units_for"]
@@ -107,8 +108,7 @@ def draw_input_code(
     seed : int
         Equal seeds give equal tables.
     """
-    if tables not in ("shared", "separate"):
-        raise ValueError(f"tables must be 'shared' or 'separate', got {tables!r}")
+    one_of("tables", tables, ("shared", "separate"))
     seeds = iter(
         np.random.SeedSequence(seed).generate_state(2 * (len(codings) + len(pairs)), np.uint64)
     )

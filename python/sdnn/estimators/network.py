@@ -38,9 +38,16 @@ class Network:
     ) -> None:
         self.input_code = input_code
         self.n_units = n_units
-        self.layer = _core.PerceptronLayer(
-            input_code.core, n_units, seed=seed, weights=weights, thresholds=thresholds
-        )
+        try:
+            self.layer = _core.PerceptronLayer(
+                input_code.core, n_units, seed=seed, weights=weights, thresholds=thresholds
+            )
+        except MemoryError:
+            n_bytes = 4 * n_units * input_code.core.n_columns
+            raise MemoryError(
+                f"{n_units} units of {input_code.core.n_columns} columns need {n_bytes} bytes for "
+                "their weights"
+            ) from None
 
     def __getstate__(self) -> dict[str, Any]:
         """Keep the weights instead of the core's object."""

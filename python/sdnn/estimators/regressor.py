@@ -80,13 +80,13 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     output_range_ : ndarray, shape (n_outputs, 2)
     n_outputs_ : int
     n_iter_ : int
-        Epochs of the last `fit`, or calls of `partial_fit`.
-    n_corrected_ : ndarray of int64, shape (n_iter_,)
-        Samples corrected in each epoch.
-    validation_scores_ : ndarray, shape (n_iter_,) or (0,)
+        Epochs of the last `fit` and calls of `partial_fit` since.
+    n_corrected_ : ndarray of int64, shape (n_epochs,)
+        Samples corrected in each epoch of the last `fit`.
+    validation_scores_ : ndarray, shape (n_epochs,) or (0,)
         With early stopping, minus the mean squared error in units of the firing count.
     training_form_, training_memory_ : str, int
-        The form of training that was chosen, and the bytes it used beside the weights.
+        The form of training that the last `fit` chose, and the bytes it used beside the weights.
     n_features_in_, feature_names_in_ : int, ndarray of str
         As everywhere in scikit-learn.
 
@@ -198,11 +198,11 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             self._begin(X, table, targets)
             self.n_iter_ = 0
         elif targets.shape[1] != self.n_outputs_:
-            raise ValueError(f"y must have {self.n_outputs_} outputs, got {targets.shape[1]}")
+            raise ValueError(
+                f"y must have as many outputs as before, {self.n_outputs_}, got {targets.shape[1]}"
+            )
         trainer = self._trainer(table, targets)
-        trainer.epoch(np.arange(len(table), dtype=np.int32))
-        trainer.synchronize()
-        self.n_iter_ += 1
+        self._pass_once(trainer, len(table))
         return self
 
     def predict(self, X: ArrayLike) -> NDArray[np.float64]:
@@ -223,14 +223,14 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         return values[:, 0] if self._flat else values
 
     def _checked(self, X: Any, y: Any, reset: bool) -> tuple[NDArray[Any], NDArray[np.float64]]:
-        least = 2 if reset and (self.output_range is None or self._learns()) else 1
         if y is None:
             # Said here because scikit-learn, told of several outputs, says it less clearly.
             raise ValueError("SDNNRegressor requires y to be passed, but the target y is None")
-        table, targets = self._validated(
-            X, y, multi_output=True, y_numeric=True, reset=reset, ensure_min_samples=least
-        )
-        targets = np.asarray(targets, dtype=np.float64)
+        table, targets = self._validated(X, y, multi_output=True, y_numeric=True, reset=reset)
+        try:
+            targets = np.asarray(targets, dtype=np.float64)
+        except ValueError as error:
+            raise ValueError(f"y must be numbers: {error}") from None
         if reset:
             self._flat = targets.ndim == 1
         return table, targets.reshape(len(targets), -1)
@@ -246,14 +246,22 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
 
     def _range_of(self, targets: NDArray[np.float64]) -> NDArray[np.float64]:
         if self.output_range is not None:
-            given = np.asarray(self.output_range, dtype=np.float64)
+            try:
+                given = np.array(self.output_range, dtype=np.float64)
+            except (TypeError, ValueError):  # words, or rows of different lengths
+                given = np.empty(0)
             given = np.tile(given, (self.n_outputs_, 1)) if given.ndim == 1 else given
-            if given.shape != (self.n_outputs_, 2) or not np.all(given[:, 0] < given[:, 1]):
+            if (
+                given.shape != (self.n_outputs_, 2)
+                or not np.all(np.isfinite(given))
+                or not np.all(given[:, 0] < given[:, 1])
+            ):
                 raise ValueError(
                     "output_range must be (low, high) or one row (low, high) per output, "
-                    f"low < high, got {self.output_range!r}"
+                    f"finite, low < high, got {self.output_range!r}"
                 )
             return given
+        self._need_two(targets, "the output_range that is not given")
         low, high = targets.min(axis=0), targets.max(axis=0)
         margin = np.where(high > low, MARGIN * (high - low), np.maximum(1.0, np.abs(low)))
         return np.stack([low - margin, high + margin], axis=1)

@@ -13,12 +13,12 @@ from sdnn.experiments.cases import EXPERIMENTS, PAPER_EPISODES, PAPER_TRIALS, Ex
 from sdnn.experiments.config import ProtocolConfig
 from sdnn.experiments.cost import QUICK_COST, CostConfig, MeasureSteps, measure_costs
 from sdnn.experiments.engine import Observer, RunOutcome, run_trials
-from sdnn.experiments.files import csv_bytes, remove_partial_files, write_whole
 from sdnn.experiments.plan import PlannedTrial, plan_trials
 from sdnn.experiments.records import TrialKey, TrialRecord
 from sdnn.experiments.results import collect, summarize
 from sdnn.experiments.store import STORE_NAME, ResultStore
 from sdnn.experiments.trial import MakeTrial
+from sdnn.whole_files import csv_bytes, remove_partial_files, write_whole
 
 QUICK_TRIALS = 2
 QUICK_EPISODES = 300

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 import estimator_transcription
 from sdnn import SDNNClassifier, SDNNRegressor, _core
 from sdnn.coding import RandomInverse
+from sdnn.estimators.classifier import numbers_of
 
 
 def transcribed(model):
@@ -29,7 +30,7 @@ def untrained(model, X, y):
         return model, model._in_counts(targets)
     table, labels = model._checked(X, y, reset=True)
     model._begin(X, table, np.unique(labels))
-    return model, model._numbers_of(labels)
+    return model, numbers_of(labels, model.classes_)
 
 
 @st.composite

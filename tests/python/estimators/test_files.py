@@ -87,6 +87,50 @@ def test_other_files_are_refused(tmp_path):
         SDNNRegressor.load(path)
     with pytest.raises(FileNotFoundError):
         SDNNRegressor.load(tmp_path / "nothing")
+    with pytest.raises(IsADirectoryError, match="is a folder"):
+        SDNNRegressor.load(tmp_path)
+
+
+@pytest.mark.parametrize("metadata", ["no JSON", "[1]", '{"format": "another"}'])
+def test_foreign_metadata_is_refused(metadata, tmp_path):
+    path = tmp_path / "model.safetensors"
+    save_file({"a": np.zeros(2)}, path, metadata={"sdnn": metadata})
+    with pytest.raises(ValueError, match="does not hold an estimator"):
+        SDNNRegressor.load(path)
+
+
+@pytest.mark.parametrize("missing", ["parameters", "pairs", "codings", "modified"])
+def test_damaged_metadata_is_refused(missing, tmp_path):
+    path = tmp_path / "model.safetensors"
+    SDNNRegressor(**SMALL).fit(X, Y).save(path)
+    with safe_open(path, framework="numpy") as file:
+        metadata = json.loads(file.metadata()["sdnn"])
+        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    save_file(tensors, path, metadata={"sdnn": json.dumps(metadata | {missing: None})})
+    with pytest.raises(ValueError, match=r"model\.safetensors is damaged"):
+        SDNNRegressor.load(path)
+    del tensors["weights"]
+    save_file(tensors, path, metadata={"sdnn": json.dumps(metadata)})
+    with pytest.raises(ValueError, match="is damaged: KeyError"):
+        SDNNRegressor.load(path)
+
+
+def test_a_file_that_cannot_be_written_is_named_and_the_old_one_stays(tmp_path, monkeypatch):
+    model = SDNNRegressor(**SMALL).fit(X, Y)
+    with pytest.raises(FileNotFoundError, match="nowhere"):
+        model.save(tmp_path / "nowhere" / "model.safetensors")
+    path = tmp_path / "model.safetensors"
+    model.save(path)
+    before = path.read_bytes()
+
+    def full(_descriptor):
+        raise OSError("no space left")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="no space left"):
+        model.partial_fit(X, Y).save(path)
+    assert path.read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
 
 def test_what_cannot_be_written_as_data_is_refused(tmp_path):

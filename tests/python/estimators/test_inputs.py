@@ -79,10 +79,15 @@ def test_unknown_categories_and_missing_values_are_refused():
 
 
 def test_words_without_a_coding_are_refused():
-    with pytest.raises(ValueError, match="could not convert string to float"):
+    hint = r"could not convert string to float: '\w+'.*words need a coding of their own"
+    with pytest.raises(ValueError, match=hint):
         SDNNRegressor().fit(TABLE, TARGETS)
-    with pytest.raises(ValueError, match="could not convert string to float"):
-        SDNNRegressor([(Circular(period=24.0), "hour"), ("symbolic", ["size"])]).fit(TABLE, TARGETS)
+    coding = [(Circular(period=24.0), "hour"), ("symbolic", ["size"])]
+    with pytest.raises(ValueError, match=hint.replace(".*", " in column 1; ")):
+        SDNNRegressor(coding).fit(TABLE, TARGETS)
+    with pytest.raises(ValueError, match="y must be numbers: could not convert") as error:
+        SDNNRegressor().fit(SIZES[:, None], np.full(len(SIZES), "red"))
+    assert "coding" not in str(error.value)
 
 
 def test_likeness_of_categories_generalizes():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from sklearn.datasets import load_iris
 
 from sdnn import SDNNClassifier, SDNNRegressor
-from sdnn.coding import RandomInverse
+from sdnn.coding import Circular, RandomInverse
 
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(0, 1, (150, 2))
@@ -88,21 +88,38 @@ def test_partial_fit_goes_on_after_fit():
 
 
 def test_partial_fit_needs_ranges_for_a_single_sample_and_known_labels():
-    with pytest.raises(ValueError, match="minimum of 2 is required"):
+    with pytest.raises(ValueError, match=r"minimum of 2 is required"):
         SDNNRegressor(coding=UNIT).partial_fit(X[:1], Y[:1])
     model = SDNNClassifier(**GIVEN)
     with pytest.raises(ValueError, match="classes must be given in the first call"):
         model.partial_fit(X, LABELS)
     with pytest.raises(ValueError, match=r"labels \[2\] that are not in classes"):
         model.partial_fit(X, LABELS, classes=[0, 1])
-    model = SDNNClassifier(**GIVEN).partial_fit(X, LABELS, classes=[0, 1, 2])
+    model = SDNNClassifier(**GIVEN)
+    with pytest.raises(ValueError, match=r"labels \[2\] that are not in classes, \[0, 1\]"):
+        model.partial_fit(X, LABELS, classes=[0, 1])
+    assert not hasattr(model, "network_"), "a refused first call leaves nothing behind"
+    model.partial_fit(X, LABELS, classes=[0, 1, 2])
     with pytest.raises(ValueError, match="not those of the first call"):
         model.partial_fit(X, LABELS, classes=[0, 1, 2, 3])
     with pytest.raises(ValueError, match=r"labels \[7\]"):
         model.partial_fit(X[:1], [7])
     regressor = SDNNRegressor(**REGRESSOR).partial_fit(X, Y)
-    with pytest.raises(ValueError, match="y must have 1 outputs, got 2"):
+    with pytest.raises(ValueError, match="as many outputs as before, 1, got 2"):
         regressor.partial_fit(X, np.stack([Y, Y], axis=1))
+
+
+def test_one_sample_is_enough_where_every_column_is_given():
+    listed = [(UNIT, 0), (Circular(period=1.0), [1])]
+    model = SDNNRegressor(coding=listed, output_range=(-3, 3), n_pattern_units=64)
+    model.partial_fit(X[:1], Y[:1])
+    assert model.n_iter_ == 1
+    model.set_params(coding=listed[:1])
+    with pytest.raises(ValueError, match=r"minimum of 2 is required .* to learn ranges"):
+        model.fit(X[:1], Y[:1])
+    model.set_params(coding=listed, output_range=None)
+    with pytest.raises(ValueError, match=r"minimum of 2 is required .* to learn the output_range"):
+        model.fit(X[:1], Y[:1])
 
 
 @pytest.mark.parametrize("training", ["dual", "block", "plain"])

@@ -16,8 +16,8 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import check_estimator
 
 import sdnn
-from sdnn import SDNNClassifier, SDNNRegressor
-from sdnn.coding import Anchor, RandomInverse
+from sdnn import SDNNClassifier, SDNNRegressor, _core
+from sdnn.coding import Anchor, Circular, RandomInverse
 
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(-2, 3, (120, 3))
@@ -42,8 +42,14 @@ def targets_of(estimator):
     [
         SDNNRegressor(),
         SDNNClassifier(),
-        SDNNClassifier(scheme="one_vs_one"),
-        SDNNRegressor("anchor", early_stopping=True, tables="separate", n_pattern_units=100),
+        SDNNClassifier(scheme="one_vs_one", n_pattern_units=100),
+        SDNNRegressor(
+            "anchor",
+            early_stopping=True,
+            tables="separate",
+            n_pattern_units=100,
+            n_output_units=70,
+        ),
         SDNNClassifier(RandomInverse(spacing="quantile"), early_stopping=True, n_pattern_units=100),
     ],
     ids=["regressor", "classifier", "one-versus-one", "regressor-options", "classifier-options"],
@@ -109,8 +115,16 @@ def test_sparse_samples_are_refused(estimator):
 
 
 def test_prediction_checks_its_samples(estimator):
-    with pytest.raises(NotFittedError):
-        estimator.predict(X)
+    for use in (
+        lambda: estimator.predict(X),
+        lambda: estimator.transform_code(X),
+        lambda: estimator.save("model.safetensors"),
+        lambda: estimator.codings_,
+        lambda: estimator.weights_,
+    ):
+        with pytest.raises(NotFittedError, match="not fitted yet"):
+            use()
+    assert not hasattr(estimator, "thresholds_")
     estimator.fit(X, targets_of(estimator))
     with pytest.raises(ValueError, match=r"X has 2 features, but .* is expecting 3 features"):
         estimator.predict(X[:, :2])
@@ -121,6 +135,8 @@ def test_prediction_checks_its_samples(estimator):
 def test_targets_are_checked():
     with pytest.raises(ValueError, match="contains NaN"):
         SDNNRegressor(**SMALL).fit(X, np.full(len(X), np.nan))
+    with pytest.raises(ValueError, match="y must be numbers: could not convert"):
+        SDNNRegressor(**SMALL).fit(X, LABELS)
     with pytest.raises(ValueError, match="Unknown label type"):
         SDNNClassifier(**SMALL).fit(X, Y)
     with pytest.raises(ValueError, match="one class"):
@@ -140,9 +156,18 @@ def test_targets_are_checked():
         ({"pairs": [(0, 0)]}, "cannot modify itself"),
         ({"pairs": [(0, 3)]}, "there is no number 3"),
         ({"pairs": [("a", "b")]}, "no feature names"),
+        ({"pairs": None}, "pairs must be 'all' or a list of"),
+        ({"pairs": [0, 1]}, r"a pair is \(modified, modifier\), got 0"),
         ({"coding": "unheard"}, "coding must be one of"),
         ({"coding": "correlation-matrix"}, "needs a matrix"),
         ({"coding": 3}, "coding must be"),
+        ({"coding": RandomInverse}, "or a Coding object"),
+        ({"coding": ("anchor", [0, 1])}, r"list of \(coding, columns\), got 'anchor' in it"),
+        ({"coding": RandomInverse(length_scale="long")}, "length_scale must be a number"),
+        ({"coding": Anchor(low="zero")}, "low must be a number, got 'zero'"),
+        ({"coding": Circular(period="day")}, "period must be a number"),
+        ({"coding": Circular(origin=None)}, "origin must be a number"),
+        ({"validation_fraction": "tenth"}, "validation_fraction must be a number"),
         ({"coding": [("anchor", [0, 1]), ("circular", 1)]}, "more than one coding"),
         ({"validation_fraction": 1.0}, "between 0 and 1"),
         ({"n_iter_no_change": 0}, "n_iter_no_change"),
@@ -159,11 +184,28 @@ def test_impossible_parameters_are_named(estimator, parameters, error):
 def test_parameters_of_one_estimator_are_named():
     with pytest.raises(ValueError, match="scheme must be one of"):
         SDNNClassifier(scheme="all").fit(X, LABELS)
-    for bad in ((1, 1), (0, 1, 2), [(0, 1), (0, 1)]):
+    for bad in (
+        (1, 1),
+        (0, 1, 2),
+        [(0, 1), (0, 1)],
+        [(0, 1), (0,)],
+        (np.nan, 1),
+        (-np.inf, np.inf),
+        "auto",
+    ):
         with pytest.raises(ValueError, match="output_range must be"):
             SDNNRegressor(output_range=bad).fit(X, Y)
     with pytest.raises(ValueError, match="n_output_units"):
         SDNNRegressor(n_output_units=0).fit(X, Y)
+
+
+def test_a_network_that_no_memory_holds_is_refused_with_its_size(monkeypatch):
+    def no_memory(*_arguments, **_options):
+        raise MemoryError("std::bad_alloc")
+
+    monkeypatch.setattr(_core, "PerceptronLayer", no_memory)
+    with pytest.raises(MemoryError, match="280 units of 384 columns need 430080 bytes"):
+        SDNNRegressor(**SMALL).fit(X, Y)
 
 
 def test_too_little_memory_for_a_form_is_said(estimator):

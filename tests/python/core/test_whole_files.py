@@ -1,6 +1,6 @@
 import pytest
 
-from sdnn.experiments.files import PARTIAL_SUFFIX, csv_bytes, remove_partial_files, write_whole
+from sdnn.whole_files import PARTIAL_SUFFIX, csv_bytes, remove_partial_files, write_whole
 
 
 def test_a_file_is_written_as_a_whole(tmp_path):
