@@ -8,18 +8,9 @@ import pytest
 
 import grid_transcription as paper
 from sdnn import _core
-from sdnn.agents import FuzzyQLearning, FuzzyQLearningConfig, QLearningConfig, Transition
+from sdnn.agents import FuzzyQLearning, FuzzyQLearningConfig, Transition
 from sdnn.agents.q_learning import RBFQLearning
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig
-from sdnn.environments import (
-    AcrobotConfig,
-    AcrobotSwingUpEnv,
-    GoalScheduleConfig,
-    NoisySensors,
-    RedundantSensors,
-    SensorConfig,
-)
-from sdnn.environments.goal_schedule import GoalSchedule
 
 OBSERVATIONS = gym.spaces.Box(-2.0, 2.0, (3,), np.float64)
 TORQUES = gym.spaces.Box(-1.0, 3.0, (1,), np.float32)
@@ -78,82 +69,6 @@ def test_learning_agrees_with_its_definition_bit_for_bit(d, n_steps, tie_rule):
     assert touched.size > 50
     for rule in touched:
         assert np.array_equal(agent.rules.values(rule), table[rule])
-
-
-# A loop in Python lives the compiled trial.
-
-
-def python_trial(make_agent, *, n_sensors, noise, n_episodes, seed):
-    """The paper's protocol written with the Python rooms; rows as the trial gives them."""
-
-    def make_env(stream):
-        env = AcrobotSwingUpEnv(
-            config=AcrobotConfig(), goal_schedule=GoalSchedule(), dtype="float64"
-        )
-        env = RedundantSensors(env, ("energy", "height")[: n_sensors - 4])
-        return NoisySensors(env, sigma=noise, seed=seed, stream=stream)
-
-    learning_env, test_env = make_env("sensor_noise"), make_env("evaluation_sensor_noise")
-    agent = make_agent(learning_env.observation_space, learning_env.action_space)
-
-    def run(env, episode, learning):
-        observation, _ = env.reset(options={"episode": episode})
-        agent.begin_episode()
-        steps, total, over = 0, 0.0, False
-        while not over:
-            action = agent.act(observation, explore=learning)
-            following, reward, terminated, truncated, _ = env.step(action)
-            if learning:
-                agent.learn(Transition(observation, action, reward, following, terminated))
-            observation = following
-            steps, total, over = steps + 1, total + reward, terminated or truncated
-        return steps, total, terminated
-
-    rows = []
-    for episode in range(1, n_episodes + 1):
-        run(learning_env, episode, True)
-        if episode % 5 == 0:
-            rows.append((episode, *run(test_env, episode, False)))
-    return rows
-
-
-@pytest.mark.parametrize(("n_sensors", "noise"), [(4, 0.0), (6, 0.02)])
-@pytest.mark.parametrize("kind", ["fuzzy", "rbf"])
-def test_a_python_loop_reproduces_the_compiled_trial(kind, n_sensors, noise):
-    n_episodes, seed = 60, 11
-    common = {
-        "acrobot": AcrobotConfig().to_core(),
-        "goal": GoalScheduleConfig().to_core(),
-        "sensors": SensorConfig(n_sensors=n_sensors, noise=noise).to_core(),
-        "protocol": _core.ProtocolConfig(n_learning_episodes=n_episodes, test_interval=5),
-        "seed": seed,
-    }
-    if kind == "fuzzy":
-        trial = _core.FuzzyAcrobotTrial(
-            approximator=FuzzyRulesConfig(n_inputs=n_sensors).to_core(),
-            learning=FuzzyQLearningConfig().to_core(),
-            **common,
-        )
-    else:
-        trial = _core.RbfAcrobotTrial(
-            approximator=RBFNetworkConfig(n_inputs=n_sensors).to_core(),
-            learning=QLearningConfig().to_core(),
-            **common,
-        )
-    trial.advance(n_episodes)
-    columns = trial.test_rows()
-    names = ("episode", "steps", "episode_return", "solved")
-    expected = list(zip(*(columns[name].tolist() for name in names), strict=True))
-    agent = FuzzyQLearning if kind == "fuzzy" else RBFQLearning
-    rows = python_trial(
-        lambda observations, actions: agent(observations, actions, seed=seed),
-        n_sensors=n_sensors,
-        noise=noise,
-        n_episodes=n_episodes,
-        seed=seed,
-    )
-    assert rows == expected
-    assert trial.finished
 
 
 # The Python faces.
@@ -258,31 +173,6 @@ def test_only_the_transition_of_the_last_exploring_act_is_learned():
     assert agent.value(here) == 0.0
     agent.learn(Transition(here, action, 1.0, there, False))
     assert agent.value(here) > 0.0
-
-
-def live(env, agent, n_steps):
-    observation, _ = env.reset(seed=1)
-    agent.begin_episode()
-    actions = []
-    for _ in range(n_steps):
-        action = agent.act(observation)
-        following, reward, terminated, truncated, _ = env.step(action)
-        agent.learn(Transition(observation, action, float(reward), following, terminated))
-        observation = following
-        actions.append(np.asarray(action).tolist())
-        if terminated or truncated:
-            observation, _ = env.reset()
-            agent.begin_episode()
-    return actions
-
-
-@pytest.mark.parametrize("kind", [FuzzyQLearning, RBFQLearning])
-def test_it_lives_in_pendulum(kind):
-    env = gym.make("Pendulum-v1")
-    agents = [kind(env.observation_space, env.action_space, seed=3) for _ in range(2)]
-    first, second = (live(env, agent, 450) for agent in agents)
-    assert first == second, "the same seeds live the same life"
-    assert first != live(env, kind(env.observation_space, env.action_space, seed=4), 450)
 
 
 def test_an_rbf_network_learns_discrete_actions_too():

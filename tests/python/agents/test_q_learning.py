@@ -11,15 +11,6 @@ from handed_over import transcribe
 from sdnn import _core
 from sdnn.agents import QLearningConfig, SDNNQLearning, Transition
 from sdnn.approximators import SDNNCConfig
-from sdnn.environments import (
-    AcrobotConfig,
-    AcrobotSwingUpEnv,
-    GoalScheduleConfig,
-    NoisySensors,
-    RedundantSensors,
-    SensorConfig,
-)
-from sdnn.environments.goal_schedule import GoalSchedule
 
 SMALL = SDNNCConfig(n_pattern_units=40, n_hidden_units=120, n_active_units=30)
 OBSERVATIONS = gym.spaces.Box(-2.0, 2.0, (3,), np.float64)
@@ -118,76 +109,6 @@ def test_one_transition_by_hand():
     best = agent.q_values(state).max()
     expected = paper.g(paper.g_inverse(1 + 0.9 * best, 2, 28, -20.0, 20.0), 2, 28, -20.0, 20.0)
     assert agent.q_values(following)[-1] == expected
-
-
-# A loop in Python lives the compiled trial.
-
-
-def python_trial(*, n_sensors, noise, n_episodes, test_interval, seed):
-    """The paper's protocol written with the Python rooms; rows as the trial gives them."""
-
-    def make_env(stream):
-        env = AcrobotSwingUpEnv(
-            config=AcrobotConfig(), goal_schedule=GoalSchedule(), dtype="float64"
-        )
-        env = RedundantSensors(env, ("energy", "height")[: n_sensors - 4])
-        return NoisySensors(env, sigma=noise, seed=seed, stream=stream)
-
-    learning_env = make_env("sensor_noise")
-    test_env = make_env("evaluation_sensor_noise")
-    agent = SDNNQLearning(learning_env.observation_space, learning_env.action_space, seed=seed)
-    n_decisions = 0
-
-    def run(env, episode, learning):
-        nonlocal n_decisions
-        observation, _ = env.reset(options={"episode": episode})
-        agent.begin_episode()
-        steps, total, over = 0, 0.0, False
-        while not over:
-            action = agent.act(observation, explore=learning)
-            following, reward, terminated, truncated, _ = env.step(action)
-            if learning:
-                agent.learn(Transition(observation, action, reward, following, terminated))
-            observation = following
-            steps += 1
-            total += reward
-            over = terminated or truncated
-        n_decisions += steps
-        return steps, total, terminated
-
-    rows = []
-    for episode in range(1, n_episodes + 1):
-        run(learning_env, episode, True)
-        if episode % test_interval == 0:
-            rows.append((episode, *run(test_env, episode, False)))
-    return rows, n_decisions
-
-
-@pytest.mark.parametrize(("n_sensors", "noise"), [(4, 0.0), (4, 0.02), (5, 0.02), (6, 0.02)])
-def test_a_python_loop_reproduces_the_compiled_trial(n_sensors, noise):
-    n_episodes, test_interval, seed = 60, 5, 11
-    trial = _core.AcrobotTrial(
-        approximator=SDNNCConfig(n_inputs=n_sensors).to_core(),
-        learning=QLearningConfig().to_core(),
-        acrobot=AcrobotConfig().to_core(),
-        goal=GoalScheduleConfig().to_core(),
-        sensors=SensorConfig(n_sensors=n_sensors, noise=noise).to_core(),
-        protocol=_core.ProtocolConfig(n_learning_episodes=n_episodes, test_interval=test_interval),
-        seed=seed,
-    )
-    trial.advance(n_episodes)
-    columns = trial.test_rows()
-    names = ("episode", "steps", "episode_return", "solved")
-    expected = list(zip(*(columns[name].tolist() for name in names), strict=True))
-    rows, n_decisions = python_trial(
-        n_sensors=n_sensors,
-        noise=noise,
-        n_episodes=n_episodes,
-        test_interval=test_interval,
-        seed=seed,
-    )
-    assert rows == expected
-    assert n_decisions == trial.n_decisions
 
 
 # The Python face.
@@ -354,53 +275,6 @@ def test_bad_rewards_are_named_and_teach_nothing(reward):
     with pytest.raises(ValueError, match="reward must be finite"):
         agent.learn(Transition(good, [0.0], reward, good, False))
     assert np.array_equal(agent._core.network.weights(), before)
-
-
-def live(env, agent, n_steps, seed=1):
-    """Acts and learns in any environment; returns the actions taken."""
-    observation, _ = env.reset(seed=seed)
-    agent.begin_episode()
-    actions = []
-    for _ in range(n_steps):
-        action = agent.act(observation)
-        following, reward, terminated, truncated, _ = env.step(action)
-        agent.learn(Transition(observation, action, float(reward), following, terminated))
-        observation = following
-        actions.append(np.asarray(action).tolist())
-        if terminated or truncated:
-            observation, _ = env.reset()
-            agent.begin_episode()
-    return actions
-
-
-def test_it_lives_in_pendulum():
-    env = gym.make("Pendulum-v1")
-    agents = [
-        SDNNQLearning(env.observation_space, env.action_space, network=SMALL, seed=3)
-        for _ in range(2)
-    ]
-    first, second = (live(env, agent, 450) for agent in agents)
-    assert first == second, "the same seeds live the same life"
-    assert len({tuple(action) for action in first}) > 20
-    fresh = SDNNQLearning(env.observation_space, env.action_space, network=SMALL, seed=3)
-    weights = [agent._core.network.weights() for agent in (*agents, fresh)]
-    assert np.array_equal(weights[0], weights[1])
-    assert not np.array_equal(weights[0], weights[2])
-
-
-def test_it_lives_in_cart_pole_with_bounds_that_matter():
-    env = gym.make("CartPole-v1")
-    with pytest.raises(ValueError, match="finite bounds"):
-        SDNNQLearning(env.observation_space, env.action_space)
-    bounds = np.array([2.4, 3.0, 0.21, 3.0])
-    agent = SDNNQLearning(
-        gym.spaces.Box(-bounds, bounds, dtype=np.float64),
-        env.action_space,
-        network=SMALL,
-        seed=3,
-    )
-    assert agent.n_actions == 2
-    assert set(live(env, agent, 300)) == {0, 1}
 
 
 def test_evaluation_has_no_effect_on_learning():
