@@ -197,18 +197,27 @@ def _run(request: ReproduceRequest) -> Reproduction:
 def _print_plan(request: ReproduceRequest, as_json: bool) -> None:
     from sdnn.experiments.reproduce import count_stored
 
-    counts = [
-        {"case": case, "agent": agent, "planned": planned, "stored": stored}
-        for (case, agent), (planned, stored) in count_stored(request).items()
-    ]
+    counts = count_stored(request)
     n_episodes = request.protocol().n_learning_episodes
+    n_costs, n_costs_stored = counts.costs
     if as_json:
-        click.echo(json.dumps({"n_learning_episodes": n_episodes, "trials": counts}, indent=2))
+        trials = [
+            {"case": case, "agent": agent, "planned": planned, "stored": stored}
+            for (case, agent), (planned, stored) in counts.trials.items()
+        ]
+        costs = {"planned": n_costs, "stored": n_costs_stored}
+        plan = {"n_learning_episodes": n_episodes, "trials": trials, "costs": costs}
+        click.echo(json.dumps(plan, indent=2))
         return
-    for row in counts:
+    for (case, agent), (planned, stored) in counts.trials.items():
         click.echo(
-            f"{row['case']} {row['agent']}: {row['planned']} trials x {n_episodes} episodes,"
-            f" {row['stored']} of them stored in {request.out}"
+            f"{case} {agent}: {planned} trials x {n_episodes} episodes,"
+            f" {stored} of them stored in {request.out}"
+        )
+    if n_costs:
+        click.echo(
+            f"cost of a step: {n_costs} measurements, {n_costs_stored} of them stored in"
+            f" {request.out}"
         )
 
 
@@ -235,7 +244,8 @@ def _finish(context: click.Context, done: Reproduction, out: Path, as_json: bool
     if done.report is not None:
         print_report(done.report, Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH))
     page = next(str(file) for file in done.files if file.suffix == ".html")
-    click.echo(f"{stored} ({outcome.n_run} run now); wrote {len(done.files)} files: see {page}")
+    done_now = f"{stored} ({outcome.n_run} run now); " if outcome.n_planned else ""
+    click.echo(f"{done_now}wrote {len(done.files)} files: see {page}")
 
 
 def _exit_interrupted(context: click.Context, message: str) -> NoReturn:

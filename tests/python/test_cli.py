@@ -1,6 +1,7 @@
 import importlib.util
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -155,6 +156,18 @@ def test_dry_run_makes_nothing_and_counts_what_is_stored(invoke, tmp_path):
     )
     assert plan["n_learning_episodes"] == 300
     assert [(row["planned"], row["stored"]) for row in plan["trials"]] == [(5, 2), (5, 2)]
+
+
+def test_dry_run_counts_costs_too(invoke, no_costs):
+    line = "cost of a step: {} measurements, {} of them stored in results"
+    assert invoke("reproduce", "cost", "--dry-run").stdout.splitlines() == [line.format(28, 0)]
+    assert invoke("reproduce", "--dry-run").stdout.splitlines()[-1] == line.format(28, 0)
+    last_line = invoke("reproduce", "cost", "--quick").stdout.splitlines()[-1]
+    assert re.fullmatch(r"wrote \d+ files: see .*report-quick\.html", last_line)
+    dry = invoke("reproduce", "cost", "--quick", "--dry-run").stdout
+    assert dry.splitlines() == [line.format(25, 25)]
+    plan = json.loads(invoke("reproduce", "a", "--dry-run", "--json").stdout)
+    assert plan["costs"] == {"planned": 0, "stored": 0}
 
 
 def test_output_that_is_a_file(invoke, tmp_path):

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import ast
-import operator
 import re
 import struct
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -15,18 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sdnn import _core
+from sdnn.estimators.libsdnn_language import entries_of, items_of, number_of, whole_of
 
 Library = Literal["msvc", "libstdc++"]
-
-_OPERATORS: dict[type, Callable[..., float]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-    ast.UAdd: operator.pos,
-    ast.USub: operator.neg,
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,7 +168,7 @@ def read_parameter_file(path: str | Path) -> LibsdnnParameters:
         reproduced.
     """
     path = Path(path)
-    return _parameters(_entries(path.read_text("latin-1"), path), path)
+    return _parameters(entries_of(path.read_text("latin-1"), path), path)
 
 
 def read_model_file(path: str | Path, library: Library = "msvc") -> LibsdnnModel:
@@ -204,7 +192,7 @@ def read_model_file(path: str | Path, library: Library = "msvc") -> LibsdnnModel
     length = struct.unpack_from("<i", content)[0] if len(content) >= 4 else -1
     if not 0 < length <= len(content) - 4:
         raise ValueError(f"{path} must begin with the length of its parameters, got {length}")
-    parameters = _parameters(_entries(content[4 : 4 + length].decode("latin-1"), path), path)
+    parameters = _parameters(entries_of(content[4 : 4 + length].decode("latin-1"), path), path)
     n_units = parameters.n_output_units
     n_columns = len(parameters.pairs) * parameters.n_units
     expected = 4 * n_units * (n_columns + 1)
@@ -223,73 +211,10 @@ def read_model_file(path: str | Path, library: Library = "msvc") -> LibsdnnModel
     return LibsdnnModel(parameters=parameters, layer=layer)
 
 
-def _entries(text: str, path: Path) -> dict[str, str]:
-    """Return the entries by their full names, such as ``SDNN/PC/n``."""
-    tags: list[str] = []
-    entries: dict[str, str] = {}
-    for number, line in enumerate(text.splitlines(), start=1):
-        stripped = re.sub(r"[\s{\0]", "", line.partition("%")[0])
-        if "<" in stripped:
-            tags.append(stripped.strip("<>"))
-        elif "}" in stripped:
-            if not tags:
-                raise ValueError(f"{path}, line {number}: }} without a tag")
-            tags.pop()
-        elif "=" in stripped:
-            name, _, value = stripped.partition("=")
-            entries["/".join([*tags, name])] = value
-        elif stripped:
-            raise ValueError(f"{path}, line {number}: must be a tag or name = value, got {line!r}")
-    return entries
-
-
-def _number(text: str, what: str) -> float:
-    """Return the value of a formula of numbers, ``+ - * / ^`` and parentheses."""
-
-    def value(node: ast.expr) -> float:
-        if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
-            return float(node.value)
-        if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATORS:
-            return _OPERATORS[type(node.op)](value(node.operand))
-        if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
-            left, right = float(value(node.left)), float(value(node.right))
-            return _OPERATORS[type(node.op)](left, right)
-        raise ValueError
-
-    try:
-        if len(text) > 1000:
-            raise ValueError
-        result = float(value(ast.parse(text.replace("^", "**"), mode="eval").body))
-        if not np.isfinite(result):
-            raise ValueError
-    except (ValueError, SyntaxError, ArithmeticError, TypeError, RecursionError, MemoryError):
-        raise ValueError(f"{what} must be a number, got {text[:80]!r}") from None
-    return result
-
-
-def _items(text: str, what: str) -> list[str]:
-    """Return the items of ``[a, b:3]``, that is ``[a, b, b, b]``; not cut in parentheses."""
-    if not (text.startswith("[") and text.endswith("]")):
-        raise ValueError(f"{what} must be a list in brackets, got {text[:80]!r}")
-    items: list[str] = []
-    for item in re.split(r",(?![^(]*\))", text[1:-1]):
-        content, colon, times = item.partition(":")
-        repeats = _whole(times, f"repeats of {what}", 1, 100000) if colon else 1
-        items += [content] * repeats
-    return items
-
-
-def _whole(text: str, what: str, low: int, high: int = 2**31 - 1) -> int:
-    value = _number(text, what)
-    if value != int(value) or not low <= value <= high:
-        raise ValueError(f"{what} must be a whole number in [{low}, {high}], got {text[:80]}")
-    return int(value)
-
-
 def _seed(text: str, what: str) -> tuple[int, ...] | None:
     if text == "hardware_entropy":
         return None
-    return tuple(_whole(item, what, 0, 2**32 - 1) for item in _items(text, what))
+    return tuple(whole_of(item, what, 0, 2**32 - 1) for item in items_of(text, what))
 
 
 def _input(text: str, n_units: int) -> LibsdnnInput:
@@ -306,8 +231,8 @@ def _input(text: str, n_units: int) -> LibsdnnInput:
         raise ValueError(f"RANDOM_INVERSE must have two arguments, got {arguments[:80]!r}")
     return LibsdnnInput(
         symbolic=kind == "SYMBOLIC",
-        n_bins=_whole(sizes[0], "q of RANDOM_INVERSE", 1, 2**24),
-        n_flipped=_whole(sizes[1], "r of RANDOM_INVERSE", 1, n_units // 2 - 1),
+        n_bins=whole_of(sizes[0], "q of RANDOM_INVERSE", 1, 2**24),
+        n_flipped=whole_of(sizes[1], "r of RANDOM_INVERSE", 1, n_units // 2 - 1),
     )
 
 
@@ -317,7 +242,7 @@ def _pairs(entries: dict[str, str], n_inputs: int, path: Path) -> tuple[tuple[in
         return tuple((i, j) for i in range(n_inputs) for j in range(n_inputs) if i != j)
     if method == "saved":
         line = entries.get("SDNN/SD/line", "[(0,1),(1,0)]")
-        lines = [item.strip("()") for item in _items(line, "SDNN/SD/line")]
+        lines = [item.strip("()") for item in items_of(line, "SDNN/SD/line")]
     elif method == "file":
         file = path.parent / entries.get("SDNN/SD/filename", "")
         if not file.is_file():
@@ -330,7 +255,7 @@ def _pairs(entries: dict[str, str], n_inputs: int, path: Path) -> tuple[tuple[in
         inputs = one.split(",")
         if len(inputs) != 2:
             raise ValueError(f"a combination must be two inputs, got {one[:80]!r}")
-        mu, nu = (_whole(item, "an input of a combination", 0, n_inputs - 1) for item in inputs)
+        mu, nu = (whole_of(item, "an input of a combination", 0, n_inputs - 1) for item in inputs)
         pairs.append((mu, nu))
     if not pairs:
         raise ValueError(f"{path} must combine at least one pair of inputs")
@@ -350,25 +275,25 @@ def _parameters(entries: dict[str, str], path: Path) -> LibsdnnParameters:
         raise ValueError(
             f"ISSUE / type must be function_approximation or pattern_recognition, got {task!r}"
         )
-    n_inputs = _whole(entry("ISSUE/input_number"), "input_number", 1, 10000)
-    n_units = _whole(entry("SDNN/PC/n"), "n", 2, 2**24)
+    n_inputs = whole_of(entry("ISSUE/input_number"), "input_number", 1, 10000)
+    n_units = whole_of(entry("SDNN/PC/n"), "n", 2, 2**24)
     if n_units % 2 != 0:
         raise ValueError(f"n must be even, got {n_units}")
     name = "SDNN/PC/input_type_and_creation_method"
-    inputs = tuple(_input(item, n_units) for item in _items(entry(name), name))
+    inputs = tuple(_input(item, n_units) for item in items_of(entry(name), name))
     if len(inputs) != n_inputs:
         raise ValueError(f"{name} must have input_number = {n_inputs} items, got {len(inputs)}")
-    limits = _items(entry("SDNN/NN/initial_value_range", "[-5,5]"), "initial_value_range")
+    limits = items_of(entry("SDNN/NN/initial_value_range", "[-5,5]"), "initial_value_range")
     if len(limits) != 2:
         raise ValueError(f"initial_value_range must be two numbers, got {len(limits)}")
-    low, high = (_whole(item, "initial_value_range", -(10**6), 10**6) for item in limits)
+    low, high = (whole_of(item, "initial_value_range", -(10**6), 10**6) for item in limits)
     if low > high:
         raise ValueError(f"initial_value_range must rise, got [{low}, {high}]")
     given: dict[str, Any] = {}
     if task == "function_approximation":
-        span = _items(entry("ISSUE/FA/output_range"), "output_range")
-        step = _number(entry("ISSUE/FA/required_step_size"), "required_step_size")
-        bounds = tuple(_number(item, "output_range") for item in span)
+        span = items_of(entry("ISSUE/FA/output_range"), "output_range")
+        step = number_of(entry("ISSUE/FA/required_step_size"), "required_step_size")
+        bounds = tuple(number_of(item, "output_range") for item in span)
         if len(bounds) != 2 or not 1e-6 <= step <= bounds[1] - bounds[0]:
             raise ValueError("output_range must be two numbers, a step size at least apart")
         given |= {"task": "regression", "output_range": bounds, "step_size": step}
@@ -377,7 +302,7 @@ def _parameters(entries: dict[str, str], path: Path) -> LibsdnnParameters:
         scheme = entry("ISSUE/PR/multi_class_recognition", "1v1")
         if scheme not in schemes:
             raise ValueError(f"multi_class_recognition must be 1v1 or 1vR, got {scheme!r}")
-        n_classes = _whole(entry("ISSUE/PR/class_number"), "class_number", 2, 1024)
+        n_classes = whole_of(entry("ISSUE/PR/class_number"), "class_number", 2, 1024)
         given |= {"task": "classification", "n_classes": n_classes, "scheme": schemes[scheme]}
     return LibsdnnParameters(
         n_units=n_units,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sdnn.experiments.cases import EXPERIMENTS, Case, Experiment, select_experiments
-    from sdnn.experiments.claims import CLAIMS, Claim, judge_claims
+    from sdnn.experiments.claims import CLAIMS, Claim
     from sdnn.experiments.config import ProtocolConfig, TrialConfig, case_config, trial_seed
     from sdnn.experiments.cost import CostConfig, CostRecord
     from sdnn.experiments.cost_figure import draw_cost
@@ -24,10 +24,11 @@ if TYPE_CHECKING:
     from sdnn.experiments.statistics import Estimate
     from sdnn.experiments.store import ResultStore
     from sdnn.experiments.trial import Trial, make_core_trial
+    from sdnn.experiments.verdicts import judge_claims
 
 _HOMES = {
     "cases": ("EXPERIMENTS", "Case", "Experiment", "select_experiments"),
-    "claims": ("CLAIMS", "Claim", "judge_claims"),
+    "claims": ("CLAIMS", "Claim"),
     "config": ("ProtocolConfig", "TrialConfig", "case_config", "trial_seed"),
     "cost": ("CostConfig", "CostRecord"),
     "engine": ("Observer", "run_trials"),
@@ -41,6 +42,7 @@ _HOMES = {
     "statistics": ("Estimate",),
     "store": ("ResultStore",),
     "trial": ("Trial", "make_core_trial"),
+    "verdicts": ("judge_claims",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 

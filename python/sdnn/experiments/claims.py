@@ -1,48 +1,25 @@
-"""The paper's claims as data, and the rule by which our data speak about them.
+"""The paper's claims as data: quantities that our data give, and the ranges they must lie in.
 
-Source: spec section 5 (the list of claims); the paper's sections 4.2.2 and 4.3.3.
-
-A claim is broken into checks: a quantity that our data give, and the range in which it must lie.
-Ranges, margins and the rule were written down before the trials of Experiment B were run:
-
-- a check *holds* if the whole 95 % interval of the quantity lies in the range, *does not hold* if
-  the whole interval lies outside on one side, and is *undecided* otherwise;
-- a claim holds if all its checks hold, does not hold if one of them does not, and is undecided
-  otherwise;
-- runs smaller than the paper's (10 trials x 15,000 episodes) are not judged.
+Source: spec section 5 (the list of claims); the paper's sections 4.2.2 and 4.3.3. Ranges and
+margins were written down before the trials of Experiment B were run; `sdnn.experiments.verdicts`
+says by which rule they are judged.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from typing import TypeAlias
 
-import numpy as np
-
 from sdnn.experiments.cases import EXPERIMENTS, agent_title
-from sdnn.experiments.cost import SERIES, CostRecord
+from sdnn.experiments.cost import SERIES
 from sdnn.experiments.measures import MeasureName
-from sdnn.experiments.results import CaseSummary
-from sdnn.experiments.statistics import Estimate, estimate_contrast
 
 EQUAL_STEPS = 2.0
 """Steps by which two agents that do "almost the same" may differ."""
 
 SHARE_STABLE = 0.9
 """Share of test episodes that an agent must solve at the end to be called stable."""
-
-
-class Verdict(Enum):
-    """What our data say about a claim; the value is the word for a reader."""
-
-    HOLDS = "holds"
-    FAILS = "does not hold"
-    UNDECIDED = "undecided"
-    NOT_JUDGED = "not judged"
-    NOT_RUN = "not run"
 
 
 @dataclass(frozen=True)
@@ -118,14 +95,6 @@ class Check:
     paper: str
     at_least: float = -math.inf
     at_most: float = math.inf
-
-    def verdict(self, estimate: Estimate) -> Verdict:
-        """Judge an estimate by the rule of this module."""
-        if self.at_least <= estimate.lower and estimate.upper <= self.at_most:
-            return Verdict.HOLDS
-        if estimate.upper < self.at_least or estimate.lower > self.at_most:
-            return Verdict.FAILS
-        return Verdict.UNDECIDED
 
 
 @dataclass(frozen=True)
@@ -256,82 +225,6 @@ CLAIMS = (
         ),
     ),
 )
-
-
-@dataclass(frozen=True)
-class CheckOutcome:
-    """A check with what our data give; no estimate where its trials were not run."""
-
-    check: Check
-    estimate: Estimate | None
-    verdict: Verdict
-
-
-@dataclass(frozen=True)
-class ClaimOutcome:
-    """A claim with its checks' outcomes."""
-
-    claim: Claim
-    checks: tuple[CheckOutcome, ...]
-
-    @property
-    def verdict(self) -> Verdict:
-        """The verdict about the whole claim, by the rule of this module."""
-        verdicts = {outcome.verdict for outcome in self.checks}
-        for decisive in (
-            Verdict.FAILS,
-            Verdict.NOT_RUN,
-            Verdict.NOT_JUDGED,
-            Verdict.UNDECIDED,
-        ):
-            if decisive in verdicts:
-                return decisive
-        return Verdict.HOLDS
-
-
-def judge_claims(
-    summaries: Iterable[CaseSummary], costs: Sequence[CostRecord]
-) -> tuple[ClaimOutcome, ...]:
-    """Judge the claims that the given results speak about, at least in part.
-
-    Parameters
-    ----------
-    summaries
-        One for each case and agent; a case that experiments share may come more than once.
-    costs
-        Measured costs.
-    """
-    by_subject = {Subject(s.result.case.id, s.result.agent): s for s in summaries}
-    outcomes = (
-        ClaimOutcome(claim, tuple(_judge(check, by_subject, costs) for check in claim.checks))
-        for claim in CLAIMS
-    )
-    return tuple(o for o in outcomes if any(check.estimate is not None for check in o.checks))
-
-
-def _judge(
-    check: Check, summaries: Mapping[Subject, CaseSummary], costs: Sequence[CostRecord]
-) -> CheckOutcome:
-    quantity = check.quantity
-    if isinstance(quantity, Growth):
-        times = {c.key.n_inputs: c.microseconds for c in costs if c.key.series == quantity.series}
-        if not {quantity.n_inputs, quantity.n_fewer} <= times.keys():
-            return CheckOutcome(check, None, Verdict.NOT_RUN)
-        growth = estimate_contrast(times[quantity.n_inputs], times[quantity.n_fewer], np.divide)
-        return CheckOutcome(check, growth, check.verdict(growth))
-    subjects = [quantity.subject]
-    if isinstance(quantity, Difference):
-        subjects.append(quantity.other)
-    if not summaries.keys() >= set(subjects):
-        return CheckOutcome(check, None, Verdict.NOT_RUN)
-    found = [summaries[subject] for subject in subjects]
-    if len(found) == 1:
-        estimate = found[0].medians[quantity.measure]
-    else:
-        values, others = (summary.uncensored(quantity.measure) for summary in found)
-        estimate = estimate_contrast(values, others)
-    judged = all(summary.result.is_paper_scale for summary in found)
-    return CheckOutcome(check, estimate, check.verdict(estimate) if judged else Verdict.NOT_JUDGED)
 
 
 def describe(quantity: Quantity) -> str:

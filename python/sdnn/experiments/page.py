@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 
 from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, agent_title
-from sdnn.experiments.claims import Verdict
 from sdnn.experiments.errors import PlotUnavailableError
 from sdnn.experiments.report import QUICK_WARNING, Report
 from sdnn.experiments.tables import (
@@ -27,6 +26,7 @@ from sdnn.experiments.tables import (
     cost_header,
     cost_rows,
 )
+from sdnn.experiments.verdicts import Verdict
 
 _TEMPLATE = "report.html.jinja"
 

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from sdnn.experiments.cases import PAPER_EPISODES, Experiment
-from sdnn.experiments.claims import ClaimOutcome, describe, judge_claims
+from sdnn.experiments.claims import describe
 from sdnn.experiments.cost import CostRecord
 from sdnn.experiments.measures import MeasureName
 from sdnn.experiments.records import TrialRecord
@@ -27,6 +27,7 @@ from sdnn.experiments.tables import (
     cost_header,
     cost_rows,
 )
+from sdnn.experiments.verdicts import ClaimOutcome, judge_claims
 
 if TYPE_CHECKING:
     from rich.console import Console

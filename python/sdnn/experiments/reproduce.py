@@ -11,7 +11,14 @@ from typing import Any
 from sdnn.experiments import cost_figure, figures, page, report
 from sdnn.experiments.cases import EXPERIMENTS, PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.experiments.config import ProtocolConfig
-from sdnn.experiments.cost import QUICK_COST, CostConfig, MeasureSteps, measure_costs
+from sdnn.experiments.cost import (
+    QUICK_COST,
+    CostConfig,
+    CostKey,
+    MeasureSteps,
+    cost_keys,
+    measure_costs,
+)
 from sdnn.experiments.engine import Observer, RunOutcome, run_trials
 from sdnn.experiments.plan import PlannedTrial, plan_trials
 from sdnn.experiments.records import TrialKey, TrialRecord
@@ -118,18 +125,38 @@ class Reproduction:
     table: dict[str, Any] = field(default_factory=dict)
 
 
-def count_stored(request: ReproduceRequest) -> dict[tuple[str, str], tuple[int, int]]:
-    """Count planned and stored trials for each case and agent, without making any file."""
-    stored = set()
+@dataclass(frozen=True, kw_only=True)
+class StoredCounts:
+    """How much a request needs and how much of it is stored: pairs (planned, stored).
+
+    Parameters
+    ----------
+    trials
+        Of each case and agent.
+    costs
+        Of measurements of costs.
+    """
+
+    trials: dict[tuple[str, str], tuple[int, int]]
+    costs: tuple[int, int]
+
+
+def count_stored(request: ReproduceRequest) -> StoredCounts:
+    """Count what is planned and what of it is stored, without making any file."""
+    trial_keys: set[TrialKey] = set()
+    known_costs: set[CostKey] = set()
     if (request.out / STORE_NAME).exists() or request.out.is_file():
         with ResultStore(request.out) as store:
-            stored = store.keys()
-    counts: dict[tuple[str, str], tuple[int, int]] = {}
+            trial_keys = store.keys()
+            found = store.load_costs(request.cost_config.config_hash)
+            known_costs = {record.key for record in found}
+    trials: dict[tuple[str, str], tuple[int, int]] = {}
     for planned in request.plan():
         pair = (planned.key.case_id, planned.key.agent)
-        n_planned, n_stored = counts.get(pair, (0, 0))
-        counts[pair] = (n_planned + 1, n_stored + (planned.key in stored))
-    return counts
+        n_planned, n_stored = trials.get(pair, (0, 0))
+        trials[pair] = (n_planned + 1, n_stored + (planned.key in trial_keys))
+    wanted = set(cost_keys(request.cost_config)) if request.cost else set()
+    return StoredCounts(trials=trials, costs=(len(wanted), len(wanted & known_costs)))
 
 
 def reproduce(

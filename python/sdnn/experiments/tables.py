@@ -8,11 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, agent_title
-from sdnn.experiments.claims import ClaimOutcome, Growth, Quantity, describe
+from sdnn.experiments.claims import Growth, Quantity, describe
 from sdnn.experiments.cost import SERIES, CostRecord
 from sdnn.experiments.measures import DEFAULT_MEASURES, MeasureName
 from sdnn.experiments.results import CaseSummary
 from sdnn.experiments.statistics import DEFAULT_BOOTSTRAP, Estimate
+from sdnn.experiments.verdicts import ClaimOutcome
 
 CASE_HEADER = (
     "case",

@@ -9,18 +9,21 @@ from sdnn.experiments.cases import EXPERIMENTS
 from sdnn.experiments.claims import (
     CLAIMS,
     Check,
-    CheckOutcome,
     Claim,
-    ClaimOutcome,
     Difference,
     Growth,
     Median,
     Subject,
-    Verdict,
     describe,
-    judge_claims,
 )
 from sdnn.experiments.cost import SERIES, CostKey, CostRecord, StepTimes
+from sdnn.experiments.verdicts import (
+    CheckOutcome,
+    ClaimOutcome,
+    Verdict,
+    judge_claims,
+    verdict_of,
+)
 
 CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
 
@@ -71,15 +74,15 @@ def verdicts(summaries, costs=()):
 )
 def test_a_check_is_judged_by_the_whole_interval(interval, verdict):
     check = Check(Median("episodes_to_learn", Subject("s4")), "about 150", at_most=150)
-    assert check.verdict(Estimate(*interval)) == verdict
+    assert verdict_of(check, Estimate(*interval)) == verdict
 
 
 def test_a_range_has_two_ends():
     check = Check(Median("final_steps", Subject("s4")), "", at_least=3, at_most=5)
-    assert check.verdict(Estimate(4, 3, 5)) == Verdict.HOLDS
-    assert check.verdict(Estimate(2, 1, 2.5)) == Verdict.FAILS
-    assert check.verdict(Estimate(7, 6, 8)) == Verdict.FAILS
-    assert check.verdict(Estimate(4, 2, 8)) == Verdict.UNDECIDED
+    assert verdict_of(check, Estimate(4, 3, 5)) == Verdict.HOLDS
+    assert verdict_of(check, Estimate(2, 1, 2.5)) == Verdict.FAILS
+    assert verdict_of(check, Estimate(7, 6, 8)) == Verdict.FAILS
+    assert verdict_of(check, Estimate(4, 2, 8)) == Verdict.UNDECIDED
 
 
 @pytest.mark.parametrize(

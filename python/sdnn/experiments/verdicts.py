@@ -1,0 +1,120 @@
+"""The rule by which our data speak about the paper's claims.
+
+It was written down before the trials of Experiment B were run:
+
+- a check *holds* if the whole 95 % interval of the quantity lies in the range, *does not hold* if
+  the whole interval lies outside on one side, and is *undecided* otherwise;
+- a claim holds if all its checks hold, does not hold if one of them does not, and is undecided
+  otherwise;
+- runs smaller than the paper's (10 trials x 15,000 episodes) are not judged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from sdnn.experiments.claims import CLAIMS, Check, Claim, Difference, Growth, Subject
+from sdnn.experiments.cost import CostRecord
+from sdnn.experiments.results import CaseSummary
+from sdnn.experiments.statistics import Estimate, estimate_contrast
+
+
+class Verdict(Enum):
+    """What our data say about a claim; the value is the word for a reader."""
+
+    HOLDS = "holds"
+    FAILS = "does not hold"
+    UNDECIDED = "undecided"
+    NOT_JUDGED = "not judged"
+    NOT_RUN = "not run"
+
+
+def verdict_of(check: Check, estimate: Estimate) -> Verdict:
+    """Judge one check by the rule of this module."""
+    if check.at_least <= estimate.lower and estimate.upper <= check.at_most:
+        return Verdict.HOLDS
+    if estimate.upper < check.at_least or estimate.lower > check.at_most:
+        return Verdict.FAILS
+    return Verdict.UNDECIDED
+
+
+@dataclass(frozen=True)
+class CheckOutcome:
+    """A check with what our data give; no estimate where its trials were not run."""
+
+    check: Check
+    estimate: Estimate | None
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
+class ClaimOutcome:
+    """A claim with its checks' outcomes."""
+
+    claim: Claim
+    checks: tuple[CheckOutcome, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict about the whole claim, by the rule of this module."""
+        verdicts = {outcome.verdict for outcome in self.checks}
+        for decisive in (
+            Verdict.FAILS,
+            Verdict.NOT_RUN,
+            Verdict.NOT_JUDGED,
+            Verdict.UNDECIDED,
+        ):
+            if decisive in verdicts:
+                return decisive
+        return Verdict.HOLDS
+
+
+def judge_claims(
+    summaries: Iterable[CaseSummary], costs: Sequence[CostRecord]
+) -> tuple[ClaimOutcome, ...]:
+    """Judge the claims that the given results speak about, at least in part.
+
+    Parameters
+    ----------
+    summaries
+        One for each case and agent; a case that experiments share may come more than once.
+    costs
+        Measured costs.
+    """
+    by_subject = {Subject(s.result.case.id, s.result.agent): s for s in summaries}
+    outcomes = (
+        ClaimOutcome(claim, tuple(_judge(check, by_subject, costs) for check in claim.checks))
+        for claim in CLAIMS
+    )
+    return tuple(o for o in outcomes if any(check.estimate is not None for check in o.checks))
+
+
+def _judge(
+    check: Check, summaries: Mapping[Subject, CaseSummary], costs: Sequence[CostRecord]
+) -> CheckOutcome:
+    quantity = check.quantity
+    if isinstance(quantity, Growth):
+        times = {c.key.n_inputs: c.microseconds for c in costs if c.key.series == quantity.series}
+        if not {quantity.n_inputs, quantity.n_fewer} <= times.keys():
+            return CheckOutcome(check, None, Verdict.NOT_RUN)
+        growth = estimate_contrast(times[quantity.n_inputs], times[quantity.n_fewer], np.divide)
+        return CheckOutcome(check, growth, verdict_of(check, growth))
+    subjects = [quantity.subject]
+    if isinstance(quantity, Difference):
+        subjects.append(quantity.other)
+    if not summaries.keys() >= set(subjects):
+        return CheckOutcome(check, None, Verdict.NOT_RUN)
+    found = [summaries[subject] for subject in subjects]
+    if len(found) == 1:
+        estimate = found[0].medians[quantity.measure]
+    else:
+        values, others = (summary.uncensored(quantity.measure) for summary in found)
+        estimate = estimate_contrast(values, others)
+    judged = all(summary.result.is_paper_scale for summary in found)
+    return CheckOutcome(
+        check, estimate, verdict_of(check, estimate) if judged else Verdict.NOT_JUDGED
+    )
