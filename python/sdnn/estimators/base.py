@@ -213,6 +213,11 @@ class BaseSDNN(BaseEstimator):
         Returns
         -------
         ndarray, shape (n_samples, n_pairs * n_pattern_units)
+
+        Raises
+        ------
+        NotFittedError, ValueError
+            As of `predict`.
         """
         table = self._table(X)
         code = self.network_.input_code

@@ -36,7 +36,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
 
     Each input becomes a binary pattern, the patterns of each two inputs are combined by selective
     desensitization, and over this code perceptrons with integer weights are trained, one per
-    class or one per pair of classes. Only units that answer wrongly are corrected.
+    class or one per pair of classes. Only units that answer wrongly are corrected. Sources: Nonaka,
+    Tanaka and Morita 2011 (the code); the manual of LIBSDNN (both schemes).
 
     Parameters
     ----------
@@ -153,6 +154,16 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         -------
         SDNNClassifier
             Itself.
+
+        Raises
+        ------
+        ValueError
+            For an impossible parameter, data that cannot be used, or a form of training that needs
+            more than ``memory_limit``.
+        OverflowError
+            Before a weight could leave its range.
+        MemoryError
+            If there is no room for the weights.
         """
         table, y = self._checked(X, y, reset=True, ensure_min_samples=2)
         random = self._begin(X, table, unique_labels(y))
@@ -188,6 +199,11 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         -------
         SDNNClassifier
             Itself.
+
+        Raises
+        ------
+        ValueError, OverflowError, MemoryError
+            As of `fit`; ValueError too for other labels than ``classes``.
         """
         first = not hasattr(self, "network_")
         if first and classes is None:
@@ -220,6 +236,13 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         -------
         ndarray, shape (n_samples, n_classes), or (n_samples,) for two classes
             For two classes, positive values speak for ``classes_[1]``.
+
+        Raises
+        ------
+        NotFittedError
+            Before `fit` or `partial_fit`.
+        ValueError
+            For samples that cannot be used: another number of features, NaN, unknown categories.
         """
         return self._decide(self._table(X))
 
@@ -233,6 +256,13 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         Returns
         -------
         ndarray, shape (n_samples,)
+
+        Raises
+        ------
+        NotFittedError
+            Before `fit` or `partial_fit`.
+        ValueError
+            For samples that cannot be used: another number of features, NaN, unknown categories.
         """
         winners = self._winners(self.decision_function(X))
         labels: NDArray[Any] = self.classes_[winners]

@@ -27,6 +27,8 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     Each input becomes a binary pattern, the patterns of each two inputs are combined by selective
     desensitization, and the number of units that fire over this code, all of them with integer
     weights, is the output. The p-delta rule corrects just the units nearest to their threshold.
+    Sources: Nonaka, Tanaka and Morita 2011 (the network); Auer, Burgsteiner and Maass 2008 (the
+    rule).
 
     Parameters
     ----------
@@ -158,6 +160,16 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         -------
         SDNNRegressor
             Itself.
+
+        Raises
+        ------
+        ValueError
+            For an impossible parameter, data that cannot be used, or a form of training that needs
+            more than ``memory_limit``.
+        OverflowError
+            Before a weight could leave its range.
+        MemoryError
+            If there is no room for the weights.
         """
         table, targets = self._checked(X, y, reset=True)
         random = self._begin(X, table, targets)
@@ -191,6 +203,11 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         -------
         SDNNRegressor
             Itself.
+
+        Raises
+        ------
+        ValueError, OverflowError, MemoryError
+            As of `fit`; ValueError too for another number of outputs.
         """
         first = not hasattr(self, "network_")
         table, targets = self._checked(X, y, reset=first)
@@ -216,6 +233,13 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         -------
         ndarray, shape (n_samples,) or (n_samples, n_outputs)
             As the targets' shape was in training.
+
+        Raises
+        ------
+        NotFittedError
+            Before `fit` or `partial_fit`.
+        ValueError
+            For samples that cannot be used: another number of features, NaN, unknown categories.
         """
         table = self._table(X)
         counts = self.network_.counts(table, self.n_outputs_, self._n_threads())
