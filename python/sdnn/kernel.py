@@ -86,7 +86,8 @@ class AnalyticKernel:
     Parameters
     ----------
     coding : str, Coding or sequence of Coding
-        Of all inputs, or of each. Ranges must be given or learned (as ``model.codings_`` are).
+        Of all inputs, or of each. Give them with ranges, or learned (as ``model.codings_`` are):
+        one without a range is taken to be on [0, 1].
     n_inputs : int, optional
         Number of inputs; needed where there is one coding for all.
     pairs : list of (int, int), optional
@@ -125,9 +126,19 @@ class AnalyticKernel:
         Returns
         -------
         ndarray, shape (n_samples, n_others)
+
+        Raises
+        ------
+        ValueError
+            For another number of inputs, NaN, or a category that no coding knows.
         """
         one = np.asarray(X)
         other = one if Y is None else np.asarray(Y)
+        for name, table in (("X", one), ("Y", other)):
+            if table.ndim != 2 or table.shape[1] != len(self.codings):
+                raise ValueError(
+                    f"{name} must have shape (n, {len(self.codings)}), got {table.shape}"
+                )
         rho = [
             matrix[np.ix_(coding.bins(one[:, index]), coding.bins(other[:, index]))]
             for index, (coding, matrix) in enumerate(

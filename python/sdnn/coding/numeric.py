@@ -33,9 +33,12 @@ def numbers(column: NDArray[Any]) -> NDArray[np.float64]:
     Raises
     ------
     ValueError
-        If a value is not a number.
+        If a value is not a number, or NaN.
     """
-    return np.asarray(column, dtype=np.float64)
+    values = np.asarray(column, dtype=np.float64)
+    if np.isnan(values).any():
+        raise ValueError("Input contains NaN")
+    return values
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -244,7 +247,10 @@ class Circular(Coding):
 
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
         """Return the bin of each value; see `Coding.bins`."""
-        turns = (numbers(column) - self.origin) / self.period
+        values = numbers(column)
+        if np.isinf(values).any():
+            raise ValueError("Input contains infinity, which has no place on a circle")
+        turns = (values - self.origin) / self.period
         return bins_of_positions(turns - np.floor(turns), self.size)
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:

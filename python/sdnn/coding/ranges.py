@@ -34,7 +34,7 @@ def learned_range(
     )
     given = low is not None and high is not None
     if not all(map(math.isfinite, ends)) or (given and ends[0] >= ends[1]):
-        raise ValueError(f"low and high must be finite, low < high, got {low!r} and {high!r}")
+        raise ValueError(f"low and high must be finite, low < high, got {ends[0]} and {ends[1]}")
     return ends[0], max(ends)
 
 

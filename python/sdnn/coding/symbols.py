@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,6 +15,13 @@ from sdnn.coding.base import Coding, known
 __all__ = ["CorrelationMatrix", "Symbolic"]
 
 Category = str | float | int | bool
+
+
+def listed(categories: Any) -> tuple[Category, ...] | None:
+    """Return given categories as a tuple; ValueError for a lone word or number."""
+    if isinstance(categories, str) or not (categories is None or isinstance(categories, Iterable)):
+        raise ValueError(f"categories must be a tuple of values, got {categories!r}")
+    return None if categories is None else tuple(categories)
 
 
 def learned_categories(column: NDArray[Any]) -> tuple[Category, ...]:
@@ -65,8 +73,7 @@ class Symbolic(Coding):
     categories: tuple[Category, ...] | None = None
 
     def __post_init__(self) -> None:
-        if self.categories is not None:
-            object.__setattr__(self, "categories", tuple(self.categories))
+        object.__setattr__(self, "categories", listed(self.categories))
 
     def fit(self, column: NDArray[Any], n_units: int) -> Symbolic:
         """Return a copy with the categories known; see `Coding.fit`."""
@@ -133,8 +140,7 @@ class CorrelationMatrix(Coding):
     def __post_init__(self) -> None:
         matrix = np.atleast_2d(np.asarray(self.matrix, dtype=np.float64))
         object.__setattr__(self, "matrix", tuple(map(tuple, matrix.tolist())))
-        if self.categories is not None:
-            object.__setattr__(self, "categories", tuple(self.categories))
+        object.__setattr__(self, "categories", listed(self.categories))
 
     def fit(self, column: NDArray[Any], n_units: int) -> CorrelationMatrix:
         """Return a copy with the categories known; see `Coding.fit`."""

@@ -178,6 +178,26 @@ def test_symbols_are_checked():
         RandomInverse().bins(UNIT)
 
 
+def test_numbers_are_checked():
+    for coding in (RandomInverse(), Anchor(), Circular(period=1.0)):
+        with pytest.raises(ValueError, match="contains NaN"):
+            coding.fit(UNIT, 64).bins(np.array([0.5, np.nan]))
+        with pytest.raises(ValueError, match="could not convert"):
+            coding.fit(UNIT, 64).bins(np.array(["a"]))
+    with pytest.raises(ValueError, match=r"must be finite, low < high, got 0.0 and inf"):
+        Anchor().fit(np.array([0.0, np.inf]), 64)
+    with pytest.raises(ValueError, match="infinity, which has no place on a circle"):
+        Circular().bins(np.array([np.inf]))
+    assert Anchor(low=0.0, high=1.0).bins(np.array([-np.inf, np.inf])).tolist() == [0, 359]
+
+
+@pytest.mark.parametrize("categories", ["red", 3])
+def test_lone_categories_are_refused(categories):
+    for make in (Symbolic, lambda **given: CorrelationMatrix(matrix=[[1.0]], **given)):
+        with pytest.raises(ValueError, match="categories must be a tuple of values, got "):
+            make(categories=categories)
+
+
 def test_knots_are_values_and_their_mean_ranks():
     assert quantile_knots(np.array([5.0])) == ((5.0, 0.0),)
     knots = quantile_knots(np.random.RandomState(0).normal(size=5000))

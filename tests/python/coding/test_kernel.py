@@ -58,6 +58,15 @@ def test_it_can_be_drawn(coding, tmp_path):
     assert (tmp_path / "similarity.png").stat().st_size > 5000
 
 
+@pytest.mark.parametrize("bad", [np.zeros((3, 1)), np.zeros((3, 3)), np.zeros(2)])
+def test_samples_of_another_shape_are_refused(bad):
+    analytic = kernel.AnalyticKernel("anchor", n_inputs=2)
+    with pytest.raises(ValueError, match=r"X must have shape \(n, 2\), got "):
+        analytic(bad)
+    with pytest.raises(ValueError, match=r"Y must have shape \(n, 2\), got "):
+        analytic(np.zeros((1, 2)), bad)
+
+
 DOCUMENTED = (
     "sdnn.coding",
     "sdnn.coding.base",
