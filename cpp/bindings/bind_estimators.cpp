@@ -61,8 +61,8 @@ py::array_t<std::int8_t> transform(const coding::SelectiveDesensitization& code,
   for (std::size_t t = 0; t < coded.size(); ++t) {
     for (std::size_t j = 0; j < code.n_columns(); ++j) {
       const std::size_t slot = code.slot_of(j);
-      const bool active = (coded.active(t)[slot / 64] >> slot % 64 & 1) != 0;
-      const bool positive = (coded.positive(t)[slot / 64] >> slot % 64 & 1) != 0;
+      const bool active = (coded[t].active[slot / 64] >> slot % 64 & 1) != 0;
+      const bool positive = (coded[t].positive[slot / 64] >> slot % 64 & 1) != 0;
       out.mutable_at(t, j) = static_cast<std::int8_t>(active ? (positive ? 1 : -1) : 0);
     }
   }
@@ -80,12 +80,10 @@ Matrix gram(const coding::SelectiveDesensitization& code, const Bins& bins,
   const py::gil_scoped_release release;
   const coding::CodedSamples one(code, values);
   const coding::CodedSamples other(code, others);
-  const auto kernels = estimators::unit_kernels();
   for (std::size_t t = 0; t < one.size(); ++t) {
     for (std::size_t s = 0; s < other.size(); ++s) {
       items[t * other.size() + s] =
-          kernels.inner_product(one.active(t), one.positive(t), other.active(s), other.positive(s),
-                                code.n_words());
+          estimators::inner_product(one[t], other[s], one.n_words());
     }
   }
   return out;

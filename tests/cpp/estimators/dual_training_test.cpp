@@ -4,53 +4,60 @@
 
 #include <algorithm>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "estimators/problems.hpp"
-#include "sdnn/core/instruction_set.hpp"
 
 namespace sdnn {
 namespace {
 
 TEST(DualTraining, HasTheBitsOfPlainTraining) {
-  for (std::uint64_t seed = 0; seed < 150; ++seed) {
-    testing::compare_with_plain(testing::random_problem(seed), estimators::TrainingForm::dual,
-                                1 + static_cast<int>(seed % 3),
-                                [&](bool same) { ASSERT_TRUE(same) << "problem " << seed; });
-  }
-}
-
-TEST(DualTraining, HasThemOnEveryInstructionSet) {
-  const std::string before(core::name_of(core::instruction_set()));
-  for (const auto level : {core::InstructionSet::portable, core::InstructionSet::avx2,
-                           core::InstructionSet::avx512}) {
-    if (level > core::best_instruction_set()) continue;
-    core::set_instruction_set(core::name_of(level));
-    for (std::uint64_t seed = 200; seed < 220; ++seed) {
-      testing::compare_with_plain(
-          testing::random_problem(seed), estimators::TrainingForm::dual, 1, [&](bool same) {
-            ASSERT_TRUE(same) << core::name_of(level) << ", problem " << seed;
-          });
-    }
-  }
-  core::set_instruction_set(before);
+  testing::expect_bits_of_plain_training(estimators::TrainingForm::dual);
 }
 
 TEST(DualTraining, HasThemInDataOrder) {  // where corrections wait for each other
   for (std::uint64_t seed = 300; seed < 340; ++seed) {
-    auto problem = testing::random_problem(seed);
-    const std::size_t n_samples = problem.bins.size() / problem.code->n_inputs();
-    for (auto& order : problem.orders) {
-      order.clear();
-      for (std::size_t t = 0; t < 20 * n_samples; ++t) {
-        order.push_back(static_cast<std::int32_t>(t % n_samples));
-      }
+    for (const bool at_once : {false, true}) {
+      testing::compare_with_plain(
+          testing::in_data_order(testing::random_problem(seed), 20, at_once),
+          estimators::TrainingForm::dual, 1 + static_cast<int>(seed % 3),
+          [&](bool same) { ASSERT_TRUE(same) << "problem " << seed; });
     }
-    testing::compare_with_plain(problem, estimators::TrainingForm::dual,
-                                1 + static_cast<int>(seed % 3),
-                                [&](bool same) { ASSERT_TRUE(same) << "problem " << seed; });
   }
+}
+
+TEST(DualTraining, HasThemOverManyWindows) {
+  auto problem = testing::random_problem(11);
+  core::Random random(11, core::Stream::exploration);
+  const std::size_t n_inputs = problem.code->n_inputs();
+  const std::size_t n_bins = problem.code->n_bins(0);
+  const std::size_t n_samples = 1500;
+  problem.bins.clear();
+  problem.targets.clear();
+  for (std::size_t i = 0; i < n_samples * n_inputs; ++i) {
+    problem.bins.push_back(static_cast<std::int32_t>(random.below(n_bins)));
+  }
+  for (std::size_t i = 0; i < n_samples * problem.n_groups; ++i) {
+    problem.targets.push_back(random.uniform() * 9.0);
+  }
+  testing::compare_with_plain(testing::in_data_order(problem, 4, false),
+                              estimators::TrainingForm::dual, 2,
+                              [](bool same) { ASSERT_TRUE(same); });
+}
+
+TEST(DualTraining, EmptiesCoefficientsBeforeTheyOverflow) {
+  // Two samples of one code that want opposite things: one coefficient rises for ever, one falls.
+  auto problem = testing::random_problem(3);
+  const std::size_t n_inputs = problem.code->n_inputs();
+  problem.bins.assign(2 * n_inputs, 0);
+  problem.n_groups = 1;
+  problem.targets = {0.0, static_cast<double>(problem.n_units)};
+  problem.orders.assign(2, std::vector<std::int32_t>(70000));
+  for (auto& order : problem.orders) {
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<std::int32_t>(i % 2);
+  }
+  testing::compare_with_plain(problem, estimators::TrainingForm::dual, 1,
+                              [](bool same) { ASSERT_TRUE(same); });
 }
 
 TEST(DualTraining, AgreesOverManyPresentationsOfFewSamples) {

@@ -1,12 +1,15 @@
 /// Random training problems, and the weights that a form leaves.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <utility>
 #include <vector>
 
+#include "instruction_sets.hpp"
 #include "sdnn/estimators/trainer.hpp"
 
 namespace sdnn::testing {
@@ -75,9 +78,12 @@ inline std::shared_ptr<estimators::PerceptronLayer> layer_for(const Problem& pro
 inline estimators::PDeltaTrainer trainer_for(const Problem& problem,
                                              std::shared_ptr<estimators::PerceptronLayer> layer,
                                              estimators::TrainingForm form, int n_threads = 1) {
-  return {std::move(layer), problem.bins,
-          estimators::PDeltaRule(problem.n_units, problem.targets, problem.n_groups), form,
-          std::size_t{1} << 30, n_threads};
+  return {std::move(layer),
+          problem.bins,
+          estimators::PDeltaRule(problem.n_units, problem.targets, problem.n_groups),
+          form,
+          std::size_t{1} << 30,
+          n_threads};
 }
 
 /// All thresholds and weights.
@@ -105,6 +111,35 @@ void compare_with_plain(const Problem& problem, estimators::TrainingForm form, i
     trainer.synchronize();
     expect(bits_of(*plain_layer) == bits_of(*layer));
   }
+}
+
+/// The bits of plain training on random problems, on several threads and on every instruction set.
+inline void expect_bits_of_plain_training(estimators::TrainingForm form) {
+  for (std::uint64_t seed = 0; seed < 150; ++seed) {
+    compare_with_plain(random_problem(seed), form, 1 + static_cast<int>(seed % 3),
+                       [&](bool same) { ASSERT_TRUE(same) << "problem " << seed; });
+  }
+  on_every_instruction_set([&](auto level) {
+    for (std::uint64_t seed = 200; seed < 220; ++seed) {
+      compare_with_plain(random_problem(seed), form, 1,
+                         [&](bool same) { ASSERT_TRUE(same) << level << ", problem " << seed; });
+    }
+  });
+}
+
+/// The problem with rounds in the order of the data instead, several in one order where `at_once`.
+inline Problem in_data_order(Problem problem, std::size_t n_rounds, bool at_once) {
+  const std::size_t n_samples = problem.bins.size() / problem.code->n_inputs();
+  for (auto& order : problem.orders) {
+    order.clear();
+    for (std::size_t t = 0; t < (at_once ? n_rounds : 1) * n_samples; ++t) {
+      order.push_back(static_cast<std::int32_t>(t % n_samples));
+    }
+  }
+  while (!at_once && problem.orders.size() < n_rounds) {
+    problem.orders.push_back(problem.orders.back());
+  }
+  return problem;
 }
 
 }  // namespace sdnn::testing

@@ -19,8 +19,8 @@ coding::SelectiveDesensitization demonstration_code() {
 }
 
 TEST(TrainingForm, NamesGoBothWays) {
-  for (const auto form : {TrainingForm::automatic, TrainingForm::dual, TrainingForm::block,
-                          TrainingForm::plain}) {
+  for (const auto form :
+       {TrainingForm::automatic, TrainingForm::dual, TrainingForm::block, TrainingForm::plain}) {
     EXPECT_EQ(estimators::training_form_named(estimators::name_of(form)), form);
   }
   EXPECT_THROW(estimators::training_form_named("primal"), std::invalid_argument);
@@ -30,9 +30,14 @@ TEST(TrainingForm, MemoryByHand) {
   const auto code = demonstration_code();
   EXPECT_EQ(estimators::product_bytes(code), 2U);
   EXPECT_EQ(estimators::form_memory(TrainingForm::plain, 280, code, 2000), 0U);
-  EXPECT_EQ(estimators::form_memory(TrainingForm::block, 280, code, 2000), 4U * 288 * 4096);
+  EXPECT_EQ(estimators::form_memory(TrainingForm::block, 280, code, 2000),
+            4U * 288 * 4096 + 128U * (2 * 64 * 8 + 4096 + 2 * 4 * 288 + 2 * 128 + 2000 + 32 * 4));
+  EXPECT_EQ(estimators::plan_bytes(280, code, 2000),
+            384U * (2 * 64 * 8 + 4096 + 2 * 4 * 288 + 2000 + 32 * 4) + 2 * (512 * 512 - 128 * 128) +
+                2000U * (512 * 2 + 2000 + 32 * 4));
   EXPECT_EQ(estimators::form_memory(TrainingForm::dual, 280, code, 2000),
-            2000U * 2016 * 2 + 280U * 2016 * 4 + 2000U * 288 * 2 + 2000U * 2 * 64 * 8);
+            2000U * 2016 * 2 + 280U * 2016 * 4 + 2000U * 288 * 2 + 2000U * 2 * 64 * 8 +
+                128U * (4 * 288 + 2 * 128));
 }
 
 TEST(TrainingForm, SuitsTheSizeAndTheLimit) {
@@ -43,6 +48,8 @@ TEST(TrainingForm, SuitsTheSizeAndTheLimit) {
   EXPECT_EQ(chosen(2000, 1 << 30), TrainingForm::dual);
   EXPECT_EQ(chosen(2000, 10 << 20), TrainingForm::block);
   EXPECT_EQ(chosen(2000, 1 << 20), TrainingForm::plain);
+  EXPECT_EQ(chosen(6000, 1 << 30), TrainingForm::dual);
+  EXPECT_EQ(chosen(7000, 1 << 30), TrainingForm::block);
   EXPECT_EQ(chosen(50000, std::size_t{64} << 30), TrainingForm::block);
   EXPECT_THROW(estimators::choose_form(TrainingForm::dual, 280, code, 2000, 10 << 20),
                std::length_error);

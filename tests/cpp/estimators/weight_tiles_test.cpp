@@ -7,17 +7,17 @@ namespace {
 using sdnn::estimators::WeightTiles;
 
 TEST(WeightTiles, LastTileIsAsWideAsNeeded) {
-  WeightTiles<std::int32_t> tiles(70, 3);
+  WeightTiles<std::int32_t> tiles(102, 3);
   EXPECT_EQ(tiles.n_tiles(), 2U);
-  EXPECT_EQ(tiles.n_padded_units(), 80U);
-  EXPECT_EQ(tiles.width(0), 64U);
+  EXPECT_EQ(tiles.n_padded_units(), 112U);
+  EXPECT_EQ(tiles.width(0), 96U);
   EXPECT_EQ(tiles.width(1), 16U);
-  EXPECT_EQ(WeightTiles<std::int32_t>::bytes(70, 3), 4U * 80 * 3);
-  tiles.at(65, 2) = -7;
+  EXPECT_EQ(WeightTiles<std::int32_t>::bytes(102, 3), 4U * 112 * 3);
+  tiles.at(97, 2) = -7;
   EXPECT_EQ(tiles.tile(1)[2 * 16 + 1], -7);
-  EXPECT_EQ(tiles.tile(1), tiles.data() + 64 * 3);
-  tiles.at(63, 1) = 6;
-  EXPECT_EQ(tiles.tile(0)[64 + 63], 6);
+  EXPECT_EQ(tiles.tile(1), tiles.data() + 96 * 3);
+  tiles.at(95, 1) = 6;
+  EXPECT_EQ(tiles.tile(0)[96 + 95], 6);
   EXPECT_EQ(tiles.largest(), 7);
 }
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "sdnn/coding/pattern_table.hpp"
+#include "sdnn/core/aligned_buffer.hpp"
 #include "sdnn/core/check.hpp"
 
 namespace sdnn::coding {
@@ -21,6 +22,12 @@ namespace sdnn::coding {
 struct InputPair {
   std::size_t modified = 0;
   std::size_t modifier = 0;
+};
+
+/// A code as words of bits: where it is not 0, and where it is +1.
+struct CodeWords {
+  const std::uint64_t* active;
+  const std::uint64_t* positive;
 };
 
 /// x_SD: for each pair (mu, nu) the pattern of input mu where that of nu is +1, and 0 elsewhere.
@@ -129,12 +136,13 @@ class SelectiveDesensitization {
   std::size_t max_active_ = 0;
 };
 
-/// The codes of several samples, word by word: what popcounts and weight updates read.
+/// The codes of several samples, filled up with zeros to a multiple of 4 words: what popcounts and
+/// weight updates read.
 class CodedSamples {
  public:
   /// Shapes: bins (n_samples, n_inputs), checked before.
   CodedSamples(const SelectiveDesensitization& code, std::span<const std::int32_t> bins)
-      : n_words_(code.n_words()), size_(bins.size() / code.n_inputs()),
+      : n_words_(padded_words(code)), size_(bins.size() / code.n_inputs()),
         words_(2 * n_words_ * size_) {
     for (std::size_t t = 0; t < size_; ++t) {
       code.encode(bins.subspan(t * code.n_inputs(), code.n_inputs()),
@@ -143,18 +151,21 @@ class CodedSamples {
   }
 
   std::size_t size() const noexcept { return size_; }
+  /// Words of a code, a multiple of 4.
   std::size_t n_words() const noexcept { return n_words_; }
-  const std::uint64_t* active(std::size_t t) const noexcept {
-    return words_.data() + 2 * t * n_words_;
-  }
-  const std::uint64_t* positive(std::size_t t) const noexcept {
-    return words_.data() + (2 * t + 1) * n_words_;
+  CodeWords operator[](std::size_t t) const noexcept {
+    const std::uint64_t* const active = words_.data() + 2 * t * n_words_;
+    return {active, active + n_words_};
   }
   static std::size_t bytes(const SelectiveDesensitization& code, std::size_t n_samples) noexcept {
-    return 2 * sizeof(std::uint64_t) * code.n_words() * n_samples;
+    return 2 * sizeof(std::uint64_t) * padded_words(code) * n_samples;
   }
 
  private:
+  static std::size_t padded_words(const SelectiveDesensitization& code) noexcept {
+    return core::round_up(code.n_words(), 4);
+  }
+
   std::size_t n_words_;
   std::size_t size_;
   std::vector<std::uint64_t> words_;

@@ -34,12 +34,17 @@ inline std::string_view name_of(InstructionSet level) noexcept {
 /// The highest level this processor and operating system offer.
 inline InstructionSet best_instruction_set() noexcept {
 #if SDNN_X86_KERNELS
+  if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("bmi") ||
+      !__builtin_cpu_supports("popcnt")) {
+    return InstructionSet::portable;
+  }
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw")) {
     return InstructionSet::avx512;
   }
-  if (__builtin_cpu_supports("avx2")) return InstructionSet::avx2;
-#endif
+  return InstructionSet::avx2;
+#else
   return InstructionSet::portable;
+#endif
 }
 
 /// The level called `name`. Throws std::invalid_argument if there is no such level, or this

@@ -8,9 +8,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <type_traits>
 #include <utility>
 
-#if defined(__GNUC__) || defined(__clang__)
+#if defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12)  // the first with shuffles as clang's
 #define SDNN_LANES 1
 /// Lanes wider than the baseline's registers must never cross a real call: everything that a kernel
 /// of another instruction set is made of has to end up inside it.
@@ -184,12 +185,12 @@ SDNN_INLINE Real magnitude(const Real& value) noexcept {
   return double_of(bits_of(value) & ~(std::uint64_t{1} << 63));
 }
 
-/// Calls `function` with 0, 1, ..., Size - 1. There is no loop left at any level of optimization,
-/// so that an array of lanes indexed by them can live in registers.
+/// Calls `function` with 0, 1, ..., Size - 1, each a std::integral_constant. There is no loop left at
+/// any level of optimization, so that an array of lanes indexed by them can live in registers.
 template <std::size_t Size, class Function>
 SDNN_INLINE void unrolled(const Function& function) noexcept {
   [&]<std::size_t... Index>(std::index_sequence<Index...>) SDNN_INLINE_LAMBDA {
-    (function(Index), ...);
+    (function(std::integral_constant<std::size_t, Index>()), ...);
   }(std::make_index_sequence<Size>());
 }
 

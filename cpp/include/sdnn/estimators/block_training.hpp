@@ -12,227 +12,240 @@
 #include <vector>
 
 #include "sdnn/core/worker_team.hpp"
+#include "sdnn/estimators/chunked_weights.hpp"
+#include "sdnn/estimators/code_products.hpp"
+#include "sdnn/estimators/code_walk.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/perceptron_layer.hpp"
-#include "sdnn/estimators/plain_training.hpp"
-#include "sdnn/estimators/weight_tiles.hpp"
+#include "sdnn/estimators/presentation_window.hpp"
+#include "sdnn/estimators/query_order.hpp"
+#include "sdnn/estimators/signed_sums.hpp"
+#include "sdnn/estimators/training_form.hpp"
+#include "sdnn/estimators/transposition.hpp"
 
 namespace sdnn::estimators {
 
-/// Presents samples in blocks of 32.
+/// Presents samples in blocks.
 ///
-/// One pass over the weights, a few cache-resident rows of a tile at a time, applies the corrections
-/// of the block before and adds up the potentials of this one. What the block's own corrections
-/// change in its later potentials follows exactly from the inner products of its codes. Weights are
-/// kept in 16 bits, in 32 as soon as one has grown beyond 8000.
+/// A pass over the weights, a few cache-resident columns of some units at a time, sums the block's
+/// potentials, from sample to sample along a short walk through their codes. What the block's own
+/// corrections change in its later potentials follows exactly from the inner products of its codes;
+/// the weights are corrected before the next pass, all corrections of a unit together. Weights are
+/// kept in 16 bits, in 32 as soon as a sum of them could leave 16.
+///
+/// Blocks are large where the same ones come again in every round through the data and there is
+/// memory to keep what does not change of them. `Product` is an integer that holds every product.
+template <class Product>
 class BlockTraining {
  public:
   BlockTraining(std::shared_ptr<PerceptronLayer> layer, std::span<const std::int32_t> bins,
-                int n_threads)
-      : layer_(std::move(layer)), bins_(bins.begin(), bins.end()), kernels_(unit_kernels()),
+                int n_threads, bool keeps_plans)
+      : layer_(std::move(layer)),
+        bins_(bins.begin(), bins.end()),
+        n_words_(block_words(layer_->code())),
         team_(static_cast<std::size_t>(n_threads)),
-        potentials_(kBlock * layer_->n_padded_units()),
-        largest_when_read_(layer_->tiles().largest()), largest_(largest_when_read_),
-        wide_(largest_when_read_ > kLargestNarrow) {
-    const std::size_t n_chunks = (layer_->code().n_words() + kChunkWords - 1) / kChunkWords;
-    for (Block* const block : {&now_, &before_}) {
-      block->plus.resize(layer_->code().n_slots());
-      block->minus.resize(layer_->code().n_slots());
-      for (Sample& sample : block->samples) {
-        sample.words.resize(2 * layer_->code().n_words());
-        sample.plus = sample.minus = SlotList(layer_->code().n_slots());
-        sample.plus_ends.resize(n_chunks + 1);
-        sample.minus_ends.resize(n_chunks + 1);
-      }
-    }
-    if (wide_) {
-      wide_weights_ = layer_->tiles();
-    } else {
-      weights_ = WeightTiles<std::int16_t>(layer_->tiles());
+        most_samples_(keeps_plans ? kLargeBlock : kSmallBlock),
+        keeps_plans_(keeps_plans),
+        words_(2 * most_samples_ * n_words_),
+        entries_(64 * most_samples_ * n_words_),
+        potentials_(most_samples_ * layer_->n_padded_units()),
+        window_(layer_->n_padded_units(), most_samples_),
+        pending_(layer_->n_units()) {
+    wide_ = ChunkedWeights<std::int32_t>(layer_->tiles(), n_words_);
+    chunk_norm_ = wide_.largest_chunk_norm();
+    if (chunk_norm_ <= kLargestSum) {
+      narrow_ = ChunkedWeights<std::int16_t>(wide_);
+      wide_ = {};
     }
   }
 
   template <class Rule>
   TrainingCount present(std::span<const std::int32_t> order, Rule& rule) {
     TrainingCount count;
-    while (!order.empty()) {
-      const auto some = order.first(std::min(order.size(), kBlock));
-      read(some);
-      pass();
-      present_block(some, rule, count);
-      order = order.subspan(some.size());
-      std::swap(now_, before_);
+    const auto add = [&](const TrainingCount& more) {
+      count.n_samples += more.n_samples;
+      count.n_units += more.n_units;
+    };
+    if (keeps_plans_ && is_whole_round(order)) {
+      ++n_rounds_;  // the first one may be the last
+      plans_.resize(n_rounds_ == 1 ? 0 : (order.size() + kLargeBlock - 1) / kLargeBlock);
+      for (std::size_t k = 0; k < plans_.size(); ++k) {
+        const auto some = order.subspan(k * kLargeBlock);
+        add(present_block(some.first(std::min(some.size(), kLargeBlock)), &plans_[k], rule));
+      }
+      if (!plans_.empty()) return count;
+    }
+    for (; !order.empty(); order = order.subspan(std::min(order.size(), kSmallBlock))) {
+      Plan plan;
+      add(present_block(order.first(std::min(order.size(), kSmallBlock)), &plan, rule));
     }
     return count;
   }
 
   void synchronize() {
-    now_.size = 0;
-    now_.corrections.clear();
-    pass();
-    before_.corrections.clear();
-    if (wide_) {
-      layer_->tiles() = wide_weights_;
+    if (narrow_.empty()) {
+      wide_.copy_to(layer_->tiles());
     } else {
-      layer_->tiles() = WeightTiles<std::int32_t>(weights_);
+      narrow_.copy_to(layer_->tiles());
     }
   }
 
  private:
-  static constexpr std::size_t kBlock = 32;
-  static constexpr std::size_t kChunkWords = 2;  // 128 slots of 64 units in 16 bits: 16 KB
-  static constexpr std::int64_t kLargestNarrow = 8000;
-  static constexpr std::int64_t kLooseness = 256;
+  static constexpr std::int64_t kLargestSum = std::numeric_limits<std::int16_t>::max();
+  template <class Weight>
+  using Columns = std::array<Weight, kChunkColumns * kMostUnits<Weight>>;
 
-  /// A sample's code: its words, and its slots with where those of each chunk end.
-  struct Sample {
-    std::vector<std::uint64_t> words;
-    SlotList plus{0}, minus{0};
-    std::vector<std::size_t> plus_ends, minus_ends;
-  };
-  struct BlockCorrection {
-    std::size_t place;  // in the block
-    Correction what;
-  };
-  struct Block {
-    std::array<Sample, kBlock> samples;
-    std::size_t size = 0;
-    std::vector<BlockCorrection> corrections;
-    std::vector<std::uint32_t> plus, minus;  // of every slot, bit b: +1 or -1 in sample b
+  /// What does not change of a block.
+  struct Plan {
+    CodeWalk walk;
+    std::size_t stride = 0;
+    core::AlignedBuffer<Product> products;  // (size, stride), 1 added to each
   };
 
-  void read(std::span<const std::int32_t> order) {
-    const PerceptronLayer::Code& code = layer_->code();
-    const std::size_t n_words = code.n_words();
-    now_.size = order.size();
-    now_.corrections.clear();
-    std::fill(now_.plus.begin(), now_.plus.end(), 0);
-    std::fill(now_.minus.begin(), now_.minus.end(), 0);
-    for (std::size_t b = 0; b < order.size(); ++b) {
-      Sample& sample = now_.samples[b];
-      std::uint64_t* const active = sample.words.data();
-      std::uint64_t* const positive = active + n_words;
-      code.encode(std::span(bins_).subspan(static_cast<std::size_t>(order[b]) * code.n_inputs(),
-                                           code.n_inputs()),
-                  active, positive);
-      sample.plus.clear();
-      sample.minus.clear();
-      for (std::size_t w = 0; w < n_words; ++w) {
-        sample.plus.append(positive[w], w);
-        sample.minus.append(active[w] & ~positive[w], w);
-        sample.plus_ends[w / kChunkWords + 1] = sample.plus.size();
-        sample.minus_ends[w / kChunkWords + 1] = sample.minus.size();
-      }
-      for (const std::uint32_t slot : sample.plus) now_.plus[slot] |= std::uint32_t{1} << b;
-      for (const std::uint32_t slot : sample.minus) now_.minus[slot] |= std::uint32_t{1} << b;
-      for (std::size_t e = 0; e < b; ++e) {
-        const Sample& earlier = now_.samples[e];
-        products_[b][e] = 1 + kernels_.inner_product(active, positive, earlier.words.data(),
-                                                     earlier.words.data() + n_words, n_words);
-      }
+  /// Every sample once, in the order of the data?
+  bool is_whole_round(std::span<const std::int32_t> order) const noexcept {
+    if (order.size() != bins_.size() / layer_->code().n_inputs()) return false;
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      if (static_cast<std::size_t>(order[i]) != i) return false;
     }
+    return true;
   }
 
-  void pass() {
-    // A block corrects a unit at most once per sample. The bound is loose; at times it is renewed.
-    largest_ += wide_ ? 0 : static_cast<std::int64_t>(kBlock);
-    if (!wide_ && largest_ > largest_when_read_ + kLooseness) {
-      largest_when_read_ = weights_.largest();
-      largest_ = largest_when_read_ + static_cast<std::int64_t>(kBlock);
-      if (largest_ > kLargestNarrow) {
-        wide_weights_ = WeightTiles<std::int32_t>(weights_);
-        weights_ = {};
-        wide_ = true;
-      }
-    }
-    const auto n_per_sum = wide_ ? std::size_t{1} << 30
-                                 : static_cast<std::size_t>(std::numeric_limits<std::int16_t>::max() /
-                                                            largest_);
+  template <class Rule>
+  TrainingCount present_block(std::span<const std::int32_t> samples, Plan* plan, Rule& rule) {
+    encode(samples);
+    if (plan->walk.empty()) make_plan(samples, plan);
+    sum_potentials(samples.size(), plan->walk);
+    const TrainingCount count = window_.present(
+        samples, plan->products.data(), plan->stride, rule, [&](std::size_t b, Correction made) {
+          pending_[made.unit].add(entries_.data() + kChunkColumns * b, made.direction);
+          layer_->thresholds()[made.unit] -= made.direction;
+        });
+    correct_weights();
+    return count;
+  }
+
+  coding::CodeWords code_of(std::size_t b) const noexcept {
+    const std::uint64_t* const active = words_.data() + 2 * b * n_words_;
+    return {active, active + n_words_};
+  }
+
+  void encode(std::span<const std::int32_t> samples) {
+    const PerceptronLayer::Code& code = layer_->code();
+    team_.run_over(samples.size(), [&](std::size_t b) {
+      std::uint64_t* const active = words_.data() + 2 * b * n_words_;
+      code.encode(std::span(bins_).subspan(static_cast<std::size_t>(samples[b]) * code.n_inputs(),
+                                           code.n_inputs()),
+                  active, active + n_words_);
+      expand_code(code_of(b), n_words_, entries_.data() + kChunkColumns * b,
+                  kChunkColumns * most_samples_);
+    });
+  }
+
+  void make_plan(std::span<const std::int32_t> samples, Plan* plan) {
+    plan->stride = core::round_up(samples.size(), 16);
+    plan->products = core::AlignedBuffer<Product>(samples.size() * plan->stride);
     team_.run([&](std::size_t part) {
-      const std::size_t n_tiles = layer_->tiles().n_tiles();
-      for (std::size_t tile = part; tile < n_tiles; tile += team_.size()) {
-        if (wide_) {
-          pass_tile(wide_weights_, tile, n_per_sum);
-        } else {
-          pass_tile(weights_, tile, n_per_sum);
+      for (std::size_t b = part; b < samples.size(); b += team_.size()) {
+        for (std::size_t e = b; e < samples.size(); ++e) {  // earlier ones are never asked for
+          plan->products[b * plan->stride + e] =
+              static_cast<Product>(1 + inner_product(code_of(b), code_of(e), n_words_));
+        }
+      }
+    });
+    const std::size_t n_inputs = layer_->code().n_inputs();
+    std::vector<std::int32_t> bins;
+    for (const std::int32_t sample : samples) {
+      const auto* const first = bins_.data() + static_cast<std::size_t>(sample) * n_inputs;
+      bins.insert(bins.end(), first, first + n_inputs);
+    }
+    plan->walk = CodeWalk(query_order(bins, n_inputs), n_words_,
+                          [&](std::uint32_t b) { return code_of(b); });
+  }
+
+  void sum_potentials(std::size_t n_samples, const CodeWalk& walk) {
+    const std::size_t n_padded = layer_->n_padded_units();
+    for (std::size_t b = 0; b < n_samples; ++b) {
+      std::int32_t* const values = &potentials_[b * n_padded];
+      for (std::size_t i = 0; i < layer_->n_units(); ++i) values[i] = -layer_->thresholds()[i];
+    }
+    if (narrow_.empty()) {
+      walk_over(wide_, walk);
+    } else {
+      walk_over(narrow_, walk);
+    }
+    transpose(potentials_.data(), n_padded, n_samples, n_padded, window_.row(0), window_.stride());
+  }
+
+  template <class Weight>
+  void walk_over(const ChunkedWeights<Weight>& weights, const CodeWalk& walk) {
+    const std::size_t n_padded = layer_->n_padded_units();
+    const std::size_t n_parts = (n_padded + kMostUnits<Weight> - 1) / kMostUnits<Weight>;
+    const std::size_t width = core::round_up((n_padded + n_parts - 1) / n_parts, kTileStep);
+    team_.run([&](std::size_t part) {
+      alignas(core::kCacheLine) Columns<Weight> columns;
+      for (std::size_t first = part * width; first < n_padded; first += team_.size() * width) {
+        const std::size_t n = std::min(width, n_padded - first);
+        for (std::size_t chunk = 0; chunk < walk.n_chunks(); ++chunk) {
+          transpose(weights.chunk(chunk, first), kChunkColumns, n, kChunkColumns, columns.data(),
+                    n);
+          walk_chunk(columns.data(), n, walk.stops(), walk.changes(chunk),
+                     potentials_.data() + first, n_padded);
         }
       }
     });
   }
 
-  template <class Weight>
-  void pass_tile(WeightTiles<Weight>& tiles, std::size_t tile, std::size_t n_per_sum) {
-    const std::size_t first_unit = tile * kTileUnits;
-    const std::size_t width = tiles.width(tile);
-    const std::size_t n_real = std::min(width, layer_->n_units() - first_unit);
-    const std::size_t n_padded = layer_->n_padded_units();
-    for (std::size_t b = 0; b < now_.size; ++b) {
-      for (std::size_t i = 0; i < n_real; ++i) {
-        potentials_[b * n_padded + first_unit + i] = -layer_->thresholds()[first_unit + i];
+  void correct_weights() {
+    keep_sums_in_16_bits();
+    team_.run_over(n_words_ / kChunkWords, [&](std::size_t chunk) {
+      const std::size_t offset = chunk * kChunkColumns * most_samples_;
+      for (std::size_t i = 0; i < layer_->n_units(); ++i) {
+        if (pending_[i].empty()) continue;
+        if (narrow_.empty()) {
+          add_signed(wide_.chunk(chunk, i), kChunkColumns, pending_[i], offset, kPerByte);
+        } else {
+          add_signed(narrow_.chunk(chunk, i), kChunkColumns, pending_[i], offset, kPerByte);
+        }
       }
-    }
-    alignas(core::kCacheLine) std::array<Weight, kBlock * kTileUnits> coefficients{};
-    std::uint32_t corrected = 0;  // samples of the block before that corrected units of this tile
-    for (const BlockCorrection& made : before_.corrections) {
-      if (made.what.unit / kTileUnits != tile) continue;
-      corrected |= std::uint32_t{1} << made.place;
-      coefficients[made.place * width + made.what.unit % kTileUnits] =
-          static_cast<Weight>(made.what.direction);
-    }
-    Weight* const weights = tiles.tile(tile);
-    const std::size_t n_chunks = now_.samples[0].plus_ends.size() - 1;
-    for (std::size_t chunk = 0; chunk < n_chunks; ++chunk) {
-      if (corrected != 0) {
-        const std::size_t slot = 64 * kChunkWords * chunk;
-        kernels_.correct_rows(weights + slot * width, width,
-                              std::min(64 * kChunkWords, tiles.n_slots() - slot),
-                              before_.plus.data() + slot, before_.minus.data() + slot, corrected,
-                              coefficients.data());
-      }
-      for (std::size_t b = 0; b < now_.size; ++b) {
-        const Sample& sample = now_.samples[b];
-        const std::size_t plus = sample.plus_ends[chunk];
-        const std::size_t minus = sample.minus_ends[chunk];
-        kernels_.add_rows(weights, width, sample.plus.data() + plus,
-                          sample.plus_ends[chunk + 1] - plus, sample.minus.data() + minus,
-                          sample.minus_ends[chunk + 1] - minus, n_per_sum,
-                          &potentials_[b * n_padded + first_unit]);
-      }
-    }
+    });
+    for (auto& rows : pending_) rows.clear();
   }
 
-  template <class Rule>
-  void present_block(std::span<const std::int32_t> order, Rule& rule, TrainingCount& count) {
-    const std::size_t n_padded = layer_->n_padded_units();
-    for (std::size_t b = 0; b < order.size(); ++b) {
-      std::int32_t* const values = &potentials_[b * n_padded];
-      for (const BlockCorrection& made : now_.corrections) {
-        values[made.what.unit] += made.what.direction * products_[b][made.place];
+  /// The sum of |weights| of a unit in a chunk grows by no more than its columns per correction.
+  void keep_sums_in_16_bits() {
+    if (narrow_.empty()) return;
+    std::size_t most = 0;
+    for (const auto& rows : pending_) most = std::max(most, rows.size());
+    const auto growth = static_cast<std::int64_t>(most * kChunkColumns);
+    if (chunk_norm_ + growth > kLargestSum) {
+      chunk_norm_ = narrow_.largest_chunk_norm();
+      if (chunk_norm_ + growth > kLargestSum) {
+        wide_ = ChunkedWeights<std::int32_t>(narrow_);
+        narrow_ = {};
       }
-      rule(static_cast<std::size_t>(order[b]), values, corrections_);
-      for (const Correction& correction : corrections_) {
-        now_.corrections.push_back({b, correction});
-        layer_->thresholds()[correction.unit] -= correction.direction;
-      }
-      count.n_samples += corrections_.empty() ? 0 : 1;
-      count.n_units += corrections_.size();
     }
+    chunk_norm_ += growth;
   }
+
+  static constexpr std::size_t kPerByte = std::numeric_limits<std::int8_t>::max();
 
   std::shared_ptr<PerceptronLayer> layer_;
   std::vector<std::int32_t> bins_;
-  UnitKernels kernels_;
+  std::size_t n_words_;
   core::WorkerTeam team_;
-  core::AlignedBuffer<std::int32_t> potentials_;  // (kBlock, n_padded_units)
-  Block now_;
-  Block before_;  // its corrections are not in the weights yet
-  std::array<std::array<std::int32_t, kBlock>, kBlock> products_{};  // 1 added to each
-  std::vector<Correction> corrections_;
-  std::int64_t largest_when_read_;  // |weight|, when last looked at
-  std::int64_t largest_;            // no |weight| exceeds it
-  bool wide_;
-  WeightTiles<std::int16_t> weights_;
-  WeightTiles<std::int32_t> wide_weights_;
+  std::size_t most_samples_;
+  bool keeps_plans_;
+  std::size_t n_rounds_ = 0;  // in the order of the data
+  std::vector<Plan> plans_;
+  std::vector<std::uint64_t> words_;          // (most_samples, active then positive, n_words)
+  core::AlignedBuffer<std::int8_t> entries_;  // (chunks, most_samples, kChunkColumns): +1, 0, -1
+  core::AlignedBuffer<std::int32_t> potentials_;  // (most_samples, n_padded_units)
+  PresentationWindow window_;
+  std::vector<SignedRows<std::int8_t>> pending_;  // of each unit, codes not yet in its weights
+  std::int64_t chunk_norm_ = 0;  // no unit's |weights| in a chunk have a larger sum
+  ChunkedWeights<std::int16_t> narrow_;
+  ChunkedWeights<std::int32_t> wide_;  // one of the two is empty
 };
 
 }  // namespace sdnn::estimators

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "sdnn/core/check.hpp"
-#include "sdnn/estimators/unit_kernels.hpp"
+#include "sdnn/estimators/unit_ranking.hpp"
 
 namespace sdnn::estimators {
 
@@ -38,7 +38,7 @@ class PDeltaRule {
   /// Shapes: targets (n_samples, n_groups). Throws std::invalid_argument if a target is not finite,
   /// or if n_groups does not divide n_units.
   PDeltaRule(std::size_t n_units, std::span<const double> targets, std::size_t n_groups)
-      : n_groups_(n_groups), kernels_(unit_kernels()) {
+      : n_groups_(n_groups) {
     core::require(n_groups > 0 && n_units % n_groups == 0, "n_groups",
                   "a divisor of n_units = " + std::to_string(n_units), n_groups);
     core::require(targets.size() % n_groups == 0, "targets", "n_groups values per sample",
@@ -67,7 +67,7 @@ class PDeltaRule {
     for (std::size_t g = 0; g < n_groups_; ++g) {
       const std::int32_t* const group = potentials + g * group_size_;
       const std::int32_t deficit =
-          targets_[sample * n_groups_ + g] - kernels_.count_firing(group, group_size_);
+          targets_[sample * n_groups_ + g] - count_firing(group, group_size_);
       if (deficit != 0) correct_group(group, g * group_size_, deficit, corrections);
     }
   }
@@ -82,12 +82,12 @@ class PDeltaRule {
     };
     if (n_corrected <= kScans) {  // the least key, then the next one, ...
       const std::size_t n_before = corrections.size();
-      std::int32_t key = kernels_.rank(potentials, group_size_, deficit < 0, n_index_bits_,
+      std::int32_t key = rank_units(potentials, group_size_, deficit < 0, n_index_bits_,
                                        distance_limit_, keys_.data());
       for (std::size_t left = n_corrected; key >> n_index_bits_ < distance_limit_;) {
         add(static_cast<std::size_t>(key & ((1 << n_index_bits_) - 1)));
         if (--left == 0) return;
-        key = kernels_.least_above(keys_.data(), group_size_, key);
+        key = least_above(keys_.data(), group_size_, key);
       }
       corrections.resize(n_before);  // too far for a key
     }
@@ -107,7 +107,6 @@ class PDeltaRule {
   std::size_t n_groups_;
   std::size_t group_size_ = 0;
   std::vector<std::int32_t> targets_;
-  UnitKernels kernels_;
   std::vector<std::int32_t> keys_;
   int n_index_bits_ = 0;
   std::int32_t distance_limit_ = 0;  // at which keys stop telling distances apart

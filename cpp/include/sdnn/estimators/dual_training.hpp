@@ -15,9 +15,13 @@
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/aligned_buffer.hpp"
 #include "sdnn/core/worker_team.hpp"
+#include "sdnn/estimators/code_products.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/perceptron_layer.hpp"
-#include "sdnn/estimators/plain_training.hpp"
+#include "sdnn/estimators/presentation_window.hpp"
+#include "sdnn/estimators/signed_sums.hpp"
+#include "sdnn/estimators/tile_rows.hpp"
+#include "sdnn/estimators/training_form.hpp"
 
 namespace sdnn::estimators {
 
@@ -26,20 +30,25 @@ namespace sdnn::estimators {
 ///
 /// Correcting a unit by x_SD(t) and its threshold by 1 moves its potential for sample s by
 /// <x_SD(t), x_SD(s)> + 1, so a correction adds one row of the table of these products. Samples are
-/// presented in blocks: inside a block corrections are applied to the block's own potentials one by
-/// one, and to those of all samples some blocks later, many corrections of a unit in one pass. `Product` is an integer that holds every product.
+/// presented in windows: a correction reaches the window's own potentials at once, and those of all
+/// samples later, together with other corrections of its unit. `Product` is an integer that holds
+/// every product.
 template <class Product>
 class DualTraining {
  public:
   DualTraining(std::shared_ptr<PerceptronLayer> layer, std::span<const std::int32_t> bins,
                int n_threads)
-      : layer_(std::move(layer)), coded_(layer_->code(), bins),
-        row_size_(core::round_up(coded_.size(), 32)),
-        n_per_sum_(std::numeric_limits<Product>::max() / (layer_->code().max_active() + 1)), kernels_(unit_kernels()),
-        team_(static_cast<std::size_t>(n_threads)), products_(coded_.size() * row_size_),
+      : layer_(std::move(layer)),
+        coded_(layer_->code(), bins),
+        row_size_(dual_row_size(coded_.size())),
+        n_per_sum_(std::numeric_limits<Product>::max() / (layer_->code().max_active() + 1)),
+        team_(static_cast<std::size_t>(n_threads)),
+        products_(coded_.size() * row_size_),
         potentials_(layer_->n_units() * row_size_),
+        pending_(layer_->n_units()),
         coefficients_(coded_.size() * layer_->n_padded_units()),
-        block_(kBlock * layer_->n_padded_units()), first_of_unit_(layer_->n_units() + 1) {
+        window_(layer_->n_padded_units(), kSmallBlock),
+        gathered_(kSmallBlock * kSmallBlock) {
     // Blocks of rows get cheaper towards the end: threads take them in turn.
     team_.run([&](std::size_t part) {
       for (std::size_t t = kRows * part; t < coded_.size(); t += kRows * team_.size()) {
@@ -56,14 +65,24 @@ class DualTraining {
   template <class Rule>
   TrainingCount present(std::span<const std::int32_t> order, Rule& rule) {
     TrainingCount count;
-    while (!order.empty()) {
-      const auto now = order.first(std::min(order.size(), kBlock));
-      turn(now);
-      present_block(now, rule, count);
+    const bool in_data_order =
+        std::adjacent_find(order.begin(), order.end(),
+                           [](auto one, auto next) { return next != one + 1; }) == order.end();
+    // Corrections may wait where a window's share of their rows lies side by side.
+    const std::size_t patience = in_data_order ? kPatience : 1;
+    for (std::size_t waiting = 0; !order.empty(); waiting += kSmallBlock) {
+      if (waiting >= patience || full_) {
+        flush();
+        waiting = 0;
+      }
+      if (full_) synchronize();
+      const auto now = order.first(std::min(order.size(), kSmallBlock));
+      const TrainingCount more = in_data_order ? present_row(now, rule) : present_some(now, rule);
+      count.n_samples += more.n_samples;
+      count.n_units += more.n_units;
       order = order.subspan(now.size());
     }
-    turn({});
-    if (full_) synchronize();
+    flush();
     return count;
   }
 
@@ -73,19 +92,15 @@ class DualTraining {
     const std::size_t n_padded = layer_->n_padded_units();
     for (std::size_t tile = 0; tile < tiles.n_tiles(); ++tile) {
       const std::size_t width = tiles.width(tile);
-      std::vector<std::size_t> used;
+      std::vector<std::pair<std::size_t, std::int32_t>> used;  // samples, largest |coefficient|
       for (std::size_t t = 0; t < coded_.size(); ++t) {
         const std::int16_t* const c = &coefficients_[t * n_padded + tile * kTileUnits];
-        if (std::any_of(c, c + width, [](std::int16_t value) { return value != 0; })) {
-          used.push_back(t);
-        }
+        const auto [low, high] = std::minmax_element(c, c + width);
+        const std::int32_t largest = std::max<std::int32_t>(*high, -std::int32_t{*low});
+        if (largest != 0) used.emplace_back(t, largest);
       }
-      team_.run_over(coded_.n_words(), [&](std::size_t w) {
-        std::int32_t* const rows = tiles.tile(tile) + 64 * w * width;
-        for (const std::size_t t : used) {
-          kernels_.add_outer(rows, width, &coefficients_[t * n_padded + tile * kTileUnits],
-                             coded_.active(t)[w], coded_.positive(t)[w]);
-        }
+      team_.run_over(layer_->code().n_words(), [&](std::size_t w) {
+        add_samples(tiles.tile(tile) + 64 * w * width, width, tile, w, used);
       });
     }
     for (std::size_t t = 0; t < coded_.size(); ++t) {
@@ -98,137 +113,116 @@ class DualTraining {
   }
 
  private:
-  struct BlockCorrection {
-    std::size_t sample;
-    Correction what;
-  };
-
-  /// The products of the samples [begin, end) with themselves and all later ones; the codes of these
-  /// few stay in the cache while those of the others pass.
+  /// The products of the samples [begin, end) with themselves and all later ones; the codes of
+  /// these few stay in the cache while those of the others pass.
   void fill_products(std::size_t begin, std::size_t end) noexcept {
     for (std::size_t s = begin; s < coded_.size(); ++s) {
       for (std::size_t t = begin; t < std::min(end, s + 1); ++t) {
-        const auto product = static_cast<Product>(
-            1 + kernels_.inner_product(coded_.active(t), coded_.positive(t), coded_.active(s),
-                                       coded_.positive(s), coded_.n_words()));
+        const auto product =
+            static_cast<Product>(1 + inner_product(coded_[t], coded_[s], coded_.n_words()));
         products_[t * row_size_ + s] = product;
         products_[s * row_size_ + t] = product;
       }
     }
   }
 
-  /// Begins the block `now`: its potentials, side by side sample by sample, with all corrections made
-  /// so far. These reach all other samples once there are enough of them to share the way; until then
-  /// they are applied to the samples asked for, which is cheap if those are neighbours in memory.
-  void turn(std::span<const std::int32_t> now) {
-    ++n_pending_blocks_;
-    const bool in_a_row = std::adjacent_find(now.begin(), now.end(), [](auto one, auto next) {
-                            return next != one + 1;
-                          }) == now.end();
-    const bool flush = now.empty() || !in_a_row || n_pending_blocks_ >= kPendingBlocks;
-    sort_pending_by_unit();
-    team_.run([&](std::size_t part) {
-      std::vector<const Product*> plus;
-      std::vector<const Product*> minus;
-      alignas(core::kCacheLine) std::array<std::int32_t, kBlock> some;
-      const std::size_t end = (part + 1) * layer_->n_units() / team_.size();
-      for (std::size_t i = part * layer_->n_units() / team_.size(); i < end; ++i) {
-        std::int32_t* const row = &potentials_[i * row_size_];
-        const std::size_t begin = flush || now.empty() ? 0 : static_cast<std::size_t>(now[0]);
-        plus.clear();
-        minus.clear();
-        for (std::size_t c = first_of_unit_[i]; c < first_of_unit_[i + 1]; ++c) {
-          const Product* const products = &products_[by_unit_[c].sample * row_size_ + begin];
-          (by_unit_[c].what.direction > 0 ? plus : minus).push_back(products);
-        }
-        if (flush) {
-          add_products(row, row_size_, plus, minus);
-          gather(row, now, i);
-        } else {
-          std::copy_n(row + begin, now.size(), some.begin());
-          add_products(some.data(), now.size(), plus, minus);
-          for (std::size_t b = 0; b < now.size(); ++b) {
-            block_[b * layer_->n_padded_units() + i] = some[b];
-          }
-        }
+  /// Adds word w of the samples to 64 rows of a tile, in 16 bits as long as these hold the sum.
+  void add_samples(
+      std::int32_t* rows, std::size_t width, std::size_t tile, std::size_t w,
+      const std::vector<std::pair<std::size_t, std::int32_t>>& samples) const noexcept {
+    alignas(core::kCacheLine) std::array<std::int16_t, 64 * kTileUnits> sums{};
+    const auto widen = [&] {
+      for (std::size_t i = 0; i < 64 * width; ++i) rows[i] += sums[i];
+      sums.fill(0);
+    };
+    std::int32_t bound = 0;
+    for (const auto& [t, largest] : samples) {
+      if (bound + largest > std::numeric_limits<std::int16_t>::max()) {
+        widen();
+        bound = 0;
       }
-    });
-    if (flush) {
-      pending_.clear();
-      n_pending_blocks_ = 0;
+      bound += largest;
+      add_outer(sums.data(), width,
+                &coefficients_[t * layer_->n_padded_units() + tile * kTileUnits],
+                coded_[t].active[w], coded_[t].positive[w]);
     }
+    widen();
   }
 
-  void sort_pending_by_unit() {
-    std::fill(first_of_unit_.begin(), first_of_unit_.end(), 0);
-    for (const auto& correction : pending_) ++first_of_unit_[correction.what.unit + 1];
-    for (std::size_t i = 0; i < layer_->n_units(); ++i) first_of_unit_[i + 1] += first_of_unit_[i];
-    by_unit_.resize(pending_.size());
-    next_of_unit_.assign(first_of_unit_.begin(), first_of_unit_.end());
-    for (const auto& correction : pending_) {
-      by_unit_[next_of_unit_[correction.what.unit]++] = correction;
+  /// Moves the potentials of all samples by the corrections that wait; some samples at a time, so
+  /// that the products stay in the cache from unit to unit.
+  void flush() {
+    for (std::size_t begin = 0; begin < row_size_; begin += kColumns) {
+      const std::size_t size = std::min(kColumns, row_size_ - begin);
+      team_.run_over(layer_->n_units(), [&](std::size_t i) {
+        if (pending_[i].empty()) return;
+        add_signed(&potentials_[i * row_size_ + begin], size, pending_[i], begin, n_per_sum_);
+      });
     }
+    for (auto& rows : pending_) rows.clear();
   }
 
-  void add_products(std::int32_t* to, std::size_t size, const std::vector<const Product*>& plus,
-                    const std::vector<const Product*>& minus) const noexcept {
-    if (plus.empty() && minus.empty()) return;
-    kernels_.add_products(to, size, plus.data(), plus.size(), minus.data(), minus.size(),
-                          n_per_sum_);
+  /// Presents samples that are neighbours in memory.
+  template <class Rule>
+  TrainingCount present_row(std::span<const std::int32_t> now, Rule& rule) {
+    const auto begin = static_cast<std::size_t>(now[0]);
+    const std::size_t size = core::round_up(now.size(), 16);
+    for (std::size_t i = 0; i < layer_->n_units(); ++i) {
+      std::copy_n(&potentials_[i * row_size_ + begin], size, window_.row(i));
+      if (!pending_[i].empty()) add_signed(window_.row(i), size, pending_[i], begin, n_per_sum_);
+    }
+    return present_window(now, &products_[begin * row_size_ + begin], row_size_, rule);
   }
 
-  void gather(const std::int32_t* row, std::span<const std::int32_t> now, std::size_t unit) noexcept {
+  /// Presents any samples. Nothing is pending.
+  template <class Rule>
+  TrainingCount present_some(std::span<const std::int32_t> now, Rule& rule) {
+    for (std::size_t i = 0; i < layer_->n_units(); ++i) {
+      for (std::size_t b = 0; b < now.size(); ++b) {
+        window_.row(i)[b] = potentials_[i * row_size_ + static_cast<std::size_t>(now[b])];
+      }
+    }
     for (std::size_t b = 0; b < now.size(); ++b) {
-      block_[b * layer_->n_padded_units() + unit] = row[static_cast<std::size_t>(now[b])];
+      const Product* const row = &products_[static_cast<std::size_t>(now[b]) * row_size_];
+      for (std::size_t e = b; e < now.size(); ++e) {
+        gathered_[b * kSmallBlock + e] = row[static_cast<std::size_t>(now[e])];
+      }
     }
+    return present_window(now, gathered_.data(), kSmallBlock, rule);
   }
 
   template <class Rule>
-  void present_block(std::span<const std::int32_t> samples, Rule& rule, TrainingCount& count) {
-    const std::size_t n_padded = layer_->n_padded_units();
-    const std::size_t n_before = pending_.size();  // what the block began with
-    for (std::size_t b = 0; b < samples.size(); ++b) {
-      const auto sample = static_cast<std::size_t>(samples[b]);
-      std::int32_t* const values = &block_[b * n_padded];
-      const Product* const products = &products_[sample * row_size_];
-      for (std::size_t c = n_before; c < pending_.size(); ++c) {
-        const BlockCorrection& made = pending_[c];
-        values[made.what.unit] += made.what.direction * products[made.sample];
-      }
-      rule(sample, values, corrections_);
-      std::int16_t* const coefficients = &coefficients_[sample * n_padded];
-      for (const Correction& correction : corrections_) {
-        pending_.push_back({sample, correction});
-        std::int16_t& coefficient = coefficients[correction.unit];
-        coefficient = static_cast<std::int16_t>(coefficient + correction.direction);
-        full_ = full_ || std::abs(coefficient) == std::numeric_limits<std::int16_t>::max();
-      }
-      count.n_samples += corrections_.empty() ? 0 : 1;
-      count.n_units += corrections_.size();
-    }
+  TrainingCount present_window(std::span<const std::int32_t> now, const Product* products,
+                               std::size_t stride, Rule& rule) {
+    return window_.present(now, products, stride, rule, [&](std::size_t b, Correction correction) {
+      const auto sample = static_cast<std::size_t>(now[b]);
+      pending_[correction.unit].add(&products_[sample * row_size_], correction.direction);
+      std::int16_t& coefficient =
+          coefficients_[sample * layer_->n_padded_units() + correction.unit];
+      coefficient = static_cast<std::int16_t>(coefficient + correction.direction);
+      full_ = full_ || std::abs(coefficient) >= kFullCoefficient;
+    });
   }
 
-  static constexpr std::size_t kBlock = 64;
+  static constexpr std::size_t kPatience = 4 * kSmallBlock;
+  static constexpr int kFullCoefficient =
+      std::numeric_limits<std::int16_t>::max() - int{kSmallBlock};
   static constexpr std::size_t kRows = 8;
-  static constexpr std::size_t kPendingBlocks = 8;
+  static constexpr std::size_t kColumns = 256;
 
   std::shared_ptr<PerceptronLayer> layer_;
   coding::CodedSamples coded_;
   std::size_t row_size_;
   std::size_t n_per_sum_;  // products whose sum a Product holds
-  UnitKernels kernels_;
   core::WorkerTeam team_;
-  core::AlignedBuffer<Product> products_;            // (n_samples, row_size), 1 added to each
-  core::AlignedBuffer<std::int32_t> potentials_;     // (n_units, row_size)
-  core::AlignedBuffer<std::int16_t> coefficients_;   // (n_samples, n_padded_units)
-  core::AlignedBuffer<std::int32_t> block_;          // (kBlock, n_padded_units)
-  std::vector<Correction> corrections_;
-  std::vector<BlockCorrection> pending_;             // not yet in all potentials, in order
-  std::size_t n_pending_blocks_ = 0;
-  std::vector<BlockCorrection> by_unit_;
-  std::vector<std::size_t> first_of_unit_;
-  std::vector<std::size_t> next_of_unit_;
-  bool full_ = false;  // a coefficient has reached the end of its range
+  core::AlignedBuffer<Product> products_;           // (n_samples, row_size), 1 added to each
+  core::AlignedBuffer<std::int32_t> potentials_;    // (n_units, row_size)
+  std::vector<SignedRows<Product>> pending_;        // of each unit: not in all potentials yet
+  core::AlignedBuffer<std::int16_t> coefficients_;  // (n_samples, n_padded_units)
+  PresentationWindow window_;
+  core::AlignedBuffer<Product>
+      gathered_;       // (kSmallBlock, kSmallBlock): products of scattered samples
+  bool full_ = false;  // another window could take a coefficient beyond its range
 };
 
 }  // namespace sdnn::estimators

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
-#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -19,61 +17,13 @@
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/check.hpp"
 #include "sdnn/core/random.hpp"
+#include "sdnn/estimators/code_changes.hpp"
 #include "sdnn/estimators/query_order.hpp"
-#include "sdnn/estimators/unit_kernels.hpp"
+#include "sdnn/estimators/tile_rows.hpp"
+#include "sdnn/estimators/unit_ranking.hpp"
 #include "sdnn/estimators/weight_tiles.hpp"
 
 namespace sdnn::estimators {
-
-/// Numbers of slots, in a store whose size is fixed before.
-class SlotList {
- public:
-  explicit SlotList(std::size_t capacity) : slots_(capacity) {}
-
-  void clear() noexcept { size_ = 0; }
-  /// Appends the slots of the set bits of a word.
-  void append(std::uint64_t bits, std::size_t word) noexcept {
-    std::size_t size = size_;
-    for (; bits != 0; bits &= bits - 1) {
-      assert(size < slots_.size());
-      slots_[size++] = static_cast<std::uint32_t>(64 * word) +
-                       static_cast<std::uint32_t>(std::countr_zero(bits));
-    }
-    size_ = size;
-  }
-  std::size_t size() const noexcept { return size_; }
-  const std::uint32_t* data() const noexcept { return slots_.data(); }
-  const std::uint32_t* begin() const noexcept { return data(); }
-  const std::uint32_t* end() const noexcept { return data() + size_; }
-
- private:
-  std::vector<std::uint32_t> slots_;
-  std::size_t size_ = 0;
-};
-
-/// Rows of a tile to add and to subtract: the columns of a code, or twice at most what differs
-/// between two.
-struct SignedSlots {
-  explicit SignedSlots(std::size_t n_slots) : plus(2 * n_slots), minus(2 * n_slots) {}
-
-  /// Overwrites them with the columns of a code.
-  void read(const std::uint64_t* active, const std::uint64_t* positive,
-            std::size_t n_words) noexcept {
-    clear();
-    for (std::size_t w = 0; w < n_words; ++w) {
-      plus.append(positive[w], w);
-      minus.append(active[w] & ~positive[w], w);
-    }
-  }
-  void clear() noexcept {
-    plus.clear();
-    minus.clear();
-  }
-  std::size_t size() const noexcept { return plus.size() + minus.size(); }
-
-  SlotList plus;
-  SlotList minus;
-};
 
 /// `n_units` units over the columns of a code: potential = weights . x_SD - threshold, firing if > 0.
 ///
@@ -210,11 +160,10 @@ class PerceptronLayer {
               std::span<std::int32_t> out) const {
     core::require(n_groups > 0 && n_units() % n_groups == 0, "n_groups",
                   "a divisor of n_units = " + std::to_string(n_units()), n_groups);
-    const UnitKernels kernels = unit_kernels();
     const std::size_t size = n_units() / n_groups;
     visit(bins, n_threads, [&](std::size_t query, const std::int32_t* values) {
       for (std::size_t g = 0; g < n_groups; ++g) {
-        out[query * n_groups + g] = kernels.count_firing(values + g * size, size);
+        out[query * n_groups + g] = count_firing(values + g * size, size);
       }
     });
   }
@@ -247,42 +196,32 @@ class PerceptronLayer {
   void visit_some(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
                   std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
                   const Consume& consume) const {
-    const UnitKernels kernels = unit_kernels();
     const std::size_t n_words = code_->n_words();
     std::vector<std::uint64_t> words(4 * n_words);
-    std::uint64_t* now = words.data();               // active, then positive
+    std::uint64_t* now = words.data();  // active, then positive
     std::uint64_t* before = now + 2 * n_words;
     std::vector<std::int32_t> values(n_padded_units());
-    for (std::size_t i = 0; i < n_units(); ++i) values[i] = -thresholds_[i];  // of the code 0
-    SignedSlots afresh(code_->n_slots());
-    SignedSlots changes(code_->n_slots());
+    const auto forget = [&] {  // the potentials of the code 0
+      for (std::size_t i = 0; i < n_units(); ++i) values[i] = -thresholds_[i];
+    };
+    forget();
+    SignedSlots slots(n_words);
     for (const std::uint32_t query : order) {
       code_->encode(bins.subspan(query * code_->n_inputs(), code_->n_inputs()), now,
                     now + n_words);
-      changes.clear();
-      for (std::size_t w = 0; w < n_words; ++w) {
-        const std::uint64_t plus = now[n_words + w];
-        const std::uint64_t old_plus = before[n_words + w];
-        if (((now[w] ^ before[w]) | (plus ^ old_plus)) == 0) continue;
-        const std::uint64_t minus = now[w] & ~plus;
-        const std::uint64_t old_minus = before[w] & ~old_plus;
-        changes.plus.append(plus & ~old_plus, w);
-        changes.plus.append(old_minus & ~minus, w);
-        changes.minus.append(minus & ~old_minus, w);
-        changes.minus.append(old_plus & ~plus, w);
-      }
-      const SignedSlots* slots = &changes;
-      if (changes.size() > code_->max_active() / 2) {
-        afresh.read(now, now + n_words, n_words);
-        if (afresh.size() < changes.size()) {
-          for (std::size_t i = 0; i < n_units(); ++i) values[i] = -thresholds_[i];
-          slots = &afresh;
+      slots.read_changes({before, before + n_words}, {now, now + n_words});
+      if (slots.size() > code_->max_active() / 2) {
+        const std::size_t n_changes = slots.size();
+        slots.read({now, now + n_words});
+        if (slots.size() < n_changes) {
+          forget();
+        } else {
+          slots.read_changes({before, before + n_words}, {now, now + n_words});
         }
       }
       for (std::size_t tile = 0; tile < tiles.n_tiles(); ++tile) {
-        kernels.add_rows(tiles.tile(tile), tiles.width(tile), slots->plus.data(),
-                         slots->plus.size(), slots->minus.data(), slots->minus.size(), n_per_sum,
-                         values.data() + tile * kTileUnits);
+        add_rows(tiles.tile(tile), tiles.width(tile), slots.plus(), slots.minus(), n_per_sum,
+                 values.data() + tile * kTileUnits);
       }
       consume(query, values.data());
       std::swap(now, before);

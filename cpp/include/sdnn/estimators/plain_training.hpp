@@ -10,23 +10,18 @@
 
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/perceptron_layer.hpp"
+#include "sdnn/estimators/presentation_window.hpp"
 
 namespace sdnn::estimators {
-
-/// What a stretch of training changed.
-struct TrainingCount {
-  std::size_t n_samples = 0;  ///< presentations that corrected something
-  std::size_t n_units = 0;    ///< corrections of single units
-};
 
 /// The reference for the other forms: works on the layer's weights directly. Needs no memory.
 class PlainTraining {
  public:
   PlainTraining(std::shared_ptr<PerceptronLayer> layer, std::span<const std::int32_t> bins,
                 int /*n_threads*/)
-      : layer_(std::move(layer)), bins_(bins.begin(), bins.end()), kernels_(unit_kernels()),
+      : layer_(std::move(layer)), bins_(bins.begin(), bins.end()),
         words_(2 * layer_->code().n_words()), potentials_(layer_->n_padded_units()),
-        slots_(layer_->code().n_slots()) {}
+        slots_(layer_->code().n_words()) {}
 
   /// Presents samples in the given order.
   template <class Rule>
@@ -39,7 +34,7 @@ class PlainTraining {
       const auto sample = static_cast<std::size_t>(index);
       code.encode(std::span(bins_).subspan(sample * code.n_inputs(), code.n_inputs()), active,
                   positive);
-      slots_.read(active, positive, code.n_words());
+      slots_.read({active, positive});
       sum_potentials();
       rule(sample, potentials_.data(), corrections_);
       for (const Correction& correction : corrections_) correct(correction);
@@ -56,9 +51,8 @@ class PlainTraining {
     auto& tiles = layer_->tiles();
     for (std::size_t i = 0; i < layer_->n_units(); ++i) potentials_[i] = -layer_->thresholds()[i];
     for (std::size_t tile = 0; tile < tiles.n_tiles(); ++tile) {
-      kernels_.add_rows(tiles.tile(tile), tiles.width(tile), slots_.plus.data(),
-                        slots_.plus.size(), slots_.minus.data(), slots_.minus.size(),
-                        std::size_t{1} << 30, potentials_.data() + tile * kTileUnits);
+      add_rows(tiles.tile(tile), tiles.width(tile), slots_.plus(), slots_.minus(),
+               std::size_t{1} << 30, potentials_.data() + tile * kTileUnits);
     }
   }
 
@@ -66,14 +60,13 @@ class PlainTraining {
     auto& tiles = layer_->tiles();
     std::int32_t* const first = &tiles.at(correction.unit, 0);
     const std::size_t width = tiles.width(correction.unit / kTileUnits);
-    for (const std::uint32_t slot : slots_.plus) first[slot * width] += correction.direction;
-    for (const std::uint32_t slot : slots_.minus) first[slot * width] -= correction.direction;
+    for (const std::uint32_t slot : slots_.plus()) first[slot * width] += correction.direction;
+    for (const std::uint32_t slot : slots_.minus()) first[slot * width] -= correction.direction;
     layer_->thresholds()[correction.unit] -= correction.direction;
   }
 
   std::shared_ptr<PerceptronLayer> layer_;
   std::vector<std::int32_t> bins_;
-  UnitKernels kernels_;
   std::vector<std::uint64_t> words_;
   std::vector<std::int32_t> potentials_;
   SignedSlots slots_;

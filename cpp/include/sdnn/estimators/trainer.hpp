@@ -43,6 +43,11 @@ class Trainer {
                   std::to_string(n_samples_) + " samples as bins has", rule_.n_samples());
     form_ = choose_form(form, layer_->n_units(), layer_->code(), n_samples_, memory_limit);
     memory_ = form_memory(form_, layer_->n_units(), layer_->code(), n_samples_);
+    if (form_ == TrainingForm::block) {
+      const std::size_t more = plan_bytes(layer_->n_units(), layer_->code(), n_samples_);
+      keeps_plans_ = memory_ + more <= memory_limit;
+      memory_ += keeps_plans_ ? more : 0;
+    }
     renew_headroom();
     make_training(bins, n_threads);
   }
@@ -83,31 +88,38 @@ class Trainer {
   }
 
  private:
-  using Training = std::variant<PlainTraining, BlockTraining, DualTraining<std::int16_t>,
-                                DualTraining<std::int32_t>>;
+  using Training =
+      std::variant<PlainTraining, BlockTraining<std::int16_t>, BlockTraining<std::int32_t>,
+                   DualTraining<std::int16_t>, DualTraining<std::int32_t>>;
 
-  /// A presentation raises a unit's norm by at most one per active column and one for the threshold.
+  /// A presentation raises a unit's norm by at most one per active column and one for the
+  /// threshold.
   void renew_headroom() {
     const std::int64_t left = std::numeric_limits<std::int32_t>::max() - layer_->check_norms();
     headroom_ = static_cast<std::size_t>(left) / (layer_->code().max_active() + 1);
     if (headroom_ == 0) {
-      throw std::overflow_error("the weights have grown so large that a further correction could "
-                                "overflow a potential of 32 bits");
+      throw std::overflow_error(
+          "the weights have grown so large that a further correction could "
+          "overflow a potential of 32 bits");
     }
   }
 
   void make_training(std::span<const std::int32_t> bins, int n_threads) {
-    const auto make = [&]<class Form>(std::in_place_type_t<Form> type) {
-      training_ = std::make_unique<Training>(type, layer_, bins, n_threads);
+    const bool short_products = product_bytes(layer_->code()) == sizeof(std::int16_t);
+    const auto make = [&]<class Form>(std::in_place_type_t<Form> form, auto... more) {
+      training_ = std::make_unique<Training>(form, layer_, bins, n_threads, more...);
     };
     switch (form_) {
       case TrainingForm::dual:
-        if (product_bytes(layer_->code()) == sizeof(std::int16_t)) {
-          return make(std::in_place_type<DualTraining<std::int16_t>>);
-        }
+        if (short_products) return make(std::in_place_type<DualTraining<std::int16_t>>);
         return make(std::in_place_type<DualTraining<std::int32_t>>);
-      case TrainingForm::block: return make(std::in_place_type<BlockTraining>);
-      default: return make(std::in_place_type<PlainTraining>);
+      case TrainingForm::block:
+        if (short_products) {
+          return make(std::in_place_type<BlockTraining<std::int16_t>>, keeps_plans_);
+        }
+        return make(std::in_place_type<BlockTraining<std::int32_t>>, keeps_plans_);
+      default:
+        return make(std::in_place_type<PlainTraining>);
     }
   }
 
@@ -116,6 +128,7 @@ class Trainer {
   std::size_t n_samples_ = 0;
   TrainingForm form_ = TrainingForm::plain;
   std::size_t memory_ = 0;
+  bool keeps_plans_ = false;
   std::size_t headroom_ = 0;  // presentations that cannot overflow
   std::unique_ptr<Training> training_;
 };

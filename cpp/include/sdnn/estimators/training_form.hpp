@@ -11,6 +11,8 @@
 
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/aligned_buffer.hpp"
+#include "sdnn/estimators/chunked_weights.hpp"
+#include "sdnn/estimators/code_walk.hpp"
 #include "sdnn/estimators/weight_tiles.hpp"
 
 namespace sdnn::estimators {
@@ -25,17 +27,21 @@ enum class TrainingForm {
 
 inline std::string_view name_of(TrainingForm form) noexcept {
   switch (form) {
-    case TrainingForm::dual: return "dual";
-    case TrainingForm::block: return "block";
-    case TrainingForm::plain: return "plain";
-    default: return "auto";
+    case TrainingForm::dual:
+      return "dual";
+    case TrainingForm::block:
+      return "block";
+    case TrainingForm::plain:
+      return "plain";
+    default:
+      return "auto";
   }
 }
 
 /// Throws std::invalid_argument if there is no such form.
 inline TrainingForm training_form_named(std::string_view name) {
-  for (const auto form : {TrainingForm::automatic, TrainingForm::dual, TrainingForm::block,
-                          TrainingForm::plain}) {
+  for (const auto form :
+       {TrainingForm::automatic, TrainingForm::dual, TrainingForm::block, TrainingForm::plain}) {
     if (name == name_of(form)) return form;
   }
   throw std::invalid_argument("form must be auto, dual, block or plain, got " + std::string(name));
@@ -46,21 +52,60 @@ inline std::size_t product_bytes(const coding::SelectiveDesensitization& code) n
   return code.max_active() < std::numeric_limits<std::int16_t>::max() ? 2 : 4;
 }
 
+/// Entries of a row that dual training keeps per sample or unit: room for a block from any sample
+/// on.
+constexpr std::size_t dual_row_size(std::size_t n_samples) noexcept {
+  return core::round_up(n_samples + 15, 32);
+}
+
+/// Samples that block training presents per pass over the weights: where what does not change of a
+/// block is kept from round to round, and elsewhere. Dual training presents small blocks.
+inline constexpr std::size_t kLargeBlock = 512;
+inline constexpr std::size_t kSmallBlock = 128;
+
+/// Words of a code in block training, filled up with zeros to whole chunks.
+inline std::size_t block_words(const coding::SelectiveDesensitization& code) noexcept {
+  return core::round_up(code.n_words(), 2 * kChunkWords);
+}
+
+/// Bytes that a block of samples needs: codes, potentials, inner products and the walk.
+inline std::size_t block_bytes(std::size_t n_samples, std::size_t padded_units,
+                               const coding::SelectiveDesensitization& code) {
+  const std::size_t n_words = block_words(code);
+  return n_samples * ((2 * 8 + 64) * n_words + 2 * sizeof(std::int32_t) * padded_units +
+                      n_samples * product_bytes(code)) +
+         CodeWalk::bytes(n_samples, n_words, code.max_active());
+}
+
+/// Bytes more that block training needs to keep what does not change of its blocks.
+inline std::size_t plan_bytes(std::size_t n_units, const coding::SelectiveDesensitization& code,
+                              std::size_t n_samples) {
+  const std::size_t padded_units = core::round_up(n_units, kTileStep);
+  return block_bytes(kLargeBlock, padded_units, code) -
+         block_bytes(kSmallBlock, padded_units, code) +
+         n_samples * kLargeBlock * product_bytes(code) +
+         CodeWalk::bytes(n_samples, block_words(code), code.max_active());
+}
+
 /// Bytes that a form needs beside the layer and the samples' bins; at most 1 % less than it takes.
 inline std::size_t form_memory(TrainingForm form, std::size_t n_units,
                                const coding::SelectiveDesensitization& code,
                                std::size_t n_samples) {
   const std::size_t padded_units = core::round_up(n_units, kTileStep);
-  const std::size_t padded_samples = core::round_up(n_samples, 32);
+  const std::size_t row_size = dual_row_size(n_samples);
   switch (form) {
     case TrainingForm::dual:
-      return n_samples * padded_samples * product_bytes(code)        // inner products
-             + n_units * padded_samples * sizeof(std::int32_t)       // potentials
-             + n_samples * padded_units * sizeof(std::int16_t)       // coefficients
-             + coding::CodedSamples::bytes(code, n_samples);
+      return n_samples * row_size * product_bytes(code)         // inner products
+             + n_units * row_size * sizeof(std::int32_t)        // potentials
+             + n_samples * padded_units * sizeof(std::int16_t)  // coefficients
+             + coding::CodedSamples::bytes(code, n_samples) +
+             kSmallBlock *
+                 (padded_units * sizeof(std::int32_t) + kSmallBlock * product_bytes(code));
     case TrainingForm::block:
-      return WeightTiles<std::int32_t>::bytes(n_units, code.n_slots());
-    default: return 0;
+      return ChunkedWeights<std::int32_t>::bytes(padded_units, block_words(code)) +
+             block_bytes(kSmallBlock, padded_units, code);
+    default:
+      return 0;
   }
 }
 
@@ -70,8 +115,8 @@ inline std::size_t form_memory(TrainingForm form, std::size_t n_units,
 ///
 /// Throws std::length_error if `form` is not automatic and needs more than `memory_limit` bytes.
 inline TrainingForm choose_form(TrainingForm form, std::size_t n_units,
-                                const coding::SelectiveDesensitization& code,
-                                std::size_t n_samples, std::size_t memory_limit) {
+                                const coding::SelectiveDesensitization& code, std::size_t n_samples,
+                                std::size_t memory_limit) {
   const auto memory = [&](TrainingForm f) { return form_memory(f, n_units, code, n_samples); };
   if (form != TrainingForm::automatic) {
     if (memory(form) > memory_limit) {
@@ -84,7 +129,7 @@ inline TrainingForm choose_form(TrainingForm form, std::size_t n_units,
   const std::size_t padded_units = core::round_up(n_units, kTileStep);
   const std::size_t row_factor = memory(TrainingForm::dual) > (std::size_t{32} << 20) ? 4 : 1;
   const std::size_t dual_cost = row_factor * n_samples / 2 + n_units;
-  const std::size_t block_cost = code.n_slots() / 2 * (padded_units / 16) / 2 + code.n_slots() * 2;
+  const std::size_t block_cost = code.n_slots() / 8 * (padded_units / 16) + code.n_slots();
   if (dual_cost <= block_cost && memory(TrainingForm::dual) <= memory_limit) {
     return TrainingForm::dual;
   }

@@ -7,13 +7,13 @@
 #include <cstdlib>
 
 #include "sdnn/core/aligned_buffer.hpp"
-#include "sdnn/estimators/unit_kernels.hpp"
+#include "sdnn/estimators/tile_rows.hpp"
 
 namespace sdnn::estimators {
 
-/// Weights in tiles of up to 64 units: inside a tile, slot after slot, the units side by side.
+/// Weights in tiles of up to kTileUnits: inside a tile, slot after slot, the units side by side.
 ///
-/// All tiles are 64 units wide but the last, whose width is the least multiple of 16 that holds the
+/// All tiles are kTileUnits wide but the last, whose width is the least multiple of 16 that holds the
 /// rest. Memory: sizeof(Weight) * n_slots * round_up(n_units, 16).
 template <class Weight>
 class WeightTiles {

@@ -1,0 +1,49 @@
+/// Random codes, bit by bit.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "sdnn/coding/selective_desensitization.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::testing {
+
+struct Code {
+  std::vector<std::uint64_t> active;
+  std::vector<std::uint64_t> positive;
+
+  coding::CodeWords words() const { return {active.data(), positive.data()}; }
+  /// +1, 0 or -1.
+  int at(std::size_t slot) const {
+    if ((active[slot / 64] >> slot % 64 & 1) == 0) return 0;
+    return (positive[slot / 64] >> slot % 64 & 1) != 0 ? 1 : -1;
+  }
+};
+
+inline Code random_code(std::size_t n_words, core::Random& random) {
+  Code code;
+  for (std::size_t w = 0; w < n_words; ++w) {
+    code.active.push_back(random.bits());
+    code.positive.push_back(random.bits() & code.active.back());
+  }
+  return code;
+}
+
+/// The same code with some slots of another.
+inline Code neighbour_of(const Code& code, std::size_t n_changes, core::Random& random) {
+  Code changed = code;
+  const Code other = random_code(code.active.size(), random);
+  for (std::size_t k = 0; k < n_changes; ++k) {
+    const std::size_t slot = random.below(64 * code.active.size());
+    const std::uint64_t bit = std::uint64_t{1} << slot % 64;
+    auto& active = changed.active[slot / 64];
+    auto& positive = changed.positive[slot / 64];
+    active = (active & ~bit) | (other.active[slot / 64] & bit);
+    positive = (positive & ~bit) | (other.positive[slot / 64] & bit);
+  }
+  return changed;
+}
+
+}  // namespace sdnn::testing
