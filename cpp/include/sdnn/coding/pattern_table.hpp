@@ -36,10 +36,15 @@ class PatternTable {
     PatternTable table(n_bins, n_units);
     core::require(signs.size() == n_bins * n_units, "signs",
                   std::to_string(n_bins * n_units) + " values", signs.size());
-    for (std::size_t i = 0; i < signs.size(); ++i) {
-      core::require(signs[i] == 1 || signs[i] == -1, "patterns", "+1 or -1 everywhere",
-                    static_cast<int>(signs[i]));
-      if (signs[i] == 1) table.flip(i / n_units, i % n_units);
+    const std::int8_t* sign = signs.data();
+    for (std::size_t bin = 0; bin < n_bins; ++bin) {
+      for (std::size_t unit = 0; unit < n_units; ++unit, ++sign) {
+        if (*sign != 1 && *sign != -1) {
+          core::require(false, "patterns", "+1 or -1 everywhere", static_cast<int>(*sign));
+        }
+        const auto on = static_cast<std::uint64_t>(*sign > 0);
+        table.words_[bin * table.n_words_ + unit / 64] |= on << unit % 64;
+      }
     }
     return table;
   }

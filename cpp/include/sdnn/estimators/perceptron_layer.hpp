@@ -46,11 +46,10 @@ class PerceptronLayer {
     core::Random random(seed, core::Stream::weights);
     const auto span = static_cast<std::uint64_t>(2 * initial_range + 1);
     const auto draw = [&] { return static_cast<std::int32_t>(random.below(span)) - initial_range; };
+    const std::vector<std::size_t> slots = slots_of_columns();
     for (std::size_t i = 0; i < n_units; ++i) {
       thresholds_[i] = draw();
-      for (std::size_t j = 0; j < code_->n_columns(); ++j) {
-        weights_.at(i, code_->slot_of(j)) = draw();
-      }
+      for (const std::size_t slot : slots) weights_.at(i, slot) = draw();
     }
     check_norms();
   }
@@ -68,10 +67,10 @@ class PerceptronLayer {
                   weights.size());
     core::require(thresholds.size() == n_units, "thresholds",
                   "n_units = " + std::to_string(n_units) + " values", thresholds.size());
+    const std::int32_t* weight = weights.data();
+    const std::vector<std::size_t> slots = slots_of_columns();
     for (std::size_t i = 0; i < n_units; ++i) {
-      for (std::size_t j = 0; j < n_columns; ++j) {
-        weights_.at(i, code_->slot_of(j)) = weights[i * n_columns + j];
-      }
+      for (const std::size_t slot : slots) weights_.at(i, slot) = *weight++;
     }
     std::copy(thresholds.begin(), thresholds.end(), thresholds_.begin());
     check_norms();
@@ -173,6 +172,12 @@ class PerceptronLayer {
     core::require_in_range("n_units", n_units, 1, std::size_t{1} << 20);
     weights_ = WeightTiles<std::int32_t>(n_units, code_->n_slots());
     thresholds_.resize(n_units);
+  }
+
+  std::vector<std::size_t> slots_of_columns() const {
+    std::vector<std::size_t> slots(code_->n_columns());
+    for (std::size_t j = 0; j < slots.size(); ++j) slots[j] = code_->slot_of(j);
+    return slots;
   }
 
   template <class Weight, class Consume>
