@@ -44,9 +44,10 @@ class ParallelPerceptron {
         std::min<std::size_t>(kWeightLimit, kThresholdLimit / n_columns));
     n_blocks_ = core::round_up(n_units, kBlockUnits) / kBlockUnits;
     bytes_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * block_bytes());
-    high_bytes_ = core::AlignedBuffer<std::int8_t>(bytes_.size());  // untouched until needed
+    high_bytes_ = bytes_;  // copied, so that its memory is there before it is needed
     most_carries_ = std::max(kFewCarries, bytes_.size() / kBytesPerCarry);
-    carries_.reserve(most_carries_);
+    carries_.resize(most_carries_);  // its memory too
+    carries_.clear();
     may_carry_.assign(n_units, 0);
     thresholds_.assign(n_units, 0);
     largest_weight_.assign(n_units, 0);
