@@ -48,6 +48,7 @@ class PotentialMemory {
       : n_inputs_(code.n_inputs()),
         n_units_(n_units),
         bins_(kEntries * n_inputs_),
+        bins_by_input_(n_inputs_ * kEntries),
         potentials_(kEntries * n_units),
         difference_(coding::SignedColumns::with_capacity(2 * code.n_columns())),
         max_corrected_(max_corrected),
@@ -87,6 +88,13 @@ class PotentialMemory {
         return use(code, slot);
       }
     }
+    std::array<std::int32_t, kEntries> distance{};
+    for (std::size_t i = 0; i < n_inputs_; ++i) {
+      const coding::Bin* const remembered = bins_by_input_.data() + i * kEntries;
+      for (std::size_t slot = 0; slot < kEntries; ++slot) {
+        distance[slot] += std::abs(int{remembered[slot]} - int{bins[i]});
+      }
+    }
     std::size_t nearest = kEntries;
     std::size_t oldest = 0;
     double least = columns_of_pass_;
@@ -94,7 +102,7 @@ class PotentialMemory {
       if (last_use_[slot] < last_use_[oldest]) oldest = slot;
       const std::uint64_t lag = n_corrections_ - up_to_[slot];
       if (last_use_[slot] == 0 || lag > kLogSize) continue;
-      const double cost = columns_per_bin_ * distance(bins_of(slot), bins) +
+      const double cost = columns_per_bin_ * distance[slot] +
                           columns_per_correction_ * static_cast<double>(lag);
       if (cost < least) {
         least = cost;
@@ -119,7 +127,10 @@ class PotentialMemory {
       ++counts_.neighbour;
       counts_.columns += difference_.positive.size() + difference_.negative.size();
     }
-    std::ranges::copy(bins, bins_.begin() + static_cast<std::ptrdiff_t>(oldest * n_inputs_));
+    for (std::size_t i = 0; i < n_inputs_; ++i) {
+      bins_[oldest * n_inputs_ + i] = bins[i];
+      bins_by_input_[i * kEntries + oldest] = bins[i];
+    }
     up_to_[oldest] = n_corrections_;
     return use(code, oldest);
   }
@@ -161,12 +172,6 @@ class PotentialMemory {
   static constexpr std::size_t kEntries = 64;
   static constexpr std::size_t kLogSize = 512;
 
-  static int distance(std::span<const coding::Bin> a, std::span<const coding::Bin> b) noexcept {
-    int sum = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(int{a[i]} - int{b[i]});
-    return sum;
-  }
-
   std::span<const coding::Bin> bins_of(std::size_t slot) const noexcept {
     return {bins_.data() + slot * n_inputs_, n_inputs_};
   }
@@ -200,6 +205,7 @@ class PotentialMemory {
   std::size_t n_inputs_;
   std::size_t n_units_;
   std::vector<coding::Bin> bins_;                    ///< [slot][input]
+  std::vector<coding::Bin> bins_by_input_;           ///< [input][slot], for quick comparison
   std::vector<std::int32_t> potentials_;             ///< [slot][unit]
   std::array<std::uint64_t, kEntries> up_to_{};      ///< corrections that are accounted for
   std::array<std::uint64_t, kEntries> last_use_{};   ///< 0: empty

@@ -302,8 +302,9 @@ class SdnnC {
   }
 
   int count_in_window(std::span<const std::int32_t> potentials, std::size_t action) const {
-    core::require(action < n_actions(), "action", "less than " + std::to_string(n_actions()),
-                  action);
+    if (action >= n_actions()) {
+      core::require(false, "action", "less than " + std::to_string(n_actions()), action);
+    }
     const std::size_t first = actions_.first_unit(action);
     int n_firing = 0;
     for (std::size_t i = first; i < first + actions_.n_active_units(); ++i) {
