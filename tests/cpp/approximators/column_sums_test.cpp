@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "sdnn/core/aligned_buffer.hpp"
@@ -16,7 +21,7 @@ struct Problem {
   core::AlignedBuffer<std::int8_t> block;
   std::vector<std::uint32_t> columns;
   int group;
-  int sign;
+  int factor;
   Sums start;
 };
 
@@ -24,11 +29,12 @@ struct Problem {
 Problem random_problem(core::Random& random) {
   static constexpr int kGroups[] = {1, 2, 4};
   const std::size_t n_columns = 1 + random.below(40);
-  Problem p{core::AlignedBuffer<std::int8_t>(n_columns * kBlockUnits), {},
-            kGroups[random.below(3)], random.below(2) == 0 ? 1 : -1, {}};
+  static constexpr int kFactors[] = {1, -1, 128, -128};
+  Problem p{core::AlignedBuffer<std::int8_t>((n_columns + 1) * kBlockUnits), {},
+            kGroups[random.below(3)], kFactors[random.below(4)], {}};
   const int largest = 127 / p.group;
   const bool extreme = random.below(4) == 0;
-  for (std::int8_t& w : p.block.span()) {
+  for (std::int8_t& w : p.block.span().first(n_columns * kBlockUnits)) {
     const int drawn = static_cast<int>(random.below(static_cast<std::uint64_t>(2 * largest + 1)));
     w = static_cast<std::int8_t>(extreme ? largest : drawn - largest);
   }
@@ -44,7 +50,7 @@ Sums plain(const Problem& p) {
   Sums sums = p.start;
   for (const std::uint32_t column : p.columns) {
     for (std::size_t i = 0; i < kBlockUnits; ++i) {
-      sums[i] += p.sign * p.block[column * kBlockUnits + i];
+      sums[i] += p.factor * p.block[column * kBlockUnits + i];
     }
   }
   return sums;
@@ -70,7 +76,14 @@ TEST_P(EveryLevel, EqualsPlainSumsOn100000RandomProblems) {
   for (int problem = 0; problem < 100000; ++problem) {
     const Problem p = random_problem(random);
     Sums sums = p.start;
-    add_columns_kernel()(p.block.data(), p.columns, p.group, p.sign, sums.data());
+    const std::size_t zeros = p.block.size() / kBlockUnits - 1;
+    std::span<const std::uint32_t> columns = p.columns;
+    do {
+      const auto some = columns.first(std::min(ColumnPlaces::kMost, columns.size()));
+      columns = columns.subspan(some.size());
+      add_columns_kernel()(p.block.data(), ColumnPlaces(some, zeros), p.group, p.factor,
+                           sums.data());
+    } while (!columns.empty());
     ASSERT_EQ(sums, plain(p)) << "problem " << problem;
   }
 }

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#if defined(__linux__)
+#include <sys/resource.h>
+#endif
+
 #include <bit>
 #include <cmath>
 #include <string>
@@ -232,6 +236,30 @@ TEST(AcrobotTrial, AnEpisodeAllocatesNothing) {
   expect_no_allocation(rbf_trial(setting));
   expect_no_allocation(agent_trial(fuzzy_agent(setting), setting));
 }
+
+#if defined(__linux__) && !defined(__SANITIZE_ADDRESS__)
+
+long n_page_faults() {
+  rusage usage;
+  getrusage(RUSAGE_THREAD, &usage);
+  return usage.ru_minflt;
+}
+
+// Memory is met for the first time when a trial is made, not while it decides. Once a trial has
+// been run, so that code and libraries are there, a few faults are left to the operating system.
+TEST(AcrobotTrial, AnEpisodeMeetsNoMemoryForTheFirstTime) {
+  for (const int n_inputs : {4, 6}) {
+    const Setting setting{.sensors = {.n_sensors = n_inputs, .noise = 0.02},
+                          .protocol = {.n_learning_episodes = 60}};
+    network_trial(setting).advance(2);
+    auto run = network_trial(setting);
+    const long before = n_page_faults();
+    run.advance(60);
+    EXPECT_LE(n_page_faults() - before, 3) << n_inputs << " inputs";
+  }
+}
+
+#endif
 
 template <class Make>
 std::string message(Make make) {

@@ -19,22 +19,23 @@ namespace sdnn::approximators {
 /// selected when deficit is 0.
 ///
 /// Source: Fig. 2, steps 1 and 2. Shapes: potentials (n',), those of the window's units; `selected`
-/// is overwritten with positions in the window. Requires |deficit| <= n'.
+/// is overwritten with positions in the window. Requires |deficit| <= n' and |potential| < 2^31.
 inline void select_units(std::span<const std::int32_t> potentials, int deficit,
                          std::vector<std::uint32_t>& selected) {
   selected.clear();
   const auto n_subsets = static_cast<std::size_t>(std::abs(deficit));
   assert(n_subsets <= potentials.size());
   const bool want_active = deficit < 0;
+  constexpr std::uint32_t kNone = std::uint32_t{1} << 31;
   for (std::size_t i = 0; i < n_subsets; ++i) {
     const std::size_t begin = i * potentials.size() / n_subsets;
     const std::size_t end = (i + 1) * potentials.size() / n_subsets;
-    std::int32_t nearest = INT32_MAX;
+    std::uint32_t nearest = kNone;
     std::size_t best = end;
     for (std::size_t unit = begin; unit < end; ++unit) {
-      const std::int32_t h = potentials[unit];
-      const std::int32_t distance = h > 0 ? h : -h;
-      if ((h > 0) == want_active && distance < nearest) {
+      const auto h = static_cast<std::uint32_t>(potentials[unit]);
+      const std::uint32_t distance = want_active ? h - 1 : 0 - h;  // kNone or more for the others
+      if (distance < nearest) {
         nearest = distance;
         best = unit;
       }

@@ -43,10 +43,11 @@ class ParallelPerceptron {
     weight_limit_ = static_cast<std::int32_t>(
         std::min<std::size_t>(kWeightLimit, kThresholdLimit / n_columns));
     n_blocks_ = core::round_up(n_units, kBlockUnits) / kBlockUnits;
-    bytes_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * n_columns * kBlockUnits);
-    high_bytes_ = core::AlignedBuffer<std::int8_t>(bytes_.size());  // untouched until needed
+    bytes_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * block_bytes());
+    high_bytes_ = bytes_;  // copied, so that its memory is there before it is needed
     most_carries_ = std::max(kFewCarries, bytes_.size() / kBytesPerCarry);
-    carries_.reserve(most_carries_);
+    carries_.resize(most_carries_);  // its memory too
+    carries_.clear();
     may_carry_.assign(n_units, 0);
     thresholds_.assign(n_units, 0);
     largest_weight_.assign(n_units, 0);
@@ -90,22 +91,8 @@ class ParallelPerceptron {
 
   /// out_i += w_i . x for the input with these columns, in which a column may come more than once.
   void add(coding::SignedColumns& input, std::span<std::int32_t> out) const {
-    const AddColumns add_columns = add_columns_kernel();
-    alignas(core::kCacheLine) std::array<std::int32_t, kBlockUnits> sums;
-    const auto add_block = [&](const core::AlignedBuffer<std::int8_t>& bytes, std::size_t b,
-                               int group, std::int32_t factor) {
-      const std::int8_t* const block = bytes.data() + b * n_columns_ * kBlockUnits;
-      sums.fill(0);
-      add_columns(block, input.positive, group, +1, sums.data());
-      add_columns(block, input.negative, group, -1, sums.data());
-      const std::size_t first = b * kBlockUnits;
-      const std::size_t n = std::min(kBlockUnits, n_units_ - first);
-      for (std::size_t i = 0; i < n; ++i) out[first + i] += factor * sums[i];
-    };
-    for (std::size_t b = 0; b < n_blocks_; ++b) {
-      add_block(bytes_, b, group_of_block_[b], 1);
-      if (has_high_bytes_) add_block(high_bytes_, b, 1, kCarry);
-    }
+    add_signed(input.positive, +1, out);
+    add_signed(input.negative, -1, out);
     if (carries_.empty()) return;
     std::vector<std::int16_t>& values = input.values;
     values.assign(n_columns_, 0);
@@ -169,7 +156,33 @@ class ParallelPerceptron {
   };
 
   std::size_t byte_index(std::size_t unit, std::size_t column) const noexcept {
-    return (unit / kBlockUnits * n_columns_ + column) * kBlockUnits + unit % kBlockUnits;
+    return unit / kBlockUnits * block_bytes() + column * kBlockUnits + unit % kBlockUnits;
+  }
+
+  /// A block's bytes: its columns, and one more of zeros, to which lists of columns are padded.
+  std::size_t block_bytes() const noexcept { return (n_columns_ + 1) * kBlockUnits; }
+
+  /// out_i += sign * the bytes of the columns; listed carries are left out.
+  void add_signed(std::span<const std::uint32_t> columns, int sign,
+                  std::span<std::int32_t> out) const {
+    const AddColumns add_columns = add_columns_kernel();
+    while (!columns.empty()) {
+      const auto some = columns.first(std::min(ColumnPlaces::kMost, columns.size()));
+      columns = columns.subspan(some.size());
+      const ColumnPlaces places(some, n_columns_);
+      for (std::size_t b = 0; b < n_blocks_; ++b) {
+        alignas(core::kCacheLine) std::array<std::int32_t, kBlockUnits> padded;
+        const std::size_t first = b * kBlockUnits;
+        const bool whole = first + kBlockUnits <= n_units_;
+        if (!whole) padded.fill(0);
+        std::int32_t* const sums = whole ? out.data() + first : padded.data();
+        add_columns(bytes_.data() + b * block_bytes(), places, group_of_block_[b], sign, sums);
+        if (has_high_bytes_) {
+          add_columns(high_bytes_.data() + b * block_bytes(), places, 1, sign * kCarry, sums);
+        }
+        for (std::size_t i = first; !whole && i < n_units_; ++i) out[i] += padded[i - first];
+      }
+    }
   }
 
   /// Columns of an input whose weights a correction changes alike.
@@ -215,7 +228,7 @@ class ParallelPerceptron {
       change[i] = static_cast<std::int8_t>(mask[i] & part.change);
     }
     for (const std::uint32_t column : part.columns) {
-      std::int8_t* const line = bytes_.data() + (block * n_columns_ + column) * kBlockUnits;
+      std::int8_t* const line = bytes_.data() + block * block_bytes() + column * kBlockUnits;
       for (std::size_t i = 0; i < kBlockUnits; ++i) {
         line[i] = static_cast<std::int8_t>(line[i] + change[i]);
       }
@@ -339,7 +352,7 @@ class ParallelPerceptron {
   std::size_t n_double_;
   std::size_t n_blocks_ = 0;
   std::int32_t weight_limit_;
-  core::AlignedBuffer<std::int8_t> bytes_;  ///< [block][column][unit in block]
+  core::AlignedBuffer<std::int8_t> bytes_;  ///< [block][column, then zeros][unit in block]
   core::AlignedBuffer<std::int8_t> high_bytes_;
   bool has_high_bytes_ = false;
   std::size_t most_carries_ = 0;

@@ -48,12 +48,17 @@ class PotentialMemory {
       : n_inputs_(code.n_inputs()),
         n_units_(n_units),
         bins_(kEntries * n_inputs_),
+        bins_by_input_(n_inputs_ * kEntries),
         potentials_(kEntries * n_units),
-        columns_(coding::SignedColumns::with_capacity(2 * code.n_columns())),
+        difference_(coding::SignedColumns::with_capacity(2 * code.n_columns())),
         max_corrected_(max_corrected),
         log_bins_(kLogSize * n_inputs_),
         log_units_(kLogSize * max_corrected),
         log_(kLogSize) {
+    for (Listed& listed : listed_) {
+      listed.bins.reserve(n_inputs_);
+      listed.columns = coding::SignedColumns::with_capacity(code.n_columns());
+    }
     // A unit of a modifier switches l - 1 inputs, which are about half as many columns: half the
     // modifiers are active. Neighbouring bins differ in `differing` units of each pattern (about
     // m / 2 / 45); where it is modified, in each of l - 1 groups, half of them are active and move
@@ -83,6 +88,13 @@ class PotentialMemory {
         return use(code, slot);
       }
     }
+    std::array<std::int32_t, kEntries> distance{};
+    for (std::size_t i = 0; i < n_inputs_; ++i) {
+      const coding::Bin* const remembered = bins_by_input_.data() + i * kEntries;
+      for (std::size_t slot = 0; slot < kEntries; ++slot) {
+        distance[slot] += std::abs(int{remembered[slot]} - int{bins[i]});
+      }
+    }
     std::size_t nearest = kEntries;
     std::size_t oldest = 0;
     double least = columns_of_pass_;
@@ -90,7 +102,7 @@ class PotentialMemory {
       if (last_use_[slot] < last_use_[oldest]) oldest = slot;
       const std::uint64_t lag = n_corrections_ - up_to_[slot];
       if (last_use_[slot] == 0 || lag > kLogSize) continue;
-      const double cost = columns_per_bin_ * distance(bins_of(slot), bins) +
+      const double cost = columns_per_bin_ * distance[slot] +
                           columns_per_correction_ * static_cast<double>(lag);
       if (cost < least) {
         least = cost;
@@ -99,24 +111,38 @@ class PotentialMemory {
     }
     const std::span<std::int32_t> fresh(potentials_.data() + oldest * n_units_, n_units_);
     if (nearest == kEntries) {
-      code.columns(bins, columns_);
-      perceptron.potentials(columns_, fresh);
+      coding::SignedColumns& columns = list(code, bins);
+      perceptron.potentials(columns, fresh);
       ++counts_.full;
+      counts_.columns += columns.positive.size() + columns.negative.size();
     } else {
       const Entry known = use(code, nearest);
       if (std::ranges::equal(known.bins, bins)) {
         ++counts_.exact;
         return known;
       }
-      code.difference(known.bins, bins, columns_);
+      code.difference(known.bins, bins, difference_);
       if (oldest != nearest) std::ranges::copy(known.potentials, fresh.begin());
-      perceptron.add(columns_, fresh);
+      perceptron.add(difference_, fresh);
       ++counts_.neighbour;
+      counts_.columns += difference_.positive.size() + difference_.negative.size();
     }
-    counts_.columns += columns_.positive.size() + columns_.negative.size();
-    std::ranges::copy(bins, bins_.begin() + static_cast<std::ptrdiff_t>(oldest * n_inputs_));
+    for (std::size_t i = 0; i < n_inputs_; ++i) {
+      bins_[oldest * n_inputs_ + i] = bins[i];
+      bins_by_input_[i * kEntries + oldest] = bins[i];
+    }
     up_to_[oldest] = n_corrections_;
     return use(code, oldest);
+  }
+
+  /// The columns of the state with these bins, listed anew unless it was one of the last two that
+  /// were listed; valid until the next call of any member.
+  const coding::SignedColumns& columns(const coding::StateCode<Capacity>& code,
+                                       std::span<const coding::Bin> bins) {
+    for (const Listed& listed : listed_) {
+      if (std::ranges::equal(listed.bins, bins)) return listed.columns;
+    }
+    return list(code, bins);
   }
 
   /// Notes that w_i += step * x_SD(bins) and w_i0 -= step for every i in `units`.
@@ -137,17 +163,26 @@ class PotentialMemory {
     std::size_t n_units = 0;
   };
 
+  /// A state's bins and columns.
+  struct Listed {
+    std::vector<coding::Bin> bins = {};
+    coding::SignedColumns columns = {};
+  };
+
   static constexpr std::size_t kEntries = 64;
   static constexpr std::size_t kLogSize = 512;
 
-  static int distance(std::span<const coding::Bin> a, std::span<const coding::Bin> b) noexcept {
-    int sum = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(int{a[i]} - int{b[i]});
-    return sum;
-  }
-
   std::span<const coding::Bin> bins_of(std::size_t slot) const noexcept {
     return {bins_.data() + slot * n_inputs_, n_inputs_};
+  }
+
+  /// Lists the columns of a state, in the place of the list before the last.
+  coding::SignedColumns& list(const coding::StateCode<Capacity>& code,
+                              std::span<const coding::Bin> bins) {
+    std::swap(listed_[0], listed_[1]);
+    listed_[0].bins.assign(bins.begin(), bins.end());
+    code.columns(bins, listed_[0].columns);
+    return listed_[0].columns;
   }
 
   /// Marks a slot as used now and brings its potentials up to date.
@@ -170,13 +205,15 @@ class PotentialMemory {
   std::size_t n_inputs_;
   std::size_t n_units_;
   std::vector<coding::Bin> bins_;                    ///< [slot][input]
+  std::vector<coding::Bin> bins_by_input_;           ///< [input][slot], for quick comparison
   std::vector<std::int32_t> potentials_;             ///< [slot][unit]
   std::array<std::uint64_t, kEntries> up_to_{};      ///< corrections that are accounted for
   std::array<std::uint64_t, kEntries> last_use_{};   ///< 0: empty
   std::uint64_t clock_ = 0;
   std::size_t latest_ = 0;
   std::size_t before_latest_ = 0;
-  coding::SignedColumns columns_;
+  coding::SignedColumns difference_;
+  std::array<Listed, 2> listed_;  ///< the latest first
 
   // The last kLogSize corrections, in a ring.
   std::uint64_t n_corrections_ = 0;

@@ -81,9 +81,9 @@ class SdnnC {
     initialize_weights(seed);
     initialize_thresholds();
     bins_.resize(code_->n_inputs());
-    columns_ = coding::SignedColumns::with_capacity(code_->n_columns());
-    n_firing_before_.assign(perceptron_.n_units() + 1, 0);
+    moves_.resize(actions_.n_hidden_units() - actions_.n_active_units());
     selected_.reserve(actions_.n_active_units());
+    rehearse();
   }
 
   const SdnnCConfig& config() const noexcept { return config_; }
@@ -106,13 +106,27 @@ class SdnnC {
   ///
   /// Throws std::invalid_argument for a state of wrong size or outside [0, 1].
   void values(std::span<const double> state, std::span<double> out) {
-    core::require(out.size() == n_actions(), "out", std::to_string(n_actions()) + " values",
-                  out.size());
-    count_firing(recall(state).potentials);
-    for (std::size_t action = 0; action < out.size(); ++action) {
-      const std::size_t first = actions_.first_unit(action);
-      out[action] = value_of_count_[static_cast<std::size_t>(
-          n_firing_before_[first + actions_.n_active_units()] - n_firing_before_[first])];
+    if (out.size() != n_actions()) {
+      core::require(false, "out", std::to_string(n_actions()) + " values", out.size());
+    }
+    const std::span<const std::int32_t> h = recall(state).potentials;
+    const std::int32_t* const leaving = h.data();
+    const std::int32_t* const entering = h.data() + actions_.n_active_units();
+    for (std::size_t i = 0; i < moves_.size(); ++i) {
+      moves_[i] = static_cast<std::int8_t>((entering[i] > 0) - (leaving[i] > 0));
+    }
+    const double* const value = value_of_count_.data();
+    std::ptrdiff_t n_firing = count_in_window(h, 0);
+    out[0] = value[n_firing];
+    if (out.size() == moves_.size() + 1) {  // every window: the usual case, in a tight loop
+      for (std::size_t i = 0; i < moves_.size(); ++i) out[i + 1] = value[n_firing += moves_[i]];
+      return;
+    }
+    for (std::size_t action = 1; action < out.size(); ++action) {
+      for (std::size_t i = actions_.first_unit(action - 1); i < actions_.first_unit(action); ++i) {
+        n_firing += moves_[i];
+      }
+      out[action] = value[n_firing];
     }
   }
 
@@ -137,8 +151,7 @@ class SdnnC {
     for (std::uint32_t& unit : selected_) unit += static_cast<std::uint32_t>(first);
 
     const std::int32_t step = deficit > 0 ? config_.lattice : -config_.lattice;
-    code_->columns(entry.bins, columns_);
-    perceptron_.correct(selected_, columns_, step);
+    perceptron_.correct(selected_, memory_.columns(*code_, entry.bins), step);
     memory_.corrected(entry.bins, selected_, step);
   }
 
@@ -271,28 +284,33 @@ class SdnnC {
     }
   }
 
+  /// Asks for some states and forgets them: the first decision then finds the weights, the wiring
+  /// and the code in the caches, as every later one does.
+  void rehearse() {
+    constexpr int kStates = 8;  // each reads a third of the weights
+    std::vector<double> out(n_actions());
+    for (int i = 0; i < kStates; ++i) {
+      values(std::vector<double>(n_inputs(), (i + 0.5) / kStates), out);
+    }
+    memory_ = PotentialMemory<Capacity>(*code_, actions_.n_hidden_units(),
+                                        actions_.n_active_units());
+  }
+
   Remembered recall(std::span<const double> state) {
     code_->encode(state, bins_);
     return memory_.recall(*code_, perceptron_, bins_);
   }
 
   int count_in_window(std::span<const std::int32_t> potentials, std::size_t action) const {
-    core::require(action < n_actions(), "action", "less than " + std::to_string(n_actions()),
-                  action);
+    if (action >= n_actions()) {
+      core::require(false, "action", "less than " + std::to_string(n_actions()), action);
+    }
     const std::size_t first = actions_.first_unit(action);
     int n_firing = 0;
     for (std::size_t i = first; i < first + actions_.n_active_units(); ++i) {
       n_firing += potentials[i] > 0;
     }
     return n_firing;
-  }
-
-  void count_firing(std::span<const std::int32_t> potentials) noexcept {
-    std::int32_t n_firing = 0;
-    for (std::size_t i = 0; i < potentials.size(); ++i) {
-      n_firing += potentials[i] > 0;
-      n_firing_before_[i + 1] = n_firing;
-    }
   }
 
   SdnnCConfig config_;
@@ -305,8 +323,7 @@ class SdnnC {
   // Workspace: sized once, so that a step allocates nothing.
   PotentialMemory<Capacity> memory_;
   std::vector<coding::Bin> bins_;
-  coding::SignedColumns columns_;
-  std::vector<std::int32_t> n_firing_before_;  ///< active units among the first i
+  std::vector<std::int8_t> moves_;  ///< what the count changes by as the window moves on a unit
   std::vector<std::uint32_t> selected_;
 };
 

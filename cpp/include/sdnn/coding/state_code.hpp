@@ -1,10 +1,12 @@
 /// Layers 2 and 3 as fixed wiring: from a state to its ternary code.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <string>
 #include <utility>
@@ -24,20 +26,60 @@ struct SignedColumns {
   std::vector<std::uint32_t> negative;
   std::vector<std::int16_t> values = {};  ///< scratch of whoever needs the whole row
 
-  /// No columns, but room for `n` of each sign, so that listing them allocates nothing.
+  /// No columns, but room for `n` of each sign, so that listing them allocates nothing and meets
+  /// no memory that was never written.
   static SignedColumns with_capacity(std::size_t n) {
     SignedColumns columns;
-    columns.positive.reserve(n);
-    columns.negative.reserve(n);
-    columns.values.reserve(n);
+    columns.positive.resize(n + 8);  // listing overwrites up to eight more
+    columns.negative.resize(n + 8);
+    columns.values.resize(n);
+    columns.clear();
     return columns;
   }
 
   void clear() noexcept {
     positive.clear();
     negative.clear();
+    values.clear();
   }
 };
+
+namespace internal {
+
+/// The set bits of a byte, in rising order.
+struct SetBits {
+  std::array<std::uint32_t, 8> bits{};
+  std::uint32_t n = 0;
+};
+
+inline constexpr std::array<SetBits, 256> kSetBits = [] {
+  std::array<SetBits, 256> table{};
+  for (std::size_t byte = 0; byte < table.size(); ++byte) {
+    for (std::uint32_t bit = 0; bit < 8; ++bit) {
+      if (byte >> bit & 1) table[byte].bits[table[byte].n++] = bit;
+    }
+  }
+  return table;
+}();
+
+/// Writes the numbers of the set bits among the first `n_bits`, plus `first`, a byte of bits at a
+/// time: always eight numbers, of which those of the set bits count, so that no branch depends on
+/// the bits. Returns the end of what counts; up to eight more are overwritten.
+template <std::size_t NWords>
+[[gnu::noinline]] std::uint32_t* list_set_bits(const std::array<std::uint64_t, NWords>& words,
+                                               std::size_t first, std::size_t n_bits,
+                                               std::uint32_t* end) noexcept {
+  for (std::size_t bit = 0; bit < n_bits; bit += 8) {
+    const SetBits& set = kSetBits[words[bit / 64] >> bit % 64 & 0xff];
+    std::array<std::uint32_t, 8> numbers = set.bits;
+    for (std::uint32_t& number : numbers) number += static_cast<std::uint32_t>(first + bit);
+    std::memcpy(end, numbers.data(), sizeof numbers);
+    end += set.n;
+  }
+  return end;
+}
+
+}  // namespace internal
 
 /// Layers 2 and 3 as fixed wiring: from a state to its ternary code x_SD.
 ///
@@ -147,24 +189,27 @@ class StateCode {
 
   /// Lists the columns of the paired code that are +1 and -1, double columns first.
   void columns(std::span<const Bin> bins, SignedColumns& out) const {
-    out.clear();
+    const std::size_t m = n_pattern_units();
+    const std::size_t most = n_columns() - n_double_columns() / 2 + 8;
+    out.positive.resize(most);
+    out.negative.resize(most);
+    std::uint32_t* positive = out.positive.data();
+    std::uint32_t* negative = out.negative.data();
     for_each_pair([&](std::size_t first, std::size_t nu, std::size_t mu_1, std::size_t mu_2) {
       const PairWords x(pattern(nu, bins), signs(mu_1, nu, bins), signs(mu_2, nu, bins));
-      for (std::size_t w = 0; w < Pattern::kWords; ++w, first += 64) {
-        append(x.sum_plus[w], first, out.positive);
-        append(x.sum_minus[w], first, out.negative);
-        append(x.difference_plus[w], first + n_pattern_units(), out.positive);
-        append(x.difference_minus[w], first + n_pattern_units(), out.negative);
-      }
+      positive = internal::list_set_bits(x.sum_plus, first, m, positive);
+      negative = internal::list_set_bits(x.sum_minus, first, m, negative);
+      positive = internal::list_set_bits(x.difference_plus, first + m, m, positive);
+      negative = internal::list_set_bits(x.difference_minus, first + m, m, negative);
     });
     for_each_single([&](std::size_t first, std::size_t nu, std::size_t mu) {
-      const auto active = pattern(nu, bins).words();
-      const auto positive = signs(mu, nu, bins).words();
-      for (std::size_t w = 0; w < Pattern::kWords; ++w, first += 64) {
-        append(active[w] & positive[w], first, out.positive);
-        append(active[w] & ~positive[w], first, out.negative);
-      }
+      const Pattern& active = pattern(nu, bins);
+      const Pattern plus = active & signs(mu, nu, bins);
+      positive = internal::list_set_bits(plus.words(), first, m, positive);
+      negative = internal::list_set_bits((active ^ plus).words(), first, m, negative);
     });
+    out.positive.resize(static_cast<std::size_t>(positive - out.positive.data()));
+    out.negative.resize(static_cast<std::size_t>(negative - out.negative.data()));
   }
 
   /// Lists the columns in which the paired codes of two states differ, x(to) - x(from); those that

@@ -60,8 +60,9 @@ class AcrobotTrial {
     core::require(agent_.n_inputs() == observed_.size(), "n_inputs",
                   "n_sensors of the sensors (" + std::to_string(observed_.size()) + ")",
                   agent_.n_inputs());
-    rows_.reserve(
-        static_cast<std::size_t>(protocol.n_learning_episodes / protocol.test_interval));
+    // Room for all rows, written once: no decision is to wait for memory it is the first to use.
+    rows_.resize(static_cast<std::size_t>(protocol.n_learning_episodes / protocol.test_interval));
+    rows_.clear();
   }
 
   int episode() const noexcept { return episode_; }
