@@ -1,9 +1,10 @@
 """Times sdnn on what LIBSDNN is given: a parameter file and a training sample.
 
-``python bench/estimators/against_libsdnn.py PARAMETERS.txt SAMPLE.csv ITERATIONS [RUNS]``. The sample
-has a line per training point: the target, then the inputs. Times are processor seconds of one thread
-for everything after the random choices: with two inputs, prediction is of the 1001 x 1001 lattice.
-LIBSDNN itself prints no times; call its ``Train`` and ``Estimate`` from a program of your own.
+``python bench/estimators/against_libsdnn.py PARAMETERS.txt SAMPLE.csv ITERATIONS [RUNS]``. The
+sample has a line per training point: the target, then the inputs. Times are processor seconds of
+one thread for everything after the random choices; with two inputs, prediction is of the
+1001 x 1001 lattice. LIBSDNN itself prints no times: call its ``Train`` and ``Estimate`` from a
+program of your own.
 """
 
 from __future__ import annotations
