@@ -93,7 +93,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     validation_scores_ : ndarray, shape (n_epochs,) or (0,)
         With early stopping, the accuracy on what is held out.
     training_form_, training_memory_ : str, int
-        The form of training that the last `fit` chose, and the bytes it used beside the weights.
+        The form of training that the last `fit` chose, and the most bytes it takes beside the
+        weights.
     n_features_in_, feature_names_in_ : int, ndarray of str
         As everywhere in scikit-learn.
 

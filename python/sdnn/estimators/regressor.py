@@ -88,7 +88,8 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     validation_scores_ : ndarray, shape (n_epochs,) or (0,)
         With early stopping, minus the mean squared error in units of the firing count.
     training_form_, training_memory_ : str, int
-        The form of training that the last `fit` chose, and the bytes it used beside the weights.
+        The form of training that the last `fit` chose, and the most bytes it takes beside the
+        weights.
     n_features_in_, feature_names_in_ : int, ndarray of str
         As everywhere in scikit-learn.
 

@@ -53,7 +53,7 @@ class Trainer {
   }
 
   TrainingForm form() const noexcept { return form_; }
-  /// Bytes that the form needs beside the layer.
+  /// The most bytes that the form takes beside the layer.
   std::size_t memory() const noexcept { return memory_; }
   std::size_t n_samples() const noexcept { return n_samples_; }
 
