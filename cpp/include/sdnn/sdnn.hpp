@@ -37,7 +37,6 @@
 #include "sdnn/core/grid_cells.hpp"
 #include "sdnn/core/instruction_set.hpp"
 #include "sdnn/core/integer_register.hpp"
-#include "sdnn/core/kernel.hpp"
 #include "sdnn/core/lanes.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/core/worker_team.hpp"

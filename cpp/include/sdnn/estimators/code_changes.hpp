@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "sdnn/coding/selective_desensitization.hpp"
-#include "sdnn/core/kernel.hpp"
+#include "sdnn/core/instruction_set.hpp"
+#include "sdnn/core/lanes.hpp"
 
 namespace sdnn::estimators {
 

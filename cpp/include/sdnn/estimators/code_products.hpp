@@ -7,7 +7,8 @@
 #include <cstdint>
 
 #include "sdnn/coding/selective_desensitization.hpp"
-#include "sdnn/core/kernel.hpp"
+#include "sdnn/core/instruction_set.hpp"
+#include "sdnn/core/lanes.hpp"
 
 #if SDNN_X86_KERNELS
 #include <immintrin.h>

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "sdnn/core/instruction_set.hpp"
 #include "sdnn/core/integer_register.hpp"
-#include "sdnn/core/kernel.hpp"
 #include "sdnn/estimators/code_changes.hpp"
 #include "sdnn/estimators/tile_rows.hpp"
 

@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "sdnn/core/aligned_buffer.hpp"
-#include "sdnn/core/kernel.hpp"
+#include "sdnn/core/instruction_set.hpp"
+#include "sdnn/core/lanes.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/transposition.hpp"
 

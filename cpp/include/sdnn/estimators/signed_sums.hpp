@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "sdnn/core/instruction_set.hpp"
 #include "sdnn/core/integer_register.hpp"
-#include "sdnn/core/kernel.hpp"
 
 namespace sdnn::estimators {
 

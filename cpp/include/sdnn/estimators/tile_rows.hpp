@@ -8,8 +8,8 @@
 #include <span>
 #include <type_traits>
 
+#include "sdnn/core/instruction_set.hpp"
 #include "sdnn/core/integer_register.hpp"
-#include "sdnn/core/kernel.hpp"
 
 namespace sdnn::estimators {
 

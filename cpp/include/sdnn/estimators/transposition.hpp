@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "sdnn/core/instruction_set.hpp"
 #include "sdnn/core/integer_register.hpp"
-#include "sdnn/core/kernel.hpp"
 
 namespace sdnn::estimators {
 

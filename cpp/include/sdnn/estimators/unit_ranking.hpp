@@ -7,8 +7,8 @@
 #include <cstring>
 #include <limits>
 
+#include "sdnn/core/instruction_set.hpp"
 #include "sdnn/core/integer_register.hpp"
-#include "sdnn/core/kernel.hpp"
 
 namespace sdnn::estimators {
 
