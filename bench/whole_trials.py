@@ -1,6 +1,6 @@
 """Whole trials of 15,000 episodes against dense products: the table in docs/performance.md.
 
-python bench/whole_trials.py [trials per case], about five minutes for 4; rows go to
+python bench/whole_trials.py [trials per case], about five minutes for 10; rows go to
 docs/whole-trials.csv. Processor time of the trial's own thread, two trials at a time; the dense
 product of each network's size is measured between the trials, in the same process.
 """

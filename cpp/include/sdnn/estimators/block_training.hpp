@@ -61,23 +61,16 @@ class BlockTraining {
 
   template <class Rule>
   TrainingCount present(std::span<const std::int32_t> order, Rule& rule) {
-    TrainingCount count;
-    const auto add = [&](const TrainingCount& more) {
-      count.n_samples += more.n_samples;
-      count.n_units += more.n_units;
-    };
     if (keeps_plans_ && is_whole_round(order)) {
-      ++n_rounds_;  // the first one may be the last
-      plans_.resize(n_rounds_ == 1 ? 0 : (order.size() + kLargeBlock - 1) / kLargeBlock);
-      for (std::size_t k = 0; k < plans_.size(); ++k) {
-        const auto some = order.subspan(k * kLargeBlock);
-        add(present_block(some.first(std::min(some.size(), kLargeBlock)), &plans_[k], rule));
-      }
-      if (!plans_.empty()) return count;
+      if (had_a_round_) return present_round(order, rule);
+      had_a_round_ = true;  // it may be the only one
     }
-    for (; !order.empty(); order = order.subspan(std::min(order.size(), kSmallBlock))) {
+    TrainingCount count;
+    while (!order.empty()) {
+      const auto some = order.first(std::min(order.size(), kSmallBlock));
       Plan plan;
-      add(present_block(order.first(std::min(order.size(), kSmallBlock)), &plan, rule));
+      count += present_block(some, &plan, rule);
+      order = order.subspan(some.size());
     }
     return count;
   }
@@ -109,6 +102,19 @@ class BlockTraining {
       if (static_cast<std::size_t>(order[i]) != i) return false;
     }
     return true;
+  }
+
+  /// A whole round in large blocks, whose plans are kept for the next one.
+  template <class Rule>
+  TrainingCount present_round(std::span<const std::int32_t> order, Rule& rule) {
+    TrainingCount count;
+    plans_.resize((order.size() + kLargeBlock - 1) / kLargeBlock);
+    for (Plan& plan : plans_) {
+      const auto some = order.first(std::min(order.size(), kLargeBlock));
+      count += present_block(some, &plan, rule);
+      order = order.subspan(some.size());
+    }
+    return count;
   }
 
   template <class Rule>
@@ -143,7 +149,7 @@ class BlockTraining {
   }
 
   void make_plan(std::span<const std::int32_t> samples, Plan* plan) {
-    plan->stride = core::round_up(samples.size(), 16);
+    plan->stride = core::round_up(samples.size(), PresentationWindow::kAtOnce);
     plan->products = core::AlignedBuffer<Product>(samples.size() * plan->stride);
     team_.run([&](std::size_t part) {
       for (std::size_t b = part; b < samples.size(); b += team_.size()) {
@@ -236,7 +242,7 @@ class BlockTraining {
   core::WorkerTeam team_;
   std::size_t most_samples_;
   bool keeps_plans_;
-  std::size_t n_rounds_ = 0;  // in the order of the data
+  bool had_a_round_ = false;  // in the order of the data
   std::vector<Plan> plans_;
   std::vector<std::uint64_t> words_;          // (most_samples, active then positive, n_words)
   core::AlignedBuffer<std::int8_t> entries_;  // (chunks, most_samples, kChunkColumns): +1, 0, -1

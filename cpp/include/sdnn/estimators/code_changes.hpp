@@ -71,6 +71,15 @@ SDNN_KERNEL(void, list_changes,
              std::uint32_t* words, std::uint32_t** up, std::uint32_t** down),
             (from, to, n_words, words, up, down))
 
+/// How many entries of a code are not 0.
+inline std::size_t n_active(const coding::CodeWords& code, std::size_t n_words) noexcept {
+  std::size_t n = 0;
+  for (std::size_t w = 0; w < n_words; ++w) {
+    n += static_cast<std::size_t>(std::popcount(code.active[w]));
+  }
+  return n;
+}
+
 /// Slots to add and slots to subtract: those of a code, or those in which two differ.
 class SignedSlots {
  public:

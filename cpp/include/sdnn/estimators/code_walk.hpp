@@ -1,7 +1,6 @@
 /// Potentials of many samples, each from those of the sample before on a short walk.
 #pragma once
 
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -174,14 +173,6 @@ class CodeWalk {
   const Changes& changes(std::size_t chunk) const noexcept { return chunks_[chunk]; }
 
  private:
-  static std::size_t n_active(const coding::CodeWords& code, std::size_t n_words) noexcept {
-    std::size_t n = 0;
-    for (std::size_t w = 0; w < n_words; ++w) {
-      n += static_cast<std::size_t>(std::popcount(code.active[w]));
-    }
-    return n;
-  }
-
   std::vector<Stop> stops_;
   std::vector<Changes> chunks_;
 };

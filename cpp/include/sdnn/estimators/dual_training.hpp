@@ -77,9 +77,7 @@ class DualTraining {
       }
       if (full_) synchronize();
       const auto now = order.first(std::min(order.size(), kSmallBlock));
-      const TrainingCount more = in_data_order ? present_row(now, rule) : present_some(now, rule);
-      count.n_samples += more.n_samples;
-      count.n_units += more.n_units;
+      count += in_data_order ? present_row(now, rule) : present_some(now, rule);
       order = order.subspan(now.size());
     }
     flush();
@@ -166,7 +164,7 @@ class DualTraining {
   template <class Rule>
   TrainingCount present_row(std::span<const std::int32_t> now, Rule& rule) {
     const auto begin = static_cast<std::size_t>(now[0]);
-    const std::size_t size = core::round_up(now.size(), 16);
+    const std::size_t size = core::round_up(now.size(), PresentationWindow::kAtOnce);
     for (std::size_t i = 0; i < layer_->n_units(); ++i) {
       std::copy_n(&potentials_[i * row_size_ + begin], size, window_.row(i));
       if (!pending_[i].empty()) add_signed(window_.row(i), size, pending_[i], begin, n_per_sum_);

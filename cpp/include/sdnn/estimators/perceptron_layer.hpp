@@ -214,15 +214,12 @@ class PerceptronLayer {
     for (const std::uint32_t query : order) {
       code_->encode(bins.subspan(query * code_->n_inputs(), code_->n_inputs()), now,
                     now + n_words);
-      slots.read_changes({before, before + n_words}, {now, now + n_words});
-      if (slots.size() > code_->max_active() / 2) {
-        const std::size_t n_changes = slots.size();
-        slots.read({now, now + n_words});
-        if (slots.size() < n_changes) {
-          forget();
-        } else {
-          slots.read_changes({before, before + n_words}, {now, now + n_words});
-        }
+      const coding::CodeWords code{now, now + n_words};
+      slots.read_changes({before, before + n_words}, code);
+      // Counting costs too, and is worth it for codes that are far apart.
+      if (slots.size() > code_->max_active() / 2 && slots.size() > n_active(code, n_words)) {
+        forget();
+        slots.read(code);
       }
       for (std::size_t tile = 0; tile < tiles.n_tiles(); ++tile) {
         add_rows(tiles.tile(tile), tiles.width(tile), slots.plus(), slots.minus(), n_per_sum,

@@ -19,6 +19,12 @@ namespace sdnn::estimators {
 struct TrainingCount {
   std::size_t n_samples = 0;  ///< presentations that corrected something
   std::size_t n_units = 0;    ///< corrections of single units
+
+  TrainingCount& operator+=(const TrainingCount& more) noexcept {
+    n_samples += more.n_samples;
+    n_units += more.n_units;
+    return *this;
+  }
 };
 
 namespace internal {
@@ -49,15 +55,19 @@ SDNN_KERNEL(void, add_row,
 /// A correction reaches the next few samples one by one, the others a row at a time.
 class PresentationWindow {
  public:
+  /// Places that are read together: what holds places is filled up to a multiple of it.
+  static constexpr std::size_t kAtOnce = 16;
+
   /// `n_padded_units` is a multiple of 16.
   PresentationWindow(std::size_t n_padded_units, std::size_t capacity)
       : n_padded_units_(n_padded_units),
-        stride_(core::round_up(capacity, kFew) + kFew),
+        stride_(core::round_up(capacity, kAtOnce) + kAtOnce),
         by_unit_(n_padded_units * stride_),
-        by_sample_(kFew * n_padded_units) {}
+        by_sample_(kAtOnce * n_padded_units) {}
 
   static std::size_t bytes(std::size_t n_padded_units, std::size_t capacity) noexcept {
-    return sizeof(std::int32_t) * n_padded_units * (core::round_up(capacity, kFew) + 2 * kFew);
+    return sizeof(std::int32_t) * n_padded_units *
+           (core::round_up(capacity, kAtOnce) + 2 * kAtOnce);
   }
 
   /// Potentials of a unit for the samples of the window: to be filled before they are presented.
@@ -67,22 +77,22 @@ class PresentationWindow {
   /// Presents `samples` in their order, and calls note(place, correction) for what each corrects.
   ///
   /// `products[b * stride + e]` is 1 plus the inner product of the samples at places b and e, with
-  /// room for a multiple of 16 places.
+  /// room for a multiple of kAtOnce places.
   template <class Product, class Rule, class Note>
   TrainingCount present(std::span<const std::int32_t> samples, const Product* products,
                         std::size_t stride, Rule& rule, const Note& note) {
     TrainingCount count;
     made_.clear();
-    for (std::size_t first = 0; first < samples.size(); first += kFew) {
-      const std::size_t left = core::round_up(samples.size() - first, kFew);
+    for (std::size_t first = 0; first < samples.size(); first += kAtOnce) {
+      const std::size_t left = core::round_up(samples.size() - first, kAtOnce);
       for (const Made& made : made_) {
         add_row(row(made.what.unit) + first, products + made.place * stride + first,
                 made.what.direction, left);
       }
       made_.clear();
-      transpose(by_unit_.data() + first, stride_, n_padded_units_, kFew, by_sample_.data(),
+      transpose(by_unit_.data() + first, stride_, n_padded_units_, kAtOnce, by_sample_.data(),
                 n_padded_units_);
-      for (std::size_t b = first; b < std::min(first + kFew, samples.size()); ++b) {
+      for (std::size_t b = first; b < std::min(first + kAtOnce, samples.size()); ++b) {
         std::int32_t* const values = by_sample_.data() + (b - first) * n_padded_units_;
         for (const Made& made : made_) {
           values[made.what.unit] += made.what.direction * products[made.place * stride + b];
@@ -104,13 +114,12 @@ class PresentationWindow {
     std::size_t place;
     Correction what;
   };
-  static constexpr std::size_t kFew = 16;
 
   std::size_t n_padded_units_;
   std::size_t
       stride_;  // a little more than the capacity: at a power of two, rows share cache lines
   core::AlignedBuffer<std::int32_t> by_unit_;    // (n_padded_units, stride)
-  core::AlignedBuffer<std::int32_t> by_sample_;  // (kFew, n_padded_units)
+  core::AlignedBuffer<std::int32_t> by_sample_;  // (kAtOnce, n_padded_units)
   std::vector<Correction> corrections_;
   std::vector<Made> made_;  // corrections that have reached the next few samples only
 };

@@ -72,10 +72,8 @@ class Trainer {
         renew_headroom();
       }
       const auto some = order.first(std::min(order.size(), headroom_));
-      const TrainingCount count =
+      total +=
           std::visit([&](auto& training) { return training.present(some, rule_); }, *training_);
-      total.n_samples += count.n_samples;
-      total.n_units += count.n_units;
       headroom_ -= some.size();
       order = order.subspan(some.size());
     }

@@ -13,6 +13,7 @@
 #include "sdnn/core/aligned_buffer.hpp"
 #include "sdnn/estimators/chunked_weights.hpp"
 #include "sdnn/estimators/code_walk.hpp"
+#include "sdnn/estimators/presentation_window.hpp"
 #include "sdnn/estimators/weight_tiles.hpp"
 
 namespace sdnn::estimators {
@@ -52,10 +53,10 @@ inline std::size_t product_bytes(const coding::SelectiveDesensitization& code) n
   return code.max_active() < std::numeric_limits<std::int16_t>::max() ? 2 : 4;
 }
 
-/// Entries of a row that dual training keeps per sample or unit: room for a block from any sample
+/// Entries of a row that dual training keeps per sample or unit: room for a window from any sample
 /// on.
 constexpr std::size_t dual_row_size(std::size_t n_samples) noexcept {
-  return core::round_up(n_samples + 15, 32);
+  return core::round_up(n_samples + PresentationWindow::kAtOnce - 1, 32);
 }
 
 /// Samples that block training presents per pass over the weights: where what does not change of a
@@ -72,8 +73,9 @@ inline std::size_t block_words(const coding::SelectiveDesensitization& code) noe
 inline std::size_t block_bytes(std::size_t n_samples, std::size_t padded_units,
                                const coding::SelectiveDesensitization& code) {
   const std::size_t n_words = block_words(code);
-  return n_samples * ((2 * 8 + 64) * n_words + 2 * sizeof(std::int32_t) * padded_units +
+  return n_samples * ((2 * 8 + 64) * n_words + sizeof(std::int32_t) * padded_units +
                       n_samples * product_bytes(code)) +
+         PresentationWindow::bytes(padded_units, n_samples) +
          CodeWalk::bytes(n_samples, n_words, code.max_active());
 }
 
@@ -99,8 +101,8 @@ inline std::size_t form_memory(TrainingForm form, std::size_t n_units,
              + n_units * row_size * sizeof(std::int32_t)        // potentials
              + n_samples * padded_units * sizeof(std::int16_t)  // coefficients
              + coding::CodedSamples::bytes(code, n_samples) +
-             kSmallBlock *
-                 (padded_units * sizeof(std::int32_t) + kSmallBlock * product_bytes(code));
+             PresentationWindow::bytes(padded_units, kSmallBlock) +
+             kSmallBlock * kSmallBlock * product_bytes(code);
     case TrainingForm::block:
       return ChunkedWeights<std::int32_t>::bytes(padded_units, block_words(code)) +
              block_bytes(kSmallBlock, padded_units, code);
