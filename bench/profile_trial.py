@@ -31,7 +31,7 @@ def short_name(symbol: str) -> str:
     while previous != symbol:
         previous, symbol = symbol, re.sub(r"<[^<>]*>", "", symbol)
     symbol = re.sub(r"<.*", "", symbol)  # perf cuts long names
-    name = symbol.split(" ")[-1].removeprefix("sdnn::").replace("internal::", "")
+    name = symbol.split(" ")[-1].removeprefix("sdnn::").replace("detail::", "")
     return name.partition("::")[2] if name.count("::") and name[0].islower() else name
 
 

@@ -83,7 +83,7 @@ BEFORE = Setting(1.0, 3.0)
 def run(task: tuple[str, Setting, int]) -> dict[str, object]:
     """One trial: a row."""
     stage, setting, seed = task
-    trial = _core.RbfAcrobotTrial(
+    trial = _core.RBFAcrobotTrial(
         network=RBFNetworkConfig(
             n_bases=setting.n_bases, width=setting.width, gradient_rate=setting.gradient_rate
         ).to_core(),

@@ -1,11 +1,10 @@
 // Selecting the units that a learning step corrects.
-#include "sdnn/approximators/error_correction.hpp"
-
 #include <benchmark/benchmark.h>
 
 #include <cstdint>
 #include <vector>
 
+#include "sdnn/approximators/error_correction.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace {

@@ -1,17 +1,16 @@
 // What an agent asks of the network: values of new and remembered states, learning steps.
-#include "sdnn/approximators/sdnn_c.hpp"
-
 #include <benchmark/benchmark.h>
 
 #include <cstddef>
 #include <vector>
 
+#include "sdnn/approximators/sdnn_c.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace {
 
 using namespace sdnn;
-using Network = approximators::SdnnC<256>;
+using Network = approximators::SDNNC<256>;
 
 constexpr int kLearningSteps = 500;
 
@@ -48,7 +47,11 @@ void values_of_new_state(benchmark::State& state) {
   }
 }
 BENCHMARK(values_of_new_state)
-    ->ArgName("inputs")->Arg(4)->Arg(5)->Arg(6)->Unit(benchmark::kMicrosecond);
+    ->ArgName("inputs")
+    ->Arg(4)
+    ->Arg(5)
+    ->Arg(6)
+    ->Unit(benchmark::kMicrosecond);
 
 void values_of_remembered_state(benchmark::State& state) {
   Setting setting(state);
@@ -58,7 +61,11 @@ void values_of_remembered_state(benchmark::State& state) {
   }
 }
 BENCHMARK(values_of_remembered_state)
-    ->ArgName("inputs")->Arg(4)->Arg(5)->Arg(6)->Unit(benchmark::kMicrosecond);
+    ->ArgName("inputs")
+    ->Arg(4)
+    ->Arg(5)
+    ->Arg(6)
+    ->Unit(benchmark::kMicrosecond);
 
 /// Learning steps up and down in turn at one state, five units each where so many can change.
 void learning_step(benchmark::State& state) {
@@ -71,7 +78,6 @@ void learning_step(benchmark::State& state) {
     sign = -sign;
   }
 }
-BENCHMARK(learning_step)
-    ->ArgName("inputs")->Arg(4)->Arg(5)->Arg(6)->Unit(benchmark::kMicrosecond);
+BENCHMARK(learning_step)->ArgName("inputs")->Arg(4)->Arg(5)->Arg(6)->Unit(benchmark::kMicrosecond);
 
 }  // namespace

@@ -32,8 +32,14 @@ void eigen_product(benchmark::State& state) {
   state.SetBytesProcessed(state.iterations() * n_columns * kUnits * 4);
 }
 BENCHMARK(eigen_product<Eigen::RowMajor>)
-    ->ArgName("columns")->Arg(2400)->Arg(6000)->Unit(benchmark::kMicrosecond);
+    ->ArgName("columns")
+    ->Arg(2400)
+    ->Arg(6000)
+    ->Unit(benchmark::kMicrosecond);
 BENCHMARK(eigen_product<Eigen::ColMajor>)
-    ->ArgName("columns")->Arg(2400)->Arg(6000)->Unit(benchmark::kMicrosecond);
+    ->ArgName("columns")
+    ->Arg(2400)
+    ->Arg(6000)
+    ->Unit(benchmark::kMicrosecond);
 
 }  // namespace

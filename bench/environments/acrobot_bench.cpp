@@ -1,9 +1,8 @@
 // One decision of the acrobot: 50 Runge-Kutta steps.
-#include "sdnn/environments/acrobot.hpp"
-
 #include <benchmark/benchmark.h>
 
 #include "sdnn/core/random.hpp"
+#include "sdnn/environments/acrobot.hpp"
 
 namespace {
 

@@ -39,7 +39,7 @@ def run(n_pattern_units, seed):
         for k in range(4)
     ]
     code = _core.SelectiveDesensitization(tables[:2], tables[2:], np.array([[0, 1], [1, 0]]))
-    layer = _core.PerceptronLayer(code, N_UNITS, seed=seed)
+    layer = _core.ParallelPerceptron(code, N_UNITS, seed=seed)
     counts = (target(points)[:, None] - LOW) / STEP
     start = time.process_time()
     trainer = _core.PDeltaTrainer(layer, bins(points), counts)

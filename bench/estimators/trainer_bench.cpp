@@ -1,6 +1,4 @@
 // Training and prediction at the demonstration problem's sizes: two inputs of 1001 bins, 280 units.
-#include "sdnn/estimators/trainer.hpp"
-
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -12,6 +10,7 @@
 #include <vector>
 
 #include "sdnn/coding/random_inverse.hpp"
+#include "sdnn/estimators/trainer.hpp"
 
 namespace {
 
@@ -44,7 +43,7 @@ void epoch(benchmark::State& state) {
     bins.insert(bins.end(), {i, j});
     counts.push_back(40.0 + 200.0 * std::pow(std::sin(i * 0.01) * std::cos(j * 0.01), 2));
   }
-  const auto layer = std::make_shared<estimators::PerceptronLayer>(
+  const auto layer = std::make_shared<estimators::ParallelPerceptron>(
       code_of(static_cast<int>(state.range(2))), kUnits, 1);
   const auto form = static_cast<estimators::TrainingForm>(state.range(0));
   estimators::PDeltaTrainer trainer(layer, bins, estimators::PDeltaRule(kUnits, counts, 1), form,
@@ -59,7 +58,7 @@ void epoch(benchmark::State& state) {
 
 /// Argument: units of a pattern. One iteration answers 101 x 1001 lattice points.
 void lattice(benchmark::State& state) {
-  const estimators::PerceptronLayer layer(code_of(static_cast<int>(state.range(0))), kUnits, 1);
+  const estimators::ParallelPerceptron layer(code_of(static_cast<int>(state.range(0))), kUnits, 1);
   std::vector<std::int32_t> bins;
   for (std::int32_t i = 0; i < kBins; i += 10) {
     for (std::int32_t j = 0; j < kBins; ++j) bins.insert(bins.end(), {i, j});

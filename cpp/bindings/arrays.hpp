@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "sdnn/coding/pattern_table.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::bindings {
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "bind_config.hpp"
 #include "bindings.hpp"
 #include "sdnn/core/elementary.hpp"
 #include "sdnn/environments/acrobot.hpp"
@@ -33,20 +34,21 @@ py::array_t<double> array(std::span<const double> values) {
 }
 
 void bind_elementary(py::module_& module) {
-  module.def("sin_cos",
-             [](const ArrayArgument<double>& x) {
-               const auto in = bindings::flat(x);
-               const std::vector<py::ssize_t> shape(x.shape(), x.shape() + x.ndim());
-               py::array_t<double> sin(shape), cos(shape);
-               double *sin_out = sin.mutable_data(), *cos_out = cos.mutable_data();
-               for (std::size_t i = 0; i < in.size(); ++i) {
-                 const core::SinCos at = core::sin_cos(in[i]);
-                 sin_out[i] = at.sin;
-                 cos_out[i] = at.cos;
-               }
-               return py::make_tuple(sin, cos);
-             },
-             py::arg("x"), "(sin x, cos x), item by item");
+  module.def(
+      "sin_cos",
+      [](const ArrayArgument<double>& x) {
+        const auto in = bindings::flat(x);
+        const std::vector<py::ssize_t> shape(x.shape(), x.shape() + x.ndim());
+        py::array_t<double> sin(shape), cos(shape);
+        double *sin_out = sin.mutable_data(), *cos_out = cos.mutable_data();
+        for (std::size_t i = 0; i < in.size(); ++i) {
+          const core::SinCos at = core::sin_cos(in[i]);
+          sin_out[i] = at.sin;
+          cos_out[i] = at.cos;
+        }
+        return py::make_tuple(sin, cos);
+      },
+      py::arg("x"), "(sin x, cos x), item by item");
   module.def("exp", py::vectorize([](double x) { return core::exp(x); }), py::arg("x"));
   module.def("log", py::vectorize([](double x) { return core::log(x); }), py::arg("x"));
   module.def("normal_quantile", py::vectorize([](double p) { return core::normal_quantile(p); }),
@@ -54,103 +56,43 @@ void bind_elementary(py::module_& module) {
 }
 
 void bind_goal_schedule(py::module_& module) {
-  const GoalScheduleConfig defaults;
   py::enum_<GoalScheduleKind>(module, "GoalScheduleKind", "The formula of lambda(k)")
       .value("inverse_linear", GoalScheduleKind::inverse_linear)
       .value("inverse_sqrt", GoalScheduleKind::inverse_sqrt)
       .value("constant", GoalScheduleKind::constant);
-  py::class_<GoalScheduleConfig>(module, "GoalScheduleConfig", "How lambda(k) falls")
-      .def(py::init([](GoalScheduleKind kind, double scale, int last_episode, double floor,
-                       double constant_value) {
-             return GoalScheduleConfig{kind, scale, last_episode, floor, constant_value};
-           }),
-           py::kw_only(), py::arg("kind") = defaults.kind, py::arg("scale") = defaults.scale,
-           py::arg("last_episode") = defaults.last_episode, py::arg("floor") = defaults.floor,
-           py::arg("constant_value") = defaults.constant_value)
-      .def_readonly("kind", &GoalScheduleConfig::kind)
-      .def_readonly("scale", &GoalScheduleConfig::scale)
-      .def_readonly("last_episode", &GoalScheduleConfig::last_episode)
-      .def_readonly("floor", &GoalScheduleConfig::floor)
-      .def_readonly("constant_value", &GoalScheduleConfig::constant_value);
+  bindings::bind_config<GoalScheduleConfig>(module, "GoalScheduleConfig", "How lambda(k) falls");
   py::class_<GoalSchedule>(module, "GoalSchedule", "lambda as a function of the learning episode")
       .def(py::init<const GoalScheduleConfig&>(), py::arg("config"))
       .def("__call__", &GoalSchedule::operator(), py::arg("episode"));
 }
 
 void bind_acrobot(py::module_& module) {
-  const AcrobotConfig defaults;
   py::enum_<GoalTest>(module, "GoalTest", "When the goal is looked for")
       .value("every_step", GoalTest::every_step)
       .value("decision_instant", GoalTest::decision_instant);
-  py::class_<AcrobotConfig> config(module, "AcrobotConfig", "The numbers of the acrobot's task");
-  config.def(
-      py::init([](double link_mass_1, double link_mass_2, double link_length_1,
-                  double link_length_2, double center_of_mass_1, double center_of_mass_2,
-                  double inertia_1, double inertia_2, double gravity, double max_torque,
-                  double decision_interval, double integration_step, int max_decisions,
-                  double goal_height, double goal_velocity_1, double goal_velocity_2,
-                  GoalTest goal_test, double goal_reward, double penalty, double idle_angle) {
-        return AcrobotConfig{
-            link_mass_1,       link_mass_2,      link_length_1, link_length_2, center_of_mass_1,
-            center_of_mass_2,  inertia_1,        inertia_2,     gravity,       max_torque,
-            decision_interval, integration_step, max_decisions, goal_height,   goal_velocity_1,
-            goal_velocity_2,   goal_test,        goal_reward,   penalty,       idle_angle};
-      }),
-      py::kw_only(), py::arg("link_mass_1") = defaults.link_mass_1,
-      py::arg("link_mass_2") = defaults.link_mass_2,
-      py::arg("link_length_1") = defaults.link_length_1,
-      py::arg("link_length_2") = defaults.link_length_2,
-      py::arg("center_of_mass_1") = defaults.center_of_mass_1,
-      py::arg("center_of_mass_2") = defaults.center_of_mass_2,
-      py::arg("inertia_1") = defaults.inertia_1, py::arg("inertia_2") = defaults.inertia_2,
-      py::arg("gravity") = defaults.gravity, py::arg("max_torque") = defaults.max_torque,
-      py::arg("decision_interval") = defaults.decision_interval,
-      py::arg("integration_step") = defaults.integration_step,
-      py::arg("max_decisions") = defaults.max_decisions,
-      py::arg("goal_height") = defaults.goal_height,
-      py::arg("goal_velocity_1") = defaults.goal_velocity_1,
-      py::arg("goal_velocity_2") = defaults.goal_velocity_2,
-      py::arg("goal_test") = defaults.goal_test, py::arg("goal_reward") = defaults.goal_reward,
-      py::arg("penalty") = defaults.penalty, py::arg("idle_angle") = defaults.idle_angle);
-  config.def_readonly("link_mass_1", &AcrobotConfig::link_mass_1)
-      .def_readonly("link_mass_2", &AcrobotConfig::link_mass_2)
-      .def_readonly("link_length_1", &AcrobotConfig::link_length_1)
-      .def_readonly("link_length_2", &AcrobotConfig::link_length_2)
-      .def_readonly("center_of_mass_1", &AcrobotConfig::center_of_mass_1)
-      .def_readonly("center_of_mass_2", &AcrobotConfig::center_of_mass_2)
-      .def_readonly("inertia_1", &AcrobotConfig::inertia_1)
-      .def_readonly("inertia_2", &AcrobotConfig::inertia_2)
-      .def_readonly("gravity", &AcrobotConfig::gravity)
-      .def_readonly("max_torque", &AcrobotConfig::max_torque)
-      .def_readonly("decision_interval", &AcrobotConfig::decision_interval)
-      .def_readonly("integration_step", &AcrobotConfig::integration_step)
-      .def_readonly("max_decisions", &AcrobotConfig::max_decisions)
-      .def_readonly("goal_height", &AcrobotConfig::goal_height)
-      .def_readonly("goal_velocity_1", &AcrobotConfig::goal_velocity_1)
-      .def_readonly("goal_velocity_2", &AcrobotConfig::goal_velocity_2)
-      .def_readonly("goal_test", &AcrobotConfig::goal_test)
-      .def_readonly("goal_reward", &AcrobotConfig::goal_reward)
-      .def_readonly("penalty", &AcrobotConfig::penalty)
-      .def_readonly("idle_angle", &AcrobotConfig::idle_angle);
+  bindings::bind_config<AcrobotConfig>(module, "AcrobotConfig", "The numbers of the acrobot's task");
 
   py::class_<Acrobot>(module, "Acrobot", "Dynamics, reward and episode end of the acrobot")
       .def(py::init<const AcrobotConfig&>(), py::arg("config"))
       .def("reset", &Acrobot::reset)
-      .def("set_state",
-           [](Acrobot& acrobot, const ArrayArgument<double>& state) {
-             acrobot.set_state(state_vector(state));
-           },
-           py::arg("state"))
-      .def("step",
-           [](Acrobot& acrobot, double torque, double lambda) {
-             const StepResult result = acrobot.step(torque, lambda);
-             return std::make_tuple(result.reward, result.terminated, result.truncated);
-           },
-           py::arg("torque"), py::arg("lambda_"), "(reward, terminated, truncated)")
-      .def("state", [](const Acrobot& acrobot) {
-        const Eigen::Vector4d state = acrobot.state();
-        return array({state.data(), 4});
-      })
+      .def(
+          "set_state",
+          [](Acrobot& acrobot, const ArrayArgument<double>& state) {
+            acrobot.set_state(state_vector(state));
+          },
+          py::arg("state"))
+      .def(
+          "step",
+          [](Acrobot& acrobot, double torque, double lambda) {
+            const StepResult result = acrobot.step(torque, lambda);
+            return std::make_tuple(result.reward, result.terminated, result.truncated);
+          },
+          py::arg("torque"), py::arg("lambda_"), "(reward, terminated, truncated)")
+      .def("state",
+           [](const Acrobot& acrobot) {
+             const Eigen::Vector4d state = acrobot.state();
+             return array({state.data(), 4});
+           })
       .def("tip_height", &Acrobot::tip_height)
       .def("energy", &Acrobot::energy)
       .def("decisions", &Acrobot::decisions);
@@ -178,51 +120,55 @@ void bind_acrobot_batch(py::module_& module) {
   py::class_<AcrobotBatch>(module, "AcrobotBatch", "Many acrobots in step, in vector lanes")
       .def(py::init<const AcrobotConfig&, std::size_t>(), py::arg("config"), py::arg("n_acrobots"))
       .def("__len__", &AcrobotBatch::size)
-      .def("reset",
-           [checked](AcrobotBatch& batch, const Mask& mask) {
-             const auto chosen = checked(batch, mask, "mask");
-             for (std::size_t i = 0; i < chosen.size(); ++i) {
-               if (chosen[i]) batch.reset(i);
-             }
-           },
-           py::arg("mask"))
-      .def("set_state",
-           [](AcrobotBatch& batch, std::size_t index, const ArrayArgument<double>& state) {
-             batch.set_state(index, state_vector(state));
-           },
-           py::arg("index"), py::arg("state"))
-      .def("step",
-           [checked](AcrobotBatch& batch, const ArrayArgument<double>& torques,
-                     const ArrayArgument<double>& lambdas, const Mask& moving) {
-             const auto chosen = checked(batch, moving, "moving");
-             const std::vector<std::uint8_t> mask(chosen.begin(), chosen.end());
-             std::vector<StepResult> results(batch.size());
-             {
-               const auto torque = bindings::vector(torques, "torques");
-               const auto lambda = bindings::vector(lambdas, "lambdas");
-               const py::gil_scoped_release unlocked;
-               batch.step(torque, lambda, mask, results);
-             }
-             const auto size = static_cast<py::ssize_t>(batch.size());
-             py::array_t<double> rewards(size);
-             py::array_t<bool> terminated(size), truncated(size);
-             for (py::ssize_t i = 0; i < size; ++i) {
-               const StepResult& result = results[static_cast<std::size_t>(i)];
-               rewards.mutable_at(i) = result.reward;
-               terminated.mutable_at(i) = result.terminated;
-               truncated.mutable_at(i) = result.truncated;
-             }
-             return std::make_tuple(rewards, terminated, truncated);
-           },
-           py::arg("torques"), py::arg("lambdas"), py::arg("moving"),
-           "(rewards, terminated, truncated)")
+      .def(
+          "reset",
+          [checked](AcrobotBatch& batch, const Mask& mask) {
+            const auto chosen = checked(batch, mask, "mask");
+            for (std::size_t i = 0; i < chosen.size(); ++i) {
+              if (chosen[i]) batch.reset(i);
+            }
+          },
+          py::arg("mask"))
+      .def(
+          "set_state",
+          [](AcrobotBatch& batch, std::size_t index, const ArrayArgument<double>& state) {
+            batch.set_state(index, state_vector(state));
+          },
+          py::arg("index"), py::arg("state"))
+      .def(
+          "step",
+          [checked](AcrobotBatch& batch, const ArrayArgument<double>& torques,
+                    const ArrayArgument<double>& lambdas, const Mask& moving) {
+            const auto chosen = checked(batch, moving, "moving");
+            const std::vector<std::uint8_t> mask(chosen.begin(), chosen.end());
+            std::vector<StepResult> results(batch.size());
+            {
+              const auto torque = bindings::vector(torques, "torques");
+              const auto lambda = bindings::vector(lambdas, "lambdas");
+              const py::gil_scoped_release unlocked;
+              batch.step(torque, lambda, mask, results);
+            }
+            const auto size = static_cast<py::ssize_t>(batch.size());
+            py::array_t<double> rewards(size);
+            py::array_t<bool> terminated(size), truncated(size);
+            for (py::ssize_t i = 0; i < size; ++i) {
+              const StepResult& result = results[static_cast<std::size_t>(i)];
+              rewards.mutable_at(i) = result.reward;
+              terminated.mutable_at(i) = result.terminated;
+              truncated.mutable_at(i) = result.truncated;
+            }
+            return std::make_tuple(rewards, terminated, truncated);
+          },
+          py::arg("torques"), py::arg("lambdas"), py::arg("moving"),
+          "(rewards, terminated, truncated)")
       .def("states",
            [rows](const AcrobotBatch& batch) {
              return rows(batch, 4, [](const Eigen::Vector4d& state) { return state; });
            })
-      .def("observations",
-           [rows](const AcrobotBatch& batch) { return rows(batch, 4, basic_observation); },
-           "s1..s4 of every state")
+      .def(
+          "observations",
+          [rows](const AcrobotBatch& batch) { return rows(batch, 4, basic_observation); },
+          "s1..s4 of every state")
       .def("tip_heights",
            [](const AcrobotBatch& batch) {
              std::vector<double> heights(batch.size());
@@ -233,46 +179,43 @@ void bind_acrobot_batch(py::module_& module) {
 }
 
 void bind_sensors(py::module_& module) {
-  const SensorConfig defaults;
   py::enum_<SensorEdge>(module, "SensorEdge", "What noise does at the ends of a sensor's range")
       .value("wrap", SensorEdge::wrap)
       .value("saturate", SensorEdge::saturate);
-  module.def("basic_observation",
-             [](const ArrayArgument<double>& state) {
-               return array(basic_observation(state_vector(state)));
-             },
-             py::arg("state"), "s1..s4 of a state");
+  module.def(
+      "basic_observation",
+      [](const ArrayArgument<double>& state) {
+        return array(basic_observation(state_vector(state)));
+      },
+      py::arg("state"), "s1..s4 of a state");
   module.def("energy_sensor", &energy_sensor, py::arg("s3"), py::arg("s4"));
   module.def("height_sensor", &height_sensor, py::arg("s1"), py::arg("s2"));
   py::class_<SensorNoise>(module, "SensorNoise", "Gaussian noise on every channel")
       .def(py::init<double, std::vector<SensorEdge>, std::uint64_t, core::Stream>(),
            py::arg("sigma"), py::arg("edges"), py::arg("seed"), py::arg("stream"))
-      .def("apply",
-           [](SensorNoise& noise, const ArrayArgument<double>& values) {
-             const auto clean = bindings::vector(values, "values");
-             core::require(clean.size() == static_cast<std::size_t>(noise.n_channels()), "values",
-                           "of " + std::to_string(noise.n_channels()) + " numbers", clean.size());
-             std::vector<double> noisy(clean.begin(), clean.end());
-             noise.apply(noisy);
-             return array(noisy);
-           },
-           py::arg("values"), "A noisy copy");
-  py::class_<SensorConfig>(module, "SensorConfig", "Which sensors there are and how noisy")
-      .def(py::init([](int n_sensors, double noise) { return SensorConfig{n_sensors, noise}; }),
-           py::kw_only(), py::arg("n_sensors") = defaults.n_sensors,
-           py::arg("noise") = defaults.noise)
-      .def_readonly("n_sensors", &SensorConfig::n_sensors)
-      .def_readonly("noise", &SensorConfig::noise);
+      .def(
+          "apply",
+          [](SensorNoise& noise, const ArrayArgument<double>& values) {
+            const auto clean = bindings::vector(values, "values");
+            core::require(clean.size() == static_cast<std::size_t>(noise.n_channels()), "values",
+                          "of " + std::to_string(noise.n_channels()) + " numbers", clean.size());
+            std::vector<double> noisy(clean.begin(), clean.end());
+            noise.apply(noisy);
+            return array(noisy);
+          },
+          py::arg("values"), "A noisy copy");
+  bindings::bind_config<SensorConfig>(module, "SensorConfig", "Which sensors there are and how noisy");
   py::class_<AcrobotSensors>(module, "AcrobotSensors", "s1..s4, s5 and s6 with their noise")
       .def(py::init<const SensorConfig&, std::uint64_t, core::Stream>(), py::arg("config"),
            py::arg("seed"), py::arg("stream"))
-      .def("observe",
-           [](AcrobotSensors& sensors, const ArrayArgument<double>& state) {
-             std::vector<double> out(static_cast<std::size_t>(sensors.n_sensors()));
-             sensors.observe(state_vector(state), out);
-             return array(out);
-           },
-           py::arg("state"));
+      .def(
+          "observe",
+          [](AcrobotSensors& sensors, const ArrayArgument<double>& state) {
+            std::vector<double> out(static_cast<std::size_t>(sensors.n_sensors()));
+            sensors.observe(state_vector(state), out);
+            return array(out);
+          },
+          py::arg("state"));
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include "bindings.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/estimators/libsdnn.hpp"
-#include "sdnn/estimators/perceptron_layer.hpp"
+#include "sdnn/estimators/parallel_perceptron.hpp"
 #include "sdnn/estimators/trainer.hpp"
 
 namespace py = pybind11;
@@ -82,28 +82,27 @@ Matrix gram(const coding::SelectiveDesensitization& code, const Bins& bins,
   const coding::CodedSamples other(code, others);
   for (std::size_t t = 0; t < one.size(); ++t) {
     for (std::size_t s = 0; s < other.size(); ++s) {
-      items[t * other.size() + s] =
-          estimators::inner_product(one[t], other[s], one.n_words());
+      items[t * other.size() + s] = estimators::inner_product(one[t], other[s], one.n_words());
     }
   }
   return out;
 }
 
-using estimators::PerceptronLayer;
+using estimators::ParallelPerceptron;
 
-std::shared_ptr<PerceptronLayer> make_layer(
+std::shared_ptr<ParallelPerceptron> make_layer(
     const std::shared_ptr<coding::SelectiveDesensitization>& code, std::size_t n_units,
     std::uint64_t seed, const std::optional<ArrayArgument<std::int32_t>>& weights,
     const std::optional<ArrayArgument<std::int32_t>>& thresholds, int initial_range) {
   core::require(weights.has_value() == thresholds.has_value(), "weights and thresholds",
                 "given together or not at all", weights.has_value() ? "weights" : "thresholds");
-  if (!weights) return std::make_shared<PerceptronLayer>(code, n_units, seed, initial_range);
-  return std::make_shared<PerceptronLayer>(code, n_units,
-                                           matrix(*weights, "weights", code->n_columns()),
-                                           bindings::vector(*thresholds, "thresholds"));
+  if (!weights) return std::make_shared<ParallelPerceptron>(code, n_units, seed, initial_range);
+  return std::make_shared<ParallelPerceptron>(code, n_units,
+                                              matrix(*weights, "weights", code->n_columns()),
+                                              bindings::vector(*thresholds, "thresholds"));
 }
 
-Matrix weights_of(const PerceptronLayer& layer) {
+Matrix weights_of(const ParallelPerceptron& layer) {
   const std::size_t n_columns = layer.code().n_columns();
   Matrix out({layer.n_units(), n_columns});
   std::int32_t* const items = out.mutable_data();
@@ -113,12 +112,12 @@ Matrix weights_of(const PerceptronLayer& layer) {
   return out;
 }
 
-py::array_t<std::int32_t> thresholds_of(const PerceptronLayer& layer) {
+py::array_t<std::int32_t> thresholds_of(const ParallelPerceptron& layer) {
   return py::array_t<std::int32_t>(static_cast<py::ssize_t>(layer.n_units()),
                                    layer.thresholds().data());
 }
 
-Matrix potentials_of(const PerceptronLayer& layer, const Bins& bins, int n_threads) {
+Matrix potentials_of(const ParallelPerceptron& layer, const Bins& bins, int n_threads) {
   const auto values = matrix(bins, "bins", layer.code().n_inputs());
   Matrix out({static_cast<std::size_t>(bins.shape(0)), layer.n_units()});
   const std::span items(out.mutable_data(), static_cast<std::size_t>(out.size()));
@@ -127,7 +126,7 @@ Matrix potentials_of(const PerceptronLayer& layer, const Bins& bins, int n_threa
   return out;
 }
 
-Matrix counts_of(const PerceptronLayer& layer, const Bins& bins, std::size_t n_groups,
+Matrix counts_of(const ParallelPerceptron& layer, const Bins& bins, std::size_t n_groups,
                  int n_threads) {
   const auto values = matrix(bins, "bins", layer.code().n_inputs());
   Matrix out({static_cast<std::size_t>(bins.shape(0)), n_groups});
@@ -165,9 +164,8 @@ py::tuple libsdnn_weights(std::size_t n_units, std::size_t n_columns, int low, i
   const auto drawn = estimators::libsdnn_weights(n_units, n_columns, low, high, random);
   Matrix weights({n_units, n_columns});
   std::copy(drawn.weights.begin(), drawn.weights.end(), weights.mutable_data());
-  return py::make_tuple(weights,
-                        py::array_t<std::int32_t>(static_cast<py::ssize_t>(n_units),
-                                                  drawn.thresholds.data()));
+  return py::make_tuple(weights, py::array_t<std::int32_t>(static_cast<py::ssize_t>(n_units),
+                                                           drawn.thresholds.data()));
 }
 
 template <class Trainer>
@@ -176,16 +174,17 @@ void bind_trainer_methods(py::class_<Trainer, std::shared_ptr<Trainer>>& trainer
       .def_property_readonly(
           "form", [](const Trainer& self) { return std::string(estimators::name_of(self.form())); })
       .def_property_readonly("memory", &Trainer::memory, "Bytes beside the layer")
-      .def("epoch",
-           [](Trainer& self, const ArrayArgument<std::int32_t>& order) {
-             const auto items = bindings::vector(order, "order");
-             const py::gil_scoped_release release;
-             const auto count = self.present(items);
-             return std::pair(count.n_samples, count.n_units);
-           },
-           py::arg("order"),
-           "Presents samples in that order; returns how many corrected something, and how many "
-           "units were corrected")
+      .def(
+          "epoch",
+          [](Trainer& self, const ArrayArgument<std::int32_t>& order) {
+            const auto items = bindings::vector(order, "order");
+            const py::gil_scoped_release release;
+            const auto count = self.present(items);
+            return std::pair(count.n_samples, count.n_units);
+          },
+          py::arg("order"),
+          "Presents samples in that order; returns how many corrected something, and how many "
+          "units were corrected")
       .def("synchronize", &Trainer::synchronize, py::call_guard<py::gil_scoped_release>(),
            "Brings the layer's weights to those of plain training in the same order");
 }
@@ -205,43 +204,42 @@ void bind_estimators(py::module_& module) {
       .def("gram", &gram, py::arg("bins"), py::arg("other_bins") = py::none(),
            "Inner products of codes");
 
-  py::class_<PerceptronLayer, std::shared_ptr<PerceptronLayer>>(
-      module, "PerceptronLayer", "Units over a code, with integer weights")
+  py::class_<ParallelPerceptron, std::shared_ptr<ParallelPerceptron>>(
+      module, "ParallelPerceptron", "Units over a code, with integer weights")
       .def(py::init(&make_layer), py::arg("code"), py::arg("n_units"), py::arg("seed") = 0,
            py::arg("weights") = py::none(), py::arg("thresholds") = py::none(),
            py::arg("initial_range") = 5)
-      .def_property_readonly("n_units", &PerceptronLayer::n_units)
+      .def_property_readonly("n_units", &ParallelPerceptron::n_units)
       .def_property_readonly("weights", &weights_of)
       .def_property_readonly("thresholds", &thresholds_of)
       .def("potentials", &potentials_of, py::arg("bins"), py::arg("n_threads") = 1)
-      .def("counts", &counts_of, py::arg("bins"), py::arg("n_groups") = 1,
-           py::arg("n_threads") = 1, "How many units of each group fire");
+      .def("counts", &counts_of, py::arg("bins"), py::arg("n_groups") = 1, py::arg("n_threads") = 1,
+           "How many units of each group fire");
 
   constexpr std::size_t kMemoryLimit = std::size_t{1} << 30;
   using estimators::PDeltaTrainer;
   py::class_<PDeltaTrainer, std::shared_ptr<PDeltaTrainer>> p_delta(
       module, "PDeltaTrainer", "Trains groups of units to fire in given numbers");
-  p_delta.def(
-      py::init([](std::shared_ptr<PerceptronLayer> layer, const Bins& bins,
-                  const ArrayArgument<double>& targets, const std::string& form,
-                  std::size_t memory_limit, int n_threads) {
-        const auto values = matrix(bins, "bins", layer->code().n_inputs());
-        estimators::PDeltaRule rule(layer->n_units(), matrix(targets, "targets"),
-                                    static_cast<std::size_t>(targets.shape(1)));
-        const auto chosen = estimators::training_form_named(form);
-        const py::gil_scoped_release release;
-        return std::make_shared<PDeltaTrainer>(std::move(layer), values, std::move(rule), chosen,
-                                               memory_limit, n_threads);
-      }),
-      py::arg("layer"), py::arg("bins"), py::arg("targets"), py::arg("form") = "auto",
-      py::arg("memory_limit") = kMemoryLimit, py::arg("n_threads") = 1);
+  p_delta.def(py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
+                          const ArrayArgument<double>& targets, const std::string& form,
+                          std::size_t memory_limit, int n_threads) {
+                const auto values = matrix(bins, "bins", layer->code().n_inputs());
+                estimators::PDeltaRule rule(layer->n_units(), matrix(targets, "targets"),
+                                            static_cast<std::size_t>(targets.shape(1)));
+                const auto chosen = estimators::training_form_named(form);
+                const py::gil_scoped_release release;
+                return std::make_shared<PDeltaTrainer>(std::move(layer), values, std::move(rule),
+                                                       chosen, memory_limit, n_threads);
+              }),
+              py::arg("layer"), py::arg("bins"), py::arg("targets"), py::arg("form") = "auto",
+              py::arg("memory_limit") = kMemoryLimit, py::arg("n_threads") = 1);
   bind_trainer_methods(p_delta);
 
-  using estimators::ErrorCorrectionTrainer;
-  py::class_<ErrorCorrectionTrainer, std::shared_ptr<ErrorCorrectionTrainer>> error_correction(
-      module, "ErrorCorrectionTrainer", "Trains units to tell classes apart");
+  using estimators::PerceptronTrainer;
+  py::class_<PerceptronTrainer, std::shared_ptr<PerceptronTrainer>> error_correction(
+      module, "PerceptronTrainer", "Trains units to tell classes apart");
   error_correction.def(
-      py::init([](std::shared_ptr<PerceptronLayer> layer, const Bins& bins,
+      py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
                   const ArrayArgument<std::int32_t>& labels, const std::string& scheme,
                   const std::string& form, std::size_t memory_limit, int n_threads) {
         const auto values = matrix(bins, "bins", layer->code().n_inputs());
@@ -252,25 +250,25 @@ void bind_estimators(py::module_& module) {
             rest ? estimators::ClassScheme::one_vs_rest : estimators::ClassScheme::one_vs_one;
         std::size_t n_classes = 2;
         while (estimators::n_units_for(class_scheme, n_classes) < layer->n_units()) ++n_classes;
-        estimators::ErrorCorrectionRule rule(layer->n_units(), bindings::vector(labels, "labels"),
-                                             n_classes, class_scheme);
+        estimators::PerceptronRule rule(layer->n_units(), bindings::vector(labels, "labels"),
+                                        n_classes, class_scheme);
         const auto chosen = estimators::training_form_named(form);
         const py::gil_scoped_release release;
-        return std::make_shared<ErrorCorrectionTrainer>(std::move(layer), values, std::move(rule),
-                                                        chosen, memory_limit, n_threads);
+        return std::make_shared<PerceptronTrainer>(std::move(layer), values, std::move(rule),
+                                                   chosen, memory_limit, n_threads);
       }),
       py::arg("layer"), py::arg("bins"), py::arg("labels"), py::arg("scheme"),
       py::arg("form") = "auto", py::arg("memory_limit") = kMemoryLimit, py::arg("n_threads") = 1);
   bind_trainer_methods(error_correction);
 
-  module.def("training_memory",
-             [](const Code& code, std::size_t n_units, std::size_t n_samples,
-                const std::string& form) {
-               return estimators::form_memory(estimators::training_form_named(form), n_units, code,
-                                              n_samples);
-             },
-             py::arg("code"), py::arg("n_units"), py::arg("n_samples"), py::arg("form"),
-             "Bytes that a form of training needs beside the layer");
+  module.def(
+      "training_memory",
+      [](const Code& code, std::size_t n_units, std::size_t n_samples, const std::string& form) {
+        return estimators::form_memory(estimators::training_form_named(form), n_units, code,
+                                       n_samples);
+      },
+      py::arg("code"), py::arg("n_units"), py::arg("n_samples"), py::arg("form"),
+      "Bytes that a form of training needs beside the layer");
   module.def("libsdnn_tables", &libsdnn_tables, py::arg("n_units"), py::arg("inputs"),
              py::arg("pairs"), py::arg("seed"), py::arg("library") = "libstdc++",
              "LIBSDNN's code tables, (modified, modifiers); inputs are (n_bins, n_flipped)");

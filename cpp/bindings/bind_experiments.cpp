@@ -1,6 +1,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/typing.h>
 
+#include "bind_config.hpp"
 #include "bindings.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
@@ -11,15 +12,15 @@
 
 namespace py = pybind11;
 using namespace sdnn;
-using approximators::DynamicSdnnC;
-using experiments::ProtocolConfig;
 using agents::FuzzyQLearning;
 using agents::QLearning;
+using approximators::DynamicSDNNC;
 using approximators::FuzzyRules;
-using approximators::RbfNetwork;
+using approximators::RBFNetwork;
 using environments::AcrobotConfig;
 using environments::GoalScheduleConfig;
 using environments::SensorConfig;
+using experiments::ProtocolConfig;
 
 namespace {
 
@@ -43,9 +44,9 @@ py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
   return rows;
 }
 
-using SdnnTrial = experiments::AcrobotTrial<QLearning<DynamicSdnnC>>;
+using SDNNTrial = experiments::AcrobotTrial<QLearning<DynamicSDNNC>>;
 
-py::typing::Dict<py::str, py::int_> memory_counts(const SdnnTrial& trial) {
+py::typing::Dict<py::str, py::int_> memory_counts(const SDNNTrial& trial) {
   return trial.agent().action_value().visit([](const auto& network) {
     const auto& counts = network.memory().counts();
     py::typing::Dict<py::str, py::int_> out;
@@ -62,32 +63,25 @@ void def_trial(py::class_<Trial> trial) {
   trial.def_property_readonly("episode", &Trial::episode)
       .def_property_readonly("finished", &Trial::finished)
       .def_property_readonly("n_decisions", &Trial::n_decisions)
-      .def("advance", [](Trial& self, int n_episodes) { self.advance(n_episodes); },
-           py::arg("n_episodes"), py::call_guard<py::gil_scoped_release>(),
-           "Runs up to n more learning episodes")
+      .def(
+          "advance", [](Trial& self, int n_episodes) { self.advance(n_episodes); },
+          py::arg("n_episodes"), py::call_guard<py::gil_scoped_release>(),
+          "Runs up to n more learning episodes")
       .def("test_rows", &test_rows<Trial>, "Columns of the test episodes so far");
 }
 
 }  // namespace
 
 void bind_experiments(py::module_& module) {
-  const ProtocolConfig defaults;
-  py::class_<ProtocolConfig>(module, "ProtocolConfig", "How long a trial is")
-      .def(py::init([](int n_learning_episodes, int test_interval) {
-             return ProtocolConfig{n_learning_episodes, test_interval};
-           }),
-           py::kw_only(), py::arg("n_learning_episodes") = defaults.n_learning_episodes,
-           py::arg("test_interval") = defaults.test_interval)
-      .def_readonly("n_learning_episodes", &ProtocolConfig::n_learning_episodes)
-      .def_readonly("test_interval", &ProtocolConfig::test_interval);
+  bindings::bind_config<ProtocolConfig>(module, "ProtocolConfig", "How long a trial is");
 
   def_trial(
-      py::class_<SdnnTrial>(module, "AcrobotTrial", "SDNN-C learns the acrobot swing-up")
-          .def(py::init([](const approximators::SdnnCConfig& approximator,
+      py::class_<SDNNTrial>(module, "AcrobotTrial", "SDNN-C learns the acrobot swing-up")
+          .def(py::init([](const approximators::SDNNCConfig& approximator,
                            const agents::QLearningConfig& learning, const AcrobotConfig& acrobot,
                            const GoalScheduleConfig& goal, const SensorConfig& sensors,
                            const ProtocolConfig& protocol, std::uint64_t seed) {
-                 return SdnnTrial({DynamicSdnnC(approximator, seed), learning, seed}, acrobot, goal,
+                 return SDNNTrial({DynamicSDNNC(approximator, seed), learning, seed}, acrobot, goal,
                                   sensors, protocol, seed);
                }),
                py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("acrobot"),
@@ -96,29 +90,29 @@ void bind_experiments(py::module_& module) {
                "How potentials came about so far: full passes, from neighbours, columns added"));
 
   using FuzzyTrial = experiments::AcrobotTrial<FuzzyQLearning>;
-  def_trial(
-      py::class_<FuzzyTrial>(module, "FuzzyAcrobotTrial",
-                             "Fuzzy Q-learning learns the acrobot swing-up")
-          .def(py::init([](const approximators::FuzzyRulesConfig& approximator,
-                           const agents::FuzzyQLearningConfig& learning,
-                           const AcrobotConfig& acrobot, const GoalScheduleConfig& goal,
-                           const SensorConfig& sensors, const ProtocolConfig& protocol,
-                           std::uint64_t seed) {
-                 return FuzzyTrial({FuzzyRules(approximator), learning, seed}, acrobot, goal, sensors,
-                                   protocol, seed);
-               }),
-               py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("acrobot"),
-               py::arg("goal"), py::arg("sensors"), py::arg("protocol"), py::arg("seed")));
+  def_trial(py::class_<FuzzyTrial>(module, "FuzzyAcrobotTrial",
+                                   "Fuzzy Q-learning learns the acrobot swing-up")
+                .def(py::init([](const approximators::FuzzyRulesConfig& approximator,
+                                 const agents::FuzzyQLearningConfig& learning,
+                                 const AcrobotConfig& acrobot, const GoalScheduleConfig& goal,
+                                 const SensorConfig& sensors, const ProtocolConfig& protocol,
+                                 std::uint64_t seed) {
+                       return FuzzyTrial({FuzzyRules(approximator), learning, seed}, acrobot, goal,
+                                         sensors, protocol, seed);
+                     }),
+                     py::kw_only(), py::arg("approximator"), py::arg("learning"),
+                     py::arg("acrobot"), py::arg("goal"), py::arg("sensors"), py::arg("protocol"),
+                     py::arg("seed")));
 
-  using RbfTrial = experiments::AcrobotTrial<QLearning<RbfNetwork>>;
+  using RBFTrial = experiments::AcrobotTrial<QLearning<RBFNetwork>>;
   def_trial(
-      py::class_<RbfTrial>(module, "RbfAcrobotTrial",
+      py::class_<RBFTrial>(module, "RBFAcrobotTrial",
                            "Q-learning with an RBF network learns the acrobot swing-up")
-          .def(py::init([](const approximators::RbfNetworkConfig& approximator,
+          .def(py::init([](const approximators::RBFNetworkConfig& approximator,
                            const agents::QLearningConfig& learning, const AcrobotConfig& acrobot,
                            const GoalScheduleConfig& goal, const SensorConfig& sensors,
                            const ProtocolConfig& protocol, std::uint64_t seed) {
-                 return RbfTrial({RbfNetwork(approximator), learning, seed}, acrobot, goal, sensors,
+                 return RBFTrial({RBFNetwork(approximator), learning, seed}, acrobot, goal, sensors,
                                  protocol, seed);
                }),
                py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("acrobot"),

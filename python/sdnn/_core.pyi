@@ -143,11 +143,16 @@ class InitialWeights:
     @property
     def value(self) -> int:
         ...
-class SdnnCConfig:
+class SDNNCConfig:
     """
     Everything that defines an SDNN-C
     """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: SDNNCConfig) -> bool:
+        ...
     def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_pattern_units: typing.SupportsInt | typing.SupportsIndex = 200, n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex = 9, n_interpolated: typing.SupportsInt | typing.SupportsIndex = 44, balanced_anchors: bool = True, circular: collections.abc.Sequence[bool] = [], n_hidden_units: typing.SupportsInt | typing.SupportsIndex = 900, n_active_units: typing.SupportsInt | typing.SupportsIndex = 300, n_actions: typing.SupportsInt | typing.SupportsIndex = 0, q_low: typing.SupportsFloat | typing.SupportsIndex = -20.0, q_high: typing.SupportsFloat | typing.SupportsIndex = 20.0, u_low: typing.SupportsInt | typing.SupportsIndex | None = None, u_high: typing.SupportsInt | typing.SupportsIndex | None = None, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.1, lattice: typing.SupportsInt | typing.SupportsIndex = 1, initial_threshold: typing.SupportsFloat | typing.SupportsIndex = 200.0, initial_weights: InitialWeights = InitialWeights.ternary, initial_weight_limit: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     @property
     def balanced_anchors(self) -> bool:
@@ -203,11 +208,11 @@ class SdnnCConfig:
     @property
     def u_low(self) -> int | None:
         ...
-class SdnnC:
+class SDNNC:
     """
     A network that gives Q(s, a) for every action at once
     """
-    def __init__(self, config: SdnnCConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, config: SDNNCConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def code_book(self, input: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
         """
@@ -244,7 +249,7 @@ class SdnnC:
         A copy, in lattice steps: (n, D)
         """
     @property
-    def config(self) -> SdnnCConfig:
+    def config(self) -> SDNNCConfig:
         ...
     @property
     def n_actions(self) -> int:
@@ -265,7 +270,12 @@ class FuzzyRulesConfig:
     """
     The sizes of a table of fuzzy rules
     """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: FuzzyRulesConfig) -> bool:
+        ...
     def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_sets: typing.SupportsInt | typing.SupportsIndex = 9, n_actions: typing.SupportsInt | typing.SupportsIndex = 21, max_table_bytes: typing.SupportsInt | typing.SupportsIndex = 1073741824) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     @property
     def max_table_bytes(self) -> int:
@@ -299,11 +309,16 @@ class FuzzyRules:
     @property
     def n_rules(self) -> int:
         ...
-class RbfNetworkConfig:
+class RBFNetworkConfig:
     """
     The sizes of an RBF network
     """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: RBFNetworkConfig) -> bool:
+        ...
     def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_bases: typing.SupportsInt | typing.SupportsIndex = 4, n_actions: typing.SupportsInt | typing.SupportsIndex = 601, width: typing.SupportsFloat | typing.SupportsIndex = 0.5, gradient_rate: typing.SupportsFloat | typing.SupportsIndex = 3.0, max_table_bytes: typing.SupportsInt | typing.SupportsIndex = 1073741824) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     @property
     def gradient_rate(self) -> float:
@@ -323,11 +338,11 @@ class RbfNetworkConfig:
     @property
     def width(self) -> float:
         ...
-class RbfNetwork:
+class RBFNetwork:
     """
     Q(s, a) linear in normalized Gaussian bases
     """
-    def __init__(self, config: RbfNetworkConfig) -> None:
+    def __init__(self, config: RBFNetworkConfig) -> None:
         ...
     def correct(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
@@ -350,7 +365,7 @@ class RbfNetwork:
         A copy, row-major over inputs and action: (n_bases^(d+1),)
         """
     @property
-    def config(self) -> RbfNetworkConfig:
+    def config(self) -> RBFNetworkConfig:
         ...
     @property
     def n_actions(self) -> int:
@@ -415,7 +430,12 @@ class GoalScheduleConfig:
     """
     How lambda(k) falls
     """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: GoalScheduleConfig) -> bool:
+        ...
     def __init__(self, *, kind: GoalScheduleKind = GoalScheduleKind.inverse_linear, scale: typing.SupportsFloat | typing.SupportsIndex = 100.0, last_episode: typing.SupportsInt | typing.SupportsIndex = 10000, floor: typing.SupportsFloat | typing.SupportsIndex = 0.01, constant_value: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     @property
     def constant_value(self) -> float:
@@ -491,7 +511,12 @@ class AcrobotConfig:
     """
     The numbers of the acrobot's task
     """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: AcrobotConfig) -> bool:
+        ...
     def __init__(self, *, link_mass_1: typing.SupportsFloat | typing.SupportsIndex = 1.0, link_mass_2: typing.SupportsFloat | typing.SupportsIndex = 1.0, link_length_1: typing.SupportsFloat | typing.SupportsIndex = 1.0, link_length_2: typing.SupportsFloat | typing.SupportsIndex = 1.0, center_of_mass_1: typing.SupportsFloat | typing.SupportsIndex = 0.5, center_of_mass_2: typing.SupportsFloat | typing.SupportsIndex = 0.5, inertia_1: typing.SupportsFloat | typing.SupportsIndex = 1.0, inertia_2: typing.SupportsFloat | typing.SupportsIndex = 1.0, gravity: typing.SupportsFloat | typing.SupportsIndex = 9.8, max_torque: typing.SupportsFloat | typing.SupportsIndex = 10.0, decision_interval: typing.SupportsFloat | typing.SupportsIndex = 1.0, integration_step: typing.SupportsFloat | typing.SupportsIndex = 0.02, max_decisions: typing.SupportsInt | typing.SupportsIndex = 50, goal_height: typing.SupportsFloat | typing.SupportsIndex = 1.5, goal_velocity_1: typing.SupportsFloat | typing.SupportsIndex = 9.42477796076938, goal_velocity_2: typing.SupportsFloat | typing.SupportsIndex = 15.707963267948966, goal_test: GoalTest = GoalTest.every_step, goal_reward: typing.SupportsFloat | typing.SupportsIndex = 10.0, penalty: typing.SupportsFloat | typing.SupportsIndex = -5.0, idle_angle: typing.SupportsFloat | typing.SupportsIndex = 0.08726646259971647) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     @property
     def center_of_mass_1(self) -> float:
@@ -662,7 +687,12 @@ class SensorConfig:
     """
     Which sensors there are and how noisy
     """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: SensorConfig) -> bool:
+        ...
     def __init__(self, *, n_sensors: typing.SupportsInt | typing.SupportsIndex = 4, noise: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     @property
     def n_sensors(self) -> int:
@@ -704,7 +734,7 @@ class SelectiveDesensitization:
     @property
     def n_units(self) -> int:
         ...
-class PerceptronLayer:
+class ParallelPerceptron:
     """
     Units over a code, with integer weights
     """
@@ -729,7 +759,7 @@ class PDeltaTrainer:
     """
     Trains groups of units to fire in given numbers
     """
-    def __init__(self, layer: PerceptronLayer, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
+    def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
         ...
     def epoch(self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> tuple[int, int]:
         """
@@ -747,11 +777,11 @@ class PDeltaTrainer:
         """
         Bytes beside the layer
         """
-class ErrorCorrectionTrainer:
+class PerceptronTrainer:
     """
     Trains units to tell classes apart
     """
-    def __init__(self, layer: PerceptronLayer, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], scheme: str, form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
+    def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], scheme: str, form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
         ...
     def epoch(self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> tuple[int, int]:
         """
@@ -819,11 +849,31 @@ class TieRule:
     @property
     def value(self) -> int:
         ...
+class EpsilonGreedyConfig:
+    """
+    The policy's parameters
+    """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: EpsilonGreedyConfig) -> bool:
+        ...
+    def __init__(self, *, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def epsilon(self) -> float:
+        ...
+    @property
+    def n_greedy_steps(self) -> int:
+        ...
+    @property
+    def tie_rule(self) -> TieRule:
+        ...
 class EpsilonGreedy:
     """
     The policy, over rows of values
     """
-    def __init__(self, *, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, config: EpsilonGreedyConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def select(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step: typing.SupportsInt | typing.SupportsIndex, explore: bool = True) -> int:
         ...
@@ -831,7 +881,12 @@ class QLearningConfig:
     """
     The parameters of Q-learning
     """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: QLearningConfig) -> bool:
+        ...
     def __init__(self, *, learning_rate: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     @property
     def discount(self) -> float:
@@ -852,7 +907,12 @@ class FuzzyQLearningConfig:
     """
     The parameters of fuzzy Q-learning
     """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: FuzzyQLearningConfig) -> bool:
+        ...
     def __init__(self, *, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, trace_decay: typing.SupportsFloat | typing.SupportsIndex = 0.0, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     @property
     def discount(self) -> float:
@@ -872,11 +932,11 @@ class FuzzyQLearningConfig:
     @property
     def trace_decay(self) -> float:
         ...
-class SdnnQLearning:
+class SDNNQLearning:
     """
     Q-learning with SDNN-C
     """
-    def __init__(self, *, network: SdnnCConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, *, network: SDNNCConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> int:
         ...
@@ -885,13 +945,13 @@ class SdnnQLearning:
     def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
         ...
     @property
-    def network(self) -> SdnnC:
+    def network(self) -> SDNNC:
         ...
-class RbfQLearning:
+class RBFQLearning:
     """
     Q-learning with an RBF network
     """
-    def __init__(self, *, network: RbfNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, *, network: RBFNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> int:
         ...
@@ -900,7 +960,7 @@ class RbfQLearning:
     def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
         ...
     @property
-    def network(self) -> RbfNetwork:
+    def network(self) -> RBFNetwork:
         ...
 class FuzzyQLearning:
     """
@@ -925,7 +985,12 @@ class ProtocolConfig:
     """
     How long a trial is
     """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: ProtocolConfig) -> bool:
+        ...
     def __init__(self, *, n_learning_episodes: typing.SupportsInt | typing.SupportsIndex = 15000, test_interval: typing.SupportsInt | typing.SupportsIndex = 10) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     @property
     def n_learning_episodes(self) -> int:
@@ -937,7 +1002,7 @@ class AcrobotTrial:
     """
     SDNN-C learns the acrobot swing-up
     """
-    def __init__(self, *, approximator: SdnnCConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, *, approximator: SDNNCConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
@@ -983,11 +1048,11 @@ class FuzzyAcrobotTrial:
     @property
     def n_decisions(self) -> int:
         ...
-class RbfAcrobotTrial:
+class RBFAcrobotTrial:
     """
     Q-learning with an RBF network learns the acrobot swing-up
     """
-    def __init__(self, *, approximator: RbfNetworkConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, *, approximator: RBFNetworkConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
@@ -1039,7 +1104,7 @@ class NetworkParts:
         Times a copy of the trial's network
         """
     @typing.overload
-    def __init__(self, network: SdnnC, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, network: SDNNC, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         Times a copy of the network
         """
@@ -1077,14 +1142,14 @@ class AcrobotDecisions:
     @property
     def n_integration_steps(self) -> int:
         ...
-class PlainRbfQLearning:
+class PlainRBFQLearning:
     """
     Q-learning with an RBF network evaluated without its product structure; only to be timed
     """
-    def __init__(self, *, network: RbfNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, *, network: RBFNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
-    def network(self) -> RbfNetwork:
+    def network(self) -> RBFNetwork:
         """
         A copy of the network
         """
@@ -1137,7 +1202,7 @@ def sin_cos(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple
     (sin x, cos x), item by item
     """
 @typing.overload
-def time_agent_steps(agent: SdnnQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+def time_agent_steps(agent: SDNNQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """
@@ -1147,12 +1212,12 @@ def time_agent_steps(agent: FuzzyQLearning, n_repetitions: typing.SupportsInt | 
     The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """
 @typing.overload
-def time_agent_steps(agent: RbfQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+def time_agent_steps(agent: RBFQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """
 @typing.overload
-def time_agent_steps(agent: PlainRbfQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+def time_agent_steps(agent: PlainRBFQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """

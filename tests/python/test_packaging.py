@@ -34,7 +34,7 @@ def run_example(cmake, configure, build, *options):
 def rows_of_trial():
     """What the example should print: a trial of the same length and seed."""
     trial = _core.AcrobotTrial(
-        approximator=_core.SdnnCConfig(),
+        approximator=_core.SDNNCConfig(),
         learning=_core.QLearningConfig(),
         acrobot=_core.AcrobotConfig(),
         goal=_core.GoalScheduleConfig(),

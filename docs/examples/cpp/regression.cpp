@@ -39,7 +39,7 @@ void run(int n_epochs, std::uint64_t seed) {
   }
   const auto code = std::make_shared<const coding::SelectiveDesensitization>(
       modified, modifiers, std::vector<coding::InputPair>{{0, 1}, {1, 0}});
-  const auto layer = std::make_shared<estimators::PerceptronLayer>(code, kUnits, seed);
+  const auto layer = std::make_shared<estimators::ParallelPerceptron>(code, kUnits, seed);
 
   std::vector<std::int32_t> bins;
   std::vector<double> counts;  // how many units should fire
@@ -66,8 +66,7 @@ void run(int n_epochs, std::uint64_t seed) {
     layer->counts(lattice, 1, 1, firing);
     double sum = 0.0;
     for (std::size_t p = 0; p < firing.size(); ++p) {
-      const double error =
-          kStep * firing[p] + kLow - target(lattice[2 * p], lattice[2 * p + 1]);
+      const double error = kStep * firing[p] + kLow - target(lattice[2 * p], lattice[2 * p + 1]);
       sum += error * error;
     }
     std::printf("%d %.4f\n", epoch, std::sqrt(sum / static_cast<double>(firing.size())));

@@ -13,7 +13,7 @@
 
 namespace {
 
-using Network = sdnn::approximators::SdnnC<256>;  // patterns of up to 256 units
+using Network = sdnn::approximators::SDNNC<256>;  // patterns of up to 256 units
 
 struct Outcome {
   int n_decisions = 0;
@@ -31,9 +31,8 @@ Outcome run_episode(sdnn::agents::QLearning<Network>& agent, sdnn::environments:
   sensors.observe(acrobot.state(), observed);
   for (bool over = false; !over;) {
     const std::size_t action = agent.act(observed, learning);
-    const double torque =
-        max_torque *
-        sdnn::coding::action_value(action, agent.action_value().n_actions(), -1.0, 1.0);
+    const double torque = max_torque * sdnn::coding::action_value(
+                                           action, agent.action_value().n_actions(), -1.0, 1.0);
     const auto result = acrobot.step(torque, lambda);
     sensors.observe(acrobot.state(), next_observed);
     if (learning) agent.learn(observed, action, result.reward, next_observed, result.terminated);

@@ -13,7 +13,8 @@ from sdnn import _core
 from sdnn.agents.spaces import BoxRange, UnitObservations
 from sdnn.agents.transition import Transition
 from sdnn.approximators.fuzzy_rules import FuzzyRulesConfig
-from sdnn.arguments import choice, seed_of
+from sdnn.arguments import seed_of
+from sdnn.config import to_core
 
 __all__ = ["FuzzyQLearning", "FuzzyQLearningConfig"]
 
@@ -46,10 +47,8 @@ class FuzzyQLearningConfig:
     tie_rule: Literal["uniform", "lowest", "middle"] = "uniform"
 
     def to_core(self) -> _core.FuzzyQLearningConfig:
-        """Make the core's struct of the same values; ValueError for an unknown ``tie_rule``."""
-        fields = dataclasses.asdict(self)
-        fields["tie_rule"] = choice("tie_rule", self.tie_rule, _core.TieRule.__members__)
-        return _core.FuzzyQLearningConfig(**fields)
+        """Make the core's struct of the same values; see `sdnn.config.to_core`."""
+        return to_core(self, _core.FuzzyQLearningConfig)
 
 
 class FuzzyQLearning:

@@ -14,7 +14,8 @@ from sdnn.agents.spaces import DiscreteActions, EvenActions, UnitObservations, d
 from sdnn.agents.transition import Transition
 from sdnn.approximators.rbf_network import RBFNetworkConfig
 from sdnn.approximators.sdnn_c import SDNNCConfig
-from sdnn.arguments import choice, seed_of
+from sdnn.arguments import seed_of
+from sdnn.config import to_core
 
 __all__ = ["QLearningConfig", "RBFQLearning", "SDNNQLearning"]
 
@@ -45,13 +46,11 @@ class QLearningConfig:
     tie_rule: Literal["uniform", "lowest", "middle"] = "uniform"
 
     def to_core(self) -> _core.QLearningConfig:
-        """Make the core's struct of the same values; ValueError for an unknown ``tie_rule``."""
-        fields = dataclasses.asdict(self)
-        fields["tie_rule"] = choice("tie_rule", self.tie_rule, _core.TieRule.__members__)
-        return _core.QLearningConfig(**fields)
+        """Make the core's struct of the same values; see `sdnn.config.to_core`."""
+        return to_core(self, _core.QLearningConfig)
 
 
-CoreAgent: TypeAlias = _core.SdnnQLearning | _core.RbfQLearning
+CoreAgent: TypeAlias = _core.SDNNQLearning | _core.RBFQLearning
 """The agents of the C++ core."""
 
 NetworkConfig = TypeVar("NetworkConfig", SDNNCConfig, RBFNetworkConfig)
@@ -195,7 +194,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         self._fit_to_spaces(observation_space, action_space, network or SDNNCConfig(), learning)
         n_windows = self.network.n_hidden_units - self.network.n_active_units + 1
         self._actions = discrete_actions(action_space, self.network.n_actions or n_windows)
-        self._core = _core.SdnnQLearning(
+        self._core = _core.SDNNQLearning(
             network=self.network.to_core(), learning=self.learning.to_core(), seed=seed_of(seed)
         )
 
@@ -256,6 +255,6 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
             observation_space, action_space, network or RBFNetworkConfig(), learning
         )
         self._actions = discrete_actions(action_space, self.network.n_actions)
-        self._core = _core.RbfQLearning(
+        self._core = _core.RBFQLearning(
             network=self.network.to_core(), learning=self.learning.to_core(), seed=seed_of(seed)
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from sdnn import _core
+from sdnn.config import to_core
 
 __all__ = ["FuzzyRulesConfig"]
 
@@ -33,5 +34,5 @@ class FuzzyRulesConfig:
     max_table_bytes: int = 2**30
 
     def to_core(self) -> _core.FuzzyRulesConfig:
-        """Make the core's struct of the same values."""
-        return _core.FuzzyRulesConfig(**dataclasses.asdict(self))
+        """Make the core's struct of the same values; see `sdnn.config.to_core`."""
+        return to_core(self, _core.FuzzyRulesConfig)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from sdnn import _core
+from sdnn.config import to_core
 
 __all__ = ["RBFNetworkConfig"]
 
@@ -40,6 +41,6 @@ class RBFNetworkConfig:
     gradient_rate: float = 3.0
     max_table_bytes: int = 2**30
 
-    def to_core(self) -> _core.RbfNetworkConfig:
-        """Make the core's struct of the same values."""
-        return _core.RbfNetworkConfig(**dataclasses.asdict(self))
+    def to_core(self) -> _core.RBFNetworkConfig:
+        """Make the core's struct of the same values; see `sdnn.config.to_core`."""
+        return to_core(self, _core.RBFNetworkConfig)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import choice, seed_of
+from sdnn.arguments import seed_of
+from sdnn.config import to_core
 
 __all__ = ["SDNNC", "SDNNCConfig"]
 
@@ -79,22 +80,9 @@ class SDNNCConfig:
     initial_weights: Literal["ternary", "uniform"] = "ternary"
     initial_weight_limit: float = 0.1
 
-    def to_core(self) -> _core.SdnnCConfig:
-        """Make the core's struct of the same values.
-
-        Raises
-        ------
-        ValueError
-            If ``initial_weights`` is not one of its two words.
-        TypeError
-            If a value has the wrong type.
-        """
-        fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        fields["circular"] = list(self.circular)
-        fields["initial_weights"] = choice(
-            "initial_weights", self.initial_weights, _core.InitialWeights.__members__
-        )
-        return _core.SdnnCConfig(**fields)
+    def to_core(self) -> _core.SDNNCConfig:
+        """Make the core's struct of the same values; see `sdnn.config.to_core`."""
+        return to_core(self, _core.SDNNCConfig)
 
 
 class SDNNC:
@@ -128,7 +116,7 @@ class SDNNC:
 
     def __init__(self, config: SDNNCConfig | None = None, *, seed: int = 0) -> None:
         self.config = config if config is not None else SDNNCConfig()
-        self._core = _core.SdnnC(self.config.to_core(), seed_of(seed))
+        self._core = _core.SDNNC(self.config.to_core(), seed_of(seed))
 
     @property
     def _lattice_step(self) -> np.float64:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 SEED = 1
 TimedAgent: TypeAlias = (
-    "_core.SdnnQLearning | _core.FuzzyQLearning | _core.RbfQLearning | _core.PlainRbfQLearning"
+    "_core.SDNNQLearning | _core.FuzzyQLearning | _core.RBFQLearning | _core.PlainRBFQLearning"
 )
 
 LARGEST_TABLE = 2**32
@@ -85,7 +85,7 @@ def _make(series_id: str, n_inputs: int) -> tuple[TimedAgent, int]:
     if series_id == "rbfn":
         return RBFQLearning(states, actions, network=network, seed=SEED).core, table_bytes
     if series_id == "rbfn-plain":
-        plain = _core.PlainRbfQLearning(
+        plain = _core.PlainRBFQLearning(
             network=network.to_core(), learning=QLearningConfig().to_core(), seed=SEED
         )
         return plain, table_bytes

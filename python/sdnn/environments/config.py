@@ -7,7 +7,7 @@ import math
 from typing import Literal
 
 from sdnn import _core
-from sdnn.arguments import choice
+from sdnn.config import to_core
 
 __all__ = ["AcrobotConfig", "GoalScheduleConfig", "SensorConfig"]
 
@@ -78,10 +78,8 @@ class AcrobotConfig:
     idle_angle: float = math.pi / 36.0
 
     def to_core(self) -> _core.AcrobotConfig:
-        """Make the core's struct of the same values; ValueError for an unknown ``goal_test``."""
-        fields = dataclasses.asdict(self)
-        fields["goal_test"] = choice("goal_test", self.goal_test, _core.GoalTest.__members__)
-        return _core.AcrobotConfig(**fields)
+        """Make the core's struct of the same values; see `sdnn.config.to_core`."""
+        return to_core(self, _core.AcrobotConfig)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -109,10 +107,8 @@ class GoalScheduleConfig:
     constant_value: float = 1.0
 
     def to_core(self) -> _core.GoalScheduleConfig:
-        """Make the core's struct of the same values; ValueError for an unknown ``kind``."""
-        fields = dataclasses.asdict(self)
-        fields["kind"] = choice("kind", self.kind, _core.GoalScheduleKind.__members__)
-        return _core.GoalScheduleConfig(**fields)
+        """Make the core's struct of the same values; see `sdnn.config.to_core`."""
+        return to_core(self, _core.GoalScheduleConfig)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -131,5 +127,5 @@ class SensorConfig:
     noise: float = 0.0
 
     def to_core(self) -> _core.SensorConfig:
-        """Make the core's struct of the same values."""
-        return _core.SensorConfig(**dataclasses.asdict(self))
+        """Make the core's struct of the same values; see `sdnn.config.to_core`."""
+        return to_core(self, _core.SensorConfig)

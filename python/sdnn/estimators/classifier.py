@@ -286,7 +286,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
 
     def _trainer(self, table: NDArray[Any], labels: NDArray[np.int32]) -> Trainer:
         self._finite(table, self.codings_)
-        return _core.ErrorCorrectionTrainer(
+        return _core.PerceptronTrainer(
             self.network_.layer,
             self.network_.input_code.bins(table),
             labels,

@@ -92,7 +92,7 @@ class LibsdnnParameters:
         )
         return _core.SelectiveDesensitization(modified, modifiers, pairs)
 
-    def make_layer(self, library: Library = "msvc") -> _core.PerceptronLayer:
+    def make_layer(self, library: Library = "msvc") -> _core.ParallelPerceptron:
         """Return the untrained network, bit for bit; needs seeds in the file."""
         if self.weight_seed is None:
             raise ValueError("random_seed of NN must be a list of numbers, got hardware_entropy")
@@ -102,13 +102,13 @@ class LibsdnnParameters:
         weights, thresholds = _core.libsdnn_weights(
             self.n_output_units, code.n_columns, low, high, self.weight_seed, library
         )
-        return _core.PerceptronLayer(
+        return _core.ParallelPerceptron(
             code, self.n_output_units, weights=weights, thresholds=thresholds
         )
 
     def make_trainer(
-        self, layer: _core.PerceptronLayer, inputs: npt.ArrayLike, targets: npt.ArrayLike
-    ) -> _core.PDeltaTrainer | _core.ErrorCorrectionTrainer:
+        self, layer: _core.ParallelPerceptron, inputs: npt.ArrayLike, targets: npt.ArrayLike
+    ) -> _core.PDeltaTrainer | _core.PerceptronTrainer:
         """Return a trainer whose ``epoch(np.arange(n_samples))`` is one iteration of LIBSDNN."""
         bins = self.bins(inputs)
         if self.task == "regression":
@@ -116,7 +116,7 @@ class LibsdnnParameters:
             counts = (np.asarray(targets, dtype=np.float64).reshape(-1, 1) - low) / self.step_size
             return _core.PDeltaTrainer(layer, bins, counts)
         labels = np.asarray(targets, dtype=np.int32)
-        return _core.ErrorCorrectionTrainer(layer, bins, labels, self.scheme)
+        return _core.PerceptronTrainer(layer, bins, labels, self.scheme)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +124,7 @@ class LibsdnnModel:
     """A trained network from a model file."""
 
     parameters: LibsdnnParameters
-    layer: _core.PerceptronLayer
+    layer: _core.ParallelPerceptron
 
     def predict(self, inputs: npt.ArrayLike, n_threads: int = 1) -> npt.NDArray[Any]:
         """LIBSDNN's outputs: numbers, or classes from 0.
@@ -202,7 +202,7 @@ def read_model_file(path: str | Path, library: Library = "msvc") -> LibsdnnModel
             f"columns, got {len(content) - 4 - length}"
         )
     rows = np.frombuffer(content, "<i4", offset=4 + length).reshape(n_units, n_columns + 1)
-    layer = _core.PerceptronLayer(
+    layer = _core.ParallelPerceptron(
         parameters.make_code(library),
         n_units,
         weights=np.ascontiguousarray(rows[:, 1:], dtype=np.int32),

@@ -39,7 +39,7 @@ class Network:
         self.input_code = input_code
         self.n_units = n_units
         try:
-            self.layer = _core.PerceptronLayer(
+            self.layer = _core.ParallelPerceptron(
                 input_code.core, n_units, seed=seed, weights=weights, thresholds=thresholds
             )
         except MemoryError:
@@ -74,7 +74,7 @@ class Network:
 
     def restore(self, weights: NDArray[np.int32], thresholds: NDArray[np.int32]) -> None:
         """Go back to earlier weights and thresholds."""
-        self.layer = _core.PerceptronLayer(
+        self.layer = _core.ParallelPerceptron(
             self.input_code.core, self.n_units, weights=weights, thresholds=thresholds
         )
 

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from sdnn import _core
 from sdnn.agents import FuzzyQLearningConfig, QLearningConfig
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.config import to_core
 from sdnn.environments import AcrobotConfig, GoalScheduleConfig, SensorConfig
 
 if TYPE_CHECKING:
-    from sdnn import _core
     from sdnn.experiments.cases import Case
 
 CONFIG_HASH_DIGITS = 16
@@ -39,12 +40,8 @@ class ProtocolConfig:
     test_interval: int = 10
 
     def to_core(self) -> _core.ProtocolConfig:
-        """Return the C++ struct with the same values."""
-        from sdnn import _core
-
-        return _core.ProtocolConfig(
-            n_learning_episodes=self.n_learning_episodes, test_interval=self.test_interval
-        )
+        """Make the core's struct of the same values; see `sdnn.config.to_core`."""
+        return to_core(self, _core.ProtocolConfig)
 
 
 ApproximatorConfig: TypeAlias = SDNNCConfig | FuzzyRulesConfig | RBFNetworkConfig

@@ -50,7 +50,7 @@ def make_core_trial(config: TrialConfig, seed: int) -> Trial:
     kind = {
         "sdnn-c": _core.AcrobotTrial,
         "fql": _core.FuzzyAcrobotTrial,
-        "rbfn": _core.RbfAcrobotTrial,
+        "rbfn": _core.RBFAcrobotTrial,
     }[config.agent]
     trial: Trial = kind(
         approximator=config.approximator.to_core(),

@@ -14,10 +14,10 @@ namespace sdnn::agents {
 namespace {
 
 static_assert(Agent<QLearning<testing::LookupTable>>);
-static_assert(Agent<QLearning<approximators::DynamicSdnnC>>);
-static_assert(Agent<QLearning<approximators::RbfNetwork>>);
+static_assert(Agent<QLearning<approximators::DynamicSDNNC>>);
+static_assert(Agent<QLearning<approximators::RBFNetwork>>);
 static_assert(Agent<FuzzyQLearning>);
-static_assert(!Agent<approximators::RbfNetwork>);
+static_assert(!Agent<approximators::RBFNetwork>);
 
 TEST(Agent, DiscreteActionsCutTheRangeEvenly) {
   const QLearning<testing::LookupTable> agent(testing::LookupTable(1, 2, 5), {}, 1);

@@ -31,9 +31,9 @@ TEST(EpsilonGreedy, LowestTakesTheFirstOfTheTied) {
 
 TEST(EpsilonGreedy, MiddleTakesTheMiddleOfTheFirstWidestRun) {
   EXPECT_EQ(best_by(TieRule::middle, {0, 1, 1, 0, 1, 1, 1, 0}), 5U);
-  EXPECT_EQ(best_by(TieRule::middle, {1, 1, 0, 1, 1}), 0U);     // even: rounded down; the first run
+  EXPECT_EQ(best_by(TieRule::middle, {1, 1, 0, 1, 1}), 0U);  // even: rounded down; the first run
   EXPECT_EQ(best_by(TieRule::middle, {0, 1, 1, 1, 1}), 2U);
-  EXPECT_EQ(best_by(TieRule::middle, Row(601, 0.0)), 300U);     // a new network: no torque
+  EXPECT_EQ(best_by(TieRule::middle, Row(601, 0.0)), 300U);  // a new network: no torque
   EXPECT_EQ(best_by(TieRule::middle, {1, 0, 1, 0, 2}), 4U);
 }
 

@@ -31,7 +31,7 @@ TEST(FuzzyQLearning, OneStepByHand) {
   rules.table()[rules.cell(2, 1)] = 8.0F;
   FuzzyQLearning agent(rules, {.policy = kGreedy}, 1);
   const State state = {0.125}, next = {0.75};
-  EXPECT_EQ(agent.act(state), 0.5);  // 3/4 (+1) + 1/4 (-1)
+  EXPECT_EQ(agent.act(state), 0.5);   // 3/4 (+1) + 1/4 (-1)
   EXPECT_EQ(agent.value(next), 5.0);  // (2 + 8) / 2
   // Q = 3/4 4 + 1/4 2 = 3.5; step = 0.5 (1 + 0.9 5 - 3.5) = 1.
   agent.learn(state, 0.5, 1.0, next, false);

@@ -85,8 +85,7 @@ TEST(QLearning, ASmallDecisionProcessIsSolvedExactly) {
 }
 
 TEST(QLearning, ByActingItFindsTheValuesOfTheSmallProcess) {
-  Agent agent(LookupTable(1, 5, 2),
-              {.policy = {.epsilon = 0.5, .n_greedy_steps = 0}}, 9);
+  Agent agent(LookupTable(1, 5, 2), {.policy = {.epsilon = 0.5, .n_greedy_steps = 0}}, 9);
   for (int episode = 0; episode < 2000; ++episode) {
     agent.begin_episode();
     for (int s = 0; !Corridor::is_goal(s);) {

@@ -26,8 +26,8 @@ struct ValueIsText : Complete {
 };
 
 static_assert(ActionValue<testing::LookupTable>);
-static_assert(ActionValue<SdnnC<256>>);
-static_assert(ActionValue<DynamicSdnnC>);
+static_assert(ActionValue<SDNNC<256>>);
+static_assert(ActionValue<DynamicSDNNC>);
 static_assert(ActionValue<Complete>);
 static_assert(!ActionValue<WithoutCorrect>);
 static_assert(!ActionValue<ValueIsText>);
@@ -67,10 +67,13 @@ void expect_a_model(Q q) {
 
 TEST(ActionValue, EveryModelKeepsTheConceptsPromises) {
   expect_a_model(testing::LookupTable(2, 4, 5));
-  const SdnnCConfig config{.n_inputs = 2, .n_pattern_units = 40, .n_hidden_units = 300,
-                           .n_active_units = 100, .n_actions = 5};
-  expect_a_model(SdnnC<256>(config, 3));
-  expect_a_model(DynamicSdnnC(config, 3));
+  const SDNNCConfig config{.n_inputs = 2,
+                           .n_pattern_units = 40,
+                           .n_hidden_units = 300,
+                           .n_active_units = 100,
+                           .n_actions = 5};
+  expect_a_model(SDNNC<256>(config, 3));
+  expect_a_model(DynamicSDNNC(config, 3));
 }
 
 }  // namespace

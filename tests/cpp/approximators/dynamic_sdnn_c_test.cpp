@@ -12,7 +12,7 @@
 namespace sdnn::approximators {
 namespace {
 
-SdnnCConfig with_pattern_units(int m) {
+SDNNCConfig with_pattern_units(int m) {
   return {.n_inputs = 2, .n_pattern_units = m, .n_hidden_units = 90, .n_active_units = 30};
 }
 
@@ -23,26 +23,26 @@ std::vector<double> values(Network& network, const std::vector<double>& state) {
   return out;
 }
 
-std::size_t capacity(const DynamicSdnnC& network) {
+std::size_t capacity(const DynamicSDNNC& network) {
   return network.visit([](const auto& net) {
     return std::remove_cvref_t<decltype(net.state_code().book(0)[0])>::kCapacity;
   });
 }
 
-TEST(DynamicSdnnC, TakesTheSmallestCapacityThatFits) {
-  EXPECT_EQ(capacity(DynamicSdnnC(with_pattern_units(2), 1)), 256U);
-  EXPECT_EQ(capacity(DynamicSdnnC(with_pattern_units(256), 1)), 256U);
-  EXPECT_EQ(capacity(DynamicSdnnC(with_pattern_units(257), 1)), 1024U);
-  EXPECT_EQ(capacity(DynamicSdnnC(with_pattern_units(1025), 1)), 4096U);
-  EXPECT_EQ(capacity(DynamicSdnnC(with_pattern_units(4096), 1)), 4096U);
+TEST(DynamicSDNNC, TakesTheSmallestCapacityThatFits) {
+  EXPECT_EQ(capacity(DynamicSDNNC(with_pattern_units(2), 1)), 256U);
+  EXPECT_EQ(capacity(DynamicSDNNC(with_pattern_units(256), 1)), 256U);
+  EXPECT_EQ(capacity(DynamicSDNNC(with_pattern_units(257), 1)), 1024U);
+  EXPECT_EQ(capacity(DynamicSDNNC(with_pattern_units(1025), 1)), 4096U);
+  EXPECT_EQ(capacity(DynamicSDNNC(with_pattern_units(4096), 1)), 4096U);
 }
 
 // The capacity is storage alone: the same config and seed learn the same on every rung.
-TEST(DynamicSdnnC, EqualsTheFixedNetworkOfAnyCapacity) {
-  const SdnnCConfig config = with_pattern_units(50);
-  DynamicSdnnC dynamic(config, 4);
-  SdnnC<256> narrow(config, 4);
-  SdnnC<4096> wide(config, 4);
+TEST(DynamicSDNNC, EqualsTheFixedNetworkOfAnyCapacity) {
+  const SDNNCConfig config = with_pattern_units(50);
+  DynamicSDNNC dynamic(config, 4);
+  SDNNC<256> narrow(config, 4);
+  SDNNC<4096> wide(config, 4);
   core::Random random(1, core::Stream::weights);
   for (int step = 0; step < 300; ++step) {
     const std::vector<double> state = {random.uniform(), random.uniform()};
@@ -61,9 +61,9 @@ TEST(DynamicSdnnC, EqualsTheFixedNetworkOfAnyCapacity) {
   EXPECT_EQ(h, expected);
 }
 
-TEST(DynamicSdnnC, CopiesAreIndependent) {
-  DynamicSdnnC original(with_pattern_units(50), 4);
-  DynamicSdnnC copy = original;
+TEST(DynamicSDNNC, CopiesAreIndependent) {
+  DynamicSDNNC original(with_pattern_units(50), 4);
+  DynamicSDNNC copy = original;
   const std::vector<double> state = {0.3, 0.8};
   const std::vector<double> before = values(original, state);
   for (int i = 0; i < 20; ++i) copy.correct(state, 7, 15.0);
@@ -71,8 +71,8 @@ TEST(DynamicSdnnC, CopiesAreIndependent) {
   EXPECT_NE(values(copy, state), before);
 }
 
-TEST(DynamicSdnnC, ActingAndLearningAllocateNothing) {
-  DynamicSdnnC network(with_pattern_units(300), 4);
+TEST(DynamicSDNNC, ActingAndLearningAllocateNothing) {
+  DynamicSDNNC network(with_pattern_units(300), 4);
   std::vector<double> out(network.n_actions());
   std::vector<double> state(2);
   core::Random random(2, core::Stream::weights);
@@ -85,26 +85,26 @@ TEST(DynamicSdnnC, ActingAndLearningAllocateNothing) {
   EXPECT_EQ(testing::allocation_count(), before);
 }
 
-TEST(DynamicSdnnC, NamesTheLargestCapacity) {
+TEST(DynamicSDNNC, NamesTheLargestCapacity) {
   try {
-    DynamicSdnnC(with_pattern_units(4097), 1);
+    DynamicSDNNC(with_pattern_units(4097), 1);
     FAIL();
   } catch (const std::length_error& error) {
     EXPECT_EQ(std::string(error.what()), "n_pattern_units must be at most 4096, got 4097");
   }
-  EXPECT_THROW(DynamicSdnnC(with_pattern_units(1), 1), std::invalid_argument);
-  EXPECT_THROW(DynamicSdnnC(with_pattern_units(-5), 1), std::invalid_argument);
-  EXPECT_THROW(DynamicSdnnC({.n_inputs = 1}, 1), std::invalid_argument);
+  EXPECT_THROW(DynamicSDNNC(with_pattern_units(1), 1), std::invalid_argument);
+  EXPECT_THROW(DynamicSDNNC(with_pattern_units(-5), 1), std::invalid_argument);
+  EXPECT_THROW(DynamicSDNNC({.n_inputs = 1}, 1), std::invalid_argument);
 }
 
-TEST(DynamicSdnnC, PassesOnWhatItHolds) {
-  const DynamicSdnnC network(with_pattern_units(20), 1);
+TEST(DynamicSDNNC, PassesOnWhatItHolds) {
+  const DynamicSDNNC network(with_pattern_units(20), 1);
   EXPECT_EQ(network.config().n_pattern_units, 20);
   EXPECT_EQ(network.n_inputs(), 2U);
   EXPECT_EQ(network.n_actions(), 61U);
   EXPECT_EQ(network.action_code().first_unit(60), 60U);
   EXPECT_EQ(network.output_scale().u_high(), 28);
-  EXPECT_EQ(network.perceptron().n_columns(), 40U);
+  EXPECT_EQ(network.hidden_layer().n_columns(), 40U);
 }
 
 }  // namespace

@@ -34,7 +34,9 @@ TEST(SelectUnits, APotentialOfZeroIsInactive) {
   EXPECT_EQ(select({0, 1}, -1), (Units{1}));
 }
 
-TEST(SelectUnits, EqualDistancesGoToTheLowestIndex) { EXPECT_EQ(select({-4, -4, -4}, 1), Units{0}); }
+TEST(SelectUnits, EqualDistancesGoToTheLowestIndex) {
+  EXPECT_EQ(select({-4, -4, -4}, 1), Units{0});
+}
 
 TEST(SelectUnits, OneSubsetPerUnitTakesAll) {
   EXPECT_EQ(select({-4, -40, -400}, 3), (Units{0, 1, 2}));

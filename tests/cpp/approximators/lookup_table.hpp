@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "sdnn/approximators/action_value.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::testing {
 

@@ -16,7 +16,7 @@
 namespace sdnn::approximators {
 namespace {
 
-static_assert(ActionValue<RbfNetwork>);
+static_assert(ActionValue<RBFNetwork>);
 
 std::vector<double> random_state(core::Random& random, std::size_t d) {
   std::vector<double> state(d);
@@ -25,8 +25,8 @@ std::vector<double> random_state(core::Random& random, std::size_t d) {
 }
 
 /// A network with weights of several sizes and signs, learned from random targets.
-RbfNetwork taught(const RbfNetworkConfig& config, int n_corrections) {
-  RbfNetwork network(config);
+RBFNetwork taught(const RBFNetworkConfig& config, int n_corrections) {
+  RBFNetwork network(config);
   core::Random random(7, core::Stream::weights);
   for (int i = 0; i < n_corrections; ++i) {
     const auto state = random_state(random, network.n_inputs());
@@ -36,15 +36,15 @@ RbfNetwork taught(const RbfNetworkConfig& config, int n_corrections) {
   return network;
 }
 
-double largest_weight(const RbfNetwork& network) {
+double largest_weight(const RBFNetwork& network) {
   double largest = 0.0;
   for (const double w : network.weights()) largest = std::max(largest, std::abs(w));
   return largest;
 }
 
 // d = 1, two bases at 0 and 1, width 1: at x = 0 Gaussians 1 and e^-1/2, at 1/2 equal ones.
-TEST(RbfNetwork, OneGradientStepByHand) {
-  RbfNetwork network(
+TEST(RBFNetwork, OneGradientStepByHand) {
+  RBFNetwork network(
       {.n_inputs = 1, .n_bases = 2, .n_actions = 3, .width = 1.0, .gradient_rate = 0.5});
   EXPECT_EQ(network.n_joint_bases(), 4U);
   const std::vector<double> state = {0.5};
@@ -61,8 +61,8 @@ TEST(RbfNetwork, OneGradientStepByHand) {
   }
 }
 
-TEST(RbfNetwork, StartsAtZeroForEveryAction) {
-  RbfNetwork network({});
+TEST(RBFNetwork, StartsAtZeroForEveryAction) {
+  RBFNetwork network({});
   EXPECT_EQ(network.n_joint_bases(), 1024U);
   std::vector<double> out(601, 1.0);
   network.values(std::vector<double>{0.1, 0.9, 0.0, 1.0}, out);
@@ -70,9 +70,9 @@ TEST(RbfNetwork, StartsAtZeroForEveryAction) {
 }
 
 // Normalized bases: equal weights give that weight everywhere.
-TEST(RbfNetwork, TheBasesSumToOne) {
+TEST(RBFNetwork, TheBasesSumToOne) {
   for (const double width : {0.1, 1.0, 100.0}) {
-    RbfNetwork network({.n_inputs = 3, .n_actions = 11, .width = width});
+    RBFNetwork network({.n_inputs = 3, .n_actions = 11, .width = width});
     network.set_weights(std::vector<double>(256, 5.0));
     core::Random random(1, core::Stream::ties);
     std::vector<double> out(11);
@@ -86,14 +86,14 @@ TEST(RbfNetwork, TheBasesSumToOne) {
   }
 }
 
-TEST(RbfNetwork, ThePlainEvaluationAgreesWithTheFactoredOne) {
+TEST(RBFNetwork, ThePlainEvaluationAgreesWithTheFactoredOne) {
   for (const int d : {1, 2, 3, 4}) {
-    for (const RbfNetworkConfig& config :
-         {RbfNetworkConfig{.n_inputs = d, .n_actions = 17},
-          RbfNetworkConfig{.n_inputs = d, .n_bases = 3, .n_actions = 5, .width = 0.4},
-          RbfNetworkConfig{.n_inputs = d, .n_bases = 5, .n_actions = 2, .width = 0.1,
-                           .gradient_rate = 1.0}}) {
-      RbfNetwork network = taught(config, 300);
+    for (const RBFNetworkConfig& config :
+         {RBFNetworkConfig{.n_inputs = d, .n_actions = 17},
+          RBFNetworkConfig{.n_inputs = d, .n_bases = 3, .n_actions = 5, .width = 0.4},
+          RBFNetworkConfig{
+              .n_inputs = d, .n_bases = 5, .n_actions = 2, .width = 0.1, .gradient_rate = 1.0}}) {
+      RBFNetwork network = taught(config, 300);
       const double tolerance = 1e-12 * largest_weight(network);
       ASSERT_GT(tolerance, 0.0);
       core::Random random(2, core::Stream::ties);
@@ -111,9 +111,9 @@ TEST(RbfNetwork, ThePlainEvaluationAgreesWithTheFactoredOne) {
   }
 }
 
-TEST(RbfNetwork, WhatIsRememberedNeverChangesWhatIsReturned) {
-  RbfNetwork used = taught({.n_inputs = 2, .n_actions = 7}, 50);
-  RbfNetwork fresh = used;
+TEST(RBFNetwork, WhatIsRememberedNeverChangesWhatIsReturned) {
+  RBFNetwork used = taught({.n_inputs = 2, .n_actions = 7}, 50);
+  RBFNetwork fresh = used;
   const std::vector<double> a = {0.2, 0.8}, b = {0.6, 0.1};
   std::vector<double> out(7), expected(7);
   for (int i = 0; i < 20; ++i) {
@@ -130,8 +130,8 @@ TEST(RbfNetwork, WhatIsRememberedNeverChangesWhatIsReturned) {
   }
 }
 
-TEST(RbfNetwork, AGradientStepGoesTheRightWayAndNotTooFar) {
-  RbfNetwork network = taught({.width = 1.0, .gradient_rate = 50.0}, 100);  // |phi|^2 <= 0.019
+TEST(RBFNetwork, AGradientStepGoesTheRightWayAndNotTooFar) {
+  RBFNetwork network = taught({.width = 1.0, .gradient_rate = 50.0}, 100);  // |phi|^2 <= 0.019
   core::Random random(5, core::Stream::ties);
   for (int i = 0; i < 200; ++i) {
     const auto state = random_state(random, 4);
@@ -145,8 +145,8 @@ TEST(RbfNetwork, AGradientStepGoesTheRightWayAndNotTooFar) {
 }
 
 // The bits are the same with every compiler and optimization level.
-TEST(RbfNetwork, KeepsItsBits) {
-  RbfNetwork network = taught({.width = 1.0}, 200);
+TEST(RBFNetwork, KeepsItsBits) {
+  RBFNetwork network = taught({.width = 1.0}, 200);
   std::uint64_t digest = 0;
   for (const double w : network.weights()) digest = digest * 31 + std::bit_cast<std::uint64_t>(w);
   std::vector<double> out(601);
@@ -155,8 +155,8 @@ TEST(RbfNetwork, KeepsItsBits) {
   EXPECT_EQ(digest, 9187274102790421898U);
 }
 
-TEST(RbfNetwork, AStepAllocatesNothing) {
-  RbfNetwork network({.n_inputs = 5});
+TEST(RBFNetwork, AStepAllocatesNothing) {
+  RBFNetwork network({.n_inputs = 5});
   const std::vector<double> state = {0.1, 0.2, 0.3, 0.4, 0.5};
   std::vector<double> out(601);
   const std::size_t before = testing::allocation_count();
@@ -168,16 +168,16 @@ TEST(RbfNetwork, AStepAllocatesNothing) {
 }
 
 template <class Error>
-std::string message(const RbfNetworkConfig& config) {
+std::string message(const RBFNetworkConfig& config) {
   try {
-    RbfNetwork network(config);
+    RBFNetwork network(config);
   } catch (const Error& error) {
     return error.what();
   }
   return "no error";
 }
 
-TEST(RbfNetwork, TooManyBasesAreRefusedBeforeMemoryIsAskedFor) {
+TEST(RBFNetwork, TooManyBasesAreRefusedBeforeMemoryIsAskedFor) {
   EXPECT_EQ(message<std::length_error>({.n_inputs = 13}),
             "a table of 4^14 = 268435456 joint bases needs 2147483648 bytes, but "
             "max_table_bytes is 1073741824");
@@ -186,7 +186,7 @@ TEST(RbfNetwork, TooManyBasesAreRefusedBeforeMemoryIsAskedFor) {
             "18446744073709551615");
 }
 
-TEST(RbfNetwork, NamesWhatIsImpossible) {
+TEST(RBFNetwork, NamesWhatIsImpossible) {
   using Error = std::invalid_argument;
   EXPECT_EQ(message<Error>({.n_inputs = 0}), "n_inputs must be in [1, 62], got 0");
   EXPECT_EQ(message<Error>({.n_bases = 1}), "n_bases must be in [2, 1048576], got 1");
@@ -196,8 +196,8 @@ TEST(RbfNetwork, NamesWhatIsImpossible) {
             "gradient_rate must be a finite number greater than 0, got -1");
 }
 
-TEST(RbfNetwork, BadArgumentsChangeNothing) {
-  RbfNetwork network = taught({.n_inputs = 2, .n_actions = 3}, 10);
+TEST(RBFNetwork, BadArgumentsChangeNothing) {
+  RBFNetwork network = taught({.n_inputs = 2, .n_actions = 3}, 10);
   const std::vector<double> weights(network.weights().begin(), network.weights().end());
   const std::vector<double> good = {0.1, 0.2};
   const std::vector<double> big = {0.1, 1.2};

@@ -14,11 +14,11 @@
 namespace sdnn::approximators {
 namespace {
 
-using Network = SdnnC<256>;
+using Network = SDNNC<256>;
 using State = std::vector<double>;
 
 /// The learning tests run on a smaller network, which has the same parts.
-SdnnCConfig small() {
+SDNNCConfig small() {
   return {.n_inputs = 3, .n_pattern_units = 50, .n_hidden_units = 200, .n_active_units = 60};
 }
 
@@ -35,7 +35,7 @@ std::vector<double> values(Network& network, const State& state) {
 }
 
 std::vector<std::int32_t> potentials(const Network& network, const State& state) {
-  std::vector<std::int32_t> out(network.perceptron().n_units());
+  std::vector<std::int32_t> out(network.hidden_layer().n_units());
   network.potentials(state, out);
   return out;
 }
@@ -60,8 +60,8 @@ std::vector<double> values_by_masks(const Network& network, const State& state) 
 }
 
 void expect_equal_parameters(const Network& a, const Network& b) {
-  const ParallelPerceptron& p = a.perceptron();
-  const ParallelPerceptron& q = b.perceptron();
+  const HiddenLayer& p = a.hidden_layer();
+  const HiddenLayer& q = b.hidden_layer();
   std::size_t n_different = 0;
   for (std::size_t i = 0; i < p.n_units(); ++i) {
     n_different += p.threshold(i) != q.threshold(i);
@@ -70,22 +70,22 @@ void expect_equal_parameters(const Network& a, const Network& b) {
   EXPECT_EQ(n_different, 0U);
 }
 
-TEST(SdnnC, ThePapersSizesFollowFromTheDefaults) {
+TEST(SDNNC, ThePapersSizesFollowFromTheDefaults) {
   const Network network({}, 1);
   EXPECT_EQ(network.n_inputs(), 4U);
   EXPECT_EQ(network.n_actions(), 601U);
   EXPECT_EQ(network.state_code().n_columns(), 2400U);
   EXPECT_EQ(network.state_code().book(0).n_bins(), 360U);
-  EXPECT_EQ(network.perceptron().n_units(), 900U);
+  EXPECT_EQ(network.hidden_layer().n_units(), 900U);
   EXPECT_EQ(network.output_scale().u_low(), 20);
   EXPECT_EQ(network.output_scale().u_high(), 280);
   EXPECT_EQ(Network({.n_inputs = 5}, 1).state_code().n_columns(), 4000U);
   EXPECT_EQ(Network({.n_inputs = 6}, 1).state_code().n_columns(), 6000U);
 }
 
-TEST(SdnnC, ThresholdsAlternateAndWeightsAreTernaryAtTheStart) {
+TEST(SDNNC, ThresholdsAlternateAndWeightsAreTernaryAtTheStart) {
   const Network network({}, 1);
-  const ParallelPerceptron& p = network.perceptron();
+  const HiddenLayer& p = network.hidden_layer();
   EXPECT_EQ(p.threshold(0), -200);  // unit 1 in the paper: odd, negative
   EXPECT_EQ(p.threshold(1), 200);
   std::array<double, 3> count{};
@@ -100,7 +100,7 @@ TEST(SdnnC, ThresholdsAlternateAndWeightsAreTernaryAtTheStart) {
   EXPECT_NEAR(count[2] / n, 0.25, 0.002);
 }
 
-TEST(SdnnC, QIsExactlyZeroEverywhereAtTheStart) {
+TEST(SDNNC, QIsExactlyZeroEverywhereAtTheStart) {
   for (const int n_inputs : {4, 6}) {
     Network network({.n_inputs = n_inputs}, 7);
     core::Random random(3, core::Stream::weights);
@@ -112,8 +112,8 @@ TEST(SdnnC, QIsExactlyZeroEverywhereAtTheStart) {
   }
 }
 
-TEST(SdnnC, UniformInitialWeightsStayWithinTheirLimitOnTheLattice) {
-  SdnnCConfig config = small();
+TEST(SDNNC, UniformInitialWeightsStayWithinTheirLimitOnTheLattice) {
+  SDNNCConfig config = small();
   config.lattice = 8;
   config.initial_weights = InitialWeights::uniform;
   config.initial_weight_limit = 0.5;
@@ -121,8 +121,8 @@ TEST(SdnnC, UniformInitialWeightsStayWithinTheirLimitOnTheLattice) {
   const Network network(config, 1);
   int largest = 0;
   for (std::size_t i = 0; i < 200; ++i) {
-    EXPECT_EQ(network.perceptron().threshold(i), i % 2 == 0 ? -80 : 80);
-    for (std::size_t j = 0; j < network.perceptron().n_columns(); ++j) {
+    EXPECT_EQ(network.hidden_layer().threshold(i), i % 2 == 0 ? -80 : 80);
+    for (std::size_t j = 0; j < network.hidden_layer().n_columns(); ++j) {
       largest = std::max(largest, std::abs(network.weight(i, j)));
     }
   }
@@ -130,8 +130,8 @@ TEST(SdnnC, UniformInitialWeightsStayWithinTheirLimitOnTheLattice) {
 }
 
 // One correction by hand: d subsets, in each the nearest unit, moved by lattice * (|x|^2 + 1).
-TEST(SdnnC, OneCorrectionMovesOneUnitOfEachSubset) {
-  SdnnCConfig config = small();
+TEST(SDNNC, OneCorrectionMovesOneUnitOfEachSubset) {
+  SDNNCConfig config = small();
   config.lattice = 4;
   config.initial_threshold = 2.0;
   Network network(config, 5);
@@ -162,7 +162,7 @@ TEST(SdnnC, OneCorrectionMovesOneUnitOfEachSubset) {
   EXPECT_EQ(network.value(state, action), network.output_scale()(n_firing + 3));
 }
 
-TEST(SdnnC, NothingHappensWhenTheCountIsRightAlready) {
+TEST(SDNNC, NothingHappensWhenTheCountIsRightAlready) {
   Network network(small(), 5);
   const Network before = network;
   const State state = {0.1, 0.5, 0.9};
@@ -171,7 +171,7 @@ TEST(SdnnC, NothingHappensWhenTheCountIsRightAlready) {
   expect_equal_parameters(network, before);
 }
 
-TEST(SdnnC, CorrectionsReachAnyTargetAndSaturateBeyond) {
+TEST(SDNNC, CorrectionsReachAnyTargetAndSaturateBeyond) {
   Network network(small(), 5);
   const State state = {0.3, 0.6, 0.2};
   for (const double target : {20.0, -20.0, 4.0, 1e300, -1e300, 0.0}) {
@@ -180,10 +180,10 @@ TEST(SdnnC, CorrectionsReachAnyTargetAndSaturateBeyond) {
   }
 }
 
-TEST(SdnnC, PopcountsOfWindowsEqualTheSlidingCount) {
+TEST(SDNNC, PopcountsOfWindowsEqualTheSlidingCount) {
   core::Random random(4, core::Stream::weights);
   for (const int n_actions : {0, 2, 7, 141}) {
-    SdnnCConfig config = small();
+    SDNNCConfig config = small();
     config.n_actions = n_actions;
     Network network(config, 9);
     for (int i = 0; i < 40; ++i) {
@@ -206,7 +206,7 @@ void walk(State& state, core::Random& random) {
 }
 
 // The remembered potentials must be those of a full pass, whatever has been learned since.
-TEST(SdnnC, RememberingChangesNothingOverThousandsOfLearningSteps) {
+TEST(SDNNC, RememberingChangesNothingOverThousandsOfLearningSteps) {
   Network remembering(small(), 2);
   Network forgetful(small(), 2);
   const State away = {0.0, 0.0, 0.0};
@@ -227,10 +227,10 @@ TEST(SdnnC, RememberingChangesNothingOverThousandsOfLearningSteps) {
         (void)network.value(away, 0);
         (void)network.value(further_away, 0);
       }
-      network.correct(state, action,
-                      0.5 * network.value(state, action) +
-                          0.5 * (reward + 0.9 * *std::max_element(following.begin(),
-                                                                  following.end())));
+      network.correct(
+          state, action,
+          0.5 * network.value(state, action) +
+              0.5 * (reward + 0.9 * *std::max_element(following.begin(), following.end())));
       if (forget) {
         (void)network.value(away, 0);
         (void)network.value(further_away, 0);
@@ -247,7 +247,7 @@ TEST(SdnnC, RememberingChangesNothingOverThousandsOfLearningSteps) {
   expect_equal_parameters(remembering, forgetful);
 }
 
-TEST(SdnnC, ActingAndLearningAllocateNothing) {
+TEST(SDNNC, ActingAndLearningAllocateNothing) {
   Network network({}, 1);
   core::Random random(6, core::Stream::weights);
   std::vector<double> out(network.n_actions());
@@ -263,8 +263,8 @@ TEST(SdnnC, ActingAndLearningAllocateNothing) {
 }
 
 // Weights that need two bytes take another way; it must not allocate on its first use either.
-TEST(SdnnC, LargeWeightsAllocateNothing) {
-  SdnnCConfig config = small();
+TEST(SDNNC, LargeWeightsAllocateNothing) {
+  SDNNCConfig config = small();
   config.lattice = 64;
   config.initial_threshold = 0.0;
   Network network(config, 1);
@@ -278,11 +278,11 @@ TEST(SdnnC, LargeWeightsAllocateNothing) {
     for (double& value : state) value = random.uniform();
   }
   EXPECT_EQ(testing::allocation_count(), before);
-  EXPECT_TRUE(network.perceptron().has_high_bytes());
+  EXPECT_TRUE(network.hidden_layer().has_high_bytes());
   EXPECT_EQ(values(network, state), values_by_masks(network, state));
 }
 
-TEST(SdnnC, CopiesShareNothingThatIsLearned) {
+TEST(SDNNC, CopiesShareNothingThatIsLearned) {
   Network original(small(), 3);
   const State state = {0.2, 0.4, 0.6};
   original.correct(state, 5, 9.0);
@@ -299,13 +299,13 @@ TEST(SdnnC, CopiesShareNothingThatIsLearned) {
   EXPECT_EQ(values(original, state), values(copy, state));
 }
 
-TEST(SdnnC, ParametersCanBeMovedToAnotherNetworkOfTheSameWiring) {
+TEST(SDNNC, ParametersCanBeMovedToAnotherNetworkOfTheSameWiring) {
   Network teacher(small(), 3);
   Network pupil(small(), 3);
   const State state = {0.2, 0.4, 0.6};
   for (int i = 0; i < 100; ++i) teacher.correct(state, 5, 12.0);
   (void)pupil.value(state, 5);  // remembered: must be forgotten
-  const ParallelPerceptron& p = teacher.perceptron();
+  const HiddenLayer& p = teacher.hidden_layer();
   std::vector<std::int32_t> weights;
   std::vector<std::int32_t> thresholds;
   for (std::size_t i = 0; i < p.n_units(); ++i) {
@@ -324,7 +324,7 @@ TEST(SdnnC, ParametersCanBeMovedToAnotherNetworkOfTheSameWiring) {
   EXPECT_THROW(pupil.set_parameters(weights, thresholds), std::invalid_argument);
 }
 
-TEST(SdnnC, TheSameSeedGivesTheSameNetworkAndAnotherSeedAnother) {
+TEST(SDNNC, TheSameSeedGivesTheSameNetworkAndAnotherSeedAnother) {
   const Network first(small(), 3), same(small(), 3), other(small(), 4);
   expect_equal_parameters(first, same);
   const auto& book = [](const Network& network) -> const auto& {
@@ -337,17 +337,32 @@ TEST(SdnnC, TheSameSeedGivesTheSameNetworkAndAnotherSeedAnother) {
   EXPECT_NE(first.state_code().permutation(0, 2), first.state_code().permutation(2, 0));
 }
 
-TEST(SdnnC, OddSizesLearnAsWell) {
+TEST(SDNNC, OddSizesLearnAsWell) {
   core::Random random(8, core::Stream::weights);
-  for (const SdnnCConfig& config :
-       {SdnnCConfig{.n_inputs = 2, .n_pattern_units = 2, .n_anchor_patterns = 2,
-                    .n_interpolated = 0, .n_hidden_units = 2, .n_active_units = 1},
-        SdnnCConfig{.n_inputs = 5, .n_pattern_units = 37, .n_anchor_patterns = 4,
-                    .n_interpolated = 10, .n_hidden_units = 101, .n_active_units = 33},
-        SdnnCConfig{.n_inputs = 2, .n_pattern_units = 256, .circular = {true, false},
-                    .n_hidden_units = 65, .n_active_units = 64, .n_actions = 2},
-        SdnnCConfig{.n_inputs = 3, .n_pattern_units = 65, .balanced_anchors = false,
-                    .n_hidden_units = 1000, .n_active_units = 1000, .lattice = 64}}) {
+  for (const SDNNCConfig& config : {SDNNCConfig{.n_inputs = 2,
+                                                .n_pattern_units = 2,
+                                                .n_anchor_patterns = 2,
+                                                .n_interpolated = 0,
+                                                .n_hidden_units = 2,
+                                                .n_active_units = 1},
+                                    SDNNCConfig{.n_inputs = 5,
+                                                .n_pattern_units = 37,
+                                                .n_anchor_patterns = 4,
+                                                .n_interpolated = 10,
+                                                .n_hidden_units = 101,
+                                                .n_active_units = 33},
+                                    SDNNCConfig{.n_inputs = 2,
+                                                .n_pattern_units = 256,
+                                                .circular = {true, false},
+                                                .n_hidden_units = 65,
+                                                .n_active_units = 64,
+                                                .n_actions = 2},
+                                    SDNNCConfig{.n_inputs = 3,
+                                                .n_pattern_units = 65,
+                                                .balanced_anchors = false,
+                                                .n_hidden_units = 1000,
+                                                .n_active_units = 1000,
+                                                .lattice = 64}}) {
     Network network(config, 1);
     for (int i = 0; i < 60; ++i) {
       const State state = random_state(network.n_inputs(), random);
@@ -357,14 +372,14 @@ TEST(SdnnC, OddSizesLearnAsWell) {
   }
 }
 
-TEST(SdnnC, TheEndsOfTheUnitIntervalAreStates) {
+TEST(SDNNC, TheEndsOfTheUnitIntervalAreStates) {
   Network network(small(), 1);
   EXPECT_EQ(values(network, {0.0, 0.0, 0.0}).size(), 141U);
   EXPECT_EQ(values(network, {1.0, 1.0, 1.0}), values(network, {0.9999, 0.9999, 0.9999}));
   EXPECT_EQ(values(network, {-0.0, 0.0, 0.0}), values(network, {0.0, 0.0, 0.0}));
 }
 
-std::string message(const SdnnCConfig& config) {
+std::string message(const SDNNCConfig& config) {
   try {
     Network(config, 1);
   } catch (const std::invalid_argument& error) {
@@ -373,11 +388,11 @@ std::string message(const SdnnCConfig& config) {
   return "no error";
 }
 
-void expect_named(const SdnnCConfig& config, const std::string& name) {
+void expect_named(const SDNNCConfig& config, const std::string& name) {
   EXPECT_EQ(message(config).rfind(name + " must be ", 0), 0U) << message(config);
 }
 
-TEST(SdnnC, NamesTheFieldThatIsImpossible) {
+TEST(SDNNC, NamesTheFieldThatIsImpossible) {
   const double nan = std::nan("");
   EXPECT_EQ(message({.n_hidden_units = 900, .n_active_units = 901}),
             "n_active_units must be in [1, 900], got 901");
@@ -407,12 +422,12 @@ TEST(SdnnC, NamesTheFieldThatIsImpossible) {
   EXPECT_THROW(Network({.n_pattern_units = 257}, 1), std::length_error);
 }
 
-TEST(SdnnC, ABadArgumentChangesNothing) {
+TEST(SDNNC, ABadArgumentChangesNothing) {
   Network network(small(), 1);
   const Network before = network;
   const State good = {0.1, 0.2, 0.3};
-  for (const double bad : {std::nan(""), -1e-300, 1.0000001,
-                           std::numeric_limits<double>::infinity()}) {
+  for (const double bad :
+       {std::nan(""), -1e-300, 1.0000001, std::numeric_limits<double>::infinity()}) {
     const State state = {0.1, bad, 0.3};
     EXPECT_THROW((void)network.value(state, 0), std::invalid_argument);
     EXPECT_THROW(network.correct(state, 0, 1.0), std::invalid_argument);

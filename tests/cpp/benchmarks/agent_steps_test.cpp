@@ -20,10 +20,10 @@ namespace {
 
 using agents::FuzzyQLearning;
 using agents::QLearning;
-using approximators::DynamicSdnnC;
+using approximators::DynamicSDNNC;
 using approximators::FuzzyRules;
-using approximators::RbfNetwork;
-using approximators::RbfNetworkConfig;
+using approximators::RBFNetwork;
+using approximators::RBFNetworkConfig;
 
 /// Writes down what it is asked; its action is the number of acts before.
 class Witness {
@@ -46,8 +46,8 @@ class Witness {
   void learn(std::span<const double> state, int action, double reward,
              std::span<const double> next_state, bool terminated) {
     calls += terminated ? 't' : 'l';
-    learned.push_back({{state.begin(), state.end()}, action, reward,
-                       {next_state.begin(), next_state.end()}});
+    learned.push_back(
+        {{state.begin(), state.end()}, action, reward, {next_state.begin(), next_state.end()}});
   }
 
   std::string calls;
@@ -90,18 +90,19 @@ void expect_times(Agent agent) {
 }
 
 TEST(TimeAgentSteps, TimesEveryAgent) {
-  const RbfNetworkConfig rbf = {.n_inputs = 2, .n_actions = 21};
-  expect_times(QLearning<DynamicSdnnC>(
-      DynamicSdnnC({.n_inputs = 2, .n_pattern_units = 40, .n_hidden_units = 100,
-                    .n_active_units = 30}, 1), {}, 1));
+  const RBFNetworkConfig rbf = {.n_inputs = 2, .n_actions = 21};
+  expect_times(QLearning<DynamicSDNNC>(
+      DynamicSDNNC(
+          {.n_inputs = 2, .n_pattern_units = 40, .n_hidden_units = 100, .n_active_units = 30}, 1),
+      {}, 1));
   expect_times(FuzzyQLearning(FuzzyRules({.n_inputs = 2}), {}, 1));
-  expect_times(QLearning<RbfNetwork>(RbfNetwork(rbf), {}, 1));
-  expect_times(QLearning<PlainRbfNetwork>(PlainRbfNetwork(rbf), {}, 1));
+  expect_times(QLearning<RBFNetwork>(RBFNetwork(rbf), {}, 1));
+  expect_times(QLearning<PlainRBFNetwork>(PlainRBFNetwork(rbf), {}, 1));
 }
 
 // Otherwise the memory of potentials would be what is timed.
 TEST(TimeAgentSteps, EveryStepOfALargeNetworkTakesAFullPass) {
-  QLearning<DynamicSdnnC> agent(DynamicSdnnC({.n_inputs = 6}, 1), {}, 1);
+  QLearning<DynamicSDNNC> agent(DynamicSDNNC({.n_inputs = 6}, 1), {}, 1);
   time_agent_steps(agent, 100, 1);
   agent.action_value().visit([](const auto& network) {
     EXPECT_GE(network.memory().counts().full, 98U);
@@ -110,9 +111,9 @@ TEST(TimeAgentSteps, EveryStepOfALargeNetworkTakesAFullPass) {
 }
 
 TEST(TimeAgentSteps, PlainAndFactoredAgentsLearnTheSame) {
-  const RbfNetworkConfig rbf = {.n_inputs = 3};
-  QLearning<RbfNetwork> factored(RbfNetwork(rbf), {}, 1);
-  QLearning<PlainRbfNetwork> plain(PlainRbfNetwork(rbf), {}, 1);
+  const RBFNetworkConfig rbf = {.n_inputs = 3};
+  QLearning<RBFNetwork> factored(RBFNetwork(rbf), {}, 1);
+  QLearning<PlainRBFNetwork> plain(PlainRBFNetwork(rbf), {}, 1);
   time_agent_steps(factored, 200, 1);
   time_agent_steps(plain, 200, 1);
   const auto expected = factored.action_value().weights();

@@ -8,18 +8,18 @@
 namespace sdnn::benchmarks {
 namespace {
 
-using approximators::DynamicSdnnC;
+using approximators::DynamicSDNNC;
 
-DynamicSdnnC small_network() {
-  return DynamicSdnnC({.n_inputs = 3, .n_pattern_units = 40, .n_hidden_units = 100,
-                       .n_active_units = 30}, 1);
+DynamicSDNNC small_network() {
+  return DynamicSDNNC(
+      {.n_inputs = 3, .n_pattern_units = 40, .n_hidden_units = 100, .n_active_units = 30}, 1);
 }
 
-int n_different_weights(const DynamicSdnnC& a, const DynamicSdnnC& b) {
+int n_different_weights(const DynamicSDNNC& a, const DynamicSDNNC& b) {
   int n = 0;
-  for (std::size_t i = 0; i < a.perceptron().n_units(); ++i) {
-    for (std::size_t j = 0; j < a.perceptron().n_columns(); ++j) {
-      n += a.perceptron().weight(i, j) != b.perceptron().weight(i, j);
+  for (std::size_t i = 0; i < a.hidden_layer().n_units(); ++i) {
+    for (std::size_t j = 0; j < a.hidden_layer().n_columns(); ++j) {
+      n += a.hidden_layer().weight(i, j) != b.hidden_layer().weight(i, j);
     }
   }
   return n;
@@ -38,20 +38,19 @@ TEST(NetworkParts, ACorrectionCorrectsAsManyUnitsAsAsked) {
   NetworkParts parts(small_network(), 1);
   parts.time_corrections(1, 6);
   int n_changed = 0;
-  const DynamicSdnnC before = small_network();
+  const DynamicSDNNC before = small_network();
   for (std::size_t i = 0; i < 100; ++i) {
-    n_changed += parts.network().perceptron().threshold(i) != before.perceptron().threshold(i);
+    n_changed += parts.network().hidden_layer().threshold(i) != before.hidden_layer().threshold(i);
   }
   EXPECT_EQ(n_changed, 6);
 }
 
 // A new state must mean a full pass: otherwise the pass is not what is timed.
 TEST(NetworkParts, NewStatesOfThePapersSizesTakeFullPasses) {
-  NetworkParts parts(DynamicSdnnC({.n_inputs = 6}, 1), 1);
+  NetworkParts parts(DynamicSDNNC({.n_inputs = 6}, 1), 1);
   parts.time_values(200);
-  parts.network().visit([](const auto& network) {
-    EXPECT_GE(network.memory().counts().full, 195U);
-  });
+  parts.network().visit(
+      [](const auto& network) { EXPECT_GE(network.memory().counts().full, 195U); });
 }
 
 // 100 units are padded to 128; of 120 modifiers half are active, and each takes one column of two.

@@ -14,16 +14,16 @@
 namespace sdnn::benchmarks {
 namespace {
 
-using approximators::RbfNetwork;
-using approximators::RbfNetworkConfig;
+using approximators::RBFNetwork;
+using approximators::RBFNetworkConfig;
 
-static_assert(approximators::ActionValue<PlainRbfNetwork>);
-static_assert(agents::Agent<agents::QLearning<PlainRbfNetwork>>);
+static_assert(approximators::ActionValue<PlainRBFNetwork>);
+static_assert(agents::Agent<agents::QLearning<PlainRBFNetwork>>);
 
 // d = 1, two bases at 0 and 1; a step at x = 1/2 for the middle of three actions has all four
 // joint bases 1/4: each weight becomes 1/2 of 8 of 1/4 = 1, so Q = 1 everywhere.
-TEST(PlainRbfNetwork, OneGradientStepByHand) {
-  PlainRbfNetwork network({.n_inputs = 1, .n_bases = 2, .n_actions = 3, .gradient_rate = 0.5});
+TEST(PlainRBFNetwork, OneGradientStepByHand) {
+  PlainRBFNetwork network({.n_inputs = 1, .n_bases = 2, .n_actions = 3, .gradient_rate = 0.5});
   EXPECT_EQ(network.n_inputs(), 1U);
   EXPECT_EQ(network.n_actions(), 3U);
   const std::vector<double> state = {0.5}, other = {0.2};
@@ -36,10 +36,10 @@ TEST(PlainRbfNetwork, OneGradientStepByHand) {
   }
 }
 
-TEST(PlainRbfNetwork, GivesAndLearnsWhatTheFactoredOneDoes) {
-  const RbfNetworkConfig config = {.n_inputs = 3, .n_actions = 17};
-  RbfNetwork factored(config);
-  PlainRbfNetwork plain(config);
+TEST(PlainRBFNetwork, GivesAndLearnsWhatTheFactoredOneDoes) {
+  const RBFNetworkConfig config = {.n_inputs = 3, .n_actions = 17};
+  RBFNetwork factored(config);
+  PlainRBFNetwork plain(config);
   std::vector<double> expected(17), out(17);
   for (int i = 1; i <= 50; ++i) {
     const std::vector<double> state = {0.02 * i, 1.0 - 0.01 * i, 0.3};
@@ -54,9 +54,9 @@ TEST(PlainRbfNetwork, GivesAndLearnsWhatTheFactoredOneDoes) {
   EXPECT_TRUE(std::ranges::equal(plain.network().weights(), factored.weights()));
 }
 
-TEST(PlainRbfNetwork, RefusesWhatTheFactoredOneRefuses) {
-  EXPECT_THROW(PlainRbfNetwork({.n_bases = 1}), std::invalid_argument);
-  PlainRbfNetwork network({.n_inputs = 2, .n_actions = 3});
+TEST(PlainRBFNetwork, RefusesWhatTheFactoredOneRefuses) {
+  EXPECT_THROW(PlainRBFNetwork({.n_bases = 1}), std::invalid_argument);
+  PlainRBFNetwork network({.n_inputs = 2, .n_actions = 3});
   const std::vector<double> good = {0.1, 0.2}, bad = {0.1, 1.2};
   std::vector<double> out(3), short_out(2);
   EXPECT_THROW(network.values(bad, out), std::invalid_argument);

@@ -28,13 +28,11 @@ TEST(BufferRead, ReadsEveryByte) {
 
 TEST(BufferRead, InstructionSetsAgree) {
   std::vector<std::byte> bytes(640 + 64);
-  auto* const aligned =
-      bytes.data() + (64 - reinterpret_cast<std::size_t>(bytes.data()) % 64) % 64;
+  auto* const aligned = bytes.data() + (64 - reinterpret_cast<std::size_t>(bytes.data()) % 64) % 64;
   for (std::size_t i = 0; i < 640; ++i) aligned[i] = static_cast<std::byte>(i * i);
 #if SDNN_X86_KERNELS
   if (core::best_instruction_set() >= core::InstructionSet::avx2) {
-    EXPECT_EQ(internal::sum_of_words_avx2(aligned, 640),
-              internal::sum_of_words_portable(aligned, 640));
+    EXPECT_EQ(detail::sum_of_words_avx2(aligned, 640), detail::sum_of_words_portable(aligned, 640));
   }
 #endif
 }
@@ -45,8 +43,8 @@ TEST(DenseProduct, IsTheProductAtAnySize) {
     DenseProduct product(n_rows, n_columns, 1);
     const auto out = product.multiply();
     std::vector<float> portable(n_rows);
-    internal::multiply_portable(product.weights().data(), n_rows, n_columns,
-                                product.input().data(), portable.data());
+    detail::multiply_portable(product.weights().data(), n_rows, n_columns, product.input().data(),
+                              portable.data());
     ASSERT_EQ(out.size(), n_rows);
     for (std::size_t i = 0; i < n_rows; ++i) {
       double expected = 0.0;

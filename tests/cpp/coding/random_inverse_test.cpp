@@ -14,7 +14,8 @@ using coding::PatternTable;
 
 int product(const PatternTable& table, std::size_t one, std::size_t other) {
   int sum = 0;
-  for (std::size_t k = 0; k < table.n_units(); ++k) sum += table.sign(one, k) * table.sign(other, k);
+  for (std::size_t k = 0; k < table.n_units(); ++k)
+    sum += table.sign(one, k) * table.sign(other, k);
   return sum;
 }
 
@@ -62,7 +63,8 @@ TEST(AnchorPatterns, AreThoseOfTheCompiledCodeBook) {
     ASSERT_EQ(table.n_bins(), book.n_bins());
     for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {
       for (std::size_t k = 0; k < 130; ++k) {
-        ASSERT_EQ(table.sign(bin, k) > 0, book[static_cast<coding::Bin>(bin)][k]) << bin << ' ' << k;
+        ASSERT_EQ(table.sign(bin, k) > 0, book[static_cast<coding::Bin>(bin)][k])
+            << bin << ' ' << k;
       }
     }
   }

@@ -57,9 +57,7 @@ TEST(BitLayer, DeMorgan) {
   EXPECT_EQ((a ^ b).count(), a.count() + b.count() - 2 * (a & b).count());
 }
 
-TEST(BitLayer, RefusesMoreThanItsCapacity) {
-  EXPECT_THROW(BitLayer<64>(65), std::length_error);
-}
+TEST(BitLayer, RefusesMoreThanItsCapacity) { EXPECT_THROW(BitLayer<64>(65), std::length_error); }
 
 }  // namespace
 }  // namespace sdnn::core

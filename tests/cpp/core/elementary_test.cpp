@@ -17,9 +17,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // True for the same number or one of its two neighbours.
-bool adjacent(double a, double b) {
-  return a == b || std::nextafter(a, b) == b;
-}
+bool adjacent(double a, double b) { return a == b || std::nextafter(a, b) == b; }
 
 // References: mpmath with 40 digits, rounded once.
 TEST(SinCos, IsWithinOneUlpAtRepresentativeAndHardPoints) {
@@ -122,10 +120,10 @@ TEST(Log, HandlesTheEndsOfItsRange) {
 
 TEST(Exp, IsWithinOneUlpAtRepresentativeAndHardPoints) {
   constexpr std::pair<double, double> kRows[] = {
-      {1.0, 0x1.5bf0a8b145769p+1},       {-1.0, 0x1.78b56362cef38p-2},
-      {0.5, 0x1.a61298e1e069cp+0},       {-0.5, 0x1.368b2fc6f960ap-1},
-      {10.0, 0x1.5829dcf950560p+14},     {-10.0, 0x1.7cd79b5647c9bp-15},
-      {100.0, 0x1.3494a9b171bf5p+144},   {-700.0, 0x1.14f2b0fb9307fp-1010},
+      {1.0, 0x1.5bf0a8b145769p+1},        {-1.0, 0x1.78b56362cef38p-2},
+      {0.5, 0x1.a61298e1e069cp+0},        {-0.5, 0x1.368b2fc6f960ap-1},
+      {10.0, 0x1.5829dcf950560p+14},      {-10.0, 0x1.7cd79b5647c9bp-15},
+      {100.0, 0x1.3494a9b171bf5p+144},    {-700.0, 0x1.14f2b0fb9307fp-1010},
       {0.34657359, 0x1.6a09e66640654p+0}, {1e-09, 0x1.000000044b830p+0},
   };
   for (const auto& [x, expected] : kRows) {

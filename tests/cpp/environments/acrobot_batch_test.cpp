@@ -31,8 +31,8 @@ class AtLevel {
 
 std::vector<core::InstructionSet> offered_levels() {
   std::vector<core::InstructionSet> levels;
-  for (const auto level : {core::InstructionSet::portable, core::InstructionSet::avx2,
-                           core::InstructionSet::avx512}) {
+  for (const auto level :
+       {core::InstructionSet::portable, core::InstructionSet::avx2, core::InstructionSet::avx512}) {
     if (level <= core::best_instruction_set()) levels.push_back(level);
   }
   return levels;
@@ -57,8 +57,8 @@ struct Step {
 
 // Random starts, torques and lambdas; some acrobots stand still, ended ones begin anew. Returns the
 // number of episodes and adds the goals to `n_goals`.
-int compare_with_single(const AcrobotConfig& config, std::size_t n, int n_steps,
-                        std::uint64_t seed, int& n_goals) {
+int compare_with_single(const AcrobotConfig& config, std::size_t n, int n_steps, std::uint64_t seed,
+                        int& n_goals) {
   core::Random random(seed, core::Stream::exploration);
   AcrobotBatch batch(config, n);
   std::vector<Acrobot> singles(n, Acrobot(config));

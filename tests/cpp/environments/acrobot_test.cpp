@@ -15,8 +15,8 @@
 namespace {
 
 using namespace sdnn::environments;
-using sdnn::core::kPi;
 using Eigen::Vector4d;
+using sdnn::core::kPi;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -276,7 +276,7 @@ TEST(AcrobotTask, SaysWhenTheSpeedBreaksTheIntegration) {
 }
 
 TEST(AcrobotTask, RejectsBadConfigurations) {
-  for (double AcrobotConfig::*field :
+  for (double AcrobotConfig::* field :
        {&AcrobotConfig::link_mass_1, &AcrobotConfig::link_mass_2, &AcrobotConfig::link_length_1,
         &AcrobotConfig::link_length_2, &AcrobotConfig::center_of_mass_1,
         &AcrobotConfig::center_of_mass_2, &AcrobotConfig::inertia_1, &AcrobotConfig::inertia_2,
@@ -289,8 +289,8 @@ TEST(AcrobotTask, RejectsBadConfigurations) {
       EXPECT_THROW(Acrobot{config}, std::invalid_argument);
     }
   }
-  for (double AcrobotConfig::*field : {&AcrobotConfig::gravity, &AcrobotConfig::goal_height,
-                                       &AcrobotConfig::goal_reward, &AcrobotConfig::penalty}) {
+  for (double AcrobotConfig::* field : {&AcrobotConfig::gravity, &AcrobotConfig::goal_height,
+                                        &AcrobotConfig::goal_reward, &AcrobotConfig::penalty}) {
     AcrobotConfig config;
     config.*field = kNaN;
     EXPECT_THROW(Acrobot{config}, std::invalid_argument);

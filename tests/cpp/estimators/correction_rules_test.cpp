@@ -28,7 +28,8 @@ Pairs apply(Rule& rule, std::size_t sample, const std::vector<std::int32_t>& pot
 
 TEST(PDeltaRule, CorrectsTheNearestLowestIndexFirst) {
   const std::vector<std::int32_t> potentials{5, -2, 0, 3, -2, -9};  // units 0 and 3 fire
-  estimators::PDeltaRule rule(6, std::vector<double>{2.0, 4.0, 1.0, 3.49, 3.5, 0.0, 99.0, -99.0}, 1);
+  estimators::PDeltaRule rule(6, std::vector<double>{2.0, 4.0, 1.0, 3.49, 3.5, 0.0, 99.0, -99.0},
+                              1);
   EXPECT_EQ(apply(rule, 0, potentials), Pairs{});
   EXPECT_EQ(apply(rule, 1, potentials), (Pairs{{1, 1}, {2, 1}}));  // 0, then -2 of unit 1
   EXPECT_EQ(apply(rule, 2, potentials), (Pairs{{3, -1}}));
@@ -59,18 +60,22 @@ TEST(PDeltaRule, AgreesWithSorting) {
     const double target = random.uniform() * static_cast<double>(n);
     std::vector<std::int32_t> potentials(n);
     for (auto& p : potentials) p = static_cast<std::int32_t>(random.below(21)) - 10;
-    const auto n_firing = std::count_if(potentials.begin(), potentials.end(), [](auto p) { return p > 0; });
-    const auto deficit = static_cast<std::int32_t>(target + 0.5) - static_cast<std::int32_t>(n_firing);
+    const auto n_firing =
+        std::count_if(potentials.begin(), potentials.end(), [](auto p) { return p > 0; });
+    const auto deficit =
+        static_cast<std::int32_t>(target + 0.5) - static_cast<std::int32_t>(n_firing);
     Pairs ranked;
     for (std::uint32_t i = 0; i < n; ++i) {
       if ((potentials[i] > 0) == (deficit < 0)) {
-        ranked.emplace_back(static_cast<std::uint32_t>(std::abs(potentials[i])), static_cast<std::int32_t>(i));
+        ranked.emplace_back(static_cast<std::uint32_t>(std::abs(potentials[i])),
+                            static_cast<std::int32_t>(i));
       }
     }
     std::sort(ranked.begin(), ranked.end());
     Pairs expected;
     for (int k = 0; k < std::abs(deficit); ++k) {
-      expected.emplace_back(static_cast<std::uint32_t>(ranked[static_cast<std::size_t>(k)].second), deficit > 0 ? 1 : -1);
+      expected.emplace_back(static_cast<std::uint32_t>(ranked[static_cast<std::size_t>(k)].second),
+                            deficit > 0 ? 1 : -1);
     }
     std::sort(expected.begin(), expected.end());
     estimators::PDeltaRule rule(n, std::vector<double>{target}, 1);
@@ -78,16 +83,16 @@ TEST(PDeltaRule, AgreesWithSorting) {
   }
 }
 
-TEST(ErrorCorrectionRule, OneVersusRest) {
-  estimators::ErrorCorrectionRule rule(3, std::vector<std::int32_t>{1}, 3, ClassScheme::one_vs_rest);
+TEST(PerceptronRule, OneVersusRest) {
+  estimators::PerceptronRule rule(3, std::vector<std::int32_t>{1}, 3, ClassScheme::one_vs_rest);
   EXPECT_EQ(apply(rule, 0, {1, 0, -1}), (Pairs{{0, -1}, {1, 1}}));
   EXPECT_EQ(apply(rule, 0, {0, 1, 0}), Pairs{});
 }
 
-TEST(ErrorCorrectionRule, OneVersusOne) {
+TEST(PerceptronRule, OneVersusOne) {
   // Units (0,1) (0,2) (0,3) (1,2) (1,3) (2,3).
   const std::vector<std::int32_t> labels{0, 2, 3};
-  estimators::ErrorCorrectionRule rule(6, labels, 4, ClassScheme::one_vs_one);
+  estimators::PerceptronRule rule(6, labels, 4, ClassScheme::one_vs_one);
   EXPECT_EQ(apply(rule, 0, {0, 0, 0, 0, 0, 0}), (Pairs{{0, 1}, {1, 1}, {2, 1}}));
   EXPECT_EQ(apply(rule, 1, {1, 1, 1, 1, 1, 0}), (Pairs{{1, -1}, {3, -1}, {5, 1}}));
   EXPECT_EQ(apply(rule, 2, {1, 1, 1, 1, 1, 1}), (Pairs{{2, -1}, {4, -1}, {5, -1}}));
@@ -99,10 +104,10 @@ TEST(CorrectionRules, RefuseBadArguments) {
   EXPECT_THROW(estimators::PDeltaRule(3, std::vector<double>{1, 1}, 2), std::invalid_argument);
   EXPECT_THROW(estimators::PDeltaRule(4, std::vector<double>{1}, 0), std::invalid_argument);
   const std::vector<std::int32_t> labels{0, 3};
-  using estimators::ErrorCorrectionRule;
-  EXPECT_THROW(ErrorCorrectionRule(3, labels, 3, ClassScheme::one_vs_rest), std::invalid_argument);
-  EXPECT_THROW(ErrorCorrectionRule(3, labels, 4, ClassScheme::one_vs_rest), std::invalid_argument);
-  EXPECT_THROW(ErrorCorrectionRule(1, labels, 1, ClassScheme::one_vs_one), std::invalid_argument);
+  using estimators::PerceptronRule;
+  EXPECT_THROW(PerceptronRule(3, labels, 3, ClassScheme::one_vs_rest), std::invalid_argument);
+  EXPECT_THROW(PerceptronRule(3, labels, 4, ClassScheme::one_vs_rest), std::invalid_argument);
+  EXPECT_THROW(PerceptronRule(1, labels, 1, ClassScheme::one_vs_one), std::invalid_argument);
 }
 
 }  // namespace

@@ -17,12 +17,12 @@ using estimators::StandardLibrary;
 constexpr std::array<std::uint32_t, 1> kSeed{1};
 
 TEST(Libsdnn, ColumnsAreReversedInGroupsOf32) {
-  EXPECT_EQ(estimators::internal::libsdnn_column(0, 70), 31U);
-  EXPECT_EQ(estimators::internal::libsdnn_column(31, 70), 0U);
-  EXPECT_EQ(estimators::internal::libsdnn_column(32, 70), 63U);
-  EXPECT_EQ(estimators::internal::libsdnn_column(64, 70), 69U);
-  EXPECT_EQ(estimators::internal::libsdnn_column(69, 70), 64U);
-  EXPECT_EQ(estimators::internal::libsdnn_column(0, 64), 31U);
+  EXPECT_EQ(estimators::detail::libsdnn_column(0, 70), 31U);
+  EXPECT_EQ(estimators::detail::libsdnn_column(31, 70), 0U);
+  EXPECT_EQ(estimators::detail::libsdnn_column(32, 70), 63U);
+  EXPECT_EQ(estimators::detail::libsdnn_column(64, 70), 69U);
+  EXPECT_EQ(estimators::detail::libsdnn_column(69, 70), 64U);
+  EXPECT_EQ(estimators::detail::libsdnn_column(0, 64), 31U);
 }
 
 #if defined(__GLIBCXX__) && defined(_GLIBCXX_RELEASE) && _GLIBCXX_RELEASE >= 11

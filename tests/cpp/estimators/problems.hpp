@@ -71,12 +71,12 @@ inline Problem random_problem(std::uint64_t seed) {
   return problem;
 }
 
-inline std::shared_ptr<estimators::PerceptronLayer> layer_for(const Problem& problem) {
-  return std::make_shared<estimators::PerceptronLayer>(problem.code, problem.n_units, 7);
+inline std::shared_ptr<estimators::ParallelPerceptron> layer_for(const Problem& problem) {
+  return std::make_shared<estimators::ParallelPerceptron>(problem.code, problem.n_units, 7);
 }
 
 inline estimators::PDeltaTrainer trainer_for(const Problem& problem,
-                                             std::shared_ptr<estimators::PerceptronLayer> layer,
+                                             std::shared_ptr<estimators::ParallelPerceptron> layer,
                                              estimators::TrainingForm form, int n_threads = 1) {
   return {std::move(layer),
           problem.bins,
@@ -87,7 +87,7 @@ inline estimators::PDeltaTrainer trainer_for(const Problem& problem,
 }
 
 /// All thresholds and weights.
-inline std::vector<std::int32_t> bits_of(const estimators::PerceptronLayer& layer) {
+inline std::vector<std::int32_t> bits_of(const estimators::ParallelPerceptron& layer) {
   std::vector<std::int32_t> bits(layer.thresholds().begin(), layer.thresholds().end());
   for (std::size_t i = 0; i < layer.n_units(); ++i) {
     for (std::size_t j = 0; j < layer.code().n_columns(); ++j) bits.push_back(layer.weight(i, j));

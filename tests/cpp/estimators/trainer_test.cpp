@@ -16,8 +16,8 @@ TEST(Trainer, ClassifiersHaveTheSameBitsInAllForms) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     auto problem = testing::random_problem(seed);
     const std::size_t n_classes = 2 + seed % 11;
-    const auto scheme = seed % 2 == 0 ? estimators::ClassScheme::one_vs_one
-                                      : estimators::ClassScheme::one_vs_rest;
+    const auto scheme =
+        seed % 2 == 0 ? estimators::ClassScheme::one_vs_one : estimators::ClassScheme::one_vs_rest;
     problem.n_units = estimators::n_units_for(scheme, n_classes);
     const std::size_t n_samples = problem.bins.size() / problem.code->n_inputs();
     std::vector<std::int32_t> labels;
@@ -27,9 +27,9 @@ TEST(Trainer, ClassifiersHaveTheSameBitsInAllForms) {
     std::vector<std::vector<std::int32_t>> bits;
     for (const auto form : {TrainingForm::plain, TrainingForm::dual, TrainingForm::block}) {
       const auto layer = testing::layer_for(problem);
-      estimators::ErrorCorrectionTrainer trainer(
+      estimators::PerceptronTrainer trainer(
           layer, problem.bins,
-          estimators::ErrorCorrectionRule(problem.n_units, labels, n_classes, scheme), form,
+          estimators::PerceptronRule(problem.n_units, labels, n_classes, scheme), form,
           std::size_t{1} << 30, 1);
       for (const auto& order : problem.orders) trainer.present(order);
       trainer.synchronize();
@@ -49,12 +49,12 @@ TEST(Trainer, StopsBeforeAPotentialOverflows) {
   const auto reach = static_cast<std::int32_t>(problem.code->max_active()) + 1;
   for (const auto form : {TrainingForm::plain, TrainingForm::dual, TrainingForm::block}) {
     thresholds[0] = INT32_MAX - reach + 1;  // no room for a single correction
-    auto layer = std::make_shared<estimators::PerceptronLayer>(problem.code, problem.n_units,
-                                                               weights, thresholds);
+    auto layer = std::make_shared<estimators::ParallelPerceptron>(problem.code, problem.n_units,
+                                                                  weights, thresholds);
     EXPECT_THROW(testing::trainer_for(problem, layer, form), std::overflow_error);
     thresholds[0] = INT32_MAX - 3 * reach;  // room for three
-    layer = std::make_shared<estimators::PerceptronLayer>(problem.code, problem.n_units, weights,
-                                                          thresholds);
+    layer = std::make_shared<estimators::ParallelPerceptron>(problem.code, problem.n_units, weights,
+                                                             thresholds);
     auto trainer = testing::trainer_for(problem, layer, form);
     for (const auto& order : problem.orders) trainer.present(order);
     trainer.synchronize();

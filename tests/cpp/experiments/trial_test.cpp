@@ -23,7 +23,7 @@ namespace sdnn::experiments {
 namespace {
 
 using testing::LookupTable;
-using Network = approximators::SdnnC<256>;
+using Network = approximators::SDNNC<256>;
 
 /// What a test varies; the rest is the paper's.
 struct Setting {
@@ -57,8 +57,8 @@ agents::FuzzyQLearning fuzzy_agent(const Setting& setting) {
 }
 
 auto rbf_trial(const Setting& setting) {
-  return trial(
-      approximators::RbfNetwork({.n_inputs = setting.sensors.n_sensors, .width = 1.0}), setting);
+  return trial(approximators::RBFNetwork({.n_inputs = setting.sensors.n_sensors, .width = 1.0}),
+               setting);
 }
 
 /// FNV-1a over the rows, returns by their bits.
@@ -107,7 +107,7 @@ TEST(AcrobotTrial, GoldenTracesOfFuzzyQLearning) {
   EXPECT_EQ(digest(noisy.rows()), 1660777440214468387U);
 }
 
-TEST(AcrobotTrial, GoldenTracesOfTheRbfNetwork) {
+TEST(AcrobotTrial, GoldenTracesOfTheRBFNetwork) {
   auto plain = rbf_trial({.protocol = {.n_learning_episodes = 200}});
   plain.advance(200);
   EXPECT_EQ(plain.n_decisions(), 940);
@@ -147,13 +147,13 @@ TEST(AcrobotTrial, TheSameSeedGivesEveryAgentTheSameNoise) {
   const Setting setting{.sensors = {.n_sensors = 5, .noise = 0.02}, .seed = 9};
   const auto fuzzy = observed_by(fuzzy_agent(setting), setting);
   EXPECT_EQ(fuzzy.size(), 22U * 50U * 5U);
-  EXPECT_EQ(fuzzy, observed_by(agents::QLearning<LookupTable>(LookupTable(5, 4, 7), {}, 9),
+  EXPECT_EQ(fuzzy,
+            observed_by(agents::QLearning<LookupTable>(LookupTable(5, 4, 7), {}, 9), setting));
+  EXPECT_EQ(fuzzy, observed_by(agents::QLearning<approximators::RBFNetwork>(
+                                   approximators::RBFNetwork({.n_inputs = 5}), {}, 9),
                                setting));
-  EXPECT_EQ(fuzzy, observed_by(agents::QLearning<approximators::RbfNetwork>(
-                                   approximators::RbfNetwork({.n_inputs = 5}), {}, 9),
-                               setting));
-  EXPECT_EQ(fuzzy, observed_by(agents::QLearning<Network>(Network({.n_inputs = 5}, 9), {}, 9),
-                               setting));
+  EXPECT_EQ(fuzzy,
+            observed_by(agents::QLearning<Network>(Network({.n_inputs = 5}, 9), {}, 9), setting));
 }
 
 TEST(AcrobotTrial, PiecesEqualTheWhole) {
@@ -201,7 +201,8 @@ TEST(AcrobotTrial, EpisodesAreCountedAndTestedWhenDue) {
 }
 
 TEST(AcrobotTrial, AnUnsolvedTestEpisodeCountsAllItsDecisions) {
-  auto run = table_trial({.acrobot = {.goal_height = 2.5}, .protocol = {.n_learning_episodes = 20}});
+  auto run =
+      table_trial({.acrobot = {.goal_height = 2.5}, .protocol = {.n_learning_episodes = 20}});
   run.advance(20);
   for (const TestRow& row : run.rows()) {
     EXPECT_EQ(row.steps, 50);
@@ -214,7 +215,8 @@ TEST(AcrobotTrial, AnUnsolvedTestEpisodeCountsAllItsDecisions) {
 
 TEST(AcrobotTrial, ASolvedTestEpisodeEndsAtTheGoal) {
   // At the start the tip hangs 2 m below joint 1: a goal there is reached within the first second.
-  auto run = table_trial({.acrobot = {.goal_height = -2.5}, .protocol = {.n_learning_episodes = 10}});
+  auto run =
+      table_trial({.acrobot = {.goal_height = -2.5}, .protocol = {.n_learning_episodes = 10}});
   run.advance(10);
   ASSERT_EQ(run.rows().size(), 1U);
   EXPECT_EQ(run.rows()[0].steps, 1);

@@ -45,7 +45,8 @@ def test_learning_agrees_with_its_definition_bit_for_bit(d, n_steps, tie_rule):
         coefficient=learning.learning_coefficient,
         discount=learning.discount,
     )
-    policy = _core.EpsilonGreedy(tie_rule=_core.TieRule.__members__[tie_rule], seed=6)
+    config = _core.EpsilonGreedyConfig(tie_rule=_core.TieRule.__members__[tie_rule])
+    policy = _core.EpsilonGreedy(config, seed=6)
     rng = np.random.default_rng(d)
     walk = positions(rng, d)
     state = next(walk)

@@ -29,7 +29,7 @@ SMALL = SDNNCConfig(n_pattern_units=40, n_hidden_units=120, n_active_units=30)
 KINDS = {
     "sdnn-c": (SDNNQLearning, _core.AcrobotTrial, SDNNCConfig, QLearningConfig),
     "fql": (FuzzyQLearning, _core.FuzzyAcrobotTrial, FuzzyRulesConfig, FuzzyQLearningConfig),
-    "rbfn": (RBFQLearning, _core.RbfAcrobotTrial, RBFNetworkConfig, QLearningConfig),
+    "rbfn": (RBFQLearning, _core.RBFAcrobotTrial, RBFNetworkConfig, QLearningConfig),
 }
 """Agent, compiled trial, and the configurations of approximator and learning."""
 

@@ -27,7 +27,7 @@ def small_agent(actions=TORQUES, **options):
 
 def learn_side_by_side(network, learning, n_steps, n_sensors=4, noise=0.0):
     """The core and the transcription live through the same acrobot episodes, as the agent acts."""
-    agent = _core.SdnnQLearning(network=network, learning=learning, seed=4)
+    agent = _core.SDNNQLearning(network=network, learning=learning, seed=4)
     slow = paper.QLearning(
         transcribe(agent.network), alpha=learning.learning_rate, gamma=learning.discount
     )
@@ -67,7 +67,7 @@ def learn_side_by_side(network, learning, n_steps, n_sensors=4, noise=0.0):
 
 def test_learning_agrees_with_the_paper_over_5000_transitions():
     n_corrected, n_random = learn_side_by_side(
-        _core.SdnnCConfig(), _core.QLearningConfig(), n_steps=5000
+        _core.SDNNCConfig(), _core.QLearningConfig(), n_steps=5000
     )
     assert n_corrected > 5000
     assert 150 < n_random < 500, "a tenth of the later steps"
@@ -75,13 +75,13 @@ def test_learning_agrees_with_the_paper_over_5000_transitions():
 
 @pytest.mark.parametrize(("n_sensors", "noise"), [(5, 0.02), (6, 0.0)])
 def test_learning_agrees_with_the_paper_with_more_sensors(n_sensors, noise):
-    network = _core.SdnnCConfig(n_inputs=n_sensors)
+    network = _core.SDNNCConfig(n_inputs=n_sensors)
     learning = _core.QLearningConfig(tie_rule=_core.TieRule.middle)
     learn_side_by_side(network, learning, 200, n_sensors=n_sensors, noise=noise)
 
 
 def test_learning_agrees_with_the_paper_at_odd_sizes():
-    network = _core.SdnnCConfig(
+    network = _core.SDNNCConfig(
         n_pattern_units=37,
         n_hidden_units=149,
         n_active_units=45,
@@ -296,7 +296,7 @@ def test_evaluation_has_no_effect_on_learning():
 
 
 def test_a_bad_row_of_values_is_refused():
-    policy = _core.EpsilonGreedy(seed=1)
+    policy = _core.EpsilonGreedy(_core.EpsilonGreedyConfig(), seed=1)
     with pytest.raises(ValueError, match="values must be not empty"):
         policy.select([], 0)
     with pytest.raises(ValueError, match="values must be numbers"):

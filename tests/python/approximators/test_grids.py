@@ -5,13 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from grid_transcription import FuzzyQLearning, RbfNetwork
+from grid_transcription import FuzzyQLearning, RBFNetwork
 from sdnn import _core
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig
 
 CONFIGS = [
     (FuzzyRulesConfig, _core.FuzzyRulesConfig),
-    (RBFNetworkConfig, _core.RbfNetworkConfig),
+    (RBFNetworkConfig, _core.RBFNetworkConfig),
 ]
 
 
@@ -43,9 +43,9 @@ def test_rules_fire_as_triangles_say(d, n_sets):
 
 @pytest.mark.parametrize(("d", "n_steps"), [(2, 3000), (3, 2000), (4, 2000), (6, 150)])
 def test_the_rbf_network_agrees_with_its_definition_bit_for_bit(d, n_steps):
-    net = _core.RbfNetwork(_core.RbfNetworkConfig(n_inputs=d))
+    net = _core.RBFNetwork(_core.RBFNetworkConfig(n_inputs=d))
     config = net.config
-    slow = RbfNetwork(
+    slow = RBFNetwork(
         d,
         n_bases=config.n_bases,
         n_actions=config.n_actions,
@@ -72,7 +72,7 @@ def test_the_rbf_network_agrees_with_its_definition_bit_for_bit(d, n_steps):
     [(2, {}), (4, {}), (3, {"n_bases": 5, "width": 0.3}), (2, {"n_bases": 3, "n_actions": 7})],
 )
 def test_the_plain_evaluation_agrees_within_its_tolerance(d, change):
-    net = _core.RbfNetwork(_core.RbfNetworkConfig(n_inputs=d, **change))
+    net = _core.RBFNetwork(_core.RBFNetworkConfig(n_inputs=d, **change))
     rng = np.random.default_rng(5)
     net.set_weights(rng.uniform(-20.0, 20.0, net.n_joint_bases))
     for _ in range(10):
@@ -104,13 +104,13 @@ def test_tables_that_are_too_large_are_refused():
     with pytest.raises(ValueError, match=r"9\^9 = 387420489 rules needs 32543321076 bytes"):
         _core.FuzzyRules(FuzzyRulesConfig(n_inputs=9).to_core())
     with pytest.raises(ValueError, match=r"4\^14 = 268435456 joint bases needs 2147483648 bytes"):
-        _core.RbfNetwork(RBFNetworkConfig(n_inputs=13).to_core())
+        _core.RBFNetwork(RBFNetworkConfig(n_inputs=13).to_core())
 
 
 @pytest.mark.parametrize("size", [1, 3])
 def test_bad_states_are_named(size):
     rules = _core.FuzzyRules(_core.FuzzyRulesConfig(n_inputs=2))
-    net = _core.RbfNetwork(_core.RbfNetworkConfig(n_inputs=2))
+    net = _core.RBFNetwork(_core.RBFNetworkConfig(n_inputs=2))
     for use in (rules.fire, net.values, net.values_plainly):
         with pytest.raises(ValueError, match=f"state must be 2 values, got {size}"):
             use(np.zeros(size))

@@ -64,7 +64,7 @@ def assert_equal_parameters(core, slow):
 
 def compare_while_learning(config, seed, n_steps, compare_weights_every):
     """Both learn the same; returns how many steps corrected something."""
-    core = _core.SdnnC(config, seed)
+    core = _core.SDNNC(config, seed)
     slow = transcribe(core)
     rng = np.random.default_rng(seed)
     state = rng.random(config.n_inputs)
@@ -89,17 +89,17 @@ def compare_while_learning(config, seed, n_steps, compare_weights_every):
 
 
 def test_the_core_agrees_with_the_paper_over_5000_learning_steps():
-    assert compare_while_learning(_core.SdnnCConfig(), 1, 5000, 1000) > 4500
+    assert compare_while_learning(_core.SDNNCConfig(), 1, 5000, 1000) > 4500
 
 
 @pytest.mark.parametrize("n_inputs", [5, 6])
 def test_the_core_agrees_with_the_paper_at_its_larger_sizes(n_inputs):
-    assert compare_while_learning(_core.SdnnCConfig(n_inputs=n_inputs), 2, 150, 75) > 100
+    assert compare_while_learning(_core.SDNNCConfig(n_inputs=n_inputs), 2, 150, 75) > 100
 
 
 @pytest.mark.parametrize("name", ODD_SIZES)
 def test_the_core_agrees_with_the_paper_at_odd_sizes(name):
-    config = _core.SdnnCConfig(**{**ODD_DEFAULTS, **ODD_SIZES[name]})
+    config = _core.SDNNCConfig(**{**ODD_DEFAULTS, **ODD_SIZES[name]})
     assert compare_while_learning(config, 3, 500, 100) > 300
 
 
@@ -114,7 +114,7 @@ def test_the_core_agrees_with_the_paper_at_odd_sizes(name):
 )
 def test_the_core_agrees_with_the_paper_at_any_size(n_inputs, m, n, window, lattice, seed):
     n_active = 1 + round(window * (n - 1))
-    config = _core.SdnnCConfig(
+    config = _core.SDNNCConfig(
         n_inputs=n_inputs,
         n_pattern_units=m,
         n_hidden_units=n,
@@ -122,7 +122,7 @@ def test_the_core_agrees_with_the_paper_at_any_size(n_inputs, m, n, window, latt
         lattice=lattice,
         initial_threshold=20.0,
     )
-    core = _core.SdnnC(config, seed)
+    core = _core.SDNNC(config, seed)
     slow = transcribe(core)
     rng = np.random.default_rng(seed)
     for _ in range(30):
@@ -150,12 +150,12 @@ def test_the_paper_numbers_of_the_transcription():
 
 @pytest.fixture(scope="module")
 def paper_network():
-    return _core.SdnnC(_core.SdnnCConfig(), 5)
+    return _core.SDNNC(_core.SDNNCConfig(), 5)
 
 
 @pytest.mark.parametrize("circular", [False, True])
 def test_code_books_follow_the_anchor_rule(circular):
-    core = _core.SdnnC(_core.SdnnCConfig(circular=[circular] * 4), 5)
+    core = _core.SDNNC(_core.SDNNCConfig(circular=[circular] * 4), 5)
     for mu in range(4):
         book = core.code_book(mu)
         assert book.shape == (360, 200)
@@ -174,7 +174,7 @@ def test_code_books_follow_the_anchor_rule(circular):
 
 def test_the_ends_of_a_range_are_alike_only_if_circular():
     for circular, most in ((True, 6), (False, None)):
-        core = _core.SdnnC(_core.SdnnCConfig(circular=[circular] * 4), 5)
+        core = _core.SDNNC(_core.SDNNCConfig(circular=[circular] * 4), 5)
         for mu in range(4):
             book = core.code_book(mu)
             distance = int((book[0] != book[359]).sum())
@@ -229,7 +229,7 @@ states = st.lists(st.floats(0, 1), min_size=3, max_size=3)
     state=states, action=st.integers(0, 90), target=st.floats(allow_nan=False), n=st.integers(1, 8)
 )
 def test_a_correction_never_moves_the_value_away_from_the_target(state, action, target, n):
-    network = _core.SdnnC(_core.SdnnCConfig(**SMALL), 1)
+    network = _core.SDNNC(_core.SDNNCConfig(**SMALL), 1)
     goal = paper.g(paper.g_inverse(target, 2, 28, -20.0, 20.0), 2, 28, -20.0, 20.0)
     before = network.value(state, action)
     assert before == 0.0
@@ -243,8 +243,8 @@ def test_a_correction_never_moves_the_value_away_from_the_target(state, action, 
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(state=states, other=states, target=st.floats(-30, 30))
 def test_asking_changes_nothing(state, other, target):
-    asked = _core.SdnnC(_core.SdnnCConfig(**SMALL), 1)
-    silent = _core.SdnnC(_core.SdnnCConfig(**SMALL), 1)
+    asked = _core.SDNNC(_core.SDNNCConfig(**SMALL), 1)
+    silent = _core.SDNNC(_core.SDNNCConfig(**SMALL), 1)
     for _ in range(4):
         asked.values(other)
         asked.value(state, 3)
@@ -257,10 +257,10 @@ def test_asking_changes_nothing(state, other, target):
 @settings(max_examples=10, deadline=None, derandomize=True)
 @given(state=states, seed=st.integers(0, 2**64 - 1))
 def test_parameters_go_out_and_in_again(state, seed):
-    network = _core.SdnnC(_core.SdnnCConfig(**SMALL), seed)
+    network = _core.SDNNC(_core.SDNNCConfig(**SMALL), seed)
     for action in range(0, 90, 10):
         network.correct(state, action, 15.0)
-    twin = _core.SdnnC(_core.SdnnCConfig(**SMALL), seed)
+    twin = _core.SDNNC(_core.SDNNCConfig(**SMALL), seed)
     twin.set_parameters(network.weights(), network.thresholds())
     assert np.array_equal(twin.weights(), network.weights())
     assert np.array_equal(twin.thresholds(), network.thresholds())
@@ -284,7 +284,7 @@ def test_c_scales_weights_and_changes_no_decision():
 
 
 def test_the_defaults_are_those_of_the_core():
-    core = _core.SdnnCConfig()
+    core = _core.SDNNCConfig()
     config = SDNNCConfig()
     for field in dataclasses.fields(SDNNCConfig):
         value = getattr(core, field.name)

@@ -148,15 +148,15 @@ def test_times_of_the_core_are_nanoseconds_per_repetition():
 def make_agents(n_inputs, seed):
     """One agent of every bound kind, by name."""
     learning = _core.QLearningConfig()
-    rbf = _core.RbfNetworkConfig(n_inputs=n_inputs, n_actions=21)
+    rbf = _core.RBFNetworkConfig(n_inputs=n_inputs, n_actions=21)
     rules = _core.FuzzyRulesConfig(n_inputs=n_inputs)
     fuzzy = _core.FuzzyQLearningConfig()
-    network = _core.SdnnCConfig(n_inputs=n_inputs)
+    network = _core.SDNNCConfig(n_inputs=n_inputs)
     return {
-        "sdnn": _core.SdnnQLearning(network=network, learning=learning, seed=seed),
+        "sdnn": _core.SDNNQLearning(network=network, learning=learning, seed=seed),
         "fuzzy": _core.FuzzyQLearning(rules=rules, learning=fuzzy, seed=seed),
-        "rbf": _core.RbfQLearning(network=rbf, learning=learning, seed=seed),
-        "plain rbf": _core.PlainRbfQLearning(network=rbf, learning=learning, seed=seed),
+        "rbf": _core.RBFQLearning(network=rbf, learning=learning, seed=seed),
+        "plain rbf": _core.PlainRBFQLearning(network=rbf, learning=learning, seed=seed),
     }
 
 

@@ -26,7 +26,7 @@ def restore():
 
 def short_trial(n_inputs, noise):
     return _core.AcrobotTrial(
-        approximator=_core.SdnnCConfig(n_inputs=n_inputs),
+        approximator=_core.SDNNCConfig(n_inputs=n_inputs),
         learning=_core.QLearningConfig(),
         acrobot=_core.AcrobotConfig(),
         goal=_core.GoalScheduleConfig(),
@@ -58,7 +58,7 @@ def test_a_learned_network_has_the_same_bits_on_all_levels():
     networks = {}
     for level in available_instruction_sets():
         set_instruction_set(level)
-        network = _core.SdnnC(_core.SdnnCConfig(n_inputs=4), 1)
+        network = _core.SDNNC(_core.SDNNCConfig(n_inputs=4), 1)
         rng = np.random.default_rng(1)
         for _ in range(300):
             network.correct(rng.random(4), int(rng.integers(601)), float(rng.uniform(-20, 20)))

@@ -17,7 +17,7 @@ def transcribed(model):
     plain = estimator_transcription.SelectiveDesensitization(
         code.modified, code.modifiers, code.core_pairs
     )
-    return estimator_transcription.PerceptronLayer(
+    return estimator_transcription.ParallelPerceptron(
         plain, model.network_.n_units, weights=model.weights_, thresholds=model.thresholds_
     )
 
@@ -93,7 +93,7 @@ def test_classification(problem, scheme):
     X, y, options, orders = problem
     model, labels = untrained(SDNNClassifier(scheme=scheme, **options), X, y)
     layer = transcribed(model)
-    slow = estimator_transcription.ErrorCorrectionTrainer(
+    slow = estimator_transcription.PerceptronTrainer(
         layer, model.network_.input_code.bins(X), labels, scheme
     )
     fast = model._trainer(X, labels)
@@ -119,7 +119,7 @@ def test_fit_presents_the_orders_it_says(regression):
     slow = (
         estimator_transcription.PDeltaTrainer(layer, bins, targets)
         if regression
-        else estimator_transcription.ErrorCorrectionTrainer(layer, bins, targets, "one_vs_rest")
+        else estimator_transcription.PerceptronTrainer(layer, bins, targets, "one_vs_rest")
     )
     orders = np.random.RandomState(11)
     orders.randint(2**31 - 1, size=2)
@@ -138,4 +138,4 @@ def test_gram_matrix_is_that_of_the_code():
     bins = model.network_.input_code.bins(random.uniform(size=(20, 3)))
     code = model.network_.input_code.core.transform(bins).astype(int)
     np.testing.assert_array_equal(model.network_.input_code.core.gram(bins), code @ code.T)
-    assert isinstance(model.network_.layer, _core.PerceptronLayer)
+    assert isinstance(model.network_.layer, _core.ParallelPerceptron)

@@ -203,7 +203,7 @@ def test_a_network_that_no_memory_holds_is_refused_with_its_size(monkeypatch):
     def no_memory(*_arguments, **_options):
         raise MemoryError("std::bad_alloc")
 
-    monkeypatch.setattr(_core, "PerceptronLayer", no_memory)
+    monkeypatch.setattr(_core, "ParallelPerceptron", no_memory)
     with pytest.raises(MemoryError, match="280 units of 384 columns need 430080 bytes"):
         SDNNRegressor(**SMALL).fit(X, Y)
 

@@ -41,7 +41,7 @@ class SelectiveDesensitization:
         return (one @ other.T).astype(np.int32)
 
 
-class PerceptronLayer:
+class ParallelPerceptron:
     """N units, potential = weights . x_SD - threshold, all whole numbers."""
 
     def __init__(self, code, n_units, seed=0, weights=None, thresholds=None, initial_range=5):
@@ -125,7 +125,7 @@ def class_pairs(n_classes):
     return [(i, j) for i in range(n_classes) for j in range(i + 1, n_classes)]
 
 
-class ErrorCorrectionTrainer(Trainer):
+class PerceptronTrainer(Trainer):
     """Classification: corrects every unit that answers wrongly."""
 
     def __init__(self, layer, bins, labels, scheme, form="auto", memory_limit=0, n_threads=1):

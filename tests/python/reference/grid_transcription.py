@@ -99,7 +99,7 @@ class FuzzyQLearning:
             self.v[cell] = np.float32(float(self.v[cell]) + step * truth)
 
 
-class RbfNetwork:
+class RBFNetwork:
     """Q(s, a) = sum_j w_j phi_j(s, a) over the joint grid of state and action."""
 
     def __init__(

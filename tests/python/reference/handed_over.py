@@ -6,11 +6,11 @@ import paper_transcription as paper
 from sdnn import _core
 
 
-def transcribe(core: _core.SdnnC) -> paper.SdnnC:
+def transcribe(core: _core.SDNNC) -> paper.SDNNC:
     """The transcription with the core's code books, permutations, weights and thresholds."""
     config = core.config
     inputs = range(config.n_inputs)
-    return paper.SdnnC(
+    return paper.SDNNC(
         code_books=[core.code_book(mu) for mu in inputs],
         permutations={
             (mu, nu): core.permutation(mu, nu) for mu in inputs for nu in inputs if mu != nu

@@ -63,7 +63,7 @@ def g_inverse(q: float, u_low: int, u_high: int, q_low: float, q_high: float) ->
     return math.floor(u_low + (clipped - q_low) * (u_high - u_low) / (q_high - q_low) + 0.5)
 
 
-class SdnnC:
+class SDNNC:
     """Layers 1 to 6 of section 3.1 and the learning procedure of Fig. 2.
 
     Parameters
@@ -162,7 +162,7 @@ class SdnnC:
 class QLearning:
     """Eq. (1): q_hat = (1 - alpha) Q(s, a) + alpha (r + gamma max_a' Q(s', a'))."""
 
-    def __init__(self, network: SdnnC, *, alpha: float, gamma: float) -> None:
+    def __init__(self, network: SDNNC, *, alpha: float, gamma: float) -> None:
         self.network = network
         self.alpha = alpha
         self.gamma = gamma

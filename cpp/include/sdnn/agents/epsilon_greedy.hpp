@@ -7,8 +7,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <tuple>
 
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/config_fields.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::agents {
@@ -22,9 +24,16 @@ enum class TieRule {
 
 /// The policy's parameters; the defaults are the paper's (section 4.2).
 struct EpsilonGreedyConfig {
-  double epsilon = 0.1;                  ///< probability of a random action, in [0, 1]
-  int n_greedy_steps = 10;               ///< first steps of an episode without random actions
+  double epsilon = 0.1;     ///< probability of a random action, in [0, 1]
+  int n_greedy_steps = 10;  ///< first steps of an episode without random actions
   TieRule tie_rule = TieRule::uniform;
+
+  static constexpr auto fields() noexcept {
+    return std::tuple(core::field("epsilon", &EpsilonGreedyConfig::epsilon),
+                      core::field("n_greedy_steps", &EpsilonGreedyConfig::n_greedy_steps),
+                      core::field("tie_rule", &EpsilonGreedyConfig::tie_rule));
+  }
+  bool operator==(const EpsilonGreedyConfig&) const = default;
 };
 
 /// The largest of `values`, not empty; NaN if the first one is. Eight partial maxima at a time, so
@@ -88,14 +97,15 @@ class EpsilonGreedy {
     std::uint64_t skip = n_tied > 1 ? ties.below(n_tied) : 0;
     std::size_t action = first_of(values, best);
     for (; skip > 0; --skip) {
-      do { ++action; } while (values[action] != best);
+      do {
+        ++action;
+      } while (values[action] != best);
     }
     return action;
   }
 
   static std::size_t first_of(std::span<const double> values, double best) noexcept {
-    return static_cast<std::size_t>(std::find(values.begin(), values.end(), best) -
-                                    values.begin());
+    return static_cast<std::size_t>(std::find(values.begin(), values.end(), best) - values.begin());
   }
 
   static std::size_t middle_of_widest_run(std::span<const double> values, double best) noexcept {

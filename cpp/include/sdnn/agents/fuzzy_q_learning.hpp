@@ -8,13 +8,15 @@
 #include <limits>
 #include <span>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/coding/action_code.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/config_fields.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/elementary.hpp"
 
 namespace sdnn::agents {
@@ -25,6 +27,15 @@ struct FuzzyQLearningConfig {
   double discount = 0.9;              ///< gamma, in [0, 1]
   double trace_decay = 0.0;           ///< lambda of the eligibility traces, in [0, 1]; 0: none
   EpsilonGreedyConfig policy = {};    ///< of every fired rule for itself
+
+  static constexpr auto fields() noexcept {
+    return std::tuple_cat(
+        std::tuple(core::field("learning_coefficient", &FuzzyQLearningConfig::learning_coefficient),
+                   core::field("discount", &FuzzyQLearningConfig::discount),
+                   core::field("trace_decay", &FuzzyQLearningConfig::trace_decay)),
+        core::nested_fields(&FuzzyQLearningConfig::policy));
+  }
+  bool operator==(const FuzzyQLearningConfig&) const = default;
 };
 
 /// An agent with a continuous action in [-1, 1], learned by Jouffe's fuzzy Q-learning.
@@ -37,9 +48,9 @@ struct FuzzyQLearningConfig {
 /// A terminated transition has target r alone. A time limit is no termination: it bootstraps.
 /// Sums are in doubles and in the order of the rules; values are rounded to floats when written.
 ///
-/// Eligibility traces (trace_decay = lambda > 0; not used in the paper): e(i, a) *= gamma lambda for
-/// all, e(i, a_i) += alpha_i for the picks, then v += c_fql (r + gamma V - Q) e everywhere. Traces
-/// accumulate, a random pick does not cut them, they end with the episode, and one below
+/// Eligibility traces (trace_decay = lambda > 0; not used in the paper): e(i, a) *= gamma lambda
+/// for all, e(i, a_i) += alpha_i for the picks, then v += c_fql (r + gamma V - Q) e everywhere.
+/// Traces accumulate, a random pick does not cut them, they end with the episode, and one below
 /// kForgottenTrace is forgotten.
 ///
 /// Source: Jouffe, L. (1998). Fuzzy inference system learning by reinforcement methods. IEEE
@@ -138,9 +149,9 @@ class FuzzyQLearning {
   /// std::overflow_error if a value would leave the floats. The table is unchanged then.
   void learn(std::span<const double> state, double action, double reward,
              std::span<const double> next_state, bool terminated) {
-    core::require(!picked_.empty() && std::equal(state.begin(), state.end(), state_.begin(),
-                                                 state_.end()),
-                  "state", "that of the last exploring act", "another");
+    core::require(
+        !picked_.empty() && std::equal(state.begin(), state.end(), state_.begin(), state_.end()),
+        "state", "that of the last exploring act", "another");
     core::require(action == action_, "action", "that of the last exploring act", action);
     core::require_finite("reward", reward);
     const double target = terminated ? reward : reward + config_.discount * value(next_state);
@@ -182,8 +193,7 @@ class FuzzyQLearning {
   }
 
   double moved(const Trace& trace, double step) const noexcept {
-    return static_cast<double>(rules_.table()[trace.cell]) +
-           step * trace.eligibility;
+    return static_cast<double>(rules_.table()[trace.cell]) + step * trace.eligibility;
   }
 
   // Fades the old traces and adds those of the picks, which are of different rules.

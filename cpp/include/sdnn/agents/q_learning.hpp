@@ -5,13 +5,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/approximators/action_value.hpp"
 #include "sdnn/coding/action_code.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/config_fields.hpp"
+#include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::agents {
 
@@ -20,6 +22,13 @@ struct QLearningConfig {
   double learning_rate = 0.5;  ///< alpha, in (0, 1]
   double discount = 0.9;       ///< gamma, in [0, 1]
   EpsilonGreedyConfig policy = {};
+
+  static constexpr auto fields() noexcept {
+    return std::tuple_cat(std::tuple(core::field("learning_rate", &QLearningConfig::learning_rate),
+                                     core::field("discount", &QLearningConfig::discount)),
+                          core::nested_fields(&QLearningConfig::policy));
+  }
+  bool operator==(const QLearningConfig&) const = default;
 };
 
 /// An agent that learns Q(s, a) by Eq. (1) and acts epsilon-greedily.

@@ -8,21 +8,20 @@
 #include <variant>
 
 #include "sdnn/approximators/sdnn_c.hpp"
-#include "sdnn/core/capacity.hpp"
+#include "sdnn/core/detail/capacity.hpp"
 
 namespace sdnn::approximators {
 
 /// An SDNN-C on the smallest capacity that holds its patterns; one dispatch per call.
 ///
-/// See SdnnC for what the members do and throw.
-class DynamicSdnnC {
+/// See SDNNC for what the members do and throw.
+class DynamicSDNNC {
  public:
   /// Throws std::length_error naming the largest capacity if n_pattern_units exceeds it, and as
-  /// SdnnC does.
-  DynamicSdnnC(const SdnnCConfig& config, std::uint64_t seed)
-      : network_(make(config, seed)) {}
+  /// SDNNC does.
+  DynamicSDNNC(const SDNNCConfig& config, std::uint64_t seed) : network_(make(config, seed)) {}
 
-  /// Calls `visitor` with the SdnnC<Capacity> inside.
+  /// Calls `visitor` with the SDNNC<Capacity> inside.
   template <class Visitor>
   decltype(auto) visit(Visitor&& visitor) const {
     return std::visit(std::forward<Visitor>(visitor), network_);
@@ -32,8 +31,8 @@ class DynamicSdnnC {
     return std::visit(std::forward<Visitor>(visitor), network_);
   }
 
-  const SdnnCConfig& config() const {
-    return visit([](const auto& net) -> const SdnnCConfig& { return net.config(); });
+  const SDNNCConfig& config() const {
+    return visit([](const auto& net) -> const SDNNCConfig& { return net.config(); });
   }
   const coding::ActionCode& action_code() const {
     return visit([](const auto& net) -> const coding::ActionCode& { return net.action_code(); });
@@ -41,8 +40,8 @@ class DynamicSdnnC {
   const OutputScale& output_scale() const {
     return visit([](const auto& net) -> const OutputScale& { return net.output_scale(); });
   }
-  const ParallelPerceptron& perceptron() const {
-    return visit([](const auto& net) -> const ParallelPerceptron& { return net.perceptron(); });
+  const HiddenLayer& hidden_layer() const {
+    return visit([](const auto& net) -> const HiddenLayer& { return net.hidden_layer(); });
   }
   std::size_t n_inputs() const {
     return visit([](const auto& net) { return net.n_inputs(); });
@@ -68,16 +67,19 @@ class DynamicSdnnC {
   }
 
  private:
-  using Network = std::variant<SdnnC<core::kPatternCapacities[0]>,
-                               SdnnC<core::kPatternCapacities[1]>,
-                               SdnnC<core::kPatternCapacities[2]>>;
+  using Network =
+      std::variant<SDNNC<core::kPatternCapacities[0]>, SDNNC<core::kPatternCapacities[1]>,
+                   SDNNC<core::kPatternCapacities[2]>>;
 
-  static Network make(const SdnnCConfig& config, std::uint64_t seed) {
+  static Network make(const SDNNCConfig& config, std::uint64_t seed) {
     core::require_in_range("n_pattern_units", config.n_pattern_units, 2, 1 << 20);
     switch (core::smallest_fit(static_cast<std::size_t>(config.n_pattern_units))) {
-      case 0: return Network(std::in_place_index<0>, config, seed);
-      case 1: return Network(std::in_place_index<1>, config, seed);
-      default: return Network(std::in_place_index<2>, config, seed);
+      case 0:
+        return Network(std::in_place_index<0>, config, seed);
+      case 1:
+        return Network(std::in_place_index<1>, config, seed);
+      default:
+        return Network(std::in_place_index<2>, config, seed);
     }
   }
 

@@ -6,11 +6,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <tuple>
 #include <vector>
 
-#include "sdnn/core/aligned_buffer.hpp"
-#include "sdnn/core/check.hpp"
-#include "sdnn/core/grid_cells.hpp"
+#include "sdnn/core/config_fields.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/grid_cells.hpp"
 
 namespace sdnn::approximators {
 
@@ -20,6 +22,14 @@ struct FuzzyRulesConfig {
   int n_sets = 9;      ///< triangular sets per input, centres 0, 1 / (n_sets - 1), ..., 1
   int n_actions = 21;  ///< discrete actions that every rule has values of
   std::uint64_t max_table_bytes = core::kDefaultMaxTableBytes;  ///< larger tables are refused
+
+  static constexpr auto fields() noexcept {
+    return std::tuple(core::field("n_inputs", &FuzzyRulesConfig::n_inputs),
+                      core::field("n_sets", &FuzzyRulesConfig::n_sets),
+                      core::field("n_actions", &FuzzyRulesConfig::n_actions),
+                      core::field("max_table_bytes", &FuzzyRulesConfig::max_table_bytes));
+  }
+  bool operator==(const FuzzyRulesConfig&) const = default;
 };
 
 /// The rules that fire in a state, and how true each is.

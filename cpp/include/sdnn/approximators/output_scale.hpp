@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::approximators {
 

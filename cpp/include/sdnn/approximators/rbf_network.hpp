@@ -9,24 +9,36 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "sdnn/coding/action_code.hpp"
-#include "sdnn/core/aligned_buffer.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/config_fields.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/elementary.hpp"
-#include "sdnn/core/grid_cells.hpp"
 
 namespace sdnn::approximators {
 
 /// The sizes of an RBF network (spec section 4).
-struct RbfNetworkConfig {
-  int n_inputs = 4;              ///< d
-  int n_bases = 4;               ///< per dimension, of the state and of the action
-  int n_actions = 601;           ///< evenly spaced over the action's range
-  double width = 0.5;            ///< of a Gaussian, in units of the spacing of the centres
-  double gradient_rate = 3.0;    ///< of the gradient step in correct; stable below 2 / |phi|^2
+struct RBFNetworkConfig {
+  int n_inputs = 4;            ///< d
+  int n_bases = 4;             ///< per dimension, of the state and of the action
+  int n_actions = 601;         ///< evenly spaced over the action's range
+  double width = 0.5;          ///< of a Gaussian, in units of the spacing of the centres
+  double gradient_rate = 3.0;  ///< of the gradient step in correct; stable below 2 / |phi|^2
   std::uint64_t max_table_bytes = core::kDefaultMaxTableBytes;  ///< more weights are refused
+
+  static constexpr auto fields() noexcept {
+    return std::tuple(core::field("n_inputs", &RBFNetworkConfig::n_inputs),
+                      core::field("n_bases", &RBFNetworkConfig::n_bases),
+                      core::field("n_actions", &RBFNetworkConfig::n_actions),
+                      core::field("width", &RBFNetworkConfig::width),
+                      core::field("gradient_rate", &RBFNetworkConfig::gradient_rate),
+                      core::field("max_table_bytes", &RBFNetworkConfig::max_table_bytes));
+  }
+  bool operator==(const RBFNetworkConfig&) const = default;
 };
 
 /// Normalized Gaussian bases on an even grid over [0, 1]^d and the action's range.
@@ -35,17 +47,17 @@ struct RbfNetworkConfig {
 /// bases: n_bases^(d+1) in number. That sum is a product too, so a normalized joint basis is the
 /// product of Gaussians normalized in their own dimension. `values` uses this: it builds the
 /// normalized bases phi(s) of the state as an outer product, multiplies them once into the weights,
-/// u = phi(s)^T W, and gives every action psi(a)^T u. `values_plainly` computes every joint basis of
-/// every action as it is written. Both sum in a fixed order and are the same everywhere; they agree
-/// to 1e-12 of the largest |weight|.
+/// u = phi(s)^T W, and gives every action psi(a)^T u. `values_plainly` computes every joint basis
+/// of every action as it is written. Both sum in a fixed order and are the same everywhere; they
+/// agree to 1e-12 of the largest |weight|.
 ///
-/// Source: spec section 4. Cost at d = 6: 16,384 multiply-adds for all actions, plainly 601 x 16,384
-/// exponentials. An object must not be used by two threads at once: it holds its workspace.
-class RbfNetwork {
+/// Source: spec section 4. Cost at d = 6: 16,384 multiply-adds for all actions, plainly 601 x
+/// 16,384 exponentials. An object must not be used by two threads at once: it holds its workspace.
+class RBFNetwork {
  public:
   /// All weights 0. Throws std::invalid_argument naming the field that is impossible;
   /// std::length_error naming bases, bytes and limit before any memory is asked for.
-  explicit RbfNetwork(const RbfNetworkConfig& config)
+  explicit RBFNetwork(const RBFNetworkConfig& config)
       : config_(checked(config)),
         n_joint_bases_(core::grid_cells("joint bases", n_bases(), n_inputs() + 1, sizeof(double),
                                         config.max_table_bytes)),
@@ -60,7 +72,7 @@ class RbfNetwork {
     }
   }
 
-  const RbfNetworkConfig& config() const noexcept { return config_; }
+  const RBFNetworkConfig& config() const noexcept { return config_; }
   std::size_t n_inputs() const noexcept { return static_cast<std::size_t>(config_.n_inputs); }
   std::size_t n_bases() const noexcept { return static_cast<std::size_t>(config_.n_bases); }
   std::size_t n_actions() const noexcept { return static_cast<std::size_t>(config_.n_actions); }
@@ -125,7 +137,7 @@ class RbfNetwork {
   }
 
  private:
-  static const RbfNetworkConfig& checked(const RbfNetworkConfig& config) {
+  static const RBFNetworkConfig& checked(const RBFNetworkConfig& config) {
     core::require_in_range("n_inputs", config.n_inputs, 1, 62);
     core::require_in_range("n_bases", config.n_bases, 2, 1 << 20);
     core::require_in_range("n_actions", config.n_actions, 1, 1 << 20);
@@ -244,14 +256,14 @@ class RbfNetwork {
 
   static constexpr std::size_t kUnrolled = 4;  // the paper's n_bases
 
-  RbfNetworkConfig config_;
+  RBFNetworkConfig config_;
   std::size_t n_joint_bases_;
   core::AlignedBuffer<double> weights_;
   core::AlignedBuffer<double> state_bases_;   // phi(s), or the exponents of its Gaussians
   core::AlignedBuffer<double> action_bases_;  // psi(a), row by row
   std::vector<double> one_dimension_;
-  std::vector<double> mixed_;                 // phi(s)^T W, or what goes with an action
-  std::vector<double> mixed_state_;           // the state of both, if is_mixed_
+  std::vector<double> mixed_;        // phi(s)^T W, or what goes with an action
+  std::vector<double> mixed_state_;  // the state of both, if is_mixed_
   bool is_mixed_ = false;
 };
 

@@ -10,18 +10,20 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "sdnn/approximators/detail/potential_memory.hpp"
 #include "sdnn/approximators/error_correction.hpp"
+#include "sdnn/approximators/hidden_layer.hpp"
 #include "sdnn/approximators/output_scale.hpp"
-#include "sdnn/approximators/parallel_perceptron.hpp"
-#include "sdnn/approximators/potential_memory.hpp"
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/coding/desensitization.hpp"
 #include "sdnn/coding/pattern_code.hpp"
 #include "sdnn/coding/state_code.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/config_fields.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::approximators {
@@ -33,7 +35,7 @@ enum class InitialWeights {
 };
 
 /// Everything that defines an SDNN-C; the defaults are the paper's values.
-struct SdnnCConfig {
+struct SDNNCConfig {
   int n_inputs = 4;                 ///< l >= 2
   int n_pattern_units = 200;        ///< m
   int n_anchor_patterns = 9;        ///< p_1 .. p_9
@@ -45,13 +47,34 @@ struct SdnnCConfig {
   int n_actions = 0;                ///< 0: all n - n' + 1 windows
   double q_low = -20.0;             ///< g saturates at these values ...
   double q_high = 20.0;
-  std::optional<int> u_low = {};    ///< ... at these counts; none: n' / 15 rounded down (20),
-  std::optional<int> u_high = {};   ///< and n' - u_low (280)
-  double learning_coefficient = 0.1;      ///< c; scales weights only, never decisions
-  int lattice = 1;                        ///< weights are multiples of c / lattice
-  double initial_threshold = 200.0;       ///< |w_i0| at the start, in units of c
+  std::optional<int> u_low = {};      ///< ... at these counts; none: n' / 15 rounded down (20),
+  std::optional<int> u_high = {};     ///< and n' - u_low (280)
+  double learning_coefficient = 0.1;  ///< c; scales weights only, never decisions
+  int lattice = 1;                    ///< weights are multiples of c / lattice
+  double initial_threshold = 200.0;   ///< |w_i0| at the start, in units of c
   InitialWeights initial_weights = InitialWeights::ternary;
-  double initial_weight_limit = 0.1;      ///< of InitialWeights::uniform, in units of c
+  double initial_weight_limit = 0.1;  ///< of InitialWeights::uniform, in units of c
+
+  static constexpr auto fields() noexcept {
+    return std::tuple(
+        core::field("n_inputs", &SDNNCConfig::n_inputs),
+        core::field("n_pattern_units", &SDNNCConfig::n_pattern_units),
+        core::field("n_anchor_patterns", &SDNNCConfig::n_anchor_patterns),
+        core::field("n_interpolated", &SDNNCConfig::n_interpolated),
+        core::field("balanced_anchors", &SDNNCConfig::balanced_anchors),
+        core::field("circular", &SDNNCConfig::circular),
+        core::field("n_hidden_units", &SDNNCConfig::n_hidden_units),
+        core::field("n_active_units", &SDNNCConfig::n_active_units),
+        core::field("n_actions", &SDNNCConfig::n_actions),
+        core::field("q_low", &SDNNCConfig::q_low), core::field("q_high", &SDNNCConfig::q_high),
+        core::field("u_low", &SDNNCConfig::u_low), core::field("u_high", &SDNNCConfig::u_high),
+        core::field("learning_coefficient", &SDNNCConfig::learning_coefficient),
+        core::field("lattice", &SDNNCConfig::lattice),
+        core::field("initial_threshold", &SDNNCConfig::initial_threshold),
+        core::field("initial_weights", &SDNNCConfig::initial_weights),
+        core::field("initial_weight_limit", &SDNNCConfig::initial_weight_limit));
+  }
+  bool operator==(const SDNNCConfig&) const = default;
 };
 
 /// The network of section 3 with patterns of at most `Capacity` units.
@@ -61,16 +84,16 @@ struct SdnnCConfig {
 /// it learns (see PotentialMemory), so that one decision needs at most one pass over the weights.
 /// An object must not be used by two threads at once; copies share the wiring and nothing else.
 template <std::size_t Capacity>
-class SdnnC {
+class SDNNC {
  public:
   /// Throws std::invalid_argument naming the field that is impossible; std::length_error if a
   /// pattern does not fit into Capacity; std::bad_alloc.
-  SdnnC(const SdnnCConfig& config, std::uint64_t seed)
+  SDNNC(const SDNNCConfig& config, std::uint64_t seed)
       : config_(config),
         code_(make_code(config, seed)),
         actions_(config.n_hidden_units, config.n_active_units, config.n_actions),
         scale_(make_scale(config)),
-        perceptron_(actions_.n_hidden_units(), code_->n_columns(), code_->n_double_columns()),
+        hidden_layer_(actions_.n_hidden_units(), code_->n_columns(), code_->n_double_columns()),
         memory_(*code_, actions_.n_hidden_units(), actions_.n_active_units()) {
     core::require_positive("learning_coefficient", config.learning_coefficient);
     core::require_in_range("lattice", config.lattice, 1, 64);
@@ -86,11 +109,11 @@ class SdnnC {
     rehearse();
   }
 
-  const SdnnCConfig& config() const noexcept { return config_; }
+  const SDNNCConfig& config() const noexcept { return config_; }
   const coding::StateCode<Capacity>& state_code() const noexcept { return *code_; }
   const coding::ActionCode& action_code() const noexcept { return actions_; }
   const OutputScale& output_scale() const noexcept { return scale_; }
-  const ParallelPerceptron& perceptron() const noexcept { return perceptron_; }
+  const HiddenLayer& hidden_layer() const noexcept { return hidden_layer_; }
   const PotentialMemory<Capacity>& memory() const noexcept { return memory_; }
   std::size_t n_inputs() const noexcept { return code_->n_inputs(); }
   std::size_t n_actions() const noexcept { return actions_.n_actions(); }
@@ -98,8 +121,9 @@ class SdnnC {
   /// The weight of a hidden unit for a unit of x_SD, in the paper's order, in lattice steps.
   std::int32_t weight(std::size_t unit, std::size_t j) const {
     const auto place = code_->place(j);
-    const std::int32_t first = perceptron_.weight(unit, place.first);
-    return place.paired ? (first + place.sign * perceptron_.weight(unit, place.second)) / 2 : first;
+    const std::int32_t first = hidden_layer_.weight(unit, place.first);
+    return place.paired ? (first + place.sign * hidden_layer_.weight(unit, place.second)) / 2
+                        : first;
   }
 
   /// Q(state, a) for every action. Shapes: state (l,) in [0, 1], out (n_actions,).
@@ -151,7 +175,7 @@ class SdnnC {
     for (std::uint32_t& unit : selected_) unit += static_cast<std::uint32_t>(first);
 
     const std::int32_t step = deficit > 0 ? config_.lattice : -config_.lattice;
-    perceptron_.correct(selected_, memory_.columns(*code_, entry.bins), step);
+    hidden_layer_.correct(selected_, memory_.columns(*code_, entry.bins), step);
     memory_.corrected(entry.bins, selected_, step);
   }
 
@@ -159,46 +183,45 @@ class SdnnC {
   ///
   /// Thread-safe: uses nothing remembered. Allocates.
   void potentials(std::span<const double> state, std::span<std::int32_t> out) const {
-    core::require(out.size() == perceptron_.n_units(), "out",
-                  std::to_string(perceptron_.n_units()) + " values", out.size());
+    core::require(out.size() == hidden_layer_.n_units(), "out",
+                  std::to_string(hidden_layer_.n_units()) + " values", out.size());
     std::vector<coding::Bin> bins(n_inputs());
     coding::SignedColumns columns;
     code_->encode(state, bins);
     code_->columns(bins, columns);
-    perceptron_.potentials(columns, out);
+    hidden_layer_.potentials(columns, out);
   }
 
   /// Replaces weights and thresholds, in lattice steps. Shapes: weights (n, D) row by row,
   /// thresholds (n,). Throws std::invalid_argument, and then nothing has changed.
   void set_parameters(std::span<const std::int32_t> weights,
                       std::span<const std::int32_t> thresholds) {
-    const std::size_t n_columns = perceptron_.n_columns();
-    core::require(weights.size() == perceptron_.n_units() * n_columns, "weights",
+    const std::size_t n_columns = hidden_layer_.n_columns();
+    core::require(weights.size() == hidden_layer_.n_units() * n_columns, "weights",
                   "n_hidden_units x D values", weights.size());
-    core::require(thresholds.size() == perceptron_.n_units(), "thresholds",
+    core::require(thresholds.size() == hidden_layer_.n_units(), "thresholds",
                   "n_hidden_units values", thresholds.size());
     for (const std::int32_t weight : weights) {
-      core::require_in_range("weight", weight, -largest_initial_weight(),
-                             largest_initial_weight());
+      core::require_in_range("weight", weight, -largest_initial_weight(), largest_initial_weight());
     }
-    ParallelPerceptron replaced(perceptron_.n_units(), n_columns, perceptron_.n_double_columns());
+    HiddenLayer replaced(hidden_layer_.n_units(), n_columns, hidden_layer_.n_double_columns());
     for (std::size_t j = 0; j < n_columns; ++j) {
       const auto place = code_->place(j);
-      for (std::size_t unit = 0; unit < perceptron_.n_units(); ++unit) {
+      for (std::size_t unit = 0; unit < hidden_layer_.n_units(); ++unit) {
         add_weight(replaced, unit, place, weights[unit * n_columns + j]);
       }
     }
-    for (std::size_t unit = 0; unit < perceptron_.n_units(); ++unit) {
+    for (std::size_t unit = 0; unit < hidden_layer_.n_units(); ++unit) {
       replaced.set_threshold(unit, thresholds[unit]);
     }
-    perceptron_ = std::move(replaced);
+    hidden_layer_ = std::move(replaced);
     memory_.forget();
   }
 
  private:
   using Remembered = typename PotentialMemory<Capacity>::Entry;
 
-  static std::shared_ptr<const coding::StateCode<Capacity>> make_code(const SdnnCConfig& config,
+  static std::shared_ptr<const coding::StateCode<Capacity>> make_code(const SDNNCConfig& config,
                                                                       std::uint64_t seed) {
     core::require_in_range("n_inputs", config.n_inputs, 2, 1024);
     const auto l = static_cast<std::size_t>(config.n_inputs);
@@ -225,7 +248,7 @@ class SdnnC {
                                                                std::move(permutations));
   }
 
-  static OutputScale make_scale(const SdnnCConfig& config) {
+  static OutputScale make_scale(const SDNNCConfig& config) {
     const int u_low = config.u_low.value_or(config.n_active_units / 15);
     core::require_in_range("u_low", u_low, 0, config.n_active_units);
     const int u_high = config.u_high.value_or(config.n_active_units - u_low);
@@ -234,14 +257,14 @@ class SdnnC {
   }
 
   /// Two weights make a sum that has to fit.
-  std::int32_t largest_initial_weight() const noexcept { return perceptron_.weight_limit() / 2; }
+  std::int32_t largest_initial_weight() const noexcept { return hidden_layer_.weight_limit() / 2; }
 
   /// Adds to the weight of a unit of x_SD, where the paired code keeps it.
-  static void add_weight(ParallelPerceptron& perceptron, std::size_t unit,
+  static void add_weight(HiddenLayer& hidden_layer, std::size_t unit,
                          const typename coding::StateCode<Capacity>::Place& place,
                          std::int32_t weight) {
     const auto add = [&](std::size_t column, std::int32_t change) {
-      perceptron.set_weight(unit, column, perceptron.weight(unit, column) + change);
+      hidden_layer.set_weight(unit, column, hidden_layer.weight(unit, column) + change);
     };
     add(place.first, weight);
     if (place.paired) add(place.second, place.sign * weight);
@@ -255,18 +278,19 @@ class SdnnC {
                   "at most " + std::to_string(largest_initial_weight()) + " / lattice",
                   config_.initial_weight_limit);
     core::Random random(seed, core::Stream::weights);
-    for (std::size_t j = 0; j < perceptron_.n_columns(); ++j) {
+    for (std::size_t j = 0; j < hidden_layer_.n_columns(); ++j) {
       const auto place = code_->place(j);
       std::uint64_t bits = 0;
-      for (std::size_t i = 0; i < perceptron_.n_units(); ++i) {
+      for (std::size_t i = 0; i < hidden_layer_.n_units(); ++i) {
         if (config_.initial_weights == InitialWeights::ternary) {
           if (i % 32 == 0) bits = random.bits();  // two bits a weight
-          add_weight(perceptron_, i, place, static_cast<std::int32_t>(bits & 1) -
-                                                static_cast<std::int32_t>(bits >> 1 & 1));
+          add_weight(
+              hidden_layer_, i, place,
+              static_cast<std::int32_t>(bits & 1) - static_cast<std::int32_t>(bits >> 1 & 1));
           bits >>= 2;
         } else {
           const double drawn = limit * (2.0 * random.uniform() - 1.0);
-          add_weight(perceptron_, i, place, static_cast<std::int32_t>(std::floor(drawn + 0.5)));
+          add_weight(hidden_layer_, i, place, static_cast<std::int32_t>(std::floor(drawn + 0.5)));
         }
       }
     }
@@ -279,8 +303,8 @@ class SdnnC {
                   "initial_threshold", "a multiple of 1 / lattice, not negative",
                   config_.initial_threshold);
     const auto threshold = static_cast<std::int32_t>(steps);
-    for (std::size_t i = 0; i < perceptron_.n_units(); ++i) {
-      perceptron_.set_threshold(i, i % 2 == 0 ? -threshold : threshold);
+    for (std::size_t i = 0; i < hidden_layer_.n_units(); ++i) {
+      hidden_layer_.set_threshold(i, i % 2 == 0 ? -threshold : threshold);
     }
   }
 
@@ -292,13 +316,13 @@ class SdnnC {
     for (int i = 0; i < kStates; ++i) {
       values(std::vector<double>(n_inputs(), (i + 0.5) / kStates), out);
     }
-    memory_ = PotentialMemory<Capacity>(*code_, actions_.n_hidden_units(),
-                                        actions_.n_active_units());
+    memory_ =
+        PotentialMemory<Capacity>(*code_, actions_.n_hidden_units(), actions_.n_active_units());
   }
 
   Remembered recall(std::span<const double> state) {
     code_->encode(state, bins_);
-    return memory_.recall(*code_, perceptron_, bins_);
+    return memory_.recall(*code_, hidden_layer_, bins_);
   }
 
   int count_in_window(std::span<const std::int32_t> potentials, std::size_t action) const {
@@ -313,11 +337,11 @@ class SdnnC {
     return n_firing;
   }
 
-  SdnnCConfig config_;
+  SDNNCConfig config_;
   std::shared_ptr<const coding::StateCode<Capacity>> code_;
   coding::ActionCode actions_;
   OutputScale scale_;
-  ParallelPerceptron perceptron_;
+  HiddenLayer hidden_layer_;
   std::vector<double> value_of_count_;
 
   // Workspace: sized once, so that a step allocates nothing.

@@ -8,13 +8,13 @@
 #include <utility>
 #include <vector>
 
-#include "sdnn/approximators/column_sums.hpp"
+#include "sdnn/approximators/detail/column_sums.hpp"
 #include "sdnn/approximators/dynamic_sdnn_c.hpp"
 #include "sdnn/approximators/error_correction.hpp"
 #include "sdnn/benchmarks/stopwatch.hpp"
 #include "sdnn/coding/state_code.hpp"
-#include "sdnn/core/aligned_buffer.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::benchmarks {
@@ -26,25 +26,27 @@ namespace sdnn::benchmarks {
 class NetworkParts {
  public:
   /// A copy of `network` is timed, and learns. The states follow from `seed`.
-  NetworkParts(approximators::DynamicSdnnC network, std::uint64_t seed)
+  NetworkParts(approximators::DynamicSDNNC network, std::uint64_t seed)
       : network_(std::move(network)),
         random_(seed, core::Stream::exploration),
         state_(network_.n_inputs()),
         values_(network_.n_actions()),
-        potentials_(network_.perceptron().n_units()) {}
+        potentials_(network_.hidden_layer().n_units()) {}
 
-  const approximators::DynamicSdnnC& network() const noexcept { return network_; }
+  const approximators::DynamicSDNNC& network() const noexcept { return network_; }
 
   /// Q(s, a) of all actions at a new state.
   Times time_values(int n_repetitions) {
-    return time_each(n_repetitions, [this](int) { draw_state(); },
-                     [this](int) { network_.values(state_, values_); });
+    return time_each(
+        n_repetitions, [this](int) { draw_state(); },
+        [this](int) { network_.values(state_, values_); });
   }
 
   /// The same at a state the network was asked about just before.
   Times time_remembered_values(int n_repetitions) {
-    return time_each(n_repetitions, [this](int) { recall_new_state(); },
-                     [this](int) { network_.values(state_, values_); });
+    return time_each(
+        n_repetitions, [this](int) { recall_new_state(); },
+        [this](int) { network_.values(state_, values_); });
   }
 
   /// A learning step at a state the network was just asked about, as an agent takes it; Q moves up
@@ -54,8 +56,8 @@ class NetworkParts {
     require_units("n_corrected", n_corrected);
     const auto& scale = network_.output_scale();
     const auto& config = network_.config();
-    const double step = n_corrected * (config.q_high - config.q_low) /
-                        std::max(1, scale.u_high() - scale.u_low());
+    const double step =
+        n_corrected * (config.q_high - config.q_low) / std::max(1, scale.u_high() - scale.u_low());
     std::size_t action = 0;
     double target = 0.0;
     return time_each(
@@ -100,7 +102,7 @@ class NetworkParts {
 
   /// Bytes of all weights, with the padding of the last block of units.
   std::size_t weight_bytes() const noexcept {
-    return padded_units() * network_.perceptron().n_columns();
+    return padded_units() * network_.hidden_layer().n_columns();
   }
 
   /// Bytes of the weights that a pass has to read: those of columns that are not neutral, the mean
@@ -123,7 +125,7 @@ class NetworkParts {
 
  private:
   std::size_t padded_units() const noexcept {
-    return core::round_up(network_.perceptron().n_units(), approximators::kBlockUnits);
+    return core::round_up(network_.hidden_layer().n_units(), approximators::kBlockUnits);
   }
 
   void require_units(const char* name, int n_units) const {
@@ -140,7 +142,7 @@ class NetworkParts {
     network_.values(state_, values_);
   }
 
-  approximators::DynamicSdnnC network_;
+  approximators::DynamicSDNNC network_;
   core::Random random_;
   std::vector<double> state_;
   std::vector<double> values_;

@@ -9,15 +9,15 @@
 namespace sdnn::benchmarks {
 
 /// An RBF network whose `values` are evaluated as the definition says: every joint basis of every
-/// action (RbfNetwork::values_plainly). It learns what RbfNetwork learns, up to rounding.
+/// action (RBFNetwork::values_plainly). It learns what RBFNetwork learns, up to rounding.
 ///
 /// `value` and `correct` concern a single action; they stay as they are, and cost less than the
-/// n_actions-th part of `values`. Throws as RbfNetwork does.
-class PlainRbfNetwork {
+/// n_actions-th part of `values`. Throws as RBFNetwork does.
+class PlainRBFNetwork {
  public:
-  explicit PlainRbfNetwork(const approximators::RbfNetworkConfig& config) : network_(config) {}
+  explicit PlainRBFNetwork(const approximators::RBFNetworkConfig& config) : network_(config) {}
 
-  const approximators::RbfNetwork& network() const noexcept { return network_; }
+  const approximators::RBFNetwork& network() const noexcept { return network_; }
   std::size_t n_inputs() const noexcept { return network_.n_inputs(); }
   std::size_t n_actions() const noexcept { return network_.n_actions(); }
 
@@ -32,7 +32,7 @@ class PlainRbfNetwork {
   }
 
  private:
-  approximators::RbfNetwork network_;
+  approximators::RBFNetwork network_;
 };
 
 }  // namespace sdnn::benchmarks

@@ -8,8 +8,8 @@
 #include <span>
 
 #include "sdnn/benchmarks/stopwatch.hpp"
-#include "sdnn/core/aligned_buffer.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/instruction_set.hpp"
 #include "sdnn/core/random.hpp"
 
@@ -19,7 +19,7 @@
 
 namespace sdnn::benchmarks {
 
-namespace internal {
+namespace detail {
 
 inline std::uint64_t sum_of_words_portable(const std::byte* bytes, std::size_t size) noexcept {
   std::array<std::uint64_t, 8> sums{};
@@ -106,7 +106,7 @@ inline bool has_avx2_and_fma() noexcept {
 
 #endif  // SDNN_X86_KERNELS
 
-}  // namespace internal
+}  // namespace detail
 
 /// Reads a buffer from front to back: the most bytes per second that a pass over weights of the
 /// same size could read. Uses the best instructions there are, whatever level is in use.
@@ -115,10 +115,10 @@ class BufferRead {
   /// `n_bytes` is rounded up to whole cache lines; the buffer is written, so its pages exist.
   /// Throws std::invalid_argument, std::bad_alloc.
   explicit BufferRead(std::size_t n_bytes)
-      : buffer_(core::round_up((core::require_in_range("n_bytes", n_bytes, std::size_t{1},
-                                                       std::size_t{1} << 34),
-                                n_bytes),
-                               core::kCacheLine)) {
+      : buffer_(core::round_up(
+            (core::require_in_range("n_bytes", n_bytes, std::size_t{1}, std::size_t{1} << 34),
+             n_bytes),
+            core::kCacheLine)) {
     for (std::size_t i = 0; i < buffer_.size(); ++i) {
       buffer_[i] = static_cast<std::byte>(i * 31 % 251);
     }
@@ -130,10 +130,10 @@ class BufferRead {
   std::uint64_t sum() const noexcept {
 #if SDNN_X86_KERNELS
     if (core::best_instruction_set() >= core::InstructionSet::avx2) {
-      return internal::sum_of_words_avx2(buffer_.data(), buffer_.size());
+      return detail::sum_of_words_avx2(buffer_.data(), buffer_.size());
     }
 #endif
-    return internal::sum_of_words_portable(buffer_.data(), buffer_.size());
+    return detail::sum_of_words_portable(buffer_.data(), buffer_.size());
   }
 
   /// Times of `n_repetitions` readings.
@@ -171,12 +171,12 @@ class DenseProduct {
   /// The product; valid until the next call. Shape: (n_rows,).
   std::span<const float> multiply() noexcept {
 #if SDNN_X86_KERNELS
-    if (internal::has_avx2_and_fma()) {
-      internal::multiply_avx2(weights_.data(), n_rows_, n_columns_, input_.data(), out_.data());
+    if (detail::has_avx2_and_fma()) {
+      detail::multiply_avx2(weights_.data(), n_rows_, n_columns_, input_.data(), out_.data());
       return out_.span();
     }
 #endif
-    internal::multiply_portable(weights_.data(), n_rows_, n_columns_, input_.data(), out_.data());
+    detail::multiply_portable(weights_.data(), n_rows_, n_columns_, input_.data(), out_.data());
     return out_.span();
   }
 

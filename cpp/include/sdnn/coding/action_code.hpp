@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::coding {
 

@@ -11,18 +11,21 @@
 #include <vector>
 
 #include "sdnn/coding/pattern_table.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::coding {
 
-namespace internal {
+namespace detail {
 
 /// Patterns as bytes and their inner products, moved towards wanted ones by swaps of two units.
 class CorrelationSearch {
  public:
   CorrelationSearch(std::span<const double> correlations, std::size_t n_bins, std::size_t n_units)
-      : n_bins_(n_bins), n_units_(n_units), signs_(n_bins * n_units), products_(n_bins * n_bins),
+      : n_bins_(n_bins),
+        n_units_(n_units),
+        signs_(n_bins * n_units),
+        products_(n_bins * n_bins),
         wanted_(n_bins * n_bins) {
     for (std::size_t i = 0; i < wanted_.size(); ++i) {
       wanted_[i] = std::llround(correlations[i] * static_cast<double>(n_units));
@@ -93,19 +96,19 @@ class CorrelationSearch {
 
   std::size_t n_bins_;
   std::size_t n_units_;
-  std::vector<std::int8_t> signs_;       // (n_bins, n_units)
-  std::vector<std::int64_t> products_;   // (n_bins, n_bins)
+  std::vector<std::int8_t> signs_;      // (n_bins, n_units)
+  std::vector<std::int64_t> products_;  // (n_bins, n_bins)
   std::vector<std::int64_t> wanted_;
 };
 
-}  // namespace internal
+}  // namespace detail
 
 /// Balanced patterns whose pairwise correlations approach a given symmetric matrix.
 ///
 /// Each pattern starts as a copy of its most alike predecessor and is then improved by swaps of two
-/// units, first against its predecessors and at last against all. Only integers are compared, so the
-/// same seed gives the same patterns everywhere. A matrix that no patterns can have is approached in
-/// the least squares sense.
+/// units, first against its predecessors and at last against all. Only integers are compared, so
+/// the same seed gives the same patterns everywhere. A matrix that no patterns can have is
+/// approached in the least squares sense.
 ///
 /// Source: Horie et al. 2014 (the purpose; the search is ours). Shapes: correlations
 /// (n_bins, n_bins). Cost: about 40 n_units n_bins^2 steps, at most some 10^9. Throws
@@ -120,8 +123,7 @@ inline PatternTable correlation_matrix_patterns(int n_units, std::span<const dou
                 correlations.size());
   for (std::size_t i = 0; i < n_bins; ++i) {
     for (std::size_t j = 0; j < n_bins; ++j) {
-      const std::string name =
-          "correlations[" + std::to_string(i) + ", " + std::to_string(j) + "]";
+      const std::string name = "correlations[" + std::to_string(i) + ", " + std::to_string(j) + "]";
       const double value = correlations[i * n_bins + j];
       core::require_in_range(name, value, -1.0, 1.0);
       core::require(i != j || value == 1.0, name, "1 on the diagonal", value);
@@ -129,7 +131,7 @@ inline PatternTable correlation_matrix_patterns(int n_units, std::span<const dou
     }
   }
   const auto units = static_cast<std::size_t>(n_units);
-  internal::CorrelationSearch search(correlations, n_bins, units);
+  detail::CorrelationSearch search(correlations, n_bins, units);
   const std::size_t affordable = 400'000'000 / (units * n_bins * n_bins) + 1;
   const std::size_t n_proposals = units * std::min<std::size_t>(20, affordable);
   for (std::size_t i = 0; i < n_bins; ++i) {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "sdnn/core/bit_layer.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::coding {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "sdnn/core/bit_layer.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::coding {
@@ -20,11 +20,11 @@ using Bin = std::uint16_t;
 
 /// How one input is coded (spec section 1, item 2).
 struct PatternCodeConfig {
-  int n_pattern_units = 200;      ///< m, units per pattern
-  int n_anchor_patterns = 9;      ///< p_1 .. p_9; the last is not assigned to a bin
-  int n_interpolated = 44;        ///< patterns between two neighbouring anchors
-  bool balanced_anchors = true;   ///< as many +1 as -1; false: independent fair units
-  bool circular = false;          ///< last anchor = first: for angles
+  int n_pattern_units = 200;     ///< m, units per pattern
+  int n_anchor_patterns = 9;     ///< p_1 .. p_9; the last is not assigned to a bin
+  int n_interpolated = 44;       ///< patterns between two neighbouring anchors
+  bool balanced_anchors = true;  ///< as many +1 as -1; false: independent fair units
+  bool circular = false;         ///< last anchor = first: for angles
 };
 
 /// The patterns of one input: `n_bins` of them, each of `n_pattern_units` units (set = +1).

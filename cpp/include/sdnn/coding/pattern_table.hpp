@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::coding {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "sdnn/coding/pattern_table.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::coding {
@@ -56,10 +56,10 @@ inline PatternTable random_inverse_patterns(const RandomInverseConfig& config,
 
 /// How a code by anchor interpolation is made.
 struct AnchorConfig {
-  int n_units = 2000;          ///< units per pattern
-  int n_anchor_patterns = 9;   ///< random patterns; the last one ends the chain
-  int n_interpolated = 44;     ///< patterns between two neighbouring anchors
-  bool circular = false;       ///< last anchor = first: for angles
+  int n_units = 2000;         ///< units per pattern
+  int n_anchor_patterns = 9;  ///< random patterns; the last one ends the chain
+  int n_interpolated = 44;    ///< patterns between two neighbouring anchors
+  bool circular = false;      ///< last anchor = first: for angles
 };
 
 /// The paper's code of layer 2: (n_anchor_patterns - 1) * (n_interpolated + 1) patterns.

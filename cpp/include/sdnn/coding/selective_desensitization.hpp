@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "sdnn/coding/pattern_table.hpp"
-#include "sdnn/core/aligned_buffer.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::coding {
 
@@ -32,8 +32,8 @@ struct CodeWords {
 
 /// x_SD: for each pair (mu, nu) the pattern of input mu where that of nu is +1, and 0 elsewhere.
 ///
-/// Columns are numbered pair by pair. Inside, a pair starts on a 64-bit word: *slot* s of the padded
-/// numbering is bit s % 64 of word s / 64, so slots and columns differ if n_units % 64 != 0.
+/// Columns are numbered pair by pair. Inside, a pair starts on a 64-bit word: *slot* s of the
+/// padded numbering is bit s % 64 of word s / 64, so slots and columns differ if n_units % 64 != 0.
 ///
 /// Source: Nonaka, Tanaka, Morita 2011; section 3.1 of the acrobot paper, layer 3. One table per
 /// pair and role: separate tables, shared ones and permuted ones differ only in what they hold.
@@ -45,8 +45,7 @@ class SelectiveDesensitization {
   /// in n_units, or if two tables of one input differ in n_bins.
   SelectiveDesensitization(std::vector<PatternTable> modified, std::vector<PatternTable> modifiers,
                            std::vector<InputPair> pairs)
-      : modified_(std::move(modified)), modifiers_(std::move(modifiers)),
-        pairs_(std::move(pairs)) {
+      : modified_(std::move(modified)), modifiers_(std::move(modifiers)), pairs_(std::move(pairs)) {
     core::require(!pairs_.empty(), "pairs", "at least one pair", pairs_.size());
     core::require(modified_.size() == pairs_.size(), "modified", "one table per pair",
                   modified_.size());
@@ -97,9 +96,10 @@ class SelectiveDesensitization {
     for (std::size_t i = 0; i < bins.size(); ++i) {
       const std::size_t limit = n_bins_[i % n_inputs()];
       if (bins[i] >= 0 && (limit == 0 || static_cast<std::size_t>(bins[i]) < limit)) continue;
-      core::require(false, "bins[" + std::to_string(i / n_inputs()) + ", " +
-                               std::to_string(i % n_inputs()) + "]",
-                    "in [0, " + std::to_string(limit) + ")", bins[i]);
+      core::require(
+          false,
+          "bins[" + std::to_string(i / n_inputs()) + ", " + std::to_string(i % n_inputs()) + "]",
+          "in [0, " + std::to_string(limit) + ")", bins[i]);
     }
   }
 
@@ -142,7 +142,8 @@ class CodedSamples {
  public:
   /// Shapes: bins (n_samples, n_inputs), checked before.
   CodedSamples(const SelectiveDesensitization& code, std::span<const std::int32_t> bins)
-      : n_words_(padded_words(code)), size_(bins.size() / code.n_inputs()),
+      : n_words_(padded_words(code)),
+        size_(bins.size() / code.n_inputs()),
         words_(2 * n_words_ * size_) {
     for (std::size_t t = 0; t < size_; ++t) {
       code.encode(bins.subspan(t * code.n_inputs(), code.n_inputs()),

@@ -15,7 +15,7 @@
 #include "sdnn/coding/desensitization.hpp"
 #include "sdnn/coding/pattern_code.hpp"
 #include "sdnn/core/bit_layer.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/instruction_set.hpp"
 
 namespace sdnn::coding {
@@ -44,7 +44,7 @@ struct SignedColumns {
   }
 };
 
-namespace internal {
+namespace detail {
 
 /// The set bits of a byte, in rising order.
 struct SetBits {
@@ -79,7 +79,7 @@ template <std::size_t NWords>
   return end;
 }
 
-}  // namespace internal
+}  // namespace detail
 
 /// Layers 2 and 3 as fixed wiring: from a state to its ternary code x_SD.
 ///
@@ -197,16 +197,16 @@ class StateCode {
     std::uint32_t* negative = out.negative.data();
     for_each_pair([&](std::size_t first, std::size_t nu, std::size_t mu_1, std::size_t mu_2) {
       const PairWords x(pattern(nu, bins), signs(mu_1, nu, bins), signs(mu_2, nu, bins));
-      positive = internal::list_set_bits(x.sum_plus, first, m, positive);
-      negative = internal::list_set_bits(x.sum_minus, first, m, negative);
-      positive = internal::list_set_bits(x.difference_plus, first + m, m, positive);
-      negative = internal::list_set_bits(x.difference_minus, first + m, m, negative);
+      positive = detail::list_set_bits(x.sum_plus, first, m, positive);
+      negative = detail::list_set_bits(x.sum_minus, first, m, negative);
+      positive = detail::list_set_bits(x.difference_plus, first + m, m, positive);
+      negative = detail::list_set_bits(x.difference_minus, first + m, m, negative);
     });
     for_each_single([&](std::size_t first, std::size_t nu, std::size_t mu) {
       const Pattern& active = pattern(nu, bins);
       const Pattern plus = active & signs(mu, nu, bins);
-      positive = internal::list_set_bits(plus.words(), first, m, positive);
-      negative = internal::list_set_bits((active ^ plus).words(), first, m, negative);
+      positive = detail::list_set_bits(plus.words(), first, m, positive);
+      negative = detail::list_set_bits((active ^ plus).words(), first, m, negative);
     });
     out.positive.resize(static_cast<std::size_t>(positive - out.positive.data()));
     out.negative.resize(static_cast<std::size_t>(negative - out.negative.data()));
@@ -307,8 +307,8 @@ class StateCode {
     }
   }
 
-  [[gnu::always_inline]] std::int32_t inner_product_of_words(std::span<const Bin> a,
-                                                             std::span<const Bin> b) const noexcept {
+  [[gnu::always_inline]] std::int32_t inner_product_of_words(
+      std::span<const Bin> a, std::span<const Bin> b) const noexcept {
     int sum = 0;
     const std::size_t l = n_inputs();
     for (std::size_t nu = 0; nu < l; ++nu) {
@@ -353,8 +353,8 @@ class StateCode {
 
   static void append(std::uint64_t word, std::size_t first, std::vector<std::uint32_t>& list) {
     for (; word != 0; word &= word - 1) {
-      list.push_back(static_cast<std::uint32_t>(
-          first + static_cast<std::size_t>(std::countr_zero(word))));
+      list.push_back(
+          static_cast<std::uint32_t>(first + static_cast<std::size_t>(std::countr_zero(word))));
     }
   }
 

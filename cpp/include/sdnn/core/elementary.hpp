@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "sdnn/core/lanes.hpp"
+#include "sdnn/core/detail/lanes.hpp"
 
 namespace sdnn::core {
 
@@ -122,7 +122,7 @@ inline double log(double x) noexcept {
   const auto bits = std::bit_cast<std::uint64_t>(x);
   exponent += static_cast<int>(bits >> 52);
   double m = std::bit_cast<double>((bits & kMantissa) | kOne);  // [1, 2)
-  if ((bits & kMantissa) > kSqrtHalf) {                        // to (sqrt 1/2, sqrt 2]
+  if ((bits & kMantissa) > kSqrtHalf) {                         // to (sqrt 1/2, sqrt 2]
     m *= 0.5;
     ++exponent;
   }
@@ -132,16 +132,16 @@ inline double log(double x) noexcept {
   const double series = z * detail::polynomial(kSeries, z);
   const double half_square = 0.5 * f * f;
   const double k = static_cast<double>(exponent);
-  return k * kLog2High -
-         ((half_square - (s * (half_square + series) + k * kLog2Low)) - f);
+  return k * kLog2High - ((half_square - (s * (half_square + series) + k * kLog2Low)) - f);
 }
 
 /// e^x; infinity above 709.78, gradually 0 below -708.4, NaN for NaN.
 ///
 /// Error: the largest of 400,000 arguments with a normal result was 0.66 ulp; a subnormal result is
 /// rounded a second time. No branch and no table, so that a loop over it can be vectorized.
-/// Source: x = n log 2 + r, |r| <= log(2) / 2, log 2 as 42 + 53 bits; e^r = 1 + r + r^2/2 + r^3 p(r)
-/// with a polynomial of our own (relative error 2^-59.8), summed so that the large parts are exact.
+/// Source: x = n log 2 + r, |r| <= log(2) / 2, log 2 as 42 + 53 bits; e^r = 1 + r + r^2/2 + r^3
+/// p(r) with a polynomial of our own (relative error 2^-59.8), summed so that the large parts are
+/// exact.
 inline double exp(double x) noexcept {
   constexpr double kLog2Inverse = 0x1.71547652b82fep+0;
   constexpr double kRounder = 0x1.8p52;  // adding it leaves the nearest integer in the low bits
@@ -182,30 +182,42 @@ inline double exp(double x) noexcept {
 /// Source: Wichura, M. J. (1988). Algorithm AS 241, PPND16. Applied Statistics 37(3), 477-484.
 inline double normal_quantile(double p) noexcept {
   using Coefficients = std::array<double, 8>;
-  constexpr Coefficients kCentreTop{
-      3.3871328727963666080e0, 1.3314166789178437745e2, 1.9715909503065514427e3,
-      1.3731693765509461125e4, 4.5921953931549871457e4, 6.7265770927008700853e4,
-      3.3430575583588128105e4, 2.5090809287301226727e3};
-  constexpr Coefficients kCentreBottom{
-      1.0,                     4.2313330701600911252e1, 6.8718700749205790830e2,
-      5.3941960214247511077e3, 2.1213794301586595867e4, 3.9307895800092710610e4,
-      2.8729085735721942674e4, 5.2264952788528545610e3};
-  constexpr Coefficients kMiddleTop{
-      1.42343711074968357734e0, 4.63033784615654529590e0, 5.76949722146069140550e0,
-      3.64784832476320460504e0, 1.27045825245236838258e0, 2.41780725177450611770e-1,
-      2.27238449892691845833e-2, 7.74545014278341407640e-4};
-  constexpr Coefficients kMiddleBottom{
-      1.0,                       2.05319162663775882187e0,  1.67638483018380384940e0,
-      6.89767334985100004550e-1, 1.48103976427480074590e-1, 1.51986665636164571966e-2,
-      5.47593808499534494600e-4, 1.05075007164441684324e-9};
-  constexpr Coefficients kTailTop{
-      6.65790464350110377720e0,  5.46378491116411436990e0,  1.78482653991729133580e0,
-      2.96560571828504891230e-1, 2.65321895265761230930e-2, 1.24266094738807843860e-3,
-      2.71155556874348757815e-5, 2.01033439929228813265e-7};
-  constexpr Coefficients kTailBottom{
-      1.0,                       5.99832206555887937690e-1, 1.36929880922735805310e-1,
-      1.48753612908506148525e-2, 7.86869131145613259100e-4, 1.84631831751005468180e-5,
-      1.42151175831644588870e-7, 2.04426310338993978564e-15};
+  constexpr Coefficients kCentreTop{3.3871328727963666080e0, 1.3314166789178437745e2,
+                                    1.9715909503065514427e3, 1.3731693765509461125e4,
+                                    4.5921953931549871457e4, 6.7265770927008700853e4,
+                                    3.3430575583588128105e4, 2.5090809287301226727e3};
+  constexpr Coefficients kCentreBottom{1.0,
+                                       4.2313330701600911252e1,
+                                       6.8718700749205790830e2,
+                                       5.3941960214247511077e3,
+                                       2.1213794301586595867e4,
+                                       3.9307895800092710610e4,
+                                       2.8729085735721942674e4,
+                                       5.2264952788528545610e3};
+  constexpr Coefficients kMiddleTop{1.42343711074968357734e0,  4.63033784615654529590e0,
+                                    5.76949722146069140550e0,  3.64784832476320460504e0,
+                                    1.27045825245236838258e0,  2.41780725177450611770e-1,
+                                    2.27238449892691845833e-2, 7.74545014278341407640e-4};
+  constexpr Coefficients kMiddleBottom{1.0,
+                                       2.05319162663775882187e0,
+                                       1.67638483018380384940e0,
+                                       6.89767334985100004550e-1,
+                                       1.48103976427480074590e-1,
+                                       1.51986665636164571966e-2,
+                                       5.47593808499534494600e-4,
+                                       1.05075007164441684324e-9};
+  constexpr Coefficients kTailTop{6.65790464350110377720e0,  5.46378491116411436990e0,
+                                  1.78482653991729133580e0,  2.96560571828504891230e-1,
+                                  2.65321895265761230930e-2, 1.24266094738807843860e-3,
+                                  2.71155556874348757815e-5, 2.01033439929228813265e-7};
+  constexpr Coefficients kTailBottom{1.0,
+                                     5.99832206555887937690e-1,
+                                     1.36929880922735805310e-1,
+                                     1.48753612908506148525e-2,
+                                     7.86869131145613259100e-4,
+                                     1.84631831751005468180e-5,
+                                     1.42151175831644588870e-7,
+                                     2.04426310338993978564e-15};
   const auto ratio = [](const Coefficients& top, const Coefficients& bottom, double x) {
     return detail::polynomial(top, x) / detail::polynomial(bottom, x);
   };

@@ -25,9 +25,12 @@ enum class InstructionSet {
 /// The level's name, as the environment variable SDNN_INSTRUCTION_SET spells it.
 inline std::string_view name_of(InstructionSet level) noexcept {
   switch (level) {
-    case InstructionSet::avx512: return "avx512";
-    case InstructionSet::avx2: return "avx2";
-    default: return "portable";
+    case InstructionSet::avx512:
+      return "avx512";
+    case InstructionSet::avx2:
+      return "avx2";
+    default:
+      return "portable";
   }
 }
 
@@ -64,7 +67,7 @@ inline InstructionSet instruction_set_named(std::string_view name) {
                               std::string(name));
 }
 
-namespace internal {
+namespace detail {
 
 inline std::atomic<InstructionSet>& active_level() {
   static std::atomic<InstructionSet> level = [] {
@@ -74,45 +77,48 @@ inline std::atomic<InstructionSet>& active_level() {
   return level;
 }
 
-}  // namespace internal
+}  // namespace detail
 
 /// The level in use: the best one, unless SDNN_INSTRUCTION_SET or set_instruction_set chose.
 ///
 /// Throws std::invalid_argument on the first call if the environment variable is unusable.
 inline InstructionSet instruction_set() {
-  return internal::active_level().load(std::memory_order_relaxed);
+  return detail::active_level().load(std::memory_order_relaxed);
 }
 
 /// Forces a level, for the whole process. Throws like instruction_set_named.
 inline void set_instruction_set(std::string_view name) {
-  internal::active_level().store(instruction_set_named(name), std::memory_order_relaxed);
+  detail::active_level().store(instruction_set_named(name), std::memory_order_relaxed);
 }
 
 }  // namespace sdnn::core
 
 /// Defines the function `name`, which runs `name_body` compiled for the instruction set in use.
 ///
-/// `name_body` has to be SDNN_INLINE in the namespace `internal`, with everything that it calls, and
-/// exact: sums of integers, so that all versions give the same result. To be used in a namespace
-/// that has an `internal`; `parameters` and `arguments` are lists in parentheses.
+/// `name_body` has to be SDNN_INLINE in the namespace `internal`, with everything that it calls,
+/// and exact: sums of integers, so that all versions give the same result. To be used in a
+/// namespace that has an `internal`; `parameters` and `arguments` are lists in parentheses.
 #if SDNN_X86_KERNELS
-#define SDNN_KERNEL(Result, name, parameters, arguments)                                           \
-  namespace internal {                                                                             \
-  [[gnu::target("avx2,bmi,popcnt")]] inline Result name##_avx2 parameters {                        \
-    return name##_body arguments;                                                                  \
-  }                                                                                                \
-  [[gnu::target("avx512f,avx512bw,avx2,bmi,popcnt")]] inline Result name##_avx512 parameters {     \
-    return name##_body arguments;                                                                  \
-  }                                                                                                \
-  }                                                                                                \
-  inline Result name parameters {                                                                  \
-    switch (core::instruction_set()) {                                                             \
-      case core::InstructionSet::avx512: return internal::name##_avx512 arguments;                 \
-      case core::InstructionSet::avx2: return internal::name##_avx2 arguments;                     \
-      default: return internal::name##_body arguments;                                             \
-    }                                                                                              \
+#define SDNN_KERNEL(Result, name, parameters, arguments)                                       \
+  namespace detail {                                                                           \
+  [[gnu::target("avx2,bmi,popcnt")]] inline Result name##_avx2 parameters {                    \
+    return name##_body arguments;                                                              \
+  }                                                                                            \
+  [[gnu::target("avx512f,avx512bw,avx2,bmi,popcnt")]] inline Result name##_avx512 parameters { \
+    return name##_body arguments;                                                              \
+  }                                                                                            \
+  }                                                                                            \
+  inline Result name parameters {                                                              \
+    switch (core::instruction_set()) {                                                         \
+      case core::InstructionSet::avx512:                                                       \
+        return detail::name##_avx512 arguments;                                                \
+      case core::InstructionSet::avx2:                                                         \
+        return detail::name##_avx2 arguments;                                                  \
+      default:                                                                                 \
+        return detail::name##_body arguments;                                                  \
+    }                                                                                          \
   }
 #else
 #define SDNN_KERNEL(Result, name, parameters, arguments) \
-  inline Result name parameters { return internal::name##_body arguments; }
+  inline Result name parameters { return detail::name##_body arguments; }
 #endif

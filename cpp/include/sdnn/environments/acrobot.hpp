@@ -6,9 +6,9 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/elementary.hpp"
-#include "sdnn/environments/acrobot_dynamics.hpp"
+#include "sdnn/environments/detail/acrobot_dynamics.hpp"
 
 namespace sdnn::environments {
 

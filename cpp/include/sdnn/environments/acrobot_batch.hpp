@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
-#include "sdnn/core/aligned_buffer.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/environments/acrobot.hpp"
-#include "sdnn/environments/acrobot_dynamics.hpp"
-#include "sdnn/environments/acrobot_kernel.hpp"
+#include "sdnn/environments/detail/acrobot_dynamics.hpp"
+#include "sdnn/environments/detail/acrobot_kernel.hpp"
 
 namespace sdnn::environments {
 
@@ -74,7 +74,9 @@ class AcrobotBatch {
     move_acrobots_kernel()(
         dynamics_,
         {{state_[0].data(), state_[1].data(), state_[2].data(), state_[3].data()},
-         torque_.data(), lambda_.data(), mask_.data()},
+         torque_.data(),
+         lambda_.data(),
+         mask_.data()},
         padded_size_);
     std::size_t n_overflows = 0, first_overflow = 0;
     for (std::size_t i = size_; i-- > 0;) {

@@ -9,10 +9,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <tuple>
 #include <utility>
 #include <vector>
 
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/config_fields.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/elementary.hpp"
 #include "sdnn/core/random.hpp"
 
@@ -50,7 +52,8 @@ inline double energy_sensor(double s3, double s4) noexcept {
 /// s6, the height of the tip: (2 + cos 2 pi s1 - cos 2 pi (s1 + s2)) / 4, in [0, 1].
 inline double height_sensor(double s1, double s2) noexcept {
   return (2.0 + core::sin_cos(core::kTwoPi * s1).cos -
-          core::sin_cos(core::kTwoPi * (s1 + s2)).cos) / 4.0;
+          core::sin_cos(core::kTwoPi * (s1 + s2)).cos) /
+         4.0;
 }
 
 /// Independent Gaussian noise on every channel of an observation.
@@ -85,6 +88,12 @@ class SensorNoise {
 struct SensorConfig {
   int n_sensors = 4;   ///< 4: s1..s4; 5: with s5; 6: with s5 and s6
   double noise = 0.0;  ///< standard deviation on every sensor; the paper's noisy cases have 0.02
+
+  static constexpr auto fields() noexcept {
+    return std::tuple(core::field("n_sensors", &SensorConfig::n_sensors),
+                      core::field("noise", &SensorConfig::noise));
+  }
+  bool operator==(const SensorConfig&) const = default;
 };
 
 /// s1..s4 and, if asked for, s5 and s6, each with its own noise.

@@ -3,8 +3,10 @@
 
 #include <cmath>
 #include <string_view>
+#include <tuple>
 
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/config_fields.hpp"
+#include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::environments {
 
@@ -21,6 +23,15 @@ struct GoalScheduleConfig {
   int last_episode = 10000;     ///< the formula holds up to this episode, `floor` beyond; >= 0
   double floor = 0.01;          ///< lambda beyond `last_episode`, >= 0
   double constant_value = 1.0;  ///< of constant, >= 0
+
+  static constexpr auto fields() noexcept {
+    return std::tuple(core::field("kind", &GoalScheduleConfig::kind),
+                      core::field("scale", &GoalScheduleConfig::scale),
+                      core::field("last_episode", &GoalScheduleConfig::last_episode),
+                      core::field("floor", &GoalScheduleConfig::floor),
+                      core::field("constant_value", &GoalScheduleConfig::constant_value));
+  }
+  bool operator==(const GoalScheduleConfig&) const = default;
 };
 
 /// lambda as a function of the number of the learning episode.

@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include "sdnn/core/check.hpp"
-#include "sdnn/estimators/unit_ranking.hpp"
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/estimators/detail/unit_ranking.hpp"
 
 namespace sdnn::estimators {
 
@@ -47,8 +47,9 @@ class PDeltaRule {
     targets_.reserve(targets.size());
     for (std::size_t i = 0; i < targets.size(); ++i) {
       if (!std::isfinite(targets[i])) {
-        core::require_finite("targets[" + std::to_string(i / n_groups) + ", " +
-                                 std::to_string(i % n_groups) + "]", targets[i]);
+        core::require_finite(
+            "targets[" + std::to_string(i / n_groups) + ", " + std::to_string(i % n_groups) + "]",
+            targets[i]);
       }
       targets_.push_back(static_cast<std::int32_t>(
           std::clamp(0.5 + targets[i], 0.0, static_cast<double>(group_size_))));
@@ -83,7 +84,7 @@ class PDeltaRule {
     if (n_corrected <= kScans) {  // the least key, then the next one, ...
       const std::size_t n_before = corrections.size();
       std::int32_t key = rank_units(potentials, group_size_, deficit < 0, n_index_bits_,
-                                       distance_limit_, keys_.data());
+                                    distance_limit_, keys_.data());
       for (std::size_t left = n_corrected; key >> n_index_bits_ < distance_limit_;) {
         add(static_cast<std::size_t>(key & ((1 << n_index_bits_) - 1)));
         if (--left == 0) return;
@@ -128,16 +129,17 @@ inline std::size_t n_units_for(ClassScheme scheme, std::size_t n_classes) {
 /// Perceptron error correction: every unit that is on the wrong side for the sample's class.
 ///
 /// Source: the LIBSDNN manual (both schemes). A one-vs-one unit ignores the other classes.
-class ErrorCorrectionRule {
+class PerceptronRule {
  public:
   /// Shapes: labels (n_samples,) in [0, n_classes). Throws std::invalid_argument otherwise, or if
   /// n_units is not what the scheme needs.
-  ErrorCorrectionRule(std::size_t n_units, std::span<const std::int32_t> labels,
-                      std::size_t n_classes, ClassScheme scheme)
+  PerceptronRule(std::size_t n_units, std::span<const std::int32_t> labels, std::size_t n_classes,
+                 ClassScheme scheme)
       : labels_(labels.begin(), labels.end()) {
     const std::size_t needed = n_units_for(scheme, n_classes);
     core::require(n_units == needed, "n_units",
-                  std::to_string(needed) + " for " + std::to_string(n_classes) + " classes", n_units);
+                  std::to_string(needed) + " for " + std::to_string(n_classes) + " classes",
+                  n_units);
     for (std::size_t t = 0; t < labels.size(); ++t) {
       if (labels[t] >= 0 && static_cast<std::size_t>(labels[t]) < n_classes) continue;
       core::require_in_range("labels[" + std::to_string(t) + "]", labels[t], 0,

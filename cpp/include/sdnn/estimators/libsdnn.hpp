@@ -13,7 +13,7 @@
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/coding/random_inverse.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::estimators {
 
@@ -23,8 +23,8 @@ enum class StandardLibrary {
   msvc,       ///< Visual Studio 2012 to 2019, as in LIBSDNN's own programs
 };
 
-/// LIBSDNN's generator: std::mt19937 from a std::seed_seq, both fully specified by the standard, and
-/// the uniform integers of one standard library, which are not.
+/// LIBSDNN's generator: std::mt19937 from a std::seed_seq, both fully specified by the standard,
+/// and the uniform integers of one standard library, which are not.
 class LibsdnnRandom {
  public:
   /// Throws std::invalid_argument if there is no seed.
@@ -58,7 +58,7 @@ class LibsdnnRandom {
   std::mt19937 generator_;
 };
 
-namespace internal {
+namespace detail {
 
 /// LIBSDNN packs 32 units into a word, first unit highest, and reads words from the lowest bit: in
 /// every 32 units (and in the rest at the end) the order of columns is reversed.
@@ -68,10 +68,10 @@ inline std::size_t libsdnn_column(std::size_t unit, std::size_t n_units) noexcep
   return begin + (end - 1 - unit);
 }
 
-}  // namespace internal
+}  // namespace detail
 
-/// A random-inverse code as LIBSDNN draws it: units are drawn one by one, until one of the sign asked
-/// for has come that has not flipped at this step; signs take turns, +1 first.
+/// A random-inverse code as LIBSDNN draws it: units are drawn one by one, until one of the sign
+/// asked for has come that has not flipped at this step; signs take turns, +1 first.
 ///
 /// Throws std::invalid_argument where LIBSDNN would refuse the setting or never end.
 inline coding::PatternTable libsdnn_patterns(const coding::RandomInverseConfig& config,
@@ -86,7 +86,7 @@ inline coding::PatternTable libsdnn_patterns(const coding::RandomInverseConfig& 
   std::vector<bool> on(n_units);
   const auto flip = [&](std::size_t bin, std::size_t unit) {
     on[unit] = !on[unit];
-    table.flip(bin, internal::libsdnn_column(unit, n_units));
+    table.flip(bin, detail::libsdnn_column(unit, n_units));
   };
   for (std::size_t i = 0; i < n_units / 2; ++i) {
     std::size_t unit = draw();
@@ -116,8 +116,8 @@ struct LibsdnnTables {
 
 /// Draws them in LIBSDNN's order.
 ///
-/// Shapes: inputs, one configuration per input. Throws std::invalid_argument for a pair of an unknown
-/// input, and like libsdnn_patterns.
+/// Shapes: inputs, one configuration per input. Throws std::invalid_argument for a pair of an
+/// unknown input, and like libsdnn_patterns.
 inline LibsdnnTables libsdnn_tables(std::span<const coding::RandomInverseConfig> inputs,
                                     std::span<const coding::InputPair> pairs,
                                     LibsdnnRandom& random) {

@@ -12,12 +12,12 @@
 #include <utility>
 #include <variant>
 
-#include "sdnn/core/check.hpp"
-#include "sdnn/estimators/block_training.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
-#include "sdnn/estimators/dual_training.hpp"
-#include "sdnn/estimators/perceptron_layer.hpp"
-#include "sdnn/estimators/plain_training.hpp"
+#include "sdnn/estimators/detail/block_training.hpp"
+#include "sdnn/estimators/detail/dual_training.hpp"
+#include "sdnn/estimators/detail/plain_training.hpp"
+#include "sdnn/estimators/parallel_perceptron.hpp"
 #include "sdnn/estimators/training_form.hpp"
 
 namespace sdnn::estimators {
@@ -33,7 +33,7 @@ class Trainer {
   /// Shapes: bins (n_samples, n_inputs). Throws std::invalid_argument for bins out of range or if
   /// the rule knows another number of samples, std::length_error if `form` (other than automatic)
   /// needs more than `memory_limit` bytes.
-  Trainer(std::shared_ptr<PerceptronLayer> layer, std::span<const std::int32_t> bins, Rule rule,
+  Trainer(std::shared_ptr<ParallelPerceptron> layer, std::span<const std::int32_t> bins, Rule rule,
           TrainingForm form, std::size_t memory_limit, int n_threads)
       : layer_(std::move(layer)), rule_(std::move(rule)) {
     core::require_in_range("n_threads", n_threads, 1, 4096);
@@ -121,7 +121,7 @@ class Trainer {
     }
   }
 
-  std::shared_ptr<PerceptronLayer> layer_;
+  std::shared_ptr<ParallelPerceptron> layer_;
   Rule rule_;
   std::size_t n_samples_ = 0;
   TrainingForm form_ = TrainingForm::plain;
@@ -132,6 +132,6 @@ class Trainer {
 };
 
 using PDeltaTrainer = Trainer<PDeltaRule>;
-using ErrorCorrectionTrainer = Trainer<ErrorCorrectionRule>;
+using PerceptronTrainer = Trainer<PerceptronRule>;
 
 }  // namespace sdnn::estimators

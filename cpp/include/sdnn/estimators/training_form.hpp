@@ -10,11 +10,11 @@
 #include <string_view>
 
 #include "sdnn/coding/selective_desensitization.hpp"
-#include "sdnn/core/aligned_buffer.hpp"
-#include "sdnn/estimators/chunked_weights.hpp"
-#include "sdnn/estimators/code_walk.hpp"
-#include "sdnn/estimators/presentation_window.hpp"
-#include "sdnn/estimators/weight_tiles.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/estimators/detail/chunked_weights.hpp"
+#include "sdnn/estimators/detail/code_walk.hpp"
+#include "sdnn/estimators/detail/presentation_window.hpp"
+#include "sdnn/estimators/detail/weight_tiles.hpp"
 
 namespace sdnn::estimators {
 

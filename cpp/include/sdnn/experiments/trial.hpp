@@ -6,11 +6,13 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "sdnn/agents/agent.hpp"
-#include "sdnn/core/check.hpp"
+#include "sdnn/core/config_fields.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/environments/acrobot.hpp"
 #include "sdnn/environments/acrobot_sensors.hpp"
@@ -22,6 +24,12 @@ namespace sdnn::experiments {
 struct ProtocolConfig {
   int n_learning_episodes = 15000;
   int test_interval = 10;  ///< learning episodes between two test episodes
+
+  static constexpr auto fields() noexcept {
+    return std::tuple(core::field("n_learning_episodes", &ProtocolConfig::n_learning_episodes),
+                      core::field("test_interval", &ProtocolConfig::test_interval));
+  }
+  bool operator==(const ProtocolConfig&) const = default;
 };
 
 /// The outcome of one test episode.

@@ -1,0 +1,283 @@
+/// The one kernel of the hidden pass: sums of byte columns, for each instruction set.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/instruction_set.hpp"
+
+#if SDNN_X86_KERNELS
+#include <immintrin.h>
+#endif
+
+namespace sdnn::approximators {
+
+/// Hidden units whose weights lie side by side: one cache line of bytes per column.
+inline constexpr std::size_t kBlockUnits = 64;
+
+/// Columns in the form that the kernels read: padded with a column of zeros to a multiple of
+/// kAtOnce, and beyond that as far as memory is asked for ahead. A place is a column's first byte
+/// in its block divided by kPlaceBytes, which a processor multiplies by within a load.
+class ColumnPlaces {
+ public:
+  static constexpr std::size_t kMost = 1024;
+  static constexpr std::size_t kAtOnce = 8;
+  /// How many columns ahead memory is asked for: about the latency of the last-level cache.
+  static constexpr std::size_t kPrefetchAhead = 16;
+  static constexpr std::size_t kPlaceBytes = 8;
+
+  /// Up to kMost columns of a block whose column `zeros` has nothing but zeros.
+  ColumnPlaces(std::span<const std::uint32_t> columns, std::size_t zeros) noexcept
+      : size_(core::round_up(columns.size(), kAtOnce)) {
+    assert(columns.size() <= kMost);
+    static constexpr auto kFactor = static_cast<std::uint32_t>(kBlockUnits / kPlaceBytes);
+    const auto end = std::ranges::transform(columns, places_.begin(), [](std::uint32_t column) {
+                       return column * kFactor;
+                     }).out;
+    std::fill(end, places_.begin() + static_cast<std::ptrdiff_t>(size_ + kPrefetchAhead),
+              static_cast<std::uint32_t>(zeros) * kFactor);
+  }
+
+  /// A multiple of kAtOnce.
+  std::size_t size() const noexcept { return size_; }
+  /// size() places, and kPrefetchAhead more that are not to be added.
+  const std::uint32_t* data() const noexcept { return places_.data(); }
+
+ private:
+  std::size_t size_;
+  std::array<std::uint32_t, kMost + kPrefetchAhead> places_;
+};
+
+/// sums[i] += factor * sum over the columns at `places` of column[i], for i = 0..63.
+///
+/// `group` (1, 2 or 4) columns may be added in 8 bits: the caller knows that |weight| <= 127 /
+/// group in this block. All sums are exact, so every implementation gives the same result.
+using AddColumns = void (*)(const std::int8_t* block, const ColumnPlaces& places, int group,
+                            int factor, std::int32_t* sums);
+
+namespace detail {
+
+/// Groups of columns whose sum fits into 16 bits: 256 * 127 < 2^15.
+inline constexpr std::size_t kGroupsPerSum = 256;
+
+/// How far from `begin` the sum of groups of `Group` places fits into 16 bits.
+template <std::size_t Group>
+const std::uint32_t* end_of_part(const std::uint32_t* begin, const std::uint32_t* end) noexcept {
+  return begin + std::min(Group * kGroupsPerSum, static_cast<std::size_t>(end - begin));
+}
+
+[[gnu::always_inline]] inline const std::int8_t* column_at(const std::int8_t* block,
+                                                           std::uint32_t place) noexcept {
+  return block + std::size_t{place} * ColumnPlaces::kPlaceBytes;
+}
+
+using Bytes = std::array<std::int8_t, kBlockUnits>;
+
+/// The sum of `Group` columns in 8 bits, by halves: loops of a shape that every compiler
+/// vectorizes. Copied first, because bytes in memory may alias anything.
+template <std::size_t Group>
+Bytes group_sum_portable(const std::int8_t* block, const std::uint32_t* places) noexcept {
+  Bytes sum;
+  if constexpr (Group == 1) {
+    std::copy_n(column_at(block, places[0]), kBlockUnits, sum.begin());
+  } else {
+    const Bytes first = group_sum_portable<Group / 2>(block, places);
+    const Bytes second = group_sum_portable<Group / 2>(block, places + Group / 2);
+    for (std::size_t i = 0; i < kBlockUnits; ++i) {
+      sum[i] = static_cast<std::int8_t>(first[i] + second[i]);
+    }
+  }
+  return sum;
+}
+
+template <std::size_t Group>
+void add_groups_portable(const std::int8_t* block, const ColumnPlaces& places, int factor,
+                         std::int32_t* sums) {
+  const std::uint32_t* const end = places.data() + places.size();
+  for (const std::uint32_t* begin = places.data(); begin != end;) {
+    const std::uint32_t* const part_end = end_of_part<Group>(begin, end);
+    std::array<std::int16_t, kBlockUnits> wide{};
+    for (; begin != part_end; begin += Group) {
+      const Bytes sum = group_sum_portable<Group>(block, begin);
+      for (std::size_t i = 0; i < kBlockUnits; ++i) {
+        wide[i] = static_cast<std::int16_t>(wide[i] + sum[i]);
+      }
+    }
+    for (std::size_t i = 0; i < kBlockUnits; ++i) sums[i] += factor * wide[i];
+  }
+}
+
+inline void add_columns_portable(const std::int8_t* block, const ColumnPlaces& places, int group,
+                                 int factor, std::int32_t* sums) {
+  switch (group) {
+    case 4:
+      return add_groups_portable<4>(block, places, factor, sums);
+    case 2:
+      return add_groups_portable<2>(block, places, factor, sums);
+    default:
+      return add_groups_portable<1>(block, places, factor, sums);
+  }
+}
+
+#if SDNN_X86_KERNELS
+
+// Both vector kernels take two groups of columns at a time: the columns of a group are added in 8
+// bits, the bytes of the two groups are interleaved, and one multiply-add by ones widens and adds
+// them pair by pair. Interleaving leaves the 16-bit sums in an order of their own, undone at the
+// end.
+
+/// Asks for the columns that will be added kPrefetchAhead places later.
+[[gnu::always_inline]] inline void prefetch_ahead(const std::int8_t* block,
+                                                  const std::uint32_t* places) noexcept {
+  for (std::size_t k = 0; k < ColumnPlaces::kAtOnce; ++k) {
+    __builtin_prefetch(column_at(block, places[ColumnPlaces::kPrefetchAhead + k]));
+  }
+}
+
+[[gnu::target("avx2"), gnu::always_inline]] inline __m256i group_sum_avx2(
+    const std::int8_t* block, const std::uint32_t* places, int group, int half) {
+  const auto bytes = [block, places, half](int k) __attribute__((always_inline)) {
+    return reinterpret_cast<const __m256i*>(column_at(block, places[k])) + half;
+  };
+  __m256i sum = _mm256_load_si256(bytes(0));
+  for (int k = 1; k < group; ++k) sum = _mm256_add_epi8(sum, _mm256_load_si256(bytes(k)));
+  return sum;
+}
+
+template <int Group>
+[[gnu::target("avx2")]] void add_groups_avx2(const std::int8_t* block, const ColumnPlaces& places,
+                                             int factor, std::int32_t* sums) {
+  const __m256i ones = _mm256_set1_epi8(1);
+  const __m256i factors = _mm256_set1_epi32(factor);
+  const std::uint32_t* const end = places.data() + places.size();
+  for (const std::uint32_t* begin = places.data(); begin != end;) {
+    const std::uint32_t* const part_end = end_of_part<Group>(begin, end);
+    __m256i wide[4] = {};  // units 0-7 and 16-23, 8-15 and 24-31, and the same of the second half
+    for (; begin != part_end; begin += ColumnPlaces::kAtOnce) {
+      prefetch_ahead(block, begin);
+      for (std::size_t k = 0; k < ColumnPlaces::kAtOnce; k += 2 * Group) {
+        for (int half = 0; half < 2; ++half) {
+          const __m256i first = group_sum_avx2(block, begin + k, Group, half);
+          const __m256i second = group_sum_avx2(block, begin + k + Group, Group, half);
+          wide[2 * half] = _mm256_add_epi16(
+              wide[2 * half], _mm256_maddubs_epi16(ones, _mm256_unpacklo_epi8(first, second)));
+          wide[2 * half + 1] = _mm256_add_epi16(
+              wide[2 * half + 1], _mm256_maddubs_epi16(ones, _mm256_unpackhi_epi8(first, second)));
+        }
+      }
+    }
+    for (int quarter = 0; quarter < 8; ++quarter) {  // eight units each, in unit order
+      const int half = quarter / 4;
+      const __m256i sixteen = wide[2 * half + quarter % 2];
+      const __m128i eight =
+          quarter % 4 < 2 ? _mm256_castsi256_si128(sixteen) : _mm256_extracti128_si256(sixteen, 1);
+      auto* const at = reinterpret_cast<__m256i*>(sums + 8 * quarter);
+      const __m256i change = _mm256_mullo_epi32(_mm256_cvtepi16_epi32(eight), factors);
+      _mm256_storeu_si256(at, _mm256_add_epi32(_mm256_loadu_si256(at), change));
+    }
+  }
+}
+
+inline void add_columns_avx2(const std::int8_t* block, const ColumnPlaces& places, int group,
+                             int factor, std::int32_t* sums) {
+  switch (group) {
+    case 4:
+      return add_groups_avx2<4>(block, places, factor, sums);
+    case 2:
+      return add_groups_avx2<2>(block, places, factor, sums);
+    default:
+      return add_groups_avx2<1>(block, places, factor, sums);
+  }
+}
+
+// GCC 12 reports the undefined lanes inside its own AVX-512 intrinsics as uninitialized.
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#endif
+
+[[gnu::target("avx512f,avx512bw"),
+  gnu::always_inline]] inline __m512i group_sum_avx512(const std::int8_t* block,
+                                                       const std::uint32_t* places, int group) {
+  __m512i sum = _mm512_load_si512(column_at(block, places[0]));
+  for (int k = 1; k < group; ++k) {
+    sum = _mm512_add_epi8(sum, _mm512_load_si512(column_at(block, places[k])));
+  }
+  return sum;
+}
+
+template <int Group>
+[[gnu::target("avx512f,avx512bw")]] void add_groups_avx512(const std::int8_t* block,
+                                                           const ColumnPlaces& places, int factor,
+                                                           std::int32_t* sums) {
+  const __m512i ones = _mm512_set1_epi8(1);
+  const std::uint32_t* const end = places.data() + places.size();
+  for (const std::uint32_t* begin = places.data(); begin != end;) {
+    const std::uint32_t* const part_end = end_of_part<Group>(begin, end);
+    __m512i low = _mm512_setzero_si512();  // of each 16 units the first eight
+    __m512i high = low;                    // and the last eight
+    for (; begin != part_end; begin += ColumnPlaces::kAtOnce) {
+      prefetch_ahead(block, begin);
+      for (std::size_t k = 0; k < ColumnPlaces::kAtOnce; k += 2 * Group) {
+        const __m512i first = group_sum_avx512(block, begin + k, Group);
+        const __m512i second = group_sum_avx512(block, begin + k + Group, Group);
+        low =
+            _mm512_add_epi16(low, _mm512_maddubs_epi16(ones, _mm512_unpacklo_epi8(first, second)));
+        high =
+            _mm512_add_epi16(high, _mm512_maddubs_epi16(ones, _mm512_unpackhi_epi8(first, second)));
+      }
+    }
+    alignas(core::kCacheLine) std::array<std::int16_t, 32> lows;
+    alignas(core::kCacheLine) std::array<std::int16_t, 32> highs;
+    _mm512_store_si512(lows.data(), low);
+    _mm512_store_si512(highs.data(), high);
+    for (std::size_t i = 0; i < 32; ++i) {
+      const std::size_t unit = i / 8 * 16 + i % 8;
+      sums[unit] += factor * lows[i];
+      sums[unit + 8] += factor * highs[i];
+    }
+  }
+}
+
+inline void add_columns_avx512(const std::int8_t* block, const ColumnPlaces& places, int group,
+                               int factor, std::int32_t* sums) {
+  switch (group) {
+    case 4:
+      return add_groups_avx512<4>(block, places, factor, sums);
+    case 2:
+      return add_groups_avx512<2>(block, places, factor, sums);
+    default:
+      return add_groups_avx512<1>(block, places, factor, sums);
+  }
+}
+
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic pop
+#endif
+
+#endif  // SDNN_X86_KERNELS
+
+}  // namespace detail
+
+/// The kernel of the instruction set in use.
+inline AddColumns add_columns_kernel() {
+#if SDNN_X86_KERNELS
+  switch (core::instruction_set()) {
+    case core::InstructionSet::avx512:
+      return detail::add_columns_avx512;
+    case core::InstructionSet::avx2:
+      return detail::add_columns_avx2;
+    default:
+      break;
+  }
+#endif
+  return detail::add_columns_portable;
+}
+
+}  // namespace sdnn::approximators

@@ -1,0 +1,236 @@
+/// Potentials of recent states, kept exact while the network learns.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/approximators/hidden_layer.hpp"
+#include "sdnn/coding/state_code.hpp"
+
+namespace sdnn::approximators {
+
+/// The inner potentials of the last states a network was asked about.
+///
+/// Most states a network meets are old ones or lie near one. Two exact identities make use of it:
+/// a correction of w_i by step * x_SD(s) moves h_i(s') by step * (<x_SD(s), x_SD(s')> + 1), so a
+/// remembered state is brought up to date by one integer product per correction since; and
+/// h(s') - h(s) = W (x_SD(s') - x_SD(s)) touches only the columns in which the codes differ. The
+/// way that is cheapest by estimate is taken: from a remembered state, or by a full pass. Whichever
+/// it is, the result is the same integers.
+template <std::size_t Capacity>
+class PotentialMemory {
+ public:
+  /// One remembered state. Shapes: bins (l,), potentials (n,).
+  struct Entry {
+    std::span<const coding::Bin> bins;
+    std::span<const std::int32_t> potentials;
+  };
+
+  /// How potentials came about, counted since construction.
+  struct Counts {
+    std::uint64_t exact = 0;      ///< the state was remembered
+    std::uint64_t neighbour = 0;  ///< derived from a remembered neighbour
+    std::uint64_t full = 0;       ///< a full pass
+    std::uint64_t columns = 0;    ///< columns added, by passes and from neighbours
+  };
+
+  /// `max_corrected`: the most units that one correction may touch.
+  PotentialMemory(const coding::StateCode<Capacity>& code, std::size_t n_units,
+                  std::size_t max_corrected)
+      : n_inputs_(code.n_inputs()),
+        n_units_(n_units),
+        bins_(kEntries * n_inputs_),
+        bins_by_input_(n_inputs_ * kEntries),
+        potentials_(kEntries * n_units),
+        difference_(coding::SignedColumns::with_capacity(2 * code.n_columns())),
+        max_corrected_(max_corrected),
+        log_bins_(kLogSize * n_inputs_),
+        log_units_(kLogSize * max_corrected),
+        log_(kLogSize) {
+    for (Listed& listed : listed_) {
+      listed.bins.reserve(n_inputs_);
+      listed.columns = coding::SignedColumns::with_capacity(code.n_columns());
+    }
+    // A unit of a modifier switches l - 1 inputs, which are about half as many columns: half the
+    // modifiers are active. Neighbouring bins differ in `differing` units of each pattern (about
+    // m / 2 / 45); where it is modified, in each of l - 1 groups, half of them are active and move
+    // two columns, or one twice.
+    const double l = static_cast<double>(code.n_inputs());
+    const double differing =
+        static_cast<double>(
+            (code.book(0)[0] ^
+             code.book(
+                 0)[static_cast<coding::Bin>(std::min<std::size_t>(10, code.book(0).n_bins() - 1))])
+                .count()) /
+        10.0;
+    const double columns_of_modifier = static_cast<double>(code.n_inputs() / 2);
+    columns_per_bin_ = (l - 1.0 + columns_of_modifier) * std::max(differing, 0.05);
+    columns_per_correction_ = 0.15 * l * (l - 1.0);
+    columns_of_pass_ = 0.5 * l * static_cast<double>(code.n_pattern_units()) * columns_of_modifier;
+  }
+
+  const Counts& counts() const noexcept { return counts_; }
+
+  /// Forgets all states: the weights have been replaced.
+  void forget() noexcept { last_use_.fill(0); }
+
+  /// The potentials of the state with these bins, for the present weights; valid until the next
+  /// call.
+  Entry recall(const coding::StateCode<Capacity>& code, const HiddenLayer& hidden_layer,
+               std::span<const coding::Bin> bins) {
+    for (const std::size_t slot : {latest_, before_latest_}) {  // a decision asks repeatedly
+      if (last_use_[slot] != 0 && std::ranges::equal(bins_of(slot), bins) &&
+          n_corrections_ - up_to_[slot] <= kLogSize) {
+        return use(code, slot);
+      }
+    }
+    std::array<std::int32_t, kEntries> distance{};
+    for (std::size_t i = 0; i < n_inputs_; ++i) {
+      const coding::Bin* const remembered = bins_by_input_.data() + i * kEntries;
+      for (std::size_t slot = 0; slot < kEntries; ++slot) {
+        distance[slot] += std::abs(int{remembered[slot]} - int{bins[i]});
+      }
+    }
+    std::size_t nearest = kEntries;
+    std::size_t oldest = 0;
+    double least = columns_of_pass_;
+    for (std::size_t slot = 0; slot < kEntries; ++slot) {
+      if (last_use_[slot] < last_use_[oldest]) oldest = slot;
+      const std::uint64_t lag = n_corrections_ - up_to_[slot];
+      if (last_use_[slot] == 0 || lag > kLogSize) continue;
+      const double cost =
+          columns_per_bin_ * distance[slot] + columns_per_correction_ * static_cast<double>(lag);
+      if (cost < least) {
+        least = cost;
+        nearest = slot;
+      }
+    }
+    const std::span<std::int32_t> fresh(potentials_.data() + oldest * n_units_, n_units_);
+    if (nearest == kEntries) {
+      coding::SignedColumns& columns = list(code, bins);
+      hidden_layer.potentials(columns, fresh);
+      ++counts_.full;
+      counts_.columns += columns.positive.size() + columns.negative.size();
+    } else {
+      const Entry known = use(code, nearest);
+      if (std::ranges::equal(known.bins, bins)) {
+        ++counts_.exact;
+        return known;
+      }
+      code.difference(known.bins, bins, difference_);
+      if (oldest != nearest) std::ranges::copy(known.potentials, fresh.begin());
+      hidden_layer.add(difference_, fresh);
+      ++counts_.neighbour;
+      counts_.columns += difference_.positive.size() + difference_.negative.size();
+    }
+    for (std::size_t i = 0; i < n_inputs_; ++i) {
+      bins_[oldest * n_inputs_ + i] = bins[i];
+      bins_by_input_[i * kEntries + oldest] = bins[i];
+    }
+    up_to_[oldest] = n_corrections_;
+    return use(code, oldest);
+  }
+
+  /// The columns of the state with these bins, listed anew unless it was one of the last two that
+  /// were listed; valid until the next call of any member.
+  const coding::SignedColumns& columns(const coding::StateCode<Capacity>& code,
+                                       std::span<const coding::Bin> bins) {
+    for (const Listed& listed : listed_) {
+      if (std::ranges::equal(listed.bins, bins)) return listed.columns;
+    }
+    return list(code, bins);
+  }
+
+  /// Notes that w_i += step * x_SD(bins) and w_i0 -= step for every i in `units`.
+  void corrected(std::span<const coding::Bin> bins, std::span<const std::uint32_t> units,
+                 std::int32_t step) noexcept {
+    assert(units.size() <= max_corrected_);
+    const std::size_t slot = n_corrections_ % kLogSize;
+    std::ranges::copy(bins, log_bins_.begin() + static_cast<std::ptrdiff_t>(slot * bins.size()));
+    std::ranges::copy(units,
+                      log_units_.begin() + static_cast<std::ptrdiff_t>(slot * max_corrected_));
+    log_[slot] = {step, units.size()};
+    ++n_corrections_;
+  }
+
+ private:
+  struct Correction {
+    std::int32_t step = 0;
+    std::size_t n_units = 0;
+  };
+
+  /// A state's bins and columns.
+  struct Listed {
+    std::vector<coding::Bin> bins = {};
+    coding::SignedColumns columns = {};
+  };
+
+  static constexpr std::size_t kEntries = 64;
+  static constexpr std::size_t kLogSize = 512;
+
+  std::span<const coding::Bin> bins_of(std::size_t slot) const noexcept {
+    return {bins_.data() + slot * n_inputs_, n_inputs_};
+  }
+
+  /// Lists the columns of a state, in the place of the list before the last.
+  coding::SignedColumns& list(const coding::StateCode<Capacity>& code,
+                              std::span<const coding::Bin> bins) {
+    std::swap(listed_[0], listed_[1]);
+    listed_[0].bins.assign(bins.begin(), bins.end());
+    code.columns(bins, listed_[0].columns);
+    return listed_[0].columns;
+  }
+
+  /// Marks a slot as used now and brings its potentials up to date.
+  Entry use(const coding::StateCode<Capacity>& code, std::size_t slot) noexcept {
+    const Entry entry{bins_of(slot), {potentials_.data() + slot * n_units_, n_units_}};
+    std::int32_t* const potentials = potentials_.data() + slot * n_units_;
+    for (std::uint64_t& next = up_to_[slot]; next < n_corrections_; ++next) {
+      const std::size_t at = next % kLogSize;
+      const std::span<const coding::Bin> corrected(log_bins_.data() + at * n_inputs_, n_inputs_);
+      const std::int32_t change = log_[at].step * (code.inner_product(corrected, entry.bins) + 1);
+      const std::uint32_t* const units = log_units_.data() + at * max_corrected_;
+      for (std::size_t k = 0; k < log_[at].n_units; ++k) potentials[units[k]] += change;
+    }
+    last_use_[slot] = ++clock_;
+    if (slot != latest_) before_latest_ = std::exchange(latest_, slot);
+    return entry;
+  }
+
+  // What is remembered, slot by slot.
+  std::size_t n_inputs_;
+  std::size_t n_units_;
+  std::vector<coding::Bin> bins_;                   ///< [slot][input]
+  std::vector<coding::Bin> bins_by_input_;          ///< [input][slot], for quick comparison
+  std::vector<std::int32_t> potentials_;            ///< [slot][unit]
+  std::array<std::uint64_t, kEntries> up_to_{};     ///< corrections that are accounted for
+  std::array<std::uint64_t, kEntries> last_use_{};  ///< 0: empty
+  std::uint64_t clock_ = 0;
+  std::size_t latest_ = 0;
+  std::size_t before_latest_ = 0;
+  coding::SignedColumns difference_;
+  std::array<Listed, 2> listed_;  ///< the latest first
+
+  // The last kLogSize corrections, in a ring.
+  std::uint64_t n_corrections_ = 0;
+  std::size_t max_corrected_;
+  std::vector<coding::Bin> log_bins_;     ///< [slot][input]
+  std::vector<std::uint32_t> log_units_;  ///< [slot][up to max_corrected_]
+  std::vector<Correction> log_;
+
+  // Estimated costs, in columns.
+  double columns_per_bin_;
+  double columns_per_correction_;
+  double columns_of_pass_;
+  Counts counts_;
+};
+
+}  // namespace sdnn::approximators

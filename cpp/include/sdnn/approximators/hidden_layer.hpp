@@ -1,0 +1,366 @@
+/// The hidden layer: threshold units with exact integer weights on a ternary code.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sdnn/approximators/detail/column_sums.hpp"
+#include "sdnn/coding/state_code.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/detail/check.hpp"
+
+namespace sdnn::approximators {
+
+/// n units h_i = w_i . x_SD - w_i0 whose weights and thresholds are integers.
+///
+/// Every sum is exact, so its order does not matter. The units come in blocks of 64; a block holds
+/// its weights column by column (one cache line: one input unit, 64 hidden units), because a pass
+/// reads only the columns that are not neutral. A weight is one byte, -127 to 127; what a few
+/// weights exceed that by, in multiples of 128, is kept in a short list, and in a second layer of
+/// bytes when the list is full. A correction that would take a weight out of both bytes, or a
+/// potential out of 32 bits, throws and changes nothing.
+///
+/// Source: section 3.1 (layer 4, z) and Eqs. (2), (3).
+class HiddenLayer {
+ public:
+  /// All weights and thresholds zero. The first `n_double` columns stand for two inputs each, half
+  /// whose sum or difference they are: a correction moves their weights by twice its step. Throws
+  /// std::invalid_argument, std::bad_alloc.
+  HiddenLayer(std::size_t n_units, std::size_t n_columns, std::size_t n_double = 0)
+      : n_units_(n_units), n_columns_(n_columns), n_double_(n_double) {
+    core::require_in_range("n_units", n_units, 1, std::size_t{1} << 20);
+    core::require_in_range("n_columns", n_columns, 1, std::size_t{1} << 27);
+    core::require_in_range("n_double", n_double, 0, n_columns);
+    weight_limit_ =
+        static_cast<std::int32_t>(std::min<std::size_t>(kWeightLimit, kThresholdLimit / n_columns));
+    n_blocks_ = core::round_up(n_units, kBlockUnits) / kBlockUnits;
+    bytes_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * block_bytes());
+    high_bytes_ = bytes_;  // copied, so that its memory is there before it is needed
+    most_carries_ = std::max(kFewCarries, bytes_.size() / kBytesPerCarry);
+    carries_.resize(most_carries_);  // its memory too
+    carries_.clear();
+    may_carry_.assign(n_units, 0);
+    thresholds_.assign(n_units, 0);
+    largest_weight_.assign(n_units, 0);
+    group_of_block_.assign(n_blocks_, kLargestGroup);
+  }
+
+  std::size_t n_units() const noexcept { return n_units_; }
+  std::size_t n_columns() const noexcept { return n_columns_; }
+  std::size_t n_double_columns() const noexcept { return n_double_; }
+  /// How many weights outside one byte are listed.
+  std::size_t n_carries() const noexcept { return carries_.size(); }
+  /// Whether every weight has a second byte.
+  bool has_high_bytes() const noexcept { return has_high_bytes_; }
+  /// The largest |weight| that is held before std::overflow_error.
+  std::int32_t weight_limit() const noexcept { return weight_limit_; }
+
+  std::int32_t weight(std::size_t unit, std::size_t column) const noexcept {
+    return bytes_[byte_index(unit, column)] + carry(unit, column);
+  }
+  std::int32_t threshold(std::size_t unit) const noexcept { return thresholds_[unit]; }
+
+  /// Throws std::invalid_argument if |value| exceeds weight_limit().
+  void set_weight(std::size_t unit, std::size_t column, std::int32_t value) {
+    core::require_in_range("weight", value, -weight_limit_, weight_limit_);
+    if (std::abs(value) > largest_weight_[unit]) note_largest(unit, std::abs(value));
+    store(unit, column, value - carry(unit, column));
+  }
+  /// Throws std::invalid_argument if |value| reaches 2^30.
+  void set_threshold(std::size_t unit, std::int32_t value) {
+    core::require_in_range("threshold", value, -kThresholdLimit, kThresholdLimit);
+    thresholds_[unit] = value;
+  }
+
+  /// The inner potentials of all units for the ternary input with these columns. Shape: out (n,).
+  /// The input's scratch row is overwritten.
+  void potentials(coding::SignedColumns& input, std::span<std::int32_t> out) const {
+    assert(out.size() == n_units_);
+    for (std::size_t i = 0; i < n_units_; ++i) out[i] = -thresholds_[i];
+    add(input, out);
+  }
+
+  /// out_i += w_i . x for the input with these columns, in which a column may come more than once.
+  void add(coding::SignedColumns& input, std::span<std::int32_t> out) const {
+    add_signed(input.positive, +1, out);
+    add_signed(input.negative, -1, out);
+    if (carries_.empty()) return;
+    std::vector<std::int16_t>& values = input.values;
+    values.assign(n_columns_, 0);
+    for (const std::uint32_t column : input.positive) ++values[column];
+    for (const std::uint32_t column : input.negative) --values[column];
+    for (const Carry& c : carries_) out[c.unit] += c.amount * values[c.column];
+  }
+
+  /// w_i += step * x, twice that in double columns, and w_i0 -= step for every i in `units`. No
+  /// unit or column may come twice, and double columns come first in the input's lists.
+  ///
+  /// Source: Eqs. (2), (3). Throws std::overflow_error before any change if a weight or threshold
+  /// would leave its range. Requires |step| <= 64. Quickest for `units` in rising order.
+  void correct(std::span<const std::uint32_t> units, const coding::SignedColumns& input,
+               std::int32_t step) {
+    const std::array<Part, 4> parts = parts_of(input, step);
+    for (const std::uint32_t unit : units) require_room(unit, parts, step);
+    for (std::size_t k = 0; k < units.size();) {  // neighbours in a block share its cache lines
+      const std::size_t block = units[k] / kBlockUnits;
+      alignas(core::kCacheLine) std::array<std::int8_t, kBlockUnits> mask{};
+      std::size_t n_changed = 0;
+      std::size_t changed = 0;
+      for (; k < units.size() && units[k] / kBlockUnits == block; ++k) {
+        const std::size_t unit = units[k];
+        raise_bound(unit, growth(step));
+        thresholds_[unit] -= step;
+        if (largest_weight_[unit] <= kByteLimit) {
+          mask[unit % kBlockUnits] = -1;
+          changed = unit;
+          ++n_changed;
+        } else {
+          for (const Part& part : parts) {
+            for (const auto j : part.columns) {
+              store(unit, j, bytes_[byte_index(unit, j)] + part.change);
+            }
+          }
+        }
+      }
+      for (const Part& part : parts) {
+        if (n_changed == 1) add_to_unit(changed, part);
+        if (n_changed > 1) add_to_block(block, part, mask);
+      }
+    }
+  }
+
+ private:
+  static constexpr std::int32_t kThresholdLimit = (std::int32_t{1} << 30) - 1;
+  static constexpr std::int32_t kByteLimit = 127;
+  static constexpr std::int32_t kCarry = 128;
+  static constexpr std::int32_t kWeightLimit = kByteLimit * kCarry + kByteLimit;
+  static constexpr int kLargestGroup = 4;
+  /// Adding a listed carry takes about as long as adding that many bytes of a second layer.
+  static constexpr std::size_t kBytesPerCarry = 128;
+  static constexpr std::size_t kFewCarries = 4096;
+
+  /// What a weight exceeds its byte by: a multiple of kCarry, not 0.
+  struct Carry {
+    std::uint32_t unit;
+    std::uint32_t column;
+    std::int32_t amount;
+  };
+
+  std::size_t byte_index(std::size_t unit, std::size_t column) const noexcept {
+    return unit / kBlockUnits * block_bytes() + column * kBlockUnits + unit % kBlockUnits;
+  }
+
+  /// A block's bytes: its columns, and one more of zeros, to which lists of columns are padded.
+  std::size_t block_bytes() const noexcept { return (n_columns_ + 1) * kBlockUnits; }
+
+  /// out_i += sign * the bytes of the columns; listed carries are left out.
+  void add_signed(std::span<const std::uint32_t> columns, int sign,
+                  std::span<std::int32_t> out) const {
+    const AddColumns add_columns = add_columns_kernel();
+    while (!columns.empty()) {
+      const auto some = columns.first(std::min(ColumnPlaces::kMost, columns.size()));
+      columns = columns.subspan(some.size());
+      const ColumnPlaces places(some, n_columns_);
+      for (std::size_t b = 0; b < n_blocks_; ++b) {
+        alignas(core::kCacheLine) std::array<std::int32_t, kBlockUnits> padded;
+        const std::size_t first = b * kBlockUnits;
+        const bool whole = first + kBlockUnits <= n_units_;
+        if (!whole) padded.fill(0);
+        std::int32_t* const sums = whole ? out.data() + first : padded.data();
+        add_columns(bytes_.data() + b * block_bytes(), places, group_of_block_[b], sign, sums);
+        if (has_high_bytes_) {
+          add_columns(high_bytes_.data() + b * block_bytes(), places, 1, sign * kCarry, sums);
+        }
+        for (std::size_t i = first; !whole && i < n_units_; ++i) out[i] += padded[i - first];
+      }
+    }
+  }
+
+  /// Columns of an input whose weights a correction changes alike.
+  struct Part {
+    std::span<const std::uint32_t> columns;
+    std::int32_t change;
+  };
+
+  std::array<Part, 4> parts_of(const coding::SignedColumns& input, std::int32_t step) const {
+    const auto split = [this](std::span<const std::uint32_t> columns) {
+      const auto end = std::partition_point(columns.begin(), columns.end(),
+                                            [this](std::uint32_t j) { return j < n_double_; });
+      return static_cast<std::size_t>(end - columns.begin());
+    };
+    const std::span<const std::uint32_t> positive = input.positive;
+    const std::span<const std::uint32_t> negative = input.negative;
+    const std::size_t n_positive = split(positive);
+    const std::size_t n_negative = split(negative);
+    return {{{positive.first(n_positive), 2 * step},
+             {negative.first(n_negative), -2 * step},
+             {positive.subspan(n_positive), step},
+             {negative.subspan(n_negative), -step}}};
+  }
+
+  /// What a correction can add to the largest weight of a unit.
+  std::int32_t growth(std::int32_t step) const noexcept {
+    return std::abs(step) * (n_double_ > 0 ? 2 : 1);
+  }
+
+  void add_to_unit(std::size_t unit, const Part& part) noexcept {
+    std::int8_t* const lane = bytes_.data() + byte_index(unit, 0);
+    for (const std::uint32_t column : part.columns) {
+      std::int8_t& weight = lane[std::size_t{column} * kBlockUnits];
+      weight = static_cast<std::int8_t>(weight + part.change);
+    }
+  }
+
+  /// Adds to the units of the block whose mask is -1, modulo 256: the result fits by the bounds.
+  void add_to_block(std::size_t block, const Part& part,
+                    const std::array<std::int8_t, kBlockUnits>& mask) noexcept {
+    std::array<std::int8_t, kBlockUnits> change;
+    for (std::size_t i = 0; i < kBlockUnits; ++i) {
+      change[i] = static_cast<std::int8_t>(mask[i] & part.change);
+    }
+    for (const std::uint32_t column : part.columns) {
+      std::int8_t* const line = bytes_.data() + block * block_bytes() + column * kBlockUnits;
+      for (std::size_t i = 0; i < kBlockUnits; ++i) {
+        line[i] = static_cast<std::int8_t>(line[i] + change[i]);
+      }
+    }
+  }
+
+  /// Where the carry of a weight is in the sorted list, or would be.
+  std::size_t carry_index(std::size_t unit, std::size_t column) const noexcept {
+    const auto at = std::lower_bound(
+        carries_.begin(), carries_.end(), std::pair(unit, column), [](const Carry& c, auto key) {
+          return std::pair<std::size_t, std::size_t>(c.unit, c.column) < key;
+        });
+    return static_cast<std::size_t>(at - carries_.begin());
+  }
+
+  bool is_carry_of(std::size_t index, std::size_t unit, std::size_t column) const noexcept {
+    return index < carries_.size() && carries_[index].unit == unit &&
+           carries_[index].column == column;
+  }
+
+  std::int32_t carry(std::size_t unit, std::size_t column) const noexcept {
+    if (has_high_bytes_) return kCarry * high_bytes_[byte_index(unit, column)];
+    if (!may_carry_[unit]) return 0;
+    const std::size_t at = carry_index(unit, column);
+    return is_carry_of(at, unit, column) ? carries_[at].amount : 0;
+  }
+
+  /// Gives the byte of a weight this value, which may lie outside a byte: the rest is carried.
+  void store(std::size_t unit, std::size_t column, std::int32_t value) {
+    if (std::abs(value) > kByteLimit) {
+      const std::int32_t change = value / kCarry;  // towards 0
+      value -= change * kCarry;
+      add_carry(unit, column, change);
+    }
+    bytes_[byte_index(unit, column)] = static_cast<std::int8_t>(value);
+  }
+
+  void add_carry(std::size_t unit, std::size_t column, std::int32_t change) {
+    if (!has_high_bytes_ && carries_.size() == most_carries_) spread_carries();
+    if (has_high_bytes_) {
+      std::int8_t& high = high_bytes_[byte_index(unit, column)];
+      high = static_cast<std::int8_t>(high + change);
+      return;
+    }
+    const std::size_t at = carry_index(unit, column);
+    const auto place = carries_.begin() + static_cast<std::ptrdiff_t>(at);
+    if (!is_carry_of(at, unit, column)) {
+      carries_.insert(place, {static_cast<std::uint32_t>(unit), static_cast<std::uint32_t>(column),
+                              change * kCarry});
+      may_carry_[unit] = 1;
+    } else if (place->amount + change * kCarry == 0) {
+      carries_.erase(place);
+    } else {
+      place->amount += change * kCarry;
+    }
+  }
+
+  /// From the list to a second byte for every weight.
+  void spread_carries() noexcept {
+    for (const Carry& c : carries_) {
+      high_bytes_[byte_index(c.unit, c.column)] = static_cast<std::int8_t>(c.amount / kCarry);
+    }
+    carries_.clear();
+    has_high_bytes_ = true;
+  }
+
+  std::int32_t largest_weight(std::size_t unit) const noexcept {
+    std::int32_t largest = 0;
+    for (std::size_t j = 0; j < n_columns_; ++j) {
+      largest = std::max(largest, std::abs(weight(unit, j)));
+    }
+    return largest;
+  }
+
+  /// Keeps the bound of a unit, and how many columns of its block may be added in 8 bits.
+  void note_largest(std::size_t unit, std::int32_t bound) noexcept {
+    largest_weight_[unit] = bound;
+    int& group = group_of_block_[unit / kBlockUnits];
+    while (group > 1 && bound > kByteLimit / group) group /= 2;
+  }
+
+  /// Throws unless the correction keeps the unit in range. The bound kept per unit only grows, so
+  /// the true maximum is looked up when the bound gets there, and the corrected weights themselves
+  /// when that is at the limit: going back is always possible.
+  void require_room(std::size_t unit, std::span<const Part> parts, std::int32_t step) {
+    const std::int32_t room = weight_limit_ - growth(step);
+    if (largest_weight_[unit] > room) largest_weight_[unit] = largest_weight(unit);
+    if ((largest_weight_[unit] > room && !fits(unit, parts)) ||
+        std::abs(thresholds_[unit] - step) > kThresholdLimit) {
+      throw std::overflow_error(
+          "a weight or threshold of hidden unit " + std::to_string(unit) +
+          " would exceed its range (|weight| <= " + std::to_string(weight_limit_) + " steps)");
+    }
+  }
+
+  bool fits(std::size_t unit, std::span<const Part> parts) const {
+    return std::ranges::all_of(parts, [&](const Part& part) {
+      return std::ranges::all_of(part.columns, [&](std::uint32_t j) {
+        return std::abs(weight(unit, j) + part.change) <= weight_limit_;
+      });
+    });
+  }
+
+  /// Raises the unit's bound by `growth`. Where the bound would cost speed, the true maximum is
+  /// looked up first; a unit within an eighth of a limit gives that one up, so that look-ups stay
+  /// rare.
+  void raise_bound(std::size_t unit, std::int32_t growth) {
+    const std::int32_t before = largest_weight_[unit];
+    std::int32_t bound = before + growth;
+    for (int group = kLargestGroup; group >= 1; group /= 2) {
+      const std::int32_t limit = kByteLimit / group;
+      if (before > limit || bound <= limit) continue;
+      const std::int32_t looked_up = largest_weight(unit) + growth;
+      bound = looked_up <= limit - limit / 8 ? looked_up : std::max(looked_up, limit + 1);
+    }
+    note_largest(unit, bound);
+  }
+
+  std::size_t n_units_;
+  std::size_t n_columns_;
+  std::size_t n_double_;
+  std::size_t n_blocks_ = 0;
+  std::int32_t weight_limit_;
+  core::AlignedBuffer<std::int8_t> bytes_;  ///< [block][column, then zeros][unit in block]
+  core::AlignedBuffer<std::int8_t> high_bytes_;
+  bool has_high_bytes_ = false;
+  std::size_t most_carries_ = 0;
+  std::vector<Carry> carries_;           ///< sorted by unit and column
+  std::vector<std::uint8_t> may_carry_;  ///< whether a unit ever had a carry
+  std::vector<std::int32_t> thresholds_;
+  std::vector<std::int32_t> largest_weight_;  ///< an upper bound of max_j |w_ij|
+  std::vector<int> group_of_block_;           ///< columns of a block that may be added in 8 bits
+};
+
+}  // namespace sdnn::approximators

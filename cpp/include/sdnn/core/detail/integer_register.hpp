@@ -1,0 +1,90 @@
+/// 32 bytes of integers side by side, for kernels.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+#include <utility>
+
+#include "sdnn/core/detail/lanes.hpp"
+
+namespace sdnn::core {
+
+#if SDNN_LANES
+
+// GCC's note about passing wide vectors concerns calls, and there are none.
+#if !defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpsabi"
+#endif
+
+/// As many integers as fit into 32 bytes; sums wrap around.
+template <class Integer>
+struct IntegerRegister {
+  typedef Integer Vector __attribute__((vector_size(32)));
+  typedef std::make_unsigned_t<Integer> Wrapping __attribute__((vector_size(32)));
+  static constexpr std::size_t kSize = 32 / sizeof(Integer);
+
+  Vector v;
+
+  SDNN_INLINE void clear() noexcept { v = Vector{}; }
+  SDNN_INLINE void load(const Integer* from) noexcept { std::memcpy(&v, from, sizeof v); }
+  SDNN_INLINE void add(const Integer* from) noexcept {
+    Wrapping other;
+    std::memcpy(&other, from, sizeof other);
+    v = (Vector)((Wrapping)v + other);
+  }
+  SDNN_INLINE void subtract(const Integer* from) noexcept {
+    Wrapping other;
+    std::memcpy(&other, from, sizeof other);
+    v = (Vector)((Wrapping)v - other);
+  }
+  SDNN_INLINE void store(Integer* to) const noexcept { std::memcpy(to, &v, sizeof v); }
+  /// to[i] += the i-th integer, in the type of `to`, which is as wide or wider.
+  template <class Wide>
+  SDNN_INLINE void add_to(Wide* to) const noexcept {
+    using Part = IntegerRegister<Wide>;
+    typedef Wide Converted __attribute__((vector_size(kSize * sizeof(Wide))));
+    const Converted all = __builtin_convertvector(v, Converted);
+    unrolled<kSize / Part::kSize>([&](auto part) SDNN_INLINE_LAMBDA {
+      [&]<std::size_t... Index>(std::index_sequence<Index...>) SDNN_INLINE_LAMBDA {
+        Part sum{__builtin_shufflevector(all, all, (part() * Part::kSize + Index)...)};
+        sum.add(to + part() * Part::kSize);
+        sum.store(to + part() * Part::kSize);
+      }(std::make_index_sequence<Part::kSize>());
+    });
+  }
+};
+
+#if !defined(__clang__)
+#pragma GCC diagnostic pop
+#endif
+
+#else
+
+template <class Integer>
+struct IntegerRegister {
+  static constexpr std::size_t kSize = 32 / sizeof(Integer);
+
+  Integer v[kSize];
+
+  void clear() noexcept { std::fill_n(v, kSize, Integer{0}); }
+  void load(const Integer* from) noexcept { std::copy_n(from, kSize, v); }
+  void add(const Integer* from) noexcept {
+    for (std::size_t i = 0; i < kSize; ++i) v[i] = static_cast<Integer>(v[i] + from[i]);
+  }
+  void subtract(const Integer* from) noexcept {
+    for (std::size_t i = 0; i < kSize; ++i) v[i] = static_cast<Integer>(v[i] - from[i]);
+  }
+  void store(Integer* to) const noexcept { std::copy_n(v, kSize, to); }
+  template <class Wide>
+  void add_to(Wide* to) const noexcept {
+    for (std::size_t i = 0; i < kSize; ++i) to[i] = static_cast<Wide>(to[i] + v[i]);
+  }
+};
+
+#endif  // SDNN_LANES
+
+}  // namespace sdnn::core

@@ -1,0 +1,198 @@
+/// Several doubles side by side in a vector register.
+///
+/// A formula written as a template over its number type runs on one double or on several of them,
+/// by the same IEEE operations in the same order, hence with the same bits in every lane.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+#include <utility>
+
+#if defined(__clang__) || \
+    (defined(__GNUC__) && __GNUC__ >= 12)  // the first with shuffles as clang's
+#define SDNN_LANES 1
+/// Lanes wider than the baseline's registers must never cross a real call: everything that a kernel
+/// of another instruction set is made of has to end up inside it.
+#define SDNN_INLINE __attribute__((always_inline)) inline
+#define SDNN_INLINE_LAMBDA __attribute__((always_inline))
+#else
+#define SDNN_LANES 0
+#define SDNN_INLINE inline
+#define SDNN_INLINE_LAMBDA
+#endif
+
+namespace sdnn::core {
+
+// One number: its mask is a bool, its bits an integer.
+
+SDNN_INLINE double select(bool mask, double first, double second) noexcept {
+  return mask ? first : second;
+}
+/// Is the mask set anywhere?
+SDNN_INLINE bool any(bool mask) noexcept { return mask; }
+SDNN_INLINE bool both(bool first, bool second) noexcept { return first && second; }
+SDNN_INLINE bool first_only(bool first, bool second) noexcept { return first && !second; }
+SDNN_INLINE std::uint64_t bits_of(double value) noexcept {
+  return std::bit_cast<std::uint64_t>(value);
+}
+SDNN_INLINE double double_of(std::uint64_t bits) noexcept { return std::bit_cast<double>(bits); }
+
+#if SDNN_LANES
+
+// Always inlined, so the way GCC would pass a wide vector to a call does not matter.
+#if !defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpsabi"
+#endif
+
+/// `Size` unsigned 64-bit integers; as a mask, all ones or all zeros in each.
+template <std::size_t Size>
+struct LaneBits {
+  typedef std::uint64_t Vector __attribute__((vector_size(Size * sizeof(std::uint64_t))));
+
+  Vector v;
+
+  SDNN_INLINE static LaneBits load(const std::uint64_t* from) noexcept {
+    LaneBits result;
+    std::memcpy(&result.v, from, sizeof result.v);
+    return result;
+  }
+  SDNN_INLINE void store(std::uint64_t* to) const noexcept { std::memcpy(to, &v, sizeof v); }
+
+  SDNN_INLINE friend LaneBits operator&(const LaneBits& a, const LaneBits& b) noexcept {
+    return {a.v & b.v};
+  }
+  SDNN_INLINE friend LaneBits operator^(const LaneBits& a, const LaneBits& b) noexcept {
+    return {a.v ^ b.v};
+  }
+  SDNN_INLINE friend LaneBits operator&(const LaneBits& a, std::uint64_t b) noexcept {
+    return {a.v & b};
+  }
+  SDNN_INLINE friend LaneBits operator+(const LaneBits& a, std::uint64_t b) noexcept {
+    return {a.v + b};
+  }
+  SDNN_INLINE friend LaneBits operator-(std::uint64_t a, const LaneBits& b) noexcept {
+    return {a - b.v};
+  }
+  SDNN_INLINE friend LaneBits operator<<(const LaneBits& a, int by) noexcept {
+    return {a.v << static_cast<std::uint64_t>(by)};
+  }
+};
+
+/// `Size` doubles, a power of two; arithmetic and comparison lane by lane.
+template <std::size_t Size>
+struct Lanes {
+  typedef double Vector __attribute__((vector_size(Size * sizeof(double))));
+  using Bits = LaneBits<Size>;
+
+  Vector v;
+
+  Lanes() = default;
+  SDNN_INLINE explicit Lanes(const Vector& values) noexcept : v(values) {}
+  /// The same number in every lane.
+  SDNN_INLINE Lanes(double value) noexcept : Lanes(value, std::make_index_sequence<Size>()) {}
+
+  /// `Size` numbers from memory, at any alignment.
+  SDNN_INLINE static Lanes load(const double* from) noexcept {
+    Lanes result;
+    std::memcpy(&result.v, from, sizeof result.v);
+    return result;
+  }
+  SDNN_INLINE void store(double* to) const noexcept { std::memcpy(to, &v, sizeof v); }
+
+  SDNN_INLINE friend Lanes operator+(const Lanes& a, const Lanes& b) noexcept {
+    return Lanes(a.v + b.v);
+  }
+  SDNN_INLINE friend Lanes operator-(const Lanes& a, const Lanes& b) noexcept {
+    return Lanes(a.v - b.v);
+  }
+  SDNN_INLINE friend Lanes operator*(const Lanes& a, const Lanes& b) noexcept {
+    return Lanes(a.v * b.v);
+  }
+  SDNN_INLINE friend Lanes operator/(const Lanes& a, const Lanes& b) noexcept {
+    return Lanes(a.v / b.v);
+  }
+  SDNN_INLINE friend Bits operator<(const Lanes& a, const Lanes& b) noexcept {
+    return {(typename Bits::Vector)(a.v < b.v)};
+  }
+  SDNN_INLINE friend Bits operator<=(const Lanes& a, const Lanes& b) noexcept {
+    return {(typename Bits::Vector)(a.v <= b.v)};
+  }
+  SDNN_INLINE friend Bits operator>=(const Lanes& a, const Lanes& b) noexcept {
+    return {(typename Bits::Vector)(a.v >= b.v)};
+  }
+
+ private:
+  template <std::size_t... Lane>
+  SDNN_INLINE Lanes(double value, std::index_sequence<Lane...>) noexcept
+      : v{(static_cast<void>(Lane), value)...} {}
+};
+
+template <std::size_t Size>
+SDNN_INLINE LaneBits<Size> bits_of(const Lanes<Size>& values) noexcept {
+  return {(typename LaneBits<Size>::Vector)values.v};
+}
+
+template <std::size_t Size>
+SDNN_INLINE Lanes<Size> double_of(const LaneBits<Size>& bits) noexcept {
+  return Lanes<Size>((typename Lanes<Size>::Vector)bits.v);
+}
+
+template <std::size_t Size>
+SDNN_INLINE Lanes<Size> select(bool mask, const Lanes<Size>& first,
+                               const Lanes<Size>& second) noexcept {
+  return mask ? first : second;
+}
+
+/// `first` where the mask is set, `second` elsewhere.
+template <std::size_t Size>
+SDNN_INLINE Lanes<Size> select(const LaneBits<Size>& mask, const Lanes<Size>& first,
+                               const Lanes<Size>& second) noexcept {
+  using Vector = typename LaneBits<Size>::Vector;
+  return double_of(LaneBits<Size>{((Vector)first.v & mask.v) | ((Vector)second.v & ~mask.v)});
+}
+
+template <std::size_t Size>
+SDNN_INLINE bool any(const LaneBits<Size>& mask) noexcept {
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < Size; ++i) sum |= mask.v[i];
+  return sum != 0;
+}
+
+template <std::size_t Size>
+SDNN_INLINE LaneBits<Size> both(const LaneBits<Size>& first,
+                                const LaneBits<Size>& second) noexcept {
+  return {first.v & second.v};
+}
+
+template <std::size_t Size>
+SDNN_INLINE LaneBits<Size> first_only(const LaneBits<Size>& first,
+                                      const LaneBits<Size>& second) noexcept {
+  return {first.v & ~second.v};
+}
+
+#if !defined(__clang__)
+#pragma GCC diagnostic pop
+#endif
+
+#endif  // SDNN_LANES
+
+/// The value with its sign bit cleared.
+template <class Real>
+SDNN_INLINE Real magnitude(const Real& value) noexcept {
+  return double_of(bits_of(value) & ~(std::uint64_t{1} << 63));
+}
+
+/// Calls `function` with 0, 1, ..., Size - 1, each a std::integral_constant. There is no loop left
+/// at any level of optimization, so that an array of lanes indexed by them can live in registers.
+template <std::size_t Size, class Function>
+SDNN_INLINE void unrolled(const Function& function) noexcept {
+  [&]<std::size_t... Index>(std::index_sequence<Index...>) SDNN_INLINE_LAMBDA {
+    (function(std::integral_constant<std::size_t, Index>()), ...);
+  }(std::make_index_sequence<Size>());
+}
+
+}  // namespace sdnn::core

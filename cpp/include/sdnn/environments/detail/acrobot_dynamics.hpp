@@ -1,0 +1,276 @@
+/// The acrobot's equations of motion, for one acrobot or for several side by side.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <tuple>
+#include <utility>
+
+#include "sdnn/core/config_fields.hpp"
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/lanes.hpp"
+#include "sdnn/core/elementary.hpp"
+#include "sdnn/environments/detail/runge_kutta.hpp"
+
+namespace sdnn::environments {
+
+/// When the goal is looked for; the paper is silent.
+enum class GoalTest {
+  every_step,        ///< after every integration step: the episode ends at that instant
+  decision_instant,  ///< only when the next decision is due
+};
+
+/// The task's numbers; the defaults are the paper's.
+struct AcrobotConfig {
+  double link_mass_1 = 1.0;                  ///< kg
+  double link_mass_2 = 1.0;                  ///< kg
+  double link_length_1 = 1.0;                ///< m
+  double link_length_2 = 1.0;                ///< m
+  double center_of_mass_1 = 0.5;             ///< m from joint 1
+  double center_of_mass_2 = 0.5;             ///< m from joint 2
+  double inertia_1 = 1.0;                    ///< kg m^2, about the link's centre of mass
+  double inertia_2 = 1.0;                    ///< kg m^2
+  double gravity = 9.8;                      ///< m/s^2
+  double max_torque = 10.0;                  ///< N m
+  double decision_interval = 1.0;            ///< s, the torque is held for it
+  double integration_step = 0.02;            ///< s, a whole fraction of decision_interval
+  int max_decisions = 50;                    ///< in an episode
+  double goal_height = 1.5;                  ///< m, of the tip above joint 1
+  double goal_velocity_1 = 3.0 * core::kPi;  ///< rad/s; times lambda for the goal, as it is for
+  double goal_velocity_2 = 5.0 * core::kPi;  ///< rad/s; the penalty
+  GoalTest goal_test = GoalTest::every_step;
+  double goal_reward = 10.0;
+  double penalty = -5.0;                 ///< for idling or too much speed; ends nothing
+  double idle_angle = core::kPi / 36.0;  ///< rad: |theta1| below it is idling; 0 = never
+
+  static constexpr auto fields() noexcept {
+    return std::tuple(core::field("link_mass_1", &AcrobotConfig::link_mass_1),
+                      core::field("link_mass_2", &AcrobotConfig::link_mass_2),
+                      core::field("link_length_1", &AcrobotConfig::link_length_1),
+                      core::field("link_length_2", &AcrobotConfig::link_length_2),
+                      core::field("center_of_mass_1", &AcrobotConfig::center_of_mass_1),
+                      core::field("center_of_mass_2", &AcrobotConfig::center_of_mass_2),
+                      core::field("inertia_1", &AcrobotConfig::inertia_1),
+                      core::field("inertia_2", &AcrobotConfig::inertia_2),
+                      core::field("gravity", &AcrobotConfig::gravity),
+                      core::field("max_torque", &AcrobotConfig::max_torque),
+                      core::field("decision_interval", &AcrobotConfig::decision_interval),
+                      core::field("integration_step", &AcrobotConfig::integration_step),
+                      core::field("max_decisions", &AcrobotConfig::max_decisions),
+                      core::field("goal_height", &AcrobotConfig::goal_height),
+                      core::field("goal_velocity_1", &AcrobotConfig::goal_velocity_1),
+                      core::field("goal_velocity_2", &AcrobotConfig::goal_velocity_2),
+                      core::field("goal_test", &AcrobotConfig::goal_test),
+                      core::field("goal_reward", &AcrobotConfig::goal_reward),
+                      core::field("penalty", &AcrobotConfig::penalty),
+                      core::field("idle_angle", &AcrobotConfig::idle_angle));
+  }
+  bool operator==(const AcrobotConfig&) const = default;
+};
+
+/// Sines and cosines of theta1, theta2 and theta1 + theta2.
+template <class Real>
+struct AcrobotAngles {
+  Real sin_1, cos_1, sin_2, cos_2, sin_12, cos_12;
+
+  SDNN_INLINE static AcrobotAngles of(const core::BasicSinCos<Real>& one,
+                                      const core::BasicSinCos<Real>& two) noexcept {
+    return {one.sin,
+            one.cos,
+            two.sin,
+            two.cos,
+            one.sin * two.cos + one.cos * two.sin,
+            one.cos * two.cos - one.sin * two.sin};
+  }
+};
+
+/// The state as four numbers theta1, theta2 (rad), theta1_dot, theta2_dot (rad/s): of one acrobot
+/// (`Real` = double), or of one acrobot in each lane.
+template <class Real>
+struct SeparateForm {
+  using Number = Real;
+  using State = std::array<Real, 4>;
+
+  SDNN_INLINE static AcrobotAngles<Real> angles(const State& state) noexcept {
+    return AcrobotAngles<Real>::of(core::sin_cos(state[0]), core::sin_cos(state[1]));
+  }
+  SDNN_INLINE static Real velocity_1(const State& state) noexcept { return state[2]; }
+  SDNN_INLINE static Real velocity_2(const State& state) noexcept { return state[3]; }
+  SDNN_INLINE static State slope(const State& state, const Real& acceleration_1,
+                                 const Real& acceleration_2) noexcept {
+    return {state[2], state[3], acceleration_1, acceleration_2};
+  }
+};
+
+#if SDNN_LANES
+/// The state of one acrobot as a pair of angles and a pair of velocities, joint beside joint: a
+/// register of two lanes is there on every machine and halves the work on the sines.
+struct PairedForm {
+  using Number = double;
+  using State = std::array<core::Lanes<2>, 2>;
+
+  SDNN_INLINE static AcrobotAngles<double> angles(const State& state) noexcept {
+    const auto at = core::sin_cos(state[0]);
+    return AcrobotAngles<double>::of({at.sin.v[0], at.cos.v[0]}, {at.sin.v[1], at.cos.v[1]});
+  }
+  SDNN_INLINE static double velocity_1(const State& state) noexcept { return state[1].v[0]; }
+  SDNN_INLINE static double velocity_2(const State& state) noexcept { return state[1].v[1]; }
+  SDNN_INLINE static State slope(const State& state, double acceleration_1,
+                                 double acceleration_2) noexcept {
+    return {state[1], core::Lanes<2>(core::Lanes<2>::Vector{acceleration_1, acceleration_2})};
+  }
+};
+#endif
+
+/// The constants of the equations of motion, and one decision interval of them.
+///
+/// theta1 = 0 hangs down, theta2 is relative to link 1; torque acts on joint 2 alone. The same bits
+/// in every form and every lane.
+/// Source: Spong, M. W. (1995). The swing up control problem for the acrobot. IEEE Control Systems
+/// 15(1), 49-55, with m2 l1 lc2 theta1_dot^2 sin theta2 in the second equation.
+class AcrobotDynamics {
+ public:
+  /// The most integration steps in one decision.
+  static constexpr double kMaxIntegrationSteps = 1e6;
+
+  /// Throws std::invalid_argument if a number is outside its range.
+  explicit AcrobotDynamics(const AcrobotConfig& config = {}) : config_(config) {
+    check(config);
+    const double steps = std::nearbyint(config.decision_interval / config.integration_step);
+    n_integration_steps_ = static_cast<int>(steps);
+    time_step_ = config.decision_interval / steps;
+    coupling_ = config.link_mass_2 * config.link_length_1 * config.center_of_mass_2;
+    inertia_22_ = config.link_mass_2 * square(config.center_of_mass_2) + config.inertia_2;
+    inertia_11_ = config.link_mass_1 * square(config.center_of_mass_1) + config.inertia_1 +
+                  config.link_mass_2 * square(config.link_length_1) + inertia_22_;
+    gravity_1_ = config.gravity * (config.link_mass_1 * config.center_of_mass_1 +
+                                   config.link_mass_2 * config.link_length_1);
+    gravity_2_ = config.gravity * config.link_mass_2 * config.center_of_mass_2;
+  }
+
+  /// Time derivative of `state` under `torque` (N m), given the sines and cosines of its angles.
+  ///
+  /// Spong's d11 a1 + d12 a2 + h1 + phi1 = 0, d12 a1 + d22 a2 + h2 + phi2 = torque by Cramer's
+  /// rule: the determinant depends on theta2 alone, so its division hides behind the right-hand
+  /// sides.
+  template <class Form>
+  SDNN_INLINE typename Form::State derivative(const typename Form::State& state,
+                                              const AcrobotAngles<typename Form::Number>& at,
+                                              const typename Form::Number& torque) const noexcept {
+    using Real = typename Form::Number;
+    const Real d12 = inertia_22_ + coupling_ * at.cos_2;
+    const Real d11 = inertia_11_ + 2.0 * coupling_ * at.cos_2;
+    const Real inverse = 1.0 / (d11 * inertia_22_ - d12 * d12);
+    const Real v1 = Form::velocity_1(state), v2 = Form::velocity_2(state);
+    const Real swirl = coupling_ * at.sin_2;
+    const Real phi2 = gravity_2_ * at.sin_12;
+    const Real right_1 = swirl * (v2 * (v2 + 2.0 * v1)) - (gravity_1_ * at.sin_1 + phi2);
+    const Real right_2 = (torque - swirl * (v1 * v1)) - phi2;
+    return Form::slope(state, (inertia_22_ * right_1 - d12 * right_2) * inverse,
+                       (d11 * right_2 - d12 * right_1) * inverse);
+  }
+
+  /// Height of the tip above joint 1, in m.
+  template <class Real>
+  SDNN_INLINE Real tip_height(const AcrobotAngles<Real>& at) const noexcept {
+    return -config_.link_length_1 * at.cos_1 - config_.link_length_2 * at.cos_12;
+  }
+
+  /// Moves `state` on by one decision interval, or to the goal, wherever the mask `moving` is set.
+  ///
+  /// `limit_1` and `limit_2` are the goal's limits of speed (rad/s). Returns where the goal was
+  /// reached. Angles are not wrapped.
+  template <class Form, class Mask>
+  SDNN_INLINE Mask integrate(typename Form::State& state, const typename Form::Number& torque,
+                             const typename Form::Number& limit_1,
+                             const typename Form::Number& limit_2,
+                             const Mask& moving) const noexcept {
+    using State = typename Form::State;
+    constexpr std::size_t kSize = std::tuple_size_v<State>;
+    const bool every_step = config_.goal_test == GoalTest::every_step;
+    const auto slope = [this, &torque](const State& at_state) SDNN_INLINE_LAMBDA {
+      return derivative<Form>(at_state, Form::angles(at_state), torque);
+    };
+    // All lanes go on until the last has arrived; `state` takes the numbers of those that do.
+    State now = state;
+    Mask under_way = moving;
+    auto at = Form::angles(now);
+    for (int i = n_integration_steps_; i > 0; --i) {
+      now = runge_kutta_step(slope, now, derivative<Form>(now, at, torque), time_step_);
+      at = Form::angles(now);
+      if (!every_step && i > 1) continue;
+      Mask arrived = core::both(tip_height(at) >= config_.goal_height, under_way);
+      if (!core::any(arrived)) continue;
+      const Mask slow = core::both(core::magnitude(Form::velocity_1(now)) < limit_1,
+                                   core::magnitude(Form::velocity_2(now)) < limit_2);
+      arrived = core::both(arrived, slow);
+      if (!core::any(arrived)) continue;
+      core::unrolled<kSize>([&](std::size_t k) SDNN_INLINE_LAMBDA {
+        state[k] = core::select(arrived, now[k], state[k]);
+      });
+      under_way = core::first_only(under_way, arrived);
+      if (!core::any(under_way)) return moving;
+    }
+    core::unrolled<kSize>([&](std::size_t k) SDNN_INLINE_LAMBDA {
+      state[k] = core::select(under_way, now[k], state[k]);
+    });
+    return core::first_only(moving, under_way);
+  }
+
+  /// Kinetic and potential energy in J, the latter counted from the height of joint 1.
+  double energy(const std::array<double, 4>& state) const noexcept {
+    const auto at = SeparateForm<double>::angles(state);
+    const double v1 = state[2], v2 = state[3];
+    const double bend = coupling_ * at.cos_2;
+    return 0.5 * (inertia_11_ + 2.0 * bend) * v1 * v1 + 0.5 * inertia_22_ * v2 * v2 +
+           (inertia_22_ + bend) * v1 * v2 - gravity_1_ * at.cos_1 - gravity_2_ * at.cos_12;
+  }
+
+  const AcrobotConfig& config() const noexcept { return config_; }
+
+ private:
+  static constexpr double square(double x) noexcept { return x * x; }
+
+  static void check(const AcrobotConfig& config);
+
+  AcrobotConfig config_;
+  int n_integration_steps_ = 0;
+  double time_step_ = 0.0;
+  double coupling_ = 0.0;    // m2 l1 lc2
+  double inertia_11_ = 0.0;  // d11 without its cosine
+  double inertia_22_ = 0.0;  // d22
+  double gravity_1_ = 0.0;   // (m1 lc1 + m2 l1) g
+  double gravity_2_ = 0.0;   // m2 lc2 g
+};
+
+inline void AcrobotDynamics::check(const AcrobotConfig& config) {
+  const std::pair<const char*, double> positive[] = {
+      {"link_mass_1", config.link_mass_1},
+      {"link_mass_2", config.link_mass_2},
+      {"link_length_1", config.link_length_1},
+      {"link_length_2", config.link_length_2},
+      {"center_of_mass_1", config.center_of_mass_1},
+      {"center_of_mass_2", config.center_of_mass_2},
+      {"inertia_1", config.inertia_1},
+      {"inertia_2", config.inertia_2},
+      {"max_torque", config.max_torque},
+      {"decision_interval", config.decision_interval},
+      {"integration_step", config.integration_step},
+      {"goal_velocity_1", config.goal_velocity_1},
+      {"goal_velocity_2", config.goal_velocity_2}};
+  for (const auto& [name, value] : positive) core::require_positive(name, value);
+  core::require_finite("gravity", config.gravity);
+  const double ratio = config.decision_interval / config.integration_step;
+  core::require(ratio > 0.5 && ratio <= kMaxIntegrationSteps &&
+                    std::abs(ratio - std::nearbyint(ratio)) <= 1e-9 * ratio,
+                "integration_step", "a whole fraction of decision_interval, at most 1e6 of them",
+                config.integration_step);
+  core::require(config.max_decisions >= 1, "max_decisions", "at least 1", config.max_decisions);
+  core::require_finite("goal_height", config.goal_height);
+  core::require_finite("goal_reward", config.goal_reward);
+  core::require_finite("penalty", config.penalty);
+  core::require_in_range("idle_angle", config.idle_angle, 0.0, core::kPi);
+}
+
+}  // namespace sdnn::environments

@@ -1,0 +1,105 @@
+/// The one kernel of a batch of acrobots: their motion in lanes, for each instruction set.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "sdnn/core/detail/lanes.hpp"
+#include "sdnn/core/instruction_set.hpp"
+#include "sdnn/environments/detail/acrobot_dynamics.hpp"
+
+namespace sdnn::environments {
+
+/// One number per acrobot in each array; lengths are multiples of kAcrobotLanes.
+struct AcrobotArrays {
+  std::array<double*, 4> state;  ///< theta1, theta2, theta1_dot, theta2_dot
+  const double* torque;
+  const double* lambda;
+  std::uint64_t* mask;  ///< in: all ones where an acrobot moves, else 0; out: where the goal is
+};
+
+/// Moves `n` acrobots on by one decision interval or to the goal; angles are not wrapped.
+using MoveAcrobots = void (*)(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays,
+                              std::size_t n);
+
+/// Doubles in the widest register.
+inline constexpr std::size_t kAcrobotLanes = 8;
+
+namespace detail {
+
+#if SDNN_LANES
+/// The kernel for registers of `Size` doubles, to be inlined where the instruction set is known.
+template <std::size_t Size>
+SDNN_INLINE void move_in_lanes(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays,
+                               std::size_t n) noexcept {
+  using Real = core::Lanes<Size>;
+  using Form = SeparateForm<Real>;
+  const double velocity_1 = dynamics.config().goal_velocity_1;
+  const double velocity_2 = dynamics.config().goal_velocity_2;
+  for (std::size_t i = 0; i < n; i += Size) {
+    auto mask = core::LaneBits<Size>::load(arrays.mask + i);
+    if (!core::any(mask)) continue;
+    typename Form::State state;
+    core::unrolled<4>([&](std::size_t k)
+                          SDNN_INLINE_LAMBDA { state[k] = Real::load(arrays.state[k] + i); });
+    const Real lambda = Real::load(arrays.lambda + i);
+    mask = dynamics.integrate<Form>(state, Real::load(arrays.torque + i), velocity_1 * lambda,
+                                    velocity_2 * lambda, mask);
+    core::unrolled<4>([&](std::size_t k)
+                          SDNN_INLINE_LAMBDA { state[k].store(arrays.state[k] + i); });
+    mask.store(arrays.mask + i);
+  }
+}
+#endif
+
+inline void move_acrobots_portable(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays,
+                                   std::size_t n) {
+#if SDNN_LANES
+  move_in_lanes<2>(dynamics, arrays, n);  // two doubles: the baseline of x86-64 and AArch64
+#else
+  using Form = SeparateForm<double>;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (arrays.mask[i] == 0) continue;
+    Form::State state;
+    for (std::size_t k = 0; k < 4; ++k) state[k] = arrays.state[k][i];
+    const double lambda = arrays.lambda[i];
+    const bool goal = dynamics.integrate<Form>(state, arrays.torque[i],
+                                               dynamics.config().goal_velocity_1 * lambda,
+                                               dynamics.config().goal_velocity_2 * lambda, true);
+    for (std::size_t k = 0; k < 4; ++k) arrays.state[k][i] = state[k];
+    arrays.mask[i] = goal ? ~std::uint64_t{0} : 0;
+  }
+#endif
+}
+
+#if SDNN_X86_KERNELS
+[[gnu::target("avx2")]] inline void move_acrobots_avx2(const AcrobotDynamics& dynamics,
+                                                       const AcrobotArrays& arrays, std::size_t n) {
+  move_in_lanes<4>(dynamics, arrays, n);
+}
+
+[[gnu::target("avx512f,avx512bw")]] inline void move_acrobots_avx512(
+    const AcrobotDynamics& dynamics, const AcrobotArrays& arrays, std::size_t n) {
+  move_in_lanes<8>(dynamics, arrays, n);
+}
+#endif
+
+}  // namespace detail
+
+/// The kernel of the instruction set in use.
+inline MoveAcrobots move_acrobots_kernel() {
+#if SDNN_X86_KERNELS
+  switch (core::instruction_set()) {
+    case core::InstructionSet::avx512:
+      return detail::move_acrobots_avx512;
+    case core::InstructionSet::avx2:
+      return detail::move_acrobots_avx2;
+    default:
+      break;
+  }
+#endif
+  return detail::move_acrobots_portable;
+}
+
+}  // namespace sdnn::environments

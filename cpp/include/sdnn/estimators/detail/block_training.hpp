@@ -1,0 +1,257 @@
+/// Training block by block over the weights: for any number of samples.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/core/detail/worker_team.hpp"
+#include "sdnn/estimators/correction_rules.hpp"
+#include "sdnn/estimators/detail/chunked_weights.hpp"
+#include "sdnn/estimators/detail/code_products.hpp"
+#include "sdnn/estimators/detail/code_walk.hpp"
+#include "sdnn/estimators/detail/presentation_window.hpp"
+#include "sdnn/estimators/detail/query_order.hpp"
+#include "sdnn/estimators/detail/signed_sums.hpp"
+#include "sdnn/estimators/detail/transposition.hpp"
+#include "sdnn/estimators/parallel_perceptron.hpp"
+#include "sdnn/estimators/training_form.hpp"
+
+namespace sdnn::estimators {
+
+/// Presents samples in blocks.
+///
+/// A pass over the weights, a few cache-resident columns of some units at a time, sums the block's
+/// potentials, from sample to sample along a short walk through their codes. What the block's own
+/// corrections change in its later potentials follows exactly from the inner products of its codes;
+/// the weights are corrected before the next pass, all corrections of a unit together. Weights are
+/// kept in 16 bits, in 32 as soon as a sum of them could leave 16.
+///
+/// Blocks are large where the same ones come again in every round through the data and there is
+/// memory to keep what does not change of them. `Product` is an integer that holds every product.
+template <class Product>
+class BlockTraining {
+ public:
+  BlockTraining(std::shared_ptr<ParallelPerceptron> layer, std::span<const std::int32_t> bins,
+                int n_threads, bool keeps_plans)
+      : layer_(std::move(layer)),
+        bins_(bins.begin(), bins.end()),
+        n_words_(block_words(layer_->code())),
+        team_(static_cast<std::size_t>(n_threads)),
+        most_samples_(keeps_plans ? kLargeBlock : kSmallBlock),
+        keeps_plans_(keeps_plans),
+        words_(2 * most_samples_ * n_words_),
+        entries_(64 * most_samples_ * n_words_),
+        potentials_(most_samples_ * layer_->n_padded_units()),
+        window_(layer_->n_padded_units(), most_samples_),
+        pending_(layer_->n_units()) {
+    wide_ = ChunkedWeights<std::int32_t>(layer_->tiles(), n_words_);
+    chunk_norm_ = wide_.largest_chunk_norm();
+    if (chunk_norm_ <= kLargestSum) {
+      narrow_ = ChunkedWeights<std::int16_t>(wide_);
+      wide_ = {};
+    }
+  }
+
+  template <class Rule>
+  TrainingCount present(std::span<const std::int32_t> order, Rule& rule) {
+    if (keeps_plans_ && is_whole_round(order)) {
+      if (had_a_round_) return present_round(order, rule);
+      had_a_round_ = true;  // it may be the only one
+    }
+    TrainingCount count;
+    while (!order.empty()) {
+      const auto some = order.first(std::min(order.size(), kSmallBlock));
+      Plan plan;
+      count += present_block(some, &plan, rule);
+      order = order.subspan(some.size());
+    }
+    return count;
+  }
+
+  void synchronize() {
+    if (narrow_.empty()) {
+      wide_.copy_to(layer_->tiles());
+    } else {
+      narrow_.copy_to(layer_->tiles());
+    }
+  }
+
+ private:
+  static constexpr std::int64_t kLargestSum = std::numeric_limits<std::int16_t>::max();
+  template <class Weight>
+  using Columns = std::array<Weight, kChunkColumns * kMostUnits<Weight>>;
+
+  /// What does not change of a block.
+  struct Plan {
+    CodeWalk walk;
+    std::size_t stride = 0;
+    core::AlignedBuffer<Product> products;  // (size, stride), 1 added to each
+  };
+
+  /// Every sample once, in the order of the data?
+  bool is_whole_round(std::span<const std::int32_t> order) const noexcept {
+    if (order.size() != bins_.size() / layer_->code().n_inputs()) return false;
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      if (static_cast<std::size_t>(order[i]) != i) return false;
+    }
+    return true;
+  }
+
+  /// A whole round in large blocks, whose plans are kept for the next one.
+  template <class Rule>
+  TrainingCount present_round(std::span<const std::int32_t> order, Rule& rule) {
+    TrainingCount count;
+    plans_.resize((order.size() + kLargeBlock - 1) / kLargeBlock);
+    for (Plan& plan : plans_) {
+      const auto some = order.first(std::min(order.size(), kLargeBlock));
+      count += present_block(some, &plan, rule);
+      order = order.subspan(some.size());
+    }
+    return count;
+  }
+
+  template <class Rule>
+  TrainingCount present_block(std::span<const std::int32_t> samples, Plan* plan, Rule& rule) {
+    encode(samples);
+    if (plan->walk.empty()) make_plan(samples, plan);
+    sum_potentials(samples.size(), plan->walk);
+    const TrainingCount count = window_.present(
+        samples, plan->products.data(), plan->stride, rule, [&](std::size_t b, Correction made) {
+          pending_[made.unit].add(entries_.data() + kChunkColumns * b, made.direction);
+          layer_->thresholds()[made.unit] -= made.direction;
+        });
+    correct_weights();
+    return count;
+  }
+
+  coding::CodeWords code_of(std::size_t b) const noexcept {
+    const std::uint64_t* const active = words_.data() + 2 * b * n_words_;
+    return {active, active + n_words_};
+  }
+
+  void encode(std::span<const std::int32_t> samples) {
+    const ParallelPerceptron::Code& code = layer_->code();
+    team_.run_over(samples.size(), [&](std::size_t b) {
+      std::uint64_t* const active = words_.data() + 2 * b * n_words_;
+      code.encode(std::span(bins_).subspan(static_cast<std::size_t>(samples[b]) * code.n_inputs(),
+                                           code.n_inputs()),
+                  active, active + n_words_);
+      expand_code(code_of(b), n_words_, entries_.data() + kChunkColumns * b,
+                  kChunkColumns * most_samples_);
+    });
+  }
+
+  void make_plan(std::span<const std::int32_t> samples, Plan* plan) {
+    plan->stride = core::round_up(samples.size(), PresentationWindow::kAtOnce);
+    plan->products = core::AlignedBuffer<Product>(samples.size() * plan->stride);
+    team_.run([&](std::size_t part) {
+      for (std::size_t b = part; b < samples.size(); b += team_.size()) {
+        for (std::size_t e = b; e < samples.size(); ++e) {  // earlier ones are never asked for
+          plan->products[b * plan->stride + e] =
+              static_cast<Product>(1 + inner_product(code_of(b), code_of(e), n_words_));
+        }
+      }
+    });
+    const std::size_t n_inputs = layer_->code().n_inputs();
+    std::vector<std::int32_t> bins;
+    for (const std::int32_t sample : samples) {
+      const auto* const first = bins_.data() + static_cast<std::size_t>(sample) * n_inputs;
+      bins.insert(bins.end(), first, first + n_inputs);
+    }
+    plan->walk = CodeWalk(query_order(bins, n_inputs), n_words_,
+                          [&](std::uint32_t b) { return code_of(b); });
+  }
+
+  void sum_potentials(std::size_t n_samples, const CodeWalk& walk) {
+    const std::size_t n_padded = layer_->n_padded_units();
+    for (std::size_t b = 0; b < n_samples; ++b) {
+      std::int32_t* const values = &potentials_[b * n_padded];
+      for (std::size_t i = 0; i < layer_->n_units(); ++i) values[i] = -layer_->thresholds()[i];
+    }
+    if (narrow_.empty()) {
+      walk_over(wide_, walk);
+    } else {
+      walk_over(narrow_, walk);
+    }
+    transpose(potentials_.data(), n_padded, n_samples, n_padded, window_.row(0), window_.stride());
+  }
+
+  template <class Weight>
+  void walk_over(const ChunkedWeights<Weight>& weights, const CodeWalk& walk) {
+    const std::size_t n_padded = layer_->n_padded_units();
+    const std::size_t n_parts = (n_padded + kMostUnits<Weight> - 1) / kMostUnits<Weight>;
+    const std::size_t width = core::round_up((n_padded + n_parts - 1) / n_parts, kTileStep);
+    team_.run([&](std::size_t part) {
+      alignas(core::kCacheLine) Columns<Weight> columns;
+      for (std::size_t first = part * width; first < n_padded; first += team_.size() * width) {
+        const std::size_t n = std::min(width, n_padded - first);
+        for (std::size_t chunk = 0; chunk < walk.n_chunks(); ++chunk) {
+          transpose(weights.chunk(chunk, first), kChunkColumns, n, kChunkColumns, columns.data(),
+                    n);
+          walk_chunk(columns.data(), n, walk.stops(), walk.changes(chunk),
+                     potentials_.data() + first, n_padded);
+        }
+      }
+    });
+  }
+
+  void correct_weights() {
+    keep_sums_in_16_bits();
+    team_.run_over(n_words_ / kChunkWords, [&](std::size_t chunk) {
+      const std::size_t offset = chunk * kChunkColumns * most_samples_;
+      for (std::size_t i = 0; i < layer_->n_units(); ++i) {
+        if (pending_[i].empty()) continue;
+        if (narrow_.empty()) {
+          add_signed(wide_.chunk(chunk, i), kChunkColumns, pending_[i], offset, kPerByte);
+        } else {
+          add_signed(narrow_.chunk(chunk, i), kChunkColumns, pending_[i], offset, kPerByte);
+        }
+      }
+    });
+    for (auto& rows : pending_) rows.clear();
+  }
+
+  /// The sum of |weights| of a unit in a chunk grows by no more than its columns per correction.
+  void keep_sums_in_16_bits() {
+    if (narrow_.empty()) return;
+    std::size_t most = 0;
+    for (const auto& rows : pending_) most = std::max(most, rows.size());
+    const auto growth = static_cast<std::int64_t>(most * kChunkColumns);
+    if (chunk_norm_ + growth > kLargestSum) {
+      chunk_norm_ = narrow_.largest_chunk_norm();
+      if (chunk_norm_ + growth > kLargestSum) {
+        wide_ = ChunkedWeights<std::int32_t>(narrow_);
+        narrow_ = {};
+      }
+    }
+    chunk_norm_ += growth;
+  }
+
+  static constexpr std::size_t kPerByte = std::numeric_limits<std::int8_t>::max();
+
+  std::shared_ptr<ParallelPerceptron> layer_;
+  std::vector<std::int32_t> bins_;
+  std::size_t n_words_;
+  core::WorkerTeam team_;
+  std::size_t most_samples_;
+  bool keeps_plans_;
+  bool had_a_round_ = false;  // in the order of the data
+  std::vector<Plan> plans_;
+  std::vector<std::uint64_t> words_;          // (most_samples, active then positive, n_words)
+  core::AlignedBuffer<std::int8_t> entries_;  // (chunks, most_samples, kChunkColumns): +1, 0, -1
+  core::AlignedBuffer<std::int32_t> potentials_;  // (most_samples, n_padded_units)
+  PresentationWindow window_;
+  std::vector<SignedRows<std::int8_t>> pending_;  // of each unit, codes not yet in its weights
+  std::int64_t chunk_norm_ = 0;  // no unit's |weights| in a chunk have a larger sum
+  ChunkedWeights<std::int16_t> narrow_;
+  ChunkedWeights<std::int32_t> wide_;  // one of the two is empty
+};
+
+}  // namespace sdnn::estimators

@@ -1,0 +1,226 @@
+/// Training on potentials instead of weights: for few samples and many columns.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/coding/selective_desensitization.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/detail/worker_team.hpp"
+#include "sdnn/estimators/correction_rules.hpp"
+#include "sdnn/estimators/detail/code_products.hpp"
+#include "sdnn/estimators/detail/presentation_window.hpp"
+#include "sdnn/estimators/detail/signed_sums.hpp"
+#include "sdnn/estimators/detail/tile_rows.hpp"
+#include "sdnn/estimators/parallel_perceptron.hpp"
+#include "sdnn/estimators/training_form.hpp"
+
+namespace sdnn::estimators {
+
+/// Keeps the potentials of all units for all training samples, and how often each sample has been
+/// added to each unit; weights are made of that when asked for.
+///
+/// Correcting a unit by x_SD(t) and its threshold by 1 moves its potential for sample s by
+/// <x_SD(t), x_SD(s)> + 1, so a correction adds one row of the table of these products. Samples are
+/// presented in windows: a correction reaches the window's own potentials at once, and those of all
+/// samples later, together with other corrections of its unit. `Product` is an integer that holds
+/// every product.
+template <class Product>
+class DualTraining {
+ public:
+  DualTraining(std::shared_ptr<ParallelPerceptron> layer, std::span<const std::int32_t> bins,
+               int n_threads)
+      : layer_(std::move(layer)),
+        coded_(layer_->code(), bins),
+        row_size_(dual_row_size(coded_.size())),
+        n_per_sum_(std::numeric_limits<Product>::max() / (layer_->code().max_active() + 1)),
+        team_(static_cast<std::size_t>(n_threads)),
+        products_(coded_.size() * row_size_),
+        potentials_(layer_->n_units() * row_size_),
+        pending_(layer_->n_units()),
+        coefficients_(coded_.size() * layer_->n_padded_units()),
+        window_(layer_->n_padded_units(), kSmallBlock),
+        gathered_(kSmallBlock * kSmallBlock) {
+    // Blocks of rows get cheaper towards the end: threads take them in turn.
+    team_.run([&](std::size_t part) {
+      for (std::size_t t = kRows * part; t < coded_.size(); t += kRows * team_.size()) {
+        fill_products(t, std::min(t + kRows, coded_.size()));
+      }
+    });
+    layer_->visit(bins, n_threads, [&](std::size_t t, const std::int32_t* values) {
+      for (std::size_t i = 0; i < layer_->n_units(); ++i) {
+        potentials_[i * row_size_ + t] = values[i];
+      }
+    });
+  }
+
+  template <class Rule>
+  TrainingCount present(std::span<const std::int32_t> order, Rule& rule) {
+    TrainingCount count;
+    const bool in_data_order =
+        std::adjacent_find(order.begin(), order.end(),
+                           [](auto one, auto next) { return next != one + 1; }) == order.end();
+    // Corrections may wait where a window's share of their rows lies side by side.
+    const std::size_t patience = in_data_order ? kPatience : 1;
+    for (std::size_t waiting = 0; !order.empty(); waiting += kSmallBlock) {
+      if (waiting >= patience || full_) {
+        flush();
+        waiting = 0;
+      }
+      if (full_) synchronize();
+      const auto now = order.first(std::min(order.size(), kSmallBlock));
+      count += in_data_order ? present_row(now, rule) : present_some(now, rule);
+      order = order.subspan(now.size());
+    }
+    flush();
+    return count;
+  }
+
+  /// weights += sum over samples of coefficient * x_SD, tile by tile and 64 slots at a time.
+  void synchronize() {
+    auto& tiles = layer_->tiles();
+    const std::size_t n_padded = layer_->n_padded_units();
+    for (std::size_t tile = 0; tile < tiles.n_tiles(); ++tile) {
+      const std::size_t width = tiles.width(tile);
+      std::vector<std::pair<std::size_t, std::int32_t>> used;  // samples, largest |coefficient|
+      for (std::size_t t = 0; t < coded_.size(); ++t) {
+        const std::int16_t* const c = &coefficients_[t * n_padded + tile * kTileUnits];
+        const auto [low, high] = std::minmax_element(c, c + width);
+        const std::int32_t largest = std::max<std::int32_t>(*high, -std::int32_t{*low});
+        if (largest != 0) used.emplace_back(t, largest);
+      }
+      team_.run_over(layer_->code().n_words(), [&](std::size_t w) {
+        add_samples(tiles.tile(tile) + 64 * w * width, width, tile, w, used);
+      });
+    }
+    for (std::size_t t = 0; t < coded_.size(); ++t) {
+      for (std::size_t i = 0; i < layer_->n_units(); ++i) {
+        layer_->thresholds()[i] -= coefficients_[t * n_padded + i];
+      }
+    }
+    std::fill_n(coefficients_.data(), coefficients_.size(), std::int16_t{0});
+    full_ = false;
+  }
+
+ private:
+  /// The products of the samples [begin, end) with themselves and all later ones; the codes of
+  /// these few stay in the cache while those of the others pass.
+  void fill_products(std::size_t begin, std::size_t end) noexcept {
+    for (std::size_t s = begin; s < coded_.size(); ++s) {
+      for (std::size_t t = begin; t < std::min(end, s + 1); ++t) {
+        const auto product =
+            static_cast<Product>(1 + inner_product(coded_[t], coded_[s], coded_.n_words()));
+        products_[t * row_size_ + s] = product;
+        products_[s * row_size_ + t] = product;
+      }
+    }
+  }
+
+  /// Adds word w of the samples to 64 rows of a tile, in 16 bits as long as these hold the sum.
+  void add_samples(
+      std::int32_t* rows, std::size_t width, std::size_t tile, std::size_t w,
+      const std::vector<std::pair<std::size_t, std::int32_t>>& samples) const noexcept {
+    alignas(core::kCacheLine) std::array<std::int16_t, 64 * kTileUnits> sums{};
+    const auto widen = [&] {
+      for (std::size_t i = 0; i < 64 * width; ++i) rows[i] += sums[i];
+      sums.fill(0);
+    };
+    std::int32_t bound = 0;
+    for (const auto& [t, largest] : samples) {
+      if (bound + largest > std::numeric_limits<std::int16_t>::max()) {
+        widen();
+        bound = 0;
+      }
+      bound += largest;
+      add_outer(sums.data(), width,
+                &coefficients_[t * layer_->n_padded_units() + tile * kTileUnits],
+                coded_[t].active[w], coded_[t].positive[w]);
+    }
+    widen();
+  }
+
+  /// Moves the potentials of all samples by the corrections that wait; some samples at a time, so
+  /// that the products stay in the cache from unit to unit.
+  void flush() {
+    for (std::size_t begin = 0; begin < row_size_; begin += kColumns) {
+      const std::size_t size = std::min(kColumns, row_size_ - begin);
+      team_.run_over(layer_->n_units(), [&](std::size_t i) {
+        if (pending_[i].empty()) return;
+        add_signed(&potentials_[i * row_size_ + begin], size, pending_[i], begin, n_per_sum_);
+      });
+    }
+    for (auto& rows : pending_) rows.clear();
+  }
+
+  /// Presents samples that are neighbours in memory.
+  template <class Rule>
+  TrainingCount present_row(std::span<const std::int32_t> now, Rule& rule) {
+    const auto begin = static_cast<std::size_t>(now[0]);
+    const std::size_t size = core::round_up(now.size(), PresentationWindow::kAtOnce);
+    for (std::size_t i = 0; i < layer_->n_units(); ++i) {
+      std::copy_n(&potentials_[i * row_size_ + begin], size, window_.row(i));
+      if (!pending_[i].empty()) add_signed(window_.row(i), size, pending_[i], begin, n_per_sum_);
+    }
+    return present_window(now, &products_[begin * row_size_ + begin], row_size_, rule);
+  }
+
+  /// Presents any samples. Nothing is pending.
+  template <class Rule>
+  TrainingCount present_some(std::span<const std::int32_t> now, Rule& rule) {
+    for (std::size_t i = 0; i < layer_->n_units(); ++i) {
+      for (std::size_t b = 0; b < now.size(); ++b) {
+        window_.row(i)[b] = potentials_[i * row_size_ + static_cast<std::size_t>(now[b])];
+      }
+    }
+    for (std::size_t b = 0; b < now.size(); ++b) {
+      const Product* const row = &products_[static_cast<std::size_t>(now[b]) * row_size_];
+      for (std::size_t e = b; e < now.size(); ++e) {
+        gathered_[b * kSmallBlock + e] = row[static_cast<std::size_t>(now[e])];
+      }
+    }
+    return present_window(now, gathered_.data(), kSmallBlock, rule);
+  }
+
+  template <class Rule>
+  TrainingCount present_window(std::span<const std::int32_t> now, const Product* products,
+                               std::size_t stride, Rule& rule) {
+    return window_.present(now, products, stride, rule, [&](std::size_t b, Correction correction) {
+      const auto sample = static_cast<std::size_t>(now[b]);
+      pending_[correction.unit].add(&products_[sample * row_size_], correction.direction);
+      std::int16_t& coefficient =
+          coefficients_[sample * layer_->n_padded_units() + correction.unit];
+      coefficient = static_cast<std::int16_t>(coefficient + correction.direction);
+      full_ = full_ || std::abs(coefficient) >= kFullCoefficient;
+    });
+  }
+
+  static constexpr std::size_t kPatience = 4 * kSmallBlock;
+  static constexpr int kFullCoefficient =
+      std::numeric_limits<std::int16_t>::max() - int{kSmallBlock};
+  static constexpr std::size_t kRows = 8;
+  static constexpr std::size_t kColumns = 256;
+
+  std::shared_ptr<ParallelPerceptron> layer_;
+  coding::CodedSamples coded_;
+  std::size_t row_size_;
+  std::size_t n_per_sum_;  // products whose sum a Product holds
+  core::WorkerTeam team_;
+  core::AlignedBuffer<Product> products_;           // (n_samples, row_size), 1 added to each
+  core::AlignedBuffer<std::int32_t> potentials_;    // (n_units, row_size)
+  std::vector<SignedRows<Product>> pending_;        // of each unit: not in all potentials yet
+  core::AlignedBuffer<std::int16_t> coefficients_;  // (n_samples, n_padded_units)
+  PresentationWindow window_;
+  core::AlignedBuffer<Product>
+      gathered_;       // (kSmallBlock, kSmallBlock): products of scattered samples
+  bool full_ = false;  // another window could take a coefficient beyond its range
+};
+
+}  // namespace sdnn::estimators

@@ -1,0 +1,96 @@
+/// The order in which queries are answered: neighbours one after the other.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <numeric>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace sdnn::estimators {
+
+namespace detail {
+
+/// The place of a point on a Hilbert curve through a cube of 2^n_bits points a side.
+///
+/// Source: Skilling 2004, "Programming the Hilbert curve". `axes` is scratch and is overwritten.
+/// Requires axes.size() * n_bits <= 64.
+inline std::uint64_t hilbert_index(std::span<std::uint32_t> axes, int n_bits) noexcept {
+  const std::size_t n = axes.size();
+  const std::uint32_t top = std::uint32_t{1} << (n_bits - 1);
+  for (std::uint32_t bit = top; bit > 1; bit >>= 1) {
+    const std::uint32_t below = bit - 1;
+    for (std::size_t i = 0; i < n; ++i) {
+      if ((axes[i] & bit) != 0) {
+        axes[0] ^= below;
+      } else {
+        const std::uint32_t exchanged = (axes[0] ^ axes[i]) & below;
+        axes[0] ^= exchanged;
+        axes[i] ^= exchanged;
+      }
+    }
+  }
+  for (std::size_t i = 1; i < n; ++i) axes[i] ^= axes[i - 1];
+  std::uint32_t mask = 0;
+  for (std::uint32_t bit = top; bit > 1; bit >>= 1) {
+    if ((axes[n - 1] & bit) != 0) mask ^= bit - 1;
+  }
+  std::uint64_t index = 0;
+  for (int bit = n_bits - 1; bit >= 0; --bit) {
+    for (std::size_t i = 0; i < n; ++i) index = index << 1 | ((axes[i] ^ mask) >> bit & 1);
+  }
+  return index;
+}
+
+/// How far a walk through the queries goes, in bins, each input's step counted up to `cap`.
+inline std::uint64_t walk_length(std::span<const std::int32_t> bins, std::size_t n_inputs,
+                                 std::span<const std::uint32_t> order, std::int32_t cap) noexcept {
+  std::uint64_t length = 0;
+  for (std::size_t q = 1; q < order.size(); ++q) {
+    const std::int32_t* const from = bins.data() + order[q - 1] * n_inputs;
+    const std::int32_t* const to = bins.data() + order[q] * n_inputs;
+    for (std::size_t i = 0; i < n_inputs; ++i) {
+      length += static_cast<std::uint64_t>(std::min(std::abs(to[i] - from[i]), cap));
+    }
+  }
+  return length;
+}
+
+}  // namespace detail
+
+/// An order of the queries in which few bins change from one to the next: the given one, or along a
+/// Hilbert curve, whichever is shorter. Shapes: bins (n_queries, n_inputs). Cost: a sort.
+inline std::vector<std::uint32_t> query_order(std::span<const std::int32_t> bins,
+                                              std::size_t n_inputs) {
+  constexpr std::int32_t kCap = 64;  // beyond, patterns have little in common anyway
+  const std::size_t n_queries = bins.size() / n_inputs;
+  std::vector<std::uint32_t> given(n_queries);
+  std::iota(given.begin(), given.end(), std::uint32_t{0});
+  const std::uint64_t given_length = detail::walk_length(bins, n_inputs, given, kCap);
+  if (n_queries < 3 || given_length <= n_queries + n_queries / 2) return given;
+
+  std::int32_t largest = 1;
+  for (const std::int32_t bin : bins) largest = std::max(largest, bin);
+  const auto n_bits = static_cast<int>(std::bit_width(static_cast<std::uint32_t>(largest)));
+  const std::size_t n_axes = std::min<std::size_t>(n_inputs, 64);
+  const int kept = std::min(n_bits, static_cast<int>(64 / n_axes));
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(n_queries);
+  std::vector<std::uint32_t> axes(n_axes);
+  for (std::size_t q = 0; q < n_queries; ++q) {
+    for (std::size_t i = 0; i < n_axes; ++i) {
+      axes[i] = static_cast<std::uint32_t>(bins[q * n_inputs + i]) >> (n_bits - kept);
+    }
+    keys[q] = {detail::hilbert_index(axes, kept), given[q]};
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::uint32_t> along(n_queries);
+  std::transform(keys.begin(), keys.end(), along.begin(),
+                 [](const auto& key) { return key.second; });
+  return detail::walk_length(bins, n_inputs, along, kCap) < given_length ? along : given;
+}
+
+}  // namespace sdnn::estimators

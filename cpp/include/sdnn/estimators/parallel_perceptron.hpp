@@ -1,0 +1,240 @@
+/// A layer of perceptrons over the desensitized code of a sample, in exact integers.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "sdnn/coding/selective_desensitization.hpp"
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/random.hpp"
+#include "sdnn/estimators/detail/code_changes.hpp"
+#include "sdnn/estimators/detail/query_order.hpp"
+#include "sdnn/estimators/detail/tile_rows.hpp"
+#include "sdnn/estimators/detail/unit_ranking.hpp"
+#include "sdnn/estimators/detail/weight_tiles.hpp"
+
+namespace sdnn::estimators {
+
+/// `n_units` units over the columns of a code: potential = weights . x_SD - threshold, firing if >
+/// 0.
+///
+/// No potential can overflow: of every unit, |threshold| plus the sum of |weights| is below 2^31,
+/// which is checked wherever weights come from.
+///
+/// Source: Nonaka, Tanaka, Morita 2011. Thread safety: const calls may run at the same time.
+class ParallelPerceptron {
+ public:
+  using Code = coding::SelectiveDesensitization;
+
+  /// Weights and thresholds are drawn uniformly from the integers in [-initial_range,
+  /// initial_range], unit by unit, the threshold first.
+  ///
+  /// Throws std::invalid_argument unless n_units is in [1, 2^20] and initial_range in [0, 10^6].
+  ParallelPerceptron(std::shared_ptr<const Code> code, std::size_t n_units, std::uint64_t seed,
+                     int initial_range = 5)
+      : ParallelPerceptron(std::move(code), n_units) {
+    core::require_in_range("initial_range", initial_range, 0, 1000000);
+    core::Random random(seed, core::Stream::weights);
+    const auto span = static_cast<std::uint64_t>(2 * initial_range + 1);
+    const auto draw = [&] { return static_cast<std::int32_t>(random.below(span)) - initial_range; };
+    const std::vector<std::size_t> slots = slots_of_columns();
+    for (std::size_t i = 0; i < n_units; ++i) {
+      thresholds_[i] = draw();
+      for (const std::size_t slot : slots) weights_.at(i, slot) = draw();
+    }
+    check_norms();
+  }
+
+  /// Given weights and thresholds.
+  ///
+  /// Shapes: weights (n_units, n_columns), thresholds (n_units,). Throws std::invalid_argument for
+  /// other sizes, std::overflow_error if a potential could overflow.
+  ParallelPerceptron(std::shared_ptr<const Code> code, std::size_t n_units,
+                     std::span<const std::int32_t> weights,
+                     std::span<const std::int32_t> thresholds)
+      : ParallelPerceptron(std::move(code), n_units) {
+    const std::size_t n_columns = code_->n_columns();
+    core::require(weights.size() == n_units * n_columns, "weights",
+                  "n_units * n_columns = " + std::to_string(n_units * n_columns) + " values",
+                  weights.size());
+    core::require(thresholds.size() == n_units, "thresholds",
+                  "n_units = " + std::to_string(n_units) + " values", thresholds.size());
+    const std::int32_t* weight = weights.data();
+    const std::vector<std::size_t> slots = slots_of_columns();
+    for (std::size_t i = 0; i < n_units; ++i) {
+      for (const std::size_t slot : slots) weights_.at(i, slot) = *weight++;
+    }
+    std::copy(thresholds.begin(), thresholds.end(), thresholds_.begin());
+    check_norms();
+  }
+
+  const Code& code() const noexcept { return *code_; }
+  std::shared_ptr<const Code> shared_code() const noexcept { return code_; }
+  std::size_t n_units() const noexcept { return weights_.n_units(); }
+  std::size_t n_padded_units() const noexcept { return weights_.n_padded_units(); }
+  std::int32_t weight(std::size_t unit, std::size_t column) const noexcept {
+    return weights_.at(unit, code_->slot_of(column));
+  }
+  std::int32_t threshold(std::size_t unit) const noexcept { return thresholds_[unit]; }
+
+  /// What trainers write to; check_norms() holds them to the layer's promise.
+  WeightTiles<std::int32_t>& tiles() noexcept { return weights_; }
+  const WeightTiles<std::int32_t>& tiles() const noexcept { return weights_; }
+  std::span<std::int32_t> thresholds() noexcept { return thresholds_; }
+  std::span<const std::int32_t> thresholds() const noexcept { return thresholds_; }
+
+  /// The largest sum of |weights| and |threshold| of a unit, a bound of all potentials.
+  /// Throws std::overflow_error if it is 2^31 or more.
+  std::int64_t check_norms() const {
+    std::vector<std::int64_t> norms(n_padded_units());
+    for (std::size_t tile = 0; tile < weights_.n_tiles(); ++tile) {
+      const std::int32_t* row = weights_.tile(tile);
+      const std::size_t width = weights_.width(tile);
+      for (std::size_t slot = 0; slot < weights_.n_slots(); ++slot, row += width) {
+        for (std::size_t i = 0; i < width; ++i) {
+          norms[tile * kTileUnits + i] += std::abs(std::int64_t{row[i]});
+        }
+      }
+    }
+    std::int64_t largest = 0;
+    for (std::size_t i = 0; i < n_units(); ++i) {
+      const std::int64_t norm = norms[i] + std::abs(std::int64_t{thresholds_[i]});
+      if (norm > std::numeric_limits<std::int32_t>::max()) {
+        throw std::overflow_error("the weights of unit " + std::to_string(i) +
+                                  " must have absolute values of a sum below 2^31, got " +
+                                  std::to_string(norm));
+      }
+      largest = std::max(largest, norm);
+    }
+    return largest;
+  }
+
+  /// Calls consume(query, potentials) once per query, in an order of its own and from up to
+  /// `n_threads` threads at a time.
+  ///
+  /// Neighbouring queries share most of their code, so the potentials of one become those of the
+  /// next by the columns in which they differ. Shapes: bins (n_queries, n_inputs), potentials
+  /// (n_padded_units,), of which the first n_units mean something. Throws std::invalid_argument for
+  /// bins out of range or n_threads < 1.
+  template <class Consume>
+  void visit(std::span<const std::int32_t> bins, int n_threads, const Consume& consume) const {
+    core::require_in_range("n_threads", n_threads, 1, 4096);
+    code_->check_bins(bins);
+    const std::size_t n_queries = bins.size() / code_->n_inputs();
+    if (n_queries == 0) return;
+    const auto order = query_order(bins, code_->n_inputs());
+    // A copy in 16 bits is half as much to read; it pays if many queries share it.
+    const std::int64_t largest = n_queries > 64 ? weights_.largest() : 0;
+    if (n_queries > 64 && largest <= std::numeric_limits<std::int16_t>::max() / 16) {
+      const WeightTiles<std::int16_t> narrow(weights_);
+      const auto n_per_sum = static_cast<std::size_t>(std::numeric_limits<std::int16_t>::max() /
+                                                      std::max<std::int64_t>(largest, 1));
+      visit_all(narrow, n_per_sum, bins, order, n_threads, consume);
+    } else {
+      visit_all(weights_, std::size_t{1} << 30, bins, order, n_threads, consume);
+    }
+  }
+
+  /// Potentials in the order of the queries. Shapes: bins (n_queries, n_inputs), out
+  /// (n_queries, n_units). Throws like visit.
+  void potentials(std::span<const std::int32_t> bins, int n_threads,
+                  std::span<std::int32_t> out) const {
+    visit(bins, n_threads, [&](std::size_t query, const std::int32_t* values) {
+      std::copy_n(values, n_units(), out.data() + query * n_units());
+    });
+  }
+
+  /// How many units fire in each of `n_groups` groups of equal size. Shapes: bins
+  /// (n_queries, n_inputs), out (n_queries, n_groups). Throws std::invalid_argument unless n_groups
+  /// divides n_units, and like visit.
+  void counts(std::span<const std::int32_t> bins, std::size_t n_groups, int n_threads,
+              std::span<std::int32_t> out) const {
+    core::require(n_groups > 0 && n_units() % n_groups == 0, "n_groups",
+                  "a divisor of n_units = " + std::to_string(n_units()), n_groups);
+    const std::size_t size = n_units() / n_groups;
+    visit(bins, n_threads, [&](std::size_t query, const std::int32_t* values) {
+      for (std::size_t g = 0; g < n_groups; ++g) {
+        out[query * n_groups + g] = count_firing(values + g * size, size);
+      }
+    });
+  }
+
+ private:
+  ParallelPerceptron(std::shared_ptr<const Code> code, std::size_t n_units)
+      : code_(std::move(code)) {
+    core::require_in_range("n_units", n_units, 1, std::size_t{1} << 20);
+    weights_ = WeightTiles<std::int32_t>(n_units, code_->n_slots());
+    thresholds_.resize(n_units);
+  }
+
+  std::vector<std::size_t> slots_of_columns() const {
+    std::vector<std::size_t> slots(code_->n_columns());
+    for (std::size_t j = 0; j < slots.size(); ++j) slots[j] = code_->slot_of(j);
+    return slots;
+  }
+
+  template <class Weight, class Consume>
+  void visit_all(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
+                 std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
+                 int n_threads, const Consume& consume) const {
+    const std::size_t n_parts =
+        std::min(static_cast<std::size_t>(n_threads), (order.size() + 255) / 256);
+    std::vector<std::jthread> threads;  // joined at the end of the scope
+    for (std::size_t part = 1; part < n_parts; ++part) {
+      const std::size_t begin = part * order.size() / n_parts;
+      const std::size_t end = (part + 1) * order.size() / n_parts;
+      threads.emplace_back([&, begin, end] {
+        visit_some(tiles, n_per_sum, bins, order.subspan(begin, end - begin), consume);
+      });
+    }
+    visit_some(tiles, n_per_sum, bins, order.first(order.size() / n_parts), consume);
+  }
+
+  template <class Weight, class Consume>
+  void visit_some(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
+                  std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
+                  const Consume& consume) const {
+    const std::size_t n_words = code_->n_words();
+    std::vector<std::uint64_t> words(4 * n_words);
+    std::uint64_t* now = words.data();  // active, then positive
+    std::uint64_t* before = now + 2 * n_words;
+    std::vector<std::int32_t> values(n_padded_units());
+    const auto forget = [&] {  // the potentials of the code 0
+      for (std::size_t i = 0; i < n_units(); ++i) values[i] = -thresholds_[i];
+    };
+    forget();
+    SignedSlots slots(n_words);
+    for (const std::uint32_t query : order) {
+      code_->encode(bins.subspan(query * code_->n_inputs(), code_->n_inputs()), now, now + n_words);
+      const coding::CodeWords code{now, now + n_words};
+      slots.read_changes({before, before + n_words}, code);
+      // Counting costs too, and is worth it for codes that are far apart.
+      if (slots.size() > code_->max_active() / 2 && slots.size() > n_active(code, n_words)) {
+        forget();
+        slots.read(code);
+      }
+      for (std::size_t tile = 0; tile < tiles.n_tiles(); ++tile) {
+        add_rows(tiles.tile(tile), tiles.width(tile), slots.plus(), slots.minus(), n_per_sum,
+                 values.data() + tile * kTileUnits);
+      }
+      consume(query, values.data());
+      std::swap(now, before);
+    }
+  }
+
+  std::shared_ptr<const Code> code_;
+  WeightTiles<std::int32_t> weights_;
+  std::vector<std::int32_t> thresholds_;
+};
+
+}  // namespace sdnn::estimators

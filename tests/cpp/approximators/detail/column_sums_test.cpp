@@ -1,0 +1,100 @@
+#include "sdnn/approximators/detail/column_sums.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::approximators {
+namespace {
+
+using Sums = std::array<std::int32_t, kBlockUnits>;
+
+struct Problem {
+  core::AlignedBuffer<std::int8_t> block;
+  std::vector<std::uint32_t> columns;
+  int group;
+  int factor;
+  Sums start;
+};
+
+// Weights reach the ends of what the group allows; columns repeat and come in any number.
+Problem random_problem(core::Random& random) {
+  static constexpr int kGroups[] = {1, 2, 4};
+  const std::size_t n_columns = 1 + random.below(40);
+  static constexpr int kFactors[] = {1, -1, 128, -128};
+  Problem p{core::AlignedBuffer<std::int8_t>((n_columns + 1) * kBlockUnits),
+            {},
+            kGroups[random.below(3)],
+            kFactors[random.below(4)],
+            {}};
+  const int largest = 127 / p.group;
+  const bool extreme = random.below(4) == 0;
+  for (std::int8_t& w : p.block.span().first(n_columns * kBlockUnits)) {
+    const int drawn = static_cast<int>(random.below(static_cast<std::uint64_t>(2 * largest + 1)));
+    w = static_cast<std::int8_t>(extreme ? largest : drawn - largest);
+  }
+  const std::size_t n = random.below(random.below(20) == 0 ? 1500 : 24);
+  for (std::size_t c = 0; c < n; ++c) {
+    p.columns.push_back(static_cast<std::uint32_t>(random.below(n_columns)));
+  }
+  for (auto& sum : p.start) sum = static_cast<std::int32_t>(random.below(2001)) - 1000;
+  return p;
+}
+
+Sums plain(const Problem& p) {
+  Sums sums = p.start;
+  for (const std::uint32_t column : p.columns) {
+    for (std::size_t i = 0; i < kBlockUnits; ++i) {
+      sums[i] += p.factor * p.block[column * kBlockUnits + i];
+    }
+  }
+  return sums;
+}
+
+class EveryLevel : public testing::TestWithParam<core::InstructionSet> {
+ protected:
+  void SetUp() override {
+    if (GetParam() > core::best_instruction_set()) {
+      GTEST_SKIP() << "this processor has no " << core::name_of(GetParam());
+    }
+    before_ = core::instruction_set();
+    core::set_instruction_set(core::name_of(GetParam()));
+  }
+  void TearDown() override { core::set_instruction_set(core::name_of(before_)); }
+
+ private:
+  core::InstructionSet before_ = core::instruction_set();
+};
+
+TEST_P(EveryLevel, EqualsPlainSumsOn100000RandomProblems) {
+  core::Random random(1, core::Stream::weights);
+  for (int problem = 0; problem < 100000; ++problem) {
+    const Problem p = random_problem(random);
+    Sums sums = p.start;
+    const std::size_t zeros = p.block.size() / kBlockUnits - 1;
+    std::span<const std::uint32_t> columns = p.columns;
+    do {
+      const auto some = columns.first(std::min(ColumnPlaces::kMost, columns.size()));
+      columns = columns.subspan(some.size());
+      add_columns_kernel()(p.block.data(), ColumnPlaces(some, zeros), p.group, p.factor,
+                           sums.data());
+    } while (!columns.empty());
+    ASSERT_EQ(sums, plain(p)) << "problem " << problem;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Levels, EveryLevel,
+                         testing::Values(core::InstructionSet::portable, core::InstructionSet::avx2,
+                                         core::InstructionSet::avx512),
+                         [](const auto& info) { return std::string(core::name_of(info.param)); });
+
+}  // namespace
+}  // namespace sdnn::approximators

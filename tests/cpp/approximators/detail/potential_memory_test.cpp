@@ -1,0 +1,63 @@
+#include "sdnn/approximators/detail/potential_memory.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "sdnn/approximators/sdnn_c.hpp"
+
+namespace sdnn::approximators {
+namespace {
+
+// A walk with small steps and jumps, with corrections of random actions in between: every way to
+// come by potentials is used, and each gives the integers of a full pass.
+TEST(PotentialMemory, WhateverWayIsTakenThePotentialsAreThoseOfAFullPass) {
+  SDNNCConfig config;
+  config.n_hidden_units = 130;
+  config.n_active_units = 50;
+  config.n_pattern_units = 90;
+  SDNNC<256> network(config, 3);
+  core::Random random(5, core::Stream::sensor_noise);
+  std::vector<double> centre(4);
+  std::vector<double> state(4);
+  std::vector<double> values(network.n_actions());
+  std::vector<std::int32_t> potentials(130);
+  for (int step = 0; step < 6000; ++step) {
+    if (step % 150 == 0) {
+      for (double& x : centre) x = random.uniform();
+    }
+    const double noise = step % 3 == 0 ? 0.0 : 0.02;
+    for (std::size_t i = 0; i < 4; ++i) {
+      state[i] = std::clamp(centre[i] + noise * random.normal(), 0.0, 1.0);
+    }
+    network.values(state, values);
+    network.potentials(state, potentials);
+    for (std::size_t action = 0; action < values.size(); ++action) {
+      const auto first = potentials.begin() + static_cast<std::ptrdiff_t>(action);
+      const auto n_firing = std::count_if(first, first + 50, [](auto h) { return h > 0; });
+      ASSERT_EQ(values[action], network.output_scale()(static_cast<int>(n_firing)));
+    }
+    if (random.below(3) != 0) {
+      network.correct(state, random.below(values.size()), 20.0 * random.uniform() - 10.0);
+    }
+  }
+  const auto& counts = network.memory().counts();
+  EXPECT_GT(counts.exact, 1000U);
+  EXPECT_GT(counts.neighbour, 1000U);
+  EXPECT_GT(counts.full, 20U);
+}
+
+TEST(PotentialMemory, ReplacedWeightsAreNotRemembered) {
+  SDNNCConfig config;
+  config.n_hidden_units = 20;
+  config.n_active_units = 10;
+  config.n_pattern_units = 10;
+  SDNNC<256> network(config, 1);
+  const std::vector<double> state = {0.1, 0.2, 0.3, 0.4};
+  EXPECT_EQ(network.value(state, 0), 0.0);
+  network.set_parameters(std::vector<std::int32_t>(20 * 120, 0), std::vector<std::int32_t>(20, -1));
+  EXPECT_EQ(network.value(state, 0), 20.0);  // every potential is 1
+}
+
+}  // namespace
+}  // namespace sdnn::approximators

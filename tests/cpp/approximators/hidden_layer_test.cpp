@@ -1,0 +1,183 @@
+#include "sdnn/approximators/hidden_layer.hpp"
+
+#include <gtest/gtest.h>
+
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::approximators {
+namespace {
+
+std::vector<std::int32_t> potentials(const HiddenLayer& p, coding::SignedColumns input) {
+  std::vector<std::int32_t> h(p.n_units());
+  p.potentials(input, h);
+  return h;
+}
+
+TEST(HiddenLayer, PotentialsAndCorrectionByHand) {
+  HiddenLayer p(2, 3);
+  p.set_weight(0, 0, 2);
+  p.set_weight(0, 2, -1);
+  p.set_weight(1, 1, 5);
+  p.set_threshold(1, 4);
+  const coding::SignedColumns x{.positive = {0}, .negative = {2}};
+  EXPECT_EQ(potentials(p, x), (std::vector<std::int32_t>{3, -4}));
+  p.correct(std::vector<std::uint32_t>{1}, x, 1);  // h_1 += |x|^2 + 1
+  EXPECT_EQ(potentials(p, x), (std::vector<std::int32_t>{3, -1}));
+  EXPECT_EQ(p.weight(1, 0), 1);
+  EXPECT_EQ(p.weight(1, 1), 5);
+  EXPECT_EQ(p.weight(1, 2), -1);
+  EXPECT_EQ(p.threshold(1), 3);
+}
+
+// A column that is half of a sum of two inputs: both weights move by the step, their sum by two.
+TEST(HiddenLayer, DoubleColumnsMoveByTwiceTheStep) {
+  HiddenLayer p(70, 4, 2);
+  const coding::SignedColumns x{.positive = {0, 3}, .negative = {1, 2}};
+  for (const auto& units : {std::vector<std::uint32_t>{5}, {5, 6}, {5, 69}}) p.correct(units, x, 3);
+  p.correct(std::vector<std::uint32_t>{6}, x, -64);
+  const auto row = [&](std::size_t unit) {
+    std::vector<std::int32_t> weights;
+    for (std::size_t j = 0; j < 4; ++j) weights.push_back(p.weight(unit, j));
+    return weights;
+  };
+  EXPECT_EQ(row(5), (std::vector<std::int32_t>{18, -18, -9, 9}));
+  EXPECT_EQ(row(6), (std::vector<std::int32_t>{-122, 122, 61, -61}));
+  EXPECT_EQ(row(69), (std::vector<std::int32_t>{6, -6, -3, 3}));
+  EXPECT_EQ(p.threshold(5), -9);
+  p.correct(std::vector<std::uint32_t>{6, 7}, x, -64);  // the one is carried, the other is not
+  EXPECT_EQ(row(6), (std::vector<std::int32_t>{-250, 250, 125, -125}));
+  EXPECT_EQ(row(7), (std::vector<std::int32_t>{-128, 128, 64, -64}));
+  EXPECT_THROW(HiddenLayer(1, 3, 4), std::invalid_argument);
+}
+
+// Random problems of many shapes, with weights on both sides of one byte, against plain sums.
+TEST(HiddenLayer, EqualsPlainSumsOnRandomProblems) {
+  core::Random random(11, core::Stream::weights);
+  std::size_t n_carries = 0;
+  int n_with_high_bytes = 0;
+  for (int problem = 0; problem < 60; ++problem) {
+    const std::size_t n = 1 + random.below(problem % 10 == 0 ? 2500 : 200);
+    const std::size_t columns = 1 + random.below(700);
+    const std::int32_t largest = problem % 3 == 0 ? 3000 : 127;
+    HiddenLayer p(n, columns);
+    for (std::size_t i = 0; i < n; ++i) {
+      p.set_threshold(i, static_cast<std::int32_t>(random.below(1000)) - 500);
+      for (std::size_t j = 0; j < columns; ++j) {
+        if (largest > 127 && random.below(50) != 0) continue;
+        p.set_weight(
+            i, j,
+            static_cast<std::int32_t>(random.below(static_cast<std::uint64_t>(2 * largest + 1))) -
+                largest);
+      }
+    }
+    if (largest == 127) {
+      EXPECT_EQ(p.n_carries(), 0U);
+    }
+    n_carries += p.n_carries();
+    n_with_high_bytes += p.has_high_bytes() ? 1 : 0;
+    coding::SignedColumns x;
+    for (std::uint32_t j = 0; j < columns; ++j) {
+      switch (random.below(4)) {
+        case 0:
+          x.positive.push_back(j);
+          break;
+        case 1:
+          x.negative.push_back(j);
+          break;
+        default:
+          break;
+      }
+    }
+    std::vector<std::int32_t> expected(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      expected[i] = -p.threshold(i);
+      for (const auto j : x.positive) expected[i] += p.weight(i, j);
+      for (const auto j : x.negative) expected[i] -= p.weight(i, j);
+    }
+    EXPECT_EQ(potentials(p, x), expected);
+
+    // A column may come twice.
+    const auto last = static_cast<std::uint32_t>(columns - 1);
+    const coding::SignedColumns few{.positive = {0, 0}, .negative = {last}};
+    for (std::size_t i = 0; i < n; ++i) {
+      expected[i] = -p.threshold(i) + 2 * p.weight(i, 0) - p.weight(i, last);
+    }
+    EXPECT_EQ(potentials(p, few), expected);
+  }
+  EXPECT_GT(n_carries, 1000U);
+  EXPECT_GT(n_with_high_bytes, 0);
+}
+
+TEST(HiddenLayer, AWeightOutsideAByteIsCarried) {
+  HiddenLayer p(3, 2);
+  const coding::SignedColumns x{.positive = {0}, .negative = {1}};
+  const std::vector<std::uint32_t> unit = {2};
+  for (int i = 1; i <= 500; ++i) {
+    p.correct(unit, x, 1);
+    ASSERT_EQ(p.weight(2, 0), i);
+    ASSERT_EQ(p.weight(2, 1), -i);
+    ASSERT_EQ(p.threshold(2), -i);
+    ASSERT_EQ(potentials(p, x), (std::vector<std::int32_t>{0, 0, 3 * i}));
+  }
+  EXPECT_EQ(p.n_carries(), 2U);
+  for (int i = 500; i > 0; --i) p.correct(unit, x, -1);
+  EXPECT_EQ(p.n_carries(), 0U);
+  for (int i = 0; i > -500; --i) p.correct(unit, x, -1);
+  EXPECT_EQ(p.weight(2, 0), -500);
+  EXPECT_EQ(p.weight(0, 0), 0);
+}
+
+// The list is kept as long as adding it is quicker than a second layer of bytes.
+TEST(HiddenLayer, ALargerNetworkListsMoreCarries) {
+  HiddenLayer p(64, 10000);  // 640,000 bytes: 5,000 carries
+  for (std::size_t j = 0; j < 5000; ++j) p.set_weight(7, j, 200);
+  EXPECT_EQ(p.n_carries(), 5000U);
+  EXPECT_FALSE(p.has_high_bytes());
+  p.set_weight(8, 0, -200);
+  EXPECT_TRUE(p.has_high_bytes());
+  coding::SignedColumns x{.positive = {0}, .negative = {9999, 4999}};
+  const auto h = potentials(p, x);
+  EXPECT_EQ(h[7], 0);
+  EXPECT_EQ(h[8], -200);
+}
+
+// Going to and fro never needs more than a byte, however often it happens.
+TEST(HiddenLayer, CorrectionsThatCancelStayInAByte) {
+  HiddenLayer p(70, 5);
+  const coding::SignedColumns x{.positive = {0, 3}, .negative = {4}};
+  const std::vector<std::uint32_t> unit = {69};
+  for (int i = 0; i < 2000; ++i) p.correct(unit, x, i % 2 == 0 ? 1 : -1);
+  EXPECT_EQ(p.n_carries(), 0U);
+  EXPECT_EQ(p.weight(69, 3), 0);
+}
+
+TEST(HiddenLayer, OverflowIsDetectedBeforeAnythingChanges) {
+  HiddenLayer p(2, 2);
+  const coding::SignedColumns x{.positive = {0}, .negative = {}};
+  p.set_weight(1, 0, 16382);
+  const std::vector<std::uint32_t> both = {0, 1};
+  p.correct(both, x, 1);
+  EXPECT_EQ(p.weight(1, 0), 16383);
+  EXPECT_THROW(p.correct(both, x, 1), std::overflow_error);
+  EXPECT_EQ(p.weight(1, 0), 16383);
+  EXPECT_EQ(p.weight(0, 0), 1);
+  EXPECT_EQ(p.threshold(0), -1);
+  p.correct(both, x, -1);  // going back is possible
+  EXPECT_EQ(p.weight(1, 0), 16382);
+}
+
+TEST(HiddenLayer, ALargerInputLowersTheWeightLimitSoThatPotentialsFit) {
+  const HiddenLayer p(1, std::size_t{1} << 20);
+  EXPECT_EQ(p.weight_limit(), 1023);  // 2^20 * 1023 < 2^30
+}
+
+TEST(HiddenLayer, NamesWhatIsImpossible) {
+  EXPECT_THROW(HiddenLayer(0, 1), std::invalid_argument);
+  EXPECT_THROW(HiddenLayer(1, 0), std::invalid_argument);
+  HiddenLayer p(1, 1);
+  EXPECT_THROW(p.set_weight(0, 0, 40000), std::invalid_argument);
+  EXPECT_THROW(p.set_threshold(0, INT32_MAX), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sdnn::approximators

@@ -1,0 +1,61 @@
+#include "sdnn/core/detail/integer_register.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+namespace sdnn::core {
+namespace {
+
+template <class Integer, class Wide>
+void check_register() {
+  constexpr std::size_t kSize = IntegerRegister<Integer>::kSize;
+  static_assert(kSize * sizeof(Integer) == 32);
+  std::vector<Integer> one(kSize);
+  std::vector<Integer> other(kSize);
+  for (std::size_t i = 0; i < kSize; ++i) {
+    one[i] = static_cast<Integer>(3 * i);
+    other[i] = static_cast<Integer>(i % 2 == 0 ? 5 : -7);
+  }
+  IntegerRegister<Integer> sum;
+  sum.clear();
+  sum.add(one.data());
+  sum.subtract(other.data());
+  std::vector<Integer> stored(kSize);
+  sum.store(stored.data());
+  std::vector<Wide> wide(kSize, 100);
+  sum.add_to(wide.data());
+  for (std::size_t i = 0; i < kSize; ++i) {
+    EXPECT_EQ(stored[i], one[i] - other[i]);
+    EXPECT_EQ(wide[i], 100 + one[i] - other[i]);
+  }
+  sum.load(other.data());
+  sum.store(stored.data());
+  EXPECT_EQ(stored, other);
+}
+
+TEST(IntegerRegister, AddsSubtractsAndWidens) {
+  check_register<std::int8_t, std::int16_t>();
+  check_register<std::int8_t, std::int32_t>();
+  check_register<std::int16_t, std::int32_t>();
+  check_register<std::int32_t, std::int32_t>();
+}
+
+TEST(IntegerRegister, WrapsAround) {
+  constexpr std::int16_t kMost = std::numeric_limits<std::int16_t>::max();
+  const std::vector<std::int16_t> most(16, kMost);
+  IntegerRegister<std::int16_t> sum;
+  sum.load(most.data());
+  sum.add(most.data());
+  std::vector<std::int16_t> stored(16);
+  sum.store(stored.data());
+  EXPECT_EQ(stored, std::vector<std::int16_t>(16, -2));
+  sum.subtract(most.data());
+  sum.store(stored.data());
+  EXPECT_EQ(stored, most);
+}
+
+}  // namespace
+}  // namespace sdnn::core

@@ -1,0 +1,88 @@
+#include "sdnn/estimators/detail/block_training.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "estimators/problems.hpp"
+
+namespace sdnn {
+namespace {
+
+TEST(BlockTraining, HasTheBitsOfPlainTraining) {
+  testing::expect_bits_of_plain_training(estimators::TrainingForm::block);
+}
+
+TEST(BlockTraining,
+     HasThemWherePlansAreKept) {  // from the second round in the order of the data on
+  for (std::uint64_t seed = 300; seed < 330; ++seed) {
+    auto problem = testing::in_data_order(testing::random_problem(seed), 6, false);
+    if (seed % 2 == 0) problem.orders[3] = {0};  // something else in between
+    testing::compare_with_plain(problem, estimators::TrainingForm::block,
+                                1 + static_cast<int>(seed % 3),
+                                [&](bool same) { ASSERT_TRUE(same) << "problem " << seed; });
+  }
+}
+
+TEST(BlockTraining, HasThemOverSeveralLargeBlocks) {
+  auto problem = testing::random_problem(12);
+  core::Random random(12, core::Stream::exploration);
+  const std::size_t n_bins = problem.code->n_bins(0);
+  problem.bins.clear();
+  problem.targets.clear();
+  for (std::size_t i = 0; i < 1300 * problem.code->n_inputs(); ++i) {
+    problem.bins.push_back(static_cast<std::int32_t>(random.below(n_bins)));
+  }
+  for (std::size_t i = 0; i < 1300 * problem.n_groups; ++i) {
+    problem.targets.push_back(random.uniform() * 9.0);
+  }
+  problem = testing::in_data_order(problem, 4, false);
+  for (const std::size_t limit :
+       {std::size_t{1} << 30, std::size_t{3} << 20}) {  // with plans, without
+    const auto one = testing::layer_for(problem);
+    const auto other = testing::layer_for(problem);
+    const auto rule = [&] {
+      return estimators::PDeltaRule(problem.n_units, problem.targets, problem.n_groups);
+    };
+    auto plain = testing::trainer_for(problem, one, estimators::TrainingForm::plain);
+    estimators::PDeltaTrainer block(other, problem.bins, rule(), estimators::TrainingForm::block,
+                                    limit, 2);
+    EXPECT_LE(block.memory(), limit);
+    for (const auto& order : problem.orders) {
+      ASSERT_EQ(plain.present(order).n_units, block.present(order).n_units);
+    }
+    block.synchronize();
+    EXPECT_EQ(testing::bits_of(*one), testing::bits_of(*other));
+  }
+}
+
+TEST(BlockTraining, ChangesToWideWeightsWithoutChangingThem) {
+  auto problem = testing::random_problem(5);
+  const std::size_t n_columns = problem.code->n_columns();
+  for (const std::int32_t start :
+       {250, 20000}) {  // 128 of them just fit into 16 bits, and not at all
+    std::vector<std::int32_t> weights(problem.n_units * n_columns);
+    for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = i % 2 == 0 ? start : -start;
+    const std::vector<std::int32_t> thresholds(problem.n_units);
+    const auto layer = [&] {
+      return std::make_shared<estimators::ParallelPerceptron>(problem.code, problem.n_units,
+                                                              weights, thresholds);
+    };
+    const auto one = layer();
+    const auto other = layer();
+    auto plain = testing::trainer_for(problem, one, estimators::TrainingForm::plain);
+    auto block = testing::trainer_for(problem, other, estimators::TrainingForm::block, 2);
+    for (int epoch = 0; epoch < 20; ++epoch) {
+      for (const auto& order : problem.orders) {
+        ASSERT_EQ(plain.present(order).n_units, block.present(order).n_units);
+      }
+    }
+    block.synchronize();
+    EXPECT_EQ(testing::bits_of(*one), testing::bits_of(*other));
+  }
+}
+
+}  // namespace
+}  // namespace sdnn

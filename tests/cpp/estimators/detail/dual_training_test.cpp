@@ -1,0 +1,103 @@
+#include "sdnn/estimators/detail/dual_training.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "estimators/problems.hpp"
+
+namespace sdnn {
+namespace {
+
+TEST(DualTraining, HasTheBitsOfPlainTraining) {
+  testing::expect_bits_of_plain_training(estimators::TrainingForm::dual);
+}
+
+TEST(DualTraining, HasThemInDataOrder) {  // where corrections wait for each other
+  for (std::uint64_t seed = 300; seed < 340; ++seed) {
+    for (const bool at_once : {false, true}) {
+      testing::compare_with_plain(
+          testing::in_data_order(testing::random_problem(seed), 20, at_once),
+          estimators::TrainingForm::dual, 1 + static_cast<int>(seed % 3),
+          [&](bool same) { ASSERT_TRUE(same) << "problem " << seed; });
+    }
+  }
+}
+
+TEST(DualTraining, HasThemOverManyWindows) {
+  auto problem = testing::random_problem(11);
+  core::Random random(11, core::Stream::exploration);
+  const std::size_t n_inputs = problem.code->n_inputs();
+  const std::size_t n_bins = problem.code->n_bins(0);
+  const std::size_t n_samples = 1500;
+  problem.bins.clear();
+  problem.targets.clear();
+  for (std::size_t i = 0; i < n_samples * n_inputs; ++i) {
+    problem.bins.push_back(static_cast<std::int32_t>(random.below(n_bins)));
+  }
+  for (std::size_t i = 0; i < n_samples * problem.n_groups; ++i) {
+    problem.targets.push_back(random.uniform() * 9.0);
+  }
+  testing::compare_with_plain(testing::in_data_order(problem, 4, false),
+                              estimators::TrainingForm::dual, 2,
+                              [](bool same) { ASSERT_TRUE(same); });
+}
+
+TEST(DualTraining, EmptiesCoefficientsBeforeTheyOverflow) {
+  // Two samples of one code that want opposite things: one coefficient rises for ever, one falls.
+  auto problem = testing::random_problem(3);
+  const std::size_t n_inputs = problem.code->n_inputs();
+  problem.bins.assign(2 * n_inputs, 0);
+  problem.n_groups = 1;
+  problem.targets = {0.0, static_cast<double>(problem.n_units)};
+  problem.orders.assign(2, std::vector<std::int32_t>(70000));
+  for (auto& order : problem.orders) {
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<std::int32_t>(i % 2);
+  }
+  testing::compare_with_plain(problem, estimators::TrainingForm::dual, 1,
+                              [](bool same) { ASSERT_TRUE(same); });
+}
+
+TEST(DualTraining, AgreesOverManyPresentationsOfFewSamples) {
+  auto problem = testing::random_problem(3);
+  const auto one = testing::layer_for(problem);
+  const auto other = testing::layer_for(problem);
+  auto plain = testing::trainer_for(problem, one, estimators::TrainingForm::plain);
+  auto dual = testing::trainer_for(problem, other, estimators::TrainingForm::dual);
+  const std::size_t n_samples = problem.bins.size() / problem.code->n_inputs();
+  std::vector<std::int32_t> order(20000);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    order[i] = static_cast<std::int32_t>(i % std::min<std::size_t>(n_samples, 3));
+  }
+  for (int epoch = 0; epoch < 2; ++epoch) {
+    EXPECT_EQ(plain.present(order).n_units, dual.present(order).n_units);
+  }
+  dual.synchronize();
+  EXPECT_EQ(testing::bits_of(*one), testing::bits_of(*other));
+}
+
+TEST(DualTraining, KeepsProductsIn32BitsOfLongCodes) {
+  // 2 * 20,000 columns may all be active: a product can exceed 16 bits.
+  std::vector<coding::PatternTable> tables;
+  coding::PatternTable all_on(2, 20000);
+  for (std::size_t bin = 0; bin < 2; ++bin) {
+    for (std::size_t k = 0; k < 20000; ++k) all_on.flip(bin, k);
+  }
+  tables = {all_on, all_on};
+  auto problem = testing::random_problem(4);
+  problem.code = std::make_shared<coding::SelectiveDesensitization>(
+      tables, tables, std::vector<coding::InputPair>{{0, 1}, {1, 0}});
+  ASSERT_EQ(estimators::product_bytes(*problem.code), 4U);
+  problem.bins = {0, 0, 0, 1, 1, 1};
+  problem.n_units = 5;
+  problem.n_groups = 1;
+  problem.targets = {0.0, 5.0, 2.0};
+  problem.orders.assign(4, {0, 1, 2, 1, 0});
+  testing::compare_with_plain(problem, estimators::TrainingForm::dual, 1,
+                              [](bool same) { ASSERT_TRUE(same); });
+}
+
+}  // namespace
+}  // namespace sdnn

@@ -1,0 +1,74 @@
+#include "sdnn/estimators/detail/query_order.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <set>
+#include <vector>
+
+#include "sdnn/core/random.hpp"
+
+namespace {
+
+using namespace sdnn;
+
+TEST(QueryOrder, HilbertsCurveVisitsEveryPointByStepsOfOne) {
+  for (const auto& [n_axes, n_bits] : {std::pair{2, 4}, std::pair{3, 3}}) {
+    const std::uint32_t side = 1U << n_bits;
+    std::size_t n_points = 1;
+    for (int i = 0; i < n_axes; ++i) n_points *= side;
+    std::vector<std::vector<std::uint32_t>> at(n_points);
+    for (std::size_t p = 0; p < n_points; ++p) {
+      std::vector<std::uint32_t> point;
+      for (std::size_t rest = p, i = 0; i < static_cast<std::size_t>(n_axes); ++i, rest /= side) {
+        point.push_back(static_cast<std::uint32_t>(rest % side));
+      }
+      auto axes = point;
+      const auto index = estimators::detail::hilbert_index(axes, n_bits);
+      ASSERT_LT(index, n_points);
+      ASSERT_TRUE(at[index].empty());
+      at[index] = point;
+    }
+    for (std::size_t p = 1; p < n_points; ++p) {
+      std::uint32_t steps = 0;
+      for (std::size_t i = 0; i < at[p].size(); ++i) {
+        steps += std::max(at[p][i], at[p - 1][i]) - std::min(at[p][i], at[p - 1][i]);
+      }
+      EXPECT_EQ(steps, 1U) << p;
+    }
+  }
+}
+
+TEST(QueryOrder, KeepsALatticeAsItIsAndShortensARandomWalk) {
+  std::vector<std::int32_t> lattice;
+  for (std::int32_t x = 0; x < 30; ++x) {
+    for (std::int32_t y = 0; y < 30; ++y) lattice.insert(lattice.end(), {x, y});
+  }
+  core::Random random(1, core::Stream::exploration);
+  std::vector<std::int32_t> scattered;
+  for (int i = 0; i < 5000; ++i) scattered.push_back(static_cast<std::int32_t>(random.below(500)));
+  for (const auto& bins : {lattice, scattered}) {
+    auto order = estimators::query_order(bins, 2);
+    std::vector<std::uint32_t> given(order.size());
+    std::iota(given.begin(), given.end(), 0U);
+    const auto length = [&](const std::vector<std::uint32_t>& o) {
+      return estimators::detail::walk_length(bins, 2, o, 64);
+    };
+    EXPECT_LE(length(order), bins.size() == lattice.size() ? length(given) : length(given) / 4);
+    std::sort(order.begin(), order.end());
+    EXPECT_EQ(order, given);  // every query once
+  }
+}
+
+TEST(QueryOrder, AcceptsFewQueriesAndManyInputs) {
+  EXPECT_TRUE(estimators::query_order({}, 3).empty());
+  core::Random random(1, core::Stream::exploration);
+  std::vector<std::int32_t> bins(100 * 80);
+  for (auto& bin : bins) bin = static_cast<std::int32_t>(random.below(1000));
+  const auto order = estimators::query_order(bins, 80);
+  EXPECT_EQ(std::set<std::uint32_t>(order.begin(), order.end()).size(), 100U);
+}
+
+}  // namespace

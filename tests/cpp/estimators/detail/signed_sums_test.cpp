@@ -1,0 +1,58 @@
+#include "sdnn/estimators/detail/signed_sums.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "instruction_sets.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn {
+namespace {
+
+template <class To, class Entry>
+void check_sums(std::int32_t largest, std::size_t n_per_sum) {
+  core::Random random(4, core::Stream::weights);
+  const auto span = static_cast<std::uint64_t>(2 * std::int64_t{largest} + 1);
+  constexpr std::size_t kOffset = 5;
+  for (const std::size_t size : {1U, 16U, 64U, 100U, 128U, 200U}) {
+    std::vector<std::vector<Entry>> rows(21, std::vector<Entry>(kOffset + size));
+    estimators::SignedRows<Entry> signed_rows;
+    std::vector<To> expected(size, 3);
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      for (auto& entry : rows[k]) {
+        entry = static_cast<Entry>(static_cast<std::int64_t>(random.below(span)) - largest);
+      }
+      const int direction = k % 3 == 0 ? -1 : 1;
+      signed_rows.add(rows[k].data(), direction);
+      for (std::size_t i = 0; i < size; ++i) {
+        expected[i] = static_cast<To>(expected[i] + direction * rows[k][kOffset + i]);
+      }
+    }
+    EXPECT_EQ(signed_rows.size(), 21U);
+    testing::on_every_instruction_set([&](auto level) {
+      std::vector<To> to(size, 3);
+      estimators::add_signed(to.data(), size, signed_rows, kOffset, n_per_sum);
+      EXPECT_EQ(to, expected) << level << ' ' << size;
+    });
+  }
+}
+
+TEST(SignedSums, AreExactWhateverTheTypes) {
+  check_sums<std::int16_t, std::int8_t>(1, 127);
+  check_sums<std::int32_t, std::int8_t>(127, 1);
+  check_sums<std::int32_t, std::int16_t>(4000, 8);
+  check_sums<std::int32_t, std::int16_t>(32767, 1);
+  check_sums<std::int32_t, std::int32_t>(1000000, std::numeric_limits<std::int32_t>::max());
+}
+
+TEST(SignedSums, OfNothingChangeNothing) {
+  std::vector<std::int32_t> to(40, 9);
+  estimators::add_signed(to.data(), to.size(), estimators::SignedRows<std::int16_t>(), 0, 8);
+  EXPECT_EQ(to, std::vector<std::int32_t>(40, 9));
+}
+
+}  // namespace
+}  // namespace sdnn

@@ -1,0 +1,92 @@
+#include "sdnn/estimators/parallel_perceptron.hpp"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "estimators/problems.hpp"
+
+namespace sdnn {
+namespace {
+
+using estimators::ParallelPerceptron;
+
+/// One input of two bins, +1 +1 -1 and -1 +1 +1, not desensitized.
+std::shared_ptr<const ParallelPerceptron::Code> small_code() {
+  const std::vector<std::int8_t> signs{1, 1, -1, -1, 1, 1};
+  const std::vector<std::int8_t> on(6, 1);
+  return std::make_shared<coding::SelectiveDesensitization>(
+      std::vector{coding::PatternTable::from_signs(signs, 2, 3)},
+      std::vector{coding::PatternTable::from_signs(on, 2, 3)},
+      std::vector<coding::InputPair>{{0, 0}});
+}
+
+TEST(ParallelPerceptron, PotentialsByHand) {
+  const std::vector<std::int32_t> weights{1, 2, 3, -4, 5, 6};
+  const std::vector<std::int32_t> thresholds{1, -2};
+  const ParallelPerceptron layer(small_code(), 2, weights, thresholds);
+  const std::vector<std::int32_t> bins{0, 1};
+  std::vector<std::int32_t> potentials(4);
+  layer.potentials(bins, 1, potentials);
+  EXPECT_EQ(potentials, (std::vector<std::int32_t>{1 + 2 - 3 - 1, -4 + 5 - 6 + 2,  //
+                                                   -1 + 2 + 3 - 1, 4 + 5 + 6 + 2}));
+  std::vector<std::int32_t> counts(2);
+  layer.counts(bins, 1, 1, counts);
+  EXPECT_EQ(counts, (std::vector<std::int32_t>{0, 2}));
+  counts.resize(4);
+  layer.counts(bins, 2, 1, counts);
+  EXPECT_EQ(counts, (std::vector<std::int32_t>{0, 0, 1, 1}));
+}
+
+TEST(ParallelPerceptron, SweepsAndSinglesAgree) {
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    const auto problem = testing::random_problem(seed);
+    const auto layer = testing::layer_for(problem);
+    const std::size_t n_inputs = problem.code->n_inputs();
+    const std::size_t n_queries = problem.bins.size() / n_inputs;
+    std::vector<std::int32_t> together(n_queries * problem.n_units);
+    layer->potentials(problem.bins, 1 + static_cast<int>(seed % 3), together);
+    for (std::size_t q = 0; q < n_queries; ++q) {
+      std::vector<std::int32_t> alone(problem.n_units);
+      layer->potentials(std::span(problem.bins).subspan(q * n_inputs, n_inputs), 1, alone);
+      ASSERT_TRUE(std::equal(alone.begin(), alone.end(),
+                             together.begin() + static_cast<std::ptrdiff_t>(q * problem.n_units)))
+          << seed;
+    }
+  }
+}
+
+TEST(ParallelPerceptron, DrawsWholeNumbersInRange) {
+  const ParallelPerceptron layer(small_code(), 400, 3, 2);
+  std::vector<int> seen(5);
+  for (std::size_t i = 0; i < 400; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) ++seen.at(static_cast<std::size_t>(layer.weight(i, j) + 2));
+  }
+  for (const int n : seen) EXPECT_GT(n, 150);
+}
+
+TEST(ParallelPerceptron, RefusesWeightsThatCouldOverflow) {
+  const std::vector<std::int32_t> weights{1 << 30, 1 << 30, 0};
+  EXPECT_THROW(ParallelPerceptron(small_code(), 1, weights, std::vector<std::int32_t>{0}),
+               std::overflow_error);
+  const std::vector<std::int32_t> fits{1 << 30, (1 << 30) - 1, 0};
+  const ParallelPerceptron layer(small_code(), 1, fits, std::vector<std::int32_t>{0});
+  EXPECT_EQ(layer.check_norms(), INT32_MAX);
+}
+
+TEST(ParallelPerceptron, RefusesBadArguments) {
+  const std::vector<std::int32_t> weights(6);
+  const std::vector<std::int32_t> thresholds(2);
+  EXPECT_THROW(ParallelPerceptron(small_code(), 0, 1), std::invalid_argument);
+  EXPECT_THROW(ParallelPerceptron(small_code(), 2, 1, -1), std::invalid_argument);
+  EXPECT_THROW(ParallelPerceptron(small_code(), 3, weights, thresholds), std::invalid_argument);
+  EXPECT_THROW(ParallelPerceptron(small_code(), 2, weights, weights), std::invalid_argument);
+  const ParallelPerceptron layer(small_code(), 2, weights, thresholds);
+  std::vector<std::int32_t> out(2);
+  EXPECT_THROW(layer.potentials(std::vector<std::int32_t>{2}, 1, out), std::invalid_argument);
+  EXPECT_THROW(layer.potentials(std::vector<std::int32_t>{0}, 0, out), std::invalid_argument);
+  EXPECT_THROW(layer.counts(std::vector<std::int32_t>{0}, 3, 1, out), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sdnn
