@@ -1,7 +1,6 @@
 /// A configuration's Python class, from the list of its fields.
 #pragma once
 
-#include <pybind11/operators.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
@@ -39,7 +38,9 @@ template <class Config>
 void bind_config(pybind11::module_& module, const char* name, const char* doc) {
   pybind11::class_<Config> type(module, name, doc);
   std::apply([&type](const auto&... field) { def_fields(type, field...); }, Config::fields());
-  type.def(pybind11::self == pybind11::self);
+  type.def("__eq__", [](const Config& self, const pybind11::object& other) {
+    return pybind11::isinstance<Config>(other) && self == other.cast<const Config&>();
+  });
 }
 
 }  // namespace sdnn::bindings

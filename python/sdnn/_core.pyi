@@ -148,7 +148,7 @@ class SDNNCConfig:
     Everything that defines an SDNN-C
     """
     __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: SDNNCConfig) -> bool:
+    def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_pattern_units: typing.SupportsInt | typing.SupportsIndex = 200, n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex = 9, n_interpolated: typing.SupportsInt | typing.SupportsIndex = 44, balanced_anchors: bool = True, circular: collections.abc.Sequence[bool] = [], n_hidden_units: typing.SupportsInt | typing.SupportsIndex = 900, n_active_units: typing.SupportsInt | typing.SupportsIndex = 300, n_actions: typing.SupportsInt | typing.SupportsIndex = 0, q_low: typing.SupportsFloat | typing.SupportsIndex = -20.0, q_high: typing.SupportsFloat | typing.SupportsIndex = 20.0, u_low: typing.SupportsInt | typing.SupportsIndex | None = None, u_high: typing.SupportsInt | typing.SupportsIndex | None = None, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.1, lattice: typing.SupportsInt | typing.SupportsIndex = 1, initial_threshold: typing.SupportsFloat | typing.SupportsIndex = 200.0, initial_weights: InitialWeights = InitialWeights.ternary, initial_weight_limit: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
         ...
@@ -271,7 +271,7 @@ class FuzzyRulesConfig:
     The sizes of a table of fuzzy rules
     """
     __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: FuzzyRulesConfig) -> bool:
+    def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_sets: typing.SupportsInt | typing.SupportsIndex = 9, n_actions: typing.SupportsInt | typing.SupportsIndex = 21, max_table_bytes: typing.SupportsInt | typing.SupportsIndex = 1073741824) -> None:
         ...
@@ -314,7 +314,7 @@ class RBFNetworkConfig:
     The sizes of an RBF network
     """
     __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: RBFNetworkConfig) -> bool:
+    def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_bases: typing.SupportsInt | typing.SupportsIndex = 4, n_actions: typing.SupportsInt | typing.SupportsIndex = 601, width: typing.SupportsFloat | typing.SupportsIndex = 0.5, gradient_rate: typing.SupportsFloat | typing.SupportsIndex = 3.0, max_table_bytes: typing.SupportsInt | typing.SupportsIndex = 1073741824) -> None:
         ...
@@ -431,7 +431,7 @@ class GoalScheduleConfig:
     How lambda(k) falls
     """
     __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: GoalScheduleConfig) -> bool:
+    def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __init__(self, *, kind: GoalScheduleKind = GoalScheduleKind.inverse_linear, scale: typing.SupportsFloat | typing.SupportsIndex = 100.0, last_episode: typing.SupportsInt | typing.SupportsIndex = 10000, floor: typing.SupportsFloat | typing.SupportsIndex = 0.01, constant_value: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         ...
@@ -512,7 +512,7 @@ class AcrobotConfig:
     The numbers of the acrobot's task
     """
     __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: AcrobotConfig) -> bool:
+    def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __init__(self, *, link_mass_1: typing.SupportsFloat | typing.SupportsIndex = 1.0, link_mass_2: typing.SupportsFloat | typing.SupportsIndex = 1.0, link_length_1: typing.SupportsFloat | typing.SupportsIndex = 1.0, link_length_2: typing.SupportsFloat | typing.SupportsIndex = 1.0, center_of_mass_1: typing.SupportsFloat | typing.SupportsIndex = 0.5, center_of_mass_2: typing.SupportsFloat | typing.SupportsIndex = 0.5, inertia_1: typing.SupportsFloat | typing.SupportsIndex = 1.0, inertia_2: typing.SupportsFloat | typing.SupportsIndex = 1.0, gravity: typing.SupportsFloat | typing.SupportsIndex = 9.8, max_torque: typing.SupportsFloat | typing.SupportsIndex = 10.0, decision_interval: typing.SupportsFloat | typing.SupportsIndex = 1.0, integration_step: typing.SupportsFloat | typing.SupportsIndex = 0.02, max_decisions: typing.SupportsInt | typing.SupportsIndex = 50, goal_height: typing.SupportsFloat | typing.SupportsIndex = 1.5, goal_velocity_1: typing.SupportsFloat | typing.SupportsIndex = 9.42477796076938, goal_velocity_2: typing.SupportsFloat | typing.SupportsIndex = 15.707963267948966, goal_test: GoalTest = GoalTest.every_step, goal_reward: typing.SupportsFloat | typing.SupportsIndex = 10.0, penalty: typing.SupportsFloat | typing.SupportsIndex = -5.0, idle_angle: typing.SupportsFloat | typing.SupportsIndex = 0.08726646259971647) -> None:
         ...
@@ -688,7 +688,7 @@ class SensorConfig:
     Which sensors there are and how noisy
     """
     __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: SensorConfig) -> bool:
+    def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __init__(self, *, n_sensors: typing.SupportsInt | typing.SupportsIndex = 4, noise: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
@@ -854,7 +854,7 @@ class EpsilonGreedyConfig:
     The policy's parameters
     """
     __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: EpsilonGreedyConfig) -> bool:
+    def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __init__(self, *, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform) -> None:
         ...
@@ -882,7 +882,7 @@ class QLearningConfig:
     The parameters of Q-learning
     """
     __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: QLearningConfig) -> bool:
+    def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __init__(self, *, learning_rate: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform) -> None:
         ...
@@ -908,7 +908,7 @@ class FuzzyQLearningConfig:
     The parameters of fuzzy Q-learning
     """
     __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: FuzzyQLearningConfig) -> bool:
+    def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __init__(self, *, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, trace_decay: typing.SupportsFloat | typing.SupportsIndex = 0.0, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform) -> None:
         ...
@@ -986,7 +986,7 @@ class ProtocolConfig:
     How long a trial is
     """
     __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: ProtocolConfig) -> bool:
+    def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __init__(self, *, n_learning_episodes: typing.SupportsInt | typing.SupportsIndex = 15000, test_interval: typing.SupportsInt | typing.SupportsIndex = 10) -> None:
         ...

@@ -55,8 +55,9 @@ class DynamicSDNNC {
   double value(std::span<const double> state, std::size_t action) {
     return visit([&](auto& net) { return net.value(state, action); });
   }
-  void correct(std::span<const double> state, std::size_t action, double target) {
-    visit([&](auto& net) { net.correct(state, action, target); });
+  void correct(std::span<const double> state, std::size_t action, double target,
+               double rate = 1.0) {
+    visit([&](auto& net) { net.correct(state, action, target, rate); });
   }
   void potentials(std::span<const double> state, std::span<std::int32_t> out) const {
     visit([&](const auto& net) { net.potentials(state, out); });

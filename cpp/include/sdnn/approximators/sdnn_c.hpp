@@ -159,14 +159,19 @@ class SDNNC {
     return scale_(count_in_window(recall(state).potentials, action));
   }
 
-  /// One step of error correction: Q(state, action) moves towards `target` (q_hat).
+  /// One step of error correction: Q = Q(state, action) moves towards
+  /// q_hat = (1 - rate) Q + rate * target.
   ///
-  /// Source: Fig. 2, Eqs. (2), (3); spec section 1, "Learning". Throws std::invalid_argument for a
-  /// bad state, action or a NaN target, std::overflow_error; then nothing has changed.
-  void correct(std::span<const double> state, std::size_t action, double target) {
+  /// Source: Fig. 2, Eqs. (1) to (3); spec section 1, "Learning". Throws std::invalid_argument for a
+  /// bad state, action or rate or a NaN target, std::overflow_error; then nothing has changed.
+  void correct(std::span<const double> state, std::size_t action, double target,
+               double rate = 1.0) {
     core::require(!std::isnan(target), "target", "a number", target);
+    core::require(rate > 0.0 && rate <= 1.0, "rate", "in (0, 1]", rate);
     const Remembered entry = recall(state);
-    const int deficit = scale_.inverse(target) - count_in_window(entry.potentials, action);
+    const int n_firing = count_in_window(entry.potentials, action);
+    const double wanted = (1.0 - rate) * scale_(n_firing) + rate * target;
+    const int deficit = scale_.inverse(wanted) - n_firing;
     if (deficit == 0) return;
     const std::size_t first = actions_.first_unit(action);
     select_units(std::span(entry.potentials).subspan(first, actions_.n_active_units()), deficit,
