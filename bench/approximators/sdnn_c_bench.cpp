@@ -10,7 +10,7 @@
 namespace {
 
 using namespace sdnn;
-using Network = approximators::SDNNC<256>;
+using Network = approximators::SDNNC;
 
 constexpr int kLearningSteps = 500;
 

@@ -4,13 +4,13 @@
 #include <cstdint>
 
 #include "sdnn/agents/q_learning.hpp"
-#include "sdnn/approximators/dynamic_sdnn_c.hpp"
+#include "sdnn/approximators/sdnn_c.hpp"
 #include "sdnn/experiments/trial.hpp"
 
 namespace {
 
 using namespace sdnn;
-using Trial = experiments::AcrobotTrial<agents::QLearning<approximators::DynamicSDNNC>>;
+using Trial = experiments::AcrobotTrial<agents::QLearning<approximators::SDNNC>>;
 
 /// Arguments: inputs, noise in per cent, learning episodes.
 void trial(benchmark::State& state) {
@@ -19,8 +19,8 @@ void trial(benchmark::State& state) {
   std::int64_t n_decisions = 0;
   for (auto _ : state) {
     state.PauseTiming();
-    Trial run(agents::QLearning(approximators::DynamicSDNNC({.n_inputs = n_inputs}, 1), {}, 1), {},
-              {}, {.n_sensors = n_inputs, .noise = noise}, {}, 1);
+    Trial run(agents::QLearning(approximators::SDNNC({.n_inputs = n_inputs}, 1), {}, 1), {}, {},
+              {.n_sensors = n_inputs, .noise = noise}, {}, 1);
     state.ResumeTiming();
     run.advance(static_cast<int>(state.range(2)));
     n_decisions += run.n_decisions();

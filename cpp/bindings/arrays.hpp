@@ -4,12 +4,15 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "sdnn/coding/pattern_table.hpp"
+#include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::bindings {
@@ -47,12 +50,33 @@ std::span<const T> matrix(const ArrayArgument<T>& array, const char* name,
 /// The patterns of a table, +1 and -1. Shapes: (n_bins, n_units).
 inline pybind11::array_t<std::int8_t> signs_of(const coding::PatternTable& table) {
   pybind11::array_t<std::int8_t> signs({table.n_bins(), table.n_units()});
+  std::int8_t* sign = signs.mutable_data();
   for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {
     for (std::size_t k = 0; k < table.n_units(); ++k) {
-      signs.mutable_at(bin, k) = static_cast<std::int8_t>(table.sign(bin, k));
+      *sign++ = static_cast<std::int8_t>(table.sign(bin, k));
     }
   }
   return signs;
+}
+
+/// The table of patterns +1 and -1. Shapes: (n_bins, n_units).
+inline coding::PatternTable table_of(const ArrayArgument<std::int8_t>& signs) {
+  const auto values = matrix(signs, "patterns");
+  return coding::PatternTable::from_signs(values, static_cast<std::size_t>(signs.shape(0)),
+                                          static_cast<std::size_t>(signs.shape(1)));
+}
+
+/// Pairs (modified, modifier) of inputs. Shapes: (n_pairs, 2).
+inline std::vector<coding::InputPair> pairs_of(const ArrayArgument<std::int32_t>& pairs) {
+  const auto inputs = matrix(pairs, "pairs", 2);
+  std::vector<coding::InputPair> input_pairs;
+  for (std::size_t p = 0; p < inputs.size(); p += 2) {
+    core::require(inputs[p] >= 0 && inputs[p + 1] >= 0, "pairs", "inputs of 0 or more",
+                  std::min(inputs[p], inputs[p + 1]));
+    input_pairs.push_back(
+        {static_cast<std::size_t>(inputs[p]), static_cast<std::size_t>(inputs[p + 1])});
+  }
+  return input_pairs;
 }
 
 }  // namespace sdnn::bindings

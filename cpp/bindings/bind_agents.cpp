@@ -8,18 +8,18 @@
 #include "bindings.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
-#include "sdnn/approximators/dynamic_sdnn_c.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
+#include "sdnn/approximators/sdnn_c.hpp"
 
 namespace py = pybind11;
 using namespace sdnn;
 using agents::FuzzyQLearning;
 using agents::FuzzyQLearningConfig;
 using agents::QLearningConfig;
-using approximators::DynamicSDNNC;
 using approximators::FuzzyRules;
 using approximators::RBFNetwork;
+using approximators::SDNNC;
 using bindings::ArrayArgument;
 
 namespace {
@@ -67,18 +67,18 @@ void bind_agents(py::module_& module) {
           py::arg("values"), py::arg("step"), py::arg("explore") = true);
   bindings::bind_config<QLearningConfig>(module, "QLearningConfig", "The parameters of Q-learning");
 
-  bindings::bind_config<FuzzyQLearningConfig>(module, "FuzzyQLearningConfig", "The parameters of fuzzy Q-learning");
+  bindings::bind_config<FuzzyQLearningConfig>(module, "FuzzyQLearningConfig",
+                                              "The parameters of fuzzy Q-learning");
 
-  using SDNNAgent = agents::QLearning<DynamicSDNNC>;
+  using SDNNAgent = agents::QLearning<SDNNC>;
   def_agent(py::class_<SDNNAgent>(module, "SDNNQLearning", "Q-learning with SDNN-C")
                 .def(py::init([](const approximators::SDNNCConfig& network,
                                  const QLearningConfig& learning, std::uint64_t seed) {
-                       return SDNNAgent(DynamicSDNNC(network, seed), learning, seed);
+                       return SDNNAgent(SDNNC(network, seed), learning, seed);
                      }),
                      py::kw_only(), py::arg("network"), py::arg("learning"), py::arg("seed"))
                 .def_property_readonly(
-                    "network",
-                    [](SDNNAgent& agent) -> DynamicSDNNC& { return agent.action_value(); },
+                    "network", [](SDNNAgent& agent) -> SDNNC& { return agent.action_value(); },
                     py::return_value_policy::reference_internal));
 
   using RBFAgent = agents::QLearning<RBFNetwork>;

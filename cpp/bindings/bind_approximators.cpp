@@ -4,71 +4,57 @@
 #include "arrays.hpp"
 #include "bind_config.hpp"
 #include "bindings.hpp"
-#include "sdnn/approximators/dynamic_sdnn_c.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
+#include "sdnn/approximators/sdnn_c.hpp"
 
 namespace py = pybind11;
 using namespace sdnn;
-using approximators::DynamicSDNNC;
 using approximators::FuzzyRules;
 using approximators::FuzzyRulesConfig;
 using approximators::RBFNetwork;
 using approximators::RBFNetworkConfig;
+using approximators::SDNNC;
 using approximators::SDNNCConfig;
 using bindings::ArrayArgument;
 
 namespace {
 
-py::array_t<std::int8_t> code_book(const DynamicSDNNC& network, std::size_t input) {
-  return network.visit([&](const auto& net) {
-    const auto& book = net.state_code().book(input);
-    py::array_t<std::int8_t> out({book.n_bins(), book.n_pattern_units()});
-    auto view = out.mutable_unchecked<2>();
-    for (std::size_t bin = 0; bin < book.n_bins(); ++bin) {
-      for (std::size_t k = 0; k < book.n_pattern_units(); ++k) {
-        view(static_cast<py::ssize_t>(bin), static_cast<py::ssize_t>(k)) =
-            book[static_cast<coding::Bin>(bin)][k] ? 1 : -1;
-      }
-    }
-    return out;
-  });
+py::array_t<std::uint32_t> permutation(const SDNNC& network, std::size_t mu, std::size_t nu) {
+  const auto& units = network.state_code().permutation(mu, nu);
+  return py::array_t<std::uint32_t>(static_cast<py::ssize_t>(units.size()), units.data());
 }
 
-py::array_t<std::uint32_t> permutation(const DynamicSDNNC& network, std::size_t mu,
-                                       std::size_t nu) {
-  return network.visit([&](const auto& net) {
-    const auto& units = net.state_code().permutation(mu, nu);
-    return py::array_t<std::uint32_t>(static_cast<py::ssize_t>(units.size()), units.data());
-  });
-}
-
-py::array_t<std::int32_t> weights(const DynamicSDNNC& network) {
-  return network.visit([](const auto& net) {
-    const std::size_t n_units = net.hidden_layer().n_units();
-    const std::size_t n_columns = net.hidden_layer().n_columns();
-    py::array_t<std::int32_t> out({n_units, n_columns});
-    auto view = out.mutable_unchecked<2>();
-    for (std::size_t i = 0; i < n_units; ++i) {
-      for (std::size_t j = 0; j < n_columns; ++j) {
-        view(static_cast<py::ssize_t>(i), static_cast<py::ssize_t>(j)) = net.weight(i, j);
-      }
-    }
-    return out;
-  });
-}
-
-py::array_t<std::int32_t> thresholds(const DynamicSDNNC& network) {
-  const auto& hidden_layer = network.hidden_layer();
-  py::array_t<std::int32_t> out(static_cast<py::ssize_t>(hidden_layer.n_units()));
-  for (std::size_t i = 0; i < hidden_layer.n_units(); ++i) {
-    out.mutable_at(static_cast<py::ssize_t>(i)) = hidden_layer.threshold(i);
+py::array_t<std::int32_t> weights(const SDNNC& network) {
+  const std::size_t n_units = network.hidden_layer().n_units();
+  const std::size_t n_columns = network.state_code().n_columns();
+  py::array_t<std::int32_t> out({n_units, n_columns});
+  std::int32_t* weight = out.mutable_data();
+  for (std::size_t i = 0; i < n_units; ++i) {
+    for (std::size_t j = 0; j < n_columns; ++j) *weight++ = network.weight(i, j);
   }
   return out;
 }
 
+py::array_t<std::int32_t> thresholds(const SDNNC& network) {
+  const auto& hidden_layer = network.hidden_layer();
+  py::array_t<std::int32_t> out(static_cast<py::ssize_t>(hidden_layer.n_units()));
+  std::int32_t* threshold = out.mutable_data();
+  for (std::size_t i = 0; i < hidden_layer.n_units(); ++i) *threshold++ = hidden_layer.threshold(i);
+  return out;
+}
+
+SDNNC make_network(const SDNNCConfig& config, std::uint64_t seed,
+                   const std::optional<std::vector<ArrayArgument<std::int8_t>>>& tables) {
+  if (!tables) return SDNNC(config, seed);
+  std::vector<coding::PatternTable> patterns;
+  for (const auto& table : *tables) patterns.push_back(bindings::table_of(table));
+  return SDNNC(config, std::move(patterns), seed);
+}
+
 void bind_fuzzy_rules(py::module_& module) {
-  bindings::bind_config<FuzzyRulesConfig>(module, "FuzzyRulesConfig", "The sizes of a table of fuzzy rules");
+  bindings::bind_config<FuzzyRulesConfig>(module, "FuzzyRulesConfig",
+                                          "The sizes of a table of fuzzy rules");
 
   py::class_<FuzzyRules>(module, "FuzzyRules", "Rules over a grid of triangular sets")
       .def(py::init<const FuzzyRulesConfig&>(), py::arg("config"))
@@ -96,7 +82,8 @@ void bind_fuzzy_rules(py::module_& module) {
 }
 
 void bind_rbf_network(py::module_& module) {
-  bindings::bind_config<RBFNetworkConfig>(module, "RBFNetworkConfig", "The sizes of an RBF network");
+  bindings::bind_config<RBFNetworkConfig>(module, "RBFNetworkConfig",
+                                          "The sizes of an RBF network");
 
   py::class_<RBFNetwork>(module, "RBFNetwork", "Q(s, a) linear in normalized Gaussian bases")
       .def(py::init<const RBFNetworkConfig&>(), py::arg("config"))
@@ -156,28 +143,17 @@ void bind_approximators(py::module_& module) {
       .value("uniform", approximators::InitialWeights::uniform);
   bindings::bind_config<SDNNCConfig>(module, "SDNNCConfig", "Everything that defines an SDNN-C");
 
-  py::class_<DynamicSDNNC>(module, "SDNNC", "A network that gives Q(s, a) for every action at once")
-      .def(py::init<const SDNNCConfig&, std::uint64_t>(), py::arg("config"), py::arg("seed"))
-      .def_property_readonly("config", [](const DynamicSDNNC& net) { return net.config(); })
-      .def_property_readonly("n_inputs", &DynamicSDNNC::n_inputs)
-      .def_property_readonly("n_actions", &DynamicSDNNC::n_actions)
-      .def_property_readonly("u_low",
-                             [](const DynamicSDNNC& net) { return net.output_scale().u_low(); })
-      .def_property_readonly("u_high",
-                             [](const DynamicSDNNC& net) { return net.output_scale().u_high(); })
-      .def_property_readonly("n_carries",
-                             [](const DynamicSDNNC& net) { return net.hidden_layer().n_carries(); })
-      .def(
-          "first_unit",
-          [](const DynamicSDNNC& net, std::size_t action) {
-            core::require(action < net.n_actions(), "action",
-                          "less than " + std::to_string(net.n_actions()), action);
-            return net.action_code().first_unit(action);
-          },
-          py::arg("action"))
+  py::class_<SDNNC>(module, "SDNNC", "A network that gives Q(s, a) for every action at once")
+      .def(py::init(&make_network), py::arg("config"), py::arg("seed"),
+           py::arg("tables") = py::none(), "Tables: patterns of each input, (n_bins, m) of -1, +1")
+      .def_property_readonly("config", [](const SDNNC& net) { return net.config(); })
+      .def_property_readonly("n_inputs", &SDNNC::n_inputs)
+      .def_property_readonly("n_actions", &SDNNC::n_actions)
+      .def_property_readonly("u_low", [](const SDNNC& net) { return net.output_scale().u_low(); })
+      .def_property_readonly("u_high", [](const SDNNC& net) { return net.output_scale().u_high(); })
       .def(
           "values",
-          [](DynamicSDNNC& net, const ArrayArgument<double>& state) {
+          [](SDNNC& net, const ArrayArgument<double>& state) {
             py::array_t<double> out(static_cast<py::ssize_t>(net.n_actions()));
             net.values(bindings::vector(state, "state"), {out.mutable_data(), net.n_actions()});
             return out;
@@ -185,32 +161,38 @@ void bind_approximators(py::module_& module) {
           py::arg("state"), "Q(state, a) for every action; shapes (l,) -> (n_actions,)")
       .def(
           "value",
-          [](DynamicSDNNC& net, const ArrayArgument<double>& state, std::size_t action) {
+          [](SDNNC& net, const ArrayArgument<double>& state, std::size_t action) {
             return net.value(bindings::vector(state, "state"), action);
           },
           py::arg("state"), py::arg("action"))
       .def(
           "correct",
-          [](DynamicSDNNC& net, const ArrayArgument<double>& state, std::size_t action,
-             double target) { net.correct(bindings::vector(state, "state"), action, target); },
+          [](SDNNC& net, const ArrayArgument<double>& state, std::size_t action, double target) {
+            net.correct(bindings::vector(state, "state"), action, target);
+          },
           py::arg("state"), py::arg("action"), py::arg("target"),
           "One step of error correction of Q(state, action) towards target")
       .def(
           "potentials",
-          [](const DynamicSDNNC& net, const ArrayArgument<double>& state) {
+          [](const SDNNC& net, const ArrayArgument<double>& state) {
             py::array_t<std::int32_t> out(static_cast<py::ssize_t>(net.hidden_layer().n_units()));
             net.potentials(bindings::vector(state, "state"),
                            {out.mutable_data(), net.hidden_layer().n_units()});
             return out;
           },
           py::arg("state"), "Inner potentials in lattice steps; shapes (l,) -> (n,)")
-      .def("code_book", &code_book, py::arg("input"), "Patterns of an input: (n_bins, m) of -1, +1")
+      .def(
+          "table",
+          [](const SDNNC& net, std::size_t input) {
+            return bindings::signs_of(net.state_code().table(input));
+          },
+          py::arg("input"), "Patterns of an input: (n_bins, m) of -1, +1")
       .def("permutation", &permutation, py::arg("mu"), py::arg("nu"), "sigma_mu_nu: (m,)")
       .def("weights", &weights, "A copy, in lattice steps: (n, D)")
       .def("thresholds", &thresholds, "A copy, in lattice steps: (n,)")
       .def(
           "set_parameters",
-          [](DynamicSDNNC& net, const ArrayArgument<std::int32_t>& new_weights,
+          [](SDNNC& net, const ArrayArgument<std::int32_t>& new_weights,
              const ArrayArgument<std::int32_t>& new_thresholds) {
             net.set_parameters(bindings::flat(new_weights), bindings::flat(new_thresholds));
           },

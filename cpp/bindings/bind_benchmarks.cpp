@@ -3,8 +3,8 @@
 #include "bindings.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
-#include "sdnn/approximators/dynamic_sdnn_c.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
+#include "sdnn/approximators/sdnn_c.hpp"
 #include "sdnn/benchmarks/agent_steps.hpp"
 #include "sdnn/benchmarks/decisions.hpp"
 #include "sdnn/benchmarks/network_parts.hpp"
@@ -20,7 +20,7 @@ using benchmarks::BufferRead;
 using benchmarks::DenseProduct;
 using benchmarks::NetworkParts;
 using benchmarks::PlainRBFNetwork;
-using Trial = experiments::AcrobotTrial<agents::QLearning<approximators::DynamicSDNNC>>;
+using Trial = experiments::AcrobotTrial<agents::QLearning<approximators::SDNNC>>;
 
 namespace {
 
@@ -68,8 +68,8 @@ void bind_benchmarks(py::module_& module) {
              return NetworkParts(trial.agent().action_value(), seed);
            }),
            py::arg("trial"), py::arg("seed"), "Times a copy of the trial's network")
-      .def(py::init<approximators::DynamicSDNNC, std::uint64_t>(), py::arg("network"),
-           py::arg("seed"), "Times a copy of the network")
+      .def(py::init<approximators::SDNNC, std::uint64_t>(), py::arg("network"), py::arg("seed"),
+           "Times a copy of the network")
       .def(
           "time_values",
           [](NetworkParts& parts, int n) { return times_of([&] { return parts.time_values(n); }); },
@@ -123,7 +123,7 @@ void bind_benchmarks(py::module_& module) {
       .def_property_readonly(
           "network", [](const PlainRBFAgent& agent) { return agent.action_value().network(); },
           "A copy of the network");
-  def_time_agent_steps<agents::QLearning<approximators::DynamicSDNNC>>(module);
+  def_time_agent_steps<agents::QLearning<approximators::SDNNC>>(module);
   def_time_agent_steps<agents::FuzzyQLearning>(module);
   def_time_agent_steps<agents::QLearning<approximators::RBFNetwork>>(module);
   def_time_agent_steps<PlainRBFAgent>(module);

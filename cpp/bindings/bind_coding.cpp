@@ -1,8 +1,17 @@
 #include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "sdnn/coding/action_code.hpp"
+#include "sdnn/coding/anchor_patterns.hpp"
+#include "sdnn/coding/coded_samples.hpp"
 #include "sdnn/coding/correlation_matrix.hpp"
 #include "sdnn/coding/random_inverse.hpp"
 #include "sdnn/core/detail/check.hpp"
@@ -10,6 +19,44 @@
 
 namespace py = pybind11;
 using namespace sdnn;
+using bindings::ArrayArgument;
+using bindings::matrix;
+
+namespace {
+
+using Bins = ArrayArgument<coding::Bin>;
+using Code = coding::SelectiveDesensitization;
+
+std::shared_ptr<Code> make_code(const std::vector<ArrayArgument<std::int8_t>>& modified,
+                                const std::vector<ArrayArgument<std::int8_t>>& modifiers,
+                                const ArrayArgument<std::int32_t>& pairs) {
+  std::vector<coding::PatternTable> modified_tables;
+  std::vector<coding::PatternTable> modifier_tables;
+  for (const auto& table : modified) modified_tables.push_back(bindings::table_of(table));
+  for (const auto& table : modifiers) modifier_tables.push_back(bindings::table_of(table));
+  return std::make_shared<Code>(std::move(modified_tables), std::move(modifier_tables),
+                                bindings::pairs_of(pairs));
+}
+
+py::array_t<std::int8_t> transform(const Code& code, const Bins& bins) {
+  const auto values = matrix(bins, "bins", code.n_inputs());
+  py::array_t<std::int8_t> out({static_cast<std::size_t>(bins.shape(0)), code.n_columns()});
+  coding::write_signs(code, values, {out.mutable_data(), static_cast<std::size_t>(out.size())});
+  return out;
+}
+
+py::array_t<std::int32_t> gram(const Code& code, const Bins& bins,
+                               const std::optional<Bins>& other_bins) {
+  const auto values = matrix(bins, "bins", code.n_inputs());
+  const auto others = other_bins ? matrix(*other_bins, "other_bins", code.n_inputs()) : values;
+  py::array_t<std::int32_t> out({values.size() / code.n_inputs(), others.size() / code.n_inputs()});
+  const std::span products(out.mutable_data(), static_cast<std::size_t>(out.size()));
+  const py::gil_scoped_release release;
+  coding::write_products(code, values, others, products);
+  return out;
+}
+
+}  // namespace
 
 void bind_coding(py::module_& module) {
   py::enum_<core::Stream>(module, "Stream", "What a random number is for")
@@ -34,18 +81,6 @@ void bind_coding(py::module_& module) {
           },
           py::arg("n"))
       .def("normal", &core::Random::normal);
-  py::class_<coding::ActionCode>(module, "ActionCode", "Windows of hidden units, one per action")
-      .def(py::init<int, int, int>(), py::arg("n_hidden_units"), py::arg("n_active_units"),
-           py::arg("n_actions") = 0)
-      .def_property_readonly("n_actions", &coding::ActionCode::n_actions)
-      .def(
-          "first_unit",
-          [](const coding::ActionCode& code, std::size_t action) {
-            core::require(action < code.n_actions(), "action",
-                          "less than " + std::to_string(code.n_actions()), action);
-            return code.first_unit(action);
-          },
-          py::arg("action"));
   module.def(
       "action_value",
       [](std::size_t action, std::size_t n_actions, double low, double high) {
@@ -68,8 +103,11 @@ void bind_coding(py::module_& module) {
       [](int n_units, int n_anchor_patterns, int n_interpolated, bool circular,
          std::uint64_t seed) {
         core::Random random(seed, core::Stream::code_books);
-        return bindings::signs_of(coding::anchor_patterns(
-            {n_units, n_anchor_patterns, n_interpolated, circular}, random));
+        return bindings::signs_of(coding::anchor_patterns({.n_units = n_units,
+                                                           .n_anchor_patterns = n_anchor_patterns,
+                                                           .n_interpolated = n_interpolated,
+                                                           .circular = circular},
+                                                          random));
       },
       py::arg("n_units"), py::arg("n_anchor_patterns"), py::arg("n_interpolated"),
       py::arg("circular"), py::arg("seed"));
@@ -82,4 +120,14 @@ void bind_coding(py::module_& module) {
             n_units, values, static_cast<std::size_t>(correlations.shape(0)), random));
       },
       py::arg("n_units"), py::arg("correlations"), py::arg("seed"));
+  py::class_<Code, std::shared_ptr<Code>>(module, "SelectiveDesensitization",
+                                          "The desensitized code of a sample, from its bins")
+      .def(py::init(&make_code), py::arg("modified"), py::arg("modifiers"), py::arg("pairs"))
+      .def_property_readonly("n_inputs", &Code::n_inputs)
+      .def_property_readonly("n_pairs", &Code::n_pairs)
+      .def_property_readonly("n_units", &Code::n_units)
+      .def_property_readonly("n_columns", &Code::n_columns)
+      .def("transform", &transform, py::arg("bins"), "Entries +1, 0, -1, sample by sample")
+      .def("gram", &gram, py::arg("bins"), py::arg("other_bins") = py::none(),
+           "Inner products of codes");
 }

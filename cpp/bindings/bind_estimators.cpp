@@ -23,71 +23,6 @@ namespace {
 using Bins = ArrayArgument<std::int32_t>;
 using Matrix = py::array_t<std::int32_t>;
 
-coding::PatternTable table_of(const ArrayArgument<std::int8_t>& signs) {
-  const auto values = matrix(signs, "patterns");
-  return coding::PatternTable::from_signs(values, static_cast<std::size_t>(signs.shape(0)),
-                                          static_cast<std::size_t>(signs.shape(1)));
-}
-
-std::vector<coding::InputPair> pairs_of(const ArrayArgument<std::int32_t>& pairs) {
-  const auto inputs = matrix(pairs, "pairs", 2);
-  std::vector<coding::InputPair> input_pairs;
-  for (std::size_t p = 0; p < inputs.size(); p += 2) {
-    core::require(inputs[p] >= 0 && inputs[p + 1] >= 0, "pairs", "inputs of 0 or more",
-                  std::min(inputs[p], inputs[p + 1]));
-    input_pairs.push_back(
-        {static_cast<std::size_t>(inputs[p]), static_cast<std::size_t>(inputs[p + 1])});
-  }
-  return input_pairs;
-}
-
-std::shared_ptr<coding::SelectiveDesensitization> make_code(
-    const std::vector<ArrayArgument<std::int8_t>>& modified,
-    const std::vector<ArrayArgument<std::int8_t>>& modifiers,
-    const ArrayArgument<std::int32_t>& pairs) {
-  std::vector<coding::PatternTable> modified_tables;
-  std::vector<coding::PatternTable> modifier_tables;
-  for (const auto& table : modified) modified_tables.push_back(table_of(table));
-  for (const auto& table : modifiers) modifier_tables.push_back(table_of(table));
-  return std::make_shared<coding::SelectiveDesensitization>(
-      std::move(modified_tables), std::move(modifier_tables), pairs_of(pairs));
-}
-
-py::array_t<std::int8_t> transform(const coding::SelectiveDesensitization& code, const Bins& bins) {
-  const auto values = matrix(bins, "bins", code.n_inputs());
-  code.check_bins(values);
-  py::array_t<std::int8_t> out({static_cast<std::size_t>(bins.shape(0)), code.n_columns()});
-  const coding::CodedSamples coded(code, values);
-  for (std::size_t t = 0; t < coded.size(); ++t) {
-    for (std::size_t j = 0; j < code.n_columns(); ++j) {
-      const std::size_t slot = code.slot_of(j);
-      const bool active = (coded[t].active[slot / 64] >> slot % 64 & 1) != 0;
-      const bool positive = (coded[t].positive[slot / 64] >> slot % 64 & 1) != 0;
-      out.mutable_at(t, j) = static_cast<std::int8_t>(active ? (positive ? 1 : -1) : 0);
-    }
-  }
-  return out;
-}
-
-Matrix gram(const coding::SelectiveDesensitization& code, const Bins& bins,
-            const std::optional<Bins>& other_bins) {
-  const auto values = matrix(bins, "bins", code.n_inputs());
-  const auto others = other_bins ? matrix(*other_bins, "other_bins", code.n_inputs()) : values;
-  code.check_bins(values);
-  code.check_bins(others);
-  Matrix out({values.size() / code.n_inputs(), others.size() / code.n_inputs()});
-  std::int32_t* const items = out.mutable_data();
-  const py::gil_scoped_release release;
-  const coding::CodedSamples one(code, values);
-  const coding::CodedSamples other(code, others);
-  for (std::size_t t = 0; t < one.size(); ++t) {
-    for (std::size_t s = 0; s < other.size(); ++s) {
-      items[t * other.size() + s] = estimators::inner_product(one[t], other[s], one.n_words());
-    }
-  }
-  return out;
-}
-
 using estimators::ParallelPerceptron;
 
 std::shared_ptr<ParallelPerceptron> make_layer(
@@ -150,7 +85,7 @@ py::tuple libsdnn_tables(int n_units, const std::vector<std::pair<int, int>>& in
   auto random = libsdnn_random(seed, library);
   std::vector<coding::RandomInverseConfig> configs;
   for (const auto& [n_bins, n_flipped] : inputs) configs.push_back({n_units, n_bins, n_flipped});
-  const auto tables = estimators::libsdnn_tables(configs, pairs_of(pairs), random);
+  const auto tables = estimators::libsdnn_tables(configs, bindings::pairs_of(pairs), random);
   py::list modified;
   py::list modifiers;
   for (const auto& table : tables.modified) modified.append(signs_of(table));
@@ -193,17 +128,6 @@ void bind_trainer_methods(py::class_<Trainer, std::shared_ptr<Trainer>>& trainer
 
 void bind_estimators(py::module_& module) {
   using Code = coding::SelectiveDesensitization;
-  py::class_<Code, std::shared_ptr<Code>>(module, "SelectiveDesensitization",
-                                          "The desensitized code of a sample, from its bins")
-      .def(py::init(&make_code), py::arg("modified"), py::arg("modifiers"), py::arg("pairs"))
-      .def_property_readonly("n_inputs", &Code::n_inputs)
-      .def_property_readonly("n_pairs", &Code::n_pairs)
-      .def_property_readonly("n_units", &Code::n_units)
-      .def_property_readonly("n_columns", &Code::n_columns)
-      .def("transform", &transform, py::arg("bins"), "Entries +1, 0, -1, sample by sample")
-      .def("gram", &gram, py::arg("bins"), py::arg("other_bins") = py::none(),
-           "Inner products of codes");
-
   py::class_<ParallelPerceptron, std::shared_ptr<ParallelPerceptron>>(
       module, "ParallelPerceptron", "Units over a code, with integer weights")
       .def(py::init(&make_layer), py::arg("code"), py::arg("n_units"), py::arg("seed") = 0,

@@ -5,18 +5,18 @@
 #include "bindings.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
-#include "sdnn/approximators/dynamic_sdnn_c.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
+#include "sdnn/approximators/sdnn_c.hpp"
 #include "sdnn/experiments/trial.hpp"
 
 namespace py = pybind11;
 using namespace sdnn;
 using agents::FuzzyQLearning;
 using agents::QLearning;
-using approximators::DynamicSDNNC;
 using approximators::FuzzyRules;
 using approximators::RBFNetwork;
+using approximators::SDNNC;
 using environments::AcrobotConfig;
 using environments::GoalScheduleConfig;
 using environments::SensorConfig;
@@ -44,17 +44,15 @@ py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
   return rows;
 }
 
-using SDNNTrial = experiments::AcrobotTrial<QLearning<DynamicSDNNC>>;
+using SDNNTrial = experiments::AcrobotTrial<QLearning<SDNNC>>;
 
 py::typing::Dict<py::str, py::int_> memory_counts(const SDNNTrial& trial) {
-  return trial.agent().action_value().visit([](const auto& network) {
-    const auto& counts = network.memory().counts();
-    py::typing::Dict<py::str, py::int_> out;
-    out["full"] = counts.full;
-    out["neighbour"] = counts.neighbour;
-    out["columns"] = counts.columns;
-    return out;
-  });
+  const auto& counts = trial.agent().action_value().memory().counts();
+  py::typing::Dict<py::str, py::int_> out;
+  out["full"] = counts.full;
+  out["neighbour"] = counts.neighbour;
+  out["columns"] = counts.columns;
+  return out;
 }
 
 /// What the trials of all agents have in common.
@@ -81,7 +79,7 @@ void bind_experiments(py::module_& module) {
                            const agents::QLearningConfig& learning, const AcrobotConfig& acrobot,
                            const GoalScheduleConfig& goal, const SensorConfig& sensors,
                            const ProtocolConfig& protocol, std::uint64_t seed) {
-                 return SDNNTrial({DynamicSDNNC(approximator, seed), learning, seed}, acrobot, goal,
+                 return SDNNTrial({SDNNC(approximator, seed), learning, seed}, acrobot, goal,
                                   sensors, protocol, seed);
                }),
                py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("acrobot"),

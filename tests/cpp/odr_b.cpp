@@ -2,12 +2,12 @@
 
 #include "sdnn/sdnn.hpp"
 
-std::size_t n_actions_seen_by_a(const sdnn::approximators::DynamicSDNNC& network);
+std::size_t n_actions_seen_by_a(const sdnn::approximators::SDNNC& network);
 
 namespace {
 
 TEST(Umbrella, TwoTranslationUnitsAgreeOnOneObject) {
-  const sdnn::approximators::DynamicSDNNC network(
+  const sdnn::approximators::SDNNC network(
       {.n_inputs = 2, .n_pattern_units = 8, .n_hidden_units = 20, .n_active_units = 6}, 1);
   EXPECT_EQ(network.n_actions(), 15U);
   EXPECT_EQ(n_actions_seen_by_a(network), network.n_actions());

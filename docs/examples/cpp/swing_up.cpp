@@ -13,7 +13,7 @@
 
 namespace {
 
-using Network = sdnn::approximators::SDNNC<256>;  // patterns of up to 256 units
+using Network = sdnn::approximators::SDNNC;  // patterns of up to 256 units
 
 struct Outcome {
   int n_decisions = 0;

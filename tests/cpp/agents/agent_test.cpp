@@ -7,14 +7,14 @@
 #include "approximators/lookup_table.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
-#include "sdnn/approximators/dynamic_sdnn_c.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
+#include "sdnn/approximators/sdnn_c.hpp"
 
 namespace sdnn::agents {
 namespace {
 
 static_assert(Agent<QLearning<testing::LookupTable>>);
-static_assert(Agent<QLearning<approximators::DynamicSDNNC>>);
+static_assert(Agent<QLearning<approximators::SDNNC>>);
 static_assert(Agent<QLearning<approximators::RBFNetwork>>);
 static_assert(Agent<FuzzyQLearning>);
 static_assert(!Agent<approximators::RBFNetwork>);

@@ -5,7 +5,7 @@
 #include <array>
 
 #include "approximators/lookup_table.hpp"
-#include "sdnn/approximators/dynamic_sdnn_c.hpp"
+#include "sdnn/approximators/sdnn_c.hpp"
 
 namespace sdnn::approximators {
 namespace {
@@ -26,8 +26,8 @@ struct ValueIsText : Complete {
 };
 
 static_assert(ActionValue<testing::LookupTable>);
-static_assert(ActionValue<SDNNC<256>>);
-static_assert(ActionValue<DynamicSDNNC>);
+static_assert(ActionValue<SDNNC>);
+static_assert(ActionValue<SDNNC>);
 static_assert(ActionValue<Complete>);
 static_assert(!ActionValue<WithoutCorrect>);
 static_assert(!ActionValue<ValueIsText>);
@@ -72,8 +72,8 @@ TEST(ActionValue, EveryModelKeepsTheConceptsPromises) {
                            .n_hidden_units = 300,
                            .n_active_units = 100,
                            .n_actions = 5};
-  expect_a_model(SDNNC<256>(config, 3));
-  expect_a_model(DynamicSDNNC(config, 3));
+  expect_a_model(SDNNC(config, 3));
+  expect_a_model(SDNNC(config, 3));
 }
 
 }  // namespace

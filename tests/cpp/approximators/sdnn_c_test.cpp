@@ -2,19 +2,21 @@
 
 #include <gtest/gtest.h>
 
+#include <bitset>
 #include <cmath>
 #include <limits>
 #include <string>
 #include <vector>
 
 #include "allocation_count.hpp"
-#include "sdnn/core/bit_layer.hpp"
+#include "sdnn/coding/anchor_patterns.hpp"
+#include "sdnn/coding/random_inverse.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::approximators {
 namespace {
 
-using Network = SDNNC<256>;
+using Network = SDNNC;
 using State = std::vector<double>;
 
 /// The learning tests run on a smaller network, which has the same parts.
@@ -42,19 +44,15 @@ std::vector<std::int32_t> potentials(const Network& network, const State& state)
 
 /// Q(s, a) of every action from a full pass and window masks: nothing remembered, nothing sliding.
 std::vector<double> values_by_masks(const Network& network, const State& state) {
-  constexpr std::size_t kHidden = 1024;
+  using Mask = std::bitset<1024>;
   const std::vector<std::int32_t> h = potentials(network, state);
-  core::BitLayer<kHidden> hidden(h.size());
-  for (std::size_t i = 0; i < h.size(); ++i) hidden.set(i, h[i] > 0);
+  Mask hidden;
+  for (std::size_t i = 0; i < h.size(); ++i) hidden[i] = h[i] > 0;
   const coding::ActionCode& code = network.action_code();
   std::vector<double> out(code.n_actions());
   for (std::size_t action = 0; action < code.n_actions(); ++action) {
-    core::BitLayer<kHidden> window(h.size());
-    for (std::size_t i = 0; i < code.n_active_units(); ++i) {
-      window.set(code.first_unit(action) + i);
-    }
-    const auto n_firing = static_cast<int>((hidden & window).count());
-    out[action] = network.output_scale()(n_firing);
+    const Mask window = (~Mask{} >> (1024 - code.n_active_units())) << code.first_unit(action);
+    out[action] = network.output_scale()(static_cast<int>((hidden & window).count()));
   }
   return out;
 }
@@ -65,7 +63,9 @@ void expect_equal_parameters(const Network& a, const Network& b) {
   std::size_t n_different = 0;
   for (std::size_t i = 0; i < p.n_units(); ++i) {
     n_different += p.threshold(i) != q.threshold(i);
-    for (std::size_t j = 0; j < p.n_columns(); ++j) n_different += a.weight(i, j) != b.weight(i, j);
+    for (std::size_t j = 0; j < a.state_code().n_columns(); ++j) {
+      n_different += a.weight(i, j) != b.weight(i, j);
+    }
   }
   EXPECT_EQ(n_different, 0U);
 }
@@ -75,7 +75,7 @@ TEST(SDNNC, ThePapersSizesFollowFromTheDefaults) {
   EXPECT_EQ(network.n_inputs(), 4U);
   EXPECT_EQ(network.n_actions(), 601U);
   EXPECT_EQ(network.state_code().n_columns(), 2400U);
-  EXPECT_EQ(network.state_code().book(0).n_bins(), 360U);
+  EXPECT_EQ(network.state_code().table(0).n_bins(), 360U);
   EXPECT_EQ(network.hidden_layer().n_units(), 900U);
   EXPECT_EQ(network.output_scale().u_low(), 20);
   EXPECT_EQ(network.output_scale().u_high(), 280);
@@ -90,7 +90,7 @@ TEST(SDNNC, ThresholdsAlternateAndWeightsAreTernaryAtTheStart) {
   EXPECT_EQ(p.threshold(1), 200);
   std::array<double, 3> count{};
   for (std::size_t i = 0; i < p.n_units(); ++i) {
-    for (std::size_t j = 0; j < p.n_columns(); ++j) {
+    for (std::size_t j = 0; j < network.state_code().n_columns(); ++j) {
       ++count.at(static_cast<std::size_t>(network.weight(i, j) + 1));
     }
   }
@@ -122,7 +122,7 @@ TEST(SDNNC, UniformInitialWeightsStayWithinTheirLimitOnTheLattice) {
   int largest = 0;
   for (std::size_t i = 0; i < 200; ++i) {
     EXPECT_EQ(network.hidden_layer().threshold(i), i % 2 == 0 ? -80 : 80);
-    for (std::size_t j = 0; j < network.hidden_layer().n_columns(); ++j) {
+    for (std::size_t j = 0; j < network.state_code().n_columns(); ++j) {
       largest = std::max(largest, std::abs(network.weight(i, j)));
     }
   }
@@ -139,7 +139,7 @@ TEST(SDNNC, OneCorrectionMovesOneUnitOfEachSubset) {
   const std::size_t action = 11;
   const std::vector<std::int32_t> before = potentials(network, state);
   std::vector<coding::Bin> bins(3);
-  network.state_code().encode(state, bins);
+  network.state_code().bins_of(state, bins);
   const std::int32_t self = network.state_code().inner_product(bins, bins);
 
   // Three units more: three subsets of twenty, in each the inactive unit nearest to 0.
@@ -249,6 +249,7 @@ TEST(SDNNC, RememberingChangesNothingOverThousandsOfLearningSteps) {
 
 TEST(SDNNC, ActingAndLearningAllocateNothing) {
   Network network({}, 1);
+  network.warm_caches();
   core::Random random(6, core::Stream::weights);
   std::vector<double> out(network.n_actions());
   State state = random_state(4, random);
@@ -268,6 +269,7 @@ TEST(SDNNC, LargeWeightsAllocateNothing) {
   config.lattice = 64;
   config.initial_threshold = 0.0;
   Network network(config, 1);
+  network.warm_caches();
   core::Random random(6, core::Stream::weights);
   std::vector<double> out(network.n_actions());
   State state = random_state(3, random);
@@ -278,7 +280,7 @@ TEST(SDNNC, LargeWeightsAllocateNothing) {
     for (double& value : state) value = random.uniform();
   }
   EXPECT_EQ(testing::allocation_count(), before);
-  EXPECT_TRUE(network.hidden_layer().has_high_bytes());
+  EXPECT_GT(network.hidden_layer().n_high_columns(), 1000U);
   EXPECT_EQ(values(network, state), values_by_masks(network, state));
 }
 
@@ -310,7 +312,9 @@ TEST(SDNNC, ParametersCanBeMovedToAnotherNetworkOfTheSameWiring) {
   std::vector<std::int32_t> thresholds;
   for (std::size_t i = 0; i < p.n_units(); ++i) {
     thresholds.push_back(p.threshold(i));
-    for (std::size_t j = 0; j < p.n_columns(); ++j) weights.push_back(teacher.weight(i, j));
+    for (std::size_t j = 0; j < teacher.state_code().n_columns(); ++j) {
+      weights.push_back(teacher.weight(i, j));
+    }
   }
   pupil.set_parameters(weights, thresholds);
   expect_equal_parameters(pupil, teacher);
@@ -327,11 +331,9 @@ TEST(SDNNC, ParametersCanBeMovedToAnotherNetworkOfTheSameWiring) {
 TEST(SDNNC, TheSameSeedGivesTheSameNetworkAndAnotherSeedAnother) {
   const Network first(small(), 3), same(small(), 3), other(small(), 4);
   expect_equal_parameters(first, same);
-  const auto& book = [](const Network& network) -> const auto& {
-    return network.state_code().book(1);
-  };
-  EXPECT_EQ(book(first)[10], book(same)[10]);
-  EXPECT_NE(book(first)[10], book(other)[10]);
+  const auto pattern = [](const Network& network) { return network.state_code().table(1)[10]; };
+  EXPECT_EQ(pattern(first), pattern(same));
+  EXPECT_NE(pattern(first), pattern(other));
   EXPECT_EQ(first.state_code().permutation(0, 2), same.state_code().permutation(0, 2));
   EXPECT_NE(first.state_code().permutation(0, 2), other.state_code().permutation(0, 2));
   EXPECT_NE(first.state_code().permutation(0, 2), first.state_code().permutation(2, 0));
@@ -370,6 +372,52 @@ TEST(SDNNC, OddSizesLearnAsWell) {
       ASSERT_EQ(values(network, state), values_by_masks(network, state));
     }
   }
+}
+
+// Any coding's patterns will do: here angles, symbols and a chain, with as many bins as each has.
+TEST(SDNNC, LearnsOverPatternsOfAnyCoding) {
+  core::Random random(3, core::Stream::code_books);
+  std::vector<coding::PatternTable> tables;
+  tables.push_back(coding::anchor_patterns({.n_units = 50, .circular = true}, random));
+  tables.push_back(coding::anchor_patterns(
+      {.n_units = 50, .n_anchor_patterns = 5, .n_interpolated = 0}, random));
+  tables.push_back(coding::random_inverse_patterns({50, 100, 1}, random));
+  Network network(small(), tables, 7);
+  EXPECT_EQ(network.state_code().table(1).n_bins(), 4U);
+  for (int i = 0; i < 60; ++i) {
+    const State state = random_state(3, random);
+    network.correct(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
+    ASSERT_EQ(values(network, state), values_by_masks(network, state));
+  }
+  EXPECT_EQ(values(network, {0.1, 0.0, 0.5}), values(network, {0.1, 0.24, 0.5}));  // one symbol
+  EXPECT_THROW(Network({.n_inputs = 4}, tables, 7), std::invalid_argument);
+  EXPECT_THROW(Network({.n_inputs = 3}, tables, 7), std::invalid_argument);  // 200 units
+}
+
+TEST(SDNNC, ARateMixesTargetAndValue) {
+  Network one(small(), 5);
+  Network other(small(), 5);
+  const State state = {0.3, 0.6, 0.2};
+  for (int i = 0; i < 50; ++i) {
+    one.correct(state, 70, 12.0, 0.25);
+    other.correct(state, 70, 0.75 * other.value(state, 70) + 0.25 * 12.0);
+  }
+  expect_equal_parameters(one, other);
+  for (const double rate : {0.0, -0.5, 1.5, std::nan("")}) {
+    EXPECT_THROW(one.correct(state, 70, 1.0, rate), std::invalid_argument);
+  }
+  expect_equal_parameters(one, other);
+}
+
+TEST(SDNNC, WarmCachesChangeNothing) {
+  Network cold(small(), 5);
+  Network warm = cold;
+  warm.warm_caches();
+  EXPECT_EQ(warm.memory().counts().full, 0U);
+  const State state = {0.3, 0.6, 0.2};
+  for (Network* const network : {&cold, &warm}) network->correct(state, 70, 12.0);
+  expect_equal_parameters(cold, warm);
+  EXPECT_EQ(values(cold, state), values(warm, state));
 }
 
 TEST(SDNNC, TheEndsOfTheUnitIntervalAreStates) {
@@ -419,7 +467,6 @@ TEST(SDNNC, NamesTheFieldThatIsImpossible) {
   expect_named({.initial_weight_limit = nan}, "initial_weight_limit");
   expect_named({.initial_weights = InitialWeights::uniform, .initial_weight_limit = 1e300},
                "initial_weight_limit");
-  EXPECT_THROW(Network({.n_pattern_units = 257}, 1), std::length_error);
 }
 
 TEST(SDNNC, ABadArgumentChangesNothing) {

@@ -16,8 +16,8 @@ TEST(PatternTable, KeepsSignsBitByBit) {
   const auto table = PatternTable::from_signs(signs, 2, 3);
   EXPECT_EQ(table.n_bins(), 2U);
   EXPECT_EQ(table.n_units(), 3U);
-  EXPECT_EQ(table[0][0], 0b101U);
-  EXPECT_EQ(table[1][0], 0b100U);
+  EXPECT_EQ(table[0].words()[0], 0b101U);
+  EXPECT_EQ(table[1].words()[0], 0b100U);
   EXPECT_EQ(table.sign(0, 1), -1);
   EXPECT_EQ(table.sign(1, 2), 1);
 }
@@ -26,7 +26,7 @@ TEST(PatternTable, BeginsEveryPatternOnAWord) {
   PatternTable table(3, 65);
   EXPECT_EQ(table.n_words(), 2U);
   table.flip(1, 64);
-  EXPECT_EQ(table[1][1], 1U);
+  EXPECT_EQ(table[1].words()[1], 1U);
   table.copy(1, 2);
   EXPECT_EQ(table.sign(2, 64), 1);
   EXPECT_EQ(table.sign(0, 64), -1);
@@ -36,11 +36,19 @@ TEST(PatternTable, BalancedPatternsHaveHalfOfTheUnitsOn) {
   core::Random random(1, core::Stream::code_books);
   for (const std::size_t n_units : {2U, 7U, 64U, 200U}) {
     PatternTable table(1, n_units);
-    coding::fill_balanced(table, 0, random);
+    coding::fill_random(table, 0, true, random);
     std::size_t n_on = 0;
     for (std::size_t k = 0; k < n_units; ++k) n_on += table.sign(0, k) > 0 ? 1 : 0;
     EXPECT_EQ(n_on, n_units / 2);
   }
+}
+
+TEST(PatternTable, BinsAreHalfOpenAndOneFallsIntoTheLast) {
+  EXPECT_EQ(coding::bin_of(0.0, 360), 0);
+  EXPECT_EQ(coding::bin_of(1.0 / 360 * 0.999, 360), 0);
+  EXPECT_EQ(coding::bin_of(0.5, 360), 180);
+  EXPECT_EQ(coding::bin_of(0.9999999, 360), 359);
+  EXPECT_EQ(coding::bin_of(1.0, 360), 359);
 }
 
 TEST(PatternTable, RefusesWhatIsNoPattern) {

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "sdnn/coding/pattern_code.hpp"
-
 namespace {
 
 using namespace sdnn;
@@ -52,32 +50,12 @@ TEST(RandomInverse, FlipsEveryUnitWhenAllMayFlip) {
   EXPECT_EQ(product(table, 0, 2), 10);
 }
 
-TEST(AnchorPatterns, AreThoseOfTheCompiledCodeBook) {
-  for (const bool circular : {false, true}) {
-    core::Random one(11, core::Stream::code_books);
-    core::Random other(11, core::Stream::code_books);
-    const auto table = coding::anchor_patterns({130, 5, 6, circular}, one);
-    const auto book = coding::anchor_interpolation<256>(
-        {.n_pattern_units = 130, .n_anchor_patterns = 5, .n_interpolated = 6, .circular = circular},
-        other);
-    ASSERT_EQ(table.n_bins(), book.n_bins());
-    for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {
-      for (std::size_t k = 0; k < 130; ++k) {
-        ASSERT_EQ(table.sign(bin, k) > 0, book[static_cast<coding::Bin>(bin)][k])
-            << bin << ' ' << k;
-      }
-    }
-  }
-}
-
 TEST(RandomInverse, RefusesImpossibleSettings) {
   core::Random random(1, core::Stream::code_books);
   EXPECT_THROW(coding::random_inverse_patterns({41, 5, 1}, random), std::invalid_argument);
   EXPECT_THROW(coding::random_inverse_patterns({40, 0, 1}, random), std::invalid_argument);
   EXPECT_THROW(coding::random_inverse_patterns({40, 5, 21}, random), std::invalid_argument);
   EXPECT_THROW(coding::random_inverse_patterns({40, 5, -1}, random), std::invalid_argument);
-  EXPECT_THROW(coding::anchor_patterns({40, 1, 5, false}, random), std::invalid_argument);
-  EXPECT_THROW(coding::anchor_patterns({1, 2, 5, false}, random), std::invalid_argument);
 }
 
 }  // namespace

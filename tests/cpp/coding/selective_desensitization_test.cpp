@@ -4,8 +4,13 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <stdexcept>
+#include <utility>
 #include <vector>
+
+#include "instruction_sets.hpp"
+#include "sdnn/core/random.hpp"
 
 namespace {
 
@@ -44,6 +49,37 @@ TEST(SelectiveDesensitization, AllowsAnInputAlone) {
   code.encode(std::array<std::int32_t, 1>{0}, &active, &positive);
   EXPECT_EQ(active, 3U);
   EXPECT_EQ(positive, 1U);
+}
+
+// Products read from the tables are those of the codes' words, with shared gates and without.
+TEST(SelectiveDesensitization, TheInnerProductIsThatOfTheCodes) {
+  core::Random random(4, core::Stream::code_books);
+  for (const std::size_t n_units : {5U, 64U, 200U, 300U}) {
+    const auto draw = [&] {
+      PatternTable drawn(7, n_units);
+      for (std::size_t bin = 0; bin < 7; ++bin) coding::fill_random(drawn, bin, false, random);
+      return std::make_shared<const PatternTable>(std::move(drawn));
+    };
+    const auto gate = draw();
+    const SelectiveDesensitization code({draw(), draw(), draw(), draw()},
+                                        {gate, gate, draw(), gate},
+                                        {{0, 1}, {2, 1}, {1, 0}, {0, 1}});
+    for (int trial = 0; trial < 20; ++trial) {
+      std::array<coding::Bin, 3> a{};
+      std::array<coding::Bin, 3> b{};
+      for (auto* const bins : {&a, &b}) {
+        for (coding::Bin& bin : *bins) bin = static_cast<coding::Bin>(random.below(7));
+      }
+      std::vector<std::uint64_t> words(4 * code.n_words());
+      const std::size_t n = code.n_words();
+      code.encode(a, words.data(), words.data() + n);
+      code.encode(b, words.data() + 2 * n, words.data() + 3 * n);
+      const auto expected = coding::inner_product({words.data(), words.data() + n},
+                                                  {words.data() + 2 * n, words.data() + 3 * n}, n);
+      sdnn::testing::on_every_instruction_set(
+          [&](auto level) { EXPECT_EQ(code.inner_product(a, b), expected) << level; });
+    }
+  }
 }
 
 TEST(SelectiveDesensitization, NamesTheBadBin) {

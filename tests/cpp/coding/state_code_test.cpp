@@ -4,45 +4,64 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/coding/anchor_patterns.hpp"
+#include "sdnn/core/random.hpp"
 
 namespace sdnn::coding {
 namespace {
 
-StateCode<64> small_code(std::size_t l, int m, std::uint64_t seed) {
-  std::vector<CodeBook<64>> books;
+StateCode small_code(std::size_t l, int m, std::uint64_t seed) {
+  std::vector<PatternTable> tables;
   std::vector<Permutation> permutations;
   for (std::size_t mu = 0; mu < l; ++mu) {
     core::Random random(seed, core::Stream::code_books, mu);
-    books.push_back(anchor_interpolation<64>({.n_pattern_units = m}, random));
+    tables.push_back(anchor_patterns({.n_units = m}, random));
   }
   for (std::size_t g = 0; g < l * (l - 1); ++g) {
     core::Random random(seed, core::Stream::permutations, g);
     permutations.push_back(random_permutation(static_cast<std::size_t>(m), random));
   }
-  return {std::move(books), std::move(permutations)};
+  return {std::move(tables), std::move(permutations)};
 }
 
-std::vector<int> dense(std::size_t n_columns, const SignedColumns& columns) {
-  std::vector<int> x(n_columns, 0);
-  for (const auto j : columns.positive) x[j] += 1;
-  for (const auto j : columns.negative) x[j] -= 1;
+/// The paired code of a state as words.
+struct Paired {
+  Paired(const StateCode& code, std::span<const Bin> bins)
+      : words(2 * code.n_words()), n_words(code.n_words()), lists(code.n_words()) {
+    code.encode(bins, words.data(), words.data() + n_words);
+    lists.read(view());
+  }
+  TernaryCode view() const { return {words.data(), words.data() + n_words}; }
+
+  std::vector<std::uint64_t> words;
+  std::size_t n_words;
+  ColumnLists lists;
+};
+
+std::vector<int> dense(std::size_t n_slots, const SignedColumns& columns) {
+  std::vector<int> x(n_slots, 0);
+  for (const auto j : columns.plus) x[j] += 1;
+  for (const auto j : columns.minus) x[j] -= 1;
   return x;
 }
 
-std::vector<int> paired(const StateCode<64>& code, std::span<const Bin> bins) {
-  SignedColumns columns;
-  code.columns(bins, columns);
-  return dense(code.n_columns(), columns);
+std::vector<int> paired(const StateCode& code, std::span<const Bin> bins) {
+  return dense(code.n_slots(), Paired(code, bins).lists.columns());
 }
 
 /// x_SD in the paper's order, from the paired code.
-std::vector<int> x_sd(const StateCode<64>& code, std::span<const Bin> bins) {
+std::vector<int> x_sd(const StateCode& code, std::span<const Bin> bins) {
   const std::vector<int> stored = paired(code, bins);
   std::vector<int> x(code.n_columns());
   for (std::size_t j = 0; j < x.size(); ++j) {
-    const auto place = code.place(j);
-    x[j] = stored[place.first] + (place.paired ? place.sign * stored[place.second] : 0);
+    const auto slots = code.slots_of(j);
+    x[j] = stored[slots.first] + (slots.paired ? slots.sign * stored[slots.second] : 0);
   }
   return x;
 }
@@ -63,13 +82,10 @@ TEST_P(StateCodeOfInputs, TheCodeFollowsTheEquationOfLayer3) {
     for (std::size_t nu = 0; nu < l; ++nu) {
       if (nu == mu) continue;
       const auto& sigma = code.permutation(mu, nu);
-      const auto pattern = code.group(mu, nu, bins);
       for (std::size_t k = 0; k < 37; ++k, ++j) {
-        const int x_mu = code.book(mu)[bins[mu]][k] ? 1 : -1;
-        const int modifier = code.book(nu)[bins[nu]][sigma[k]] ? 1 : -1;
+        const int x_mu = code.table(mu)[static_cast<std::size_t>(bins[mu])][k] ? 1 : -1;
+        const int modifier = code.table(nu)[static_cast<std::size_t>(bins[nu])][sigma[k]] ? 1 : -1;
         EXPECT_EQ(x[j], (1 + modifier) / 2 * x_mu);
-        EXPECT_EQ(pattern.active[k], x[j] != 0);
-        EXPECT_EQ(pattern.positive[k], x[j] > 0);
       }
     }
   }
@@ -79,52 +95,52 @@ TEST_P(StateCodeOfInputs, TheCodeFollowsTheEquationOfLayer3) {
 TEST_P(StateCodeOfInputs, HalfAsManyPairedColumnsAreActive) {
   const std::size_t l = GetParam();
   const auto code = small_code(l, 37, 5);
-  EXPECT_EQ(code.n_double_columns(), 37U * l * (l - 1 - (l - 1) % 2));
+  EXPECT_EQ(code.n_double_slots(), 64U * l * (l - 1 - (l - 1) % 2));
   std::vector<Bin> bins = {17, 200, 359, 0, 90, 123};
   bins.resize(l);
   const auto x = x_sd(code, bins);
-  SignedColumns columns;
-  code.columns(bins, columns);
+  const Paired paired_code(code, bins);
+  const SignedColumns columns = paired_code.lists.columns();
   std::size_t n_active = 0;
   std::size_t n_listed = 0;
   for (std::size_t j = 0; j < x.size(); ++j) {
-    if (x[j] != 0) n_active += code.place(j).paired ? 1 : 2;
+    if (x[j] != 0) n_active += code.slots_of(j).paired ? 1 : 2;
   }
-  for (const auto* list : {&columns.positive, &columns.negative}) {
+  for (const auto* list : {&columns.plus, &columns.minus}) {
     n_listed += list->size();
     EXPECT_TRUE(std::ranges::is_partitioned(
-        *list, [&](std::uint32_t j) { return j < code.n_double_columns(); }));
+        *list, [&](std::uint32_t j) { return j < code.n_double_slots(); }));
   }
   EXPECT_EQ(2 * n_listed, n_active);
 }
 
-TEST_P(StateCodeOfInputs, EveryColumnOfThePairedCodeHasItsPlace) {
+TEST_P(StateCodeOfInputs, EveryUnitHasItsSlotsInThePairedCode) {
   const auto code = small_code(GetParam(), 13, 5);
-  std::vector<int> taken(code.n_columns(), 0);
-  for (std::size_t j = 0; j < taken.size(); ++j) {
-    const auto place = code.place(j);
-    EXPECT_EQ(place.paired, place.first < code.n_double_columns());
-    ++taken[place.first];
-    if (place.paired) ++taken[place.second];
+  std::vector<int> taken(code.n_slots(), 0);
+  for (std::size_t j = 0; j < code.n_columns(); ++j) {
+    const auto slots = code.slots_of(j);
+    EXPECT_EQ(slots.paired, slots.first < code.n_double_slots());
+    ++taken[slots.first];
+    if (slots.paired) ++taken[slots.second];
   }
-  for (std::size_t j = 0; j < taken.size(); ++j) {
-    EXPECT_EQ(taken[j], j < code.n_double_columns() ? 2 : 1);
+  for (std::size_t j = 0; j < taken.size(); ++j) {  // 13 units of each word of 64
+    EXPECT_EQ(taken[j], j % 64 >= 13 ? 0 : j < code.n_double_slots() ? 2 : 1);
   }
-  EXPECT_THROW(static_cast<void>(code.place(taken.size())), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(code.slots_of(code.n_columns())), std::invalid_argument);
 }
 
 TEST_P(StateCodeOfInputs, TheDifferenceIsThatOfThePairedCodes) {
   const std::size_t l = GetParam();
   const auto code = small_code(l, 50, 6);
   core::Random random(2, core::Stream::ties);
-  SignedColumns columns;
+  ColumnLists changes(code.n_words());
   for (int trial = 0; trial < 100; ++trial) {
     std::vector<Bin> from(l);
     std::vector<Bin> to(l);
     for (auto& bin : from) bin = static_cast<Bin>(random.below(360));
     for (auto& bin : to) bin = static_cast<Bin>(random.below(360));
-    code.difference(from, to, columns);
-    const auto change = dense(code.n_columns(), columns);
+    changes.read_changes(Paired(code, from).view(), Paired(code, to).view());
+    const auto change = dense(code.n_slots(), changes.columns());
     const auto before = paired(code, from);
     const auto after = paired(code, to);
     for (std::size_t j = 0; j < change.size(); ++j) ASSERT_EQ(change[j], after[j] - before[j]);
@@ -156,12 +172,12 @@ TEST(StateCode, AnAnchorStateHasHalfOfItsColumns) {
   EXPECT_EQ(code.inner_product(anchors, anchors), 12 * 32);
 }
 
-TEST(StateCode, EncodeRefusesWhatIsNoState) {
+TEST(StateCode, RefusesWhatIsNoState) {
   const auto code = small_code(2, 10, 8);
   std::vector<Bin> bins(2);
   const auto message = [&](std::vector<double> state) -> std::string {
     try {
-      code.encode(state, bins);
+      code.bins_of(state, bins);
     } catch (const std::invalid_argument& error) {
       return error.what();
     }
@@ -177,11 +193,11 @@ TEST(StateCode, EncodeRefusesWhatIsNoState) {
 
 TEST(StateCode, RefusesWrongWiring) {
   const auto code = small_code(2, 3, 9);
-  const std::vector<CodeBook<64>> books = {code.book(0), code.book(1)};
-  EXPECT_THROW(StateCode<64>({code.book(0)}, {}), std::invalid_argument);
-  EXPECT_THROW(StateCode<64>(books, {{0, 1, 2}}), std::invalid_argument);
-  EXPECT_THROW(StateCode<64>(books, {{0, 1, 2}, {0, 1, 1}}), std::invalid_argument);
-  EXPECT_NO_THROW(StateCode<64>(books, {{0, 1, 2}, {2, 1, 0}}));
+  const std::vector<PatternTable> tables = {code.table(0), code.table(1)};
+  EXPECT_THROW(StateCode({code.table(0)}, {}), std::invalid_argument);
+  EXPECT_THROW(StateCode(tables, {{0, 1, 2}}), std::invalid_argument);
+  EXPECT_THROW(StateCode(tables, {{0, 1, 2}, {0, 1, 1}}), std::invalid_argument);
+  EXPECT_NO_THROW(StateCode(tables, {{0, 1, 2}, {2, 1, 0}}));
   EXPECT_THROW(static_cast<void>(code.permutation(1, 1)), std::invalid_argument);
 }
 

@@ -14,7 +14,7 @@ struct Code {
   std::vector<std::uint64_t> active;
   std::vector<std::uint64_t> positive;
 
-  coding::CodeWords words() const { return {active.data(), positive.data()}; }
+  coding::TernaryCode words() const { return {active.data(), positive.data()}; }
   /// +1, 0 or -1.
   int at(std::size_t slot) const {
     if ((active[slot / 64] >> slot % 64 & 1) == 0) return 0;

@@ -23,7 +23,7 @@ namespace sdnn::experiments {
 namespace {
 
 using testing::LookupTable;
-using Network = approximators::SDNNC<256>;
+using Network = approximators::SDNNC;
 
 /// What a test varies; the rest is the paper's.
 struct Setting {

@@ -157,7 +157,7 @@ def paper_network():
 def test_code_books_follow_the_anchor_rule(circular):
     core = _core.SDNNC(_core.SDNNCConfig(circular=[circular] * 4), 5)
     for mu in range(4):
-        book = core.code_book(mu)
+        book = core.table(mu)
         assert book.shape == (360, 200)
         assert set(np.unique(book)) == {-1, 1}
         for anchor in range(8):
@@ -176,13 +176,13 @@ def test_the_ends_of_a_range_are_alike_only_if_circular():
     for circular, most in ((True, 6), (False, None)):
         core = _core.SDNNC(_core.SDNNCConfig(circular=[circular] * 4), 5)
         for mu in range(4):
-            book = core.code_book(mu)
+            book = core.table(mu)
             distance = int((book[0] != book[359]).sum())
             assert distance <= most if circular else distance > 60
 
 
 def test_code_books_of_two_inputs_are_independent(paper_network):
-    first, second = (paper_network.code_book(mu).astype(int) for mu in (0, 1))
+    first, second = (paper_network.table(mu).astype(int) for mu in (0, 1))
     anchors = [45 * i for i in range(8)]
     # Balanced random patterns of 200 units: a product of standard deviation about 14.
     assert np.abs(first[anchors] @ second[anchors].T).max() < 5 * 14.2

@@ -11,7 +11,7 @@ def transcribe(core: _core.SDNNC) -> paper.SDNNC:
     config = core.config
     inputs = range(config.n_inputs)
     return paper.SDNNC(
-        code_books=[core.code_book(mu) for mu in inputs],
+        code_books=[core.table(mu) for mu in inputs],
         permutations={
             (mu, nu): core.permutation(mu, nu) for mu in inputs for nu in inputs if mu != nu
         },

@@ -58,6 +58,13 @@ class QLearning {
   /// Starts counting the steps of an episode anew (for the greedy first steps).
   void begin_episode() noexcept { step_ = 0; }
 
+  /// Lets the approximator write to the memory that it will need, where it knows how.
+  void warm_caches()
+    requires requires(Q& q) { q.warm_caches(); }
+  {
+    action_value_.warm_caches();
+  }
+
   /// The action to take in `state`; without `explore` a best one. Shape: state (l,) in [0, 1].
   std::size_t act(std::span<const double> state, bool explore = true) {
     action_value_.values(state, values_);

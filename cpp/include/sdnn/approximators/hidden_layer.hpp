@@ -14,7 +14,8 @@
 #include <vector>
 
 #include "sdnn/approximators/detail/column_sums.hpp"
-#include "sdnn/coding/state_code.hpp"
+#include "sdnn/coding/detail/ternary_code.hpp"
+#include "sdnn/core/bit_layer.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
 
@@ -24,10 +25,10 @@ namespace sdnn::approximators {
 ///
 /// Every sum is exact, so its order does not matter. The units come in blocks of 64; a block holds
 /// its weights column by column (one cache line: one input unit, 64 hidden units), because a pass
-/// reads only the columns that are not neutral. A weight is one byte, -127 to 127; what a few
-/// weights exceed that by, in multiples of 128, is kept in a short list, and in a second layer of
-/// bytes when the list is full. A correction that would take a weight out of both bytes, or a
-/// potential out of 32 bits, throws and changes nothing.
+/// reads only the columns that are not neutral. A weight is a byte, -127 to 127, plus 128 times a
+/// *high byte*. High bytes lie in a second layer, of which a pass reads only the columns that have
+/// one that is not 0 in a block: in training, few ever do. A correction that would take a weight
+/// out of both bytes, or a potential out of 32 bits, throws and changes nothing.
 ///
 /// Source: section 3.1 (layer 4, z) and Eqs. (2), (3).
 class HiddenLayer {
@@ -44,11 +45,9 @@ class HiddenLayer {
         static_cast<std::int32_t>(std::min<std::size_t>(kWeightLimit, kThresholdLimit / n_columns));
     n_blocks_ = core::round_up(n_units, kBlockUnits) / kBlockUnits;
     bytes_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * block_bytes());
-    high_bytes_ = bytes_;  // copied, so that its memory is there before it is needed
-    most_carries_ = std::max(kFewCarries, bytes_.size() / kBytesPerCarry);
-    carries_.resize(most_carries_);  // its memory too
-    carries_.clear();
-    may_carry_.assign(n_units, 0);
+    high_bytes_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * block_bytes());
+    high_columns_.assign(n_blocks_, Columns(n_columns));
+    high_anywhere_ = Columns(n_columns);
     thresholds_.assign(n_units, 0);
     largest_weight_.assign(n_units, 0);
     group_of_block_.assign(n_blocks_, kLargestGroup);
@@ -57,15 +56,18 @@ class HiddenLayer {
   std::size_t n_units() const noexcept { return n_units_; }
   std::size_t n_columns() const noexcept { return n_columns_; }
   std::size_t n_double_columns() const noexcept { return n_double_; }
-  /// How many weights outside one byte are listed.
-  std::size_t n_carries() const noexcept { return carries_.size(); }
-  /// Whether every weight has a second byte.
-  bool has_high_bytes() const noexcept { return has_high_bytes_; }
+  /// The columns that a pass reads high bytes of, summed over blocks.
+  std::size_t n_high_columns() const noexcept {
+    std::size_t n = 0;
+    for (const Columns& columns : high_columns_) n += columns.size();
+    return n;
+  }
   /// The largest |weight| that is held before std::overflow_error.
   std::int32_t weight_limit() const noexcept { return weight_limit_; }
 
   std::int32_t weight(std::size_t unit, std::size_t column) const noexcept {
-    return bytes_[byte_index(unit, column)] + carry(unit, column);
+    const std::size_t at = byte_index(unit, column);
+    return bytes_[at] + kHighByte * high_bytes_[at];
   }
   std::int32_t threshold(std::size_t unit) const noexcept { return thresholds_[unit]; }
 
@@ -73,7 +75,8 @@ class HiddenLayer {
   void set_weight(std::size_t unit, std::size_t column, std::int32_t value) {
     core::require_in_range("weight", value, -weight_limit_, weight_limit_);
     if (std::abs(value) > largest_weight_[unit]) note_largest(unit, std::abs(value));
-    store(unit, column, value - carry(unit, column));
+    high_bytes_[byte_index(unit, column)] = 0;
+    store(unit, column, value);
   }
   /// Throws std::invalid_argument if |value| reaches 2^30.
   void set_threshold(std::size_t unit, std::int32_t value) {
@@ -81,24 +84,27 @@ class HiddenLayer {
     thresholds_[unit] = value;
   }
 
+  /// Writes to all memory that learning may need, so that no decision meets pages it is the first
+  /// to use. Changes nothing.
+  void touch_memory() noexcept {
+    constexpr std::size_t kPage = 4096;
+    for (std::size_t at = 0; at < high_bytes_.size(); at += kPage) {
+      std::int8_t volatile& byte = high_bytes_[at];
+      byte = byte;
+    }
+  }
+
   /// The inner potentials of all units for the ternary input with these columns. Shape: out (n,).
-  /// The input's scratch row is overwritten.
-  void potentials(coding::SignedColumns& input, std::span<std::int32_t> out) const {
+  void potentials(const coding::SignedColumns& input, std::span<std::int32_t> out) const {
     assert(out.size() == n_units_);
     for (std::size_t i = 0; i < n_units_; ++i) out[i] = -thresholds_[i];
     add(input, out);
   }
 
   /// out_i += w_i . x for the input with these columns, in which a column may come more than once.
-  void add(coding::SignedColumns& input, std::span<std::int32_t> out) const {
-    add_signed(input.positive, +1, out);
-    add_signed(input.negative, -1, out);
-    if (carries_.empty()) return;
-    std::vector<std::int16_t>& values = input.values;
-    values.assign(n_columns_, 0);
-    for (const std::uint32_t column : input.positive) ++values[column];
-    for (const std::uint32_t column : input.negative) --values[column];
-    for (const Carry& c : carries_) out[c.unit] += c.amount * values[c.column];
+  void add(const coding::SignedColumns& input, std::span<std::int32_t> out) const {
+    add_signed(input.plus, +1, out);
+    add_signed(input.minus, -1, out);
   }
 
   /// w_i += step * x, twice that in double columns, and w_i0 -= step for every i in `units`. No
@@ -124,11 +130,7 @@ class HiddenLayer {
           changed = unit;
           ++n_changed;
         } else {
-          for (const Part& part : parts) {
-            for (const auto j : part.columns) {
-              store(unit, j, bytes_[byte_index(unit, j)] + part.change);
-            }
-          }
+          for (const Part& part : parts) add_with_high_bytes(unit, part);
         }
       }
       for (const Part& part : parts) {
@@ -141,19 +143,38 @@ class HiddenLayer {
  private:
   static constexpr std::int32_t kThresholdLimit = (std::int32_t{1} << 30) - 1;
   static constexpr std::int32_t kByteLimit = 127;
-  static constexpr std::int32_t kCarry = 128;
-  static constexpr std::int32_t kWeightLimit = kByteLimit * kCarry + kByteLimit;
+  static constexpr std::int32_t kHighByte = 128;
+  static constexpr std::int32_t kWeightLimit = kByteLimit * kHighByte + kByteLimit;
   static constexpr int kLargestGroup = 4;
-  /// Adding a listed carry takes about as long as adding that many bytes of a second layer.
-  static constexpr std::size_t kBytesPerCarry = 128;
-  static constexpr std::size_t kFewCarries = 4096;
 
-  /// What a weight exceeds its byte by: a multiple of kCarry, not 0.
-  struct Carry {
-    std::uint32_t unit;
-    std::uint32_t column;
-    std::int32_t amount;
+  /// A set of columns.
+  class Columns {
+   public:
+    Columns() = default;
+    explicit Columns(std::size_t n_columns) : words_(core::n_bit_words(n_columns)) {}
+
+    std::size_t size() const noexcept { return size_; }
+    bool holds(std::size_t column) const noexcept { return words_[column / 64][column % 64]; }
+    void add(std::size_t column) noexcept {
+      size_ += holds(column) ? 0 : 1;
+      words_[column / 64][column % 64] = true;
+    }
+    /// Writes those of `columns` that are in the set; returns how many.
+    std::size_t select(std::span<const std::uint32_t> columns, std::uint32_t* out) const noexcept {
+      std::size_t n = 0;
+      for (const std::uint32_t column : columns) {
+        out[n] = column;
+        n += holds(column) ? 1 : 0;
+      }
+      return n;
+    }
+
+   private:
+    std::vector<core::BitWord> words_;
+    std::size_t size_ = 0;
   };
+
+  using SomeColumns = std::array<std::uint32_t, ColumnPlaces::kMost>;
 
   std::size_t byte_index(std::size_t unit, std::size_t column) const noexcept {
     return unit / kBlockUnits * block_bytes() + column * kBlockUnits + unit % kBlockUnits;
@@ -162,14 +183,16 @@ class HiddenLayer {
   /// A block's bytes: its columns, and one more of zeros, to which lists of columns are padded.
   std::size_t block_bytes() const noexcept { return (n_columns_ + 1) * kBlockUnits; }
 
-  /// out_i += sign * the bytes of the columns; listed carries are left out.
+  /// out_i += sign * the weights of the columns.
   void add_signed(std::span<const std::uint32_t> columns, int sign,
                   std::span<std::int32_t> out) const {
-    const AddColumns add_columns = add_columns_kernel();
     while (!columns.empty()) {
       const auto some = columns.first(std::min(ColumnPlaces::kMost, columns.size()));
       columns = columns.subspan(some.size());
       const ColumnPlaces places(some, n_columns_);
+      SomeColumns high;
+      const std::size_t n_high =
+          high_anywhere_.size() == 0 ? 0 : high_anywhere_.select(some, high.data());
       for (std::size_t b = 0; b < n_blocks_; ++b) {
         alignas(core::kCacheLine) std::array<std::int32_t, kBlockUnits> padded;
         const std::size_t first = b * kBlockUnits;
@@ -177,12 +200,26 @@ class HiddenLayer {
         if (!whole) padded.fill(0);
         std::int32_t* const sums = whole ? out.data() + first : padded.data();
         add_columns(bytes_.data() + b * block_bytes(), places, group_of_block_[b], sign, sums);
-        if (has_high_bytes_) {
-          add_columns(high_bytes_.data() + b * block_bytes(), places, 1, sign * kCarry, sums);
+        if (n_high > 0 && high_columns_[b].size() > 0) {
+          add_high_bytes(b, std::span(high).first(n_high), sign, sums);
         }
         for (std::size_t i = first; !whole && i < n_units_; ++i) out[i] += padded[i - first];
       }
     }
+  }
+
+  /// The part of high bytes. Where many columns have some, telling which costs more than it saves.
+  void add_high_bytes(std::size_t block, std::span<const std::uint32_t> columns, int sign,
+                      std::int32_t* sums) const {
+    SomeColumns own;
+    if (high_columns_[block].size() < n_columns_ / 4) {
+      columns = {own.data(), high_columns_[block].select(columns, own.data())};
+    }
+    const std::int32_t bound = (largest_of_block(block) + kByteLimit) / kHighByte;
+    int group = kLargestGroup;
+    while (group > 1 && bound > kByteLimit / group) group /= 2;
+    add_columns(high_bytes_.data() + block * block_bytes(), ColumnPlaces(columns, n_columns_),
+                group, sign * kHighByte, sums);
   }
 
   /// Columns of an input whose weights a correction changes alike.
@@ -197,14 +234,12 @@ class HiddenLayer {
                                             [this](std::uint32_t j) { return j < n_double_; });
       return static_cast<std::size_t>(end - columns.begin());
     };
-    const std::span<const std::uint32_t> positive = input.positive;
-    const std::span<const std::uint32_t> negative = input.negative;
-    const std::size_t n_positive = split(positive);
-    const std::size_t n_negative = split(negative);
-    return {{{positive.first(n_positive), 2 * step},
-             {negative.first(n_negative), -2 * step},
-             {positive.subspan(n_positive), step},
-             {negative.subspan(n_negative), -step}}};
+    const std::size_t n_plus = split(input.plus);
+    const std::size_t n_minus = split(input.minus);
+    return {{{input.plus.first(n_plus), 2 * step},
+             {input.minus.first(n_minus), -2 * step},
+             {input.plus.subspan(n_plus), step},
+             {input.minus.subspan(n_minus), -step}}};
   }
 
   /// What a correction can add to the largest weight of a unit.
@@ -217,6 +252,12 @@ class HiddenLayer {
     for (const std::uint32_t column : part.columns) {
       std::int8_t& weight = lane[std::size_t{column} * kBlockUnits];
       weight = static_cast<std::int8_t>(weight + part.change);
+    }
+  }
+
+  void add_with_high_bytes(std::size_t unit, const Part& part) noexcept {
+    for (const std::uint32_t column : part.columns) {
+      store(unit, column, bytes_[byte_index(unit, column)] + part.change);
     }
   }
 
@@ -235,64 +276,25 @@ class HiddenLayer {
     }
   }
 
-  /// Where the carry of a weight is in the sorted list, or would be.
-  std::size_t carry_index(std::size_t unit, std::size_t column) const noexcept {
-    const auto at = std::lower_bound(
-        carries_.begin(), carries_.end(), std::pair(unit, column), [](const Carry& c, auto key) {
-          return std::pair<std::size_t, std::size_t>(c.unit, c.column) < key;
-        });
-    return static_cast<std::size_t>(at - carries_.begin());
-  }
-
-  bool is_carry_of(std::size_t index, std::size_t unit, std::size_t column) const noexcept {
-    return index < carries_.size() && carries_[index].unit == unit &&
-           carries_[index].column == column;
-  }
-
-  std::int32_t carry(std::size_t unit, std::size_t column) const noexcept {
-    if (has_high_bytes_) return kCarry * high_bytes_[byte_index(unit, column)];
-    if (!may_carry_[unit]) return 0;
-    const std::size_t at = carry_index(unit, column);
-    return is_carry_of(at, unit, column) ? carries_[at].amount : 0;
-  }
-
-  /// Gives the byte of a weight this value, which may lie outside a byte: the rest is carried.
-  void store(std::size_t unit, std::size_t column, std::int32_t value) {
+  /// Gives the byte of a weight this value; what lies outside a byte is added to the high byte.
+  void store(std::size_t unit, std::size_t column, std::int32_t value) noexcept {
+    const std::size_t at = byte_index(unit, column);
     if (std::abs(value) > kByteLimit) {
-      const std::int32_t change = value / kCarry;  // towards 0
-      value -= change * kCarry;
-      add_carry(unit, column, change);
+      const std::int32_t change = value / kHighByte;  // towards 0
+      value -= change * kHighByte;
+      high_bytes_[at] = static_cast<std::int8_t>(high_bytes_[at] + change);
+      high_columns_[unit / kBlockUnits].add(column);
+      high_anywhere_.add(column);
     }
-    bytes_[byte_index(unit, column)] = static_cast<std::int8_t>(value);
+    bytes_[at] = static_cast<std::int8_t>(value);
   }
 
-  void add_carry(std::size_t unit, std::size_t column, std::int32_t change) {
-    if (!has_high_bytes_ && carries_.size() == most_carries_) spread_carries();
-    if (has_high_bytes_) {
-      std::int8_t& high = high_bytes_[byte_index(unit, column)];
-      high = static_cast<std::int8_t>(high + change);
-      return;
-    }
-    const std::size_t at = carry_index(unit, column);
-    const auto place = carries_.begin() + static_cast<std::ptrdiff_t>(at);
-    if (!is_carry_of(at, unit, column)) {
-      carries_.insert(place, {static_cast<std::uint32_t>(unit), static_cast<std::uint32_t>(column),
-                              change * kCarry});
-      may_carry_[unit] = 1;
-    } else if (place->amount + change * kCarry == 0) {
-      carries_.erase(place);
-    } else {
-      place->amount += change * kCarry;
-    }
-  }
-
-  /// From the list to a second byte for every weight.
-  void spread_carries() noexcept {
-    for (const Carry& c : carries_) {
-      high_bytes_[byte_index(c.unit, c.column)] = static_cast<std::int8_t>(c.amount / kCarry);
-    }
-    carries_.clear();
-    has_high_bytes_ = true;
+  /// A bound of the |weights| of a block.
+  std::int32_t largest_of_block(std::size_t block) const noexcept {
+    const std::size_t end = std::min(n_units_, (block + 1) * kBlockUnits);
+    return *std::max_element(
+        largest_weight_.begin() + static_cast<std::ptrdiff_t>(block * kBlockUnits),
+        largest_weight_.begin() + static_cast<std::ptrdiff_t>(end));
   }
 
   std::int32_t largest_weight(std::size_t unit) const noexcept {
@@ -352,12 +354,10 @@ class HiddenLayer {
   std::size_t n_double_;
   std::size_t n_blocks_ = 0;
   std::int32_t weight_limit_;
-  core::AlignedBuffer<std::int8_t> bytes_;  ///< [block][column, then zeros][unit in block]
-  core::AlignedBuffer<std::int8_t> high_bytes_;
-  bool has_high_bytes_ = false;
-  std::size_t most_carries_ = 0;
-  std::vector<Carry> carries_;           ///< sorted by unit and column
-  std::vector<std::uint8_t> may_carry_;  ///< whether a unit ever had a carry
+  core::AlignedBuffer<std::int8_t> bytes_;       ///< [block][column, then zeros][unit in block]
+  core::AlignedBuffer<std::int8_t> high_bytes_;  ///< the same, in multiples of kHighByte
+  std::vector<Columns> high_columns_;            ///< of each block: those with high bytes, ever
+  Columns high_anywhere_;                        ///< their union
   std::vector<std::int32_t> thresholds_;
   std::vector<std::int32_t> largest_weight_;  ///< an upper bound of max_j |w_ij|
   std::vector<int> group_of_block_;           ///< columns of a block that may be added in 8 bits

@@ -19,8 +19,9 @@
 #include "sdnn/approximators/hidden_layer.hpp"
 #include "sdnn/approximators/output_scale.hpp"
 #include "sdnn/coding/action_code.hpp"
-#include "sdnn/coding/desensitization.hpp"
-#include "sdnn/coding/pattern_code.hpp"
+#include "sdnn/coding/anchor_patterns.hpp"
+#include "sdnn/coding/pattern_table.hpp"
+#include "sdnn/coding/permutation.hpp"
 #include "sdnn/coding/state_code.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
@@ -77,23 +78,28 @@ struct SDNNCConfig {
   bool operator==(const SDNNCConfig&) const = default;
 };
 
-/// The network of section 3 with patterns of at most `Capacity` units.
+/// The network of section 3.
 ///
 /// Wiring (code books, permutations) is fixed by config and seed. Reading does not change what is
 /// returned, but the network remembers the potentials of recent states and keeps them exact while
 /// it learns (see PotentialMemory), so that one decision needs at most one pass over the weights.
 /// An object must not be used by two threads at once; copies share the wiring and nothing else.
-template <std::size_t Capacity>
 class SDNNC {
  public:
-  /// Throws std::invalid_argument naming the field that is impossible; std::length_error if a
-  /// pattern does not fit into Capacity; std::bad_alloc.
+  /// Code books by anchor interpolation. Throws std::invalid_argument naming the field that is
+  /// impossible; std::bad_alloc.
   SDNNC(const SDNNCConfig& config, std::uint64_t seed)
+      : SDNNC(config, anchor_tables(config, seed), seed) {}
+
+  /// Code books of any coding, a table per input: the range [0, 1] is cut into as many equal bins
+  /// as the table has patterns. The config's fields about anchors do not matter then. Throws
+  /// std::invalid_argument if n_inputs or n_pattern_units are not the tables', and as above.
+  SDNNC(const SDNNCConfig& config, std::vector<coding::PatternTable> tables, std::uint64_t seed)
       : config_(config),
-        code_(make_code(config, seed)),
+        code_(make_code(config, std::move(tables), seed)),
         actions_(config.n_hidden_units, config.n_active_units, config.n_actions),
         scale_(make_scale(config)),
-        hidden_layer_(actions_.n_hidden_units(), code_->n_columns(), code_->n_double_columns()),
+        hidden_layer_(actions_.n_hidden_units(), code_->n_slots(), code_->n_double_slots()),
         memory_(*code_, actions_.n_hidden_units(), actions_.n_active_units()) {
     core::require_positive("learning_coefficient", config.learning_coefficient);
     core::require_in_range("lattice", config.lattice, 1, 64);
@@ -106,23 +112,22 @@ class SDNNC {
     bins_.resize(code_->n_inputs());
     moves_.resize(actions_.n_hidden_units() - actions_.n_active_units());
     selected_.reserve(actions_.n_active_units());
-    rehearse();
   }
 
   const SDNNCConfig& config() const noexcept { return config_; }
-  const coding::StateCode<Capacity>& state_code() const noexcept { return *code_; }
+  const coding::StateCode& state_code() const noexcept { return *code_; }
   const coding::ActionCode& action_code() const noexcept { return actions_; }
   const OutputScale& output_scale() const noexcept { return scale_; }
   const HiddenLayer& hidden_layer() const noexcept { return hidden_layer_; }
-  const PotentialMemory<Capacity>& memory() const noexcept { return memory_; }
+  const PotentialMemory& memory() const noexcept { return memory_; }
   std::size_t n_inputs() const noexcept { return code_->n_inputs(); }
   std::size_t n_actions() const noexcept { return actions_.n_actions(); }
 
   /// The weight of a hidden unit for a unit of x_SD, in the paper's order, in lattice steps.
   std::int32_t weight(std::size_t unit, std::size_t j) const {
-    const auto place = code_->place(j);
-    const std::int32_t first = hidden_layer_.weight(unit, place.first);
-    return place.paired ? (first + place.sign * hidden_layer_.weight(unit, place.second)) / 2
+    const auto slots = code_->slots_of(j);
+    const std::int32_t first = hidden_layer_.weight(unit, slots.first);
+    return slots.paired ? (first + slots.sign * hidden_layer_.weight(unit, slots.second)) / 2
                         : first;
   }
 
@@ -162,8 +167,8 @@ class SDNNC {
   /// One step of error correction: Q = Q(state, action) moves towards
   /// q_hat = (1 - rate) Q + rate * target.
   ///
-  /// Source: Fig. 2, Eqs. (1) to (3); spec section 1, "Learning". Throws std::invalid_argument for a
-  /// bad state, action or rate or a NaN target, std::overflow_error; then nothing has changed.
+  /// Source: Fig. 2, Eqs. (1) to (3); spec section 1, "Learning". Throws std::invalid_argument for
+  /// a bad state, action or rate or a NaN target, std::overflow_error; then nothing has changed.
   void correct(std::span<const double> state, std::size_t action, double target,
                double rate = 1.0) {
     core::require(!std::isnan(target), "target", "a number", target);
@@ -191,17 +196,32 @@ class SDNNC {
     core::require(out.size() == hidden_layer_.n_units(), "out",
                   std::to_string(hidden_layer_.n_units()) + " values", out.size());
     std::vector<coding::Bin> bins(n_inputs());
-    coding::SignedColumns columns;
-    code_->encode(state, bins);
-    code_->columns(bins, columns);
-    hidden_layer_.potentials(columns, out);
+    code_->bins_of(state, bins);
+    std::vector<std::uint64_t> words(2 * code_->n_words());
+    code_->encode(bins, words.data(), words.data() + code_->n_words());
+    coding::ColumnLists lists(code_->n_words());
+    lists.read({words.data(), words.data() + code_->n_words()});
+    hidden_layer_.potentials(lists.columns(), out);
+  }
+
+  /// Asks for some states and forgets them, and touches the memory that learning may need: the
+  /// first decision then finds everything in the caches, as every later one does. Nothing that is
+  /// ever returned changes.
+  void warm_caches() {
+    constexpr int kStates = 8;  // each reads a third of the weights
+    hidden_layer_.touch_memory();
+    std::vector<double> out(n_actions());
+    for (int i = 0; i < kStates; ++i) {
+      values(std::vector<double>(n_inputs(), (i + 0.5) / kStates), out);
+    }
+    memory_ = PotentialMemory(*code_, actions_.n_hidden_units(), actions_.n_active_units());
   }
 
   /// Replaces weights and thresholds, in lattice steps. Shapes: weights (n, D) row by row,
   /// thresholds (n,). Throws std::invalid_argument, and then nothing has changed.
   void set_parameters(std::span<const std::int32_t> weights,
                       std::span<const std::int32_t> thresholds) {
-    const std::size_t n_columns = hidden_layer_.n_columns();
+    const std::size_t n_columns = code_->n_columns();
     core::require(weights.size() == hidden_layer_.n_units() * n_columns, "weights",
                   "n_hidden_units x D values", weights.size());
     core::require(thresholds.size() == hidden_layer_.n_units(), "thresholds",
@@ -209,11 +229,12 @@ class SDNNC {
     for (const std::int32_t weight : weights) {
       core::require_in_range("weight", weight, -largest_initial_weight(), largest_initial_weight());
     }
-    HiddenLayer replaced(hidden_layer_.n_units(), n_columns, hidden_layer_.n_double_columns());
+    HiddenLayer replaced(hidden_layer_.n_units(), hidden_layer_.n_columns(),
+                         hidden_layer_.n_double_columns());
     for (std::size_t j = 0; j < n_columns; ++j) {
-      const auto place = code_->place(j);
+      const auto slots = code_->slots_of(j);
       for (std::size_t unit = 0; unit < hidden_layer_.n_units(); ++unit) {
-        add_weight(replaced, unit, place, weights[unit * n_columns + j]);
+        add_weight(replaced, unit, slots, weights[unit * n_columns + j]);
       }
     }
     for (std::size_t unit = 0; unit < hidden_layer_.n_units(); ++unit) {
@@ -224,24 +245,41 @@ class SDNNC {
   }
 
  private:
-  using Remembered = typename PotentialMemory<Capacity>::Entry;
+  using Remembered = PotentialMemory::Entry;
 
-  static std::shared_ptr<const coding::StateCode<Capacity>> make_code(const SDNNCConfig& config,
-                                                                      std::uint64_t seed) {
+  static std::size_t checked_inputs(const SDNNCConfig& config) {
     core::require_in_range("n_inputs", config.n_inputs, 2, 1024);
-    const auto l = static_cast<std::size_t>(config.n_inputs);
+    return static_cast<std::size_t>(config.n_inputs);
+  }
+
+  static std::vector<coding::PatternTable> anchor_tables(const SDNNCConfig& config,
+                                                         std::uint64_t seed) {
+    const std::size_t l = checked_inputs(config);
+    core::require_in_range("n_pattern_units", config.n_pattern_units, 2, 1 << 20);
     core::require(config.circular.empty() || config.circular.size() == l, "circular",
                   "empty or one flag per input", config.circular.size());
-    std::vector<coding::CodeBook<Capacity>> books;
+    std::vector<coding::PatternTable> tables;
     for (std::size_t mu = 0; mu < l; ++mu) {
       core::Random random(seed, core::Stream::code_books, mu);
-      books.push_back(coding::anchor_interpolation<Capacity>(
-          {.n_pattern_units = config.n_pattern_units,
-           .n_anchor_patterns = config.n_anchor_patterns,
-           .n_interpolated = config.n_interpolated,
-           .balanced_anchors = config.balanced_anchors,
-           .circular = !config.circular.empty() && config.circular[mu]},
-          random));
+      tables.push_back(
+          coding::anchor_patterns({.n_units = config.n_pattern_units,
+                                   .n_anchor_patterns = config.n_anchor_patterns,
+                                   .n_interpolated = config.n_interpolated,
+                                   .balanced = config.balanced_anchors,
+                                   .circular = !config.circular.empty() && config.circular[mu]},
+                                  random));
+    }
+    return tables;
+  }
+
+  static std::shared_ptr<const coding::StateCode> make_code(
+      const SDNNCConfig& config, std::vector<coding::PatternTable> tables, std::uint64_t seed) {
+    const std::size_t l = checked_inputs(config);
+    core::require(tables.size() == l, "tables", "one per input", tables.size());
+    for (const coding::PatternTable& table : tables) {
+      core::require(table.n_units() == static_cast<std::size_t>(config.n_pattern_units), "tables",
+                    "of n_pattern_units = " + std::to_string(config.n_pattern_units) + " units",
+                    table.n_units());
     }
     std::vector<coding::Permutation> permutations;
     for (std::size_t group = 0; group < l * (l - 1); ++group) {
@@ -249,8 +287,7 @@ class SDNNC {
       permutations.push_back(
           coding::random_permutation(static_cast<std::size_t>(config.n_pattern_units), random));
     }
-    return std::make_shared<const coding::StateCode<Capacity>>(std::move(books),
-                                                               std::move(permutations));
+    return std::make_shared<const coding::StateCode>(std::move(tables), std::move(permutations));
   }
 
   static OutputScale make_scale(const SDNNCConfig& config) {
@@ -266,13 +303,12 @@ class SDNNC {
 
   /// Adds to the weight of a unit of x_SD, where the paired code keeps it.
   static void add_weight(HiddenLayer& hidden_layer, std::size_t unit,
-                         const typename coding::StateCode<Capacity>::Place& place,
-                         std::int32_t weight) {
-    const auto add = [&](std::size_t column, std::int32_t change) {
-      hidden_layer.set_weight(unit, column, hidden_layer.weight(unit, column) + change);
+                         const coding::StateCode::Slots& slots, std::int32_t weight) {
+    const auto add = [&](std::size_t slot, std::int32_t change) {
+      hidden_layer.set_weight(unit, slot, hidden_layer.weight(unit, slot) + change);
     };
-    add(place.first, weight);
-    if (place.paired) add(place.second, place.sign * weight);
+    add(slots.first, weight);
+    if (slots.paired) add(slots.second, slots.sign * weight);
   }
 
   void initialize_weights(std::uint64_t seed) {
@@ -283,19 +319,19 @@ class SDNNC {
                   "at most " + std::to_string(largest_initial_weight()) + " / lattice",
                   config_.initial_weight_limit);
     core::Random random(seed, core::Stream::weights);
-    for (std::size_t j = 0; j < hidden_layer_.n_columns(); ++j) {
-      const auto place = code_->place(j);
+    for (std::size_t j = 0; j < code_->n_columns(); ++j) {
+      const auto slots = code_->slots_of(j);
       std::uint64_t bits = 0;
       for (std::size_t i = 0; i < hidden_layer_.n_units(); ++i) {
         if (config_.initial_weights == InitialWeights::ternary) {
           if (i % 32 == 0) bits = random.bits();  // two bits a weight
           add_weight(
-              hidden_layer_, i, place,
+              hidden_layer_, i, slots,
               static_cast<std::int32_t>(bits & 1) - static_cast<std::int32_t>(bits >> 1 & 1));
           bits >>= 2;
         } else {
           const double drawn = limit * (2.0 * random.uniform() - 1.0);
-          add_weight(hidden_layer_, i, place, static_cast<std::int32_t>(std::floor(drawn + 0.5)));
+          add_weight(hidden_layer_, i, slots, static_cast<std::int32_t>(std::floor(drawn + 0.5)));
         }
       }
     }
@@ -313,20 +349,8 @@ class SDNNC {
     }
   }
 
-  /// Asks for some states and forgets them: the first decision then finds the weights, the wiring
-  /// and the code in the caches, as every later one does.
-  void rehearse() {
-    constexpr int kStates = 8;  // each reads a third of the weights
-    std::vector<double> out(n_actions());
-    for (int i = 0; i < kStates; ++i) {
-      values(std::vector<double>(n_inputs(), (i + 0.5) / kStates), out);
-    }
-    memory_ =
-        PotentialMemory<Capacity>(*code_, actions_.n_hidden_units(), actions_.n_active_units());
-  }
-
   Remembered recall(std::span<const double> state) {
-    code_->encode(state, bins_);
+    code_->bins_of(state, bins_);
     return memory_.recall(*code_, hidden_layer_, bins_);
   }
 
@@ -343,14 +367,14 @@ class SDNNC {
   }
 
   SDNNCConfig config_;
-  std::shared_ptr<const coding::StateCode<Capacity>> code_;
+  std::shared_ptr<const coding::StateCode> code_;
   coding::ActionCode actions_;
   OutputScale scale_;
   HiddenLayer hidden_layer_;
   std::vector<double> value_of_count_;
 
   // Workspace: sized once, so that a step allocates nothing.
-  PotentialMemory<Capacity> memory_;
+  PotentialMemory memory_;
   std::vector<coding::Bin> bins_;
   std::vector<std::int8_t> moves_;  ///< what the count changes by as the window moves on a unit
   std::vector<std::uint32_t> selected_;

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "sdnn/approximators/detail/column_sums.hpp"
-#include "sdnn/approximators/dynamic_sdnn_c.hpp"
 #include "sdnn/approximators/error_correction.hpp"
+#include "sdnn/approximators/sdnn_c.hpp"
 #include "sdnn/benchmarks/stopwatch.hpp"
 #include "sdnn/coding/state_code.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
@@ -26,14 +26,14 @@ namespace sdnn::benchmarks {
 class NetworkParts {
  public:
   /// A copy of `network` is timed, and learns. The states follow from `seed`.
-  NetworkParts(approximators::DynamicSDNNC network, std::uint64_t seed)
+  NetworkParts(approximators::SDNNC network, std::uint64_t seed)
       : network_(std::move(network)),
         random_(seed, core::Stream::exploration),
         state_(network_.n_inputs()),
         values_(network_.n_actions()),
         potentials_(network_.hidden_layer().n_units()) {}
 
-  const approximators::DynamicSDNNC& network() const noexcept { return network_; }
+  const approximators::SDNNC& network() const noexcept { return network_; }
 
   /// Q(s, a) of all actions at a new state.
   Times time_values(int n_repetitions) {
@@ -102,24 +102,24 @@ class NetworkParts {
 
   /// Bytes of all weights, with the padding of the last block of units.
   std::size_t weight_bytes() const noexcept {
-    return padded_units() * network_.hidden_layer().n_columns();
+    return padded_units() * network_.state_code().n_columns();
   }
 
   /// Bytes of the weights that a pass has to read: those of columns that are not neutral, the mean
   /// over `n_states` new states. Throws std::invalid_argument unless n_states is at least 1.
   double mean_bytes_of_pass(int n_states) {
     core::require_in_range("n_states", n_states, 1, kMaxRepetitions);
+    const auto& code = network_.state_code();
+    std::vector<coding::Bin> bins(network_.n_inputs());
+    std::vector<std::uint64_t> words(2 * code.n_words());
+    const coding::TernaryCode paired{words.data(), words.data() + code.n_words()};
     std::size_t n_columns = 0;
-    network_.visit([&](const auto& network) {
-      std::vector<coding::Bin> bins(network.n_inputs());
-      coding::SignedColumns columns;
-      for (int i = 0; i < n_states; ++i) {
-        draw_state();
-        network.state_code().encode(state_, bins);
-        network.state_code().columns(bins, columns);
-        n_columns += columns.positive.size() + columns.negative.size();
-      }
-    });
+    for (int i = 0; i < n_states; ++i) {
+      draw_state();
+      code.bins_of(state_, bins);
+      code.encode(bins, words.data(), words.data() + code.n_words());
+      n_columns += coding::n_active(paired, code.n_words());
+    }
     return static_cast<double>(n_columns * padded_units()) / n_states;
   }
 
@@ -142,7 +142,7 @@ class NetworkParts {
     network_.values(state_, values_);
   }
 
-  approximators::DynamicSDNNC network_;
+  approximators::SDNNC network_;
   core::Random random_;
   std::vector<double> state_;
   std::vector<double> values_;

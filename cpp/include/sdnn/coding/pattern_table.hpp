@@ -1,6 +1,7 @@
-/// Patterns of +1 and -1 for the bins of one input, at a length chosen at run time.
+/// Layer 2: the patterns of +1 and -1 that stand for the bins of one input.
 #pragma once
 
+#include <algorithm>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
@@ -9,20 +10,30 @@
 #include <string>
 #include <vector>
 
+#include "sdnn/core/bit_layer.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::coding {
 
-/// `n_bins` patterns of `n_units` units each, one bit per unit (set = +1); unused bits are zero.
+/// The number of a sub-range of an input's range, and of the pattern that stands for it.
+using Bin = std::int32_t;
+
+/// The bin of `value` among `n_bins` equal half-open parts of [0, 1]; 1 falls into the last.
+inline Bin bin_of(double value, std::size_t n_bins) noexcept {
+  assert(value >= 0.0 && value <= 1.0);
+  const auto bin = static_cast<std::size_t>(value * static_cast<double>(n_bins));
+  return static_cast<Bin>(bin < n_bins ? bin : n_bins - 1);
+}
+
+/// `n_bins` patterns of `n_units` units each (set = +1): what every coding makes.
 ///
-/// Unlike a CodeBook it has no compiled capacity: the codes of a regressor are thousands of units
-/// long. Unit k of a pattern is bit k % 64 of its word k / 64.
+/// Source: section 3.1 (layer 2). Memory: n_bins * n_units / 8 bytes, patterns begin on words.
 class PatternTable {
  public:
   /// All units -1. Throws std::invalid_argument unless there is at least one bin and one unit.
   PatternTable(std::size_t n_bins, std::size_t n_units)
-      : n_bins_(n_bins), n_units_(n_units), n_words_((n_units + 63) / 64) {
+      : n_bins_(n_bins), n_units_(n_units), n_words_(core::n_bit_words(n_units)) {
     core::require_in_range("n_bins", n_bins, 1, std::size_t{1} << 30);
     core::require_in_range("n_units", n_units, 1, std::size_t{1} << 24);
     words_.resize(n_bins_ * n_words_);
@@ -42,8 +53,7 @@ class PatternTable {
         if (*sign != 1 && *sign != -1) {
           core::require(false, "patterns", "+1 or -1 everywhere", static_cast<int>(*sign));
         }
-        const auto on = static_cast<std::uint64_t>(*sign > 0);
-        table.words_[bin * table.n_words_ + unit / 64] |= on << unit % 64;
+        table.set(bin, unit, *sign > 0);
       }
     }
     return table;
@@ -51,27 +61,29 @@ class PatternTable {
 
   std::size_t n_bins() const noexcept { return n_bins_; }
   std::size_t n_units() const noexcept { return n_units_; }
-  /// Words of 64 units per pattern.
+  /// Words of a pattern.
   std::size_t n_words() const noexcept { return n_words_; }
+  /// The words of all patterns, one pattern after the other.
+  const core::BitWord* words() const noexcept { return words_.data(); }
 
-  std::span<const std::uint64_t> operator[](std::size_t bin) const noexcept {
+  core::BitLayer operator[](std::size_t bin) const noexcept {
     assert(bin < n_bins_);
-    return {words_.data() + bin * n_words_, n_words_};
+    return {words_.data() + bin * n_words_, n_units_};
   }
   /// +1 or -1.
-  int sign(std::size_t bin, std::size_t unit) const noexcept {
+  int sign(std::size_t bin, std::size_t unit) const noexcept { return (*this)[bin][unit] ? 1 : -1; }
+  void set(std::size_t bin, std::size_t unit, bool on = true) noexcept {
     assert(bin < n_bins_ && unit < n_units_);
-    return (words_[bin * n_words_ + unit / 64] >> unit % 64 & 1) != 0 ? 1 : -1;
+    words_[bin * n_words_ + unit / 64][unit % 64] = on;
   }
   void flip(std::size_t bin, std::size_t unit) noexcept {
     assert(bin < n_bins_ && unit < n_units_);
-    words_[bin * n_words_ + unit / 64] ^= std::uint64_t{1} << unit % 64;
+    words_[bin * n_words_ + unit / 64].flip(unit % 64);
   }
   /// Makes the pattern of `bin` a copy of that of `from`.
   void copy(std::size_t from, std::size_t bin) noexcept {
-    for (std::size_t w = 0; w < n_words_; ++w) {
-      words_[bin * n_words_ + w] = words_[from * n_words_ + w];
-    }
+    assert(from < n_bins_ && bin < n_bins_);
+    std::copy_n(words_.data() + from * n_words_, n_words_, words_.data() + bin * n_words_);
   }
 
   bool operator==(const PatternTable&) const = default;
@@ -80,15 +92,20 @@ class PatternTable {
   std::size_t n_bins_;
   std::size_t n_units_;
   std::size_t n_words_;
-  std::vector<std::uint64_t> words_;
+  std::vector<core::BitWord> words_;
 };
 
-/// Makes `bin` a random pattern with floor(n_units / 2) units at +1; it must be all -1 before.
-inline void fill_balanced(PatternTable& table, std::size_t bin, core::Random& random) {
+/// Makes `bin` a random pattern: `balanced`, with floor(n_units / 2) units at +1, or of
+/// independent fair units. It must be all -1 before.
+inline void fill_random(PatternTable& table, std::size_t bin, bool balanced, core::Random& random) {
+  if (!balanced) {
+    for (std::size_t k = 0; k < table.n_units(); ++k) table.set(bin, k, random.below(2) == 1);
+    return;
+  }
   std::vector<std::size_t> order(table.n_units());
   std::iota(order.begin(), order.end(), std::size_t{0});
   random.shuffle(std::span(order));
-  for (std::size_t k = 0; k < order.size() / 2; ++k) table.flip(bin, order[k]);
+  for (std::size_t k = 0; k < order.size() / 2; ++k) table.set(bin, order[k]);
 }
 
 }  // namespace sdnn::coding

@@ -32,7 +32,7 @@ inline PatternTable random_inverse_patterns(const RandomInverseConfig& config,
   const auto n_units = static_cast<std::size_t>(config.n_units);
   const auto n_flipped = static_cast<std::size_t>(config.n_flipped);
   PatternTable table(static_cast<std::size_t>(config.n_bins), n_units);
-  fill_balanced(table, 0, random);
+  fill_random(table, 0, true, random);
 
   // Units of each sign, in an order that only the draws below change.
   std::vector<std::size_t> positive;
@@ -50,49 +50,6 @@ inline PatternTable random_inverse_patterns(const RandomInverseConfig& config,
     }
     std::swap_ranges(positive.begin(), positive.begin() + static_cast<std::ptrdiff_t>(n_flipped),
                      negative.begin());
-  }
-  return table;
-}
-
-/// How a code by anchor interpolation is made.
-struct AnchorConfig {
-  int n_units = 2000;         ///< units per pattern
-  int n_anchor_patterns = 9;  ///< random patterns; the last one ends the chain
-  int n_interpolated = 44;    ///< patterns between two neighbouring anchors
-  bool circular = false;      ///< last anchor = first: for angles
-};
-
-/// The paper's code of layer 2: (n_anchor_patterns - 1) * (n_interpolated + 1) patterns.
-///
-/// The same draws and patterns as anchor_interpolation, without its compiled capacity.
-/// Throws std::invalid_argument naming the impossible field.
-inline PatternTable anchor_patterns(const AnchorConfig& config, core::Random& random) {
-  core::require_in_range("n_units", config.n_units, 2, 1 << 24);
-  core::require_in_range("n_anchor_patterns", config.n_anchor_patterns, 2, 10000);
-  core::require_in_range("n_interpolated", config.n_interpolated, 0, 10000);
-  const auto n_units = static_cast<std::size_t>(config.n_units);
-  const auto n_anchors = static_cast<std::size_t>(config.n_anchor_patterns);
-  const auto n_portions = static_cast<std::size_t>(config.n_interpolated) + 1;
-  PatternTable anchors(n_anchors, n_units);
-  for (std::size_t i = 0; i < n_anchors; ++i) fill_balanced(anchors, i, random);
-  if (config.circular) anchors.copy(0, n_anchors - 1);
-
-  PatternTable table((n_anchors - 1) * n_portions, n_units);
-  for (std::size_t i = 0; i + 1 < n_anchors; ++i) {
-    std::vector<std::size_t> differing;
-    for (std::size_t k = 0; k < n_units; ++k) {
-      if (anchors.sign(i, k) != anchors.sign(i + 1, k)) differing.push_back(k);
-    }
-    random.shuffle(std::span(differing));
-    for (std::size_t j = 0; j < n_portions; ++j) {
-      const std::size_t bin = i * n_portions + j;
-      for (std::size_t k = 0; k < n_units; ++k) {
-        if (table.sign(bin, k) != anchors.sign(i, k)) table.flip(bin, k);
-      }
-      for (std::size_t d = 0; d < j * differing.size() / n_portions; ++d) {
-        table.flip(bin, differing[d]);
-      }
-    }
   }
   return table;
 }

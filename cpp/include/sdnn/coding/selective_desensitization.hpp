@@ -1,4 +1,4 @@
-/// The code of a sample: for every pair of inputs, one pattern desensitized by another.
+/// Layer 3: for every pair of inputs, the pattern of one desensitized by that of the other.
 #pragma once
 
 #include <algorithm>
@@ -12,9 +12,10 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/pattern_table.hpp"
-#include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/kernel.hpp"
 
 namespace sdnn::coding {
 
@@ -24,26 +25,87 @@ struct InputPair {
   std::size_t modifier = 0;
 };
 
-/// A code as words of bits: where it is not 0, and where it is +1.
-struct CodeWords {
-  const std::uint64_t* active;
-  const std::uint64_t* positive;
+/// Tables that pairs may share.
+using SharedTables = std::vector<std::shared_ptr<const PatternTable>>;
+
+namespace detail {
+
+/// Where the pattern of an input begins: in a table, by the input's bin.
+struct TableOfInput {
+  const core::BitWord* words;
+  std::size_t input;
+
+  SDNN_INLINE const core::BitWord* pattern(const Bin* bins, std::size_t n_words) const noexcept {
+    return words + static_cast<std::size_t>(bins[input]) * n_words;
+  }
 };
+
+/// A modifier's table and the pairs that it desensitizes, `begin` to `end`.
+struct Gate {
+  TableOfInput modifier;
+  std::size_t begin;
+  std::size_t end;
+};
+
+/// <x_SD(a), x_SD(b)>, gate by gate: where both modifiers are on, like signs less unlike ones.
+template <std::size_t Words>
+SDNN_INLINE std::int32_t gated_product_of_width(std::span<const Gate> gates,
+                                                const TableOfInput* modified, std::size_t n_words,
+                                                const Bin* a, const Bin* b) noexcept {
+  const std::size_t width = Words > 0 ? Words : n_words;
+  std::int32_t sum = 0;
+  for (const Gate& gate : gates) {
+    const core::BitWord* const gate_a = gate.modifier.pattern(a, width);
+    const core::BitWord* const gate_b = gate.modifier.pattern(b, width);
+    std::int32_t both = 0;
+    for (std::size_t w = 0; w < width; ++w) {
+      both += std::popcount((gate_a[w] & gate_b[w]).to_ullong());
+    }
+    std::int32_t unlike = 0;
+    for (std::size_t pair = gate.begin; pair < gate.end; ++pair) {
+      const core::BitWord* const x_a = modified[pair].pattern(a, width);
+      const core::BitWord* const x_b = modified[pair].pattern(b, width);
+      for (std::size_t w = 0; w < width; ++w) {
+        unlike += std::popcount((gate_a[w] & gate_b[w] & (x_a[w] ^ x_b[w])).to_ullong());
+      }
+    }
+    sum += static_cast<std::int32_t>(gate.end - gate.begin) * both - 2 * unlike;
+  }
+  return sum;
+}
+
+SDNN_INLINE std::int32_t gated_product_body(std::span<const Gate> gates,
+                                            const TableOfInput* modified, std::size_t n_words,
+                                            const Bin* a, const Bin* b) noexcept {
+  // The paper's 200 units have four words: a number known when the loop is compiled.
+  return n_words == 4 ? gated_product_of_width<4>(gates, modified, n_words, a, b)
+                      : gated_product_of_width<0>(gates, modified, n_words, a, b);
+}
+
+}  // namespace detail
+
+/// The inner product of the codes of two samples, read from the tables.
+SDNN_KERNEL(std::int32_t, gated_product,
+            (std::span<const detail::Gate> gates, const detail::TableOfInput* modified,
+             std::size_t n_words, const Bin* a, const Bin* b),
+            (gates, modified, n_words, a, b))
 
 /// x_SD: for each pair (mu, nu) the pattern of input mu where that of nu is +1, and 0 elsewhere.
 ///
-/// Columns are numbered pair by pair. Inside, a pair starts on a 64-bit word: *slot* s of the
-/// padded numbering is bit s % 64 of word s / 64, so slots and columns differ if n_units % 64 != 0.
+/// In the paper x^mu(nu)_k = (1 + (sigma_mu_nu x^nu)_k) / 2 * x^mu_k. A table per pair and role:
+/// tables shared by pairs, permuted ones and separate ones differ only in what they hold.
 ///
-/// Source: Nonaka, Tanaka, Morita 2011; section 3.1 of the acrobot paper, layer 3. One table per
-/// pair and role: separate tables, shared ones and permuted ones differ only in what they hold.
+/// Columns are numbered pair by pair, n_units each. Kernels number them in *slots*: each pair
+/// begins on a 64-bit word, so slots and columns differ if n_units % 64 != 0.
+///
+/// Source: section 3.1 (layer 3); Nonaka, Tanaka, Morita 2011.
 class SelectiveDesensitization {
  public:
-  /// One table of each list per pair.
+  /// One table of each list per pair. Consecutive pairs with the same modifier table are a gate.
   ///
   /// Throws std::invalid_argument if the lists differ in length or are empty, if the tables differ
   /// in n_units, or if two tables of one input differ in n_bins.
-  SelectiveDesensitization(std::vector<PatternTable> modified, std::vector<PatternTable> modifiers,
+  SelectiveDesensitization(SharedTables modified, SharedTables modifiers,
                            std::vector<InputPair> pairs)
       : modified_(std::move(modified)), modifiers_(std::move(modifiers)), pairs_(std::move(pairs)) {
     core::require(!pairs_.empty(), "pairs", "at least one pair", pairs_.size());
@@ -52,30 +114,38 @@ class SelectiveDesensitization {
     core::require(modifiers_.size() == pairs_.size(), "modifiers", "one table per pair",
                   modifiers_.size());
     for (std::size_t p = 0; p < pairs_.size(); ++p) {
-      note_input(pairs_[p].modified, modified_[p]);
-      note_input(pairs_[p].modifier, modifiers_[p]);
+      note_input(pairs_[p].modified, *modified_[p]);
+      note_input(pairs_[p].modifier, *modifiers_[p]);
     }
     core::require(n_columns() <= (std::size_t{1} << 30), "n_pairs * n_units", "at most 2^30",
                   n_columns());
-    for (const PatternTable& table : modifiers_) {
-      std::size_t most = 0;
-      for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {
-        std::size_t n_on = 0;
-        for (const std::uint64_t word : table[bin]) {
-          n_on += static_cast<std::size_t>(std::popcount(word));
-        }
-        most = std::max(most, n_on);
+    std::size_t most_on = 0;
+    for (std::size_t p = 0; p < pairs_.size(); ++p) {
+      modified_at_.push_back({modified_[p]->words(), pairs_[p].modified});
+      const bool is_new = p == 0 || modifiers_[p] != modifiers_[p - 1] ||
+                          pairs_[p].modifier != pairs_[p - 1].modifier;
+      if (is_new) {
+        gates_.push_back({{modifiers_[p]->words(), pairs_[p].modifier}, p, p});
+        most_on = largest_count(*modifiers_[p]);
       }
-      max_active_ += most;
+      gates_.back().end = p + 1;
+      max_active_ += most_on;
     }
   }
+  /// Tables that no pairs share.
+  SelectiveDesensitization(std::vector<PatternTable> modified, std::vector<PatternTable> modifiers,
+                           std::vector<InputPair> pairs)
+      : SelectiveDesensitization(shared(std::move(modified)), shared(std::move(modifiers)),
+                                 std::move(pairs)) {}
 
   std::size_t n_inputs() const noexcept { return n_bins_.size(); }
   std::size_t n_pairs() const noexcept { return pairs_.size(); }
-  std::size_t n_units() const noexcept { return modified_.front().n_units(); }
+  std::size_t n_units() const noexcept { return modified_.front()->n_units(); }
   std::size_t n_columns() const noexcept { return n_pairs() * n_units(); }
+  /// Words of a pair's columns.
+  std::size_t n_pair_words() const noexcept { return modified_.front()->n_words(); }
   /// Words of 64 slots in the code of a sample.
-  std::size_t n_words() const noexcept { return n_pairs() * modified_.front().n_words(); }
+  std::size_t n_words() const noexcept { return n_pairs() * n_pair_words(); }
   std::size_t n_slots() const noexcept { return 64 * n_words(); }
   /// The most columns of a code that are not 0: no code's products exceed it.
   std::size_t max_active() const noexcept { return max_active_; }
@@ -84,13 +154,13 @@ class SelectiveDesensitization {
   InputPair pair(std::size_t p) const noexcept { return pairs_[p]; }
 
   std::size_t slot_of(std::size_t column) const noexcept {
-    return column / n_units() * 64 * modified_.front().n_words() + column % n_units();
+    return column / n_units() * 64 * n_pair_words() + column % n_units();
   }
 
   /// Throws std::invalid_argument unless every one of `bins` is a bin of its input.
   ///
   /// Shapes: bins (n_samples, n_inputs).
-  void check_bins(std::span<const std::int32_t> bins) const {
+  void check_bins(std::span<const Bin> bins) const {
     core::require(bins.size() % n_inputs() == 0, "bins",
                   "n_inputs = " + std::to_string(n_inputs()) + " per sample", bins.size());
     for (std::size_t i = 0; i < bins.size(); ++i) {
@@ -106,20 +176,44 @@ class SelectiveDesensitization {
   /// Where the code of a sample is not 0 (`active`) and where it is +1 (`positive`).
   ///
   /// Shapes: bins (n_inputs,), checked before; active and positive (n_words,).
-  void encode(std::span<const std::int32_t> bins, std::uint64_t* active,
+  void encode(std::span<const Bin> bins, std::uint64_t* active,
               std::uint64_t* positive) const noexcept {
-    const std::size_t n_words = modified_.front().n_words();
-    for (std::size_t p = 0; p < pairs_.size(); ++p) {
-      const auto mu = modified_[p][static_cast<std::size_t>(bins[pairs_[p].modified])];
-      const auto nu = modifiers_[p][static_cast<std::size_t>(bins[pairs_[p].modifier])];
-      for (std::size_t w = 0; w < n_words; ++w) {
-        active[p * n_words + w] = nu[w];
-        positive[p * n_words + w] = nu[w] & mu[w];
+    const std::size_t n_words = n_pair_words();
+    for (const detail::Gate& gate : gates_) {
+      const core::BitWord* const by = gate.modifier.pattern(bins.data(), n_words);
+      for (std::size_t p = gate.begin; p < gate.end; ++p) {
+        const core::BitWord* const x = modified_at_[p].pattern(bins.data(), n_words);
+        for (std::size_t w = 0; w < n_words; ++w) {
+          *active++ = by[w].to_ullong();
+          *positive++ = (by[w] & x[w]).to_ullong();
+        }
       }
     }
   }
 
+  /// The inner product of the codes of two samples. Shapes: (n_inputs,), checked before.
+  std::int32_t inner_product(std::span<const Bin> a, std::span<const Bin> b) const {
+    assert(a.size() == n_inputs() && b.size() == n_inputs());
+    return gated_product(gates_, modified_at_.data(), n_pair_words(), a.data(), b.data());
+  }
+
  private:
+  static SharedTables shared(std::vector<PatternTable> tables) {
+    SharedTables result;
+    for (PatternTable& table : tables) {
+      result.push_back(std::make_shared<const PatternTable>(std::move(table)));
+    }
+    return result;
+  }
+
+  static std::size_t largest_count(const PatternTable& table) noexcept {
+    std::size_t most = 0;
+    for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {
+      most = std::max(most, table[bin].count());
+    }
+    return most;
+  }
+
   void note_input(std::size_t input, const PatternTable& table) {
     core::require(input < (std::size_t{1} << 20), "pairs", "inputs below 2^20", input);
     core::require(table.n_units() == n_units(), "tables", "all of one n_units", table.n_units());
@@ -129,47 +223,13 @@ class SelectiveDesensitization {
     n_bins_[input] = table.n_bins();
   }
 
-  std::vector<PatternTable> modified_;
-  std::vector<PatternTable> modifiers_;
+  SharedTables modified_;
+  SharedTables modifiers_;
   std::vector<InputPair> pairs_;
   std::vector<std::size_t> n_bins_;
+  std::vector<detail::Gate> gates_;
+  std::vector<detail::TableOfInput> modified_at_;  // of every pair
   std::size_t max_active_ = 0;
-};
-
-/// The codes of several samples, filled up with zeros to a multiple of 4 words: what popcounts and
-/// weight updates read.
-class CodedSamples {
- public:
-  /// Shapes: bins (n_samples, n_inputs), checked before.
-  CodedSamples(const SelectiveDesensitization& code, std::span<const std::int32_t> bins)
-      : n_words_(padded_words(code)),
-        size_(bins.size() / code.n_inputs()),
-        words_(2 * n_words_ * size_) {
-    for (std::size_t t = 0; t < size_; ++t) {
-      code.encode(bins.subspan(t * code.n_inputs(), code.n_inputs()),
-                  words_.data() + 2 * t * n_words_, words_.data() + (2 * t + 1) * n_words_);
-    }
-  }
-
-  std::size_t size() const noexcept { return size_; }
-  /// Words of a code, a multiple of 4.
-  std::size_t n_words() const noexcept { return n_words_; }
-  CodeWords operator[](std::size_t t) const noexcept {
-    const std::uint64_t* const active = words_.data() + 2 * t * n_words_;
-    return {active, active + n_words_};
-  }
-  static std::size_t bytes(const SelectiveDesensitization& code, std::size_t n_samples) noexcept {
-    return 2 * sizeof(std::uint64_t) * padded_words(code) * n_samples;
-  }
-
- private:
-  static std::size_t padded_words(const SelectiveDesensitization& code) noexcept {
-    return core::round_up(code.n_words(), 4);
-  }
-
-  std::size_t n_words_;
-  std::size_t size_;
-  std::vector<std::uint64_t> words_;
 };
 
 }  // namespace sdnn::coding

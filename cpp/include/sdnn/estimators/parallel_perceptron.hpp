@@ -14,10 +14,10 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
-#include "sdnn/estimators/detail/code_changes.hpp"
 #include "sdnn/estimators/detail/query_order.hpp"
 #include "sdnn/estimators/detail/tile_rows.hpp"
 #include "sdnn/estimators/detail/unit_ranking.hpp"
@@ -179,7 +179,7 @@ class ParallelPerceptron {
 
   std::vector<std::size_t> slots_of_columns() const {
     std::vector<std::size_t> slots(code_->n_columns());
-    for (std::size_t j = 0; j < slots.size(); ++j) slots[j] = code_->slot_of(j);
+    for (std::size_t j = 0; j < slots.columns().size(); ++j) slots[j] = code_->slot_of(j);
     return slots;
   }
 
@@ -213,19 +213,20 @@ class ParallelPerceptron {
       for (std::size_t i = 0; i < n_units(); ++i) values[i] = -thresholds_[i];
     };
     forget();
-    SignedSlots slots(n_words);
+    coding::ColumnLists slots(n_words);
     for (const std::uint32_t query : order) {
       code_->encode(bins.subspan(query * code_->n_inputs(), code_->n_inputs()), now, now + n_words);
-      const coding::CodeWords code{now, now + n_words};
+      const coding::TernaryCode code{now, now + n_words};
       slots.read_changes({before, before + n_words}, code);
       // Counting costs too, and is worth it for codes that are far apart.
-      if (slots.size() > code_->max_active() / 2 && slots.size() > n_active(code, n_words)) {
+      if (slots.columns().size() > code_->max_active() / 2 &&
+          slots.columns().size() > coding::n_active(code, n_words)) {
         forget();
         slots.read(code);
       }
       for (std::size_t tile = 0; tile < tiles.n_tiles(); ++tile) {
-        add_rows(tiles.tile(tile), tiles.width(tile), slots.plus(), slots.minus(), n_per_sum,
-                 values.data() + tile * kTileUnits);
+        add_rows(tiles.tile(tile), tiles.width(tile), slots.columns().plus, slots.columns().minus,
+                 n_per_sum, values.data() + tile * kTileUnits);
       }
       consume(query, values.data());
       std::swap(now, before);

@@ -68,7 +68,8 @@ class AcrobotTrial {
     core::require(agent_.n_inputs() == observed_.size(), "n_inputs",
                   "n_sensors of the sensors (" + std::to_string(observed_.size()) + ")",
                   agent_.n_inputs());
-    // Room for all rows, written once: no decision is to wait for memory it is the first to use.
+    // No decision is to wait for memory it is the first to use: that of the agent, room for rows.
+    if constexpr (requires { agent_.warm_caches(); }) agent_.warm_caches();
     rows_.resize(static_cast<std::size_t>(protocol.n_learning_episodes / protocol.test_interval));
     rows_.clear();
   }

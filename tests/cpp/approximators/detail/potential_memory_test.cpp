@@ -16,7 +16,7 @@ TEST(PotentialMemory, WhateverWayIsTakenThePotentialsAreThoseOfAFullPass) {
   config.n_hidden_units = 130;
   config.n_active_units = 50;
   config.n_pattern_units = 90;
-  SDNNC<256> network(config, 3);
+  SDNNC network(config, 3);
   core::Random random(5, core::Stream::sensor_noise);
   std::vector<double> centre(4);
   std::vector<double> state(4);
@@ -52,7 +52,7 @@ TEST(PotentialMemory, ReplacedWeightsAreNotRemembered) {
   config.n_hidden_units = 20;
   config.n_active_units = 10;
   config.n_pattern_units = 10;
-  SDNNC<256> network(config, 1);
+  SDNNC network(config, 1);
   const std::vector<double> state = {0.1, 0.2, 0.3, 0.4};
   EXPECT_EQ(network.value(state, 0), 0.0);
   network.set_parameters(std::vector<std::int32_t>(20 * 120, 0), std::vector<std::int32_t>(20, -1));

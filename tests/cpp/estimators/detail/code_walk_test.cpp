@@ -8,6 +8,7 @@
 
 #include "estimators/codes.hpp"
 #include "instruction_sets.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
 
 namespace sdnn {
 namespace {

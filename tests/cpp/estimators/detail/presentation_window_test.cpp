@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "instruction_sets.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn {

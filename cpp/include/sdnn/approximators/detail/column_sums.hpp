@@ -9,7 +9,7 @@
 #include <span>
 
 #include "sdnn/core/detail/aligned_buffer.hpp"
-#include "sdnn/core/instruction_set.hpp"
+#include "sdnn/core/detail/kernel.hpp"
 
 #if SDNN_X86_KERNELS
 #include <immintrin.h>
@@ -52,13 +52,6 @@ class ColumnPlaces {
   std::size_t size_;
   std::array<std::uint32_t, kMost + kPrefetchAhead> places_;
 };
-
-/// sums[i] += factor * sum over the columns at `places` of column[i], for i = 0..63.
-///
-/// `group` (1, 2 or 4) columns may be added in 8 bits: the caller knows that |weight| <= 127 /
-/// group in this block. All sums are exact, so every implementation gives the same result.
-using AddColumns = void (*)(const std::int8_t* block, const ColumnPlaces& places, int group,
-                            int factor, std::int32_t* sums);
 
 namespace detail {
 
@@ -150,8 +143,8 @@ inline void add_columns_portable(const std::int8_t* block, const ColumnPlaces& p
 }
 
 template <int Group>
-[[gnu::target("avx2")]] void add_groups_avx2(const std::int8_t* block, const ColumnPlaces& places,
-                                             int factor, std::int32_t* sums) {
+[[SDNN_TARGET_AVX2]] void add_groups_avx2(const std::int8_t* block, const ColumnPlaces& places,
+                                          int factor, std::int32_t* sums) {
   const __m256i ones = _mm256_set1_epi8(1);
   const __m256i factors = _mm256_set1_epi32(factor);
   const std::uint32_t* const end = places.data() + places.size();
@@ -183,8 +176,9 @@ template <int Group>
   }
 }
 
-inline void add_columns_avx2(const std::int8_t* block, const ColumnPlaces& places, int group,
-                             int factor, std::int32_t* sums) {
+[[SDNN_TARGET_AVX2]] inline void add_columns_avx2(const std::int8_t* block,
+                                                  const ColumnPlaces& places, int group, int factor,
+                                                  std::int32_t* sums) {
   switch (group) {
     case 4:
       return add_groups_avx2<4>(block, places, factor, sums);
@@ -213,9 +207,8 @@ inline void add_columns_avx2(const std::int8_t* block, const ColumnPlaces& place
 }
 
 template <int Group>
-[[gnu::target("avx512f,avx512bw")]] void add_groups_avx512(const std::int8_t* block,
-                                                           const ColumnPlaces& places, int factor,
-                                                           std::int32_t* sums) {
+[[SDNN_TARGET_AVX512]] void add_groups_avx512(const std::int8_t* block, const ColumnPlaces& places,
+                                              int factor, std::int32_t* sums) {
   const __m512i ones = _mm512_set1_epi8(1);
   const std::uint32_t* const end = places.data() + places.size();
   for (const std::uint32_t* begin = places.data(); begin != end;) {
@@ -245,8 +238,9 @@ template <int Group>
   }
 }
 
-inline void add_columns_avx512(const std::int8_t* block, const ColumnPlaces& places, int group,
-                               int factor, std::int32_t* sums) {
+[[SDNN_TARGET_AVX512]] inline void add_columns_avx512(const std::int8_t* block,
+                                                      const ColumnPlaces& places, int group,
+                                                      int factor, std::int32_t* sums) {
   switch (group) {
     case 4:
       return add_groups_avx512<4>(block, places, factor, sums);
@@ -265,19 +259,13 @@ inline void add_columns_avx512(const std::int8_t* block, const ColumnPlaces& pla
 
 }  // namespace detail
 
-/// The kernel of the instruction set in use.
-inline AddColumns add_columns_kernel() {
-#if SDNN_X86_KERNELS
-  switch (core::instruction_set()) {
-    case core::InstructionSet::avx512:
-      return detail::add_columns_avx512;
-    case core::InstructionSet::avx2:
-      return detail::add_columns_avx2;
-    default:
-      break;
-  }
-#endif
-  return detail::add_columns_portable;
-}
+/// sums[i] += factor * sum over the columns at `places` of column[i], for i = 0..63.
+///
+/// `group` (1, 2 or 4) columns may be added in 8 bits: the caller knows that |weight| <= 127 /
+/// group in this block. All sums are exact, so every version gives the same result.
+SDNN_DISPATCH(void, add_columns,
+              (const std::int8_t* block, const ColumnPlaces& places, int group, int factor,
+               std::int32_t* sums),
+              (block, places, group, factor, sums))
 
 }  // namespace sdnn::approximators

@@ -25,7 +25,6 @@ namespace sdnn::approximators {
 /// h(s') - h(s) = W (x_SD(s') - x_SD(s)) touches only the columns in which the codes differ. The
 /// way that is cheapest by estimate is taken: from a remembered state, or by a full pass. Whichever
 /// it is, the result is the same integers.
-template <std::size_t Capacity>
 class PotentialMemory {
  public:
   /// One remembered state. Shapes: bins (l,), potentials (n,).
@@ -43,34 +42,29 @@ class PotentialMemory {
   };
 
   /// `max_corrected`: the most units that one correction may touch.
-  PotentialMemory(const coding::StateCode<Capacity>& code, std::size_t n_units,
-                  std::size_t max_corrected)
+  PotentialMemory(const coding::StateCode& code, std::size_t n_units, std::size_t max_corrected)
       : n_inputs_(code.n_inputs()),
         n_units_(n_units),
         bins_(kEntries * n_inputs_),
         bins_by_input_(n_inputs_ * kEntries),
         potentials_(kEntries * n_units),
-        difference_(coding::SignedColumns::with_capacity(2 * code.n_columns())),
+        from_(code),
+        to_(code),
+        changes_(code.n_words()),
+        listed_{Listed(code), Listed(code)},
         max_corrected_(max_corrected),
         log_bins_(kLogSize * n_inputs_),
         log_units_(kLogSize * max_corrected),
         log_(kLogSize) {
-    for (Listed& listed : listed_) {
-      listed.bins.reserve(n_inputs_);
-      listed.columns = coding::SignedColumns::with_capacity(code.n_columns());
-    }
     // A unit of a modifier switches l - 1 inputs, which are about half as many columns: half the
     // modifiers are active. Neighbouring bins differ in `differing` units of each pattern (about
     // m / 2 / 45); where it is modified, in each of l - 1 groups, half of them are active and move
     // two columns, or one twice.
     const double l = static_cast<double>(code.n_inputs());
-    const double differing =
-        static_cast<double>(
-            (code.book(0)[0] ^
-             code.book(
-                 0)[static_cast<coding::Bin>(std::min<std::size_t>(10, code.book(0).n_bins() - 1))])
-                .count()) /
-        10.0;
+    const coding::PatternTable& table = code.table(0);
+    const double differing = static_cast<double>(table[0].distance(
+                                 table[std::min<std::size_t>(10, table.n_bins() - 1)])) /
+                             10.0;
     const double columns_of_modifier = static_cast<double>(code.n_inputs() / 2);
     columns_per_bin_ = (l - 1.0 + columns_of_modifier) * std::max(differing, 0.05);
     columns_per_correction_ = 0.15 * l * (l - 1.0);
@@ -84,7 +78,7 @@ class PotentialMemory {
 
   /// The potentials of the state with these bins, for the present weights; valid until the next
   /// call.
-  Entry recall(const coding::StateCode<Capacity>& code, const HiddenLayer& hidden_layer,
+  Entry recall(const coding::StateCode& code, const HiddenLayer& hidden_layer,
                std::span<const coding::Bin> bins) {
     for (const std::size_t slot : {latest_, before_latest_}) {  // a decision asks repeatedly
       if (last_use_[slot] != 0 && std::ranges::equal(bins_of(slot), bins) &&
@@ -96,7 +90,7 @@ class PotentialMemory {
     for (std::size_t i = 0; i < n_inputs_; ++i) {
       const coding::Bin* const remembered = bins_by_input_.data() + i * kEntries;
       for (std::size_t slot = 0; slot < kEntries; ++slot) {
-        distance[slot] += std::abs(int{remembered[slot]} - int{bins[i]});
+        distance[slot] += std::abs(remembered[slot] - bins[i]);
       }
     }
     std::size_t nearest = kEntries;
@@ -115,21 +109,21 @@ class PotentialMemory {
     }
     const std::span<std::int32_t> fresh(potentials_.data() + oldest * n_units_, n_units_);
     if (nearest == kEntries) {
-      coding::SignedColumns& columns = list(code, bins);
+      const coding::SignedColumns columns = list(code, bins);
       hidden_layer.potentials(columns, fresh);
       ++counts_.full;
-      counts_.columns += columns.positive.size() + columns.negative.size();
+      counts_.columns += columns.size();
     } else {
       const Entry known = use(code, nearest);
       if (std::ranges::equal(known.bins, bins)) {
         ++counts_.exact;
         return known;
       }
-      code.difference(known.bins, bins, difference_);
+      changes_.read_changes(from_.encode(code, known.bins), to_.encode(code, bins));
       if (oldest != nearest) std::ranges::copy(known.potentials, fresh.begin());
-      hidden_layer.add(difference_, fresh);
+      hidden_layer.add(changes_.columns(), fresh);
       ++counts_.neighbour;
-      counts_.columns += difference_.positive.size() + difference_.negative.size();
+      counts_.columns += changes_.columns().size();
     }
     for (std::size_t i = 0; i < n_inputs_; ++i) {
       bins_[oldest * n_inputs_ + i] = bins[i];
@@ -141,10 +135,9 @@ class PotentialMemory {
 
   /// The columns of the state with these bins, listed anew unless it was one of the last two that
   /// were listed; valid until the next call of any member.
-  const coding::SignedColumns& columns(const coding::StateCode<Capacity>& code,
-                                       std::span<const coding::Bin> bins) {
+  coding::SignedColumns columns(const coding::StateCode& code, std::span<const coding::Bin> bins) {
     for (const Listed& listed : listed_) {
-      if (std::ranges::equal(listed.bins, bins)) return listed.columns;
+      if (std::ranges::equal(listed.bins, bins)) return listed.lists.columns();
     }
     return list(code, bins);
   }
@@ -167,10 +160,30 @@ class PotentialMemory {
     std::size_t n_units = 0;
   };
 
+  /// Room for the paired code of a state.
+  class Words {
+   public:
+    explicit Words(const coding::StateCode& code) : words_(2 * code.n_words()) {}
+
+    coding::TernaryCode encode(const coding::StateCode& code,
+                               std::span<const coding::Bin> bins) noexcept {
+      std::uint64_t* const positive = words_.data() + code.n_words();
+      code.encode(bins, words_.data(), positive);
+      return {words_.data(), positive};
+    }
+
+   private:
+    std::vector<std::uint64_t> words_;  // active, then positive
+  };
+
   /// A state's bins and columns.
   struct Listed {
+    explicit Listed(const coding::StateCode& code) : lists(code.n_words()) {
+      bins.reserve(code.n_inputs());
+    }
+
     std::vector<coding::Bin> bins = {};
-    coding::SignedColumns columns = {};
+    coding::ColumnLists lists;
   };
 
   static constexpr std::size_t kEntries = 64;
@@ -181,16 +194,15 @@ class PotentialMemory {
   }
 
   /// Lists the columns of a state, in the place of the list before the last.
-  coding::SignedColumns& list(const coding::StateCode<Capacity>& code,
-                              std::span<const coding::Bin> bins) {
+  coding::SignedColumns list(const coding::StateCode& code, std::span<const coding::Bin> bins) {
     std::swap(listed_[0], listed_[1]);
     listed_[0].bins.assign(bins.begin(), bins.end());
-    code.columns(bins, listed_[0].columns);
-    return listed_[0].columns;
+    listed_[0].lists.read(to_.encode(code, bins));
+    return listed_[0].lists.columns();
   }
 
   /// Marks a slot as used now and brings its potentials up to date.
-  Entry use(const coding::StateCode<Capacity>& code, std::size_t slot) noexcept {
+  Entry use(const coding::StateCode& code, std::size_t slot) noexcept {
     const Entry entry{bins_of(slot), {potentials_.data() + slot * n_units_, n_units_}};
     std::int32_t* const potentials = potentials_.data() + slot * n_units_;
     for (std::uint64_t& next = up_to_[slot]; next < n_corrections_; ++next) {
@@ -216,7 +228,9 @@ class PotentialMemory {
   std::uint64_t clock_ = 0;
   std::size_t latest_ = 0;
   std::size_t before_latest_ = 0;
-  coding::SignedColumns difference_;
+  Words from_;
+  Words to_;
+  coding::ColumnLists changes_;
   std::array<Listed, 2> listed_;  ///< the latest first
 
   // The last kLogSize corrections, in a ring.

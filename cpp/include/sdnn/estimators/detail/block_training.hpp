@@ -11,10 +11,11 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/coding/detail/ternary_code.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/worker_team.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/detail/chunked_weights.hpp"
-#include "sdnn/estimators/detail/code_products.hpp"
 #include "sdnn/estimators/detail/code_walk.hpp"
 #include "sdnn/estimators/detail/presentation_window.hpp"
 #include "sdnn/estimators/detail/query_order.hpp"
@@ -131,7 +132,7 @@ class BlockTraining {
     return count;
   }
 
-  coding::CodeWords code_of(std::size_t b) const noexcept {
+  coding::TernaryCode code_of(std::size_t b) const noexcept {
     const std::uint64_t* const active = words_.data() + 2 * b * n_words_;
     return {active, active + n_words_};
   }
@@ -155,7 +156,7 @@ class BlockTraining {
       for (std::size_t b = part; b < samples.size(); b += team_.size()) {
         for (std::size_t e = b; e < samples.size(); ++e) {  // earlier ones are never asked for
           plan->products[b * plan->stride + e] =
-              static_cast<Product>(1 + inner_product(code_of(b), code_of(e), n_words_));
+              static_cast<Product>(1 + coding::inner_product(code_of(b), code_of(e), n_words_));
         }
       }
     });

@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/core/detail/integer_register.hpp"
-#include "sdnn/core/instruction_set.hpp"
-#include "sdnn/estimators/detail/code_changes.hpp"
+#include "sdnn/core/detail/kernel.hpp"
 #include "sdnn/estimators/detail/tile_rows.hpp"
 
 namespace sdnn::estimators {
@@ -59,7 +59,7 @@ SDNN_INLINE void expand_bits(std::uint32_t plus, std::uint32_t minus,
 #pragma GCC diagnostic pop
 #endif
 
-SDNN_INLINE void expand_code_body(const coding::CodeWords& code, std::size_t n_words,
+SDNN_INLINE void expand_code_body(const coding::TernaryCode& code, std::size_t n_words,
                                   std::int8_t* entries, std::size_t chunk_stride) noexcept {
   for (std::size_t w = 0; w < n_words; w += kChunkWords, entries += chunk_stride) {
     for (std::size_t k = 0; k < kChunkWords; ++k) {
@@ -73,15 +73,17 @@ SDNN_INLINE void expand_code_body(const coding::CodeWords& code, std::size_t n_w
   }
 }
 
-SDNN_INLINE std::uint8_t* list_chunk_changes_body(const coding::CodeWords& from,
-                                                  const coding::CodeWords& to, std::size_t n_words,
-                                                  std::uint8_t* at, std::uint8_t** ends) noexcept {
+SDNN_INLINE std::uint8_t* list_chunk_changes_body(const coding::TernaryCode& from,
+                                                  const coding::TernaryCode& to,
+                                                  std::size_t n_words, std::uint8_t* at,
+                                                  std::uint8_t** ends) noexcept {
   for (std::size_t w = 0; w < n_words; w += kChunkWords) {
     for (const bool rising : {true, false}) {
       core::unrolled<kChunkWords>([&](std::size_t k) SDNN_INLINE_LAMBDA {
-        const WordChanges changes(from, to, w + k);
-        at = append_bits<4>(at, rising ? changes.up : changes.down, 64 * k);
-        at = append_bits<4>(at, rising ? changes.up_again : changes.down_again, 64 * k);
+        const coding::detail::WordChanges changes(from, to, w + k);
+        at = coding::detail::append_few_bits<4>(at, rising ? changes.up : changes.down, 64 * k);
+        at = coding::detail::append_few_bits<4>(at, rising ? changes.up_again : changes.down_again,
+                                                64 * k);
       });
       *ends++ = at;
     }
@@ -93,7 +95,7 @@ SDNN_INLINE std::uint8_t* list_chunk_changes_body(const coding::CodeWords& from,
 
 /// entries[chunk * chunk_stride + k] = the code's +1, 0 or -1 in column k of a chunk.
 SDNN_KERNEL(void, expand_code,
-            (const coding::CodeWords& code, std::size_t n_words, std::int8_t* entries,
+            (const coding::TernaryCode& code, std::size_t n_words, std::int8_t* entries,
              std::size_t chunk_stride),
             (code, n_words, entries, chunk_stride))
 
@@ -103,7 +105,7 @@ SDNN_KERNEL(void, expand_code,
 /// Writes numbers inside the chunk from `at` on, at most 2 * 64 * n_words + 4, and where each list
 /// ends. Returns the end. `n_words` is a multiple of kChunkWords.
 SDNN_KERNEL(std::uint8_t*, list_chunk_changes,
-            (const coding::CodeWords& from, const coding::CodeWords& to, std::size_t n_words,
+            (const coding::TernaryCode& from, const coding::TernaryCode& to, std::size_t n_words,
              std::uint8_t* at, std::uint8_t** ends),
             (from, to, n_words, at, ends))
 
@@ -134,16 +136,16 @@ class CodeWalk {
     const std::vector<std::uint64_t> nothing(n_words);
     std::vector<std::uint8_t> columns(2 * 64 * n_words + 4);
     std::vector<std::uint8_t*> ends(2 * chunks_.size());
-    coding::CodeWords last{nothing.data(), nothing.data()};
+    coding::TernaryCode last{nothing.data(), nothing.data()};
     for (const std::uint32_t sample : order) {
-      const coding::CodeWords code = code_of(sample);
-      const auto list = [&](const coding::CodeWords& from) {
+      const coding::TernaryCode code = code_of(sample);
+      const auto list = [&](const coding::TernaryCode& from) {
         const auto* const end =
             list_chunk_changes(from, code, n_words, columns.data(), ends.data());
         return static_cast<std::size_t>(end - columns.data());
       };
       bool afresh = stops_.empty();
-      if (list(last) > n_active(code, n_words)) {
+      if (list(last) > coding::n_active(code, n_words)) {
         list({nothing.data(), nothing.data()});
         afresh = true;
       }

@@ -12,11 +12,12 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/coding/coded_samples.hpp"
+#include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/worker_team.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
-#include "sdnn/estimators/detail/code_products.hpp"
 #include "sdnn/estimators/detail/presentation_window.hpp"
 #include "sdnn/estimators/detail/signed_sums.hpp"
 #include "sdnn/estimators/detail/tile_rows.hpp"
@@ -117,7 +118,7 @@ class DualTraining {
     for (std::size_t s = begin; s < coded_.size(); ++s) {
       for (std::size_t t = begin; t < std::min(end, s + 1); ++t) {
         const auto product =
-            static_cast<Product>(1 + inner_product(coded_[t], coded_[s], coded_.n_words()));
+            static_cast<Product>(1 + coding::inner_product(coded_[t], coded_[s], coded_.n_words()));
         products_[t * row_size_ + s] = product;
         products_[s * row_size_ + t] = product;
       }

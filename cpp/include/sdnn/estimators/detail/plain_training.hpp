@@ -53,7 +53,7 @@ class PlainTraining {
     auto& tiles = layer_->tiles();
     for (std::size_t i = 0; i < layer_->n_units(); ++i) potentials_[i] = -layer_->thresholds()[i];
     for (std::size_t tile = 0; tile < tiles.n_tiles(); ++tile) {
-      add_rows(tiles.tile(tile), tiles.width(tile), slots_.plus(), slots_.minus(),
+      add_rows(tiles.tile(tile), tiles.width(tile), slots_.columns().plus, slots_.columns().minus,
                std::size_t{1} << 30, potentials_.data() + tile * kTileUnits);
     }
   }
@@ -62,8 +62,10 @@ class PlainTraining {
     auto& tiles = layer_->tiles();
     std::int32_t* const first = &tiles.at(correction.unit, 0);
     const std::size_t width = tiles.width(correction.unit / kTileUnits);
-    for (const std::uint32_t slot : slots_.plus()) first[slot * width] += correction.direction;
-    for (const std::uint32_t slot : slots_.minus()) first[slot * width] -= correction.direction;
+    for (const std::uint32_t slot : slots_.columns().plus)
+      first[slot * width] += correction.direction;
+    for (const std::uint32_t slot : slots_.columns().minus)
+      first[slot * width] -= correction.direction;
     layer_->thresholds()[correction.unit] -= correction.direction;
   }
 
@@ -71,7 +73,7 @@ class PlainTraining {
   std::vector<std::int32_t> bins_;
   std::vector<std::uint64_t> words_;
   std::vector<std::int32_t> potentials_;
-  SignedSlots slots_;
+  coding::ColumnLists slots_;
   std::vector<Correction> corrections_;
 };
 

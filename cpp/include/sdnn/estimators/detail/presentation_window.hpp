@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/detail/kernel.hpp"
 #include "sdnn/core/detail/lanes.hpp"
-#include "sdnn/core/instruction_set.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/detail/transposition.hpp"
 

@@ -9,7 +9,7 @@
 #include <type_traits>
 
 #include "sdnn/core/detail/integer_register.hpp"
-#include "sdnn/core/instruction_set.hpp"
+#include "sdnn/core/detail/kernel.hpp"
 
 namespace sdnn::estimators {
 

@@ -6,7 +6,7 @@
 #include <cstring>
 
 #include "sdnn/core/detail/integer_register.hpp"
-#include "sdnn/core/instruction_set.hpp"
+#include "sdnn/core/detail/kernel.hpp"
 
 namespace sdnn::estimators {
 

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "sdnn/core/detail/integer_register.hpp"
-#include "sdnn/core/instruction_set.hpp"
+#include "sdnn/core/detail/kernel.hpp"
 
 namespace sdnn::estimators {
 

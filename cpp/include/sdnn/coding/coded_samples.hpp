@@ -1,0 +1,91 @@
+/// The codes of several samples at once: as words, as signs, and their inner products.
+#pragma once
+
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sdnn/coding/detail/ternary_code.hpp"
+#include "sdnn/coding/selective_desensitization.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
+
+namespace sdnn::coding {
+
+/// The codes of several samples, filled up with zeros to a multiple of 4 words: what inner products
+/// and corrections read.
+class CodedSamples {
+ public:
+  /// Shapes: bins (n_samples, n_inputs), checked before.
+  CodedSamples(const SelectiveDesensitization& code, std::span<const Bin> bins)
+      : n_words_(padded_words(code)),
+        size_(bins.size() / code.n_inputs()),
+        words_(2 * n_words_ * size_) {
+    for (std::size_t t = 0; t < size_; ++t) {
+      code.encode(bins.subspan(t * code.n_inputs(), code.n_inputs()),
+                  words_.data() + 2 * t * n_words_, words_.data() + (2 * t + 1) * n_words_);
+    }
+  }
+
+  std::size_t size() const noexcept { return size_; }
+  /// Words of a code, a multiple of 4.
+  std::size_t n_words() const noexcept { return n_words_; }
+  TernaryCode operator[](std::size_t t) const noexcept {
+    const std::uint64_t* const active = words_.data() + 2 * t * n_words_;
+    return {active, active + n_words_};
+  }
+  static std::size_t bytes(const SelectiveDesensitization& code, std::size_t n_samples) noexcept {
+    return 2 * sizeof(std::uint64_t) * padded_words(code) * n_samples;
+  }
+
+ private:
+  static std::size_t padded_words(const SelectiveDesensitization& code) noexcept {
+    return core::round_up(code.n_words(), 4);
+  }
+
+  std::size_t n_words_;
+  std::size_t size_;
+  std::vector<std::uint64_t> words_;
+};
+
+/// Writes the entries +1, 0, -1 of the codes of samples.
+///
+/// Shapes: bins (n_samples, n_inputs), signs (n_samples, n_columns). Throws std::invalid_argument
+/// for bins out of range.
+inline void write_signs(const SelectiveDesensitization& code, std::span<const Bin> bins,
+                        std::span<std::int8_t> signs) {
+  code.check_bins(bins);
+  const CodedSamples coded(code, bins);
+  assert(signs.size() == coded.size() * code.n_columns());
+  std::int8_t* sign = signs.data();
+  for (std::size_t t = 0; t < coded.size(); ++t) {
+    for (std::size_t j = 0; j < code.n_columns(); ++j) {
+      const std::size_t slot = code.slot_of(j);
+      const auto active = static_cast<int>(coded[t].active[slot / 64] >> slot % 64 & 1);
+      const auto positive = static_cast<int>(coded[t].positive[slot / 64] >> slot % 64 & 1);
+      *sign++ = static_cast<std::int8_t>(2 * positive - active);
+    }
+  }
+}
+
+/// Writes the inner products of the codes of samples with those of others.
+///
+/// Shapes: bins (n, n_inputs), others (m, n_inputs), products (n, m). Throws std::invalid_argument
+/// for bins out of range.
+inline void write_products(const SelectiveDesensitization& code, std::span<const Bin> bins,
+                           std::span<const Bin> others, std::span<std::int32_t> products) {
+  code.check_bins(bins);
+  code.check_bins(others);
+  const CodedSamples one(code, bins);
+  const CodedSamples other(code, others);
+  assert(products.size() == one.size() * other.size());
+  std::int32_t* product = products.data();
+  for (std::size_t t = 0; t < one.size(); ++t) {
+    for (std::size_t s = 0; s < other.size(); ++s) {
+      *product++ = inner_product(one[t], other[s], one.n_words());
+    }
+  }
+}
+
+}  // namespace sdnn::coding

@@ -1,0 +1,262 @@
+/// Ternary codes as words of bits: their inner products, their columns, their differences.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include "sdnn/core/detail/kernel.hpp"
+
+#if SDNN_X86_KERNELS
+#include <immintrin.h>
+#endif
+
+namespace sdnn::coding {
+
+/// A code of +1, 0 and -1: where it is not 0, and where it is +1. Column j is bit j % 64 of word
+/// j / 64. Plain words, because kernels count, list and compare them, which std::bitset cannot.
+struct TernaryCode {
+  const std::uint64_t* active;
+  const std::uint64_t* positive;
+};
+
+namespace detail {
+
+/// The part of the words [begin, end).
+SDNN_INLINE std::int32_t inner_product_of_words(const TernaryCode& one, const TernaryCode& other,
+                                                std::size_t begin, std::size_t end) noexcept {
+  std::int32_t both = 0;
+  std::int32_t unlike = 0;
+  for (std::size_t w = begin; w < end; ++w) {
+    const std::uint64_t shared = one.active[w] & other.active[w];
+    both += std::popcount(shared);
+    unlike += std::popcount(shared & (one.positive[w] ^ other.positive[w]));
+  }
+  return both - 2 * unlike;
+}
+
+inline std::int32_t inner_product_portable(const TernaryCode& one, const TernaryCode& other,
+                                           std::size_t n_words) noexcept {
+  return inner_product_of_words(one, other, 0, n_words);
+}
+
+#if SDNN_X86_KERNELS
+
+[[gnu::target("avx2"), gnu::always_inline]] inline __m256i load_avx2(const std::uint64_t* from) {
+  return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
+}
+
+/// 256 bits at a time: the bits of all 4-bit parts are counted by looking them up in a register.
+[[gnu::target("avx2,popcnt")]] inline std::int32_t inner_product_avx2(const TernaryCode& one,
+                                                                      const TernaryCode& other,
+                                                                      std::size_t n_words) {
+  constexpr std::size_t kMost = 4 * 31;  // words whose counts, 8 a byte at most, fit into bytes
+  const __m256i counts = _mm256_setr_epi8(0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4,  //
+                                          0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4);
+  const __m256i low = _mm256_set1_epi8(15);
+  const __m256i none = _mm256_setzero_si256();
+  const auto add_counts = [&](__m256i bytes,
+                              __m256i bits) __attribute__((always_inline, target("avx2,popcnt"))) {
+    const __m256i first = _mm256_shuffle_epi8(counts, _mm256_and_si256(bits, low));
+    const __m256i second =
+        _mm256_shuffle_epi8(counts, _mm256_and_si256(_mm256_srli_epi16(bits, 4), low));
+    return _mm256_add_epi8(bytes, _mm256_add_epi8(first, second));
+  };
+  __m256i total = none;
+  std::size_t w = 0;
+  while (w + 4 <= n_words) {
+    __m256i both = none;
+    __m256i unlike = none;
+    for (const std::size_t end = std::min(n_words, w + kMost); w + 4 <= end; w += 4) {
+      const __m256i shared =
+          _mm256_and_si256(load_avx2(one.active + w), load_avx2(other.active + w));
+      const __m256i differing =
+          _mm256_xor_si256(load_avx2(one.positive + w), load_avx2(other.positive + w));
+      both = add_counts(both, shared);
+      unlike = add_counts(unlike, _mm256_and_si256(shared, differing));
+    }
+    const __m256i n_unlike = _mm256_sad_epu8(unlike, none);
+    total = _mm256_add_epi64(
+        total, _mm256_sub_epi64(_mm256_sad_epu8(both, none), _mm256_add_epi64(n_unlike, n_unlike)));
+  }
+  alignas(32) std::int64_t parts[4];
+  _mm256_store_si256(reinterpret_cast<__m256i*>(parts), total);
+  return static_cast<std::int32_t>(parts[0] + parts[1] + parts[2] + parts[3]) +
+         inner_product_of_words(one, other, w, n_words);
+}
+
+[[gnu::target("avx2,popcnt")]] inline std::int32_t inner_product_avx512(const TernaryCode& one,
+                                                                        const TernaryCode& other,
+                                                                        std::size_t n_words) {
+  return inner_product_avx2(one, other, n_words);
+}
+
+#endif  // SDNN_X86_KERNELS
+
+}  // namespace detail
+
+/// The inner product of two codes. Quickest if n_words is a multiple of 4.
+SDNN_DISPATCH(std::int32_t, inner_product,
+              (const TernaryCode& one, const TernaryCode& other, std::size_t n_words),
+              (one, other, n_words))
+
+/// How many entries of a code are not 0.
+inline std::size_t n_active(const TernaryCode& code, std::size_t n_words) noexcept {
+  std::size_t n = 0;
+  for (std::size_t w = 0; w < n_words; ++w) {
+    n += static_cast<std::size_t>(std::popcount(code.active[w]));
+  }
+  return n;
+}
+
+namespace detail {
+
+/// The bits of a word where the code's entry goes up or down, and those where it does so by 2.
+struct WordChanges {
+  SDNN_INLINE WordChanges(const TernaryCode& from, const TernaryCode& to,
+                          std::size_t word) noexcept {
+    const std::uint64_t plus = to.positive[word];
+    const std::uint64_t minus = to.active[word] & ~plus;
+    const std::uint64_t old_plus = from.positive[word];
+    const std::uint64_t old_minus = from.active[word] & ~old_plus;
+    up = (plus & ~old_plus) | (old_minus & ~minus);
+    up_again = plus & old_minus;
+    down = (minus & ~old_minus) | (old_plus & ~plus);
+    down_again = minus & old_plus;
+  }
+
+  std::uint64_t up, up_again, down, down_again;
+};
+
+/// Writes `base` + the numbers of the set bits; returns their end. `Some` numbers are written at a
+/// time, so that few bits need no jump: up to that many may lie beyond the end.
+template <std::size_t Some, class Number>
+SDNN_INLINE Number* append_few_bits(Number* to, std::uint64_t bits, std::size_t base) noexcept {
+  Number* const end = to + std::popcount(bits);
+  do {
+    core::unrolled<Some>([&](std::size_t) SDNN_INLINE_LAMBDA {
+      *to++ = static_cast<Number>(base + static_cast<std::size_t>(std::countr_zero(bits)));
+      bits &= bits - 1;
+    });
+  } while (bits != 0);
+  return end;
+}
+
+/// The set bits of a byte, in rising order.
+struct BitsOfByte {
+  std::array<std::uint32_t, 8> numbers{};
+  std::uint32_t n = 0;
+};
+
+inline constexpr std::array<BitsOfByte, 256> kBitsOfByte = [] {
+  std::array<BitsOfByte, 256> table{};
+  for (std::size_t byte = 0; byte < table.size(); ++byte) {
+    for (std::uint32_t bit = 0; bit < 8; ++bit) {
+      if (byte >> bit & 1) table[byte].numbers[table[byte].n++] = bit;
+    }
+  }
+  return table;
+}();
+
+/// The same for words of which about a quarter of the bits is set, a byte of bits at a time: always
+/// eight numbers, so that no branch depends on the bits. Up to eight may lie beyond the end.
+inline std::uint32_t* append_many_bits(std::uint32_t* to, std::uint64_t bits,
+                                       std::size_t base) noexcept {
+  for (; bits != 0; bits >>= 8, base += 8) {
+    const BitsOfByte& set = kBitsOfByte[bits & 0xff];
+    std::array<std::uint32_t, 8> numbers = set.numbers;
+    for (std::uint32_t& number : numbers) number += static_cast<std::uint32_t>(base);
+    std::memcpy(to, numbers.data(), sizeof numbers);
+    to += set.n;
+  }
+  return to;
+}
+
+SDNN_INLINE void list_changes_body(const TernaryCode& from, const TernaryCode& to,
+                                   std::size_t n_words, std::uint32_t* words, std::uint32_t** up,
+                                   std::uint32_t** down) noexcept {
+  std::uint32_t* end = words;
+  for (std::size_t w = 0; w < n_words; ++w) {
+    *end = static_cast<std::uint32_t>(w);
+    end += ((from.active[w] ^ to.active[w]) | (from.positive[w] ^ to.positive[w])) != 0 ? 1 : 0;
+  }
+  for (; words != end; ++words) {
+    const WordChanges changes(from, to, *words);
+    const std::size_t base = std::size_t{64} * *words;
+    *up = append_few_bits<1>(append_few_bits<1>(*up, changes.up, base), changes.up_again, base);
+    *down =
+        append_few_bits<1>(append_few_bits<1>(*down, changes.down, base), changes.down_again, base);
+  }
+}
+
+}  // namespace detail
+
+/// Appends to `up` and `down` the columns whose entry rises or falls from one code to another,
+/// twice if by 2: up to 128 * n_words and one more. `words` is scratch for n_words and one more.
+SDNN_KERNEL(void, list_changes,
+            (const TernaryCode& from, const TernaryCode& to, std::size_t n_words,
+             std::uint32_t* words, std::uint32_t** up, std::uint32_t** down),
+            (from, to, n_words, words, up, down))
+
+/// Columns to add and columns to subtract, each in rising order but for those that come twice.
+struct SignedColumns {
+  std::span<const std::uint32_t> plus;
+  std::span<const std::uint32_t> minus;
+
+  std::size_t size() const noexcept { return plus.size() + minus.size(); }
+};
+
+/// Room for the columns of a code, or for those in which two codes differ. All of it is written
+/// once, so that listing allocates nothing and meets no memory that was never used.
+class ColumnLists {
+ public:
+  explicit ColumnLists(std::size_t n_words)
+      : n_words_(n_words),
+        words_(n_words + 1),
+        plus_(128 * n_words + 8),
+        minus_(128 * n_words + 8) {}
+
+  /// Overwrites them with the columns of a code that are +1 and -1.
+  void read(const TernaryCode& code) noexcept {
+    std::uint32_t* plus = plus_.data();
+    std::uint32_t* minus = minus_.data();
+    for (std::size_t w = 0; w < n_words_; ++w) {
+      plus = detail::append_many_bits(plus, code.positive[w], 64 * w);
+      minus = detail::append_many_bits(minus, code.active[w] & ~code.positive[w], 64 * w);
+    }
+    note_ends(plus, minus);
+  }
+
+  /// Overwrites them with the columns that lead from one code to another, twice if by 2.
+  void read_changes(const TernaryCode& from, const TernaryCode& to) {
+    std::uint32_t* up = plus_.data();
+    std::uint32_t* down = minus_.data();
+    list_changes(from, to, n_words_, words_.data(), &up, &down);
+    note_ends(up, down);
+  }
+
+  /// What was read last; valid until more is read.
+  SignedColumns columns() const noexcept {
+    return {std::span(plus_).first(n_plus_), std::span(minus_).first(n_minus_)};
+  }
+
+ private:
+  void note_ends(const std::uint32_t* plus, const std::uint32_t* minus) noexcept {
+    n_plus_ = static_cast<std::size_t>(plus - plus_.data());
+    n_minus_ = static_cast<std::size_t>(minus - minus_.data());
+  }
+
+  std::size_t n_words_;
+  std::vector<std::uint32_t> words_;  // scratch
+  std::vector<std::uint32_t> plus_;
+  std::vector<std::uint32_t> minus_;
+  std::size_t n_plus_ = 0;
+  std::size_t n_minus_ = 0;
+};
+
+}  // namespace sdnn::coding

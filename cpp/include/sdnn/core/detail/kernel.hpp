@@ -1,0 +1,65 @@
+/// Kernels: functions that are compiled for every instruction set and choose when they are called.
+///
+/// The one way to an instruction set. A kernel `name` in a room's namespace has a version for each
+/// level in the nested namespace `detail`: name_portable, name_avx2, name_avx512. It is exact: sums
+/// of integers, or floating-point operations in a fixed order, so that all versions give the same
+/// bits. SDNN_KERNEL makes all versions from one body; a version that is worth writing by hand is
+/// written, the others are made by SDNN_KERNEL_PORTABLE, SDNN_KERNEL_AVX2 and SDNN_KERNEL_AVX512,
+/// and SDNN_DISPATCH makes the function that chooses. Another level, such as one for NEON, is an
+/// enumerator of core::InstructionSet, a macro like these and a line in SDNN_DISPATCH.
+#pragma once
+
+#include "sdnn/core/detail/lanes.hpp"
+#include "sdnn/core/instruction_set.hpp"
+
+// `parameters` and `arguments` are lists in parentheses. The function `name_body` in `detail` has
+// to be SDNN_INLINE, with everything that it calls, so that it is compiled anew inside each
+// version.
+
+#define SDNN_KERNEL_PORTABLE(Result, name, parameters, arguments)            \
+  namespace detail {                                                         \
+  inline Result name##_portable parameters { return name##_body arguments; } \
+  }
+
+#if SDNN_X86_KERNELS
+
+#define SDNN_TARGET_AVX2 gnu::target("avx2,bmi,popcnt")
+#define SDNN_TARGET_AVX512 gnu::target("avx512f,avx512bw,avx2,bmi,popcnt")
+
+#define SDNN_KERNEL_AVX2(Result, name, parameters, arguments)                                 \
+  namespace detail {                                                                          \
+  [[SDNN_TARGET_AVX2]] inline Result name##_avx2 parameters { return name##_body arguments; } \
+  }
+
+#define SDNN_KERNEL_AVX512(Result, name, parameters, arguments)                                   \
+  namespace detail {                                                                              \
+  [[SDNN_TARGET_AVX512]] inline Result name##_avx512 parameters { return name##_body arguments; } \
+  }
+
+#define SDNN_DISPATCH(Result, name, parameters, arguments) \
+  inline Result name parameters {                          \
+    switch (core::instruction_set()) {                     \
+      case core::InstructionSet::avx512:                   \
+        return detail::name##_avx512 arguments;            \
+      case core::InstructionSet::avx2:                     \
+        return detail::name##_avx2 arguments;              \
+      default:                                             \
+        return detail::name##_portable arguments;          \
+    }                                                      \
+  }
+
+#else
+
+#define SDNN_KERNEL_AVX2(Result, name, parameters, arguments)
+#define SDNN_KERNEL_AVX512(Result, name, parameters, arguments)
+
+#define SDNN_DISPATCH(Result, name, parameters, arguments) \
+  inline Result name parameters { return detail::name##_portable arguments; }
+
+#endif
+
+#define SDNN_KERNEL(Result, name, parameters, arguments)    \
+  SDNN_KERNEL_PORTABLE(Result, name, parameters, arguments) \
+  SDNN_KERNEL_AVX2(Result, name, parameters, arguments)     \
+  SDNN_KERNEL_AVX512(Result, name, parameters, arguments)   \
+  SDNN_DISPATCH(Result, name, parameters, arguments)

@@ -1,0 +1,79 @@
+#include "sdnn/coding/anchor_patterns.hpp"
+
+#include <gtest/gtest.h>
+
+namespace sdnn::coding {
+namespace {
+
+PatternTable paper_table(std::uint64_t seed, AnchorConfig config = {.n_units = 200}) {
+  core::Random random(seed, core::Stream::code_books);
+  return anchor_patterns(config, random);
+}
+
+TEST(AnchorPatterns, ThePaperHas360PatternsOf200Units) {
+  const PatternTable table = paper_table(1);
+  EXPECT_EQ(table.n_bins(), 360U);
+  EXPECT_EQ(table.n_units(), 200U);
+}
+
+TEST(AnchorPatterns, AnchorsAreBalancedAndEveryPatternNearlySo) {
+  const PatternTable table = paper_table(2);
+  for (std::size_t anchor = 0; anchor < 8; ++anchor) {
+    EXPECT_EQ(table[45 * anchor].count(), 100U);
+  }
+}
+
+TEST(AnchorPatterns, UnbalancedAnchorsAreFairUnits) {
+  core::Random random(6, core::Stream::code_books);
+  core::Random same = random;
+  const PatternTable table = anchor_patterns(
+      {.n_units = 70, .n_anchor_patterns = 2, .n_interpolated = 0, .balanced = false}, random);
+  for (std::size_t k = 0; k < 70; ++k) EXPECT_EQ(table[0][k], same.below(2) == 1);
+}
+
+TEST(AnchorPatterns, OddPatternsAreBalancedToOneUnit) {
+  const PatternTable table = paper_table(2, {.n_units = 7});
+  EXPECT_EQ(table[0].count(), 3U);
+}
+
+// Between two anchors every differing unit flips once: distances to the first anchor are the cuts
+// floor(j * differing / 45), and the last portion leads to the next anchor.
+TEST(AnchorPatterns, NeighboursDifferByNearlyEqualPortions) {
+  const PatternTable table = paper_table(3);
+  for (std::size_t segment = 0; segment + 1 < 8; ++segment) {
+    const std::size_t first = 45 * segment;
+    const std::size_t differing = table[first].distance(table[first + 45]);
+    for (std::size_t j = 0; j < 45; ++j) {
+      const std::size_t here = first + j;
+      EXPECT_EQ(table[first].distance(table[here]), j * differing / 45);
+      EXPECT_EQ(table[here].distance(table[first + 45]), differing - j * differing / 45);
+    }
+  }
+}
+
+TEST(AnchorPatterns, ACircularBookEndsNextToItsBeginning) {
+  const PatternTable straight = paper_table(4);
+  const PatternTable circular = paper_table(4, {.n_units = 200, .circular = true});
+  EXPECT_LE(circular[359].distance(circular[0]), 4U);
+  EXPECT_GT(straight[359].distance(straight[0]), 60U);
+  EXPECT_EQ(straight[100], circular[100]);  // only the last segment differs
+}
+
+TEST(AnchorPatterns, NamesWhatIsImpossible) {
+  const auto message = [](AnchorConfig config) -> std::string {
+    try {
+      paper_table(1, config);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(message({.n_units = 1}), "n_units must be in [2, 16777216], got 1");
+  EXPECT_EQ(message({.n_units = 9, .n_anchor_patterns = 1}),
+            "n_anchor_patterns must be in [2, 10000], got 1");
+  EXPECT_EQ(message({.n_units = 9, .n_interpolated = -1}),
+            "n_interpolated must be in [0, 10000], got -1");
+}
+
+}  // namespace
+}  // namespace sdnn::coding

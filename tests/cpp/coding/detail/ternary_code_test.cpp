@@ -1,0 +1,89 @@
+#include "sdnn/coding/detail/ternary_code.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "estimators/codes.hpp"
+#include "instruction_sets.hpp"
+
+namespace sdnn {
+namespace {
+
+TEST(TernaryCode, AreExactForAnyNumberOfWords) {
+  core::Random random(3, core::Stream::weights);
+  for (std::size_t n_words = 0; n_words < 270; n_words += n_words < 70 ? 1 : 13) {
+    const auto one = testing::random_code(n_words, random);
+    const auto other = testing::random_code(n_words, random);
+    std::int32_t expected = 0;
+    for (std::size_t slot = 0; slot < 64 * n_words; ++slot)
+      expected += one.at(slot) * other.at(slot);
+    testing::on_every_instruction_set([&](auto level) {
+      EXPECT_EQ(coding::inner_product(one.words(), other.words(), n_words), expected) << level;
+    });
+  }
+}
+
+TEST(TernaryCode, HoldTheExtremes) {  // where counts in bytes are fullest
+  for (const std::size_t n_words : {124U, 128U, 400U}) {
+    testing::Code on{std::vector<std::uint64_t>(n_words, ~std::uint64_t{0}),
+                     std::vector<std::uint64_t>(n_words, ~std::uint64_t{0})};
+    testing::Code off = on;
+    off.positive.assign(n_words, 0);
+    const auto all = static_cast<std::int32_t>(64 * n_words);
+    testing::on_every_instruction_set([&](auto level) {
+      EXPECT_EQ(coding::inner_product(on.words(), on.words(), n_words), all) << level;
+      EXPECT_EQ(coding::inner_product(on.words(), off.words(), n_words), -all) << level;
+    });
+  }
+}
+
+/// What the columns add to each entry of a code.
+std::vector<int> entries_of(const coding::ColumnLists& slots, std::size_t n_words) {
+  std::vector<int> entries(64 * n_words);
+  for (const std::uint32_t slot : slots.columns().plus) ++entries[slot];
+  for (const std::uint32_t slot : slots.columns().minus) --entries[slot];
+  return entries;
+}
+
+TEST(ColumnLists, LeadFromOneCodeToAnother) {
+  core::Random random(5, core::Stream::weights);
+  for (std::size_t n_words = 0; n_words < 9; ++n_words) {
+    for (const std::size_t n_changes : {0U, 1U, 5U, 1000U}) {
+      const auto from = testing::random_code(n_words, random);
+      const auto to = n_words == 0 ? from : testing::neighbour_of(from, n_changes, random);
+      std::vector<int> differences;
+      std::size_t distance = 0;
+      for (std::size_t slot = 0; slot < 64 * n_words; ++slot) {
+        differences.push_back(to.at(slot) - from.at(slot));
+        distance += static_cast<std::size_t>(std::abs(differences.back()));
+      }
+      testing::on_every_instruction_set([&](auto level) {
+        coding::ColumnLists slots(n_words);
+        slots.read_changes(from.words(), to.words());
+        EXPECT_EQ(entries_of(slots, n_words), differences) << level;
+        EXPECT_EQ(slots.columns().size(), distance);
+      });
+    }
+  }
+}
+
+TEST(ColumnLists, HoldTheLongestLists) {
+  const std::size_t n_words = 3;
+  testing::Code up{std::vector<std::uint64_t>(n_words, ~std::uint64_t{0}),
+                   std::vector<std::uint64_t>(n_words, ~std::uint64_t{0})};
+  testing::Code down = up;
+  down.positive.assign(n_words, 0);
+  testing::on_every_instruction_set([&](auto level) {
+    coding::ColumnLists slots(n_words);
+    slots.read_changes(down.words(), up.words());
+    EXPECT_EQ(slots.columns().plus.size(), 128 * n_words) << level;
+    slots.read(down.words());
+    EXPECT_EQ(slots.columns().minus.size(), 64 * n_words) << level;
+    EXPECT_TRUE(slots.columns().plus.empty());
+  });
+}
+
+}  // namespace
+}  // namespace sdnn
