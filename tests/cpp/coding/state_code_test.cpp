@@ -33,7 +33,7 @@ StateCode small_code(std::size_t l, int m, std::uint64_t seed) {
 /// The paired code of a state as words.
 struct Paired {
   Paired(const StateCode& code, std::span<const Bin> bins)
-      : words(2 * code.n_words()), n_words(code.n_words()), lists(code.n_words()) {
+      : words(2 * code.n_words()), n_words(code.n_words()), lists(code.column_lists()) {
     code.encode(bins, words.data(), words.data() + n_words);
     lists.read(view());
   }
@@ -44,15 +44,15 @@ struct Paired {
   ColumnLists lists;
 };
 
-std::vector<int> dense(std::size_t n_slots, const SignedColumns& columns) {
-  std::vector<int> x(n_slots, 0);
+std::vector<int> dense(std::size_t n_columns, const SignedColumns& columns) {
+  std::vector<int> x(n_columns, 0);
   for (const auto j : columns.plus) x[j] += 1;
   for (const auto j : columns.minus) x[j] -= 1;
   return x;
 }
 
 std::vector<int> paired(const StateCode& code, std::span<const Bin> bins) {
-  return dense(code.n_slots(), Paired(code, bins).lists.columns());
+  return dense(code.n_columns(), Paired(code, bins).lists.columns());
 }
 
 /// x_SD in the paper's order, from the paired code.
@@ -60,8 +60,8 @@ std::vector<int> x_sd(const StateCode& code, std::span<const Bin> bins) {
   const std::vector<int> stored = paired(code, bins);
   std::vector<int> x(code.n_columns());
   for (std::size_t j = 0; j < x.size(); ++j) {
-    const auto slots = code.slots_of(j);
-    x[j] = stored[slots.first] + (slots.paired ? slots.sign * stored[slots.second] : 0);
+    const auto columns = code.columns_of(j);
+    x[j] = stored[columns.first] + (columns.paired ? columns.sign * stored[columns.second] : 0);
   }
   return x;
 }
@@ -95,7 +95,7 @@ TEST_P(StateCodeOfInputs, TheCodeFollowsTheEquationOfLayer3) {
 TEST_P(StateCodeOfInputs, HalfAsManyPairedColumnsAreActive) {
   const std::size_t l = GetParam();
   const auto code = small_code(l, 37, 5);
-  EXPECT_EQ(code.n_double_slots(), 64U * l * (l - 1 - (l - 1) % 2));
+  EXPECT_EQ(code.n_double_columns(), 37U * l * (l - 1 - (l - 1) % 2));
   std::vector<Bin> bins = {17, 200, 359, 0, 90, 123};
   bins.resize(l);
   const auto x = x_sd(code, bins);
@@ -104,43 +104,43 @@ TEST_P(StateCodeOfInputs, HalfAsManyPairedColumnsAreActive) {
   std::size_t n_active = 0;
   std::size_t n_listed = 0;
   for (std::size_t j = 0; j < x.size(); ++j) {
-    if (x[j] != 0) n_active += code.slots_of(j).paired ? 1 : 2;
+    if (x[j] != 0) n_active += code.columns_of(j).paired ? 1 : 2;
   }
   for (const auto* list : {&columns.plus, &columns.minus}) {
     n_listed += list->size();
     EXPECT_TRUE(std::ranges::is_partitioned(
-        *list, [&](std::uint32_t j) { return j < code.n_double_slots(); }));
+        *list, [&](std::uint32_t j) { return j < code.n_double_columns(); }));
   }
   EXPECT_EQ(2 * n_listed, n_active);
 }
 
-TEST_P(StateCodeOfInputs, EveryUnitHasItsSlotsInThePairedCode) {
+TEST_P(StateCodeOfInputs, EveryColumnOfThePairedCodeHasItsUnits) {
   const auto code = small_code(GetParam(), 13, 5);
-  std::vector<int> taken(code.n_slots(), 0);
+  std::vector<int> taken(code.n_columns(), 0);
   for (std::size_t j = 0; j < code.n_columns(); ++j) {
-    const auto slots = code.slots_of(j);
-    EXPECT_EQ(slots.paired, slots.first < code.n_double_slots());
-    ++taken[slots.first];
-    if (slots.paired) ++taken[slots.second];
+    const auto columns = code.columns_of(j);
+    EXPECT_EQ(columns.paired, columns.first < code.n_double_columns());
+    ++taken[columns.first];
+    if (columns.paired) ++taken[columns.second];
   }
-  for (std::size_t j = 0; j < taken.size(); ++j) {  // 13 units of each word of 64
-    EXPECT_EQ(taken[j], j % 64 >= 13 ? 0 : j < code.n_double_slots() ? 2 : 1);
+  for (std::size_t j = 0; j < taken.size(); ++j) {
+    EXPECT_EQ(taken[j], j < code.n_double_columns() ? 2 : 1);
   }
-  EXPECT_THROW(static_cast<void>(code.slots_of(code.n_columns())), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(code.columns_of(code.n_columns())), std::invalid_argument);
 }
 
 TEST_P(StateCodeOfInputs, TheDifferenceIsThatOfThePairedCodes) {
   const std::size_t l = GetParam();
   const auto code = small_code(l, 50, 6);
   core::Random random(2, core::Stream::ties);
-  ColumnLists changes(code.n_words());
+  ColumnLists changes = code.column_lists();
   for (int trial = 0; trial < 100; ++trial) {
     std::vector<Bin> from(l);
     std::vector<Bin> to(l);
     for (auto& bin : from) bin = static_cast<Bin>(random.below(360));
     for (auto& bin : to) bin = static_cast<Bin>(random.below(360));
     changes.read_changes(Paired(code, from).view(), Paired(code, to).view());
-    const auto change = dense(code.n_slots(), changes.columns());
+    const auto change = dense(code.n_columns(), changes.columns());
     const auto before = paired(code, from);
     const auto after = paired(code, to);
     for (std::size_t j = 0; j < change.size(); ++j) ASSERT_EQ(change[j], after[j] - before[j]);

@@ -99,7 +99,7 @@ class SDNNC {
         code_(make_code(config, std::move(tables), seed)),
         actions_(config.n_hidden_units, config.n_active_units, config.n_actions),
         scale_(make_scale(config)),
-        hidden_layer_(actions_.n_hidden_units(), code_->n_slots(), code_->n_double_slots()),
+        hidden_layer_(actions_.n_hidden_units(), code_->n_columns(), code_->n_double_columns()),
         memory_(*code_, actions_.n_hidden_units(), actions_.n_active_units()) {
     core::require_positive("learning_coefficient", config.learning_coefficient);
     core::require_in_range("lattice", config.lattice, 1, 64);
@@ -125,10 +125,10 @@ class SDNNC {
 
   /// The weight of a hidden unit for a unit of x_SD, in the paper's order, in lattice steps.
   std::int32_t weight(std::size_t unit, std::size_t j) const {
-    const auto slots = code_->slots_of(j);
-    const std::int32_t first = hidden_layer_.weight(unit, slots.first);
-    return slots.paired ? (first + slots.sign * hidden_layer_.weight(unit, slots.second)) / 2
-                        : first;
+    const auto columns = code_->columns_of(j);
+    const std::int32_t first = hidden_layer_.weight(unit, columns.first);
+    return columns.paired ? (first + columns.sign * hidden_layer_.weight(unit, columns.second)) / 2
+                          : first;
   }
 
   /// Q(state, a) for every action. Shapes: state (l,) in [0, 1], out (n_actions,).
@@ -199,7 +199,7 @@ class SDNNC {
     code_->bins_of(state, bins);
     std::vector<std::uint64_t> words(2 * code_->n_words());
     code_->encode(bins, words.data(), words.data() + code_->n_words());
-    coding::ColumnLists lists(code_->n_words());
+    coding::ColumnLists lists = code_->column_lists();
     lists.read({words.data(), words.data() + code_->n_words()});
     hidden_layer_.potentials(lists.columns(), out);
   }
@@ -232,9 +232,9 @@ class SDNNC {
     HiddenLayer replaced(hidden_layer_.n_units(), hidden_layer_.n_columns(),
                          hidden_layer_.n_double_columns());
     for (std::size_t j = 0; j < n_columns; ++j) {
-      const auto slots = code_->slots_of(j);
+      const auto columns = code_->columns_of(j);
       for (std::size_t unit = 0; unit < hidden_layer_.n_units(); ++unit) {
-        add_weight(replaced, unit, slots, weights[unit * n_columns + j]);
+        add_weight(replaced, unit, columns, weights[unit * n_columns + j]);
       }
     }
     for (std::size_t unit = 0; unit < hidden_layer_.n_units(); ++unit) {
@@ -303,12 +303,12 @@ class SDNNC {
 
   /// Adds to the weight of a unit of x_SD, where the paired code keeps it.
   static void add_weight(HiddenLayer& hidden_layer, std::size_t unit,
-                         const coding::StateCode::Slots& slots, std::int32_t weight) {
-    const auto add = [&](std::size_t slot, std::int32_t change) {
-      hidden_layer.set_weight(unit, slot, hidden_layer.weight(unit, slot) + change);
+                         const coding::StateCode::PairedColumns& columns, std::int32_t weight) {
+    const auto add = [&](std::size_t column, std::int32_t change) {
+      hidden_layer.set_weight(unit, column, hidden_layer.weight(unit, column) + change);
     };
-    add(slots.first, weight);
-    if (slots.paired) add(slots.second, slots.sign * weight);
+    add(columns.first, weight);
+    if (columns.paired) add(columns.second, columns.sign * weight);
   }
 
   void initialize_weights(std::uint64_t seed) {
@@ -320,18 +320,18 @@ class SDNNC {
                   config_.initial_weight_limit);
     core::Random random(seed, core::Stream::weights);
     for (std::size_t j = 0; j < code_->n_columns(); ++j) {
-      const auto slots = code_->slots_of(j);
+      const auto columns = code_->columns_of(j);
       std::uint64_t bits = 0;
       for (std::size_t i = 0; i < hidden_layer_.n_units(); ++i) {
         if (config_.initial_weights == InitialWeights::ternary) {
           if (i % 32 == 0) bits = random.bits();  // two bits a weight
           add_weight(
-              hidden_layer_, i, slots,
+              hidden_layer_, i, columns,
               static_cast<std::int32_t>(bits & 1) - static_cast<std::int32_t>(bits >> 1 & 1));
           bits >>= 2;
         } else {
           const double drawn = limit * (2.0 * random.uniform() - 1.0);
-          add_weight(hidden_layer_, i, slots, static_cast<std::int32_t>(std::floor(drawn + 0.5)));
+          add_weight(hidden_layer_, i, columns, static_cast<std::int32_t>(std::floor(drawn + 0.5)));
         }
       }
     }

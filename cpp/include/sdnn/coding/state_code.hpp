@@ -27,10 +27,9 @@ namespace sdnn::coding {
 /// The l - 1 units that unit q of x^nu modifies, one in each group (mu, nu), are neutral together.
 /// Two of them, x_j and x_k, are stored as (x_j + x_k) / 2 and (x_j - x_k) / 2. One of these is
 /// always neutral, so whoever reads or corrects the columns that are not has half as many of them.
-/// This is the *paired code*, numbered in slots (see SelectiveDesensitization). Its first
-/// n_double_slots() slots are such halves: for each nu and each two of its groups the half sums,
-/// then the half differences. If l is even, the group of the last mu is left over for each nu and
-/// follows as it is.
+/// This is the *paired code*, D columns too. Its first n_double_columns() are such halves: for each
+/// nu and each two of its groups m half sums, then m half differences, in the order of q. If l is
+/// even, the group of the last mu is left over for each nu and follows as it is.
 class StateCode {
  public:
   /// Wiring from given tables, one per input, and permutations, one per group.
@@ -49,11 +48,12 @@ class StateCode {
   std::size_t n_columns() const noexcept { return n_pattern_units() * n_groups(); }
   /// Words of the paired code.
   std::size_t n_words() const noexcept { return n_groups() * code_.n_pair_words(); }
-  std::size_t n_slots() const noexcept { return 64 * n_words(); }
-  /// How many slots of the paired code are half a sum or difference; they come first.
-  std::size_t n_double_slots() const noexcept {
-    return 64 * code_.n_pair_words() * 2 * n_inputs() * n_pairs();
+  /// How many columns of the paired code are half a sum or difference; they come first.
+  std::size_t n_double_columns() const noexcept {
+    return 2 * n_inputs() * n_pairs() * n_pattern_units();
   }
+  /// Room for the columns of the paired code.
+  ColumnLists column_lists() const { return {n_words(), code_.n_pair_words(), n_pattern_units()}; }
 
   /// The patterns of an input. Throws std::out_of_range if there is no such input.
   const PatternTable& table(std::size_t input) const { return *tables_.at(input); }
@@ -77,7 +77,7 @@ class StateCode {
 
   /// Where a unit of x_SD is in the paired code: x = first + sign * second, or, unless it is
   /// paired, first alone; and its weight is half of that sum of their weights, or the weight alone.
-  struct Slots {
+  struct PairedColumns {
     bool paired;
     std::size_t first;
     std::size_t second;
@@ -85,19 +85,18 @@ class StateCode {
   };
 
   /// Throws std::invalid_argument if there is no such unit.
-  Slots slots_of(std::size_t unit) const {
+  PairedColumns columns_of(std::size_t unit) const {
     core::require(unit < n_columns(), "unit", "less than " + std::to_string(n_columns()), unit);
     const std::size_t m = n_pattern_units();
-    const std::size_t width = 64 * code_.n_pair_words();
     const std::size_t group = unit / m;
     const std::size_t mu = group / (n_inputs() - 1);
     const std::size_t nu = group % (n_inputs() - 1) + (group % (n_inputs() - 1) >= mu ? 1 : 0);
     const std::size_t modifier = permutations_[group][unit % m];
     const std::size_t among = mu < nu ? mu : mu - 1;  // of the groups that nu modifies
     const std::size_t pair = among / 2;
-    if (pair == n_pairs()) return {false, n_double_slots() + nu * width + modifier, 0, 0};
-    const std::size_t first = 2 * (nu * n_pairs() + pair) * width + modifier;
-    return {true, first, first + width, among % 2 == 0 ? 1 : -1};
+    if (pair == n_pairs()) return {false, n_double_columns() + nu * m + modifier, 0, 0};
+    const std::size_t first = 2 * (nu * n_pairs() + pair) * m + modifier;
+    return {true, first, first + m, among % 2 == 0 ? 1 : -1};
   }
 
   /// The paired code of a state. Shapes: bins (l,), active and positive (n_words,).

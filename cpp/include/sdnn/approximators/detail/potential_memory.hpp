@@ -50,7 +50,7 @@ class PotentialMemory {
         potentials_(kEntries * n_units),
         from_(code),
         to_(code),
-        changes_(code.n_words()),
+        changes_(code.column_lists()),
         listed_{Listed(code), Listed(code)},
         max_corrected_(max_corrected),
         log_bins_(kLogSize * n_inputs_),
@@ -178,7 +178,7 @@ class PotentialMemory {
 
   /// A state's bins and columns.
   struct Listed {
-    explicit Listed(const coding::StateCode& code) : lists(code.n_words()) {
+    explicit Listed(const coding::StateCode& code) : lists(code.column_lists()) {
       bins.reserve(code.n_inputs());
     }
 

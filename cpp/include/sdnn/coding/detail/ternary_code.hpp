@@ -178,16 +178,17 @@ inline std::uint32_t* append_many_bits(std::uint32_t* to, std::uint64_t bits,
 }
 
 SDNN_INLINE void list_changes_body(const TernaryCode& from, const TernaryCode& to,
-                                   std::size_t n_words, std::uint32_t* words, std::uint32_t** up,
+                                   std::span<const std::uint32_t> first_columns,
+                                   std::uint32_t* words, std::uint32_t** up,
                                    std::uint32_t** down) noexcept {
   std::uint32_t* end = words;
-  for (std::size_t w = 0; w < n_words; ++w) {
+  for (std::size_t w = 0; w < first_columns.size(); ++w) {
     *end = static_cast<std::uint32_t>(w);
     end += ((from.active[w] ^ to.active[w]) | (from.positive[w] ^ to.positive[w])) != 0 ? 1 : 0;
   }
   for (; words != end; ++words) {
     const WordChanges changes(from, to, *words);
-    const std::size_t base = std::size_t{64} * *words;
+    const std::size_t base = first_columns[*words];
     *up = append_few_bits<1>(append_few_bits<1>(*up, changes.up, base), changes.up_again, base);
     *down =
         append_few_bits<1>(append_few_bits<1>(*down, changes.down, base), changes.down_again, base);
@@ -197,11 +198,13 @@ SDNN_INLINE void list_changes_body(const TernaryCode& from, const TernaryCode& t
 }  // namespace detail
 
 /// Appends to `up` and `down` the columns whose entry rises or falls from one code to another,
-/// twice if by 2: up to 128 * n_words and one more. `words` is scratch for n_words and one more.
+/// twice if by 2: up to 128 a word and one more. `first_columns` has the number of each word's bit
+/// 0; `words` is scratch for as many and one more.
 SDNN_KERNEL(void, list_changes,
-            (const TernaryCode& from, const TernaryCode& to, std::size_t n_words,
-             std::uint32_t* words, std::uint32_t** up, std::uint32_t** down),
-            (from, to, n_words, words, up, down))
+            (const TernaryCode& from, const TernaryCode& to,
+             std::span<const std::uint32_t> first_columns, std::uint32_t* words, std::uint32_t** up,
+             std::uint32_t** down),
+            (from, to, first_columns, words, up, down))
 
 /// Columns to add and columns to subtract, each in rising order but for those that come twice.
 struct SignedColumns {
@@ -215,19 +218,29 @@ struct SignedColumns {
 /// once, so that listing allocates nothing and meets no memory that was never used.
 class ColumnLists {
  public:
-  explicit ColumnLists(std::size_t n_words)
-      : n_words_(n_words),
+  /// Columns numbered by bits: column j is bit j % 64 of word j / 64.
+  explicit ColumnLists(std::size_t n_words) : ColumnLists(n_words, 1, 64) {}
+  /// Columns numbered without the unused bits of words: every `words_per_group` words hold
+  /// `columns_per_group` columns.
+  ColumnLists(std::size_t n_words, std::size_t words_per_group, std::size_t columns_per_group)
+      : first_columns_(n_words),
         words_(n_words + 1),
         plus_(128 * n_words + 8),
-        minus_(128 * n_words + 8) {}
+        minus_(128 * n_words + 8) {
+    for (std::size_t w = 0; w < n_words; ++w) {
+      first_columns_[w] = static_cast<std::uint32_t>(w / words_per_group * columns_per_group +
+                                                     w % words_per_group * 64);
+    }
+  }
 
   /// Overwrites them with the columns of a code that are +1 and -1.
   void read(const TernaryCode& code) noexcept {
     std::uint32_t* plus = plus_.data();
     std::uint32_t* minus = minus_.data();
-    for (std::size_t w = 0; w < n_words_; ++w) {
-      plus = detail::append_many_bits(plus, code.positive[w], 64 * w);
-      minus = detail::append_many_bits(minus, code.active[w] & ~code.positive[w], 64 * w);
+    for (std::size_t w = 0; w < first_columns_.size(); ++w) {
+      const std::size_t first = first_columns_[w];
+      plus = detail::append_many_bits(plus, code.positive[w], first);
+      minus = detail::append_many_bits(minus, code.active[w] & ~code.positive[w], first);
     }
     note_ends(plus, minus);
   }
@@ -236,7 +249,7 @@ class ColumnLists {
   void read_changes(const TernaryCode& from, const TernaryCode& to) {
     std::uint32_t* up = plus_.data();
     std::uint32_t* down = minus_.data();
-    list_changes(from, to, n_words_, words_.data(), &up, &down);
+    list_changes(from, to, first_columns_, words_.data(), &up, &down);
     note_ends(up, down);
   }
 
@@ -251,8 +264,8 @@ class ColumnLists {
     n_minus_ = static_cast<std::size_t>(minus - minus_.data());
   }
 
-  std::size_t n_words_;
-  std::vector<std::uint32_t> words_;  // scratch
+  std::vector<std::uint32_t> first_columns_;  // the number of each word's bit 0
+  std::vector<std::uint32_t> words_;          // scratch
   std::vector<std::uint32_t> plus_;
   std::vector<std::uint32_t> minus_;
   std::size_t n_plus_ = 0;
