@@ -12,28 +12,6 @@ namespace py = pybind11;
 using namespace sdnn;
 
 void bind_coding(py::module_& module) {
-  py::enum_<core::Stream>(module, "Stream", "What a random number is for")
-      .value("code_books", core::Stream::code_books)
-      .value("permutations", core::Stream::permutations)
-      .value("weights", core::Stream::weights)
-      .value("ties", core::Stream::ties)
-      .value("exploration", core::Stream::exploration)
-      .value("sensor_noise", core::Stream::sensor_noise)
-      .value("evaluation_ties", core::Stream::evaluation_ties)
-      .value("evaluation_sensor_noise", core::Stream::evaluation_sensor_noise);
-  py::class_<core::Random>(module, "Random", "The core's random generator: (seed, stream, index)")
-      .def(py::init<std::uint64_t, core::Stream, std::uint64_t>(), py::arg("seed"),
-           py::arg("stream"), py::arg("index") = 0)
-      .def("bits", &core::Random::bits)
-      .def("uniform", &core::Random::uniform)
-      .def(
-          "below",
-          [](core::Random& random, std::uint64_t n) {
-            core::require(n > 0, "n", "at least 1", n);
-            return random.below(n);
-          },
-          py::arg("n"))
-      .def("normal", &core::Random::normal);
   py::class_<coding::ActionCode>(module, "ActionCode", "Windows of hidden units, one per action")
       .def(py::init<int, int, int>(), py::arg("n_hidden_units"), py::arg("n_active_units"),
            py::arg("n_actions") = 0)
