@@ -89,9 +89,10 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
     ## Goal tolerance
 
     The task's one difficulty, the paper's lambda; it stays as it is until another is given, in the
-    constructor, by `reset(options={"goal_tolerance": ...})` or as the attribute `goal_tolerance`,
-    which holds from the next reset on. The paper goes from 1 to 0.01 over 10,000 learning episodes:
-    that is the wrapper `TighteningGoal`, which is given the episode.
+    constructor, by `reset(options={"goal_tolerance": ...})` or as the attribute
+    `env.unwrapped.goal_tolerance`, which holds from the next reset on. The paper goes from
+    1 to 0.01 over 10,000 learning episodes: that is the wrapper `TighteningGoal`, which is given
+    the episode.
 
     | `goal_tolerance` | solved by random torques | solved by `SDNNQLearning`, in decisions |
     |------------------|--------------------------|----------------------------------------|
@@ -104,6 +105,7 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
     Random: 500 episodes. `SDNNQLearning` learns with the tolerance fixed, 5 seeds: test episodes
     after 300 to 1,000 learning episodes, and the median of the seeds' median decisions. The
     smallest tolerances are learned by way of larger ones.
+
     ## Arguments
 
     - `config`: an `AcrobotConfig`, all the numbers above;
