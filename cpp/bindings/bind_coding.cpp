@@ -59,28 +59,6 @@ py::array_t<std::int32_t> gram(const Code& code, const Bins& bins,
 }  // namespace
 
 void bind_coding(py::module_& module) {
-  py::enum_<core::Stream>(module, "Stream", "What a random number is for")
-      .value("code_books", core::Stream::code_books)
-      .value("permutations", core::Stream::permutations)
-      .value("weights", core::Stream::weights)
-      .value("ties", core::Stream::ties)
-      .value("exploration", core::Stream::exploration)
-      .value("sensor_noise", core::Stream::sensor_noise)
-      .value("evaluation_ties", core::Stream::evaluation_ties)
-      .value("evaluation_sensor_noise", core::Stream::evaluation_sensor_noise);
-  py::class_<core::Random>(module, "Random", "The core's random generator: (seed, stream, index)")
-      .def(py::init<std::uint64_t, core::Stream, std::uint64_t>(), py::arg("seed"),
-           py::arg("stream"), py::arg("index") = 0)
-      .def("bits", &core::Random::bits)
-      .def("uniform", &core::Random::uniform)
-      .def(
-          "below",
-          [](core::Random& random, std::uint64_t n) {
-            core::require(n > 0, "n", "at least 1", n);
-            return random.below(n);
-          },
-          py::arg("n"))
-      .def("normal", &core::Random::normal);
   module.def(
       "action_value",
       [](std::size_t action, std::size_t n_actions, double low, double high) {

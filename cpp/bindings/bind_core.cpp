@@ -1,12 +1,20 @@
+#include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include <vector>
+
+#include "arrays.hpp"
 #include "bindings.hpp"
+#include "sdnn/core/elementary.hpp"
 #include "sdnn/core/instruction_set.hpp"
+#include "sdnn/core/random.hpp"
 
 namespace py = pybind11;
 using namespace sdnn;
 
-void bind_core(py::module_& module) {
+namespace {
+
+void bind_instruction_set(py::module_& module) {
   module.def(
       "instruction_set", [] { return core::name_of(core::instruction_set()); },
       "The instruction set in use");
@@ -15,4 +23,46 @@ void bind_core(py::module_& module) {
       "The best instruction set that this machine offers");
   module.def("set_instruction_set", &core::set_instruction_set, py::arg("name"),
              "Forces an instruction set, for the whole process");
+}
+
+void bind_random(py::module_& module) {
+  py::enum_<core::Stream>(module, "Stream", "What a random number is for")
+      .value("code_books", core::Stream::code_books)
+      .value("permutations", core::Stream::permutations)
+      .value("weights", core::Stream::weights)
+      .value("ties", core::Stream::ties)
+      .value("exploration", core::Stream::exploration)
+      .value("sensor_noise", core::Stream::sensor_noise)
+      .value("evaluation_ties", core::Stream::evaluation_ties)
+      .value("evaluation_sensor_noise", core::Stream::evaluation_sensor_noise);
+}
+
+void bind_elementary(py::module_& module) {
+  module.def(
+      "sin_cos",
+      [](const bindings::ArrayArgument<double>& x) {
+        const auto in = bindings::flat(x);
+        const std::vector<py::ssize_t> shape(x.shape(), x.shape() + x.ndim());
+        py::array_t<double> sin(shape), cos(shape);
+        double *sin_out = sin.mutable_data(), *cos_out = cos.mutable_data();
+        for (std::size_t i = 0; i < in.size(); ++i) {
+          const core::SinCos at = core::sin_cos(in[i]);
+          sin_out[i] = at.sin;
+          cos_out[i] = at.cos;
+        }
+        return py::make_tuple(sin, cos);
+      },
+      py::arg("x"), "(sin x, cos x), item by item");
+  module.def("exp", py::vectorize([](double x) { return core::exp(x); }), py::arg("x"));
+  module.def("log", py::vectorize([](double x) { return core::log(x); }), py::arg("x"));
+  module.def("normal_quantile", py::vectorize([](double p) { return core::normal_quantile(p); }),
+             py::arg("p"));
+}
+
+}  // namespace
+
+void bind_core(py::module_& module) {
+  bind_instruction_set(module);
+  bind_random(module);
+  bind_elementary(module);
 }

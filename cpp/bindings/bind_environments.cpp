@@ -1,8 +1,8 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
-#include <algorithm>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -10,10 +10,11 @@
 #include "arrays.hpp"
 #include "bind_config.hpp"
 #include "bindings.hpp"
-#include "sdnn/core/elementary.hpp"
 #include "sdnn/environments/acrobot.hpp"
 #include "sdnn/environments/acrobot_batch.hpp"
+#include "sdnn/environments/acrobot_config.hpp"
 #include "sdnn/environments/acrobot_sensors.hpp"
+#include "sdnn/environments/acrobot_state.hpp"
 #include "sdnn/environments/goal_schedule.hpp"
 
 namespace py = pybind11;
@@ -23,7 +24,7 @@ using bindings::ArrayArgument;
 
 namespace {
 
-Eigen::Vector4d state_vector(const ArrayArgument<double>& state) {
+AcrobotState state_vector(const ArrayArgument<double>& state) {
   const auto values = bindings::vector(state, "state");
   core::require(values.size() == 4, "state", "of 4 numbers", values.size());
   return {values[0], values[1], values[2], values[3]};
@@ -33,26 +34,18 @@ py::array_t<double> array(std::span<const double> values) {
   return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
-void bind_elementary(py::module_& module) {
-  module.def(
-      "sin_cos",
-      [](const ArrayArgument<double>& x) {
-        const auto in = bindings::flat(x);
-        const std::vector<py::ssize_t> shape(x.shape(), x.shape() + x.ndim());
-        py::array_t<double> sin(shape), cos(shape);
-        double *sin_out = sin.mutable_data(), *cos_out = cos.mutable_data();
-        for (std::size_t i = 0; i < in.size(); ++i) {
-          const core::SinCos at = core::sin_cos(in[i]);
-          sin_out[i] = at.sin;
-          cos_out[i] = at.cos;
-        }
-        return py::make_tuple(sin, cos);
-      },
-      py::arg("x"), "(sin x, cos x), item by item");
-  module.def("exp", py::vectorize([](double x) { return core::exp(x); }), py::arg("x"));
-  module.def("log", py::vectorize([](double x) { return core::log(x); }), py::arg("x"));
-  module.def("normal_quantile", py::vectorize([](double p) { return core::normal_quantile(p); }),
-             py::arg("p"));
+std::span<const std::uint8_t> flags(const ArrayArgument<bool>& array, const char* name) {
+  const auto items = bindings::vector(array, name);
+  return {reinterpret_cast<const std::uint8_t*>(items.data()), items.size()};
+}
+
+std::span<std::uint8_t> flags(py::array_t<bool>& array) {
+  return {reinterpret_cast<std::uint8_t*>(array.mutable_data()),
+          static_cast<std::size_t>(array.size())};
+}
+
+std::span<double> items(py::array_t<double>& array) {
+  return {array.mutable_data(), static_cast<std::size_t>(array.size())};
 }
 
 void bind_goal_schedule(py::module_& module) {
@@ -84,51 +77,35 @@ void bind_acrobot(py::module_& module) {
           py::arg("state"))
       .def(
           "step",
-          [](Acrobot& acrobot, double torque, double lambda) {
-            const StepResult result = acrobot.step(torque, lambda);
+          [](Acrobot& acrobot, double torque, double goal_tolerance) {
+            const StepResult result = acrobot.step(torque, goal_tolerance);
             return std::make_tuple(result.reward, result.terminated, result.truncated);
           },
-          py::arg("torque"), py::arg("lambda_"), "(reward, terminated, truncated)")
+          py::arg("torque"), py::arg("goal_tolerance"), "(reward, terminated, truncated)")
       .def("state",
            [](const Acrobot& acrobot) {
-             const Eigen::Vector4d state = acrobot.state();
+             const AcrobotState state = acrobot.state();
              return array({state.data(), 4});
            })
       .def("tip_height", &Acrobot::tip_height)
-      .def("energy", &Acrobot::energy)
       .def("decisions", &Acrobot::decisions);
 }
 
 void bind_acrobot_batch(py::module_& module) {
   using Mask = ArrayArgument<bool>;
-  // A row of numbers for each acrobot, shape (size, width).
-  const auto rows = [](const AcrobotBatch& batch, py::ssize_t width, auto&& row_of) {
-    const auto size = static_cast<py::ssize_t>(batch.size());
-    py::array_t<double> result({size, width});
-    double* out = result.mutable_data();
-    for (std::size_t i = 0; i < batch.size(); ++i) {
-      const auto row = row_of(batch.state(i));
-      out = std::copy_n(row.data(), width, out);
-    }
-    return result;
-  };
-  const auto checked = [](const AcrobotBatch& batch, const Mask& mask, const char* name) {
-    const auto items = bindings::vector(mask, name);
-    core::require(items.size() == batch.size(), name,
-                  "of " + std::to_string(batch.size()) + " items", items.size());
-    return items;
+  using Write = void (AcrobotBatch::*)(std::span<double>) const;
+  const auto rows = [](Write write) {
+    return [write](const AcrobotBatch& batch) {
+      py::array_t<double> result({batch.size(), std::size_t{4}});
+      (batch.*write)(items(result));
+      return result;
+    };
   };
   py::class_<AcrobotBatch>(module, "AcrobotBatch", "Many acrobots in step, in vector lanes")
       .def(py::init<const AcrobotConfig&, std::size_t>(), py::arg("config"), py::arg("n_acrobots"))
       .def("__len__", &AcrobotBatch::size)
       .def(
-          "reset",
-          [checked](AcrobotBatch& batch, const Mask& mask) {
-            const auto chosen = checked(batch, mask, "mask");
-            for (std::size_t i = 0; i < chosen.size(); ++i) {
-              if (chosen[i]) batch.reset(i);
-            }
-          },
+          "reset", [](AcrobotBatch& batch, const Mask& mask) { batch.reset(flags(mask, "mask")); },
           py::arg("mask"))
       .def(
           "set_state",
@@ -138,43 +115,30 @@ void bind_acrobot_batch(py::module_& module) {
           py::arg("index"), py::arg("state"))
       .def(
           "step",
-          [checked](AcrobotBatch& batch, const ArrayArgument<double>& torques,
-                    const ArrayArgument<double>& lambdas, const Mask& moving) {
-            const auto chosen = checked(batch, moving, "moving");
-            const std::vector<std::uint8_t> mask(chosen.begin(), chosen.end());
-            std::vector<StepResult> results(batch.size());
-            {
-              const auto torque = bindings::vector(torques, "torques");
-              const auto lambda = bindings::vector(lambdas, "lambdas");
-              const py::gil_scoped_release unlocked;
-              batch.step(torque, lambda, mask, results);
-            }
+          [](AcrobotBatch& batch, const ArrayArgument<double>& torques,
+             const ArrayArgument<double>& goal_tolerances, const Mask& moving) {
             const auto size = static_cast<py::ssize_t>(batch.size());
             py::array_t<double> rewards(size);
             py::array_t<bool> terminated(size), truncated(size);
-            for (py::ssize_t i = 0; i < size; ++i) {
-              const StepResult& result = results[static_cast<std::size_t>(i)];
-              rewards.mutable_at(i) = result.reward;
-              terminated.mutable_at(i) = result.terminated;
-              truncated.mutable_at(i) = result.truncated;
+            const auto torque = bindings::vector(torques, "torques");
+            const auto tolerance = bindings::vector(goal_tolerances, "goal_tolerances");
+            const auto mask = flags(moving, "moving");
+            const AcrobotBatchResults results{items(rewards), flags(terminated), flags(truncated)};
+            {
+              const py::gil_scoped_release unlocked;
+              batch.step(torque, tolerance, mask, results);
             }
             return std::make_tuple(rewards, terminated, truncated);
           },
-          py::arg("torques"), py::arg("lambdas"), py::arg("moving"),
+          py::arg("torques"), py::arg("goal_tolerances"), py::arg("moving"),
           "(rewards, terminated, truncated)")
-      .def("states",
-           [rows](const AcrobotBatch& batch) {
-             return rows(batch, 4, [](const Eigen::Vector4d& state) { return state; });
-           })
-      .def(
-          "observations",
-          [rows](const AcrobotBatch& batch) { return rows(batch, 4, basic_observation); },
-          "s1..s4 of every state")
+      .def("states", rows(&AcrobotBatch::states))
+      .def("observations", rows(&AcrobotBatch::observations), "s1..s4 of every state")
       .def("tip_heights",
            [](const AcrobotBatch& batch) {
-             std::vector<double> heights(batch.size());
-             for (std::size_t i = 0; i < heights.size(); ++i) heights[i] = batch.tip_height(i);
-             return array(heights);
+             py::array_t<double> heights(static_cast<py::ssize_t>(batch.size()));
+             batch.tip_heights(items(heights));
+             return heights;
            })
       .def("decisions", &AcrobotBatch::decisions, py::arg("index"));
 }
@@ -186,7 +150,8 @@ void bind_sensors(py::module_& module) {
   module.def(
       "basic_observation",
       [](const ArrayArgument<double>& state) {
-        return array(basic_observation(state_vector(state)));
+        const Eigen::Vector4d observation = basic_observation(state_vector(state));
+        return array({observation.data(), 4});
       },
       py::arg("state"), "s1..s4 of a state");
   module.def("energy_sensor", &energy_sensor, py::arg("s3"), py::arg("s4"));
@@ -223,7 +188,6 @@ void bind_sensors(py::module_& module) {
 }  // namespace
 
 void bind_environments(py::module_& module) {
-  bind_elementary(module);
   bind_goal_schedule(module);
   bind_acrobot(module);
   bind_acrobot_batch(module);

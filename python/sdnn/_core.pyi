@@ -71,20 +71,6 @@ class Stream:
     @property
     def value(self) -> int:
         ...
-class Random:
-    """
-    The core's random generator: (seed, stream, index)
-    """
-    def __init__(self, seed: typing.SupportsInt | typing.SupportsIndex, stream: Stream, index: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def below(self, n: typing.SupportsInt | typing.SupportsIndex) -> int:
-        ...
-    def bits(self) -> int:
-        ...
-    def normal(self) -> float:
-        ...
-    def uniform(self) -> float:
-        ...
 class ActionCode:
     """
     Windows of hidden units, one per action
@@ -586,15 +572,13 @@ class Acrobot:
         ...
     def decisions(self) -> int:
         ...
-    def energy(self) -> float:
-        ...
     def reset(self) -> None:
         ...
     def set_state(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         ...
     def state(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def step(self, torque: typing.SupportsFloat | typing.SupportsIndex, lambda_: typing.SupportsFloat | typing.SupportsIndex) -> tuple[float, bool, bool]:
+    def step(self, torque: typing.SupportsFloat | typing.SupportsIndex, goal_tolerance: typing.SupportsFloat | typing.SupportsIndex) -> tuple[float, bool, bool]:
         """
         (reward, terminated, truncated)
         """
@@ -620,7 +604,7 @@ class AcrobotBatch:
         ...
     def states(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def step(self, torques: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], lambdas: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], moving: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool], numpy.typing.NDArray[numpy.bool]]:
+    def step(self, torques: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], goal_tolerances: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], moving: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool], numpy.typing.NDArray[numpy.bool]]:
         """
         (rewards, terminated, truncated)
         """

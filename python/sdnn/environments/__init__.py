@@ -11,6 +11,9 @@ and many of them at once, stepped side by side in vector registers:
 
 >>> gym.make_vec("sdnn/AcrobotSwingUp-v0", num_envs=16).observation_space.shape
 (16, 4)
+
+How hard it is, is one number, ``goal_tolerance``; `TighteningGoal` lets it fall while the agent
+learns, as in the paper.
 """
 
 import gymnasium as gym
@@ -19,6 +22,7 @@ from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.config import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.environments.goal_schedule import GoalSchedule
 from sdnn.environments.sensors import NoisySensors, RedundantSensors
+from sdnn.environments.tightening_goal import TighteningGoal
 from sdnn.environments.vector_env import AcrobotSwingUpVectorEnv
 
 __all__ = [
@@ -30,6 +34,7 @@ __all__ = [
     "NoisySensors",
     "RedundantSensors",
     "SensorConfig",
+    "TighteningGoal",
     "register_environments",
 ]
 

@@ -42,8 +42,8 @@ class AcrobotConfig:
     goal_height : float
         m above joint 1, which the tip must reach.
     goal_velocity_1, goal_velocity_2 : float
-        rad/s, > 0. Limits of |theta1_dot| and |theta2_dot|: times lambda in the goal, as they are
-        in the penalty.
+        rad/s, > 0. Limits of |theta1_dot| and |theta2_dot|: times the goal tolerance in the goal,
+        as they are in the penalty.
     goal_test : {"every_step", "decision_instant"}
         When the goal is looked for: after every integration step, and the episode ends there; or
         only when the next decision is due. A reading.
@@ -84,7 +84,9 @@ class AcrobotConfig:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class GoalScheduleConfig:
-    """How lambda(k) falls with the learning episode k (section 4.1; garbled in print: a reading).
+    """How the goal tolerance lambda(k) falls with the learning episode k (section 4.1).
+
+    A reading: the formula is garbled in print.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""lambda(k): how the goal's speed limits tighten with the learning episode."""
+"""lambda(k): the goal tolerance, which falls with the learning episode k."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ __all__ = ["GoalSchedule"]
 
 
 class GoalSchedule:
-    """lambda as a function of the number of the learning episode.
+    """The goal tolerance lambda as a function of the number of the learning episode.
+
+    `TighteningGoal` applies it to an environment.
 
     Parameters
     ----------
@@ -23,8 +25,8 @@ class GoalSchedule:
     Examples
     --------
     >>> from sdnn.environments import GoalSchedule, GoalScheduleConfig
-    >>> lambda_ = GoalSchedule()
-    >>> lambda_(100), lambda_(300), lambda_(10001)
+    >>> schedule = GoalSchedule()
+    >>> schedule(100), schedule(300), schedule(10001)
     (0.5, 0.25, 0.01)
     >>> GoalSchedule(GoalScheduleConfig(kind="inverse_sqrt"))(99)
     0.1
@@ -35,8 +37,11 @@ class GoalSchedule:
         self._core = _core.GoalSchedule(self.config.to_core())
 
     def __call__(self, episode: int) -> float:
-        """Lambda of the 1-based learning episode; ValueError below 1."""
+        """Goal tolerance of the 1-based learning episode; ValueError below 1."""
         return float(self._core(episode))
+
+    def __reduce__(self) -> tuple[type[GoalSchedule], tuple[GoalScheduleConfig]]:
+        return GoalSchedule, (self.config,)  # environments are copied with their schedule
 
     def __repr__(self) -> str:
         return f"GoalSchedule({self.config})"

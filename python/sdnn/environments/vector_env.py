@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import gymnasium as gym
@@ -28,12 +28,14 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
     """N acrobots in step, with the bits of N `AcrobotSwingUpEnv`, much faster.
 
     ``gymnasium.make_vec("sdnn/AcrobotSwingUp-v0", num_envs=N)`` makes one. Observations, rewards,
-    ends, infos and the count of episodes are those of ``gymnasium.vector.SyncVectorEnv`` over N
-    single environments, whose page describes the task. The dynamics run in the lanes of vector
+    ends and infos are those of ``gymnasium.vector.SyncVectorEnv`` over N single environments, whose
+    page describes the task. The dynamics run in the lanes of vector
     registers, without Python's global lock.
 
     An environment whose episode has ended is reset by the next step (``AutoresetMode.NEXT_STEP``):
-    its action is ignored, its reward is 0, and its next episode begins.
+    its action is ignored, its reward is 0, and its next episode begins, with the goal tolerance
+    that it had or that was set since. To tighten the goal while an agent learns, set it:
+    ``envs.goal_tolerance = GoalSchedule()(k)``.
 
     Parameters
     ----------
@@ -41,9 +43,8 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         N >= 1.
     config : AcrobotConfig, optional
         The same for all.
-    goal_schedule : callable, optional
-        lambda as a function of the number k of the learning episode; each environment counts its
-        own.
+    goal_tolerance : float or array_like, shape (num_envs,)
+        Factor of the goal's speed limits, >= 0, for all or for each.
     render_mode : {"rgb_array"}, optional
         Needs pygame-ce.
     dtype : {"float32", "float64"}
@@ -58,10 +59,10 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
     --------
     >>> import numpy as np
     >>> from sdnn.environments import AcrobotSwingUpVectorEnv
-    >>> envs = AcrobotSwingUpVectorEnv(num_envs=3)
+    >>> envs = AcrobotSwingUpVectorEnv(num_envs=3, goal_tolerance=[1.0, 0.5, 0.1])
     >>> observations, infos = envs.reset(seed=1)
-    >>> observations.shape, infos["lambda"].round(3).tolist()
-    ((3, 4), [0.99, 0.99, 0.99])
+    >>> observations.shape, infos["goal_tolerance"].tolist()
+    ((3, 4), [1.0, 0.5, 0.1])
     >>> observations, rewards, *_, infos = envs.step(np.array([[1.0], [0.0], [-1.0]]))
     >>> rewards.tolist(), infos["tip_height"].round(3).tolist()
     ([0.0, -5.0, 0.0], [0.496, -2.0, 0.496])
@@ -78,7 +79,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         num_envs: int = 1,
         *,
         config: AcrobotConfig | None = None,
-        goal_schedule: Callable[[int], float] | None = None,
+        goal_tolerance: ArrayLike = 1.0,
         render_mode: str | None = None,
         dtype: Literal["float32", "float64"] = "float32",
     ) -> None:
@@ -91,9 +92,9 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
                 f"render_mode must be None or one of {self.metadata['render_modes']}, "
                 f"got {render_mode!r}"
             )
-        single = AcrobotSwingUpEnv(config=config, goal_schedule=goal_schedule, dtype=dtype)
+        single = AcrobotSwingUpEnv(config=config, dtype=dtype)
         self.config = single.config
-        self.goal_schedule = single.goal_schedule
+        self.goal_tolerance = goal_tolerance
         self.render_mode = render_mode
         self.single_action_space = single.action_space
         self.single_observation_space = single.observation_space
@@ -101,17 +102,24 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         self.observation_space = batch_space(single.observation_space, self.num_envs)
         self._dtype = single.observation_space.dtype
         self._batch = _core.AcrobotBatch(self.config.to_core(), self.num_envs)
-        self._episodes = np.zeros(self.num_envs, np.int64)
-        self._lambdas = np.full(self.num_envs, np.nan)
+        self._tolerances = self._goal_tolerance.copy()
+        self._was_reset = np.zeros(self.num_envs, np.bool_)
         self._torques = np.zeros(self.num_envs)
         self._success = np.zeros(self.num_envs, np.bool_)
         self._ended = np.zeros(self.num_envs, np.bool_)
         self._picture: AcrobotPicture | None = None
 
     @property
-    def episodes(self) -> NDArray[np.int64]:
-        """Number of every environment's present learning episode, 0 before its first reset."""
-        return self._episodes.copy()
+    def goal_tolerance(self) -> NDArray[np.float64]:
+        """Factors of the goals' speed limits, shape (num_envs,), from each one's next reset on.
+
+        May be set, to a number for all or an array.
+        """
+        return self._goal_tolerance.copy()
+
+    @goal_tolerance.setter
+    def goal_tolerance(self, values: ArrayLike) -> None:
+        self._goal_tolerance = self._tolerances_of(values)
 
     def reset(
         self,
@@ -124,29 +132,29 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         Parameters
         ----------
         seed : int or sequence of (int or None), shape (num_envs,), optional
-            A number begins an environment's count of episodes anew; there is no randomness to
-            seed.
+            Changes nothing: there is no randomness to seed.
         options : dict, optional
-            ``"episode"``: the number k >= 1 of the learning episode, for lambda(k);
-            ``"reset_mask"``: bool array, shape (num_envs,): the environments to reset.
+            ``"goal_tolerance"``: of this episode and those that follow, a number or an array of
+            shape (num_envs,); without it, as before. ``"reset_mask"``: bool array, shape
+            (num_envs,): the environments to reset, and the only ones whose tolerance changes.
 
         Raises
         ------
         ValueError
-            For an unknown option, an episode below 1 or a wrong number of seeds.
+            For an unknown option, a tolerance below 0 or a wrong number of seeds.
         """
         options = dict(options or {})
         mask = self._reset_mask(options.pop("reset_mask", None))
-        unknown = sorted(set(options) - {"episode"})
-        if unknown:
+        tolerances = self._tolerances_of(options.pop("goal_tolerance", self._goal_tolerance))
+        if options:
             raise ValueError(
-                f"options may hold 'episode' and 'reset_mask', got {', '.join(map(repr, unknown))}"
+                "options may hold 'goal_tolerance' and 'reset_mask', "
+                f"got {', '.join(map(repr, sorted(options)))}"
             )
-        following = np.where(self._is_seeded(seed), 1, self._episodes + 1)
-        if "episode" in options:
-            following[:] = operator.index(options["episode"])
+        self._check_seed(seed)
         super().reset(seed=seed if isinstance(seed, int) else None)
-        self._begin(mask, following)
+        self._goal_tolerance[mask] = tolerances[mask]
+        self._begin(mask)
         return self._observations(), self._infos(mask)
 
     def step(
@@ -174,7 +182,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         ValueError
             Unless each action is one number in [-1, 1]; then nothing has moved.
         """
-        if not self._episodes.all():
+        if not self._was_reset.all():
             raise gym.error.ResetNeeded("call reset before step")
         shares = np.asarray(actions, dtype=np.float64)
         if shares.shape not in ((self.num_envs, 1), (self.num_envs,)):
@@ -189,9 +197,9 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
                 f"actions[{wrong[0]}] must be one number in [-1, 1], got {shares[wrong[0]]}"
             )
         if self._ended.any():
-            self._begin(self._ended, self._episodes + 1)
+            self._begin(self._ended)
         np.multiply(self.config.max_torque, shares, out=self._torques, where=moving)
-        rewards, terminated, truncated = self._batch.step(self._torques, self._lambdas, moving)
+        rewards, terminated, truncated = self._batch.step(self._torques, self._tolerances, moving)
         self._success = terminated.copy()
         self._ended = terminated | truncated
         every = np.ones(self.num_envs, np.bool_)
@@ -237,20 +245,27 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
             )
         return chosen
 
-    def _is_seeded(self, seed: int | Sequence[int | None] | None) -> NDArray[np.bool_]:
+    def _check_seed(self, seed: int | Sequence[int | None] | None) -> None:
         if seed is None or isinstance(seed, int | np.integer):
-            return np.full(self.num_envs, seed is not None)
+            return
         if len(seed) != self.num_envs:
             raise ValueError(f"seed must have num_envs={self.num_envs} items, got {len(seed)}")
-        return np.array([item is not None for item in seed])
 
-    def _begin(self, mask: NDArray[np.bool_], episodes: NDArray[np.int64]) -> None:
-        """Begin ``episodes[i]`` wherever the mask is set."""
-        numbers = np.unique(episodes[mask]).tolist()
-        schedule = {episode: float(self.goal_schedule(episode)) for episode in numbers}
-        for i in np.flatnonzero(mask).tolist():
-            self._lambdas[i] = schedule[int(episodes[i])]
-        self._episodes[mask] = episodes[mask]
+    def _tolerances_of(self, values: ArrayLike) -> NDArray[np.float64]:
+        tolerances = np.array(values, dtype=np.float64)
+        if tolerances.shape not in ((), (self.num_envs,)):
+            raise ValueError(
+                f"goal_tolerance must be a number or of shape ({self.num_envs},), "
+                f"got shape {tolerances.shape}"
+            )
+        if not (tolerances >= 0.0).all():
+            raise ValueError(f"goal_tolerance must be at least 0, got {values!r}")
+        return np.broadcast_to(tolerances, self.num_envs).copy()
+
+    def _begin(self, mask: NDArray[np.bool_]) -> None:
+        """Begin an episode wherever the mask is set."""
+        self._tolerances[mask] = self._goal_tolerance[mask]
+        self._was_reset |= mask
         self._torques[mask] = 0.0
         self._success[mask] = False
         self._ended = self._ended & ~mask
@@ -264,7 +279,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         values = {
             "state": self._batch.states(),
             "tip_height": self._batch.tip_heights(),
-            "lambda": self._lambdas.copy(),
+            "goal_tolerance": self._tolerances.copy(),
             "is_success": self._success.copy(),
         }
         infos: dict[str, Any] = {}

@@ -38,7 +38,7 @@ std::vector<core::InstructionSet> offered_levels() {
   return levels;
 }
 
-bool same_bits(const Eigen::Vector4d& a, const Eigen::Vector4d& b) {
+bool same_bits(const AcrobotState& a, const AcrobotState& b) {
   for (Eigen::Index i = 0; i < 4; ++i) {
     if (std::bit_cast<std::uint64_t>(a[i]) != std::bit_cast<std::uint64_t>(b[i])) return false;
   }
@@ -47,16 +47,20 @@ bool same_bits(const Eigen::Vector4d& a, const Eigen::Vector4d& b) {
 
 /// What one batch step is given and gives, of the right sizes.
 struct Step {
-  explicit Step(std::size_t n) : torques(n), lambdas(n, 1.0), moving(n, 1), results(n) {}
-  void of(AcrobotBatch& batch) { batch.step(torques, lambdas, moving, results); }
+  explicit Step(std::size_t n)
+      : torques(n), tolerances(n, 1.0), moving(n, 1), rewards(n), terminated(n), truncated(n) {}
+  void of(AcrobotBatch& batch) {
+    batch.step(torques, tolerances, moving, {rewards, terminated, truncated});
+  }
 
-  std::vector<double> torques, lambdas;
+  std::vector<double> torques, tolerances;
   std::vector<std::uint8_t> moving;
-  std::vector<StepResult> results;
+  std::vector<double> rewards;
+  std::vector<std::uint8_t> terminated, truncated;
 };
 
-// Random starts, torques and lambdas; some acrobots stand still, ended ones begin anew. Returns the
-// number of episodes and adds the goals to `n_goals`.
+// Random starts, torques and tolerances; some acrobots stand still, ended ones begin anew. Returns
+// the number of episodes and adds the goals to `n_goals`.
 int compare_with_single(const AcrobotConfig& config, std::size_t n, int n_steps, std::uint64_t seed,
                         int& n_goals) {
   core::Random random(seed, core::Stream::exploration);
@@ -65,13 +69,13 @@ int compare_with_single(const AcrobotConfig& config, std::size_t n, int n_steps,
   Step step(n);
   int n_episodes = 0;
   const auto begin = [&](std::size_t i) {
-    Eigen::Vector4d state = Eigen::Vector4d::Zero();
+    AcrobotState state = AcrobotState::Zero();
     if (random.uniform() < 0.7) {
       for (double& value : state) value = 8.0 * random.uniform() - 4.0;
     }
     singles[i].set_state(state);
     batch.set_state(i, state);
-    step.lambdas[i] = random.uniform();
+    step.tolerances[i] = random.uniform();
     ++n_episodes;
   };
   for (std::size_t i = 0; i < n; ++i) begin(i);
@@ -83,17 +87,17 @@ int compare_with_single(const AcrobotConfig& config, std::size_t n, int n_steps,
     step.of(batch);
     for (std::size_t i = 0; i < n; ++i) {
       StepResult expected{0.0, false, false};
-      if (step.moving[i]) expected = singles[i].step(step.torques[i], step.lambdas[i]);
-      const StepResult& got = step.results[i];
-      const bool same = got.reward == expected.reward && got.terminated == expected.terminated &&
-                        got.truncated == expected.truncated &&
+      if (step.moving[i]) expected = singles[i].step(step.torques[i], step.tolerances[i]);
+      const bool same = step.rewards[i] == expected.reward &&
+                        step.terminated[i] == expected.terminated &&
+                        step.truncated[i] == expected.truncated &&
                         same_bits(batch.state(i), singles[i].state()) &&
                         batch.tip_height(i) == singles[i].tip_height() &&
                         batch.decisions(i) == singles[i].decisions();
       EXPECT_TRUE(same) << "acrobot " << i << " of " << n << ", step " << s;
       if (!same) return 0;
-      n_goals += got.terminated;
-      if (got.terminated || got.truncated) begin(i);
+      n_goals += expected.terminated;
+      if (expected.terminated || expected.truncated) begin(i);
     }
   }
   return n_episodes;
@@ -176,11 +180,14 @@ TEST(AcrobotBatch, RejectsBadArgumentsBeforeAnythingMoves) {
   EXPECT_EQ(message(step), "torques[2] must be in [-10, 10], got nan");
   step.moving[2] = 0;
   EXPECT_EQ(message(step), "");
-  step.lambdas[1] = -1.0;
-  EXPECT_EQ(message(step), "lambdas[1] must be at least 0, got -1");
-  step.lambdas[1] = 1.0;
+  step.tolerances[1] = -1.0;
+  EXPECT_EQ(message(step), "goal_tolerances[1] must be at least 0, got -1");
+  step.tolerances[1] = 1.0;
   step.torques.pop_back();
   EXPECT_EQ(message(step), "torques must be of 3 items, got 2");
+  step = Step(3);
+  step.truncated.push_back(0);
+  EXPECT_EQ(message(step), "truncated must be of 3 items, got 4");
   EXPECT_EQ(batch.decisions(0), 1);
   EXPECT_EQ(batch.decisions(2), 0);
   EXPECT_THROW(batch.set_state(0, {kNaN, 0.0, 0.0, 0.0}), std::invalid_argument);
@@ -203,18 +210,55 @@ TEST(AcrobotBatch, EndsEpisodesOneByOne) {
   batch.set_state(0, {2.0, 0.0, 2.0, 0.0});
   Step step(2);
   step.of(batch);
-  EXPECT_TRUE(step.results[0].terminated);
-  EXPECT_EQ(step.results[0].reward, 10.0);
-  EXPECT_FALSE(step.results[1].terminated || step.results[1].truncated);
+  EXPECT_TRUE(step.terminated[0]);
+  EXPECT_EQ(step.rewards[0], 10.0);
+  EXPECT_FALSE(step.terminated[1] || step.truncated[1]);
   EXPECT_THROW(step.of(batch), std::logic_error);
   batch.reset(0);
-  EXPECT_EQ(batch.state(0), Eigen::Vector4d::Zero());
+  EXPECT_EQ(batch.state(0), AcrobotState::Zero());
   step.of(batch);
-  EXPECT_FALSE(step.results[0].truncated);
-  EXPECT_TRUE(step.results[1].truncated);
+  EXPECT_FALSE(step.truncated[0]);
+  EXPECT_TRUE(step.truncated[1]);
   batch.reset();
   EXPECT_EQ(batch.decisions(0), 0);
   EXPECT_EQ(batch.decisions(1), 0);
+}
+
+TEST(AcrobotBatch, ResetsThoseOfAMask) {
+  AcrobotBatch batch({}, 3);
+  Step step(3);
+  step.torques.assign(3, 10.0);
+  step.of(batch);
+  const AcrobotState moved = batch.state(0);
+  EXPECT_NE(moved, AcrobotState::Zero());
+  batch.reset(std::vector<std::uint8_t>{0, 1, 0});
+  EXPECT_EQ(batch.state(0), moved);
+  EXPECT_EQ(batch.state(1), AcrobotState::Zero());
+  EXPECT_EQ(batch.decisions(1), 0);
+  EXPECT_EQ(batch.decisions(2), 1);
+  EXPECT_THROW(batch.reset(std::vector<std::uint8_t>{0, 1}), std::invalid_argument);
+}
+
+TEST(AcrobotBatch, WritesRowsOfWhatSingleCallsGive) {
+  AcrobotBatch batch({}, 3);
+  Step step(3);
+  step.torques = {10.0, 0.0, -7.0};
+  step.of(batch);
+  std::vector<double> states(12), observations(12), heights(3);
+  batch.states(states);
+  batch.observations(observations);
+  batch.tip_heights(heights);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const AcrobotState state = batch.state(i);
+    EXPECT_EQ(AcrobotState(&states[4 * i]), state);
+    EXPECT_EQ(AcrobotState(&observations[4 * i]), basic_observation(state));
+    EXPECT_EQ(heights[i], batch.tip_height(i));
+  }
+  EXPECT_EQ(heights[1], -2.0);
+  EXPECT_THROW(batch.tip_heights(states), std::invalid_argument);
+  states.push_back(0.0);
+  EXPECT_THROW(batch.states(states), std::invalid_argument);
+  EXPECT_THROW(batch.observations(states), std::invalid_argument);
 }
 
 TEST(AcrobotBatch, AStepAllocatesNothing) {

@@ -14,13 +14,13 @@ using namespace sdnn::environments;
 using sdnn::core::kPi;
 using sdnn::core::Stream;
 
-std::vector<double> observe(AcrobotSensors& sensors, const Eigen::Vector4d& state) {
+std::vector<double> observe(AcrobotSensors& sensors, const AcrobotState& state) {
   std::vector<double> out(static_cast<std::size_t>(sensors.n_sensors()));
   sensors.observe(state, out);
   return out;
 }
 
-std::vector<double> observe(const SensorConfig& config, const Eigen::Vector4d& state) {
+std::vector<double> observe(const SensorConfig& config, const AcrobotState& state) {
   AcrobotSensors sensors(config, 1, Stream::sensor_noise);
   return observe(sensors, state);
 }
@@ -50,7 +50,7 @@ TEST(AcrobotSensors, HeightIsTheNormalizedTipHeight) {
 }
 
 TEST(AcrobotSensors, FewerSensorsSeeTheSame) {
-  const Eigen::Vector4d state{0.3, -2.0, 4.0, -6.0};
+  const AcrobotState state{0.3, -2.0, 4.0, -6.0};
   const auto six = observe({6, 0.0}, state);
   for (int n = 4; n < 6; ++n) {
     EXPECT_EQ(observe({n, 0.0}, state), std::vector<double>(six.begin(), six.begin() + n));
@@ -71,7 +71,7 @@ TEST(AcrobotSensors, AnglesNeverReachOne) {
 }
 
 TEST(AcrobotSensors, NoiseIsOneNormalNumberPerSensorInOrder) {
-  const Eigen::Vector4d state{0.3, -1.0, 2.0, -3.0};
+  const AcrobotState state{0.3, -1.0, 2.0, -3.0};
   const auto clean = observe({6, 0.0}, state);
   AcrobotSensors sensors({6, 0.001}, 42, Stream::sensor_noise);
   sdnn::core::Random random(42, Stream::sensor_noise);
@@ -83,7 +83,7 @@ TEST(AcrobotSensors, NoiseIsOneNormalNumberPerSensorInOrder) {
 
 TEST(AcrobotSensors, NoiseHasItsStandardDeviationAndNoCorrelation) {
   AcrobotSensors sensors({6, 0.02}, 7, Stream::sensor_noise);
-  const Eigen::Vector4d state{0.5, 0.5, 3.0, -5.0};
+  const AcrobotState state{0.5, 0.5, 3.0, -5.0};
   const auto clean = observe({6, 0.0}, state);
   constexpr int kDraws = 40000;
   std::array<double, 6> mean{}, variance{};

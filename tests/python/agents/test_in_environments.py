@@ -21,8 +21,8 @@ from sdnn.environments import (
     NoisySensors,
     RedundantSensors,
     SensorConfig,
+    TighteningGoal,
 )
-from sdnn.environments.goal_schedule import GoalSchedule
 
 SMALL = SDNNCConfig(n_pattern_units=40, n_hidden_units=120, n_active_units=30)
 
@@ -38,9 +38,7 @@ def python_trial(make_agent, *, n_sensors, noise, n_episodes, test_interval, see
     """The paper's protocol written with the Python rooms; rows as the trial gives them."""
 
     def make_env(stream):
-        env = AcrobotSwingUpEnv(
-            config=AcrobotConfig(), goal_schedule=GoalSchedule(), dtype="float64"
-        )
+        env = TighteningGoal(AcrobotSwingUpEnv(config=AcrobotConfig(), dtype="float64"))
         env = RedundantSensors(env, ("energy", "height")[: n_sensors - 4])
         return NoisySensors(env, sigma=noise, seed=seed, stream=stream)
 

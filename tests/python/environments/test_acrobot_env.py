@@ -12,12 +12,7 @@ from gymnasium.utils.env_checker import check_env
 
 import sdnn
 from sdnn import _core
-from sdnn.environments import (
-    AcrobotConfig,
-    AcrobotSwingUpEnv,
-    GoalSchedule,
-    GoalScheduleConfig,
-)
+from sdnn.environments import AcrobotConfig, AcrobotSwingUpEnv
 
 ID = "sdnn/AcrobotSwingUp-v0"
 
@@ -61,16 +56,16 @@ def test_equals_the_core_bit_for_bit():
     env = AcrobotSwingUpEnv(dtype="float64")
     core = _core.Acrobot(AcrobotConfig().to_core())
     sensors = _core.AcrobotSensors(_core.SensorConfig(), 1, _core.Stream.sensor_noise)
-    schedule = GoalSchedule()
     n_ends = 0
     for episode in range(1, 41):
-        observation, info = env.reset()
+        tolerance = 1.0 / episode
+        observation, info = env.reset(options={"goal_tolerance": tolerance})
         core.reset()
         np.testing.assert_array_equal(observation, sensors.observe(core.state()))
-        assert info["lambda"] == schedule(episode)
+        assert info["goal_tolerance"] == tolerance
         for share in shares(50, episode):
             observation, *result, info = env.step(np.array([share]))
-            assert tuple(result) == core.step(10.0 * share, schedule(episode))
+            assert tuple(result) == core.step(10.0 * share, tolerance)
             np.testing.assert_array_equal(info["state"], core.state())
             np.testing.assert_array_equal(observation, sensors.observe(core.state()))
             assert info["tip_height"] == core.tip_height()
@@ -104,23 +99,39 @@ def test_truncates_by_itself_after_50_decisions():
         env.step(np.zeros(1, np.float32))
 
 
-def test_counts_learning_episodes():
+def tolerances(env, **reset):
+    """What an environment has from its next reset on, and in the episode that begins."""
+    before = env.goal_tolerance
+    return before, env.reset(**reset)[1]["goal_tolerance"]
+
+
+def test_no_reset_moves_the_task():
     env = AcrobotSwingUpEnv()
-    assert env.episode == 0
-    schedule = GoalSchedule()
-    assert [env.reset()[1]["lambda"] for _ in range(3)] == [schedule(k) for k in (1, 2, 3)]
-    assert env.reset(options={"episode": 300})[1]["lambda"] == 0.25
-    assert env.reset()[1]["lambda"] == schedule(301)
-    assert env.reset(seed=5)[1]["lambda"] == schedule(1)
-    assert env.reset(seed=5, options={"episode": 100})[1]["lambda"] == 0.5
+    assert env.goal_tolerance == 1.0
+    for reset in ({}, {"seed": 5}, {"options": {}}, {"seed": 5, "options": None}):
+        assert tolerances(env, **reset) == (1.0, 1.0)
+    env = gym.make(ID, goal_tolerance=0.25).unwrapped
+    assert [tolerances(env) for _ in range(3)] == [(0.25, 0.25)] * 3
 
 
-def test_goal_schedule_is_any_function_of_the_episode():
-    env = AcrobotSwingUpEnv(goal_schedule=lambda episode: 0.5**episode)
-    assert [env.reset()[1]["lambda"] for _ in range(3)] == [0.5, 0.25, 0.125]
-    constant = GoalSchedule(GoalScheduleConfig(kind="constant", constant_value=0.3))
-    assert AcrobotSwingUpEnv(goal_schedule=constant).reset()[1]["lambda"] == 0.3
-    assert "constant" in repr(constant)
+def test_a_goal_tolerance_holds_until_another_is_given():
+    env = AcrobotSwingUpEnv(goal_tolerance=0.5)
+    assert tolerances(env, options={"goal_tolerance": 0.01}) == (0.5, 0.01)
+    assert tolerances(env, seed=1) == (0.01, 0.01)
+    env.goal_tolerance = 0.1
+    assert env.step([0.0])[4]["goal_tolerance"] == 0.01, "the episode under way keeps its own"
+    assert tolerances(env) == (0.1, 0.1)
+
+
+def test_the_goal_tolerance_is_that_of_the_dynamics():
+    """The tip passes the goal at 0.615 and 1.097 rad/s: at 0.0653 of 3 pi, 0.0699 of 5 pi."""
+    ends = []
+    for tolerance in (0.0, 0.0695, 0.0703, np.inf):
+        env = AcrobotSwingUpEnv(goal_tolerance=tolerance)
+        env.reset()
+        env._acrobot.set_state([2.0, 0.0, 2.0, 0.0])
+        ends.append(env.step([0.0])[2])
+    assert ends == [False, False, True, True]
 
 
 def test_bad_arguments():
@@ -133,12 +144,18 @@ def test_bad_arguments():
             env.step([bad])
     with pytest.raises(ValueError, match=re.escape("one number in [-1, 1], got [0.0, 0.0]")):
         env.step([0.0, 0.0])
-    with pytest.raises(ValueError, match="episode must be at least 1, got 0"):
-        env.reset(options={"episode": 0})
-    with pytest.raises(TypeError):
-        env.reset(options={"episode": 1.5})
-    with pytest.raises(ValueError, match="'epsiode'"):
-        env.reset(options={"epsiode": 3})
+    for bad in (-0.1, np.nan):
+        with pytest.raises(ValueError, match=f"goal_tolerance must be at least 0, got {bad}"):
+            env.reset(options={"goal_tolerance": bad})
+        with pytest.raises(ValueError, match=f"goal_tolerance must be at least 0, got {bad}"):
+            AcrobotSwingUpEnv(goal_tolerance=bad)
+        with pytest.raises(ValueError, match=f"goal_tolerance must be at least 0, got {bad}"):
+            env.goal_tolerance = bad
+    with pytest.raises(ValueError, match="goal_tolerance must be a number, got 'low'"):
+        env.reset(options={"goal_tolerance": "low"})
+    with pytest.raises(ValueError, match="may hold 'goal_tolerance', got 'episode'"):
+        env.reset(options={"episode": 3})
+    assert env.goal_tolerance == 1.0
     with pytest.raises(ValueError, match="dtype must be one of"):
         AcrobotSwingUpEnv(dtype="float16")
     with pytest.raises(ValueError, match="render_mode"):
@@ -184,7 +201,7 @@ def test_render_without_a_mode_warns():
         assert env.render() is None
 
 
-@pytest.mark.parametrize("name", ["", ".acrobot", ".goal_schedule", ".sensors"])
+@pytest.mark.parametrize("name", ["", ".acrobot", ".goal_schedule", ".sensors", ".tightening_goal"])
 def test_doctests(name):
     module = importlib.import_module(f"sdnn.environments{name}")
     result = doctest.testmod(module)

@@ -17,7 +17,6 @@ from sdnn.environments import (
     AcrobotSwingUpEnv,
     AcrobotSwingUpVectorEnv,
     GoalSchedule,
-    GoalScheduleConfig,
 )
 
 ID = "sdnn/AcrobotSwingUp-v0"
@@ -87,7 +86,6 @@ def test_equals_single_environments(instruction_set, num_envs, dtype):
         n_truncated += got[3].sum()
     assert n_terminated >= num_envs
     assert n_truncated >= num_envs
-    assert (envs.episodes > 5).all()
 
 
 def test_equals_single_environments_with_the_papers_task():
@@ -107,11 +105,11 @@ def test_resets_like_single_environments():
         {},
         {"seed": 7},
         {"seed": [None, 1, None, 2]},
-        {"options": {"episode": 100}},
+        {"options": {"goal_tolerance": 0.5}},
         {"options": {"reset_mask": mask}},
-        {"options": {"reset_mask": ~mask, "episode": 40}},
+        {"options": {"reset_mask": ~mask, "goal_tolerance": 0.7}},
         {"seed": [1, None, None, None], "options": {"reset_mask": mask}},
-        {"seed": 3, "options": {"episode": 300}},
+        {"seed": 3, "options": {"goal_tolerance": 0.25}},
     ]
     for _ in range(3):
         for arguments in resets:
@@ -119,47 +117,67 @@ def test_resets_like_single_environments():
                 key: dict(value) if key == "options" else value for key, value in arguments.items()
             }
             assert_same(envs.reset(**arguments), sync.reset(**theirs))
+            assert envs.goal_tolerance.tolist() == list(sync.get_attr("goal_tolerance"))
             for _ in range(random.integers(15)):
                 actions = random.uniform(-1.0, 1.0, (4, 1)).astype(np.float32)
                 assert_same(envs.step(actions), sync.step(actions))
     assert "reset_mask" in resets[4]["options"]  # what was given stays as it was
 
 
-def test_counts_episodes_for_each_environment():
-    envs = AcrobotSwingUpVectorEnv(3, config=AcrobotConfig(max_decisions=2))
-    schedule = GoalSchedule()
-    assert envs.episodes.tolist() == [0, 0, 0]
+def end_episodes(envs):
+    """Let all end at once, as `max_decisions` = 2 does, and the next step begin the next ones."""
+    still = np.zeros((envs.num_envs, 1))
+    assert envs.step(still)[3].tolist() == [False] * envs.num_envs
+    assert envs.step(still)[3].tolist() == [True] * envs.num_envs
+    *_, truncated, infos = envs.step(still * np.nan)  # the actions are ignored
+    assert truncated.tolist() == [False] * envs.num_envs
+    assert infos["state"].tolist() == np.zeros((envs.num_envs, 4)).tolist()
+    return infos["goal_tolerance"].tolist()
+
+
+def test_no_reset_moves_the_task():
+    envs = AcrobotSwingUpVectorEnv(
+        3, config=AcrobotConfig(max_decisions=2), goal_tolerance=[1.0, 0.5, 0.1]
+    )
+    assert envs.reset()[1]["goal_tolerance"].tolist() == [1.0, 0.5, 0.1]
+    assert envs.reset(seed=1)[1]["goal_tolerance"].tolist() == [1.0, 0.5, 0.1]
+    assert end_episodes(envs) == [1.0, 0.5, 0.1]
+    assert gym.make_vec(ID, num_envs=2).reset()[1]["goal_tolerance"].tolist() == [1.0, 1.0]
+
+
+def test_a_goal_tolerance_holds_until_another_is_given():
+    envs = AcrobotSwingUpVectorEnv(3, config=AcrobotConfig(max_decisions=2), goal_tolerance=0.5)
+    infos = envs.reset(options={"goal_tolerance": [0.3, 0.2, 0.1]})[1]
+    assert infos["goal_tolerance"].tolist() == [0.3, 0.2, 0.1]
+    assert end_episodes(envs) == [0.3, 0.2, 0.1]
+    mask = np.array([False, True, False])
+    infos = envs.reset(options={"reset_mask": mask, "goal_tolerance": 0.7})[1]
+    assert infos["goal_tolerance"].tolist() == [0.0, 0.7, 0.0]  # only the masked ones tell
+    assert envs.goal_tolerance.tolist() == [0.3, 0.7, 0.1]
+    assert envs.reset()[1]["goal_tolerance"].tolist() == [0.3, 0.7, 0.1]
+
+
+def test_a_goal_tolerance_that_is_set_holds_from_each_ones_next_episode_on():
+    envs = AcrobotSwingUpVectorEnv(2, config=AcrobotConfig(max_decisions=2))
     envs.reset()
-    envs.reset(options={"reset_mask": np.array([False, True, False])})
-    assert envs.episodes.tolist() == [1, 2, 1]
-    still = np.zeros((3, 1))
-    assert envs.step(still)[3].tolist() == [False] * 3
-    assert envs.step(still)[3].tolist() == [True] * 3
-    *_, truncated, infos = envs.step(np.full((3, 1), np.nan))  # the actions are ignored
-    assert truncated.tolist() == [False] * 3
-    assert envs.episodes.tolist() == [2, 3, 2]
-    assert infos["lambda"].tolist() == [schedule(k) for k in (2, 3, 2)]
-    assert infos["state"].tolist() == np.zeros((3, 4)).tolist()
-
-
-def test_goal_schedule_is_any_function_of_the_episode():
-    envs = AcrobotSwingUpVectorEnv(2, goal_schedule=lambda episode: 0.5**episode)
-    assert [envs.reset()[1]["lambda"].tolist() for _ in range(2)] == [[0.5] * 2, [0.25] * 2]
-    constant = GoalSchedule(GoalScheduleConfig(kind="constant", constant_value=0.3))
-    envs = AcrobotSwingUpVectorEnv(2, goal_schedule=constant)
-    assert envs.reset()[1]["lambda"].tolist() == [0.3] * 2
+    envs.goal_tolerance = GoalSchedule()(300)
+    assert end_episodes(envs) == [0.25, 0.25]
+    envs.goal_tolerance = [0.1, 0.2]
+    assert envs.step(np.zeros((2, 1)))[4]["goal_tolerance"].tolist() == [0.25, 0.25]
+    envs.goal_tolerance[0] = 7.0  # a copy
+    assert envs.reset()[1]["goal_tolerance"].tolist() == [0.1, 0.2]
 
 
 def test_what_it_returns_is_the_callers():
     envs = AcrobotSwingUpVectorEnv(2)
     first = envs.reset()
-    kept = [first[0].copy(), first[1]["state"].copy(), first[1]["lambda"].copy()]
+    kept = [first[0].copy(), first[1]["state"].copy(), first[1]["goal_tolerance"].copy()]
     for array in (first[0], *first[1].values()):
         array[:] = 1
     second = envs.reset(seed=0)
     np.testing.assert_array_equal(second[0], kept[0])
     np.testing.assert_array_equal(second[1]["state"], kept[1])
-    np.testing.assert_array_equal(second[1]["lambda"], kept[2])
+    np.testing.assert_array_equal(second[1]["goal_tolerance"], kept[2])
 
 
 def test_bad_actions_name_the_argument_and_move_nothing():
@@ -197,14 +215,26 @@ def test_bad_arguments():
     envs = AcrobotSwingUpVectorEnv(2)
     with pytest.raises(ValueError, match="seed must have num_envs=2 items, got 3"):
         envs.reset(seed=[1, 2, 3])
-    with pytest.raises(ValueError, match="episode must be at least 1, got 0"):
-        envs.reset(options={"episode": 0})
-    with pytest.raises(ValueError, match="'epsiode'"):
-        envs.reset(options={"epsiode": 3})
+    for bad, message in (
+        (-0.1, "must be at least 0, got -0.1"),
+        ([1.0, np.nan], "must be at least 0, got [1.0, nan]"),
+        ([1.0] * 3, "must be a number or of shape (2,), got shape (3,)"),
+    ):
+        message = re.escape(f"goal_tolerance {message}")
+        with pytest.raises(ValueError, match=message):
+            envs.reset(options={"goal_tolerance": bad})
+        with pytest.raises(ValueError, match=message):
+            AcrobotSwingUpVectorEnv(2, goal_tolerance=bad)
+        with pytest.raises(ValueError, match=message):
+            envs.goal_tolerance = bad
+    with pytest.raises(ValueError, match="'goal_tolerance' and 'reset_mask', got 'episode'"):
+        envs.reset(options={"episode": 3})
     for mask in (np.zeros(2, bool), np.ones(3, bool), np.ones(2), "yes"):
         with pytest.raises(ValueError, match="reset_mask"):
             envs.reset(options={"reset_mask": mask})
-    assert envs.episodes.tolist() == [0, 0]
+    assert envs.goal_tolerance.tolist() == [1.0, 1.0]
+    with pytest.raises(gym.error.ResetNeeded):
+        envs.step(np.zeros((2, 1)))
 
 
 def test_core_batch_checks_its_arguments():
@@ -214,7 +244,7 @@ def test_core_batch_checks_its_arguments():
     good = np.zeros(3)
     with pytest.raises(ValueError, match=re.escape("torques[2] must be in [-10, 10], got 11")):
         batch.step([0.0, 0.0, 11.0], good, every)
-    with pytest.raises(ValueError, match=re.escape("lambdas[0] must be at least 0, got -1")):
+    with pytest.raises(ValueError, match=r"goal_tolerances\[0\] must be at least 0, got -1"):
         batch.step(good, [-1.0, 0.0, 0.0], every)
     with pytest.raises(ValueError, match="torques must be of 3 items, got 2"):
         batch.step(good[:2], good, every)

@@ -2,12 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cmath>
 #include <stdexcept>
 
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/elementary.hpp"
+#include "sdnn/environments/acrobot_config.hpp"
+#include "sdnn/environments/acrobot_state.hpp"
 #include "sdnn/environments/detail/acrobot_dynamics.hpp"
 
 namespace sdnn::environments {
@@ -19,21 +19,11 @@ struct StepResult {
   bool truncated;
 };
 
-/// The angle plus the whole number of turns that brings it into [-pi, pi).
-///
-/// std::remainder is exact by IEEE 754, hence the same everywhere; an angle that lies in the
-/// interval stays as it is.
-inline double wrap_angle(double angle) noexcept {
-  if (angle >= -core::kPi && angle < core::kPi) return angle;
-  const double wrapped = std::remainder(angle, core::kTwoPi);
-  return wrapped >= core::kPi ? -core::kPi : wrapped;
-}
-
 /// Reward and episode end after the `decisions`-th decision of an episode led to `state`.
 ///
 /// The goal overrides the penalty, which looks at the decision instant only.
-inline StepResult result_of(const AcrobotConfig& config, const std::array<double, 4>& state,
-                            bool goal, int decisions) noexcept {
+inline StepResult result_of(const AcrobotConfig& config, const AcrobotState& state, bool goal,
+                            int decisions) noexcept {
   const bool penalized = std::abs(state[0]) < config.idle_angle ||
                          std::abs(state[2]) > config.goal_velocity_1 ||
                          std::abs(state[3]) > config.goal_velocity_2;
@@ -47,34 +37,29 @@ inline StepResult result_of(const AcrobotConfig& config, const std::array<double
 /// allocates nothing.
 class Acrobot {
  public:
-  /// theta1, theta2 (rad), theta1_dot, theta2_dot (rad/s).
-  using State = std::array<double, 4>;
-
   /// At rest, hanging down. Throws std::invalid_argument if a number is outside its range.
   explicit Acrobot(const AcrobotConfig& config = {}) : dynamics_(config) {}
 
   /// Starts an episode at rest, hanging down.
-  void reset() noexcept { begin_at({0.0, 0.0, 0.0, 0.0}); }
+  void reset() noexcept { begin_at(AcrobotState::Zero()); }
 
   /// Starts an episode at `state`; the angles are wrapped. Throws std::invalid_argument unless
   /// every number is finite.
-  void set_state(const Eigen::Vector4d& state) {
-    for (const double value : state) core::require_finite("state", value);
-    begin_at({wrap_angle(state[0]), wrap_angle(state[1]), state[2], state[3]});
-  }
+  void set_state(const AcrobotState& state) { begin_at(wrapped(state)); }
 
-  /// Holds `torque` (N m) for one decision interval; `lambda` scales the goal's speed limits.
-  /// The goal overrides the penalty, which looks at the decision instant only. Throws
-  /// std::invalid_argument unless |torque| <= max_torque and lambda >= 0, std::logic_error if the
-  /// episode is over, std::overflow_error if the speeds outgrow the integration step.
-  StepResult step(double torque, double lambda) {
+  /// Holds `torque` (N m) for one decision interval; `goal_tolerance`, the paper's lambda,
+  /// is the factor of the goal's speed limits. The goal overrides the penalty, which looks at the
+  /// decision instant only. Throws std::invalid_argument unless |torque| <= max_torque and
+  /// goal_tolerance >= 0, std::logic_error if the episode is over, std::overflow_error if the
+  /// speeds outgrow the integration step.
+  StepResult step(double torque, double goal_tolerance) {
     core::require_in_range("torque", torque, -config().max_torque, config().max_torque);
-    core::require(lambda >= 0.0, "lambda", "at least 0", lambda);
+    core::require(goal_tolerance >= 0.0, "goal_tolerance", "at least 0", goal_tolerance);
     if (over_) throw std::logic_error("the episode is over: call reset before step");
-    const bool goal = integrate(torque, lambda);
+    const bool goal = integrate(torque, goal_tolerance);
     state_[0] = wrap_angle(state_[0]);
     state_[1] = wrap_angle(state_[1]);
-    if (!std::isfinite(state_[0] + state_[1] + state_[2] + state_[3])) {
+    if (!state_.allFinite()) {
       over_ = true;
       throw std::overflow_error("the acrobot's speed is too high for this integration_step");
     }
@@ -84,21 +69,23 @@ class Acrobot {
     return result;
   }
 
-  /// theta1, theta2 in [-pi, pi) (rad), theta1_dot, theta2_dot (rad/s).
-  Eigen::Vector4d state() const noexcept { return {state_[0], state_[1], state_[2], state_[3]}; }
+  /// The present state, its angles in [-pi, pi).
+  AcrobotState state() const noexcept { return state_; }
 
   /// Height of the tip above joint 1, in m.
-  double tip_height() const noexcept {
-    return dynamics_.tip_height(SeparateForm<double>::angles(state_));
-  }
+  double tip_height() const noexcept { return dynamics_.tip_height(state_); }
 
   /// Kinetic and potential energy in J, the latter counted from the height of joint 1.
   double energy() const noexcept { return dynamics_.energy(state_); }
 
   /// Time derivative of `state` under `torque` (N m).
-  State derivative(const State& state, double torque) const noexcept {
-    using Form = SeparateForm<double>;
-    return dynamics_.derivative<Form>(state, Form::angles(state), torque);
+  AcrobotState derivative(const AcrobotState& state, double torque) const noexcept {
+    return dynamics_.derivative(state, torque);
+  }
+
+  /// The matrix M (kg m^2) of the equations M (theta1_dot_dot, theta2_dot_dot) = torques.
+  Eigen::Matrix2d mass_matrix(double theta2) const noexcept {
+    return dynamics_.mass_matrix(theta2);
   }
 
   /// Decisions made in this episode.
@@ -108,28 +95,31 @@ class Acrobot {
 
  private:
   // Moves the state on by one decision interval, or to the goal: then true.
-  bool integrate(double torque, double lambda) noexcept {
-    const double limit_1 = config().goal_velocity_1 * lambda;
-    const double limit_2 = config().goal_velocity_2 * lambda;
+  bool integrate(double torque, double goal_tolerance) noexcept {
+    const double limit_1 = config().goal_velocity_1 * goal_tolerance;
+    const double limit_2 = config().goal_velocity_2 * goal_tolerance;
 #if SDNN_LANES
-    PairedForm::State pairs{core::Lanes<2>::load(&state_[0]), core::Lanes<2>::load(&state_[2])};
-    const bool goal = dynamics_.integrate<PairedForm>(pairs, torque, limit_1, limit_2, true);
-    pairs[0].store(&state_[0]);
-    pairs[1].store(&state_[2]);
-    return goal;
+    PairedForm::State now{core::Lanes<2>::load(&state_[0]), core::Lanes<2>::load(&state_[2])};
+    const bool goal = dynamics_.integrate<PairedForm>(now, torque, limit_1, limit_2, true);
+    now[0].store(&state_[0]);
+    now[1].store(&state_[2]);
 #else
-    return dynamics_.integrate<SeparateForm<double>>(state_, torque, limit_1, limit_2, true);
+    using Form = SeparateForm<double>;
+    Form::State now{state_[0], state_[1], state_[2], state_[3]};
+    const bool goal = dynamics_.integrate<Form>(now, torque, limit_1, limit_2, true);
+    state_ = {now[0], now[1], now[2], now[3]};
 #endif
+    return goal;
   }
 
-  void begin_at(const State& state) noexcept {
+  void begin_at(const AcrobotState& state) noexcept {
     state_ = state;
     decisions_ = 0;
     over_ = false;
   }
 
   AcrobotDynamics dynamics_;
-  State state_{};
+  AcrobotState state_ = AcrobotState::Zero();
   int decisions_ = 0;
   bool over_ = false;
 };

@@ -14,6 +14,9 @@
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/environments/acrobot.hpp"
+#include "sdnn/environments/acrobot_config.hpp"
+#include "sdnn/environments/acrobot_sensors.hpp"
+#include "sdnn/environments/acrobot_state.hpp"
 #include "sdnn/environments/detail/acrobot_dynamics.hpp"
 #include "sdnn/environments/detail/acrobot_kernel.hpp"
 
@@ -22,10 +25,17 @@ namespace sdnn::environments {
 /// The most acrobots in one batch.
 inline constexpr std::size_t kMaxAcrobots = std::size_t{1} << 24;
 
+/// What a step brings to every acrobot of a batch: StepResult's members. Shapes: all (size(),).
+struct AcrobotBatchResults {
+  std::span<double> rewards;
+  std::span<std::uint8_t> terminated;  ///< 1: the goal
+  std::span<std::uint8_t> truncated;   ///< 1: the last decision was made
+};
+
 /// N acrobots in step, each with the bits that an Acrobot of its own would have.
 ///
-/// The torques, the goal's limits and the instants at which episodes end are each acrobot's own.
-/// A step allocates nothing.
+/// The torques, the goal's tolerances and the instants at which episodes end are each acrobot's
+/// own. A step allocates nothing.
 class AcrobotBatch {
  public:
   /// All at rest, hanging down. Throws std::invalid_argument if a number is outside its range.
@@ -34,7 +44,7 @@ class AcrobotBatch {
         size_(checked(n_acrobots)),
         padded_size_(core::round_up(n_acrobots, kAcrobotLanes)),
         torque_(padded_size_),
-        lambda_(padded_size_),
+        goal_tolerance_(padded_size_),
         mask_(padded_size_),
         decisions_(n_acrobots),
         over_(n_acrobots) {
@@ -44,57 +54,66 @@ class AcrobotBatch {
   std::size_t size() const noexcept { return size_; }
 
   /// Starts an episode of acrobot `i` at rest, hanging down. Throws std::out_of_range.
-  void reset(std::size_t i) { begin_at(i, {0.0, 0.0, 0.0, 0.0}); }
+  void reset(std::size_t i) { begin_at(i, AcrobotState::Zero()); }
 
   /// Starts an episode of every acrobot.
   void reset() {
     for (std::size_t i = 0; i < size_; ++i) reset(i);
   }
 
-  /// Starts an episode of acrobot `i` at `state`; the angles are wrapped. Throws
-  /// std::invalid_argument unless every number is finite, std::out_of_range.
-  void set_state(std::size_t i, const Eigen::Vector4d& state) {
-    for (const double value : state) core::require_finite("state", value);
-    begin_at(i, {wrap_angle(state[0]), wrap_angle(state[1]), state[2], state[3]});
+  /// Starts an episode of every acrobot whose item of `mask` is not 0.
+  ///
+  /// Shape: (size(),). Throws std::invalid_argument.
+  void reset(std::span<const std::uint8_t> mask) {
+    require_size("mask", mask.size());
+    for (std::size_t i = 0; i < size_; ++i) {
+      if (mask[i]) reset(i);
+    }
   }
 
+  /// Starts an episode of acrobot `i` at `state`; the angles are wrapped. Throws
+  /// std::invalid_argument unless every number is finite, std::out_of_range.
+  void set_state(std::size_t i, const AcrobotState& state) { begin_at(i, wrapped(state)); }
+
   /// Acrobot::step for every acrobot whose item of `moving` is not 0; the others stay as they are
-  /// (reward 0, no end), whatever their torque and lambda.
+  /// (reward 0, no end), whatever their torque and tolerance.
   ///
   /// Shapes: all (size(),). Throws std::invalid_argument or std::logic_error, like Acrobot::step,
   /// before anything moves; std::overflow_error after all have moved.
-  void step(std::span<const double> torques, std::span<const double> lambdas,
-            std::span<const std::uint8_t> moving, std::span<StepResult> results) {
-    check_step(torques, lambdas, moving, results);
+  void step(std::span<const double> torques, std::span<const double> goal_tolerances,
+            std::span<const std::uint8_t> moving, const AcrobotBatchResults& results) {
+    check_step(torques, goal_tolerances, moving, results);
     for (std::size_t i = 0; i < size_; ++i) {
       torque_[i] = moving[i] ? torques[i] : 0.0;
-      lambda_[i] = moving[i] ? lambdas[i] : 0.0;
+      goal_tolerance_[i] = moving[i] ? goal_tolerances[i] : 0.0;
       mask_[i] = moving[i] ? ~std::uint64_t{0} : 0;
     }
     move_acrobots_kernel()(
         dynamics_,
         {{state_[0].data(), state_[1].data(), state_[2].data(), state_[3].data()},
          torque_.data(),
-         lambda_.data(),
+         goal_tolerance_.data(),
          mask_.data()},
         padded_size_);
     std::size_t n_overflows = 0, first_overflow = 0;
     for (std::size_t i = size_; i-- > 0;) {
-      if (!moving[i]) {
-        results[i] = {0.0, false, false};
-        continue;
+      StepResult result{0.0, false, false};
+      if (moving[i]) {
+        state_[0][i] = wrap_angle(state_[0][i]);
+        state_[1][i] = wrap_angle(state_[1][i]);
+        const AcrobotState now = state_of(i);
+        if (now.allFinite()) {
+          result = result_of(config(), now, mask_[i] != 0, ++decisions_[i]);
+          over_[i] = result.terminated || result.truncated;
+        } else {
+          over_[i] = true;
+          first_overflow = i;
+          ++n_overflows;
+        }
       }
-      state_[0][i] = wrap_angle(state_[0][i]);
-      state_[1][i] = wrap_angle(state_[1][i]);
-      const auto now = numbers(i);
-      if (!std::isfinite(now[0] + now[1] + now[2] + now[3])) {
-        over_[i] = true;
-        first_overflow = i;
-        ++n_overflows;
-        continue;
-      }
-      results[i] = result_of(config(), now, mask_[i] != 0, ++decisions_[i]);
-      over_[i] = results[i].terminated || results[i].truncated;
+      results.rewards[i] = result.reward;
+      results.terminated[i] = result.terminated;
+      results.truncated[i] = result.truncated;
     }
     if (n_overflows > 0) {
       throw std::overflow_error("the speed of acrobot " + std::to_string(first_overflow) +
@@ -102,17 +121,28 @@ class AcrobotBatch {
     }
   }
 
-  /// theta1, theta2 in [-pi, pi) (rad), theta1_dot, theta2_dot (rad/s). Throws std::out_of_range.
-  Eigen::Vector4d state(std::size_t i) const {
+  /// The present state of acrobot `i`, its angles in [-pi, pi). Throws std::out_of_range.
+  AcrobotState state(std::size_t i) const {
     require_index(i);
-    const auto now = numbers(i);
-    return {now[0], now[1], now[2], now[3]};
+    return state_of(i);
   }
 
-  /// Height of the tip above joint 1, in m. Throws std::out_of_range.
-  double tip_height(std::size_t i) const {
-    require_index(i);
-    return dynamics_.tip_height(SeparateForm<double>::angles(numbers(i)));
+  /// Writes every state. Shape: (size(), 4), row after row. Throws std::invalid_argument.
+  void states(std::span<double> out) const {
+    write_rows(out, [](const AcrobotState& state) { return state; });
+  }
+
+  /// Writes the basic observation s1..s4 of every acrobot. Shape: (size(), 4), row after row.
+  /// Throws std::invalid_argument.
+  void observations(std::span<double> out) const { write_rows(out, basic_observation); }
+
+  /// Height of the tip of acrobot `i` above joint 1, in m. Throws std::out_of_range.
+  double tip_height(std::size_t i) const { return dynamics_.tip_height(state(i)); }
+
+  /// Writes the height of every tip. Shape: (size(),). Throws std::invalid_argument.
+  void tip_heights(std::span<double> out) const {
+    require_size("out", out.size());
+    for (std::size_t i = 0; i < size_; ++i) out[i] = dynamics_.tip_height(state_of(i));
   }
 
   /// Decisions made in the episode of acrobot `i`. Throws std::out_of_range.
@@ -124,8 +154,6 @@ class AcrobotBatch {
   const AcrobotConfig& config() const noexcept { return dynamics_.config(); }
 
  private:
-  using State = std::array<double, 4>;
-
   static std::size_t checked(std::size_t n_acrobots) {
     core::require_in_range("n_acrobots", n_acrobots, 1, kMaxAcrobots);
     return n_acrobots;
@@ -138,33 +166,48 @@ class AcrobotBatch {
     }
   }
 
-  State numbers(std::size_t i) const noexcept {
+  void require_size(const char* name, std::size_t size, std::size_t width = 1) const {
+    const std::size_t expected = width * size_;
+    core::require(size == expected, name, "of " + std::to_string(expected) + " items", size);
+  }
+
+  AcrobotState state_of(std::size_t i) const noexcept {
     return {state_[0][i], state_[1][i], state_[2][i], state_[3][i]};
   }
 
-  void begin_at(std::size_t i, const State& state) {
+  template <class RowOf>
+  void write_rows(std::span<double> out, const RowOf& row_of) const {
+    require_size("out", out.size(), 4);
+    for (std::size_t i = 0; i < size_; ++i) {
+      Eigen::Vector4d::Map(&out[4 * i]) = row_of(state_of(i));
+    }
+  }
+
+  void begin_at(std::size_t i, const AcrobotState& state) {
     require_index(i);
-    for (std::size_t k = 0; k < state.size(); ++k) state_[k][i] = state[k];
+    for (std::size_t k = 0; k < state_.size(); ++k) {
+      state_[k][i] = state[static_cast<Eigen::Index>(k)];
+    }
     decisions_[i] = 0;
     over_[i] = false;
   }
 
-  void check_step(std::span<const double> torques, std::span<const double> lambdas,
-                  std::span<const std::uint8_t> moving, std::span<StepResult> results) const {
-    const auto require_size = [this](const char* name, std::size_t size) {
-      core::require(size == size_, name, "of " + std::to_string(size_) + " items", size);
-    };
+  void check_step(std::span<const double> torques, std::span<const double> goal_tolerances,
+                  std::span<const std::uint8_t> moving, const AcrobotBatchResults& results) const {
     require_size("torques", torques.size());
-    require_size("lambdas", lambdas.size());
+    require_size("goal_tolerances", goal_tolerances.size());
     require_size("moving", moving.size());
-    require_size("results", results.size());
+    require_size("rewards", results.rewards.size());
+    require_size("terminated", results.terminated.size());
+    require_size("truncated", results.truncated.size());
     const double max_torque = config().max_torque;
     for (std::size_t i = 0; i < size_; ++i) {
       if (!moving[i]) continue;
-      if (std::abs(torques[i]) <= max_torque && lambdas[i] >= 0.0 && !over_[i]) continue;
+      if (std::abs(torques[i]) <= max_torque && goal_tolerances[i] >= 0.0 && !over_[i]) continue;
       const std::string item = "[" + std::to_string(i) + "]";
       core::require_in_range("torques" + item, torques[i], -max_torque, max_torque);
-      core::require(lambdas[i] >= 0.0, "lambdas" + item, "at least 0", lambdas[i]);
+      core::require(goal_tolerances[i] >= 0.0, "goal_tolerances" + item, "at least 0",
+                    goal_tolerances[i]);
       throw std::logic_error("the episode of acrobot " + std::to_string(i) +
                              " is over: call reset before step");
     }
@@ -175,7 +218,7 @@ class AcrobotBatch {
   std::size_t padded_size_;
   std::array<core::AlignedBuffer<double>, 4> state_;  // theta1, theta2, theta1_dot, theta2_dot
   core::AlignedBuffer<double> torque_;
-  core::AlignedBuffer<double> lambda_;
+  core::AlignedBuffer<double> goal_tolerance_;
   core::AlignedBuffer<std::uint64_t> mask_;
   std::vector<int> decisions_;
   std::vector<char> over_;

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
@@ -17,6 +16,7 @@
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/elementary.hpp"
 #include "sdnn/core/random.hpp"
+#include "sdnn/environments/acrobot_state.hpp"
 
 namespace sdnn::environments {
 
@@ -35,9 +35,9 @@ inline double wrap_to_unit(double x) noexcept {
 /// The nearest number in [0, 1].
 inline double saturate_to_unit(double x) noexcept { return std::clamp(x, 0.0, 1.0); }
 
-/// The four basic observations s1..s4 of a state (theta1, theta2, theta1_dot, theta2_dot), rad and
-/// rad/s: angles as turns in [0, 1), speeds so that -3 pi .. 3 pi and -5 pi .. 5 pi fill [0, 1].
-inline std::array<double, 4> basic_observation(const Eigen::Vector4d& state) noexcept {
+/// The four basic observations s1..s4 of a state: angles as turns in [0, 1), speeds so that
+/// -3 pi .. 3 pi and -5 pi .. 5 pi fill [0, 1].
+inline Eigen::Vector4d basic_observation(const AcrobotState& state) noexcept {
   constexpr double kSpeedRange1 = 6.0 * core::kPi, kSpeedRange2 = 10.0 * core::kPi;
   return {wrap_to_unit(state[0] / core::kTwoPi + 0.5), wrap_to_unit(state[1] / core::kTwoPi + 0.5),
           saturate_to_unit(state[2] / kSpeedRange1 + 0.5),
@@ -108,9 +108,9 @@ class AcrobotSensors {
         noise_(config.noise, edges(config.n_sensors), seed, stream) {}
 
   /// Writes one observation of `state`. Shapes: out (n_sensors,), every entry in [0, 1].
-  void observe(const Eigen::Vector4d& state, std::span<double> out) noexcept {
+  void observe(const AcrobotState& state, std::span<double> out) noexcept {
     assert(out.size() == n_sensors_);
-    const auto basic = basic_observation(state);
+    const Eigen::Vector4d basic = basic_observation(state);
     std::copy(basic.begin(), basic.end(), out.begin());
     if (n_sensors_ > 4) out[4] = energy_sensor(basic[2], basic[3]);
     if (n_sensors_ > 5) out[5] = height_sensor(basic[0], basic[1]);

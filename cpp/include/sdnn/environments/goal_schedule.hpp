@@ -1,4 +1,4 @@
-/// lambda(k): how the speed limits of the acrobot's goal tighten with the learning episode k.
+/// lambda(k): the goal tolerance of the acrobot's task, which falls with the learning episode k.
 #pragma once
 
 #include <cmath>

@@ -38,12 +38,12 @@ TEST(AcrobotKernel, KeepsTheBitsAtEveryLevel) {
   const AcrobotDynamics dynamics(config);
   core::Random random(5, core::Stream::exploration);
   std::vector<One::State> starts(kSize);
-  std::vector<double> torque(kSize), lambda(kSize);
+  std::vector<double> torque(kSize), tolerance(kSize);
   std::vector<std::uint64_t> moving(kSize);
   for (std::size_t i = 0; i < kSize; ++i) {
     for (double& value : starts[i]) value = 6.0 * random.uniform() - 3.0;
     torque[i] = 20.0 * random.uniform() - 10.0;
-    lambda[i] = random.uniform();
+    tolerance[i] = random.uniform();
     moving[i] = random.uniform() < 0.8 ? ~std::uint64_t{0} : 0;
   }
   for (std::size_t i = 512; i < 1024; ++i) moving[i] = 0;  // whole registers stand still
@@ -56,15 +56,15 @@ TEST(AcrobotKernel, KeepsTheBitsAtEveryLevel) {
     move(dynamics,
          {{state[0].data(), state[1].data(), state[2].data(), state[3].data()},
           torque.data(),
-          lambda.data(),
+          tolerance.data(),
           mask.data()},
          kSize);
     int n_goals = 0;
     for (std::size_t i = 0; i < kSize; ++i) {
       One::State expected = starts[i];
       const bool goal =
-          dynamics.integrate<One>(expected, torque[i], config.goal_velocity_1 * lambda[i],
-                                  config.goal_velocity_2 * lambda[i], moving[i] != 0);
+          dynamics.integrate<One>(expected, torque[i], config.goal_velocity_1 * tolerance[i],
+                                  config.goal_velocity_2 * tolerance[i], moving[i] != 0);
       ASSERT_EQ(mask[i], goal ? ~std::uint64_t{0} : 0) << i;
       n_goals += goal;
       for (std::size_t k = 0; k < 4; ++k) {

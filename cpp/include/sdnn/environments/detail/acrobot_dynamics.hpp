@@ -1,73 +1,21 @@
 /// The acrobot's equations of motion, for one acrobot or for several side by side.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <tuple>
 #include <utility>
 
-#include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/lanes.hpp"
 #include "sdnn/core/elementary.hpp"
+#include "sdnn/environments/acrobot_config.hpp"
+#include "sdnn/environments/acrobot_state.hpp"
 #include "sdnn/environments/detail/runge_kutta.hpp"
 
 namespace sdnn::environments {
-
-/// When the goal is looked for; the paper is silent.
-enum class GoalTest {
-  every_step,        ///< after every integration step: the episode ends at that instant
-  decision_instant,  ///< only when the next decision is due
-};
-
-/// The task's numbers; the defaults are the paper's.
-struct AcrobotConfig {
-  double link_mass_1 = 1.0;                  ///< kg
-  double link_mass_2 = 1.0;                  ///< kg
-  double link_length_1 = 1.0;                ///< m
-  double link_length_2 = 1.0;                ///< m
-  double center_of_mass_1 = 0.5;             ///< m from joint 1
-  double center_of_mass_2 = 0.5;             ///< m from joint 2
-  double inertia_1 = 1.0;                    ///< kg m^2, about the link's centre of mass
-  double inertia_2 = 1.0;                    ///< kg m^2
-  double gravity = 9.8;                      ///< m/s^2
-  double max_torque = 10.0;                  ///< N m
-  double decision_interval = 1.0;            ///< s, the torque is held for it
-  double integration_step = 0.02;            ///< s, a whole fraction of decision_interval
-  int max_decisions = 50;                    ///< in an episode
-  double goal_height = 1.5;                  ///< m, of the tip above joint 1
-  double goal_velocity_1 = 3.0 * core::kPi;  ///< rad/s; times lambda for the goal, as it is for
-  double goal_velocity_2 = 5.0 * core::kPi;  ///< rad/s; the penalty
-  GoalTest goal_test = GoalTest::every_step;
-  double goal_reward = 10.0;
-  double penalty = -5.0;                 ///< for idling or too much speed; ends nothing
-  double idle_angle = core::kPi / 36.0;  ///< rad: |theta1| below it is idling; 0 = never
-
-  static constexpr auto fields() noexcept {
-    return std::tuple(core::field("link_mass_1", &AcrobotConfig::link_mass_1),
-                      core::field("link_mass_2", &AcrobotConfig::link_mass_2),
-                      core::field("link_length_1", &AcrobotConfig::link_length_1),
-                      core::field("link_length_2", &AcrobotConfig::link_length_2),
-                      core::field("center_of_mass_1", &AcrobotConfig::center_of_mass_1),
-                      core::field("center_of_mass_2", &AcrobotConfig::center_of_mass_2),
-                      core::field("inertia_1", &AcrobotConfig::inertia_1),
-                      core::field("inertia_2", &AcrobotConfig::inertia_2),
-                      core::field("gravity", &AcrobotConfig::gravity),
-                      core::field("max_torque", &AcrobotConfig::max_torque),
-                      core::field("decision_interval", &AcrobotConfig::decision_interval),
-                      core::field("integration_step", &AcrobotConfig::integration_step),
-                      core::field("max_decisions", &AcrobotConfig::max_decisions),
-                      core::field("goal_height", &AcrobotConfig::goal_height),
-                      core::field("goal_velocity_1", &AcrobotConfig::goal_velocity_1),
-                      core::field("goal_velocity_2", &AcrobotConfig::goal_velocity_2),
-                      core::field("goal_test", &AcrobotConfig::goal_test),
-                      core::field("goal_reward", &AcrobotConfig::goal_reward),
-                      core::field("penalty", &AcrobotConfig::penalty),
-                      core::field("idle_angle", &AcrobotConfig::idle_angle));
-  }
-  bool operator==(const AcrobotConfig&) const = default;
-};
 
 /// Sines and cosines of theta1, theta2 and theta1 + theta2.
 template <class Real>
@@ -87,6 +35,9 @@ struct AcrobotAngles {
 
 /// The state as four numbers theta1, theta2 (rad), theta1_dot, theta2_dot (rad/s): of one acrobot
 /// (`Real` = double), or of one acrobot in each lane.
+///
+/// An array and no Eigen vector: Eigen knows no numbers such as ours of lanes, and does not promise
+/// to inline its calls into a kernel that is compiled for one instruction set.
 template <class Real>
 struct SeparateForm {
   using Number = Real;
@@ -218,19 +169,42 @@ class AcrobotDynamics {
     return core::first_only(moving, under_way);
   }
 
+  /// Time derivative of `state` under `torque` (N m).
+  AcrobotState derivative(const AcrobotState& state, double torque) const noexcept {
+    using Form = SeparateForm<double>;
+    const Form::State now = separate(state);
+    const Form::State slope = derivative<Form>(now, Form::angles(now), torque);
+    return {slope[0], slope[1], slope[2], slope[3]};
+  }
+
+  /// Height of the tip above joint 1, in m.
+  double tip_height(const AcrobotState& state) const noexcept {
+    return tip_height(SeparateForm<double>::angles(separate(state)));
+  }
+
+  /// Spong's d11, d12 = d21, d22 in kg m^2: accelerations of the joints to torques on them.
+  Eigen::Matrix2d mass_matrix(double theta2) const noexcept {
+    const double bend = coupling_ * core::sin_cos(theta2).cos;
+    const double d12 = inertia_22_ + bend;
+    return Eigen::Matrix2d{{inertia_11_ + 2.0 * bend, d12}, {d12, inertia_22_}};
+  }
+
   /// Kinetic and potential energy in J, the latter counted from the height of joint 1.
-  double energy(const std::array<double, 4>& state) const noexcept {
-    const auto at = SeparateForm<double>::angles(state);
-    const double v1 = state[2], v2 = state[3];
-    const double bend = coupling_ * at.cos_2;
-    return 0.5 * (inertia_11_ + 2.0 * bend) * v1 * v1 + 0.5 * inertia_22_ * v2 * v2 +
-           (inertia_22_ + bend) * v1 * v2 - gravity_1_ * at.cos_1 - gravity_2_ * at.cos_12;
+  double energy(const AcrobotState& state) const noexcept {
+    const auto at = SeparateForm<double>::angles(separate(state));
+    const Eigen::Vector2d velocity = state.tail<2>();
+    return 0.5 * velocity.dot(mass_matrix(state[1]) * velocity) - gravity_1_ * at.cos_1 -
+           gravity_2_ * at.cos_12;
   }
 
   const AcrobotConfig& config() const noexcept { return config_; }
 
  private:
   static constexpr double square(double x) noexcept { return x * x; }
+
+  static SeparateForm<double>::State separate(const AcrobotState& state) noexcept {
+    return {state[0], state[1], state[2], state[3]};
+  }
 
   static void check(const AcrobotConfig& config);
 

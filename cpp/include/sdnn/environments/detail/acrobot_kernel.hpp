@@ -15,7 +15,7 @@ namespace sdnn::environments {
 struct AcrobotArrays {
   std::array<double*, 4> state;  ///< theta1, theta2, theta1_dot, theta2_dot
   const double* torque;
-  const double* lambda;
+  const double* goal_tolerance;
   std::uint64_t* mask;  ///< in: all ones where an acrobot moves, else 0; out: where the goal is
 };
 
@@ -43,9 +43,9 @@ SDNN_INLINE void move_in_lanes(const AcrobotDynamics& dynamics, const AcrobotArr
     typename Form::State state;
     core::unrolled<4>([&](std::size_t k)
                           SDNN_INLINE_LAMBDA { state[k] = Real::load(arrays.state[k] + i); });
-    const Real lambda = Real::load(arrays.lambda + i);
-    mask = dynamics.integrate<Form>(state, Real::load(arrays.torque + i), velocity_1 * lambda,
-                                    velocity_2 * lambda, mask);
+    const Real tolerance = Real::load(arrays.goal_tolerance + i);
+    mask = dynamics.integrate<Form>(state, Real::load(arrays.torque + i), velocity_1 * tolerance,
+                                    velocity_2 * tolerance, mask);
     core::unrolled<4>([&](std::size_t k)
                           SDNN_INLINE_LAMBDA { state[k].store(arrays.state[k] + i); });
     mask.store(arrays.mask + i);
@@ -63,10 +63,10 @@ inline void move_acrobots_portable(const AcrobotDynamics& dynamics, const Acrobo
     if (arrays.mask[i] == 0) continue;
     Form::State state;
     for (std::size_t k = 0; k < 4; ++k) state[k] = arrays.state[k][i];
-    const double lambda = arrays.lambda[i];
+    const double tolerance = arrays.goal_tolerance[i];
     const bool goal = dynamics.integrate<Form>(state, arrays.torque[i],
-                                               dynamics.config().goal_velocity_1 * lambda,
-                                               dynamics.config().goal_velocity_2 * lambda, true);
+                                               dynamics.config().goal_velocity_1 * tolerance,
+                                               dynamics.config().goal_velocity_2 * tolerance, true);
     for (std::size_t k = 0; k < 4; ++k) arrays.state[k][i] = state[k];
     arrays.mask[i] = goal ? ~std::uint64_t{0} : 0;
   }

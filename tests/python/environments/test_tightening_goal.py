@@ -1,0 +1,130 @@
+"""A goal that tightens with the learning episode that it is given, and with nothing else."""
+
+import pickle
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from sdnn.environments import (
+    AcrobotConfig,
+    AcrobotSwingUpEnv,
+    GoalSchedule,
+    GoalScheduleConfig,
+    NoisySensors,
+    RedundantSensors,
+    TighteningGoal,
+)
+
+ID = "sdnn/AcrobotSwingUp-v0"
+
+
+def tolerance(env, **reset):
+    return env.reset(**reset)[1]["goal_tolerance"]
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_check_env(dtype):
+    env = TighteningGoal(AcrobotSwingUpEnv(dtype=dtype))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", message=".*different from the unwrapped version")
+        check_env(env, skip_render_check=True)
+
+
+def test_tightens_with_the_episode_that_it_is_given():
+    env = TighteningGoal(AcrobotSwingUpEnv())
+    schedule = GoalSchedule()
+    for episode in (1, 2, 100, 10000, 10001, 3):
+        assert tolerance(env, options={"episode": episode}) == schedule(episode)
+        assert env.episode == episode
+
+
+def test_no_reset_without_an_episode_moves_the_task():
+    env = TighteningGoal(gym.make(ID))
+    assert env.episode == 1
+    assert tolerance(env) == GoalSchedule()(1)
+    assert tolerance(env, options={"episode": 300}) == 0.25
+    for reset in ({}, {"seed": 3}, {"options": {}}):
+        assert tolerance(env, **reset) == 0.25
+        assert env.episode == 300
+
+
+def test_an_episode_that_is_set_holds_from_the_next_reset_on():
+    env = TighteningGoal(AcrobotSwingUpEnv())
+    env.reset()
+    env.episode = 100
+    assert env.step([0.0])[4]["goal_tolerance"] == GoalSchedule()(1)
+    assert [tolerance(env) for _ in range(2)] == [0.5, 0.5]
+
+
+def test_evaluating_leaves_the_learning_task_alone():
+    learning, evaluation = (TighteningGoal(AcrobotSwingUpEnv()) for _ in range(2))
+    seen = []
+    for episode in range(1, 31):
+        seen.append(tolerance(learning, options={"episode": episode}))
+        if episode % 10 == 0:
+            for env in (evaluation, learning):
+                assert tolerance(env, options={"episode": episode}) == seen[-1]
+    assert seen == [GoalSchedule()(episode) for episode in range(1, 31)]
+
+
+def test_any_function_of_the_episode_is_a_schedule():
+    env = TighteningGoal(AcrobotSwingUpEnv(), lambda episode: 0.5**episode)
+    assert [tolerance(env, options={"episode": k}) for k in (1, 2, 3)] == [0.5, 0.25, 0.125]
+    constant = GoalSchedule(GoalScheduleConfig(kind="constant", constant_value=0.3))
+    assert tolerance(TighteningGoal(AcrobotSwingUpEnv(), schedule=constant)) == 0.3
+    assert "constant" in repr(constant)
+    assert pickle.loads(pickle.dumps(constant))(7) == 0.3
+
+
+def test_other_wrappers_may_lie_between_and_around():
+    env = NoisySensors(TighteningGoal(RedundantSensors(gym.make(ID, config=AcrobotConfig()))))
+    assert env.reset(options={"episode": 100})[0].shape == (6,)
+    env.set_wrapper_attr("episode", 300)
+    assert tolerance(env) == 0.25
+    assert env.get_wrapper_attr("goal_tolerance") == 0.25
+
+
+def test_every_environment_of_a_vector_has_its_own():
+    envs = gym.make_vec(
+        ID,
+        num_envs=2,
+        vectorization_mode="sync",
+        wrappers=[TighteningGoal],
+        config=AcrobotConfig(max_decisions=1),
+    )
+    infos = envs.reset(options={"episode": 100})[1]
+    assert infos["goal_tolerance"].tolist() == [0.5, 0.5]
+    envs.set_attr("episode", [300, 1])
+    still = np.zeros((2, 1), np.float32)
+    assert envs.step(still)[4]["goal_tolerance"].tolist() == [0.5, 0.5]
+    assert envs.step(still)[4]["goal_tolerance"].tolist() == [0.25, GoalSchedule()(1)]
+
+
+def test_it_is_part_of_the_spec():
+    env = TighteningGoal(gym.make(ID), schedule=lambda episode: 1.0 / episode)
+    again = gym.make(env.spec)
+    assert tolerance(again, options={"episode": 4}) == 0.25
+
+
+def test_bad_arguments_change_nothing():
+    env = TighteningGoal(AcrobotSwingUpEnv())
+    for bad in (0, -1):
+        with pytest.raises(ValueError, match=f"episode must be at least 1, got {bad}"):
+            env.reset(options={"episode": bad})
+        with pytest.raises(ValueError, match=f"episode must be at least 1, got {bad}"):
+            env.episode = bad
+    with pytest.raises(TypeError):
+        env.reset(options={"episode": 1.5})
+    with pytest.raises(ValueError, match="'episode' in place of 'goal_tolerance'"):
+        env.reset(options={"goal_tolerance": 0.5})
+    with pytest.raises(ValueError, match="got 'epsiode'"):
+        env.reset(options={"episode": 5, "epsiode": 3})
+    with pytest.raises(ValueError, match="goal_tolerance must be at least 0, got -1"):
+        TighteningGoal(AcrobotSwingUpEnv(), lambda episode: -1.0).reset()
+    assert env.episode == 1
+    with pytest.raises(ValueError, match=r"env must have a goal_tolerance, got .*CartPole"):
+        TighteningGoal(gym.make("CartPole-v1"))
