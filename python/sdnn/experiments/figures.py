@@ -16,7 +16,7 @@ import numpy as np
 from sdnn.experiments.cases import EXPERIMENTS, PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.experiments.errors import PlotUnavailableError
 from sdnn.experiments.records import CostRecord
-from sdnn.experiments.registry import agent_entry, cost_series
+from sdnn.experiments.registry import AGENTS, agent_entry, cost_series
 from sdnn.experiments.results import CaseResult
 from sdnn.experiments.statistics import running_median
 
@@ -97,7 +97,7 @@ def draw_experiment(
     panels = grid[:: len(heights)].ravel()
     starts = grid[1::2].ravel() if with_start else None
     agents = list(dict.fromkeys(result.agent for result in results))
-    colors = {agent: _color(i) for i, agent in enumerate(agents)}
+    colors = {agent: _color(list(AGENTS).index(agent)) for agent in agents}
     for number, (case, axes) in enumerate(zip(experiment.cases, panels, strict=False)):
         shown = [result for result in results if result.case == case]
         axes.set_title(case.title, fontsize=10.5, loc="left", color=INK)

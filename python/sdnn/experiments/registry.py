@@ -131,6 +131,7 @@ def register(entry: AgentEntry) -> None:
     for series in entry.costs:
         if series.id in known:
             raise ValueError(f"a series {series.id!r} is already registered")
+        known.add(series.id)
     AGENTS[entry.id] = entry
 
 

@@ -18,18 +18,11 @@ from sdnn.experiments import (
     summarize,
 )
 from sdnn.experiments.figures import SMOOTHED_TESTS, figure_bytes
-from sdnn.experiments.page import Call, to_html
-from sdnn.experiments.report import (
-    ROW_HEADER,
-    ExperimentReport,
-    Report,
-    to_json,
-    to_markdown,
-    trial_rows,
-)
+from sdnn.experiments.page import Call, to_html, to_markdown
+from sdnn.experiments.records import ROW_HEADER, trial_rows
+from sdnn.experiments.report import ExperimentReport, Report, format_estimate, to_json
 from sdnn.experiments.reproduce import ReproduceRequest, reproduce
 from sdnn.experiments.statistics import Estimate, running_median
-from sdnn.experiments.tables import format_estimate
 
 (EXPERIMENT,) = select_experiments("a")
 
@@ -41,7 +34,7 @@ def results(tmp_path, fake, run):
     plan = fake.make_plan(3, 3000)
     run(tmp_path, plan)
     with ResultStore(tmp_path) as store:
-        return collect(EXPERIMENT, [p.key for p in plan], store)
+        return collect(EXPERIMENT, store.load(p.key for p in plan))
 
 
 def all_text(figure):
@@ -80,7 +73,7 @@ def test_short_runs_are_drawn_as_they_are(tmp_path, fake, run):
     plan = fake.make_plan(2, 300)
     run(tmp_path, plan)
     with ResultStore(tmp_path) as store:
-        results = collect(EXPERIMENT, [p.key for p in plan], store)
+        results = collect(EXPERIMENT, store.load(p.key for p in plan))
     for axes, result in zip(draw_experiment(EXPERIMENT, results).axes, results, strict=True):
         ((_, line),) = curves_of(axes)
         np.testing.assert_array_equal(line, np.median(result.steps, axis=0))
@@ -121,13 +114,9 @@ def test_figures_are_repeatable_to_the_byte(results):
 @pytest.mark.parametrize("module", ["figures", "page"])
 def test_missing_extra_is_told_before_any_trial(monkeypatch, tmp_path, module):
     monkeypatch.setattr(f"sdnn.experiments.{module}.find_spec", lambda name: None)
-
-    def make(config, seed):
-        raise AssertionError("a trial was made")
-
     request = ReproduceRequest(experiments=(EXPERIMENT,), out=tmp_path / "out", quick=True)
     with pytest.raises(PlotUnavailableError, match=re.escape('pip install "sdnn[reproduce]"')):
-        reproduce(request, make, make, version="0", machine="m")
+        reproduce(request)
     assert not (tmp_path / "out").exists()
 
 
