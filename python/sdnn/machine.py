@@ -6,6 +6,8 @@ import os
 import platform
 from pathlib import Path
 
+from sdnn.instruction_sets import instruction_set
+
 _PROCESSOR_FILE = Path("/proc/cpuinfo")
 
 
@@ -26,3 +28,8 @@ def n_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def description() -> str:
+    """Name the processor and the instruction set in use, as results of times are labelled."""
+    return f"{processor()}, {instruction_set()}"

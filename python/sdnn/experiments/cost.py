@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Box
 
-from sdnn import _core
+from sdnn import _core, machine
 from sdnn.experiments.engine import Observer
 from sdnn.experiments.records import CostKey, CostRecord, StepTimes
 from sdnn.experiments.registry import AgentEntry, CostSeries, cost_series
@@ -83,8 +83,6 @@ def measure_costs(
     keys: Sequence[CostKey],
     config: CostConfig,
     store: ResultStore,
-    *,
-    machine: str,
     observer: Observer,
 ) -> None:
     """Measure what is not stored yet, one after another, and store each at once.
@@ -97,8 +95,6 @@ def measure_costs(
         How thoroughly.
     store
         Where the records go.
-    machine
-        Processor and instruction set.
     observer
         Told what happens.
 
@@ -118,7 +114,7 @@ def measure_costs(
             record = CostRecord(
                 key=key,
                 version=_core.__version__,
-                machine=machine,
+                machine=machine.description(),
                 finished_at=datetime.now(timezone.utc).isoformat(timespec="seconds"),
                 times=times,
             )

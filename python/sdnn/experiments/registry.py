@@ -8,6 +8,7 @@ A new agent is one class and one entry. An agent of one's own takes part after i
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -123,8 +124,10 @@ def register(entry: AgentEntry) -> None:
     Raises
     ------
     ValueError
-        If an agent or a series of that id is there already.
+        If the id is no word for file names, or an agent or series of that id is there already.
     """
+    if not re.fullmatch(r"\w[\w.-]*", entry.id):
+        raise ValueError(f"id must be of letters, digits, '_', '.' and '-', got {entry.id!r}")
     if entry.id in AGENTS:
         raise ValueError(f"an agent {entry.id!r} is already registered")
     known = {series.id for _, series in cost_series()}

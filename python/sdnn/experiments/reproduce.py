@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from sdnn import _core
+from sdnn import _core, machine
 from sdnn.experiments import figures, page
 from sdnn.experiments.cases import EXPERIMENTS, PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.experiments.config import PlannedTrial, plan_trials
@@ -30,8 +30,6 @@ from sdnn.experiments.report import ExperimentReport, Report, to_json
 from sdnn.experiments.results import collect, summarize
 from sdnn.experiments.store import STORE_NAME, ResultStore
 from sdnn.experiments.trial import ProtocolConfig
-from sdnn.instruction_sets import instruction_set
-from sdnn.machine import processor
 from sdnn.whole_files import csv_bytes, remove_partial_files, write_whole
 
 QUICK_TRIALS = 2
@@ -123,18 +121,17 @@ class ReproduceRequest:
         ------
         ValueError
             If the trials would be too short to hold a test episode, no agent has one of the ids,
-            or nothing at all would be run.
+            or only costs are asked for, of agents that have none.
         """
         n_trials = self.n_trials or (QUICK_TRIALS if self.quick else PAPER_TRIALS)
-        known = [
-            e.with_agents(self.agents) for e in dict.fromkeys((*EXPERIMENTS, *self.experiments))
-        ]
-        asked = {e.id for e in self.experiments}
+        by_id = {experiment.id: experiment for experiment in (*EXPERIMENTS, *self.experiments)}
+        known = [experiment.with_agents(self.agents) for experiment in by_id.values()]
         cases = [case for experiment in known for case in experiment.cases]
         planned = plan_trials(cases, n_trials, self.seed, self.protocol)
+        asked = {experiment.id for experiment in self.experiments}
         wanted = {pair for e in known if e.id in asked for pair in e.pairs}
         costs = cost_keys(self.cost_config, self.agents or None) if self.cost else ()
-        if not wanted and not costs:
+        if self.cost and not (wanted or costs):
             measured = dict.fromkeys(entry.id for entry, _ in cost_series())
             raise ValueError(
                 f"agents whose cost is measured are {', '.join(measured)},"
@@ -241,17 +238,16 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
     page.require_jinja()
     begin = time.monotonic()
     watcher = Observer() if observer is None else observer
-    machine = f"{processor()}, {instruction_set()}"
     plan = request.plan
     with ResultStore(request.out) as store:
         remove_partial_files(request.out)
         outcome = run_trials(plan.trials, store, jobs=request.jobs, observer=watcher)
         if outcome.failures or outcome.interrupted:
             return Reproduction(outcome)
-        measure_costs(plan.costs, request.cost_config, store, machine=machine, observer=watcher)
+        measure_costs(plan.costs, request.cost_config, store, watcher)
         report, records = _read(request, store)
     call = page.Call(
-        machine=machine,
+        machine=machine.description(),
         seconds=time.monotonic() - begin,
         n_run=outcome.n_run,
         n_planned=outcome.n_planned,

@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from sdnn import _core
+from sdnn import _core, machine
 from sdnn.experiments import AGENTS, CostConfig, Observer, ResultStore, StoreError, draw_cost
 from sdnn.experiments.cost import QUICK_COST, cost_keys, measure_costs, measure_steps
 from sdnn.experiments.records import StepTimes, records_digest
@@ -39,7 +39,7 @@ def measured(monkeypatch):
         monkeypatch.setattr("sdnn.experiments.cost.measure_steps", measure)
         with ResultStore(folder) as store:
             keys = cost_keys(config)
-            measure_costs(keys, config, store, machine="m", observer=Observer())
+            measure_costs(keys, config, store, Observer())
             return store.load_costs(config.config_hash)
 
     return _measured
@@ -82,6 +82,8 @@ def test_what_is_stored_is_not_measured_again(tmp_path, measured):
     assert [cost.key for cost in again] == [cost.key for cost in costs]
     np.testing.assert_array_equal(costs[0].microseconds, [16.0, 32.0, 48.0])
     assert (costs[0].times.n_steps, costs[0].times.table_bytes) == (5, 81)
+    assert {cost.machine for cost in costs} == {machine.description()}
+    assert {cost.version for cost in costs} == {_core.__version__}
 
 
 def test_settings_of_costs_live_side_by_side(tmp_path, measured):

@@ -8,18 +8,21 @@ from html import escape
 import numpy as np
 import pytest
 
+import sdnn.experiments.reproduce as reproduce_module
 from sdnn.experiments import (
     CaseResult,
     PlotUnavailableError,
+    ProtocolConfig,
     ResultStore,
     collect,
     draw_experiment,
+    plan_trials,
     select_experiments,
     summarize,
 )
 from sdnn.experiments.figures import SMOOTHED_TESTS, figure_bytes
 from sdnn.experiments.page import Call, to_html, to_markdown
-from sdnn.experiments.records import ROW_HEADER, trial_rows
+from sdnn.experiments.records import ROW_HEADER, records_digest, trial_rows
 from sdnn.experiments.report import ExperimentReport, Report, format_estimate, to_json
 from sdnn.experiments.reproduce import ReproduceRequest, reproduce
 from sdnn.experiments.statistics import Estimate, running_median
@@ -118,6 +121,48 @@ def test_missing_extra_is_told_before_any_trial(monkeypatch, tmp_path, module):
     with pytest.raises(PlotUnavailableError, match=re.escape('pip install "sdnn[reproduce]"')):
         reproduce(request)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_run_plans_once_and_reads_its_trials_once(monkeypatch, tmp_path, fake, use_trial):
+    use_trial(fake.FakeTrial)
+    calls = []
+
+    def counted(name, function):
+        def call(*arguments, **options):
+            calls.append(name)
+            return function(*arguments, **options)
+
+        return call
+
+    monkeypatch.setattr(reproduce_module, "plan_trials", counted("plan", plan_trials))
+    monkeypatch.setattr(ResultStore, "_load_one", counted("trial", ResultStore._load_one))
+    request = ReproduceRequest(experiments=select_experiments("all"), out=tmp_path, quick=True)
+    done = reproduce(request)
+    # SDNN-C in Case I belongs to both figures.
+    assert [len(one.summaries) for one in done.report.experiments] == [2, 8]
+    assert calls == ["plan"] + ["trial"] * 18
+    with ResultStore(tmp_path) as store:
+        assert done.report.digest == records_digest(store.load())
+
+
+def test_a_colour_stands_for_an_agent_in_every_figure(tmp_path, fake, run):
+    def colors(*agents):
+        other = EXPERIMENT.with_agents(agents)
+        plan = plan_trials(other.cases, 1, 0, ProtocolConfig(n_learning_episodes=100))
+        run(tmp_path, plan)
+        with ResultStore(tmp_path) as store:
+            results = collect(other, store.load(p.key for p in plan))
+        figure = draw_experiment(other, results)
+        (legend,) = figure.legends
+        lines = {line.get_color() for line in figure.axes[0].get_lines()}
+        return [text.get_text() for text in legend.get_texts()], lines
+
+    titles, one = colors("rbfn")
+    assert titles == ["RBFN"]
+    titles, two = colors("rbfn", "sdnn-c")
+    assert titles == ["RBFN", "SDNN-C"]
+    assert one < two
+    assert len(two) == 2
 
 
 def test_mixed_settings_are_refused(results):

@@ -132,6 +132,8 @@ def test_ids_are_registered_once():
         register(entry_of("new", "rbfn-plain"))
     with pytest.raises(ValueError, match="series 'twice' is already registered"):
         register(entry_of("new", "twice", "twice"))
+    with pytest.raises(ValueError, match=r"id must be of letters.*got '\.\./x'"):
+        register(entry_of("../x"))
     assert before == AGENTS
 
 
