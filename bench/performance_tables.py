@@ -8,9 +8,10 @@ The profile in docs/profile.json, made by bench/profile_trial.py, becomes the la
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
-from sdnn.benchmarks.report import to_markdown
+from sdnn.benchmarks.report import describe_run, tables
 
 DOCS = Path(__file__).parents[1] / "docs"
 RESULTS = DOCS / "performance.json"
@@ -18,6 +19,21 @@ PROFILE = DOCS / "profile.json"
 PAGE = DOCS / "performance.md"
 BEGIN = "<!-- tables: made by bench/performance_tables.py from performance.json -->"
 END = "<!-- end of tables -->"
+
+
+def to_markdown(results: dict) -> str:
+    """All tables, after the lines that say on what was measured."""
+    blocks = ["\n".join(f"- {line}" for line in describe_run(results))]
+    for table in tables(results):
+        lines = [f"**{table.title}**", "", _row(table.header)]
+        lines += [_row(("---", *("---:",) * (len(table.header) - 1)))]
+        lines += [_row(row) for row in table.rows]
+        blocks.append("\n".join(lines))
+    return "\n\n".join(blocks) + "\n"
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
 
 
 def profile_table(profile: dict[str, dict[str, float]]) -> str:

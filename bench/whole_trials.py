@@ -19,7 +19,6 @@ from sdnn import _core
 from sdnn.approximators import SDNNCConfig
 from sdnn.environments import SensorConfig
 from sdnn.experiments.config import TrialConfig, trial_seed
-from sdnn.experiments.trial import make_core_trial
 
 CASES = (("s4", 4, 0.0), ("s6", 6, 0.0), ("s4-noise", 4, 0.02), ("s6-noise", 6, 0.02))
 ROWS = Path(__file__).parents[1] / "docs" / "whole-trials.csv"
@@ -37,7 +36,7 @@ def run(task: tuple[str, int, float, int]) -> dict[str, object]:
         approximator=SDNNCConfig(n_inputs=n_inputs),
         sensors=SensorConfig(n_sensors=n_inputs, noise=noise),
     )
-    trial = make_core_trial(config, trial_seed(0, case, number))
+    trial = config.make_trial(trial_seed(0, case, number))
     start = time.thread_time()
     trial.advance(15_000)
     seconds = time.thread_time() - start

@@ -1,17 +1,13 @@
-#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
 
 #include "bindings.hpp"
-#include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
-#include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
-#include "sdnn/benchmarks/agent_steps.hpp"
 #include "sdnn/benchmarks/decisions.hpp"
 #include "sdnn/benchmarks/network_parts.hpp"
-#include "sdnn/benchmarks/plain_rbf_network.hpp"
-#include "sdnn/benchmarks/stopwatch.hpp"
 #include "sdnn/benchmarks/yardsticks.hpp"
 #include "sdnn/experiments/trial.hpp"
+#include "times.hpp"
 
 namespace py = pybind11;
 using namespace sdnn;
@@ -19,34 +15,8 @@ using benchmarks::AcrobotDecisions;
 using benchmarks::BufferRead;
 using benchmarks::DenseProduct;
 using benchmarks::NetworkParts;
-using benchmarks::PlainRBFNetwork;
+using bindings::times_of;
 using Trial = experiments::AcrobotTrial<agents::QLearning<approximators::SDNNC>>;
-
-namespace {
-
-/// The times that `measure` returns; it runs without the GIL.
-template <class Measure>
-py::array_t<std::int64_t> times_of(Measure&& measure) {
-  benchmarks::Times times;
-  {
-    const py::gil_scoped_release release;
-    times = measure();
-  }
-  return py::array_t<std::int64_t>(static_cast<py::ssize_t>(times.size()), times.data());
-}
-
-template <class Agent>
-void def_time_agent_steps(py::module_& module) {
-  module.def(
-      "time_agent_steps",
-      [](Agent& agent, int n_repetitions, std::uint64_t seed) {
-        return times_of([&] { return benchmarks::time_agent_steps(agent, n_repetitions, seed); });
-      },
-      py::arg("agent"), py::arg("n_repetitions"), py::arg("seed"),
-      "The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)");
-}
-
-}  // namespace
 
 void bind_benchmarks(py::module_& module) {
   py::class_<BufferRead>(module, "BufferRead", "Reads a buffer from front to back")
@@ -110,21 +80,4 @@ void bind_benchmarks(py::module_& module) {
       },
       py::arg("trial"), py::arg("n_episodes"),
       "Advances a trial; nanoseconds of every decision in it");
-
-  using PlainRBFAgent = agents::QLearning<PlainRBFNetwork>;
-  py::class_<PlainRBFAgent>(module, "PlainRBFQLearning",
-                            "Q-learning with an RBF network evaluated without its product "
-                            "structure; only to be timed")
-      .def(py::init([](const approximators::RBFNetworkConfig& network,
-                       const agents::QLearningConfig& learning, std::uint64_t seed) {
-             return PlainRBFAgent(PlainRBFNetwork(network), learning, seed);
-           }),
-           py::kw_only(), py::arg("network"), py::arg("learning"), py::arg("seed"))
-      .def_property_readonly(
-          "network", [](const PlainRBFAgent& agent) { return agent.action_value().network(); },
-          "A copy of the network");
-  def_time_agent_steps<agents::QLearning<approximators::SDNNC>>(module);
-  def_time_agent_steps<agents::FuzzyQLearning>(module);
-  def_time_agent_steps<agents::QLearning<approximators::RBFNetwork>>(module);
-  def_time_agent_steps<PlainRBFAgent>(module);
 }

@@ -8,21 +8,43 @@
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
+#include "sdnn/experiments/detail/agent_steps.hpp"
+#include "sdnn/experiments/detail/plain_rbf_network.hpp"
 #include "sdnn/experiments/trial.hpp"
+#include "times.hpp"
 
 namespace py = pybind11;
 using namespace sdnn;
 using agents::FuzzyQLearning;
+using agents::FuzzyQLearningConfig;
 using agents::QLearning;
-using approximators::FuzzyRules;
-using approximators::RBFNetwork;
+using agents::QLearningConfig;
 using approximators::SDNNC;
+using approximators::FuzzyRules;
+using approximators::FuzzyRulesConfig;
+using approximators::RBFNetwork;
+using approximators::RBFNetworkConfig;
+using approximators::SDNNCConfig;
 using environments::AcrobotConfig;
 using environments::GoalScheduleConfig;
 using environments::SensorConfig;
+using experiments::AcrobotTrial;
+using experiments::PlainRBFNetwork;
 using experiments::ProtocolConfig;
 
 namespace {
+
+template <class Agent>
+void def_time_agent_steps(py::module_& module) {
+  module.def(
+      "time_agent_steps",
+      [](Agent& agent, int n_repetitions, std::uint64_t seed) {
+        return bindings::times_of(
+            [&] { return experiments::time_agent_steps(agent, n_repetitions, seed); });
+      },
+      py::arg("agent"), py::arg("n_repetitions"), py::arg("seed"),
+      "The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)");
+}
 
 template <class Value, class Trial, class Read>
 py::array_t<Value> column(const Trial& trial, Read read) {
@@ -44,7 +66,7 @@ py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
   return rows;
 }
 
-using SDNNTrial = experiments::AcrobotTrial<QLearning<SDNNC>>;
+using SDNNTrial = AcrobotTrial<QLearning<SDNNC>>;
 
 py::typing::Dict<py::str, py::int_> memory_counts(const SDNNTrial& trial) {
   const auto& counts = trial.agent().action_value().memory().counts();
@@ -55,10 +77,26 @@ py::typing::Dict<py::str, py::int_> memory_counts(const SDNNTrial& trial) {
   return out;
 }
 
-/// What the trials of all agents have in common.
-template <class Trial>
-void def_trial(py::class_<Trial> trial) {
-  trial.def_property_readonly("episode", &Trial::episode)
+/// A trial of the agent that `make_agent` makes of approximator, learning and seed; with it the
+/// time of such an agent's steps.
+template <class Agent, class Approximator, class Learning>
+py::class_<AcrobotTrial<Agent>> def_trial(py::module_& module, const char* name, const char* doc,
+                                          Agent (*make_agent)(const Approximator&, const Learning&,
+                                                              std::uint64_t)) {
+  using Trial = AcrobotTrial<Agent>;
+  def_time_agent_steps<Agent>(module);
+  py::class_<Trial> trial(module, name, doc);
+  trial
+      .def(py::init([make_agent](const Approximator& approximator, const Learning& learning,
+                                 const AcrobotConfig& acrobot, const GoalScheduleConfig& goal,
+                                 const SensorConfig& sensors, const ProtocolConfig& protocol,
+                                 std::uint64_t seed) {
+             return Trial(make_agent(approximator, learning, seed), acrobot, goal, sensors,
+                          protocol, seed);
+           }),
+           py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("acrobot"),
+           py::arg("goal"), py::arg("sensors"), py::arg("protocol"), py::arg("seed"))
+      .def_property_readonly("episode", &Trial::episode)
       .def_property_readonly("finished", &Trial::finished)
       .def_property_readonly("n_decisions", &Trial::n_decisions)
       .def(
@@ -66,6 +104,18 @@ void def_trial(py::class_<Trial> trial) {
           py::arg("n_episodes"), py::call_guard<py::gil_scoped_release>(),
           "Runs up to n more learning episodes")
       .def("test_rows", &test_rows<Trial>, "Columns of the test episodes so far");
+  return trial;
+}
+
+/// An agent of an approximator that is made of its configuration alone.
+template <class Agent, class Approximator, class Config, class Learning>
+Agent agent_with(const Config& approximator, const Learning& learning, std::uint64_t seed) {
+  return {Approximator(approximator), learning, seed};
+}
+
+QLearning<SDNNC> sdnn_agent(const SDNNCConfig& approximator, const QLearningConfig& learning,
+                                   std::uint64_t seed) {
+  return {SDNNC(approximator, seed), learning, seed};
 }
 
 }  // namespace
@@ -73,46 +123,22 @@ void def_trial(py::class_<Trial> trial) {
 void bind_experiments(py::module_& module) {
   bindings::bind_config<ProtocolConfig>(module, "ProtocolConfig", "How long a trial is");
 
-  def_trial(
-      py::class_<SDNNTrial>(module, "AcrobotTrial", "SDNN-C learns the acrobot swing-up")
-          .def(py::init([](const approximators::SDNNCConfig& approximator,
-                           const agents::QLearningConfig& learning, const AcrobotConfig& acrobot,
-                           const GoalScheduleConfig& goal, const SensorConfig& sensors,
-                           const ProtocolConfig& protocol, std::uint64_t seed) {
-                 return SDNNTrial({SDNNC(approximator, seed), learning, seed}, acrobot, goal,
-                                  sensors, protocol, seed);
-               }),
-               py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("acrobot"),
-               py::arg("goal"), py::arg("sensors"), py::arg("protocol"), py::arg("seed"))
-          .def("memory_counts", &memory_counts,
-               "How potentials came about so far: full passes, from neighbours, columns added"));
+  def_trial(module, "AcrobotTrial", "SDNN-C learns the acrobot swing-up", &sdnn_agent)
+      .def("memory_counts", &memory_counts,
+           "How potentials came about so far: full passes, from neighbours, columns added");
+  def_trial(module, "FuzzyAcrobotTrial", "Fuzzy Q-learning learns the acrobot swing-up",
+            &agent_with<FuzzyQLearning, FuzzyRules, FuzzyRulesConfig, FuzzyQLearningConfig>);
+  def_trial(module, "RBFAcrobotTrial", "Q-learning with an RBF network learns the acrobot swing-up",
+            &agent_with<QLearning<RBFNetwork>, RBFNetwork, RBFNetworkConfig, QLearningConfig>);
 
-  using FuzzyTrial = experiments::AcrobotTrial<FuzzyQLearning>;
-  def_trial(py::class_<FuzzyTrial>(module, "FuzzyAcrobotTrial",
-                                   "Fuzzy Q-learning learns the acrobot swing-up")
-                .def(py::init([](const approximators::FuzzyRulesConfig& approximator,
-                                 const agents::FuzzyQLearningConfig& learning,
-                                 const AcrobotConfig& acrobot, const GoalScheduleConfig& goal,
-                                 const SensorConfig& sensors, const ProtocolConfig& protocol,
-                                 std::uint64_t seed) {
-                       return FuzzyTrial({FuzzyRules(approximator), learning, seed}, acrobot, goal,
-                                         sensors, protocol, seed);
-                     }),
-                     py::kw_only(), py::arg("approximator"), py::arg("learning"),
-                     py::arg("acrobot"), py::arg("goal"), py::arg("sensors"), py::arg("protocol"),
-                     py::arg("seed")));
-
-  using RBFTrial = experiments::AcrobotTrial<QLearning<RBFNetwork>>;
-  def_trial(
-      py::class_<RBFTrial>(module, "RBFAcrobotTrial",
-                           "Q-learning with an RBF network learns the acrobot swing-up")
-          .def(py::init([](const approximators::RBFNetworkConfig& approximator,
-                           const agents::QLearningConfig& learning, const AcrobotConfig& acrobot,
-                           const GoalScheduleConfig& goal, const SensorConfig& sensors,
-                           const ProtocolConfig& protocol, std::uint64_t seed) {
-                 return RBFTrial({RBFNetwork(approximator), learning, seed}, acrobot, goal, sensors,
-                                 protocol, seed);
-               }),
-               py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("acrobot"),
-               py::arg("goal"), py::arg("sensors"), py::arg("protocol"), py::arg("seed")));
+  using PlainRBFAgent = QLearning<PlainRBFNetwork>;
+  py::class_<PlainRBFAgent>(module, "PlainRBFQLearning",
+                            "Q-learning with an RBF network evaluated without its product "
+                            "structure; only to be timed")
+      .def(py::init(&agent_with<PlainRBFAgent, PlainRBFNetwork, RBFNetworkConfig, QLearningConfig>),
+           py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"))
+      .def_property_readonly(
+          "network", [](const PlainRBFAgent& agent) { return agent.action_value().network(); },
+          "A copy of the network");
+  def_time_agent_steps<PlainRBFAgent>(module);
 }

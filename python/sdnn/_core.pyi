@@ -1055,6 +1055,17 @@ class RBFAcrobotTrial:
     @property
     def n_decisions(self) -> int:
         ...
+class PlainRBFQLearning:
+    """
+    Q-learning with an RBF network evaluated without its product structure; only to be timed
+    """
+    def __init__(self, *, approximator: RBFNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def network(self) -> RBFNetwork:
+        """
+        A copy of the network
+        """
 class BufferRead:
     """
     Reads a buffer from front to back
@@ -1126,17 +1137,6 @@ class AcrobotDecisions:
     @property
     def n_integration_steps(self) -> int:
         ...
-class PlainRBFQLearning:
-    """
-    Q-learning with an RBF network evaluated without its product structure; only to be timed
-    """
-    def __init__(self, *, network: RBFNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def network(self) -> RBFNetwork:
-        """
-        A copy of the network
-        """
 def action_value(action: typing.SupportsInt | typing.SupportsIndex, n_actions: typing.SupportsInt | typing.SupportsIndex, low: typing.SupportsFloat | typing.SupportsIndex, high: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     The value of an action in a range cut evenly

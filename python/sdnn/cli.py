@@ -12,6 +12,9 @@ import click
 from sdnn.experiments.cases import WORDS, includes_cost, select_experiments
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sdnn.experiments.report import Report
     from sdnn.experiments.reproduce import ReproduceRequest, Reproduction
 
 EXIT_FAILURE = 1
@@ -102,6 +105,13 @@ def main() -> None:
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
 @click.option("--dry-run", is_flag=True, help="Only say what would be run.")
+@click.option(
+    "--agent",
+    "agents",
+    metavar="ID",
+    multiple=True,
+    help="Run this agent in every case instead of the case's own; may be repeated.",
+)
 @click.pass_context
 def reproduce(
     context: click.Context,
@@ -114,6 +124,7 @@ def reproduce(
     quick: bool,
     as_json: bool,
     dry_run: bool,
+    agents: tuple[str, ...],
 ) -> None:
     """Run the paper's experiments and write a report with its figures and claims.
 
@@ -134,9 +145,10 @@ def reproduce(
         seed=seed,
         jobs=jobs,
         quick=quick,
+        agents=agents,
     )
     try:
-        request.plan()
+        _ = request.plan
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     try:
@@ -168,37 +180,24 @@ def bench(quick: bool, as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(results, indent=2))
         return
-    from rich.console import Console
-
-    print_results(results, Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH))
+    print_results(results, _console())
 
 
 def _run(request: ReproduceRequest) -> Reproduction:
     from rich.console import Console
 
-    from sdnn.benchmarks.agent_cost import measure_steps
-    from sdnn.benchmarks.machine import processor
-    from sdnn.experiments import trial
     from sdnn.experiments.progress import ProgressObserver
     from sdnn.experiments.reproduce import reproduce as run
-    from sdnn.instruction_sets import instruction_set
 
     with ProgressObserver(Console(stderr=True)) as observer:
-        return run(
-            request,
-            trial.make_core_trial,
-            measure_steps,
-            version=_library_version(),
-            machine=f"{processor()}, {instruction_set()}",
-            observer=observer,
-        )
+        return run(request, observer=observer)
 
 
 def _print_plan(request: ReproduceRequest, as_json: bool) -> None:
     from sdnn.experiments.reproduce import count_stored
 
     counts = count_stored(request)
-    n_episodes = request.protocol().n_learning_episodes
+    n_episodes = request.protocol.n_learning_episodes
     n_costs, n_costs_stored = counts.costs
     if as_json:
         trials = [
@@ -222,10 +221,7 @@ def _print_plan(request: ReproduceRequest, as_json: bool) -> None:
 
 
 def _finish(context: click.Context, done: Reproduction, out: Path, as_json: bool) -> None:
-    from rich.console import Console
-
     from sdnn.experiments.progress import describe
-    from sdnn.experiments.report import print_report
 
     outcome = done.outcome
     n_stored = outcome.n_reused + outcome.n_run
@@ -242,10 +238,35 @@ def _finish(context: click.Context, done: Reproduction, out: Path, as_json: bool
         click.echo(json.dumps(done.table, indent=2))
         return
     if done.report is not None:
-        print_report(done.report, Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH))
+        _print_report(done.report)
     page = next(str(file) for file in done.files if file.suffix == ".html")
     done_now = f"{stored} ({outcome.n_run} run now); " if outcome.n_planned else ""
     click.echo(f"{done_now}wrote {len(done.files)} files: see {page}")
+
+
+def _print_report(report: Report) -> None:
+    from rich import box
+    from rich.table import Table
+
+    console = _console()
+    if note := report.agents_note():
+        console.print(note, highlight=False)
+    for title, header, rows in report.tables():
+        mark = " (QUICK LOOK, not the result)" if report.quick else ""
+        table = Table(title=title + mark, title_justify="left", box=box.SIMPLE_HEAD)
+        for column in header:
+            table.add_column(column)
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
+    for note in report.notes():
+        console.print(note, style="dim", highlight=False)
+
+
+def _console() -> Console:
+    from rich.console import Console
+
+    return Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
 
 
 def _exit_interrupted(context: click.Context, message: str) -> NoReturn:

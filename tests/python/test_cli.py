@@ -1,3 +1,4 @@
+import csv
 import importlib.util
 import json
 import os
@@ -6,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,7 @@ from click.testing import CliRunner
 
 import sdnn
 from sdnn.cli import main
-from sdnn.experiments import trial
+from sdnn.experiments import AGENTS, AgentEntry, register
 
 
 @pytest.fixture(scope="module")
@@ -31,8 +33,9 @@ def invoke(monkeypatch, tmp_path, fake):
     """Call the command in an empty folder, with fake trials unless told otherwise."""
     monkeypatch.chdir(tmp_path)
 
-    def _invoke(*arguments, make_trial=fake.FakeTrial):
-        monkeypatch.setattr(trial, "make_core_trial", make_trial)
+    def _invoke(*arguments, trial=fake.FakeTrial):
+        for name, entry in fake.agents_with(trial).items():
+            monkeypatch.setitem(AGENTS, name, entry)
         return CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
 
     return _invoke
@@ -54,6 +57,7 @@ def test_help_and_version(invoke):
         (["reproduce", "a", "--jobs", 0], "--jobs"),
         (["reproduce", "a", "--seed", -1], "--seed"),
         (["reproduce", "a", "--fast"], "--fast"),
+        (["reproduce", "a", "--agent", "dqn"], "one of sdnn-c, fql, rbfn, got 'dqn'"),
         (["learn"], "learn"),
     ],
 )
@@ -87,17 +91,17 @@ def test_quick_run_writes_marked_files_and_one_summary_line(invoke, tmp_path):
 @pytest.fixture
 def no_costs(monkeypatch):
     """Costs that take no time, and a list of what was asked."""
-    from sdnn.benchmarks import agent_cost
-    from sdnn.experiments.cost import StepTimes
+    from sdnn.experiments import cost
+    from sdnn.experiments.records import StepTimes
 
     asked = []
 
-    def measure(series, n_inputs, config):
+    def measure(entry, series, n_inputs, config):
         asked.append((series.id, n_inputs))
         times = float(n_inputs) * np.ones(config.n_rounds)
         return StepTimes(microseconds=times, n_steps=1, table_bytes=1)
 
-    monkeypatch.setattr(agent_cost, "measure_steps", measure)
+    monkeypatch.setattr(cost, "measure_steps", measure)
     return asked
 
 
@@ -170,6 +174,127 @@ def test_dry_run_counts_costs_too(invoke, no_costs):
     assert plan["costs"] == {"planned": 0, "stored": 0}
 
 
+def test_other_agents_have_files_of_their_own(invoke, tmp_path, no_costs):
+    invoke("reproduce", "a", "--quick", "--out", "out")
+    before = {path.name: path.read_bytes() for path in (tmp_path / "out").glob("*-quick.*")}
+    result = invoke(
+        "reproduce", "a", "--quick", "--out", "out", "--agent", "rbfn", "--agent", "fql"
+    )
+    assert "8 of 8 trials are stored in out (8 run now)" in result.stdout.splitlines()[-1]
+    assert "RBFN, FQL instead of the agents of its cases" in result.stdout
+    names = {path.name for path in (tmp_path / "out").iterdir()} - set(before)
+    assert names == {
+        "experiment-a-rbfn-fql-quick.png",
+        "experiment-a-rbfn-fql-quick.svg",
+        "report-rbfn-fql-quick.html",
+        "results-rbfn-fql-quick.csv",
+        "results-rbfn-fql-quick.md",
+        "results.sqlite",
+        "table-rbfn-fql-quick.json",
+    }
+    assert {name: (tmp_path / "out" / name).read_bytes() for name in before} == before
+    table = json.loads((tmp_path / "out" / "table-rbfn-fql-quick.json").read_text())
+    assert [(case["case"], case["agent"]) for case in table["experiments"][0]["cases"]] == [
+        ("s4", "rbfn"), ("s4", "fql"), ("s6", "rbfn"), ("s6", "fql"),
+    ]  # fmt: skip
+    assert [claim["number"] for claim in table["claims"]] == [3]
+
+
+def test_costs_of_other_agents(invoke, no_costs):
+    dry = invoke("reproduce", "cost", "--agent", "rbfn", "--dry-run")
+    assert dry.stdout == "cost of a step: 14 measurements, 0 of them stored in results\n"
+    table = json.loads(invoke("reproduce", "cost", "--agent", "rbfn", "--quick", "--json").stdout)
+    assert {cost["series"] for cost in table["costs"]} == {"rbfn", "rbfn-plain"}
+    assert {series for series, _ in no_costs} == {"rbfn", "rbfn-plain"}
+
+
+@dataclass(frozen=True)
+class PumpingConfig:
+    """Nothing to set but what every agent is told."""
+
+    n_inputs: int = 4
+
+
+@dataclass(frozen=True)
+class ThresholdConfig:
+    """From where on it pushes the other way."""
+
+    threshold: float = 0.5
+
+
+class Pumping:
+    """Pushes the elbow the way the first link swings; learns nothing."""
+
+    def __init__(self, observation_space, action_space, *, approximator, learning, seed):
+        assert observation_space.shape == (approximator.n_inputs,)
+        self._strongest = action_space.high
+        self._threshold = learning.threshold
+
+    def begin_episode(self):
+        pass
+
+    def act(self, observation, explore=True):
+        return self._strongest if observation[2] >= self._threshold else -self._strongest
+
+    def learn(self, transition):
+        pass
+
+
+@pytest.fixture
+def pumping():
+    entry = AgentEntry(
+        id="pumping",
+        title="Pumping",
+        approximator=PumpingConfig,
+        learning=ThresholdConfig,
+        agent=Pumping,
+    )
+    register(entry)
+    yield entry
+    del AGENTS["pumping"]
+
+
+def test_a_new_agent_is_one_class_and_one_entry(pumping, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments):
+        return CliRunner().invoke(main, ["reproduce", *arguments], catch_exceptions=False)
+
+    done = call("b", "--quick", "--agent", "pumping")
+    assert done.exit_code == 0
+    assert "Pumping" in done.stdout
+    folder = tmp_path / "results"
+    text = (folder / "results-pumping-quick.csv").read_text()
+    rows = list(csv.DictReader(text.splitlines()))
+    assert len(rows) == 4 * 2 * 30
+    assert {row["agent"] for row in rows} == {"pumping"}
+    assert {row["case"] for row in rows} == {"s4", "s4-noise", "s5-noise", "s6-noise"}
+    in_time = [row["solved"] == "1" for row in rows if row["case"] == "s4"]
+    assert 0 < sum(in_time) < len(in_time)  # easy while the goal is wide
+    # It has no chance in it, so trials differ by their sensors' noise alone.
+    steps = {
+        (case, trial): [
+            row["steps"] for row in rows if (row["case"], row["trial"]) == (case, trial)
+        ]
+        for case in ("s4", "s4-noise")
+        for trial in ("0", "1")
+    }
+    assert steps["s4", "0"] == steps["s4", "1"]
+    assert steps["s4-noise", "0"] != steps["s4-noise", "1"]
+    assert (folder / "experiment-b-pumping-quick.png").read_bytes().startswith(b"\x89PNG")
+    assert (
+        "| Case I: 4 inputs, no noise | Pumping | 2 |"
+        in (folder / "results-pumping-quick.md").read_text()
+    )
+    assert "Pumping" in (folder / "report-pumping-quick.html").read_text()
+    table = json.loads((folder / "table-pumping-quick.json").read_text())
+    assert table["claims"] == []  # the paper says nothing about it
+    assert "(0 run now)" in call("b", "--quick", "--agent", "pumping").stdout
+    refused = call("cost", "--agent", "pumping")
+    assert refused.exit_code == 2
+    assert "agents whose cost is measured are sdnn-c, fql, rbfn, got pumping" in refused.stderr
+
+
 def test_output_that_is_a_file(invoke, tmp_path):
     (tmp_path / "out").write_text("mine")
     result = invoke("reproduce", "a", "--quick", "--out", "out")
@@ -198,12 +323,12 @@ def test_missing_matplotlib_is_one_clear_line(invoke, tmp_path, monkeypatch):
 
 
 def test_failing_trials_are_exit_code_1(invoke, tmp_path, fake):
-    def make(config, seed):
-        if config.sensors.n_sensors == 6:
+    def make(*, sensors, **parts):
+        if sensors.n_sensors == 6:
             raise RuntimeError("broken")
-        return fake.FakeTrial(config, seed)
+        return fake.FakeTrial(**parts)
 
-    result = invoke("reproduce", "a", "--quick", make_trial=make)
+    result = invoke("reproduce", "a", "--quick", trial=make)
     assert result.exit_code == 1
     assert "Error: SDNN-C s6, trial 1 failed: RuntimeError: broken" in result.stderr
     assert "2 of 4 trials are stored" in result.stderr
@@ -214,14 +339,14 @@ def test_interruption_is_exit_code_130_and_the_command_goes_on(invoke, fake):
     class Interrupting(fake.FakeTrial):
         """Interrupts the run when it starts, and never ends by itself."""
 
-        def __init__(self, config, seed):
-            super().__init__(config, seed)
+        def __init__(self, **parts):
+            super().__init__(**parts)
             os.kill(os.getpid(), signal.SIGINT)
 
         def advance(self, n):
             time.sleep(0.001)
 
-    result = invoke("reproduce", "a", "--quick", "--jobs", 1, make_trial=Interrupting)
+    result = invoke("reproduce", "a", "--quick", "--jobs", 1, trial=Interrupting)
     assert result.exit_code == 130
     assert "interrupted; 0 of 4 trials are stored in results" in result.stderr
     assert invoke("reproduce", "a", "--quick").exit_code == 0
@@ -253,7 +378,8 @@ def test_cmakedir_is_the_installed_package():
 def test_command_line_starts_without_heavy_imports():
     code = (
         "import sys; import sdnn; before = set(sys.modules); import sdnn.cli;"
-        "print([m for m in ('matplotlib', 'rich', 'sqlite3', 'sdnn.experiments.engine')"
+        "heavy = ('matplotlib', 'rich', 'sqlite3', 'sdnn.agents', 'sdnn.experiments.engine');"
+        "print([m for m in heavy"
         " if m in set(sys.modules) - before])"
     )
     assert python("-c", code).stdout.strip() == "[]"

@@ -1,18 +1,18 @@
-"""The machine: as much about it as the operating system tells."""
+"""What `sdnn.machine` tells, with what else bears on these times: caches, Python, NumPy."""
 
 from __future__ import annotations
 
-import os
 import platform
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sdnn.machine import n_cores, processor
+
 if TYPE_CHECKING:
     from sdnn.benchmarks.results import Machine
 
-_PROCESSOR_FILE = Path("/proc/cpuinfo")
 _CACHE_FOLDER = Path("/sys/devices/system/cpu/cpu0/cache")
 _MULTIPLES = {"K": 2**10, "M": 2**20, "G": 2**30}
 
@@ -22,30 +22,12 @@ def describe_machine() -> Machine:
     return {
         "processor": processor(),
         "system": f"{platform.system()} {platform.machine()}",
-        "n_cores": _n_cores(),
+        "n_cores": n_cores(),
         "caches": _caches(_CACHE_FOLDER),
         "python": platform.python_version(),
         "numpy": np.__version__,
         "blas": _blas(),
     }
-
-
-def processor() -> str:
-    """Name of the processor, or "unknown"."""
-    try:
-        for line in _PROCESSOR_FILE.read_text().splitlines():
-            name, _, value = line.partition(":")
-            if name.strip() == "model name":
-                return value.strip()
-    except OSError:
-        pass
-    return platform.processor() or "unknown"
-
-
-def _n_cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _caches(folder: Path) -> dict[str, int]:

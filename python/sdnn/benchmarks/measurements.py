@@ -22,8 +22,8 @@ from sdnn import _core
 from sdnn.approximators import SDNNCConfig
 from sdnn.benchmarks.machine import describe_machine
 from sdnn.environments import AcrobotConfig, SensorConfig
-from sdnn.experiments.config import ProtocolConfig, TrialConfig
-from sdnn.experiments.trial import make_core_trial
+from sdnn.experiments.config import TrialConfig
+from sdnn.experiments.trial import ProtocolConfig
 from sdnn.instruction_sets import (
     available_instruction_sets,
     best_instruction_set,
@@ -268,7 +268,7 @@ def _short_trial(n_inputs: int, noise: float, n_episodes: int) -> Trial:
         sensors=SensorConfig(n_sensors=n_inputs, noise=noise),
         protocol=ProtocolConfig(n_learning_episodes=n_episodes, test_interval=n_episodes + 1),
     )
-    return make_core_trial(config, SEED)
+    return config.make_trial(SEED)
 
 
 def _at_level(level: str, run: Run) -> Run:

@@ -1,4 +1,4 @@
-"""The results as tables: on the screen, and as Markdown for the documentation."""
+"""The results as tables."""
 
 from __future__ import annotations
 
@@ -60,17 +60,6 @@ def tables(results: Results) -> list[Table]:
         _decisions_table(results["decisions"]),
         _threads_table(results),
     ]
-
-
-def to_markdown(results: Results) -> str:
-    """Write all tables as Markdown, after the lines that say on what was measured."""
-    blocks = ["\n".join(f"- {line}" for line in describe_run(results))]
-    for table in tables(results):
-        lines = [f"**{table.title}**", "", _row(table.header)]
-        lines += [_row(("---", *("---:",) * (len(table.header) - 1)))]
-        lines += [_row(row) for row in table.rows]
-        blocks.append("\n".join(lines))
-    return "\n\n".join(blocks) + "\n"
 
 
 def print_results(results: Results, console: Console) -> None:
@@ -202,7 +191,3 @@ def _size(n_bytes: int) -> str:
         if n_bytes >= unit:
             return f"{n_bytes / unit:g} {name}"
     return f"{n_bytes} B"
-
-
-def _row(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"

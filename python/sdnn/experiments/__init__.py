@@ -11,58 +11,119 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from sdnn.experiments.cases import EXPERIMENTS, Case, Experiment, select_experiments
     from sdnn.experiments.claims import CLAIMS, Claim
-    from sdnn.experiments.config import ProtocolConfig, TrialConfig, case_config, trial_seed
-    from sdnn.experiments.cost import CostConfig, CostRecord
-    from sdnn.experiments.cost_figure import draw_cost
+    from sdnn.experiments.config import (
+        PlannedTrial,
+        TrialConfig,
+        case_config,
+        plan_trials,
+        trial_seed,
+    )
+    from sdnn.experiments.cost import CostConfig
     from sdnn.experiments.engine import Observer, run_trials
     from sdnn.experiments.errors import ExperimentError, PlotUnavailableError, StoreError
-    from sdnn.experiments.figures import draw_experiment
+    from sdnn.experiments.figures import draw_cost, draw_experiment
     from sdnn.experiments.measures import MeasureConfig
-    from sdnn.experiments.plan import PlannedTrial, plan_trials
-    from sdnn.experiments.records import TrialKey, TrialRecord, TrialRows
+    from sdnn.experiments.records import CostRecord, TrialKey, TrialRecord, TrialRows
+    from sdnn.experiments.registry import AGENTS, AgentEntry, CostSeries, agent_entry, register
+    from sdnn.experiments.reproduce import ReproduceRequest, Reproduction
     from sdnn.experiments.results import CaseResult, CaseSummary, collect, summarize
     from sdnn.experiments.statistics import Estimate
     from sdnn.experiments.store import ResultStore
-    from sdnn.experiments.trial import Trial, make_core_trial
+    from sdnn.experiments.trial import LearningAgent, ProtocolConfig, PythonTrial, Trial
     from sdnn.experiments.verdicts import judge_claims
 
 _HOMES = {
-    "cases": ("EXPERIMENTS", "Case", "Experiment", "select_experiments"),
-    "claims": ("CLAIMS", "Claim"),
-    "config": ("ProtocolConfig", "TrialConfig", "case_config", "trial_seed"),
-    "cost": ("CostConfig", "CostRecord"),
-    "engine": ("Observer", "run_trials"),
-    "errors": ("ExperimentError", "PlotUnavailableError", "StoreError"),
-    "cost_figure": ("draw_cost",),
-    "figures": ("draw_experiment",),
+    "cases": (
+        "EXPERIMENTS",
+        "Case",
+        "Experiment",
+        "select_experiments",
+    ),
+    "claims": (
+        "CLAIMS",
+        "Claim",
+    ),
+    "config": (
+        "PlannedTrial",
+        "TrialConfig",
+        "case_config",
+        "plan_trials",
+        "trial_seed",
+    ),
+    "cost": ("CostConfig",),
+    "engine": (
+        "Observer",
+        "run_trials",
+    ),
+    "errors": (
+        "ExperimentError",
+        "PlotUnavailableError",
+        "StoreError",
+    ),
+    "figures": (
+        "draw_cost",
+        "draw_experiment",
+    ),
     "measures": ("MeasureConfig",),
-    "plan": ("PlannedTrial", "plan_trials"),
-    "records": ("TrialKey", "TrialRecord", "TrialRows"),
-    "results": ("CaseResult", "CaseSummary", "collect", "summarize"),
+    "records": (
+        "CostRecord",
+        "TrialKey",
+        "TrialRecord",
+        "TrialRows",
+    ),
+    "registry": (
+        "AGENTS",
+        "AgentEntry",
+        "CostSeries",
+        "agent_entry",
+        "register",
+    ),
+    "reproduce": (
+        "ReproduceRequest",
+        "Reproduction",
+    ),
+    "results": (
+        "CaseResult",
+        "CaseSummary",
+        "collect",
+        "summarize",
+    ),
     "statistics": ("Estimate",),
     "store": ("ResultStore",),
-    "trial": ("Trial", "make_core_trial"),
+    "trial": (
+        "LearningAgent",
+        "ProtocolConfig",
+        "PythonTrial",
+        "Trial",
+    ),
     "verdicts": ("judge_claims",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "AGENTS",
     "CLAIMS",
     "EXPERIMENTS",
+    "AgentEntry",
     "Case",
     "CaseResult",
     "CaseSummary",
     "Claim",
     "CostConfig",
     "CostRecord",
+    "CostSeries",
     "Estimate",
     "Experiment",
     "ExperimentError",
+    "LearningAgent",
     "MeasureConfig",
     "Observer",
     "PlannedTrial",
     "PlotUnavailableError",
     "ProtocolConfig",
+    "PythonTrial",
+    "ReproduceRequest",
+    "Reproduction",
     "ResultStore",
     "StoreError",
     "Trial",
@@ -70,13 +131,14 @@ __all__ = [
     "TrialKey",
     "TrialRecord",
     "TrialRows",
+    "agent_entry",
     "case_config",
     "collect",
     "draw_cost",
     "draw_experiment",
     "judge_claims",
-    "make_core_trial",
     "plan_trials",
+    "register",
     "run_trials",
     "select_experiments",
     "summarize",

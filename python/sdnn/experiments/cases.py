@@ -6,7 +6,8 @@ imports nothing heavy, so that the command line may read it at start.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 PAPER_TRIALS = 10
 """Trials per case in the paper; fewer support no conclusion."""
@@ -16,22 +17,6 @@ PAPER_EPISODES = 15_000
 
 SENSOR_NOISE = 0.02
 """Standard deviation of the noise in the paper's Cases II to IV."""
-
-
-@dataclass(frozen=True)
-class Agent:
-    """An agent that takes part in the experiments.
-
-    Parameters
-    ----------
-    id
-        The word used in the result file.
-    title
-        The word used in figures and tables.
-    """
-
-    id: str
-    title: str
 
 
 @dataclass(frozen=True)
@@ -51,7 +36,7 @@ class Case:
     noise
         Standard deviation of the sensor noise, in units of the normalized variables.
     agents
-        Ids of the agents compared.
+        Ids of the agents compared, as in `sdnn.experiments.registry`.
     paper_figure
         Where the paper shows this case.
     """
@@ -85,8 +70,18 @@ class Experiment:
     cases: tuple[Case, ...]
     start_panels: bool = False
 
+    @property
+    def pairs(self) -> frozenset[tuple[str, str]]:
+        """Ids of case and agent whose trials it needs."""
+        return frozenset((case.id, agent) for case in self.cases for agent in case.agents)
 
-AGENTS = (Agent("sdnn-c", "SDNN-C"), Agent("fql", "FQL"), Agent("rbfn", "RBFN"))
+    def with_agents(self, agents: Iterable[str]) -> Experiment:
+        """Return the experiment with other agents in all its cases; with none: as it is."""
+        others = tuple(dict.fromkeys(agents))
+        if not others:
+            return self
+        return replace(self, cases=tuple(replace(case, agents=others) for case in self.cases))
+
 
 BOTH = ("sdnn-c", "fql")
 
@@ -118,25 +113,6 @@ COST = "cost"
 
 WORDS = (*(experiment.id for experiment in EXPERIMENTS), COST, "all")
 """What may be reproduced."""
-
-
-def agent_title(agent_id: str) -> str:
-    """Title of an agent.
-
-    Raises
-    ------
-    ValueError
-        If no agent has that id.
-
-    Examples
-    --------
-    >>> agent_title("sdnn-c")
-    'SDNN-C'
-    """
-    for agent in AGENTS:
-        if agent.id == agent_id:
-            return agent.title
-    raise ValueError(f"agent must be one of {[a.id for a in AGENTS]}, got {agent_id!r}")
 
 
 def select_experiments(word: str) -> tuple[Experiment, ...]:

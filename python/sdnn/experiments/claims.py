@@ -11,9 +11,9 @@ import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from sdnn.experiments.cases import EXPERIMENTS, agent_title
-from sdnn.experiments.cost import SERIES
+from sdnn.experiments.cases import EXPERIMENTS
 from sdnn.experiments.measures import MeasureName
+from sdnn.experiments.registry import agent_entry, cost_series
 
 EQUAL_STEPS = 2.0
 """Steps by which two agents that do "almost the same" may differ."""
@@ -41,7 +41,7 @@ class Subject:
         """Name of both for a reader."""
         case = next(c for e in EXPERIMENTS for c in e.cases if c.id == self.case_id)
         noisy = "noisy " if case.noise else ""
-        return f"{agent_title(self.agent)}, {case.n_sensors} {noisy}inputs"
+        return f"{agent_entry(self.agent).title}, {case.n_sensors} {noisy}inputs"
 
 
 @dataclass(frozen=True)
@@ -236,13 +236,14 @@ def describe(quantity: Quantity) -> str:
     'time per step, 8 inputs / 4 inputs: RBFN, factored'
     """
     if isinstance(quantity, Growth):
-        titles = {series.id: series.title for series in SERIES}
+        titles = {series.id: series.title for _, series in cost_series()}
         return (
             f"time per step, {quantity.n_inputs} inputs / {quantity.n_fewer} inputs:"
             f" {titles[quantity.series]}"
         )
     words = quantity.measure.replace("_", " ")
     if isinstance(quantity, Difference):
-        fewer = str(quantity.other).removeprefix(f"{agent_title(quantity.subject.agent)}, ")
+        title = agent_entry(quantity.subject.agent).title
+        fewer = str(quantity.other).removeprefix(f"{title}, ")
         return f"{words}: {quantity.subject} less {fewer}"
     return f"{words}: {quantity.subject}"

@@ -1,57 +1,26 @@
-"""Configuration of one trial, its hash, and the seeds of trials."""
+"""The trials that a run needs: the configuration of one, its hash, its seed, and their list."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import zlib
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any, TypeAlias
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any
 
 import numpy as np
 
-from sdnn import _core
-from sdnn.agents import FuzzyQLearningConfig, QLearningConfig
-from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
-from sdnn.config import to_core
+from sdnn.agents import QLearningConfig
+from sdnn.approximators import SDNNCConfig
 from sdnn.environments import AcrobotConfig, GoalScheduleConfig, SensorConfig
-
-if TYPE_CHECKING:
-    from sdnn.experiments.cases import Case
+from sdnn.experiments.cases import Case
+from sdnn.experiments.records import TrialKey
+from sdnn.experiments.registry import agent_entry
+from sdnn.experiments.trial import ProtocolConfig, PythonTrial, Trial
 
 CONFIG_HASH_DIGITS = 16
 """Hexadecimal digits kept of a configuration's SHA-256: 64 bits."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ProtocolConfig:
-    """Learning protocol of a trial; the defaults are the paper's values (spec section 5).
-
-    Parameters
-    ----------
-    n_learning_episodes
-        Learning episodes in a trial, at least 1.
-    test_interval
-        One test episode follows every so many learning episodes, at least 1.
-    """
-
-    n_learning_episodes: int = 15_000
-    test_interval: int = 10
-
-    def to_core(self) -> _core.ProtocolConfig:
-        """Make the core's struct of the same values; see `sdnn.config.to_core`."""
-        return to_core(self, _core.ProtocolConfig)
-
-
-ApproximatorConfig: TypeAlias = SDNNCConfig | FuzzyRulesConfig | RBFNetworkConfig
-LearningConfig: TypeAlias = QLearningConfig | FuzzyQLearningConfig
-
-_AGENT_CONFIGS: dict[str, tuple[type[ApproximatorConfig], type[LearningConfig]]] = {
-    "sdnn-c": (SDNNCConfig, QLearningConfig),
-    "fql": (FuzzyRulesConfig, FuzzyQLearningConfig),
-    "rbfn": (RBFNetworkConfig, QLearningConfig),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,11 +30,11 @@ class TrialConfig:
     Parameters
     ----------
     agent
-        Id of the agent.
+        Id of the agent, as in `sdnn.experiments.registry`.
     approximator
-        Sizes and start of what the agent learns with.
+        Sizes and start of what the agent learns with: the dataclass of its entry.
     learning
-        How the agent learns and explores.
+        How the agent learns and explores: the dataclass of its entry.
     acrobot
         Physics, goal and reward.
     goal
@@ -89,16 +58,16 @@ class TrialConfig:
     """
 
     agent: str = "sdnn-c"
-    approximator: ApproximatorConfig = field(default_factory=SDNNCConfig)
-    learning: LearningConfig = field(default_factory=QLearningConfig)
+    approximator: Any = field(default_factory=SDNNCConfig)
+    learning: Any = field(default_factory=QLearningConfig)
     acrobot: AcrobotConfig = field(default_factory=AcrobotConfig)
     goal: GoalScheduleConfig = field(default_factory=GoalScheduleConfig)
     sensors: SensorConfig = field(default_factory=SensorConfig)
     protocol: ProtocolConfig = field(default_factory=ProtocolConfig)
 
     def __post_init__(self) -> None:
-        expected = _configs_of(self.agent)
-        for name, kind in zip(("approximator", "learning"), expected, strict=True):
+        entry = agent_entry(self.agent)
+        for name, kind in (("approximator", entry.approximator), ("learning", entry.learning)):
             value = getattr(self, name)
             if not isinstance(value, kind):
                 raise TypeError(
@@ -121,11 +90,21 @@ class TrialConfig:
         digest = hashlib.sha256(self.canonical_json().encode()).hexdigest()
         return digest[:CONFIG_HASH_DIGITS]
 
+    def make_trial(self, seed: int) -> Trial:
+        """Make the trial: in C++ if the agent has one there, else in Python.
 
-def _configs_of(agent: str) -> tuple[type[ApproximatorConfig], type[LearningConfig]]:
-    if agent not in _AGENT_CONFIGS:
-        raise ValueError(f"agent must be one of {list(_AGENT_CONFIGS)}, got {agent!r}")
-    return _AGENT_CONFIGS[agent]
+        A trial in C++ releases the GIL while it advances.
+
+        Raises
+        ------
+        ValueError
+            If a value of the configuration is out of its range.
+        """
+        entry = agent_entry(self.agent)
+        parts = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "agent"}
+        if entry.core_trial is None:
+            return PythonTrial(entry.make_agent, **parts, seed=seed)
+        return entry.core_trial(**{n: part.to_core() for n, part in parts.items()}, seed=seed)
 
 
 def _canonical(value: Any) -> Any:
@@ -141,7 +120,7 @@ def _canonical(value: Any) -> Any:
 
 
 def case_config(case: Case, agent: str, protocol: ProtocolConfig | None = None) -> TrialConfig:
-    """Return the paper's configuration of an agent in a case.
+    """Return the configuration of an agent in a case: its entry's defaults, the case's sensors.
 
     Parameters
     ----------
@@ -155,15 +134,15 @@ def case_config(case: Case, agent: str, protocol: ProtocolConfig | None = None) 
     Raises
     ------
     ValueError
-        If the agent takes no part in the case.
+        If the agent takes no part in the case, or no agent has that id.
     """
     if agent not in case.agents:
         raise ValueError(f"agent must be one of {case.agents} in case {case.id}, got {agent!r}")
-    approximator, learning = _configs_of(agent)
+    entry = agent_entry(agent)
     return TrialConfig(
         agent=agent,
-        approximator=approximator(n_inputs=case.n_sensors),
-        learning=learning(),
+        approximator=entry.approximator(n_inputs=case.n_sensors),
+        learning=entry.learning(),
         sensors=SensorConfig(n_sensors=case.n_sensors, noise=case.noise),
         protocol=ProtocolConfig() if protocol is None else protocol,
     )
@@ -194,3 +173,49 @@ def trial_seed(root_seed: int, case_id: str, trial: int) -> int:
     spawn_key = (zlib.crc32(case_id.encode()), trial)
     word = np.random.SeedSequence(root_seed, spawn_key=spawn_key).generate_state(1, np.uint64)[0]
     return int(word) >> 1
+
+
+@dataclass(frozen=True)
+class PlannedTrial:
+    """A trial that a run needs.
+
+    Parameters
+    ----------
+    key
+        Where its result is stored.
+    config
+        Its settings.
+    """
+
+    key: TrialKey
+    config: TrialConfig
+
+
+def plan_trials(
+    cases: Iterable[Case], n_trials: int, root_seed: int, protocol: ProtocolConfig | None = None
+) -> tuple[PlannedTrial, ...]:
+    """List the trials of all agents in the given cases, each once.
+
+    The first trial of every case comes first, so an interrupted run covers all cases evenly.
+
+    Parameters
+    ----------
+    cases
+        Cases; rows that share an id and an agent share their trials.
+    n_trials
+        Trials for each case and agent.
+    root_seed
+        Seed from which the trials' seeds are derived.
+    protocol
+        Another protocol than the paper's.
+    """
+    plan: dict[TrialKey, PlannedTrial] = {}
+    pairs = [
+        (case, agent, case_config(case, agent, protocol)) for case in cases for agent in case.agents
+    ]
+    for trial in range(n_trials):
+        for case, agent, config in pairs:
+            seed = trial_seed(root_seed, case.id, trial)
+            key = TrialKey(case.id, agent, trial, seed, config.config_hash)
+            plan.setdefault(key, PlannedTrial(key, config))
+    return tuple(plan.values())

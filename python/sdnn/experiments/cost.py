@@ -1,4 +1,4 @@
-"""How the cost of a step grows with the number of inputs: what is measured, and its records.
+"""How the cost of a step grows with the number of inputs: what is measured, and how.
 
 Source: spec section 5, claim 9. A step is one whole decision of a learning agent without its
 environment: acting in a new random state and learning the transition to it. Times are the only
@@ -9,47 +9,21 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from gymnasium.spaces import Box
 
-if TYPE_CHECKING:
-    from sdnn.experiments.engine import Observer
-    from sdnn.experiments.store import ResultStore
+from sdnn import _core, machine
+from sdnn.experiments.engine import Observer
+from sdnn.experiments.records import CostKey, CostRecord, StepTimes
+from sdnn.experiments.registry import AgentEntry, CostSeries, cost_series
+from sdnn.experiments.store import ResultStore
 
-
-@dataclass(frozen=True)
-class Series:
-    """One curve of the figure.
-
-    Parameters
-    ----------
-    id
-        The word used in the result file.
-    title
-        The word used in figures and tables.
-    agent
-        Id of the agent.
-    growth
-        What the number of operations is proportional to, for a reader (mathtext).
-    """
-
-    id: str
-    title: str
-    agent: str
-    growth: str
-
-
-SERIES = (
-    Series("sdnn-c", "SDNN-C", "sdnn-c", "$d(d-1)$ groups of columns"),
-    Series("fql", "FQL", "fql", "$2^d$ fired rules of $9^d$"),
-    Series("rbfn", "RBFN, factored", "rbfn", "$4^{d+1}$ weights"),
-    Series("rbfn-plain", "RBFN, plain", "rbfn", "$601 \\cdot 4^{d+1}$ basis values"),
-)
+SEED = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +43,7 @@ class CostConfig:
     n_learned
         Steps of learning before the first round: an agent at work has no fresh weights.
     most_plain_inputs
-        Largest number of inputs of RBFN evaluated plainly: seconds a step with 8.
+        Largest number of inputs of what is evaluated plainly: seconds a step with 8.
     """
 
     n_inputs: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 8)
@@ -89,100 +63,38 @@ class CostConfig:
 QUICK_COST = CostConfig(n_rounds=3, round_seconds=0.01, min_steps=1, most_plain_inputs=5)
 
 
-class CostKey(NamedTuple):
-    """What makes two measurements the same: stored once, not measured again."""
+def cost_keys(config: CostConfig, agents: Iterable[str] | None = None) -> tuple[CostKey, ...]:
+    """Keys of all measurements of some agents (default: all), inputs ascending in each series.
 
-    series: str
-    n_inputs: int
-    config_hash: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class StepTimes:
-    """Measured times of an agent's steps.
-
-    Parameters
-    ----------
-    microseconds : (n_rounds,)
-        Median time of a step in each round.
-    n_steps
-        Steps in a round.
-    table_bytes
-        Memory of what the agent learns.
+    Raises
+    ------
+    ValueError
+        If no agent has one of the ids.
     """
-
-    microseconds: NDArray[np.float64]
-    n_steps: int
-    table_bytes: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class CostRecord:
-    """The cost of a series at one number of inputs.
-
-    Parameters
-    ----------
-    key
-        Which measurement it is.
-    version
-        Version of the library.
-    machine
-        Processor and instruction set.
-    finished_at
-        Time of the end, ISO 8601, UTC.
-    times
-        What was measured.
-    """
-
-    key: CostKey
-    version: str
-    machine: str
-    finished_at: str
-    times: StepTimes
-
-    @property
-    def microseconds(self) -> NDArray[np.float64]:
-        """Median time of a step in each round, (n_rounds,)."""
-        return self.times.microseconds
-
-
-MeasureSteps: TypeAlias = Callable[[Series, int, CostConfig], "StepTimes | None"]
-"""Measures a series at a number of inputs; None where there is no memory for it."""
-
-
-def cost_keys(config: CostConfig) -> tuple[CostKey, ...]:
-    """Keys of all measurements, each series in ascending numbers of inputs."""
     return tuple(
         CostKey(series.id, n_inputs, config.config_hash)
-        for series in SERIES
+        for _, series in cost_series(agents)
         for n_inputs in sorted(config.n_inputs)
-        if series.id != "rbfn-plain" or n_inputs <= config.most_plain_inputs
+        if not series.is_plain or n_inputs <= config.most_plain_inputs
     )
 
 
 def measure_costs(
+    keys: Sequence[CostKey],
     config: CostConfig,
     store: ResultStore,
-    measure: MeasureSteps,
-    *,
-    version: str,
-    machine: str,
     observer: Observer,
 ) -> None:
     """Measure what is not stored yet, one after another, and store each at once.
 
     Parameters
     ----------
+    keys
+        What is wanted.
     config
         How thoroughly.
     store
         Where the records go.
-    measure
-        Measures one of them.
-    version
-        Version of the library.
-    machine
-        Processor and instruction set.
     observer
         Told what happens.
 
@@ -192,15 +104,17 @@ def measure_costs(
         If the store cannot be read or written.
     """
     stored = {record.key for record in store.load_costs(config.config_hash)}
-    missing = [key for key in cost_keys(config) if key not in stored]
+    missing = [key for key in keys if key not in stored]
     observer.costs_begun(len(missing))
-    for key, series in _with_series(missing):
-        times = measure(series, key.n_inputs, config)
+    by_id = {series.id: (entry, series) for entry, series in cost_series()}
+    for key in missing:
+        entry, series = by_id[key.series]
+        times = measure_steps(entry, series, key.n_inputs, config)
         if times is not None:
             record = CostRecord(
                 key=key,
-                version=version,
-                machine=machine,
+                version=_core.__version__,
+                machine=machine.description(),
                 finished_at=datetime.now(timezone.utc).isoformat(timespec="seconds"),
                 times=times,
             )
@@ -208,7 +122,59 @@ def measure_costs(
         observer.cost_measured(f"{series.title}, {key.n_inputs} inputs")
 
 
-def _with_series(keys: list[CostKey]) -> Iterator[tuple[CostKey, Series]]:
-    series = {series.id: series for series in SERIES}
-    for key in keys:
-        yield key, series[key.series]
+def measure_steps(
+    entry: AgentEntry, series: CostSeries, n_inputs: int, config: CostConfig
+) -> StepTimes | None:
+    """Measure a step of an agent of the paper's sizes: acting in a new state and learning.
+
+    Parameters
+    ----------
+    entry
+        Which agent.
+    series
+        Evaluated how.
+    n_inputs
+        Number of inputs d.
+    config
+        How thoroughly.
+
+    Returns
+    -------
+    StepTimes or None
+        None where there is no memory for the agent.
+    """
+    approximator = entry.approximator(**(dict(series.settings) | {"n_inputs": n_inputs}))
+    try:
+        agent = _core_agent(entry, series, approximator)
+    except MemoryError:
+        return None
+    step_seconds = float(_core.time_agent_steps(agent, 1, SEED)[0]) / 1e9
+    in_a_round = int(config.round_seconds / step_seconds)
+    n_learned = min(config.n_learned, in_a_round)
+    learning = _core.time_agent_steps(agent, n_learned, SEED + 1)
+    if n_learned:
+        in_a_round = int(config.round_seconds * 1e9 / float(np.median(learning)))
+    n_steps = max(config.min_steps, in_a_round)
+    medians = [
+        float(np.median(_core.time_agent_steps(agent, n_steps, SEED + 2 + number))) / 1e3
+        for number in range(config.n_rounds)
+    ]
+    return StepTimes(
+        microseconds=np.array(medians, np.float64),
+        n_steps=n_steps,
+        table_bytes=series.learned_bytes(approximator),
+    )
+
+
+def _core_agent(entry: AgentEntry, series: CostSeries, approximator: Any) -> Any:
+    learning = entry.learning()
+    if series.core_agent is not None:
+        return series.core_agent(
+            approximator=approximator.to_core(), learning=learning.to_core(), seed=SEED
+        )
+    states = Box(0.0, 1.0, (approximator.n_inputs,), np.float64)
+    actions = Box(-1.0, 1.0, (1,), np.float64)
+    agent: Any = entry.make_agent(
+        states, actions, approximator=approximator, learning=learning, seed=SEED
+    )
+    return agent.core

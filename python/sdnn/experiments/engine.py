@@ -6,7 +6,6 @@ compute and send messages; the calling thread alone writes the store and tells t
 
 from __future__ import annotations
 
-import os
 import signal
 import threading
 import time
@@ -18,10 +17,11 @@ from datetime import datetime, timezone
 from queue import Empty, SimpleQueue
 from types import FrameType
 
-from sdnn.experiments.plan import PlannedTrial
+from sdnn import _core
+from sdnn.experiments.config import PlannedTrial
 from sdnn.experiments.records import TrialKey, TrialRecord, TrialRows
 from sdnn.experiments.store import ResultStore
-from sdnn.experiments.trial import MakeTrial
+from sdnn.machine import n_cores
 
 CHUNK_SECONDS = 0.1
 """A trial reports about this often; it is also how long an interruption waits."""
@@ -127,19 +127,10 @@ class _Abandoned:
 _Message = _Started | _Advanced | _Finished | _Failed | _Abandoned
 
 
-def default_jobs() -> int:
-    """Cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 def run_trials(
     plan: Iterable[PlannedTrial],
     store: ResultStore,
-    make_trial: MakeTrial,
     *,
-    version: str,
     jobs: int | None = None,
     observer: Observer | None = None,
 ) -> RunOutcome:
@@ -154,10 +145,6 @@ def run_trials(
         Trials the run needs.
     store
         Where they go.
-    make_trial
-        Makes a trial from its configuration and seed.
-    version
-        Version of the library, stored with each trial.
     jobs
         Trials at the same time; default one for each core.
     observer
@@ -170,7 +157,7 @@ def run_trials(
     StoreError
         If the store cannot be read or written; running trials are given up.
     """
-    n_jobs = default_jobs() if jobs is None else jobs
+    n_jobs = n_cores() if jobs is None else jobs
     if n_jobs < 1:
         raise ValueError(f"jobs must be at least 1, got {n_jobs}")
     watcher = Observer() if observer is None else observer
@@ -189,7 +176,7 @@ def run_trials(
         _set_at_exit(stop),
     ):
         for item in missing:
-            pool.submit(_run_one, item, make_trial, version, messages, stop)
+            pool.submit(_run_one, item, messages, stop)
         # Every submitted trial sends one last message, also after a stop.
         n_open = len(missing)
         while n_open:
@@ -219,13 +206,7 @@ def run_trials(
     )
 
 
-def _run_one(
-    planned: PlannedTrial,
-    make_trial: MakeTrial,
-    version: str,
-    messages: SimpleQueue[_Message],
-    stop: threading.Event,
-) -> None:
+def _run_one(planned: PlannedTrial, messages: SimpleQueue[_Message], stop: threading.Event) -> None:
     """Advance one trial to its end; runs in a worker thread."""
     if stop.is_set():
         messages.put(_Abandoned(planned))
@@ -233,7 +214,7 @@ def _run_one(
     try:
         messages.put(_Started(planned))
         begin = time.thread_time()
-        trial = make_trial(planned.config, planned.key.seed)
+        trial = planned.config.make_trial(planned.key.seed)
         chunk = 1
         while not trial.finished:
             if stop.is_set():
@@ -246,7 +227,7 @@ def _run_one(
         record = TrialRecord(
             key=planned.key,
             config=planned.config.canonical_json(),
-            version=version,
+            version=_core.__version__,
             n_decisions=int(trial.n_decisions),
             seconds=time.thread_time() - begin,
             finished_at=datetime.now(timezone.utc).isoformat(timespec="seconds"),

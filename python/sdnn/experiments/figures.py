@@ -1,4 +1,4 @@
-"""Figures like the paper's, drawn from stored rows only.
+"""Figures like the paper's, and that of costs, drawn from stored rows only.
 
 matplotlib is an extra and is imported when it is needed. Figures are made without pyplot, so no
 window, backend or style of the user's session is touched.
@@ -11,8 +11,12 @@ from importlib.util import find_spec
 from io import BytesIO
 from typing import TYPE_CHECKING
 
-from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, Experiment, agent_title
+import numpy as np
+
+from sdnn.experiments.cases import EXPERIMENTS, PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.experiments.errors import PlotUnavailableError
+from sdnn.experiments.records import CostRecord
+from sdnn.experiments.registry import AGENTS, agent_entry, cost_series
 from sdnn.experiments.results import CaseResult
 from sdnn.experiments.statistics import running_median
 
@@ -32,10 +36,11 @@ SMOOTHED_TESTS = 25
 _PANEL_HEIGHT = 3.3
 _START_HEIGHT = 1.9
 
-SERIES_COLORS = ("#1f5a96", "#c2542d", "#3c7d4b", "#7a5195")
+COLORS = ("#1f5a96", "#c2542d", "#3c7d4b", "#7a5195")
 WARNING_COLOR = "#a31515"
 INK = "#2b2b2b"
 FAINT = "#6f6f6f"
+_MARKERS = ("o", "s", "^", "v")
 
 
 def require_matplotlib() -> None:
@@ -92,7 +97,7 @@ def draw_experiment(
     panels = grid[:: len(heights)].ravel()
     starts = grid[1::2].ravel() if with_start else None
     agents = list(dict.fromkeys(result.agent for result in results))
-    colors = {agent: SERIES_COLORS[i % len(SERIES_COLORS)] for i, agent in enumerate(agents)}
+    colors = {agent: _color(list(AGENTS).index(agent)) for agent in agents}
     for number, (case, axes) in enumerate(zip(experiment.cases, panels, strict=False)):
         shown = [result for result in results if result.case == case]
         axes.set_title(case.title, fontsize=10.5, loc="left", color=INK)
@@ -103,19 +108,84 @@ def draw_experiment(
         if with_start or number >= len(experiment.cases) - n_columns:
             axes.set_xlabel("learning episodes")
         if quick:
-            watermark(axes)
+            _watermark(axes)
         if starts is not None:
             _draw_start(starts[number], shown, colors)
     for row in (panels, starts if starts is not None else ()):
         for axes in row[len(experiment.cases) :]:
             axes.set_visible(False)
-    if len(agents) > 1:
+    if len(agents) > 1 or experiment not in EXPERIMENTS:
         lines, titles = panels[0].get_legend_handles_labels()
         figure.legend(
             lines[::-1], titles[::-1], frameon=False, fontsize=9.5, loc="upper right",
             bbox_to_anchor=(0.975, 1 - 0.08 / height), ncols=len(agents),
         )  # fmt: skip
     _label(figure, experiment, results, quick)
+    return figure
+
+
+def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
+    """Draw the time of a step against the number of inputs, a line per series, on a log scale.
+
+    Exponential growth is a straight line there; quadratic growth bends. A dotted line continues
+    what SDNN-C needs with 4 inputs by its number of columns.
+
+    Parameters
+    ----------
+    costs
+        Measured costs, at least one.
+    quick
+        Whether to mark the figure as a quick look, which is no result.
+
+    Raises
+    ------
+    PlotUnavailableError
+        If matplotlib is not installed.
+    """
+    require_matplotlib()
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.4, 4.7))
+    figure.subplots_adjust(left=0.085, right=0.7, top=0.9, bottom=0.2)
+    axes = figure.add_subplot()
+    for number, (_, series) in enumerate(cost_series()):
+        own = sorted((c for c in costs if c.key.series == series.id), key=lambda c: c.key.n_inputs)
+        if not own:
+            continue
+        x = [cost.key.n_inputs for cost in own]
+        lower, middle, upper = np.transpose(
+            [np.percentile(cost.microseconds, (25, 50, 75)) for cost in own]
+        )
+        axes.errorbar(
+            x, middle, (middle - lower, upper - middle), color=_color(number),
+            marker=_MARKERS[number % len(_MARKERS)], markersize=5, capsize=3, linewidth=1.2,
+            label=f"{series.title}\n{series.growth}",
+        )  # fmt: skip
+        if series.id == "sdnn-c" and 4 in x:
+            fine = np.linspace(x[0], x[-1], 100)
+            scale = middle[x.index(4)] / (4 * 3)
+            axes.plot(
+                fine, scale * fine * (fine - 1), ":", color=_color(number), linewidth=1.2,
+                label="proportional to $d(d-1)$",
+            )  # fmt: skip
+    axes.set_yscale("log")
+    axes.set_xticks(sorted({cost.key.n_inputs for cost in costs}))
+    axes.set_xlabel("number of inputs d")
+    axes.set_ylabel("time of a step [µs]")
+    _style(axes)
+    axes.legend(
+        frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.01, 1.02), labelspacing=1.0
+    )  # fmt: skip
+    axes.set_title("Cost of a step against the number of inputs", loc="left", color=INK)
+    if quick:
+        _watermark(axes)
+    machines = ", ".join(sorted({cost.machine for cost in costs}))
+    figure.text(
+        0.012, 0.02,
+        "Medians, bars: quartiles of rounds. A step: acting in a new random state and learning the"
+        f" transition to it.\nsdnn {costs[0].version}; {machines}; one thread.",
+        fontsize=6.5, va="bottom", color=FAINT, linespacing=1.4,
+    )  # fmt: skip
     return figure
 
 
@@ -137,7 +207,7 @@ def _draw_curves(
     for depth, result in enumerate(reversed(shown)):
         curve, color = result.curve, colors[result.agent]
         lower, upper = curve.lower, curve.upper
-        title = agent_title(result.agent)
+        title = agent_entry(result.agent).title
         if smooth:
             lower, middle, upper = (
                 running_median(values, SMOOTHED_TESTS) for values in (lower, curve.median, upper)
@@ -163,10 +233,7 @@ def _draw_case(
     axes.set_ylim(0, MAX_STEPS)
     axes.xaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
-    axes.grid(axis="y", color="#e4e4e4", linewidth=0.7)
-    axes.set_axisbelow(True)
-    axes.tick_params(colors=INK, labelsize=8.5)
-    axes.spines[["top", "right"]].set_visible(False)
+    _style(axes)
 
 
 def _draw_start(axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str]) -> None:
@@ -182,7 +249,18 @@ def _is_long(results: Sequence[CaseResult]) -> bool:
     return max(int(result.episode[-1]) for result in results) >= 4 * START_EPISODES
 
 
-def watermark(axes: Axes) -> None:
+def _color(number: int) -> str:
+    return COLORS[number % len(COLORS)]
+
+
+def _style(axes: Axes) -> None:
+    axes.grid(axis="y", color="#e4e4e4", linewidth=0.7)
+    axes.set_axisbelow(True)
+    axes.tick_params(colors=INK, labelsize=8.5)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _watermark(axes: Axes) -> None:
     """Write across a panel that it is a quick look."""
     axes.text(
         0.5, 0.6, "quick", transform=axes.transAxes, ha="center", va="center",

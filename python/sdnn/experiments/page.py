@@ -1,4 +1,4 @@
-"""The report as one self-contained HTML page: figures, tables, settings and seeds.
+"""The report as pages: one self-contained HTML page with figures, settings and seeds; Markdown.
 
 Jinja is an extra and is imported when it is needed.
 """
@@ -7,20 +7,22 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 
-from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, agent_title
+from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS
 from sdnn.experiments.errors import PlotUnavailableError
-from sdnn.experiments.report import QUICK_WARNING, Report
-from sdnn.experiments.tables import (
+from sdnn.experiments.registry import agent_entry
+from sdnn.experiments.report import (
     CASE_HEADER,
     CLAIM_HEADER,
     COST_NOTE,
     MEASURES,
     NOTE,
+    QUICK_WARNING,
     RULE_NOTE,
+    Report,
     case_rows,
     claim_rows,
     cost_header,
@@ -149,7 +151,7 @@ def to_html(report: Report, pictures: Mapping[str, bytes], call: Call) -> str:
         cost_note=COST_NOTE,
         settings=[
             {
-                "title": f"{agent_title(summary.result.agent)}, {summary.result.case.title}",
+                "title": f"{agent_entry(summary.result.agent).title}, {summary.result.case.title}",
                 "hash": summary.result.config_hash,
                 "seeds": [record.key.seed for record in summary.result.records],
                 "versions": sorted({record.version for record in summary.result.records}),
@@ -158,6 +160,29 @@ def to_html(report: Report, pictures: Mapping[str, bytes], call: Call) -> str:
             for summary in summaries
         ],
     )
+
+
+def to_markdown(report: Report) -> str:
+    """Write the tables as Markdown."""
+
+    def line(cells: Sequence[str]) -> str:
+        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+    lines = ["# The paper's experiments", ""]
+    if report.quick:
+        lines += [f"**{QUICK_WARNING}**", ""]
+    if note := report.agents_note():
+        lines += [note, ""]
+    for title, header, rows in report.tables():
+        lines += [f"## {title}", "", line(header), "|" + "---|" * len(header)]
+        lines += [*map(line, rows), ""]
+    lines += [f"- {text}" for text in report.notes()]
+    lines += [
+        "",
+        f"Root seed {report.seed}; digest of the rows {report.digest[:16]}; sdnn {report.version}.",
+        "",
+    ]
+    return "\n".join(lines)
 
 
 def _data_url(svg: bytes) -> str:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from sdnn.experiments.cases import agent_title
+from sdnn.experiments.config import PlannedTrial
 from sdnn.experiments.engine import Observer
-from sdnn.experiments.plan import PlannedTrial
 from sdnn.experiments.records import TrialKey
+from sdnn.experiments.registry import agent_entry
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -28,7 +28,7 @@ def describe(key: TrialKey) -> str:
     >>> describe(TrialKey("s4", "sdnn-c", 0, 1, ""))
     'SDNN-C s4, trial 1'
     """
-    return f"{agent_title(key.agent)} {key.case_id}, trial {key.trial + 1}"
+    return f"{agent_entry(key.agent).title} {key.case_id}, trial {key.trial + 1}"
 
 
 class ProgressObserver(Observer):

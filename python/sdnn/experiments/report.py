@@ -1,50 +1,78 @@
-"""What a run gave, as tables: on the screen, as Markdown and as JSON."""
+"""What a run gave, as tables of texts and as JSON: the same cells for screen, Markdown and HTML."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from sdnn.experiments.cases import PAPER_EPISODES, Experiment
-from sdnn.experiments.claims import describe
-from sdnn.experiments.cost import CostRecord
-from sdnn.experiments.measures import MeasureName
-from sdnn.experiments.records import TrialRecord
+import numpy as np
+
+from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, Experiment
+from sdnn.experiments.claims import Growth, Quantity, describe
+from sdnn.experiments.measures import DEFAULT_MEASURES, MeasureName
+from sdnn.experiments.records import CostRecord
+from sdnn.experiments.registry import agent_entry, cost_series
 from sdnn.experiments.results import CaseSummary
-from sdnn.experiments.statistics import Estimate
-from sdnn.experiments.tables import (
-    CASE_HEADER,
-    CLAIM_HEADER,
-    COST_NOTE,
-    MEASURES,
-    NOTE,
-    RULE_NOTE,
-    case_rows,
-    claim_rows,
-    cost_header,
-    cost_rows,
-)
+from sdnn.experiments.statistics import DEFAULT_BOOTSTRAP, Estimate
 from sdnn.experiments.verdicts import ClaimOutcome, judge_claims
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 QUICK_WARNING = "A quick look at a fraction of the experiments, not their result."
 
+CASE_HEADER = (
+    "case",
+    "agent",
+    "trials",
+    "episodes to learn",
+    "early steps",
+    "episode of collapse",
+    "final steps",
+    "final share solved",
+    "decisions",
+    "us/decision",
+)
+CLAIM_HEADER = ("claim", "the paper says", "measured", "paper", "ours", "verdict")
 
-ROW_HEADER = (
-    "case", "agent", "trial", "seed", "config_hash", "version", "episode", "steps",
-    "episode_return", "solved",
-)  # fmt: skip
-"""Columns of the file of all test episodes."""
+MEASURES: dict[MeasureName, str] = {
+    "episodes_to_learn": (
+        f"learning episodes before the first test of at most {DEFAULT_MEASURES.good_steps:g} steps"
+        f" that begins {DEFAULT_MEASURES.learned_window} tests in a row with a median of at most"
+        f" {DEFAULT_MEASURES.good_steps:g}"
+    ),
+    "early_steps": (
+        "median steps of the tests in the first"
+        f" {DEFAULT_MEASURES.early_episodes:,} learning episodes"
+    ),
+    "episode_of_collapse": (
+        f"learning episodes before the end of the last {DEFAULT_MEASURES.stable_window} tests in a"
+        f" row with a median of at most {DEFAULT_MEASURES.good_steps:g} steps: until then the agent"
+        " can do the task; censored (> the last episode) if it still can at the end"
+    ),
+    "final_steps": f"median steps of the last {DEFAULT_MEASURES.final_window} tests",
+    "final_share_solved": (
+        f"share of the last {DEFAULT_MEASURES.final_window} tests that reach the goal"
+    ),
+}
+"""What the measures mean, for a reader."""
 
-COST_ROW_HEADER = (
-    "series", "n_inputs", "round", "microseconds", "n_steps", "table_bytes", "version", "machine"
-)  # fmt: skip
-"""Columns of the file of all rounds of cost measurements."""
+NOTE = (
+    f"Medians over trials with {100 * DEFAULT_BOOTSTRAP.confidence:.0f} % bootstrap intervals over"
+    " trials. us/decision: processor time of sensing, choosing, physics and learning."
+)
+
+RULE_NOTE = (
+    "A line about a claim holds if the whole interval lies in the range that was written down"
+    " before the trials were run, does not hold if the whole interval lies outside on one side, and"
+    " is undecided otherwise. Runs smaller than"
+    f" {PAPER_TRIALS} trials x {PAPER_EPISODES:,} episodes are not judged."
+)
+
+COST_NOTE = (
+    "Median time of a step (acting in a new random state and learning the transition to it, without"
+    " the environment) with the quartiles of rounds, and how often longer than with one input less."
+)
 
 
 @dataclass(frozen=True)
@@ -81,6 +109,8 @@ class Report:
         Version of the library that made the report.
     digest
         Digest of the experiments' rows.
+    agents
+        Ids of the agents that were run instead of those of the cases; none if those were.
     """
 
     experiments: tuple[ExperimentReport, ...]
@@ -89,6 +119,7 @@ class Report:
     seed: int
     version: str
     digest: str
+    agents: tuple[str, ...] = ()
 
     @cached_property
     def claims(self) -> tuple[ClaimOutcome, ...]:
@@ -109,71 +140,148 @@ class Report:
         ]
         if self.costs:
             tables.append(("Cost of a step", cost_header(), cost_rows(self.costs)))
-        claims = claim_rows(self.claims, self.last_episode)
-        return [*tables, ("Beside the paper's claims", CLAIM_HEADER, claims)]
+        if self.claims:
+            claims = claim_rows(self.claims, self.last_episode)
+            tables.append(("Beside the paper's claims", CLAIM_HEADER, claims))
+        return tables
 
     def notes(self) -> list[str]:
         """Say what the tables mean."""
-        notes = [RULE_NOTE]
+        notes = [RULE_NOTE] if self.claims else []
         if self.experiments:
             notes += [NOTE, *(f"{n.replace('_', ' ')}: {text}." for n, text in MEASURES.items())]
         return [*notes, COST_NOTE] if self.costs else notes
 
-
-def print_report(report: Report, console: Console) -> None:
-    """Print the tables."""
-    from rich import box
-    from rich.table import Table
-
-    for title, header, rows in report.tables():
-        mark = " (QUICK LOOK, not the result)" if report.quick else ""
-        table = Table(title=title + mark, title_justify="left", box=box.SIMPLE_HEAD)
-        for column in header:
-            table.add_column(column)
-        for row in rows:
-            table.add_row(*row)
-        console.print(table)
-    for note in report.notes():
-        console.print(note, style="dim", highlight=False)
+    def agents_note(self) -> str | None:
+        """Say which agents were run instead of the paper's; None if those were."""
+        if not self.agents:
+            return None
+        titles = ", ".join(agent_entry(agent).title for agent in self.agents)
+        return f"Not the paper's comparison: {titles} instead of the agents of its cases."
 
 
-def to_markdown(report: Report) -> str:
-    """Write the tables as Markdown."""
+def format_estimate(estimate: Estimate, measure: MeasureName, last_episode: int) -> str:
+    """Write an estimate with its interval; what is censored becomes ``>last_episode``.
 
-    def line(cells: Sequence[str]) -> str:
-        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+    Examples
+    --------
+    >>> format_estimate(Estimate(120.0, 90.0, math.inf), "episodes_to_learn", 15000)
+    '120 [90, >15000]'
+    >>> format_estimate(Estimate(0.9, 0.8, 1.0), "final_share_solved", 15000)
+    '90 % [80, 100]'
+    """
+    scale, unit = (100, " %") if measure == "final_share_solved" else (1, "")
 
-    lines = ["# The paper's experiments", ""]
-    if report.quick:
-        lines += [f"**{QUICK_WARNING}**", ""]
-    for title, header, rows in report.tables():
-        lines += [f"## {title}", "", line(header), "|" + "---|" * len(header)]
-        lines += [*map(line, rows), ""]
-    lines += [f"- {note}" for note in report.notes()]
-    lines += [
-        "",
-        f"Root seed {report.seed}; digest of the rows {report.digest[:16]}; sdnn {report.version}.",
-        "",
-    ]
-    return "\n".join(lines)
+    def number(value: float) -> str:
+        return f">{last_episode}" if math.isinf(value) else f"{round(scale * value, 1):g}"
 
-
-def trial_rows(records: Iterable[TrialRecord]) -> Iterator[tuple[object, ...]]:
-    """All test episodes of trials, each once, under `ROW_HEADER`."""
-    for record in records:
-        key, rows = record.key, record.rows
-        start = (key.case_id, key.agent, key.trial, key.seed, key.config_hash, record.version)
-        columns = (rows.episode, rows.steps, rows.episode_return, rows.solved.astype(int))
-        for row in zip(*(column.tolist() for column in columns), strict=True):
-            yield (*start, *row)
+    if math.isnan(estimate.value):
+        return "-"
+    if math.isnan(estimate.lower):
+        return number(estimate.value) + unit
+    return f"{number(estimate.value)}{unit} [{number(estimate.lower)}, {number(estimate.upper)}]"
 
 
-def round_rows(costs: Iterable[CostRecord]) -> Iterator[tuple[object, ...]]:
-    """All rounds of cost measurements under `COST_ROW_HEADER`."""
-    for cost in costs:
-        end = (cost.times.n_steps, cost.times.table_bytes, cost.version, cost.machine)
-        for number, microseconds in enumerate(cost.microseconds.tolist()):
-            yield (cost.key.series, cost.key.n_inputs, number, microseconds, *end)
+def case_rows(summaries: Sequence[CaseSummary]) -> list[tuple[str, ...]]:
+    """Rows of the table of measures, under `CASE_HEADER`."""
+    rows: list[tuple[str, ...]] = []
+    for summary in summaries:
+        result = summary.result
+        measured = (
+            format_estimate(summary.medians[name], name, result.last_episode) for name in MEASURES
+        )
+        rows.append(
+            (
+                result.case.title,
+                agent_entry(result.agent).title,
+                str(result.n_trials),
+                *measured,
+                f"{result.n_decisions:,}",
+                f"{result.microseconds_per_decision:.1f}",
+            )
+        )
+    return rows
+
+
+def claim_rows(outcomes: Sequence[ClaimOutcome], last_episode: int) -> list[tuple[str, ...]]:
+    """Rows of the table of claims, under `CLAIM_HEADER`.
+
+    A claim of several checks has a row of its own, with the verdict about all, before theirs.
+    """
+    rows: list[tuple[str, ...]] = []
+    for outcome in outcomes:
+        start: tuple[str, str] = (str(outcome.claim.number), outcome.claim.text)
+        if len(outcome.checks) > 1:
+            rows.append((*start, "", "", "", outcome.verdict.value))
+            start = ("", "")
+        for checked in outcome.checks:
+            quantity = checked.check.quantity
+            ours = (
+                "-"
+                if checked.estimate is None
+                else _format_quantity(quantity, checked.estimate, last_episode)
+            )
+            rows.append(
+                (*start, describe(quantity), checked.check.paper, ours, checked.verdict.value)
+            )
+    return rows
+
+
+def _format_quantity(quantity: Quantity, estimate: Estimate, last_episode: int) -> str:
+    if isinstance(quantity, Growth):
+        return _growth(estimate.value) + (
+            "" if math.isnan(estimate.lower)
+            else f" [{_growth(estimate.lower)}, {_growth(estimate.upper)}]"
+        )  # fmt: skip
+    return format_estimate(estimate, quantity.measure, last_episode)
+
+
+def _growth(ratio: float) -> str:
+    return f"{ratio:.1f}x" if ratio < 100 else f"{ratio:,.0f}x"
+
+
+def cost_header() -> tuple[str, ...]:
+    """Header of the table of costs: a column for each series."""
+    return ("inputs", *(series.title for _, series in cost_series()), "FQL's table")
+
+
+def cost_rows(costs: Sequence[CostRecord]) -> list[tuple[str, ...]]:
+    """Rows of the table of costs, one for each number of inputs, under `cost_header`."""
+    by_key = {(cost.key.series, cost.key.n_inputs): cost for cost in costs}
+    rows: list[tuple[str, ...]] = []
+    for n_inputs in sorted({cost.key.n_inputs for cost in costs}):
+        cells = [str(n_inputs)]
+        for _, series in cost_series():
+            cost = by_key.get((series.id, n_inputs))
+            cells.append(
+                "-" if cost is None else _cost(cost, by_key.get((series.id, n_inputs - 1)))
+            )
+        table = by_key.get(("fql", n_inputs))
+        cells.append("-" if table is None else _size(table.times.table_bytes))
+        rows.append(tuple(cells))
+    return rows
+
+
+def _cost(cost: CostRecord, with_one_less: CostRecord | None) -> str:
+    lower, middle, upper = np.percentile(cost.microseconds, (25, 50, 75))
+    text = f"{_time(middle)} [{_time(lower)}, {_time(upper)}]"
+    if with_one_less is None:
+        return text
+    return f"{text}, {_growth(middle / float(np.median(with_one_less.microseconds)))}"
+
+
+def _time(microseconds: float) -> str:
+    for unit, size in (("s", 1e6), ("ms", 1e3)):
+        if microseconds >= size:
+            return f"{microseconds / size:.3g} {unit}"
+    return f"{microseconds:.3g} us"
+
+
+def _size(n_bytes: int) -> str:
+    for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if n_bytes >= size:
+            return f"{n_bytes / size:.3g} {unit}"
+    return f"{n_bytes} B"
 
 
 def to_json(report: Report) -> dict[str, Any]:
@@ -182,7 +290,6 @@ def to_json(report: Report) -> dict[str, Any]:
     A censored value is the text ``">n"`` with n the last episode; an interval that one trial
     cannot give is null.
     """
-    last = report.last_episode
     return {
         "quick": report.quick,
         "seed": report.seed,
@@ -192,79 +299,10 @@ def to_json(report: Report) -> dict[str, Any]:
             {
                 "id": one.experiment.id,
                 "title": one.experiment.title,
-                "cases": [_summary_json(summary) for summary in one.summaries],
+                "cases": [summary.to_json() for summary in one.summaries],
             }
             for one in report.experiments
         ],
-        "costs": [
-            {
-                "series": cost.key.series,
-                "n_inputs": cost.key.n_inputs,
-                "microseconds": cost.microseconds.tolist(),
-                "n_steps": cost.times.n_steps,
-                "table_bytes": cost.times.table_bytes,
-                "machine": cost.machine,
-                "version": cost.version,
-            }
-            for cost in report.costs
-        ],
-        "claims": [
-            {
-                "number": outcome.claim.number,
-                "text": outcome.claim.text,
-                "verdict": outcome.verdict.value,
-                "checks": [
-                    {
-                        "measured": describe(checked.check.quantity),
-                        "paper": checked.check.paper,
-                        "at_least": _number(checked.check.at_least, None),
-                        "at_most": _number(checked.check.at_most, None),
-                        "ours": None
-                        if checked.estimate is None
-                        else _estimate_json(checked.estimate, last),
-                        "verdict": checked.verdict.value,
-                    }
-                    for checked in outcome.checks
-                ],
-            }
-            for outcome in report.claims
-        ],
-    }
-
-
-def _number(value: float, last_episode: int | None) -> float | str | None:
-    if math.isnan(value) or (math.isinf(value) and last_episode is None):
-        return None
-    return f">{last_episode}" if math.isinf(value) else value
-
-
-def _estimate_json(estimate: Estimate, last_episode: int) -> dict[str, float | str | None]:
-    ends = {"value": estimate.value, "lower": estimate.lower, "upper": estimate.upper}
-    return {name: _number(value, last_episode) for name, value in ends.items()}
-
-
-def _summary_json(summary: CaseSummary) -> dict[str, Any]:
-    result = summary.result
-    last = result.last_episode
-
-    def measure(name: MeasureName) -> dict[str, Any]:
-        return {
-            "trials": [_number(float(value), last) for value in summary.values[name]],
-            "median": _estimate_json(summary.medians[name], last),
-        }
-
-    return {
-        "case": result.case.id,
-        "title": result.case.title,
-        "paper_figure": result.case.paper_figure,
-        "agent": result.agent,
-        "config_hash": result.config_hash,
-        "versions": sorted({record.version for record in result.records}),
-        "seeds": [record.key.seed for record in result.records],
-        "n_trials": result.n_trials,
-        "last_episode": last,
-        "measures": {name: measure(name) for name in summary.values},
-        "median_curve_episodes_to_learn": _number(summary.median_curve_episodes_to_learn, last),
-        "n_decisions": result.n_decisions,
-        "microseconds_per_decision": _number(result.microseconds_per_decision, None),
+        "costs": [cost.to_json() for cost in report.costs],
+        "claims": [outcome.to_json(report.last_episode) for outcome in report.claims],
     }

@@ -5,30 +5,55 @@ from __future__ import annotations
 import json
 import time
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from sdnn.experiments import cost_figure, figures, page, report
+from sdnn import _core, machine
+from sdnn.experiments import figures, page
 from sdnn.experiments.cases import EXPERIMENTS, PAPER_EPISODES, PAPER_TRIALS, Experiment
-from sdnn.experiments.config import ProtocolConfig
-from sdnn.experiments.cost import (
-    QUICK_COST,
-    CostConfig,
-    CostKey,
-    MeasureSteps,
-    cost_keys,
-    measure_costs,
-)
+from sdnn.experiments.config import PlannedTrial, plan_trials
+from sdnn.experiments.cost import QUICK_COST, CostConfig, cost_keys, measure_costs
 from sdnn.experiments.engine import Observer, RunOutcome, run_trials
-from sdnn.experiments.plan import PlannedTrial, plan_trials
-from sdnn.experiments.records import TrialKey, TrialRecord
+from sdnn.experiments.records import (
+    COST_ROW_HEADER,
+    ROW_HEADER,
+    CostKey,
+    TrialKey,
+    TrialRecord,
+    records_digest,
+    round_rows,
+    trial_rows,
+)
+from sdnn.experiments.registry import cost_series
+from sdnn.experiments.report import ExperimentReport, Report, to_json
 from sdnn.experiments.results import collect, summarize
 from sdnn.experiments.store import STORE_NAME, ResultStore
-from sdnn.experiments.trial import MakeTrial
+from sdnn.experiments.trial import ProtocolConfig
 from sdnn.whole_files import csv_bytes, remove_partial_files, write_whole
 
 QUICK_TRIALS = 2
 QUICK_EPISODES = 300
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a request needs, and what its report may show.
+
+    Parameters
+    ----------
+    trials
+        Trials to run, in this order.
+    costs
+        Costs to measure, in this order.
+    experiments
+        Every experiment under the request's settings with the keys of its trials: the report shows
+        those whose trials are all there, asked for or not.
+    """
+
+    trials: tuple[PlannedTrial, ...]
+    costs: tuple[CostKey, ...]
+    experiments: tuple[tuple[Experiment, tuple[TrialKey, ...]], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +78,8 @@ class ReproduceRequest:
         Trials at the same time; default one for each core.
     quick
         Whether this is a look at a fraction; its files are named and marked so.
+    agents
+        Ids of the agents to run in every case instead of the case's own; files are named so.
     """
 
     experiments: tuple[Experiment, ...]
@@ -63,7 +90,12 @@ class ReproduceRequest:
     seed: int = 0
     jobs: int | None = None
     quick: bool = False
+    agents: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "agents", tuple(dict.fromkeys(self.agents)))
+
+    @cached_property
     def protocol(self) -> ProtocolConfig:
         """How long a trial is.
 
@@ -81,26 +113,47 @@ class ReproduceRequest:
             )
         return protocol
 
-    def plan(self) -> tuple[PlannedTrial, ...]:
-        """List the trials needed.
+    @cached_property
+    def plan(self) -> Plan:
+        """What is needed: made when first asked for, and once.
 
         Raises
         ------
         ValueError
-            If the trials would be too short to hold a test episode.
+            If the trials would be too short to hold a test episode, no agent has one of the ids,
+            or only costs are asked for, of agents that have none.
         """
-        return self.plan_of(self.experiments)
-
-    def plan_of(self, experiments: tuple[Experiment, ...]) -> tuple[PlannedTrial, ...]:
-        """List the trials that other experiments would need under the same settings."""
         n_trials = self.n_trials or (QUICK_TRIALS if self.quick else PAPER_TRIALS)
-        cases = [case for experiment in experiments for case in experiment.cases]
-        return plan_trials(cases, n_trials, self.seed, self.protocol())
+        by_id = {experiment.id: experiment for experiment in (*EXPERIMENTS, *self.experiments)}
+        known = [experiment.with_agents(self.agents) for experiment in by_id.values()]
+        cases = [case for experiment in known for case in experiment.cases]
+        planned = plan_trials(cases, n_trials, self.seed, self.protocol)
+        asked = {experiment.id for experiment in self.experiments}
+        wanted = {pair for e in known if e.id in asked for pair in e.pairs}
+        costs = cost_keys(self.cost_config, self.agents or None) if self.cost else ()
+        if self.cost and not (wanted or costs):
+            measured = dict.fromkeys(entry.id for entry, _ in cost_series())
+            raise ValueError(
+                f"agents whose cost is measured are {', '.join(measured)},"
+                f" got {', '.join(self.agents)}"
+            )
+        return Plan(
+            trials=tuple(p for p in planned if p.key[:2] in wanted),
+            costs=costs,
+            experiments=tuple(
+                (e, tuple(p.key for p in planned if p.key[:2] in e.pairs)) for e in known
+            ),
+        )
 
     @property
     def cost_config(self) -> CostConfig:
         """How thoroughly costs are measured."""
         return QUICK_COST if self.quick else CostConfig()
+
+    def file_name(self, name: str) -> str:
+        """Name of a file of this request, such as ``table-rbfn-quick.json``."""
+        stem, _, kind = name.rpartition(".")
+        return "-".join([stem, *self.agents, *(["quick"] if self.quick else [])]) + f".{kind}"
 
 
 @dataclass(frozen=True)
@@ -120,7 +173,7 @@ class Reproduction:
     """
 
     outcome: RunOutcome
-    report: report.Report | None = None
+    report: Report | None = None
     files: tuple[Path, ...] = ()
     table: dict[str, Any] = field(default_factory=dict)
 
@@ -151,23 +204,15 @@ def count_stored(request: ReproduceRequest) -> StoredCounts:
             found = store.load_costs(request.cost_config.config_hash)
             known_costs = {record.key for record in found}
     trials: dict[tuple[str, str], tuple[int, int]] = {}
-    for planned in request.plan():
+    for planned in request.plan.trials:
         pair = (planned.key.case_id, planned.key.agent)
         n_planned, n_stored = trials.get(pair, (0, 0))
         trials[pair] = (n_planned + 1, n_stored + (planned.key in trial_keys))
-    wanted = set(cost_keys(request.cost_config)) if request.cost else set()
+    wanted = set(request.plan.costs)
     return StoredCounts(trials=trials, costs=(len(wanted), len(wanted & known_costs)))
 
 
-def reproduce(
-    request: ReproduceRequest,
-    make_trial: MakeTrial,
-    measure_steps: MeasureSteps,
-    *,
-    version: str,
-    machine: str,
-    observer: Observer | None = None,
-) -> Reproduction:
+def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) -> Reproduction:
     """Run what is missing; when all is there, draw the figures and write tables and page.
 
     The files cover every experiment whose trials are all stored under the request's settings, not
@@ -177,19 +222,13 @@ def reproduce(
     ----------
     request
         What to run.
-    make_trial
-        Makes a trial from its configuration and seed.
-    measure_steps
-        Measures the time of an agent's steps.
-    version
-        Version of the library, stored with each trial.
-    machine
-        Processor and instruction set, stored with costs and written on the page.
     observer
         Told how the run goes.
 
     Raises
     ------
+    ValueError
+        If nothing can be run as the request says.
     PlotUnavailableError
         If matplotlib or Jinja is not installed; no trial is run then.
     StoreError
@@ -199,67 +238,61 @@ def reproduce(
     page.require_jinja()
     begin = time.monotonic()
     watcher = Observer() if observer is None else observer
+    plan = request.plan
     with ResultStore(request.out) as store:
         remove_partial_files(request.out)
-        outcome = run_trials(
-            request.plan(), store, make_trial, version=version, jobs=request.jobs, observer=watcher
-        )
+        outcome = run_trials(plan.trials, store, jobs=request.jobs, observer=watcher)
         if outcome.failures or outcome.interrupted:
             return Reproduction(outcome)
-        if request.cost:
-            measure_costs(
-                request.cost_config, store, measure_steps,
-                version=version, machine=machine, observer=watcher,
-            )  # fmt: skip
-        results, records = _results(request, store, version)
+        measure_costs(plan.costs, request.cost_config, store, watcher)
+        report, records = _read(request, store)
     call = page.Call(
-        machine=machine,
+        machine=machine.description(),
         seconds=time.monotonic() - begin,
         n_run=outcome.n_run,
         n_planned=outcome.n_planned,
         processor_seconds=sum(record.seconds for record in records),
     )
-    return Reproduction(outcome, results, *_write(request, results, records, call))
+    return Reproduction(outcome, report, *_write(request, report, records, call))
 
 
-def _results(
-    request: ReproduceRequest, store: ResultStore, version: str
-) -> tuple[report.Report, tuple[TrialRecord, ...]]:
+def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[TrialRecord, ...]]:
     """Read everything that is complete under the request's settings, and the trials it is from."""
     stored = store.keys()
-    reports: list[report.ExperimentReport] = []
-    keys: list[TrialKey] = []
-    for experiment in EXPERIMENTS:
-        wanted = [planned.key for planned in request.plan_of((experiment,))]
-        if stored.issuperset(wanted):
-            summaries = tuple(summarize(r) for r in collect(experiment, wanted, store))
-            reports.append(report.ExperimentReport(experiment, summaries))
-            keys += wanted
-    results = report.Report(
-        experiments=tuple(reports),
-        costs=store.load_costs(request.cost_config.config_hash),
+    complete = [(e, keys) for e, keys in request.plan.experiments if stored.issuperset(keys)]
+    records = store.load(key for _, keys in complete for key in keys)
+    shown = {series.id for _, series in cost_series(request.agents or None)}
+    report = Report(
+        experiments=tuple(
+            ExperimentReport(experiment, tuple(map(summarize, collect(experiment, records))))
+            for experiment, _ in complete
+        ),
+        costs=tuple(
+            cost
+            for cost in store.load_costs(request.cost_config.config_hash)
+            if cost.key.series in shown
+        ),
         quick=request.quick,
         seed=request.seed,
-        version=version,
-        digest=store.content_digest(keys),
+        version=_core.__version__,
+        digest=records_digest(records),
+        agents=request.agents,
     )
-    return results, store.load(keys)
+    return report, records
 
 
 def _write(
     request: ReproduceRequest,
-    results: report.Report,
+    report: Report,
     records: tuple[TrialRecord, ...],
     call: page.Call,
 ) -> tuple[tuple[Path, ...], dict[str, Any]]:
     """Draw and write everything; returns the files and the content of the JSON file."""
-    suffix = "-quick" if request.quick else ""
     files: list[Path] = []
     pictures: dict[str, bytes] = {}
 
     def write(name: str, content: bytes) -> None:
-        stem, _, kind = name.rpartition(".")
-        path = request.out / f"{stem}{suffix}.{kind}"
+        path = request.out / request.file_name(name)
         write_whole(path, content)
         files.append(path)
 
@@ -267,19 +300,19 @@ def _write(
         f"experiment-{one.experiment.id}": figures.draw_experiment(
             one.experiment, [summary.result for summary in one.summaries], quick=request.quick
         )
-        for one in results.experiments
+        for one in report.experiments
     }
-    if results.costs:
-        drawn["cost"] = cost_figure.draw_cost(results.costs, quick=request.quick)
+    if report.costs:
+        drawn["cost"] = figures.draw_cost(report.costs, quick=request.quick)
     for name, figure in drawn.items():
         png, pictures[name] = figures.figure_bytes(figure)
         write(f"{name}.png", png)
         write(f"{name}.svg", pictures[name])
-    table = report.to_json(results)
-    write("results.md", report.to_markdown(results).encode())
+    table = to_json(report)
+    write("results.md", page.to_markdown(report).encode())
     write("table.json", (json.dumps(table, indent=2, allow_nan=False) + "\n").encode())
-    write("results.csv", csv_bytes(report.ROW_HEADER, report.trial_rows(records)))
-    if results.costs:
-        write("cost.csv", csv_bytes(report.COST_ROW_HEADER, report.round_rows(results.costs)))
-    write("report.html", page.to_html(results, pictures, call).encode())
+    write("results.csv", csv_bytes(ROW_HEADER, trial_rows(records)))
+    if report.costs:
+        write("cost.csv", csv_bytes(COST_ROW_HEADER, round_rows(report.costs)))
+    write("report.html", page.to_html(report, pictures, call).encode())
     return tuple(files), table

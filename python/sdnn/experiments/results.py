@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,8 @@ from numpy.typing import NDArray
 from sdnn.experiments import measures, statistics
 from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, Case, Experiment
 from sdnn.experiments.measures import DEFAULT_MEASURES, MeasureConfig, MeasureName
-from sdnn.experiments.records import TrialKey, TrialRecord
-from sdnn.experiments.statistics import Curve, Estimate
-from sdnn.experiments.store import ResultStore
+from sdnn.experiments.records import TrialRecord
+from sdnn.experiments.statistics import Curve, Estimate, json_number
 
 
 @dataclass(frozen=True)
@@ -124,26 +124,48 @@ class CaseSummary:
         """Return a measure of each trial, (n_trials,), infinite ones as the last episode."""
         return np.minimum(self.values[measure], self.result.last_episode)
 
+    def to_json(self) -> dict[str, Any]:
+        """Return it as values that JSON can hold."""
+        result = self.result
+        last = result.last_episode
+        return {
+            "case": result.case.id,
+            "title": result.case.title,
+            "paper_figure": result.case.paper_figure,
+            "agent": result.agent,
+            "config_hash": result.config_hash,
+            "versions": sorted({record.version for record in result.records}),
+            "seeds": [record.key.seed for record in result.records],
+            "n_trials": result.n_trials,
+            "last_episode": last,
+            "measures": {
+                name: {
+                    "trials": [json_number(float(value), last) for value in self.values[name]],
+                    "median": self.medians[name].to_json(last),
+                }
+                for name in self.values
+            },
+            "median_curve_episodes_to_learn": json_number(
+                self.median_curve_episodes_to_learn, last
+            ),
+            "n_decisions": result.n_decisions,
+            "microseconds_per_decision": json_number(result.microseconds_per_decision, None),
+        }
 
-def collect(
-    experiment: Experiment, keys: Iterable[TrialKey], store: ResultStore
-) -> tuple[CaseResult, ...]:
-    """Read an experiment's trials out of the store, one result for each case and agent.
 
-    Only the given keys are read, so trials under other settings never mix in.
+def collect(experiment: Experiment, records: Iterable[TrialRecord]) -> tuple[CaseResult, ...]:
+    """Sort trials into one result for each case and agent of an experiment.
 
     Parameters
     ----------
     experiment
         Its cases and agents.
-    keys
-        Keys of the planned trials; those of other experiments are passed over.
-    store
-        Where the trials are.
+    records
+        Trials of the plan, in the order in which they are to be shown; those of other experiments
+        are passed over.
     """
     by_pair: dict[tuple[str, str], list[TrialRecord]] = {}
-    pairs = {(case.id, agent) for case in experiment.cases for agent in case.agents}
-    for record in store.load(key for key in keys if (key.case_id, key.agent) in pairs):
+    for record in records:
         by_pair.setdefault((record.key.case_id, record.key.agent), []).append(record)
     return tuple(
         CaseResult(case, agent, tuple(by_pair.get((case.id, agent), ())))

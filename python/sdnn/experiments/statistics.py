@@ -39,6 +39,19 @@ class BootstrapConfig:
 DEFAULT_BOOTSTRAP = BootstrapConfig()
 
 
+def json_number(value: float, last_episode: int | None) -> float | str | None:
+    """Return a number as JSON can hold it: NaN is null, infinity ``">last_episode"`` or null.
+
+    Examples
+    --------
+    >>> json_number(math.inf, 15000)
+    '>15000'
+    """
+    if math.isnan(value) or (math.isinf(value) and last_episode is None):
+        return None
+    return f">{last_episode}" if math.isinf(value) else value
+
+
 @dataclass(frozen=True)
 class Estimate:
     """A statistic over trials with its bootstrap interval.
@@ -54,6 +67,11 @@ class Estimate:
     value: float
     lower: float
     upper: float
+
+    def to_json(self, last_episode: int) -> dict[str, float | str | None]:
+        """Return it as values that JSON can hold; see `json_number`."""
+        ends = {"value": self.value, "lower": self.lower, "upper": self.upper}
+        return {name: json_number(value, last_episode) for name, value in ends.items()}
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,15 @@ from types import TracebackType
 
 import numpy as np
 
-from sdnn.experiments.cost import CostKey, CostRecord, StepTimes
 from sdnn.experiments.errors import StoreError
-from sdnn.experiments.records import TrialKey, TrialRecord, TrialRows, records_digest
+from sdnn.experiments.records import (
+    CostKey,
+    CostRecord,
+    StepTimes,
+    TrialKey,
+    TrialRecord,
+    TrialRows,
+)
 
 STORE_NAME = "results.sqlite"
 SCHEMA_VERSION = 2
@@ -251,14 +257,6 @@ class ResultStore:
                 (config_hash,),
             ).fetchall()
             return tuple(_cost_record(*row) for row in found)
-
-    def content_digest(self, keys: Iterable[TrialKey] | None = None) -> str:
-        """SHA-256 of the stored results, to compare runs.
-
-        It covers keys, configurations, decisions and rows, sorted by key; it leaves out times and
-        the version, so runs with other jobs, interruptions or order agree.
-        """
-        return records_digest(self.load(keys))
 
 
 def _cost_record(

@@ -1,14 +1,55 @@
-"""What the engine asks of a trial, and the trial computed in C++."""
+"""One trial: what the engine asks of it, and the trial of an agent that is written in Python.
+
+The trials of the core's agents are computed in C++ (``_core.AcrobotTrial`` and its siblings), by
+the same protocol, bit for bit.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from dataclasses import dataclass
+from typing import Any, Protocol
 
+import gymnasium as gym
+import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from sdnn.experiments.config import TrialConfig
+from sdnn import _core
+from sdnn.agents import Transition
+from sdnn.config import to_core
+from sdnn.environments import (
+    AcrobotConfig,
+    AcrobotSwingUpEnv,
+    GoalSchedule,
+    GoalScheduleConfig,
+    NoisySensors,
+    RedundantSensors,
+    SensorConfig,
+    TighteningGoal,
+)
+
+BASIC_SENSORS = 4
+"""Observed variables without the redundant ones, s1 to s4."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProtocolConfig:
+    """Learning protocol of a trial; the defaults are the paper's values (spec section 5).
+
+    Parameters
+    ----------
+    n_learning_episodes
+        Learning episodes in a trial, at least 1.
+    test_interval
+        One test episode follows every so many learning episodes, at least 1.
+    """
+
+    n_learning_episodes: int = 15_000
+    test_interval: int = 10
+
+    def to_core(self) -> _core.ProtocolConfig:
+        """Make the core's struct of the same values; see `sdnn.config.to_core`."""
+        return to_core(self, _core.ProtocolConfig)
 
 
 class Trial(Protocol):
@@ -26,39 +67,160 @@ class Trial(Protocol):
     def n_decisions(self) -> int:
         """Decisions made so far, in learning and test episodes."""
 
-    def advance(self, n: int, /) -> None:
-        """Run up to `n` more learning episodes and the test episodes due among them."""
+    def advance(self, n_episodes: int, /) -> None:
+        """Run up to so many more learning episodes and the test episodes due among them."""
 
     def test_rows(self) -> dict[str, NDArray[Any]]:
         """Test episodes so far: arrays `episode`, `steps`, `episode_return`, `solved`, (n,)."""
 
 
-MakeTrial: TypeAlias = "Callable[[TrialConfig, int], Trial]"
-"""Makes a trial from its configuration and seed."""
+class LearningAgent(Protocol):
+    """What a trial asks of an agent in Python; actions are elements of its action space."""
+
+    def begin_episode(self) -> None:
+        """Note that an episode begins."""
+
+    def act(self, observation: NDArray[np.float64], explore: bool = True) -> Any:
+        """Choose the action to take; without `explore` nothing may be learned or remembered."""
+
+    def learn(self, transition: Transition) -> None:
+        """Learn one step."""
 
 
-def make_core_trial(config: TrialConfig, seed: int) -> Trial:
-    """Make the trial that runs in C++ and releases the GIL while it advances.
+class PythonTrial:
+    """The protocol of the core's `AcrobotTrial` for an agent in Python, on Gymnasium environments.
+
+    For the same agent and seed it gives the rows of the compiled trial, bit for bit. It holds the
+    GIL, so trials of this kind do not run faster on several threads.
+
+    Parameters
+    ----------
+    make_agent
+        Makes the agent from an observation space, an action space and ``approximator=``,
+        ``learning=``, ``seed=``.
+    approximator, learning
+        The agent's settings. ``approximator.n_inputs`` must be the number of sensors.
+    acrobot, goal, sensors, protocol
+        The task's settings.
+    seed
+        The same seed gives every agent the same sensor noise, observation by observation.
 
     Raises
     ------
     ValueError
-        If a value of the configuration is out of its range.
+        If a value is out of its range, or agent and sensors do not fit.
     """
-    from sdnn import _core
 
-    kind = {
-        "sdnn-c": _core.AcrobotTrial,
-        "fql": _core.FuzzyAcrobotTrial,
-        "rbfn": _core.RBFAcrobotTrial,
-    }[config.agent]
-    trial: Trial = kind(
-        approximator=config.approximator.to_core(),
-        learning=config.learning.to_core(),
-        acrobot=config.acrobot.to_core(),
-        goal=config.goal.to_core(),
-        sensors=config.sensors.to_core(),
-        protocol=config.protocol.to_core(),
-        seed=seed,
-    )
-    return trial
+    def __init__(
+        self,
+        make_agent: Callable[..., LearningAgent],
+        *,
+        approximator: Any,
+        learning: Any,
+        acrobot: AcrobotConfig,
+        goal: GoalScheduleConfig,
+        sensors: SensorConfig,
+        protocol: ProtocolConfig,
+        seed: int,
+    ) -> None:
+        for name in ("n_learning_episodes", "test_interval"):
+            if getattr(protocol, name) < 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(protocol, name)}")
+        if approximator.n_inputs != sensors.n_sensors:
+            raise ValueError(
+                f"n_inputs must be n_sensors of the sensors ({sensors.n_sensors}),"
+                f" got {approximator.n_inputs}"
+            )
+        self._protocol = protocol
+        self._env = _environment(acrobot, goal, sensors, seed, "sensor_noise")
+        self._test_env = _environment(acrobot, goal, sensors, seed, "evaluation_sensor_noise")
+        self._agent = make_agent(
+            self._env.observation_space,
+            self._env.action_space,
+            approximator=approximator,
+            learning=learning,
+            seed=seed,
+        )
+        self._rows: list[tuple[int, int, float, bool]] = []
+        self._episode = 0
+        self._n_decisions = 0
+
+    @property
+    def episode(self) -> int:
+        """Learning episodes done."""
+        return self._episode
+
+    @property
+    def finished(self) -> bool:
+        """Whether all learning episodes are done."""
+        return self._episode == self._protocol.n_learning_episodes
+
+    @property
+    def n_decisions(self) -> int:
+        """Decisions made so far, in learning and test episodes."""
+        return self._n_decisions
+
+    def advance(self, n_episodes: int, /) -> None:
+        """Run up to `n_episodes` more learning episodes, with the test episodes that fall due.
+
+        Raises
+        ------
+        ValueError
+            If `n_episodes` is negative.
+        """
+        if n_episodes < 0:
+            raise ValueError(f"n_episodes must be at least 0, got {n_episodes}")
+        last = min(self._episode + n_episodes, self._protocol.n_learning_episodes)
+        while self._episode < last:
+            self._episode += 1
+            self._run_episode(self._env, learning=True)
+            if self._episode % self._protocol.test_interval == 0:
+                self._rows.append(self._run_episode(self._test_env, learning=False))
+
+    def test_rows(self) -> dict[str, NDArray[Any]]:
+        """Test episodes so far: arrays `episode`, `steps`, `episode_return`, `solved`, (n,)."""
+        types = {
+            "episode": np.int32,
+            "steps": np.int32,
+            "episode_return": np.float64,
+            "solved": np.bool_,
+        }
+        return {
+            name: np.array([row[column] for row in self._rows], kind)
+            for column, (name, kind) in enumerate(types.items())
+        }
+
+    def _run_episode(
+        self, env: gym.Env[NDArray[np.float64], Any], *, learning: bool
+    ) -> tuple[int, int, float, bool]:
+        observation, _ = env.reset(options={"episode": self._episode})
+        self._agent.begin_episode()
+        steps, episode_return = 0, 0.0
+        terminated = truncated = False
+        while not (terminated or truncated):
+            action = self._agent.act(observation, explore=learning)
+            following, reward, terminated, truncated, _ = env.step(action)
+            if learning:
+                self._agent.learn(
+                    Transition(observation, action, float(reward), following, terminated)
+                )
+            observation = following
+            steps += 1
+            episode_return += float(reward)
+        self._n_decisions += steps
+        return self._episode, steps, episode_return, terminated
+
+
+def _environment(
+    acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, seed: int, stream: Any
+) -> gym.Env[NDArray[np.float64], Any]:
+    """Stack the task as the core does: redundancy first, then noise on all sensors."""
+    redundant = ("energy", "height")
+    n_redundant = sensors.n_sensors - BASIC_SENSORS
+    if not 0 <= n_redundant <= len(redundant):
+        raise ValueError(f"n_sensors must be in [4, 6], got {sensors.n_sensors}")
+    env = TighteningGoal(AcrobotSwingUpEnv(config=acrobot, dtype="float64"), GoalSchedule(goal))
+    return NoisySensors(
+        RedundantSensors(env, redundant[:n_redundant]),
+        sigma=sensors.noise, seed=seed, stream=stream,
+    )  # fmt: skip

@@ -14,13 +14,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 import numpy as np
 
-from sdnn.experiments.claims import CLAIMS, Check, Claim, Difference, Growth, Subject
-from sdnn.experiments.cost import CostRecord
+from sdnn.experiments.claims import CLAIMS, Check, Claim, Difference, Growth, Subject, describe
+from sdnn.experiments.records import CostRecord
 from sdnn.experiments.results import CaseSummary
-from sdnn.experiments.statistics import Estimate, estimate_contrast
+from sdnn.experiments.statistics import Estimate, estimate_contrast, json_number
 
 
 class Verdict(Enum):
@@ -71,6 +72,27 @@ class ClaimOutcome:
             if decisive in verdicts:
                 return decisive
         return Verdict.HOLDS
+
+    def to_json(self, last_episode: int) -> dict[str, Any]:
+        """Return it as values that JSON can hold; what is censored becomes ``">last_episode"``."""
+        return {
+            "number": self.claim.number,
+            "text": self.claim.text,
+            "verdict": self.verdict.value,
+            "checks": [
+                {
+                    "measured": describe(checked.check.quantity),
+                    "paper": checked.check.paper,
+                    "at_least": json_number(checked.check.at_least, None),
+                    "at_most": json_number(checked.check.at_most, None),
+                    "ours": None
+                    if checked.estimate is None
+                    else checked.estimate.to_json(last_episode),
+                    "verdict": checked.verdict.value,
+                }
+                for checked in self.checks
+            ],
+        }
 
 
 def judge_claims(

@@ -4,111 +4,15 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from sdnn import _core
 from sdnn.agents import (
     FuzzyQLearning,
-    FuzzyQLearningConfig,
-    QLearningConfig,
     RBFQLearning,
     SDNNQLearning,
     Transition,
 )
-from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
-from sdnn.environments import (
-    AcrobotConfig,
-    AcrobotSwingUpEnv,
-    GoalScheduleConfig,
-    NoisySensors,
-    RedundantSensors,
-    SensorConfig,
-    TighteningGoal,
-)
+from sdnn.approximators import SDNNCConfig
 
 SMALL = SDNNCConfig(n_pattern_units=40, n_hidden_units=120, n_active_units=30)
-
-KINDS = {
-    "sdnn-c": (SDNNQLearning, _core.AcrobotTrial, SDNNCConfig, QLearningConfig),
-    "fql": (FuzzyQLearning, _core.FuzzyAcrobotTrial, FuzzyRulesConfig, FuzzyQLearningConfig),
-    "rbfn": (RBFQLearning, _core.RBFAcrobotTrial, RBFNetworkConfig, QLearningConfig),
-}
-"""Agent, compiled trial, and the configurations of approximator and learning."""
-
-
-def python_trial(make_agent, *, n_sensors, noise, n_episodes, test_interval, seed):
-    """The paper's protocol written with the Python rooms; rows as the trial gives them."""
-
-    def make_env(stream):
-        env = TighteningGoal(AcrobotSwingUpEnv(config=AcrobotConfig(), dtype="float64"))
-        env = RedundantSensors(env, ("energy", "height")[: n_sensors - 4])
-        return NoisySensors(env, sigma=noise, seed=seed, stream=stream)
-
-    learning_env, test_env = make_env("sensor_noise"), make_env("evaluation_sensor_noise")
-    agent = make_agent(learning_env.observation_space, learning_env.action_space, seed=seed)
-    n_decisions = 0
-
-    def run(env, episode, learning):
-        nonlocal n_decisions
-        observation, _ = env.reset(options={"episode": episode})
-        agent.begin_episode()
-        steps, total, over = 0, 0.0, False
-        while not over:
-            action = agent.act(observation, explore=learning)
-            following, reward, terminated, truncated, _ = env.step(action)
-            if learning:
-                agent.learn(Transition(observation, action, reward, following, terminated))
-            observation = following
-            steps, total, over = steps + 1, total + reward, terminated or truncated
-        n_decisions += steps
-        return steps, total, terminated
-
-    rows = []
-    for episode in range(1, n_episodes + 1):
-        run(learning_env, episode, True)
-        if episode % test_interval == 0:
-            rows.append((episode, *run(test_env, episode, False)))
-    return rows, n_decisions
-
-
-@pytest.mark.parametrize(
-    ("kind", "n_sensors", "noise"),
-    [
-        ("sdnn-c", 4, 0.0),
-        ("sdnn-c", 4, 0.02),
-        ("sdnn-c", 5, 0.02),
-        ("sdnn-c", 6, 0.02),
-        ("fql", 4, 0.0),
-        ("fql", 6, 0.02),
-        ("rbfn", 4, 0.0),
-        ("rbfn", 6, 0.02),
-    ],
-)
-def test_a_python_loop_reproduces_the_compiled_trial(kind, n_sensors, noise):
-    n_episodes, test_interval, seed = 60, 5, 11
-    make_agent, make_trial, approximator, learning = KINDS[kind]
-    trial = make_trial(
-        approximator=approximator(n_inputs=n_sensors).to_core(),
-        learning=learning().to_core(),
-        acrobot=AcrobotConfig().to_core(),
-        goal=GoalScheduleConfig().to_core(),
-        sensors=SensorConfig(n_sensors=n_sensors, noise=noise).to_core(),
-        protocol=_core.ProtocolConfig(n_learning_episodes=n_episodes, test_interval=test_interval),
-        seed=seed,
-    )
-    trial.advance(n_episodes)
-    assert trial.finished
-    columns = trial.test_rows()
-    names = ("episode", "steps", "episode_return", "solved")
-    expected = list(zip(*(columns[name].tolist() for name in names), strict=True))
-    rows, n_decisions = python_trial(
-        make_agent,
-        n_sensors=n_sensors,
-        noise=noise,
-        n_episodes=n_episodes,
-        test_interval=test_interval,
-        seed=seed,
-    )
-    assert rows == expected
-    assert n_decisions == trial.n_decisions
 
 
 def live(env, agent, n_steps):

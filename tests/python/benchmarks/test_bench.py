@@ -27,6 +27,15 @@ def quick():
     return json.loads(done.stdout)
 
 
+def performance_tables():
+    """The script that writes the documentation's tables."""
+    path = ROOT / "bench" / "performance_tables.py"
+    spec = importlib.util.spec_from_file_location("performance_tables", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
 def check_shape(value, shape, path):
     """``value`` has exactly the fields of a TypedDict, whose numbers are positive and finite."""
     assert set(value) == set(shape.__annotations__), path
@@ -86,7 +95,8 @@ def test_tables_are_on_the_screen_and_in_markdown(quick, monkeypatch):
     given = quick
     done = CliRunner().invoke(main, ["bench", "--quick"], catch_exceptions=False)
     assert done.exit_code == 0
-    text = report.to_markdown(quick)
+    page = performance_tables()
+    text = page.to_markdown(quick)
     for table in report.tables(quick):
         assert table.title in text
         assert all(len(row) == len(table.header) for row in table.rows)
@@ -95,7 +105,7 @@ def test_tables_are_on_the_screen_and_in_markdown(quick, monkeypatch):
             assert row[0].split(",")[0] in done.stdout
     assert report.QUICK_WARNING in text
     assert report.QUICK_WARNING in done.stdout
-    assert report.QUICK_WARNING not in report.to_markdown({**quick, "quick": False})
+    assert report.QUICK_WARNING not in page.to_markdown({**quick, "quick": False})
 
 
 def test_a_failing_process_is_one_clear_line(monkeypatch):
@@ -145,46 +155,8 @@ def test_times_of_the_core_are_nanoseconds_per_repetition():
         parts.time_corrections(1, 0)
 
 
-def make_agents(n_inputs, seed):
-    """One agent of every bound kind, by name."""
-    learning = _core.QLearningConfig()
-    rbf = _core.RBFNetworkConfig(n_inputs=n_inputs, n_actions=21)
-    rules = _core.FuzzyRulesConfig(n_inputs=n_inputs)
-    fuzzy = _core.FuzzyQLearningConfig()
-    network = _core.SDNNCConfig(n_inputs=n_inputs)
-    return {
-        "sdnn": _core.SDNNQLearning(network=network, learning=learning, seed=seed),
-        "fuzzy": _core.FuzzyQLearning(rules=rules, learning=fuzzy, seed=seed),
-        "rbf": _core.RBFQLearning(network=rbf, learning=learning, seed=seed),
-        "plain rbf": _core.PlainRBFQLearning(network=rbf, learning=learning, seed=seed),
-    }
-
-
-@pytest.mark.parametrize("kind", ["sdnn", "fuzzy", "rbf", "plain rbf"])
-def test_steps_of_every_agent_are_timed(kind):
-    agent = make_agents(3, 1)[kind]
-    times = _core.time_agent_steps(agent, 12, seed=1)
-    assert times.dtype == np.int64
-    assert times.shape == (12,)
-    assert (times > 0).all()
-    assert _core.time_agent_steps(agent, 0, seed=1).size == 0
-    with pytest.raises(ValueError, match="n_repetitions"):
-        _core.time_agent_steps(agent, -1, seed=1)
-
-
-def test_the_seed_decides_what_the_timed_agent_learns():
-    def weights(kind, seed):
-        agent = make_agents(2, 5)[kind]
-        _core.time_agent_steps(agent, 40, seed)
-        return agent.network.weights()
-
-    np.testing.assert_array_equal(weights("rbf", 1), weights("rbf", 1))
-    assert (weights("rbf", 1) != weights("rbf", 2)).any()
-    np.testing.assert_allclose(weights("plain rbf", 1), weights("rbf", 1), rtol=0, atol=1e-10)
-
-
 def test_machines_that_tell_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(machine, "_PROCESSOR_FILE", tmp_path / "none")
+    monkeypatch.setattr("sdnn.machine._PROCESSOR_FILE", tmp_path / "none")
     monkeypatch.setattr(machine, "_CACHE_FOLDER", tmp_path / "none")
     described = machine.describe_machine()
     assert described["processor"]
@@ -203,10 +175,7 @@ def test_caches_are_read(tmp_path):
 
 
 def test_the_page_shows_the_stored_run():
-    path = ROOT / "bench" / "performance_tables.py"
-    spec = importlib.util.spec_from_file_location("performance_tables", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = performance_tables()
     page = module.PAGE.read_text()
     stored = json.loads(module.RESULTS.read_text())
     assert stored["quick"] is False

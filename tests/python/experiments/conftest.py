@@ -17,19 +17,27 @@ def fake():
 
 
 @pytest.fixture
-def run(fake):
-    """Run a plan into the store of a folder; returns outcome and digest."""
-    from sdnn.experiments import ResultStore, run_trials
+def use_trial(monkeypatch, fake):
+    """Let every agent run in trials of another kind."""
+    from sdnn.experiments import AGENTS
 
-    def _run(folder, plan=None, make_trial=fake.FakeTrial, **options):
+    def _use(core_trial):
+        for name, entry in fake.agents_with(core_trial).items():
+            monkeypatch.setitem(AGENTS, name, entry)
+
+    return _use
+
+
+@pytest.fixture
+def run(fake, use_trial):
+    """Run a plan into the store of a folder, with fake trials; returns outcome and digest."""
+    from sdnn.experiments import ResultStore, run_trials
+    from sdnn.experiments.records import records_digest
+
+    def _run(folder, plan=None, trial=fake.FakeTrial, **options):
+        use_trial(trial)
         with ResultStore(folder) as store:
-            outcome = run_trials(
-                fake.make_plan() if plan is None else plan,
-                store,
-                make_trial,
-                version=fake.VERSION,
-                **options,
-            )
-            return outcome, store.content_digest()
+            outcome = run_trials(fake.make_plan() if plan is None else plan, store, **options)
+            return outcome, records_digest(store.load())
 
     return _run

@@ -2,23 +2,30 @@
 
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from sdnn.experiments import Observer, ProtocolConfig, ResultStore, plan_trials, run_trials
-from sdnn.experiments.cases import EXPERIMENTS
+from sdnn.experiments import (
+    AGENTS,
+    EXPERIMENTS,
+    Observer,
+    ProtocolConfig,
+    ResultStore,
+    plan_trials,
+    run_trials,
+)
 
 CASES = EXPERIMENTS[0].cases
-VERSION = "0.0.test"
 
 
 class FakeTrial:
     """Steps fall from 50 to about 5; every number is fixed by the seed, not by the chunks."""
 
-    def __init__(self, config, seed):
-        self._protocol = config.protocol
-        n_tests = config.protocol.n_learning_episodes // config.protocol.test_interval
+    def __init__(self, *, protocol, seed, **_others):
+        self._protocol = protocol
+        n_tests = protocol.n_learning_episodes // protocol.test_interval
         generator = np.random.default_rng(seed)
         learned = generator.integers(2, 8)
         self._steps = np.where(
@@ -64,8 +71,12 @@ def make_plan(n_trials=3, n_episodes=300, root_seed=0):
     return plan_trials(CASES, n_trials, root_seed, ProtocolConfig(n_learning_episodes=n_episodes))
 
 
+def agents_with(core_trial):
+    """All agents as they are, but for their trials."""
+    return {name: replace(entry, core_trial=core_trial) for name, entry in AGENTS.items()}
+
+
 if __name__ == "__main__":
+    AGENTS.update(agents_with(SlowTrial))
     with ResultStore(Path(sys.argv[1])) as store:
-        run_trials(
-            make_plan(6, 100), store, SlowTrial, version=VERSION, jobs=2, observer=_Speaker()
-        )
+        run_trials(make_plan(6, 100), store, jobs=2, observer=_Speaker())

@@ -8,17 +8,15 @@ from sdnn.agents import FuzzyQLearningConfig
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig
 from sdnn.environments import SensorConfig
 from sdnn.experiments import (
+    AGENTS,
     EXPERIMENTS,
-    Case,
     ProtocolConfig,
     TrialConfig,
     case_config,
-    make_core_trial,
     plan_trials,
     select_experiments,
     trial_seed,
 )
-from sdnn.experiments.cases import AGENTS
 
 
 def test_experiment_a_is_the_one_of_the_paper():
@@ -66,7 +64,7 @@ def test_rows_that_share_an_id_observe_the_same():
                 case.n_sensors,
                 case.noise,
             )
-            assert set(case.agents) <= {agent.id for agent in AGENTS}
+            assert set(case.agents) <= set(AGENTS)
 
 
 def test_unknown_experiment_is_named():
@@ -136,14 +134,15 @@ def test_settings_of_another_agent_are_refused():
         TrialConfig(agent="fql", approximator=FuzzyRulesConfig())
 
 
-@pytest.mark.parametrize("agent", ["sdnn-c", "fql", "rbfn"])
-def test_every_agent_has_a_trial(agent):
-    case = Case("s5-noise", "", 5, 0.02, (agent,), "")
-    config = case_config(case, agent, ProtocolConfig(n_learning_episodes=10))
-    trial = make_core_trial(config, 1)
-    trial.advance(10)
-    assert trial.finished
-    assert trial.test_rows()["episode"].tolist() == [10]
+def test_an_experiment_with_other_agents_differs_in_nothing_else():
+    (experiment,) = select_experiments("b")
+    other = experiment.with_agents(["rbfn", "sdnn-c", "rbfn"])
+    assert {case.agents for case in other.cases} == {("rbfn", "sdnn-c")}
+    assert [replace(case, agents=("sdnn-c", "fql")) for case in other.cases] == list(
+        experiment.cases
+    )
+    assert ("s4", "rbfn") in other.pairs
+    assert experiment.with_agents([]) is experiment
 
 
 def test_trial_seed_follows_its_definition():

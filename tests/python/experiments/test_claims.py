@@ -16,7 +16,8 @@ from sdnn.experiments.claims import (
     Subject,
     describe,
 )
-from sdnn.experiments.cost import SERIES, CostKey, CostRecord, StepTimes
+from sdnn.experiments.records import CostKey, CostRecord, StepTimes
+from sdnn.experiments.registry import cost_series
 from sdnn.experiments.verdicts import (
     CheckOutcome,
     ClaimOutcome,
@@ -104,7 +105,7 @@ def test_a_claim_is_as_good_as_its_checks(parts, whole):
 def test_the_claims_are_the_nine_of_the_paper_and_know_their_subjects():
     assert [claim.number for claim in CLAIMS] == list(range(1, 10))
     planned = {(case.id, agent) for e in EXPERIMENTS for case in e.cases for agent in case.agents}
-    series = {series.id for series in SERIES}
+    series = {series.id for _, series in cost_series()}
     for check in (check for claim in CLAIMS for check in claim.checks):
         quantity = check.quantity
         if isinstance(quantity, Growth):

@@ -5,11 +5,14 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from sdnn.benchmarks.agent_cost import measure_steps
-from sdnn.experiments import CostConfig, Observer, ResultStore, StoreError, draw_cost
-from sdnn.experiments.cost import QUICK_COST, SERIES, StepTimes, cost_keys, measure_costs
-from sdnn.experiments.tables import cost_header, cost_rows
+from sdnn import _core, machine
+from sdnn.experiments import AGENTS, CostConfig, Observer, ResultStore, StoreError, draw_cost
+from sdnn.experiments.cost import QUICK_COST, cost_keys, measure_costs, measure_steps
+from sdnn.experiments.records import StepTimes, records_digest
+from sdnn.experiments.registry import cost_series
+from sdnn.experiments.report import cost_header, cost_rows
 
+SERIES = [series for _, series in cost_series()]
 SMALL = CostConfig(n_inputs=(3, 2), n_rounds=3, round_seconds=0.001, min_steps=1)
 
 
@@ -20,7 +23,7 @@ class FakeMeasure:
         self.asked = []
         self._last = ends_after
 
-    def __call__(self, series, n_inputs, config):
+    def __call__(self, entry, series, n_inputs, config):
         self.asked.append((series.id, n_inputs))
         if n_inputs > self._last:
             return None
@@ -28,10 +31,18 @@ class FakeMeasure:
         return StepTimes(microseconds=times, n_steps=5, table_bytes=9**n_inputs)
 
 
-def measured(folder, measure, config=SMALL):
-    with ResultStore(folder) as store:
-        measure_costs(config, store, measure, version="1", machine="m", observer=Observer())
-        return store.load_costs(config.config_hash)
+@pytest.fixture
+def measured(monkeypatch):
+    """Measure all costs with another clock; returns what is stored."""
+
+    def _measured(folder, measure, config=SMALL):
+        monkeypatch.setattr("sdnn.experiments.cost.measure_steps", measure)
+        with ResultStore(folder) as store:
+            keys = cost_keys(config)
+            measure_costs(keys, config, store, Observer())
+            return store.load_costs(config.config_hash)
+
+    return _measured
 
 
 def test_keys_are_all_series_in_ascending_inputs():
@@ -45,18 +56,19 @@ def test_keys_are_all_series_in_ascending_inputs():
     assert len(quick) == 3 * 7 + 4
     assert replace(SMALL, n_rounds=4).config_hash != SMALL.config_hash
     assert CostConfig().n_inputs == tuple(range(2, 9))
+    assert CostConfig().config_hash == "cfe16d17b9773885"  # under which results are stored
     assert asdict(QUICK_COST)["n_inputs"] == asdict(CostConfig())["n_inputs"]
 
 
-def test_what_is_stored_is_not_measured_again(tmp_path):
+def test_what_is_stored_is_not_measured_again(tmp_path, measured):
     class KilledError(Exception):
         pass
 
     class Dies(FakeMeasure):
-        def __call__(self, series, n_inputs, config):
+        def __call__(self, *arguments):
             if len(self.asked) == 3:
                 raise KilledError
-            return super().__call__(series, n_inputs, config)
+            return super().__call__(*arguments)
 
     with pytest.raises(KilledError):
         measured(tmp_path, Dies())
@@ -70,18 +82,21 @@ def test_what_is_stored_is_not_measured_again(tmp_path):
     assert [cost.key for cost in again] == [cost.key for cost in costs]
     np.testing.assert_array_equal(costs[0].microseconds, [16.0, 32.0, 48.0])
     assert (costs[0].times.n_steps, costs[0].times.table_bytes) == (5, 81)
+    assert {cost.machine for cost in costs} == {machine.description()}
+    assert {cost.version for cost in costs} == {_core.__version__}
 
 
-def test_settings_of_costs_live_side_by_side(tmp_path):
+def test_settings_of_costs_live_side_by_side(tmp_path, measured):
     measured(tmp_path, FakeMeasure())
     other = replace(SMALL, n_rounds=5)
     assert [c.microseconds.size for c in measured(tmp_path, FakeMeasure(), other)] == [5] * 8
     with ResultStore(tmp_path) as store:
         assert len(store.load_costs(SMALL.config_hash)) == 8
-        assert store.content_digest() == ResultStore(tmp_path / "empty").content_digest()
+        assert store.load() == ()
+        assert records_digest(store.load()) == records_digest(())
 
 
-def test_damaged_costs_are_named(tmp_path):
+def test_damaged_costs_are_named(tmp_path, measured):
     measured(tmp_path, FakeMeasure())
     with ResultStore(tmp_path) as store:
         store._connection.execute("UPDATE costs SET microseconds = 'x'")
@@ -90,7 +105,7 @@ def test_damaged_costs_are_named(tmp_path):
             store.load_costs(SMALL.config_hash)
 
 
-def test_table_gives_times_and_growth(tmp_path):
+def test_table_gives_times_and_growth(tmp_path, measured):
     rows = cost_rows(measured(tmp_path, FakeMeasure(ends_after=2)))
     assert [row[0] for row in rows] == ["2"]
     rows = cost_rows(measured(tmp_path / "all", FakeMeasure()))
@@ -100,7 +115,7 @@ def test_table_gives_times_and_growth(tmp_path):
     assert rows[1][-1] == "729 B"
 
 
-def test_figure_holds_the_stored_rows(tmp_path):
+def test_figure_holds_the_stored_rows(tmp_path, measured):
     costs = measured(tmp_path, FakeMeasure())
     (axes,) = draw_cost(costs).axes
     assert axes.get_yscale() == "log"
@@ -109,24 +124,65 @@ def test_figure_holds_the_stored_rows(tmp_path):
     assert "quick" in json.dumps([t.get_text() for t in draw_cost(costs, quick=True).axes[0].texts])
 
 
-@pytest.mark.parametrize("series", SERIES, ids=lambda series: series.id)
-def test_real_agents_are_measured(series):
-    times = measure_steps(series, 2, SMALL)
+@pytest.mark.parametrize(
+    ("entry", "series"), cost_series(), ids=[series.id for _, series in cost_series()]
+)
+def test_real_agents_are_measured(entry, series):
+    times = measure_steps(entry, series, 2, SMALL)
     assert times.microseconds.shape == (3,)
     assert (times.microseconds > 0).all()
     assert times.n_steps >= 1
     sizes = {"sdnn-c": 2 * 200 * 900, "fql": 9**2 * 21 * 4, "rbfn": 4**3 * 8}
-    assert times.table_bytes == sizes[series.agent]
+    assert times.table_bytes == sizes[entry.id]
 
 
-def test_what_there_is_no_memory_for_is_left_out(monkeypatch):
+def test_what_there_is_no_memory_for_is_left_out():
     def refuse(*_arguments, **_options):
         raise MemoryError
 
-    monkeypatch.setattr("sdnn.benchmarks.agent_cost.FuzzyQLearning", refuse)
-    assert measure_steps(SERIES[1], 2, SMALL) is None
+    entry = replace(AGENTS["fql"], agent=refuse)
+    assert measure_steps(entry, entry.costs[0], 2, SMALL) is None
 
 
-def test_unknown_series_is_named():
+def test_costs_of_some_agents():
+    assert {key.series for key in cost_keys(SMALL, ["rbfn"])} == {"rbfn", "rbfn-plain"}
     with pytest.raises(ValueError, match="got 'tiles'"):
-        measure_steps(replace(SERIES[0], id="tiles"), 2, SMALL)
+        cost_keys(SMALL, ["tiles"])
+
+
+def make_agents(n_inputs, seed):
+    """One agent of every bound kind, by name."""
+    learning = _core.QLearningConfig()
+    rbf = _core.RBFNetworkConfig(n_inputs=n_inputs, n_actions=21)
+    rules = _core.FuzzyRulesConfig(n_inputs=n_inputs)
+    fuzzy = _core.FuzzyQLearningConfig()
+    network = _core.SDNNCConfig(n_inputs=n_inputs)
+    return {
+        "sdnn": _core.SDNNQLearning(network=network, learning=learning, seed=seed),
+        "fuzzy": _core.FuzzyQLearning(rules=rules, learning=fuzzy, seed=seed),
+        "rbf": _core.RBFQLearning(network=rbf, learning=learning, seed=seed),
+        "plain rbf": _core.PlainRBFQLearning(approximator=rbf, learning=learning, seed=seed),
+    }
+
+
+@pytest.mark.parametrize("kind", ["sdnn", "fuzzy", "rbf", "plain rbf"])
+def test_steps_of_every_agent_are_timed(kind):
+    agent = make_agents(3, 1)[kind]
+    times = _core.time_agent_steps(agent, 12, seed=1)
+    assert times.dtype == np.int64
+    assert times.shape == (12,)
+    assert (times > 0).all()
+    assert _core.time_agent_steps(agent, 0, seed=1).size == 0
+    with pytest.raises(ValueError, match="n_repetitions"):
+        _core.time_agent_steps(agent, -1, seed=1)
+
+
+def test_the_seed_decides_what_the_timed_agent_learns():
+    def weights(kind, seed):
+        agent = make_agents(2, 5)[kind]
+        _core.time_agent_steps(agent, 40, seed)
+        return agent.network.weights()
+
+    np.testing.assert_array_equal(weights("rbf", 1), weights("rbf", 1))
+    assert (weights("rbf", 1) != weights("rbf", 2)).any()
+    np.testing.assert_allclose(weights("plain rbf", 1), weights("rbf", 1), rtol=0, atol=1e-10)

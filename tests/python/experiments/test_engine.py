@@ -35,9 +35,9 @@ def test_jobs_do_not_change_the_content(tmp_path, run):
 def test_stored_trials_are_not_run_again(tmp_path, fake, run):
     made = []
 
-    def make(config, seed):
+    def make(*, seed, **parts):
         made.append(seed)
-        return fake.FakeTrial(config, seed)
+        return fake.FakeTrial(seed=seed, **parts)
 
     run(tmp_path, fake.make_plan(2), make)
     assert len(made) == 4
@@ -74,10 +74,10 @@ def test_observer_hears_every_trial_from_the_calling_thread(tmp_path, fake, run)
 def test_failing_trial_does_not_stop_the_others(tmp_path, fake, run):
     plan = fake.make_plan()
 
-    def make(config, seed):
+    def make(*, seed, **parts):
         if seed == plan[0].key.seed:
             raise RuntimeError("broken")
-        return fake.FakeTrial(config, seed)
+        return fake.FakeTrial(seed=seed, **parts)
 
     recorder = Recorder()
     outcome, _ = run(tmp_path, plan, make, observer=recorder)
@@ -93,8 +93,8 @@ def test_interruption_keeps_what_is_finished(tmp_path, fake, run):
     before = signal.getsignal(signal.SIGINT)
 
     class Interrupting(fake.FakeTrial):
-        def __init__(self, config, seed):
-            super().__init__(config, seed)
+        def __init__(self, *, seed, **parts):
+            super().__init__(seed=seed, **parts)
             made.append(seed)
 
         def advance(self, n):
@@ -117,7 +117,7 @@ def test_interruption_keeps_what_is_finished(tmp_path, fake, run):
     assert digest == run(tmp_path / "whole")[1]
 
 
-def test_unwritable_store_stops_the_run(tmp_path, fake):
+def test_unwritable_store_stops_the_run(tmp_path, fake, use_trial):
     from sdnn.experiments import run_trials
 
     class Full(ResultStore):
@@ -127,12 +127,13 @@ def test_unwritable_store_stops_the_run(tmp_path, fake):
     made = []
 
     class Counted(fake.SlowTrial):
-        def __init__(self, config, seed):
-            super().__init__(config, seed)
+        def __init__(self, *, seed, **parts):
+            super().__init__(seed=seed, **parts)
             made.append(seed)
 
+    use_trial(Counted)
     with Full(tmp_path) as store, pytest.raises(StoreError, match="disk full"):
-        run_trials(fake.make_plan(10, 50), store, Counted, version="0", jobs=1)
+        run_trials(fake.make_plan(10, 50), store, jobs=1)
     assert len(made) < 20
 
 

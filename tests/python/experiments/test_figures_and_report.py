@@ -8,28 +8,24 @@ from html import escape
 import numpy as np
 import pytest
 
+import sdnn.experiments.reproduce as reproduce_module
 from sdnn.experiments import (
     CaseResult,
     PlotUnavailableError,
+    ProtocolConfig,
     ResultStore,
     collect,
     draw_experiment,
+    plan_trials,
     select_experiments,
     summarize,
 )
 from sdnn.experiments.figures import SMOOTHED_TESTS, figure_bytes
-from sdnn.experiments.page import Call, to_html
-from sdnn.experiments.report import (
-    ROW_HEADER,
-    ExperimentReport,
-    Report,
-    to_json,
-    to_markdown,
-    trial_rows,
-)
+from sdnn.experiments.page import Call, to_html, to_markdown
+from sdnn.experiments.records import ROW_HEADER, records_digest, trial_rows
+from sdnn.experiments.report import ExperimentReport, Report, format_estimate, to_json
 from sdnn.experiments.reproduce import ReproduceRequest, reproduce
 from sdnn.experiments.statistics import Estimate, running_median
-from sdnn.experiments.tables import format_estimate
 
 (EXPERIMENT,) = select_experiments("a")
 
@@ -41,7 +37,7 @@ def results(tmp_path, fake, run):
     plan = fake.make_plan(3, 3000)
     run(tmp_path, plan)
     with ResultStore(tmp_path) as store:
-        return collect(EXPERIMENT, [p.key for p in plan], store)
+        return collect(EXPERIMENT, store.load(p.key for p in plan))
 
 
 def all_text(figure):
@@ -80,7 +76,7 @@ def test_short_runs_are_drawn_as_they_are(tmp_path, fake, run):
     plan = fake.make_plan(2, 300)
     run(tmp_path, plan)
     with ResultStore(tmp_path) as store:
-        results = collect(EXPERIMENT, [p.key for p in plan], store)
+        results = collect(EXPERIMENT, store.load(p.key for p in plan))
     for axes, result in zip(draw_experiment(EXPERIMENT, results).axes, results, strict=True):
         ((_, line),) = curves_of(axes)
         np.testing.assert_array_equal(line, np.median(result.steps, axis=0))
@@ -121,14 +117,52 @@ def test_figures_are_repeatable_to_the_byte(results):
 @pytest.mark.parametrize("module", ["figures", "page"])
 def test_missing_extra_is_told_before_any_trial(monkeypatch, tmp_path, module):
     monkeypatch.setattr(f"sdnn.experiments.{module}.find_spec", lambda name: None)
-
-    def make(config, seed):
-        raise AssertionError("a trial was made")
-
     request = ReproduceRequest(experiments=(EXPERIMENT,), out=tmp_path / "out", quick=True)
     with pytest.raises(PlotUnavailableError, match=re.escape('pip install "sdnn[reproduce]"')):
-        reproduce(request, make, make, version="0", machine="m")
+        reproduce(request)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_run_plans_once_and_reads_its_trials_once(monkeypatch, tmp_path, fake, use_trial):
+    use_trial(fake.FakeTrial)
+    calls = []
+
+    def counted(name, function):
+        def call(*arguments, **options):
+            calls.append(name)
+            return function(*arguments, **options)
+
+        return call
+
+    monkeypatch.setattr(reproduce_module, "plan_trials", counted("plan", plan_trials))
+    monkeypatch.setattr(ResultStore, "_load_one", counted("trial", ResultStore._load_one))
+    request = ReproduceRequest(experiments=select_experiments("all"), out=tmp_path, quick=True)
+    done = reproduce(request)
+    # SDNN-C in Case I belongs to both figures.
+    assert [len(one.summaries) for one in done.report.experiments] == [2, 8]
+    assert calls == ["plan"] + ["trial"] * 18
+    with ResultStore(tmp_path) as store:
+        assert done.report.digest == records_digest(store.load())
+
+
+def test_a_colour_stands_for_an_agent_in_every_figure(tmp_path, fake, run):
+    def colors(*agents):
+        other = EXPERIMENT.with_agents(agents)
+        plan = plan_trials(other.cases, 1, 0, ProtocolConfig(n_learning_episodes=100))
+        run(tmp_path, plan)
+        with ResultStore(tmp_path) as store:
+            results = collect(other, store.load(p.key for p in plan))
+        figure = draw_experiment(other, results)
+        (legend,) = figure.legends
+        lines = {line.get_color() for line in figure.axes[0].get_lines()}
+        return [text.get_text() for text in legend.get_texts()], lines
+
+    titles, one = colors("rbfn")
+    assert titles == ["RBFN"]
+    titles, two = colors("rbfn", "sdnn-c")
+    assert titles == ["RBFN", "SDNN-C"]
+    assert one < two
+    assert len(two) == 2
 
 
 def test_mixed_settings_are_refused(results):

@@ -5,12 +5,14 @@
 #include <limits>
 
 #include "sdnn/agents/agent.hpp"
-#include "sdnn/benchmarks/stopwatch.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/environments/acrobot.hpp"
+#include "sdnn/experiments/detail/stopwatch.hpp"
 #include "sdnn/experiments/trial.hpp"
 
 namespace sdnn::benchmarks {
+
+using experiments::keep, experiments::now, experiments::time_each, experiments::Times;
 
 /// The times of all decisions in the next `n_episodes` learning episodes of a trial: choosing an
 /// action, the acrobot, its sensors, and learning from it. Test episodes among them count too.

@@ -11,13 +11,15 @@
 #include "sdnn/approximators/detail/column_sums.hpp"
 #include "sdnn/approximators/error_correction.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
-#include "sdnn/benchmarks/stopwatch.hpp"
 #include "sdnn/coding/state_code.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
+#include "sdnn/experiments/detail/stopwatch.hpp"
 
 namespace sdnn::benchmarks {
+
+using experiments::keep, experiments::kMaxRepetitions, experiments::time_each, experiments::Times;
 
 /// Times a network at random states, which are new to it: nothing it remembers helps.
 ///

@@ -7,17 +7,19 @@
 #include <cstring>
 #include <span>
 
-#include "sdnn/benchmarks/stopwatch.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/instruction_set.hpp"
 #include "sdnn/core/random.hpp"
+#include "sdnn/experiments/detail/stopwatch.hpp"
 
 #if SDNN_X86_KERNELS
 #include <immintrin.h>
 #endif
 
 namespace sdnn::benchmarks {
+
+using experiments::keep, experiments::time_each, experiments::Times;
 
 namespace detail {
 

@@ -1,4 +1,4 @@
-#include "sdnn/benchmarks/plain_rbf_network.hpp"
+#include "sdnn/experiments/detail/plain_rbf_network.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/action_value.hpp"
 
-namespace sdnn::benchmarks {
+namespace sdnn::experiments {
 namespace {
 
 using approximators::RBFNetwork;
@@ -66,4 +66,4 @@ TEST(PlainRBFNetwork, RefusesWhatTheFactoredOneRefuses) {
 }
 
 }  // namespace
-}  // namespace sdnn::benchmarks
+}  // namespace sdnn::experiments

@@ -6,7 +6,7 @@
 
 #include "sdnn/approximators/rbf_network.hpp"
 
-namespace sdnn::benchmarks {
+namespace sdnn::experiments {
 
 /// An RBF network whose `values` are evaluated as the definition says: every joint basis of every
 /// action (RBFNetwork::values_plainly). It learns what RBFNetwork learns, up to rounding.
@@ -35,4 +35,4 @@ class PlainRBFNetwork {
   approximators::RBFNetwork network_;
 };
 
-}  // namespace sdnn::benchmarks
+}  // namespace sdnn::experiments

@@ -1,4 +1,4 @@
-#include "sdnn/benchmarks/stopwatch.hpp"
+#include "sdnn/experiments/detail/stopwatch.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace sdnn::benchmarks {
+namespace sdnn::experiments {
 namespace {
 
 TEST(TimeEach, PreparesAndTimesEveryRepetitionInOrder) {
@@ -41,4 +41,4 @@ TEST(TimeEach, RefusesImpossibleNumbers) {
 }
 
 }  // namespace
-}  // namespace sdnn::benchmarks
+}  // namespace sdnn::experiments

@@ -1,0 +1,25 @@
+/// Measured times as an array.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <cstdint>
+
+#include "sdnn/experiments/detail/stopwatch.hpp"
+
+namespace sdnn::bindings {
+
+/// The times that `measure` returns, int64 nanoseconds (n,); it runs without the GIL.
+template <class Measure>
+pybind11::array_t<std::int64_t> times_of(Measure&& measure) {
+  experiments::Times times;
+  {
+    const pybind11::gil_scoped_release release;
+    times = measure();
+  }
+  return pybind11::array_t<std::int64_t>(static_cast<pybind11::ssize_t>(times.size()),
+                                         times.data());
+}
+
+}  // namespace sdnn::bindings

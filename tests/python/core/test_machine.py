@@ -1,0 +1,25 @@
+import os
+
+from sdnn import instruction_sets, machine
+
+
+def test_the_processor_has_the_name_that_the_system_gives(tmp_path, monkeypatch):
+    told = tmp_path / "cpuinfo"
+    monkeypatch.setattr(machine, "_PROCESSOR_FILE", told)
+    told.write_text("processor : 0\nmodel name\t: Fast One @ 1 GHz\nmodel name\t: Other\n")
+    assert machine.processor() == "Fast One @ 1 GHz"
+    assert machine.description() == f"Fast One @ 1 GHz, {instruction_sets.instruction_set()}"
+
+
+def test_a_system_that_tells_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(machine, "_PROCESSOR_FILE", tmp_path / "none")
+    monkeypatch.setattr(machine.platform, "processor", lambda: "")
+    assert machine.processor() == "unknown"
+
+
+def test_only_cores_that_this_process_may_use_are_counted(monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 3, 5}, raising=False)
+    assert machine.n_cores() == 3
+    monkeypatch.delattr(os, "sched_getaffinity")
+    monkeypatch.setattr(os, "cpu_count", lambda: None)
+    assert machine.n_cores() == 1
