@@ -9,7 +9,7 @@
 
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/instruction_set.hpp"
+#include "sdnn/core/detail/kernel.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/experiments/detail/stopwatch.hpp"
 
@@ -23,7 +23,7 @@ using experiments::keep, experiments::time_each, experiments::Times;
 
 namespace detail {
 
-inline std::uint64_t sum_of_words_portable(const std::byte* bytes, std::size_t size) noexcept {
+SDNN_INLINE std::uint64_t sum_of_words_body(const std::byte* bytes, std::size_t size) noexcept {
   std::array<std::uint64_t, 8> sums{};
   for (std::size_t i = 0; i < size; i += core::kCacheLine) {
     std::array<std::uint64_t, 8> words;
@@ -54,24 +54,10 @@ inline void multiply_portable(const float* weights, std::size_t n_rows, std::siz
 
 #if SDNN_X86_KERNELS
 
-[[gnu::target("avx2")]] inline std::uint64_t sum_of_words_avx2(const std::byte* bytes,
-                                                               std::size_t size) noexcept {
-  __m256i low = _mm256_setzero_si256();
-  __m256i high = low;
-  for (std::size_t i = 0; i < size; i += core::kCacheLine) {
-    const auto* const line = reinterpret_cast<const __m256i*>(bytes + i);
-    low = _mm256_add_epi64(low, _mm256_load_si256(line));
-    high = _mm256_add_epi64(high, _mm256_load_si256(line + 1));
-  }
-  alignas(32) std::array<std::uint64_t, 4> sums;
-  _mm256_store_si256(reinterpret_cast<__m256i*>(sums.data()), _mm256_add_epi64(low, high));
-  return sums[0] + sums[1] + sums[2] + sums[3];
-}
-
 /// Eight rows at a time, so that a piece of the input is loaded once for all of them.
-[[gnu::target("avx2,fma")]] inline void multiply_avx2(const float* weights, std::size_t n_rows,
-                                                      std::size_t n_columns, const float* input,
-                                                      float* out) noexcept {
+[[gnu::target("avx2,fma")]] inline void multiply_fma(const float* weights, std::size_t n_rows,
+                                                     std::size_t n_columns, const float* input,
+                                                     float* out) noexcept {
   constexpr std::size_t kRows = 8;
   constexpr std::size_t kLanes = 8;
   const std::size_t whole_rows = n_rows - n_rows % kRows;
@@ -101,17 +87,34 @@ inline void multiply_portable(const float* weights, std::size_t n_rows, std::siz
                     out + whole_rows);
 }
 
-inline bool has_avx2_and_fma() noexcept {
-  return core::best_instruction_set() >= core::InstructionSet::avx2 &&
-         __builtin_cpu_supports("fma");
+/// No processor is known to have AVX2 without fused multiply-adds, but one may.
+inline void multiply_avx2(const float* weights, std::size_t n_rows, std::size_t n_columns,
+                          const float* input, float* out) noexcept {
+  const auto multiply = __builtin_cpu_supports("fma") ? multiply_fma : multiply_portable;
+  multiply(weights, n_rows, n_columns, input, out);
+}
+
+inline void multiply_avx512(const float* weights, std::size_t n_rows, std::size_t n_columns,
+                            const float* input, float* out) noexcept {
+  multiply_avx2(weights, n_rows, n_columns, input, out);
 }
 
 #endif  // SDNN_X86_KERNELS
 
 }  // namespace detail
 
+/// The sum of 64-bit words, modulo 2^64. Shape: whole cache lines.
+SDNN_KERNEL(std::uint64_t, sum_of_words, (const std::byte* bytes, std::size_t size), (bytes, size))
+
+/// out = weights . input, in 32-bit floats; the only kernel whose bits depend on the level. Shapes:
+/// weights (n_rows, n_columns), input (n_columns,), out (n_rows,).
+SDNN_DISPATCH(void, multiply,
+              (const float* weights, std::size_t n_rows, std::size_t n_columns, const float* input,
+               float* out),
+              (weights, n_rows, n_columns, input, out))
+
 /// Reads a buffer from front to back: the most bytes per second that a pass over weights of the
-/// same size could read. Uses the best instructions there are, whatever level is in use.
+/// same size could read with the instruction set in use.
 class BufferRead {
  public:
   /// `n_bytes` is rounded up to whole cache lines; the buffer is written, so its pages exist.
@@ -129,14 +132,7 @@ class BufferRead {
   std::size_t n_bytes() const noexcept { return buffer_.size(); }
 
   /// The sum of the buffer's 64-bit words, modulo 2^64.
-  std::uint64_t sum() const noexcept {
-#if SDNN_X86_KERNELS
-    if (core::best_instruction_set() >= core::InstructionSet::avx2) {
-      return detail::sum_of_words_avx2(buffer_.data(), buffer_.size());
-    }
-#endif
-    return detail::sum_of_words_portable(buffer_.data(), buffer_.size());
-  }
+  std::uint64_t sum() const { return sum_of_words(buffer_.data(), buffer_.size()); }
 
   /// Times of `n_repetitions` readings.
   Times run(int n_repetitions) const {
@@ -171,14 +167,8 @@ class DenseProduct {
   std::span<const float> input() const noexcept { return input_.span(); }
 
   /// The product; valid until the next call. Shape: (n_rows,).
-  std::span<const float> multiply() noexcept {
-#if SDNN_X86_KERNELS
-    if (detail::has_avx2_and_fma()) {
-      detail::multiply_avx2(weights_.data(), n_rows_, n_columns_, input_.data(), out_.data());
-      return out_.span();
-    }
-#endif
-    detail::multiply_portable(weights_.data(), n_rows_, n_columns_, input_.data(), out_.data());
+  std::span<const float> multiply() {
+    benchmarks::multiply(weights_.data(), n_rows_, n_columns_, input_.data(), out_.data());
     return out_.span();
   }
 

@@ -88,13 +88,12 @@ class AcrobotBatch {
       goal_tolerance_[i] = moving[i] ? goal_tolerances[i] : 0.0;
       mask_[i] = moving[i] ? ~std::uint64_t{0} : 0;
     }
-    move_acrobots_kernel()(
-        dynamics_,
-        {{state_[0].data(), state_[1].data(), state_[2].data(), state_[3].data()},
-         torque_.data(),
-         goal_tolerance_.data(),
-         mask_.data()},
-        padded_size_);
+    move_acrobots(dynamics_,
+                  {{state_[0].data(), state_[1].data(), state_[2].data(), state_[3].data()},
+                   torque_.data(),
+                   goal_tolerance_.data(),
+                   mask_.data()},
+                  padded_size_);
     std::size_t n_overflows = 0, first_overflow = 0;
     for (std::size_t i = size_; i-- > 0;) {
       StepResult result{0.0, false, false};

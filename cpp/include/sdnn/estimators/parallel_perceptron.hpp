@@ -179,7 +179,7 @@ class ParallelPerceptron {
 
   std::vector<std::size_t> slots_of_columns() const {
     std::vector<std::size_t> slots(code_->n_columns());
-    for (std::size_t j = 0; j < slots.columns().size(); ++j) slots[j] = code_->slot_of(j);
+    for (std::size_t j = 0; j < slots.size(); ++j) slots[j] = code_->slot_of(j);
     return slots;
   }
 

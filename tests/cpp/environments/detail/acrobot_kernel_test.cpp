@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "instruction_sets.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::environments {
@@ -23,15 +24,6 @@ void move_eight(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays, st
 
 // Every kernel this processor can run, against one acrobot after the other.
 TEST(AcrobotKernel, KeepsTheBitsAtEveryLevel) {
-  std::vector<MoveAcrobots> kernels{detail::move_acrobots_portable};
-#if SDNN_LANES
-  kernels.push_back(move_eight);
-#endif
-#if SDNN_X86_KERNELS
-  const auto best = core::best_instruction_set();
-  if (best >= core::InstructionSet::avx2) kernels.push_back(detail::move_acrobots_avx2);
-  if (best >= core::InstructionSet::avx512) kernels.push_back(detail::move_acrobots_avx512);
-#endif
   constexpr std::size_t kSize = 4096;
   AcrobotConfig config;
   config.link_mass_1 = 0.9;
@@ -47,7 +39,7 @@ TEST(AcrobotKernel, KeepsTheBitsAtEveryLevel) {
     moving[i] = random.uniform() < 0.8 ? ~std::uint64_t{0} : 0;
   }
   for (std::size_t i = 512; i < 1024; ++i) moving[i] = 0;  // whole registers stand still
-  for (const MoveAcrobots move : kernels) {
+  const auto check = [&](const auto& move) {
     std::array<std::vector<double>, 4> state;
     for (std::size_t k = 0; k < 4; ++k) {
       for (const auto& start : starts) state[k].push_back(start[k]);
@@ -74,20 +66,14 @@ TEST(AcrobotKernel, KeepsTheBitsAtEveryLevel) {
       }
     }
     EXPECT_GT(n_goals, 100);
-  }
-}
-
-TEST(AcrobotKernel, IsThatOfTheInstructionSetInUse) {
-  const auto before = core::instruction_set();
-  core::set_instruction_set("portable");
-  EXPECT_EQ(move_acrobots_kernel(), &detail::move_acrobots_portable);
-#if SDNN_X86_KERNELS
-  if (core::best_instruction_set() >= core::InstructionSet::avx2) {
-    core::set_instruction_set("avx2");
-    EXPECT_EQ(move_acrobots_kernel(), &detail::move_acrobots_avx2);
-  }
+  };
+  sdnn::testing::on_every_instruction_set([&](auto level) {
+    SCOPED_TRACE(level);
+    check(move_acrobots);
+  });
+#if SDNN_LANES
+  check(move_eight);
 #endif
-  core::set_instruction_set(core::name_of(before));
 }
 
 }  // namespace

@@ -132,8 +132,9 @@ inline void add_columns_portable(const std::int8_t* block, const ColumnPlaces& p
   }
 }
 
-[[gnu::target("avx2"), gnu::always_inline]] inline __m256i group_sum_avx2(
-    const std::int8_t* block, const std::uint32_t* places, int group, int half) {
+[[SDNN_TARGET_AVX2, gnu::always_inline]] inline __m256i group_sum_avx2(const std::int8_t* block,
+                                                                       const std::uint32_t* places,
+                                                                       int group, int half) {
   const auto bytes = [block, places, half](int k) __attribute__((always_inline)) {
     return reinterpret_cast<const __m256i*>(column_at(block, places[k])) + half;
   };
@@ -196,7 +197,7 @@ template <int Group>
 #pragma GCC diagnostic ignored "-Wuninitialized"
 #endif
 
-[[gnu::target("avx512f,avx512bw"),
+[[SDNN_TARGET_AVX512,
   gnu::always_inline]] inline __m512i group_sum_avx512(const std::int8_t* block,
                                                        const std::uint32_t* places, int group) {
   __m512i sum = _mm512_load_si512(column_at(block, places[0]));

@@ -47,14 +47,14 @@ inline std::int32_t inner_product_portable(const TernaryCode& one, const Ternary
 
 #if SDNN_X86_KERNELS
 
-[[gnu::target("avx2"), gnu::always_inline]] inline __m256i load_avx2(const std::uint64_t* from) {
+[[SDNN_TARGET_AVX2, gnu::always_inline]] inline __m256i load_avx2(const std::uint64_t* from) {
   return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
 }
 
 /// 256 bits at a time: the bits of all 4-bit parts are counted by looking them up in a register.
-[[gnu::target("avx2,popcnt")]] inline std::int32_t inner_product_avx2(const TernaryCode& one,
-                                                                      const TernaryCode& other,
-                                                                      std::size_t n_words) {
+[[SDNN_TARGET_AVX2]] inline std::int32_t inner_product_avx2(const TernaryCode& one,
+                                                            const TernaryCode& other,
+                                                            std::size_t n_words) {
   constexpr std::size_t kMost = 4 * 31;  // words whose counts, 8 a byte at most, fit into bytes
   const __m256i counts = _mm256_setr_epi8(0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4,  //
                                           0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4);
@@ -90,9 +90,9 @@ inline std::int32_t inner_product_portable(const TernaryCode& one, const Ternary
          inner_product_of_words(one, other, w, n_words);
 }
 
-[[gnu::target("avx2,popcnt")]] inline std::int32_t inner_product_avx512(const TernaryCode& one,
-                                                                        const TernaryCode& other,
-                                                                        std::size_t n_words) {
+[[SDNN_TARGET_AVX2]] inline std::int32_t inner_product_avx512(const TernaryCode& one,
+                                                              const TernaryCode& other,
+                                                              std::size_t n_words) {
   return inner_product_avx2(one, other, n_words);
 }
 

@@ -1,12 +1,12 @@
-/// The one kernel of a batch of acrobots: their motion in lanes, for each instruction set.
+/// The kernel of a batch of acrobots: their motion in lanes, wider ones where the processor has
+/// them.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 
-#include "sdnn/core/detail/lanes.hpp"
-#include "sdnn/core/instruction_set.hpp"
+#include "sdnn/core/detail/kernel.hpp"
 #include "sdnn/environments/detail/acrobot_dynamics.hpp"
 
 namespace sdnn::environments {
@@ -18,10 +18,6 @@ struct AcrobotArrays {
   const double* goal_tolerance;
   std::uint64_t* mask;  ///< in: all ones where an acrobot moves, else 0; out: where the goal is
 };
-
-/// Moves `n` acrobots on by one decision interval or to the goal; angles are not wrapped.
-using MoveAcrobots = void (*)(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays,
-                              std::size_t n);
 
 /// Doubles in the widest register.
 inline constexpr std::size_t kAcrobotLanes = 8;
@@ -74,32 +70,23 @@ inline void move_acrobots_portable(const AcrobotDynamics& dynamics, const Acrobo
 }
 
 #if SDNN_X86_KERNELS
-[[gnu::target("avx2")]] inline void move_acrobots_avx2(const AcrobotDynamics& dynamics,
-                                                       const AcrobotArrays& arrays, std::size_t n) {
+[[SDNN_TARGET_AVX2]] inline void move_acrobots_avx2(const AcrobotDynamics& dynamics,
+                                                    const AcrobotArrays& arrays, std::size_t n) {
   move_in_lanes<4>(dynamics, arrays, n);
 }
 
-[[gnu::target("avx512f,avx512bw")]] inline void move_acrobots_avx512(
-    const AcrobotDynamics& dynamics, const AcrobotArrays& arrays, std::size_t n) {
+[[SDNN_TARGET_AVX512]] inline void move_acrobots_avx512(const AcrobotDynamics& dynamics,
+                                                        const AcrobotArrays& arrays,
+                                                        std::size_t n) {
   move_in_lanes<8>(dynamics, arrays, n);
 }
 #endif
 
 }  // namespace detail
 
-/// The kernel of the instruction set in use.
-inline MoveAcrobots move_acrobots_kernel() {
-#if SDNN_X86_KERNELS
-  switch (core::instruction_set()) {
-    case core::InstructionSet::avx512:
-      return detail::move_acrobots_avx512;
-    case core::InstructionSet::avx2:
-      return detail::move_acrobots_avx2;
-    default:
-      break;
-  }
-#endif
-  return detail::move_acrobots_portable;
-}
+/// Moves `n` acrobots on by one decision interval or to the goal; angles are not wrapped.
+SDNN_DISPATCH(void, move_acrobots,
+              (const AcrobotDynamics& dynamics, const AcrobotArrays& arrays, std::size_t n),
+              (dynamics, arrays, n))
 
 }  // namespace sdnn::environments
