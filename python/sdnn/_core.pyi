@@ -71,16 +71,31 @@ class Stream:
     @property
     def value(self) -> int:
         ...
-class ActionCode:
+class SelectiveDesensitization:
     """
-    Windows of hidden units, one per action
+    The desensitized code of a sample, from its bins
     """
-    def __init__(self, n_hidden_units: typing.SupportsInt | typing.SupportsIndex, n_active_units: typing.SupportsInt | typing.SupportsIndex, n_actions: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, modified: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]], modifiers: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]], pairs: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> None:
         ...
-    def first_unit(self, action: typing.SupportsInt | typing.SupportsIndex) -> int:
+    def gram(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], other_bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        Inner products of codes
+        """
+    def transform(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> numpy.typing.NDArray[numpy.int8]:
+        """
+        Entries +1, 0, -1, sample by sample
+        """
+    @property
+    def n_columns(self) -> int:
         ...
     @property
-    def n_actions(self) -> int:
+    def n_inputs(self) -> int:
+        ...
+    @property
+    def n_pairs(self) -> int:
+        ...
+    @property
+    def n_units(self) -> int:
         ...
 class InitialWeights:
     """
@@ -198,18 +213,14 @@ class SDNNC:
     """
     A network that gives Q(s, a) for every action at once
     """
-    def __init__(self, config: SDNNCConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def code_book(self, input: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
+    def __init__(self, config: SDNNCConfig, seed: typing.SupportsInt | typing.SupportsIndex, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] | None = None) -> None:
         """
-        Patterns of an input: (n_bins, m) of -1, +1
+        Tables: patterns of each input, (n_bins, m) of -1, +1
         """
     def correct(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         One step of error correction of Q(state, action) towards target
         """
-    def first_unit(self, action: typing.SupportsInt | typing.SupportsIndex) -> int:
-        ...
     def permutation(self, mu: typing.SupportsInt | typing.SupportsIndex, nu: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.uint32]:
         """
         sigma_mu_nu: (m,)
@@ -220,6 +231,10 @@ class SDNNC:
         """
     def set_parameters(self, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], thresholds: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> None:
         ...
+    def table(self, input: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
+        """
+        Patterns of an input: (n_bins, m) of -1, +1
+        """
     def thresholds(self) -> numpy.typing.NDArray[numpy.int32]:
         """
         A copy, in lattice steps: (n,)
@@ -239,9 +254,6 @@ class SDNNC:
         ...
     @property
     def n_actions(self) -> int:
-        ...
-    @property
-    def n_carries(self) -> int:
         ...
     @property
     def n_inputs(self) -> int:
@@ -691,32 +703,6 @@ class AcrobotSensors:
     def __init__(self, config: SensorConfig, seed: typing.SupportsInt | typing.SupportsIndex, stream: Stream) -> None:
         ...
     def observe(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-class SelectiveDesensitization:
-    """
-    The desensitized code of a sample, from its bins
-    """
-    def __init__(self, modified: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]], modifiers: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]], pairs: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> None:
-        ...
-    def gram(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], other_bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None) -> numpy.typing.NDArray[numpy.int32]:
-        """
-        Inner products of codes
-        """
-    def transform(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> numpy.typing.NDArray[numpy.int8]:
-        """
-        Entries +1, 0, -1, sample by sample
-        """
-    @property
-    def n_columns(self) -> int:
-        ...
-    @property
-    def n_inputs(self) -> int:
-        ...
-    @property
-    def n_pairs(self) -> int:
-        ...
-    @property
-    def n_units(self) -> int:
         ...
 class ParallelPerceptron:
     """
