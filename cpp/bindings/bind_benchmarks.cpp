@@ -115,14 +115,14 @@ void bind_benchmarks(py::module_& module) {
   py::class_<PlainRBFAgent>(module, "PlainRBFQLearning",
                             "Q-learning with an RBF network evaluated without its product "
                             "structure; only to be timed")
-      .def(py::init([](const approximators::RBFNetworkConfig& network,
+      .def(py::init([](const approximators::RBFNetworkConfig& approximator,
                        const agents::QLearningConfig& learning, std::uint64_t seed) {
-             return PlainRBFAgent(PlainRBFNetwork(network), learning, seed);
+             return PlainRBFAgent(PlainRBFNetwork(approximator), learning, seed);
            }),
-           py::kw_only(), py::arg("network"), py::arg("learning"), py::arg("seed"))
+           py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"))
       .def_property_readonly(
-          "network", [](const PlainRBFAgent& agent) { return agent.action_value().network(); },
-          "A copy of the network");
+          "action_value", [](const PlainRBFAgent& agent) { return agent.action_value().network(); },
+          "A copy of the network behind it");
   def_time_agent_steps<agents::QLearning<approximators::DynamicSDNNC>>(module);
   def_time_agent_steps<agents::FuzzyQLearning>(module);
   def_time_agent_steps<agents::QLearning<approximators::RBFNetwork>>(module);

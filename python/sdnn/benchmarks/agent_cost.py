@@ -74,19 +74,19 @@ def _make(series_id: str, n_inputs: int) -> tuple[TimedAgent, int]:
     actions = Box(-1.0, 1.0, (1,), np.float64)
     if series_id == "sdnn-c":
         sdnn = SDNNQLearning(states, actions, seed=SEED)
-        n_columns = sdnn.network.n_pattern_units * n_inputs * (n_inputs - 1)
-        return sdnn.core, n_columns * sdnn.network.n_hidden_units
+        n_columns = sdnn.approximator.n_pattern_units * n_inputs * (n_inputs - 1)
+        return sdnn.core, n_columns * sdnn.approximator.n_hidden_units
     if series_id == "fql":
         rules = FuzzyRulesConfig(max_table_bytes=LARGEST_TABLE)
-        fuzzy = FuzzyQLearning(states, actions, rules=rules, seed=SEED)
+        fuzzy = FuzzyQLearning(states, actions, approximator=rules, seed=SEED)
         return fuzzy.core, fuzzy.n_rules * rules.n_actions * _BYTES_OF_FLOAT
     network = RBFNetworkConfig(n_inputs=n_inputs)
     table_bytes = network.n_bases ** (n_inputs + 1) * _BYTES_OF_DOUBLE
     if series_id == "rbfn":
-        return RBFQLearning(states, actions, network=network, seed=SEED).core, table_bytes
+        return RBFQLearning(states, actions, approximator=network, seed=SEED).core, table_bytes
     if series_id == "rbfn-plain":
         plain = _core.PlainRBFQLearning(
-            network=network.to_core(), learning=QLearningConfig().to_core(), seed=SEED
+            approximator=network.to_core(), learning=QLearningConfig().to_core(), seed=SEED
         )
         return plain, table_bytes
     raise ValueError(f"series must be one of the experiment's, got {series_id!r}")
