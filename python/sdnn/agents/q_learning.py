@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
@@ -56,7 +57,7 @@ CoreAgent: TypeAlias = _core.SDNNQLearning | _core.RBFQLearning
 Approximator = TypeVar("Approximator", SDNNCConfig, RBFNetworkConfig)
 
 
-class _QLearning(Generic[Approximator]):
+class _QLearning(abc.ABC, Generic[Approximator]):
     """What Q-learning with any approximator has in common: spaces in, spaces out."""
 
     def __init__(
@@ -78,8 +79,9 @@ class _QLearning(Generic[Approximator]):
         self.approximator: Approximator = dataclasses.replace(approximator, n_actions=n_actions)
         self._actions = discrete_actions(action_space, n_actions)
 
+    @abc.abstractmethod
     def _make_core(self, approximator: Approximator, seed: int) -> CoreAgent:
-        raise NotImplementedError
+        """Make the compiled agent; ``learning`` is known."""
 
     @property
     def core(self) -> CoreAgent:

@@ -47,7 +47,7 @@ struct RBFNetworkConfig {
 /// bases: n_bases^(d+1) in number. That sum is a product too, so a normalized joint basis is the
 /// product of Gaussians normalized in their own dimension. Hence, with phi(s) the normalized bases
 /// of the state, an outer product, the weights are multiplied once, u = phi(s)^T W, and every
-/// action has psi(a)^T u. All sums start at 0 and add in the order of the bases: rows of Eigen's
+/// action has psi(a)^T u. All sums start at 0 and add in the order of the bases: columns of Eigen's
 /// arrays, never its products, whose order depends on the instruction set.
 ///
 /// Source: spec section 4. Cost at d = 6: 16,384 multiply-adds for all actions. An object must not
@@ -106,9 +106,9 @@ class RBFNetwork {
     core::require(action < n_actions(), "action", "less than " + std::to_string(n_actions()),
                   action);
     mix(state);
+    const auto bases = action_bases_.row(index(action));
     double q = 0.0;
-    for (Eigen::Index b = 0; b < mixed_.size(); ++b)
-      q += mixed_[b] * action_bases_(index(action), b);
+    for (Eigen::Index b = 0; b < bases.size(); ++b) q += mixed_[b] * bases[b];
     return q;
   }
 
@@ -149,7 +149,7 @@ class RBFNetwork {
 
   static Eigen::Index index(std::size_t i) noexcept { return static_cast<Eigen::Index>(i); }
 
-  // one_dimension_ = Gaussians around the centres 0, 1, ... at x n_gaps, divided by their sum.
+  // one_dimension_ = the Gaussians of one dimension at x, divided by their sum.
   void to_one_dimension(double x) noexcept {
     double total = 0.0;
     for (Eigen::Index k = 0; k < one_dimension_.size(); ++k) {
