@@ -84,7 +84,7 @@ def run(task: tuple[str, Setting, int]) -> dict[str, object]:
     """One trial: a row."""
     stage, setting, seed = task
     trial = _core.RBFAcrobotTrial(
-        network=RBFNetworkConfig(
+        approximator=RBFNetworkConfig(
             n_bases=setting.n_bases, width=setting.width, gradient_rate=setting.gradient_rate
         ).to_core(),
         learning=QLearningConfig(tie_rule=setting.tie_rule).to_core(),

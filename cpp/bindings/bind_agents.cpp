@@ -1,6 +1,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <cstdint>
 #include <utility>
 
 #include "arrays.hpp"
@@ -18,8 +19,11 @@ using agents::FuzzyQLearning;
 using agents::FuzzyQLearningConfig;
 using agents::QLearningConfig;
 using approximators::FuzzyRules;
+using approximators::FuzzyRulesConfig;
 using approximators::RBFNetwork;
+using approximators::RBFNetworkConfig;
 using approximators::SDNNC;
+using approximators::SDNNCConfig;
 using bindings::ArrayArgument;
 
 namespace {
@@ -46,6 +50,22 @@ void def_agent(py::class_<Agent> agent) {
           py::arg("terminated"));
 }
 
+/// Q-learning with an approximator that `make(approximator, seed)` makes of its configuration.
+template <class Config, class Approximator, class Make>
+void def_q_learning(py::class_<agents::QLearning<Approximator>> agent, Make make) {
+  using Agent = agents::QLearning<Approximator>;
+  agent
+      .def(py::init([make](const Config& approximator, const QLearningConfig& learning,
+                           std::uint64_t seed) {
+             return Agent(make(approximator, seed), learning, seed);
+           }),
+           py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"))
+      .def_property_readonly(
+          "action_value", [](Agent& self) -> Approximator& { return self.action_value(); },
+          py::return_value_policy::reference_internal);
+  def_agent(agent);
+}
+
 }  // namespace
 
 void bind_agents(py::module_& module) {
@@ -66,39 +86,23 @@ void bind_agents(py::module_& module) {
           },
           py::arg("values"), py::arg("step"), py::arg("explore") = true);
   bindings::bind_config<QLearningConfig>(module, "QLearningConfig", "The parameters of Q-learning");
-
   bindings::bind_config<FuzzyQLearningConfig>(module, "FuzzyQLearningConfig",
                                               "The parameters of fuzzy Q-learning");
 
-  using SDNNAgent = agents::QLearning<SDNNC>;
-  def_agent(py::class_<SDNNAgent>(module, "SDNNQLearning", "Q-learning with SDNN-C")
-                .def(py::init([](const approximators::SDNNCConfig& network,
-                                 const QLearningConfig& learning, std::uint64_t seed) {
-                       return SDNNAgent(SDNNC(network, seed), learning, seed);
-                     }),
-                     py::kw_only(), py::arg("network"), py::arg("learning"), py::arg("seed"))
-                .def_property_readonly(
-                    "network", [](SDNNAgent& agent) -> SDNNC& { return agent.action_value(); },
-                    py::return_value_policy::reference_internal));
-
-  using RBFAgent = agents::QLearning<RBFNetwork>;
-  def_agent(py::class_<RBFAgent>(module, "RBFQLearning", "Q-learning with an RBF network")
-                .def(py::init([](const approximators::RBFNetworkConfig& network,
-                                 const QLearningConfig& learning, std::uint64_t seed) {
-                       return RBFAgent(RBFNetwork(network), learning, seed);
-                     }),
-                     py::kw_only(), py::arg("network"), py::arg("learning"), py::arg("seed"))
-                .def_property_readonly(
-                    "network", [](RBFAgent& agent) -> RBFNetwork& { return agent.action_value(); },
-                    py::return_value_policy::reference_internal));
-
+  def_q_learning<SDNNCConfig>(
+      py::class_<agents::QLearning<SDNNC>>(module, "SDNNQLearning", "Q-learning with SDNN-C"),
+      [](const SDNNCConfig& config, std::uint64_t seed) { return SDNNC(config, seed); });
+  def_q_learning<RBFNetworkConfig>(
+      py::class_<agents::QLearning<RBFNetwork>>(module, "RBFQLearning",
+                                                "Q-learning with an RBF network"),
+      [](const RBFNetworkConfig& config, std::uint64_t) { return RBFNetwork(config); });
   def_agent(py::class_<FuzzyQLearning>(module, "FuzzyQLearning",
                                        "Fuzzy Q-learning; actions are numbers in [-1, 1]")
-                .def(py::init([](const approximators::FuzzyRulesConfig& rules,
+                .def(py::init([](const FuzzyRulesConfig& approximator,
                                  const FuzzyQLearningConfig& learning, std::uint64_t seed) {
-                       return FuzzyQLearning(FuzzyRules(rules), learning, seed);
+                       return FuzzyQLearning(FuzzyRules(approximator), learning, seed);
                      }),
-                     py::kw_only(), py::arg("rules"), py::arg("learning"), py::arg("seed"))
+                     py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"))
                 .def_property_readonly(
                     "rules", [](FuzzyQLearning& agent) -> FuzzyRules& { return agent.rules(); },
                     py::return_value_policy::reference_internal)

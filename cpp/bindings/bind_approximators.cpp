@@ -58,7 +58,6 @@ void bind_fuzzy_rules(py::module_& module) {
 
   py::class_<FuzzyRules>(module, "FuzzyRules", "Rules over a grid of triangular sets")
       .def(py::init<const FuzzyRulesConfig&>(), py::arg("config"))
-      .def_property_readonly("config", [](const FuzzyRules& rules) { return rules.config(); })
       .def_property_readonly("n_rules", &FuzzyRules::n_rules)
       .def(
           "fire",
@@ -88,7 +87,6 @@ void bind_rbf_network(py::module_& module) {
   py::class_<RBFNetwork>(module, "RBFNetwork", "Q(s, a) linear in normalized Gaussian bases")
       .def(py::init<const RBFNetworkConfig&>(), py::arg("config"))
       .def_property_readonly("config", [](const RBFNetwork& net) { return net.config(); })
-      .def_property_readonly("n_inputs", &RBFNetwork::n_inputs)
       .def_property_readonly("n_actions", &RBFNetwork::n_actions)
       .def_property_readonly("n_joint_bases", &RBFNetwork::n_joint_bases)
       .def(
@@ -100,26 +98,11 @@ void bind_rbf_network(py::module_& module) {
           },
           py::arg("state"), "Q(state, a) for every action; shapes (d,) -> (n_actions,)")
       .def(
-          "values_plainly",
-          [](RBFNetwork& net, const ArrayArgument<double>& state) {
-            py::array_t<double> out(static_cast<py::ssize_t>(net.n_actions()));
-            net.values_plainly(bindings::vector(state, "state"),
-                               {out.mutable_data(), net.n_actions()});
-            return out;
-          },
-          py::arg("state"), "The same as values, from every joint basis of every action")
-      .def(
-          "value",
-          [](RBFNetwork& net, const ArrayArgument<double>& state, std::size_t action) {
-            return net.value(bindings::vector(state, "state"), action);
-          },
-          py::arg("state"), py::arg("action"))
-      .def(
           "correct",
-          [](RBFNetwork& net, const ArrayArgument<double>& state, std::size_t action,
-             double target) { net.correct(bindings::vector(state, "state"), action, target); },
-          py::arg("state"), py::arg("action"), py::arg("target"),
-          "One gradient step of Q(state, action) towards target")
+          [](RBFNetwork& net, const ArrayArgument<double>& state, std::size_t action, double target,
+             double rate) { net.correct(bindings::vector(state, "state"), action, target, rate); },
+          py::arg("state"), py::arg("action"), py::arg("target"), py::arg("rate") = 1.0,
+          "One gradient step of Q = Q(state, action) towards (1 - rate) Q + rate target")
       .def(
           "weights",
           [](const RBFNetwork& net) {
@@ -167,10 +150,9 @@ void bind_approximators(py::module_& module) {
           py::arg("state"), py::arg("action"))
       .def(
           "correct",
-          [](SDNNC& net, const ArrayArgument<double>& state, std::size_t action, double target) {
-            net.correct(bindings::vector(state, "state"), action, target);
-          },
-          py::arg("state"), py::arg("action"), py::arg("target"),
+          [](SDNNC& net, const ArrayArgument<double>& state, std::size_t action, double target,
+             double rate) { net.correct(bindings::vector(state, "state"), action, target, rate); },
+          py::arg("state"), py::arg("action"), py::arg("target"), py::arg("rate") = 1.0,
           "One step of error correction of Q(state, action) towards target")
       .def(
           "potentials",

@@ -19,11 +19,11 @@ using agents::FuzzyQLearning;
 using agents::FuzzyQLearningConfig;
 using agents::QLearning;
 using agents::QLearningConfig;
-using approximators::SDNNC;
 using approximators::FuzzyRules;
 using approximators::FuzzyRulesConfig;
 using approximators::RBFNetwork;
 using approximators::RBFNetworkConfig;
+using approximators::SDNNC;
 using approximators::SDNNCConfig;
 using environments::AcrobotConfig;
 using environments::GoalScheduleConfig;
@@ -114,7 +114,7 @@ Agent agent_with(const Config& approximator, const Learning& learning, std::uint
 }
 
 QLearning<SDNNC> sdnn_agent(const SDNNCConfig& approximator, const QLearningConfig& learning,
-                                   std::uint64_t seed) {
+                            std::uint64_t seed) {
   return {SDNNC(approximator, seed), learning, seed};
 }
 
@@ -138,7 +138,7 @@ void bind_experiments(py::module_& module) {
       .def(py::init(&agent_with<PlainRBFAgent, PlainRBFNetwork, RBFNetworkConfig, QLearningConfig>),
            py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"))
       .def_property_readonly(
-          "network", [](const PlainRBFAgent& agent) { return agent.action_value().network(); },
-          "A copy of the network");
+          "action_value", [](const PlainRBFAgent& agent) { return agent.action_value().network(); },
+          "A copy of the network behind it");
   def_time_agent_steps<PlainRBFAgent>(module);
 }

@@ -302,9 +302,6 @@ class FuzzyRules:
         A copy of v(rule, a) for every action: (n_actions,)
         """
     @property
-    def config(self) -> FuzzyRulesConfig:
-        ...
-    @property
     def n_rules(self) -> int:
         ...
 class RBFNetworkConfig:
@@ -342,21 +339,15 @@ class RBFNetwork:
     """
     def __init__(self, config: RBFNetworkConfig) -> None:
         ...
-    def correct(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def correct(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         """
-        One gradient step of Q(state, action) towards target
+        One gradient step of Q = Q(state, action) towards (1 - rate) Q + rate target
         """
     def set_weights(self, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
-        ...
-    def value(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex) -> float:
         ...
     def values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         Q(state, a) for every action; shapes (d,) -> (n_actions,)
-        """
-    def values_plainly(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        The same as values, from every joint basis of every action
         """
     def weights(self) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -367,9 +358,6 @@ class RBFNetwork:
         ...
     @property
     def n_actions(self) -> int:
-        ...
-    @property
-    def n_inputs(self) -> int:
         ...
     @property
     def n_joint_bases(self) -> int:
@@ -906,7 +894,7 @@ class SDNNQLearning:
     """
     Q-learning with SDNN-C
     """
-    def __init__(self, *, network: SDNNCConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, *, approximator: SDNNCConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> int:
         ...
@@ -915,13 +903,13 @@ class SDNNQLearning:
     def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
         ...
     @property
-    def network(self) -> SDNNC:
+    def action_value(self) -> SDNNC:
         ...
 class RBFQLearning:
     """
     Q-learning with an RBF network
     """
-    def __init__(self, *, network: RBFNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, *, approximator: RBFNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> int:
         ...
@@ -930,13 +918,13 @@ class RBFQLearning:
     def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
         ...
     @property
-    def network(self) -> RBFNetwork:
+    def action_value(self) -> RBFNetwork:
         ...
 class FuzzyQLearning:
     """
     Fuzzy Q-learning; actions are numbers in [-1, 1]
     """
-    def __init__(self, *, rules: FuzzyRulesConfig, learning: FuzzyQLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, *, approximator: FuzzyRulesConfig, learning: FuzzyQLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> float:
         ...
@@ -1123,6 +1111,17 @@ class AcrobotDecisions:
     @property
     def n_integration_steps(self) -> int:
         ...
+class PlainRBFQLearning:
+    """
+    Q-learning with an RBF network evaluated without its product structure; only to be timed
+    """
+    def __init__(self, *, approximator: RBFNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def action_value(self) -> RBFNetwork:
+        """
+        A copy of the network behind it
+        """
 def action_value(action: typing.SupportsInt | typing.SupportsIndex, n_actions: typing.SupportsInt | typing.SupportsIndex, low: typing.SupportsFloat | typing.SupportsIndex, high: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     The value of an action in a range cut evenly

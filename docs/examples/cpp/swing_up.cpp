@@ -31,9 +31,7 @@ Outcome run_episode(sdnn::agents::QLearning<Network>& agent, sdnn::environments:
   sensors.observe(acrobot.state(), observed);
   for (bool over = false; !over;) {
     const std::size_t action = agent.act(observed, learning);
-    const double torque = max_torque * sdnn::coding::action_value(
-                                           action, agent.action_value().n_actions(), -1.0, 1.0);
-    const auto result = acrobot.step(torque, lambda);
+    const auto result = acrobot.step(max_torque * agent.normalized_action(action), lambda);
     sensors.observe(acrobot.state(), next_observed);
     if (learning) agent.learn(observed, action, result.reward, next_observed, result.terminated);
     std::swap(observed, next_observed);

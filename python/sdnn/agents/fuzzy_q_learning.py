@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.agents.spaces import BoxRange, UnitObservations
+from sdnn.agents.spaces import ContinuousActions, UnitObservations
 from sdnn.agents.transition import Transition
 from sdnn.approximators.fuzzy_rules import FuzzyRulesConfig
 from sdnn.arguments import seed_of
@@ -64,7 +64,7 @@ class FuzzyQLearning:
         Finite bounds.
     action_space : gymnasium.spaces.Box, shape (1,)
         Finite bounds.
-    rules : FuzzyRulesConfig, optional
+    approximator : FuzzyRulesConfig, optional
         ``n_inputs`` is taken from the observation space.
     learning : FuzzyQLearningConfig, optional
     seed : int
@@ -76,7 +76,14 @@ class FuzzyQLearning:
         For spaces of another kind.
     ValueError
         For spaces of another shape or without finite bounds, impossible settings, or a larger table
-        than ``rules.max_table_bytes`` allows.
+        than ``approximator.max_table_bytes`` allows.
+
+    Attributes
+    ----------
+    approximator : FuzzyRulesConfig
+        As used.
+    learning : FuzzyQLearningConfig
+        As used.
 
     Examples
     --------
@@ -100,25 +107,29 @@ class FuzzyQLearning:
         observation_space: gym.Space[Any],
         action_space: gym.Space[Any],
         *,
-        rules: FuzzyRulesConfig | None = None,
+        approximator: FuzzyRulesConfig | None = None,
         learning: FuzzyQLearningConfig | None = None,
         seed: int = 0,
     ) -> None:
         self._scaled = UnitObservations(observation_space)
-        self._range = BoxRange(action_space)
+        self._actions = ContinuousActions(action_space)
         self.action_space = action_space
-        self.rules = dataclasses.replace(
-            rules or FuzzyRulesConfig(), n_inputs=self._scaled.n_inputs
+        self.approximator = dataclasses.replace(
+            approximator or FuzzyRulesConfig(), n_inputs=self._scaled.n_inputs
         )
         self.learning = learning or FuzzyQLearningConfig()
         self._core = _core.FuzzyQLearning(
-            rules=self.rules.to_core(), learning=self.learning.to_core(), seed=seed_of(seed)
+            approximator=self.approximator.to_core(),
+            learning=self.learning.to_core(),
+            seed=seed_of(seed),
         )
-        self._taken: tuple[float, float] | None = None  # the action as given away, and its share
 
     @property
     def core(self) -> _core.FuzzyQLearning:
-        """The compiled agent, which shares all that is learned: states [0, 1], actions [-1, 1]."""
+        """The compiled agent, which shares all that is learned: states [0, 1], actions [-1, 1].
+
+        ``core.rules`` is its table of rules.
+        """
         return self._core
 
     @property
@@ -127,10 +138,13 @@ class FuzzyQLearning:
         return self._core.rules.n_rules
 
     def begin_episode(self) -> None:
-        """Start counting steps anew, for the greedy first steps of an episode; forget traces."""
+        """Start counting steps anew, for the greedy first steps of an episode; forget traces.
+
+        To be called at the start of each episode: `learn` never does.
+        """
         self._core.begin_episode()
 
-    def act(self, observation: ArrayLike, explore: bool = True) -> NDArray[Any]:
+    def act(self, observation: ArrayLike, explore: bool = True) -> Any:
         """Choose the action to take, an element of the action space.
 
         Parameters
@@ -145,18 +159,14 @@ class FuzzyQLearning:
         ValueError
             If the observation has another shape or holds NaN.
         """
-        share = self._core.act(self._scaled("observation", observation), explore)
-        low, high = self._range.low, self._range.high
-        value = 0.5 * (low + high) + 0.5 * (high - low) * share
-        action = self._range.action(min(max(value, low), high))
-        if explore:
-            self._taken = (float(action[0]), share)
-        return action
+        action = self._core.act(self._scaled("observation", observation), explore)
+        return self._actions.take(action) if explore else self._actions.element(action)
 
     def learn(self, transition: Transition) -> None:
         """Learn the transition that began with the last exploring `act`.
 
-        Other transitions cannot be learned: which rule picked what is known of that act only.
+        Other transitions cannot be learned: which rule picked what is known of that act only. A
+        terminated transition ends the eligibility traces, but begins no episode.
 
         Raises
         ------
@@ -166,18 +176,13 @@ class FuzzyQLearning:
         OverflowError
             If a value would leave the range of 32-bit floats; nothing is learned then.
         """
-        value = self._range.number(transition.action)
-        if self._taken is None or value != self._taken[0]:
-            raise ValueError(f"action must be that of the last exploring act, got {value}")
         self._core.learn(
             self._scaled("observation", transition.observation),
-            self._taken[1],
+            self._actions.core_action(transition.action),
             float(transition.reward),
             self._scaled("next_observation", transition.next_observation),
             bool(transition.terminated),
         )
-        if transition.terminated:
-            self.begin_episode()
 
     def value(self, observation: ArrayLike) -> float:
         """V(observation): the truth-weighted mean of every fired rule's best value."""

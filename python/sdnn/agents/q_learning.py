@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.agents.spaces import DiscreteActions, EvenActions, UnitObservations, discrete_actions
+from sdnn.agents.spaces import UnitObservations, discrete_actions
 from sdnn.agents.transition import Transition
 from sdnn.approximators.rbf_network import RBFNetworkConfig
 from sdnn.approximators.sdnn_c import SDNNCConfig
@@ -53,40 +54,47 @@ class QLearningConfig:
 CoreAgent: TypeAlias = _core.SDNNQLearning | _core.RBFQLearning
 """The agents of the C++ core."""
 
-NetworkConfig = TypeVar("NetworkConfig", SDNNCConfig, RBFNetworkConfig)
+Approximator = TypeVar("Approximator", SDNNCConfig, RBFNetworkConfig)
 
 
-class _QLearning(Generic[NetworkConfig]):
+class _QLearning(abc.ABC, Generic[Approximator]):
     """What Q-learning with any approximator has in common: spaces in, spaces out."""
 
-    _core: CoreAgent
-    _actions: DiscreteActions | EvenActions
-
-    def _fit_to_spaces(
+    def __init__(
         self,
         observation_space: gym.Space[Any],
         action_space: gym.Space[Any],
-        network: NetworkConfig,
+        approximator: Approximator,
         learning: QLearningConfig | None,
+        seed: int,
     ) -> None:
-        """Keep the configurations, of the size that the spaces ask for."""
         self._scaled = UnitObservations(observation_space)
-        network = dataclasses.replace(network, n_inputs=self._scaled.n_inputs)
+        approximator = dataclasses.replace(approximator, n_inputs=self._scaled.n_inputs)
         if isinstance(action_space, gym.spaces.Discrete):
-            network = dataclasses.replace(network, n_actions=int(action_space.n))
+            approximator = dataclasses.replace(approximator, n_actions=int(action_space.n))
         self.action_space = action_space
-        self.network: NetworkConfig = network
         self.learning = learning or QLearningConfig()
+        self._core = self._make_core(approximator, seed_of(seed))
+        n_actions = self._core.action_value.n_actions
+        self.approximator: Approximator = dataclasses.replace(approximator, n_actions=n_actions)
+        self._actions = discrete_actions(action_space, n_actions)
+
+    @abc.abstractmethod
+    def _make_core(self, approximator: Approximator, seed: int) -> CoreAgent:
+        """Make the compiled agent; ``learning`` is known."""
 
     @property
     def core(self) -> CoreAgent:
-        """The compiled agent, which shares all that is learned: states in [0, 1], indices."""
+        """The compiled agent, which shares all that is learned: states in [0, 1], indices.
+
+        ``core.action_value`` is its approximator.
+        """
         return self._core
 
     @property
     def n_actions(self) -> int:
         """Number of actions the agent chooses from."""
-        return self._core.network.n_actions
+        return self._core.action_value.n_actions
 
     @property
     def actions(self) -> NDArray[Any]:
@@ -94,7 +102,10 @@ class _QLearning(Generic[NetworkConfig]):
         return self._actions.values
 
     def begin_episode(self) -> None:
-        """Start counting steps anew, for the greedy first steps of an episode."""
+        """Start counting steps anew, for the greedy first steps of an episode.
+
+        To be called at the start of each episode: `learn` never does.
+        """
         self._core.begin_episode()
 
     def act(self, observation: ArrayLike, explore: bool = True) -> Any:
@@ -111,12 +122,14 @@ class _QLearning(Generic[NetworkConfig]):
         ValueError
             If the observation has another shape or holds NaN.
         """
-        return self._actions.action(
-            self._core.act(self._scaled("observation", observation), explore)
-        )
+        action = self._core.act(self._scaled("observation", observation), explore)
+        return self._actions.take(action) if explore else self._actions.element(action)
 
     def learn(self, transition: Transition) -> None:
         """Learn one transition by Eq. (1).
+
+        Any action of the space can be learned, not only that of the last `act`; of a ``Box`` the
+        nearest one is. A terminated transition begins no episode.
 
         Raises
         ------
@@ -127,17 +140,15 @@ class _QLearning(Generic[NetworkConfig]):
         """
         self._core.learn(
             self._scaled("observation", transition.observation),
-            self._actions.index(transition.action),
+            self._actions.core_action(transition.action),
             float(transition.reward),
             self._scaled("next_observation", transition.next_observation),
             bool(transition.terminated),
         )
-        if transition.terminated:
-            self.begin_episode()
 
     def q_values(self, observation: ArrayLike) -> NDArray[np.float64]:
         """Q(observation, a) of every action, shape (n_actions,)."""
-        return self._core.network.values(self._scaled("observation", observation))
+        return self._core.action_value.values(self._scaled("observation", observation))
 
 
 class SDNNQLearning(_QLearning[SDNNCConfig]):
@@ -152,7 +163,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
     observation_space : gymnasium.spaces.Box, shape (l,)
         Finite bounds, l >= 2.
     action_space : gymnasium.spaces.Box of shape (1,) or gymnasium.spaces.Discrete
-    network : SDNNCConfig, optional
+    approximator : SDNNCConfig, optional
         ``n_inputs`` (and ``n_actions``, for a Discrete space) are taken from the spaces.
     learning : QLearningConfig, optional
     seed : int
@@ -164,6 +175,13 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         For spaces of another kind.
     ValueError
         For spaces of another shape or without finite bounds, or impossible settings.
+
+    Attributes
+    ----------
+    approximator : SDNNCConfig
+        As used, with ``n_inputs`` and ``n_actions`` filled in.
+    learning : QLearningConfig
+        As used.
 
     Examples
     --------
@@ -187,15 +205,17 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         observation_space: gym.Space[Any],
         action_space: gym.Space[Any],
         *,
-        network: SDNNCConfig | None = None,
+        approximator: SDNNCConfig | None = None,
         learning: QLearningConfig | None = None,
         seed: int = 0,
     ) -> None:
-        self._fit_to_spaces(observation_space, action_space, network or SDNNCConfig(), learning)
-        n_windows = self.network.n_hidden_units - self.network.n_active_units + 1
-        self._actions = discrete_actions(action_space, self.network.n_actions or n_windows)
-        self._core = _core.SDNNQLearning(
-            network=self.network.to_core(), learning=self.learning.to_core(), seed=seed_of(seed)
+        super().__init__(
+            observation_space, action_space, approximator or SDNNCConfig(), learning, seed
+        )
+
+    def _make_core(self, approximator: SDNNCConfig, seed: int) -> _core.SDNNQLearning:
+        return _core.SDNNQLearning(
+            approximator=approximator.to_core(), learning=self.learning.to_core(), seed=seed
         )
 
 
@@ -211,7 +231,7 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
     observation_space : gymnasium.spaces.Box, shape (d,)
         Finite bounds.
     action_space : gymnasium.spaces.Box of shape (1,) or gymnasium.spaces.Discrete
-    network : RBFNetworkConfig, optional
+    approximator : RBFNetworkConfig, optional
         ``n_inputs`` (and ``n_actions``, for a Discrete space) are taken from the spaces.
     learning : QLearningConfig, optional
     seed : int
@@ -223,7 +243,14 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
         For spaces of another kind.
     ValueError
         For spaces of another shape or without finite bounds, impossible settings, or more weights
-        than ``network.max_table_bytes`` allows.
+        than ``approximator.max_table_bytes`` allows.
+
+    Attributes
+    ----------
+    approximator : RBFNetworkConfig
+        As used, with ``n_inputs`` and ``n_actions`` filled in.
+    learning : QLearningConfig
+        As used.
 
     Examples
     --------
@@ -247,14 +274,15 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
         observation_space: gym.Space[Any],
         action_space: gym.Space[Any],
         *,
-        network: RBFNetworkConfig | None = None,
+        approximator: RBFNetworkConfig | None = None,
         learning: QLearningConfig | None = None,
         seed: int = 0,
     ) -> None:
-        self._fit_to_spaces(
-            observation_space, action_space, network or RBFNetworkConfig(), learning
+        super().__init__(
+            observation_space, action_space, approximator or RBFNetworkConfig(), learning, seed
         )
-        self._actions = discrete_actions(action_space, self.network.n_actions)
-        self._core = _core.RBFQLearning(
-            network=self.network.to_core(), learning=self.learning.to_core(), seed=seed_of(seed)
+
+    def _make_core(self, approximator: RBFNetworkConfig, seed: int) -> _core.RBFQLearning:
+        return _core.RBFQLearning(
+            approximator=approximator.to_core(), learning=self.learning.to_core(), seed=seed
         )

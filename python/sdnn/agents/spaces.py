@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+import abc
+from typing import Any, Generic, TypeVar
 
 import gymnasium as gym
 import numpy as np
@@ -10,7 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 
-__all__ = ["BoxRange", "DiscreteActions", "EvenActions", "UnitObservations", "discrete_actions"]
+__all__ = [
+    "ContinuousActions",
+    "DiscreteActions",
+    "EvenActions",
+    "UnitObservations",
+    "discrete_actions",
+]
+
+CoreAction = TypeVar("CoreAction", int, float)
+"""An action as an agent of the core has it: its index, or a number in [-1, 1]."""
 
 
 class UnitObservations:
@@ -34,36 +44,74 @@ class UnitObservations:
         return np.clip((values - self._low) / (self._high - self._low), 0.0, 1.0)
 
 
-class BoxRange:
-    """A ``Box`` of shape (1,): the range of one continuous action."""
+class _Actions(abc.ABC, Generic[CoreAction]):
+    """Actions of a space as the core has them, and back.
+
+    The action taken last is remembered with what it was in the core; only other ones are looked
+    up. What is remembered is its number, not the array given away, which others may change.
+    """
+
+    _taken: tuple[float, CoreAction] | None = None
+
+    def take(self, core_action: CoreAction) -> Any:
+        """Make the element of the space, and remember it."""
+        action = self.element(core_action)
+        self._taken = (np.asarray(action).item(), core_action)
+        return action
+
+    def core_action(self, action: Any) -> CoreAction:
+        """Find what an element of the space is in the core; ValueError if it is none."""
+        number = self._number(action)
+        if self._taken is not None and number == self._taken[0]:
+            return self._taken[1]
+        return self._find(number)
+
+    @abc.abstractmethod
+    def element(self, core_action: CoreAction) -> Any:
+        """Make the element of the space."""
+
+    @abc.abstractmethod
+    def _number(self, action: Any) -> float:
+        """Read an element of the space; ValueError if it is none."""
+
+    @abc.abstractmethod
+    def _find(self, number: float) -> CoreAction:
+        """Find what an action that was not taken last is in the core."""
+
+
+class _BoxActions(_Actions[CoreAction]):
+    """Actions of a ``Box`` of shape (1,)."""
 
     def __init__(self, space: gym.Space[Any]) -> None:
         low, high = _finite_bounds("action_space", space)
         if low.size != 1:
             raise ValueError(f"action_space must have 1 dimension, got {low.size}")
-        self.low, self.high = float(low[0]), float(high[0])
+        self._low, self._high = float(low[0]), float(high[0])
         self._dtype = space.dtype
 
-    def action(self, value: float) -> NDArray[Any]:
+    def element(self, core_action: CoreAction) -> NDArray[Any]:
         """Make the element of the space, shape (1,)."""
-        return np.array([value], dtype=self._dtype)
+        return np.array([self._value(core_action)], dtype=self._dtype)
 
-    def number(self, action: Any) -> float:
-        """Read an action; ValueError unless it is one number in the range."""
+    def _number(self, action: Any) -> float:
         value = np.asarray(action)
         is_number = value.size == 1 and value.dtype.kind in "biuf"
-        if not is_number or not self.low <= value.item() <= self.high:
+        if not is_number or not self._low <= value.item() <= self._high:
             raise ValueError(
-                f"action must be one number in [{self.low}, {self.high}], got {action!r}"
+                f"action must be one number in [{self._low}, {self._high}], got {action!r}"
             )
         return float(value.item())
 
+    @abc.abstractmethod
+    def _value(self, core_action: CoreAction) -> float:
+        """Convert an action to the units of the space."""
 
-class EvenActions:
-    """A ``Box`` of shape (1,) cut evenly into ``n_actions``."""
+
+class EvenActions(_BoxActions[int]):
+    """A ``Box`` of shape (1,) cut evenly into ``n_actions``; other actions are the nearest one."""
 
     def __init__(self, space: gym.Space[Any], n_actions: int) -> None:
-        self._range = BoxRange(space)
+        super().__init__(space)
         self.n_actions = n_actions
 
     @property
@@ -71,22 +119,26 @@ class EvenActions:
         """The actions in order, shape (n_actions,)."""
         return np.array([self._value(index) for index in range(self.n_actions)])
 
-    def action(self, index: int) -> NDArray[Any]:
-        """Make the element of the space, shape (1,)."""
-        return self._range.action(self._value(index))
+    def _find(self, number: float) -> int:
+        position = (number - self._low) / (self._high - self._low)
+        return round(position * (self.n_actions - 1))
 
-    def index(self, action: Any) -> int:
-        """Find the nearest action's number; ValueError if it is outside the range."""
-        share = (self._range.number(action) - self._range.low) / (
-            self._range.high - self._range.low
-        )
-        return round(share * (self.n_actions - 1))
-
-    def _value(self, index: int) -> float:
-        return _core.action_value(index, self.n_actions, self._range.low, self._range.high)
+    def _value(self, core_action: int) -> float:
+        return _core.action_value(core_action, self.n_actions, self._low, self._high)
 
 
-class DiscreteActions:
+class ContinuousActions(_BoxActions[float]):
+    """A ``Box`` of shape (1,), of which the action taken last is the only one known."""
+
+    def _find(self, number: float) -> float:
+        raise ValueError(f"action must be that of the last exploring act, got {number}")
+
+    def _value(self, core_action: float) -> float:
+        low, high = self._low, self._high
+        return min(max(0.5 * (low + high) + 0.5 * (high - low) * core_action, low), high)
+
+
+class DiscreteActions(_Actions[int]):
     """The actions of a ``Discrete`` space."""
 
     def __init__(self, space: gym.spaces.Discrete) -> None:
@@ -98,18 +150,20 @@ class DiscreteActions:
         """The actions in order, shape (n_actions,)."""
         return np.arange(self.n_actions) + int(self._space.start)
 
-    def action(self, index: int) -> Any:
+    def element(self, core_action: int) -> Any:
         """Make the element of the space."""
-        return self._space.start + index
+        return self._space.start + core_action
 
-    def index(self, action: Any) -> int:
-        """Find the action's number; ValueError if the space does not hold it."""
+    def _number(self, action: Any) -> float:
         value = np.asarray(action)
         start = int(self._space.start)
         is_whole = value.size == 1 and value.dtype.kind in "biuf" and value.item() % 1 == 0
         if not is_whole or not 0 <= int(value.item()) - start < self.n_actions:
             raise ValueError(f"action must be in {self._space}, got {action!r}")
-        return int(value.item()) - start
+        return int(value.item())
+
+    def _find(self, number: float) -> int:
+        return int(number) - int(self._space.start)
 
 
 def discrete_actions(space: gym.Space[Any], n_actions: int) -> DiscreteActions | EvenActions:

@@ -150,17 +150,17 @@ class SDNNC:
         """Q(state, action)."""
         return self._core.value(state, action)
 
-    def correct(self, state: ArrayLike, action: int, target: float) -> None:
-        """One step of error correction of Q(state, action) towards ``target`` (Fig. 2).
+    def correct(self, state: ArrayLike, action: int, target: float, rate: float = 1.0) -> None:
+        """One step of error correction (Fig. 2): Q towards (1 - rate) Q + rate * target.
 
         Raises
         ------
         ValueError
-            For a bad state or action, or a NaN target.
+            For a bad state, action or rate, or a NaN target.
         OverflowError
             If a weight would leave its range. In both cases nothing has changed.
         """
-        self._core.correct(state, action, target)
+        self._core.correct(state, action, target, rate)
 
     def weights(self) -> NDArray[np.float64]:
         """Copy the weights in the paper's units, shape (n, D)."""

@@ -105,12 +105,12 @@ class AgentEntry:
         seed: int,
     ) -> LearningAgent:
         """Make the agent in Python."""
-        name = {FuzzyQLearning: "rules", SDNNQLearning: "network", RBFQLearning: "network"}.get(
-            self.agent,  # type: ignore[call-overload]
-            "approximator",
-        )
         return self.agent(
-            observation_space, action_space, **{name: approximator}, learning=learning, seed=seed
+            observation_space,
+            action_space,
+            approximator=approximator,
+            learning=learning,
+            seed=seed,
         )
 
 

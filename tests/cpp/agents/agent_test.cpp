@@ -21,11 +21,36 @@ static_assert(!Agent<approximators::RBFNetwork>);
 
 TEST(Agent, DiscreteActionsCutTheRangeEvenly) {
   const QLearning<testing::LookupTable> agent(testing::LookupTable(1, 2, 5), {}, 1);
-  const std::vector<double> shares = {-1.0, -0.5, 0.0, 0.5, 1.0};
+  const std::vector<double> expected = {-1.0, -0.5, 0.0, 0.5, 1.0};
   for (std::size_t action = 0; action < 5; ++action) {
-    EXPECT_EQ(agent.share(action), shares[action]);
+    EXPECT_EQ(agent.normalized_action(action), expected[action]);
   }
   EXPECT_EQ(agent.n_inputs(), 1U);
+}
+
+// Episodes are the caller's: only begin_episode starts the greedy first steps anew.
+template <Agent A>
+void expect_that_learning_begins_no_episode(A agent) {
+  const std::vector<double> state = {0.3}, next = {0.6};
+  agent.begin_episode();
+  agent.learn(state, agent.act(state), 1.0, next, false);  // the only greedy step
+  const auto best = agent.act(state, false);
+  int others = 0;
+  for (int i = 0; i < 200; ++i) {
+    const auto action = agent.act(state);
+    others += action != best;
+    agent.learn(state, action, 0.0, next, true);
+  }
+  EXPECT_GT(others, 50);
+}
+
+TEST(Agent, ATerminatedTransitionBeginsNoEpisode) {
+  const EpsilonGreedyConfig policy{
+      .epsilon = 1.0, .n_greedy_steps = 1, .tie_rule = TieRule::lowest};
+  expect_that_learning_begins_no_episode(
+      QLearning<testing::LookupTable>(testing::LookupTable(1, 2, 5), {.policy = policy}, 1));
+  expect_that_learning_begins_no_episode(
+      FuzzyQLearning(approximators::FuzzyRules({.n_inputs = 1}), {.policy = policy}, 1));
 }
 
 }  // namespace

@@ -5,8 +5,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <string>
 #include <vector>
+
+#include "sdnn/core/random.hpp"
 
 namespace sdnn::agents {
 namespace {
@@ -15,6 +18,24 @@ using Row = std::vector<double>;
 
 std::size_t best_by(TieRule rule, const Row& values) {
   return EpsilonGreedy({.tie_rule = rule}, 1).select(values, 0, true);
+}
+
+TEST(BestValue, IsTheLargestWhereverItStands) {
+  for (std::size_t size = 1; size < 70; ++size) {
+    for (std::size_t at = 0; at < size; ++at) {
+      Row values(size, -3.0);
+      values[at] = -1.5;
+      EXPECT_EQ(best_value(std::span<const double>(values)), -1.5) << size << " " << at;
+      std::vector<float> floats(values.begin(), values.end());
+      EXPECT_EQ(best_value(std::span<const float>(floats)), -1.5F) << size << " " << at;
+    }
+  }
+}
+
+TEST(BestValue, InfinitiesAreValues) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(best_value(std::span<const double>(Row{0.0, kInfinity, -kInfinity})), kInfinity);
+  EXPECT_EQ(best_value(std::span<const double>(Row(9, -kInfinity))), -kInfinity);
 }
 
 TEST(EpsilonGreedy, ASingleBestActionIsTakenByEveryRule) {
@@ -46,6 +67,23 @@ TEST(EpsilonGreedy, UniformTakesEveryTiedActionEquallyOften) {
   EXPECT_EQ(taken[1] + taken[4], 0);
   const double sigma = std::sqrt(n * 0.25 * 0.75);
   for (const std::size_t action : {0U, 2U, 3U, 5U}) EXPECT_NEAR(taken[action], n / 4, 5 * sigma);
+}
+
+// The rules of fuzzy Q-learning keep floats: the same picks and the same draws as from doubles.
+TEST(EpsilonGreedy, FloatsAreSelectedFromAsDoublesAre) {
+  for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {
+    const EpsilonGreedyConfig config{.epsilon = 0.3, .n_greedy_steps = 2, .tie_rule = rule};
+    EpsilonGreedy of_doubles(config, 4), of_floats(config, 4);
+    core::Random random(4, core::Stream::weights);
+    for (int i = 0; i < 1000; ++i) {
+      std::vector<float> floats(21);
+      for (float& value : floats) value = 0.1F * static_cast<float>(random.below(6));
+      const Row doubles(floats.begin(), floats.end());
+      const bool explore = i % 5 != 0;
+      ASSERT_EQ(of_floats.select(floats, i % 7, explore),
+                of_doubles.select(doubles, i % 7, explore));
+    }
+  }
 }
 
 TEST(EpsilonGreedy, TheFirstStepsAreGreedyAndLaterOnesRandomWithProbabilityEpsilon) {
@@ -118,6 +156,21 @@ TEST(EpsilonGreedy, NamesWhatIsImpossible) {
   for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {
     EXPECT_THROW((void)best_by(rule, Row(3, std::numeric_limits<double>::quiet_NaN())),
                  std::invalid_argument);
+  }
+}
+
+// Which of numbers and NaN is the best one Eigen leaves open: a number of the row, or refused.
+TEST(EpsilonGreedy, ANaNIsNeverTaken) {
+  for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {
+    for (std::size_t at = 0; at < 20; ++at) {
+      Row values(20, 1.0);
+      values[at] = std::numeric_limits<double>::quiet_NaN();
+      try {
+        EXPECT_NE(best_by(rule, values), at);
+      } catch (const std::invalid_argument& error) {
+        EXPECT_STREQ(error.what(), "values must be numbers, got nan");
+      }
+    }
   }
 }
 

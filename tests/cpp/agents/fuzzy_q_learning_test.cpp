@@ -20,15 +20,16 @@ using State = std::vector<double>;
 constexpr EpsilonGreedyConfig kGreedy{.epsilon = 0.0, .tie_rule = TieRule::lowest};
 
 std::vector<float> table(const FuzzyQLearning& agent) {
-  return {agent.rules().table().begin(), agent.rules().table().end()};
+  const auto values = agent.rules().table();
+  return {values.data(), values.data() + values.size()};
 }
 
 // One input, sets at 0, 1/2, 1; actions -1, 0, 1. At 0.125 rules 0 and 1 are true 3/4 and 1/4.
 TEST(FuzzyQLearning, OneStepByHand) {
   FuzzyRules rules({.n_inputs = 1, .n_sets = 3, .n_actions = 3});
-  rules.table()[rules.cell(0, 2)] = 4.0F;  // rule 0 picks +1
-  rules.table()[rules.cell(1, 0)] = 2.0F;  // rule 1 picks -1
-  rules.table()[rules.cell(2, 1)] = 8.0F;
+  rules.set_value(0, 2, 4.0F);  // rule 0 picks +1
+  rules.set_value(1, 0, 2.0F);  // rule 1 picks -1
+  rules.set_value(2, 1, 8.0F);
   FuzzyQLearning agent(rules, {.policy = kGreedy}, 1);
   const State state = {0.125}, next = {0.75};
   EXPECT_EQ(agent.act(state), 0.5);   // 3/4 (+1) + 1/4 (-1)
@@ -51,9 +52,7 @@ TEST(FuzzyQLearning, OnlyFiredRulesAreTouched) {
   const double action = agent.act(state);
   agent.learn(state, action, 1.0, {{0.4, 0.5, 0.6}}, false);
   EXPECT_EQ(agent.fired().size(), 4U);  // 0.5 is a centre
-  std::size_t touched = 0;
-  for (const float value : agent.rules().table()) touched += value != 0.0F;
-  EXPECT_EQ(touched, 4U);
+  EXPECT_EQ((agent.rules().table() != 0.0F).count(), 4);
   for (std::size_t i = 0; i < 4; ++i) {
     EXPECT_EQ(agent.rules().values(agent.fired().rules[i])[agent.picked()[i]],
               static_cast<float>(0.5 * agent.fired().truth_values[i]));
@@ -77,7 +76,7 @@ TEST(FuzzyQLearning, ActionsAreContinuousAndStayInTheRange) {
 TEST(FuzzyQLearning, RulesExploreIndependentlyAfterTheGreedyFirstSteps) {
   FuzzyRules rules({.n_inputs = 4});
   for (std::size_t rule = 0; rule < rules.n_rules(); ++rule) {
-    rules.table()[rules.cell(rule, 7)] = 1.0F;
+    rules.set_value(rule, 7, 1.0F);
   }
   FuzzyQLearning agent(rules, {}, 5);
   const State state = {0.3, 0.3, 0.3, 0.3};
@@ -100,7 +99,7 @@ TEST(FuzzyQLearning, RulesExploreIndependentlyAfterTheGreedyFirstSteps) {
 
 TEST(FuzzyQLearning, ATerminatedTransitionDoesNotBootstrapATruncatedOneDoes) {
   FuzzyRules rules({.n_inputs = 1, .n_sets = 3, .n_actions = 2});
-  rules.table()[rules.cell(2, 0)] = 20.0F;
+  rules.set_value(2, 0, 20.0F);
   for (const bool terminated : {true, false}) {
     FuzzyQLearning agent(rules, {.policy = kGreedy}, 1);
     agent.learn(State{0.0}, agent.act(State{0.0}), 1.0, State{1.0}, terminated);

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -91,10 +90,15 @@ TEST(FuzzyRules, AgreesWithTheTrianglesOfAllRules) {
 TEST(FuzzyRules, ValuesStartAtZeroAndEachHasItsPlace) {
   FuzzyRules rules({.n_inputs = 2, .n_sets = 3, .n_actions = 4});
   EXPECT_EQ(rules.table().size(), 36U);
-  for (const float value : rules.table()) EXPECT_EQ(value, 0.0F);
-  rules.table()[rules.cell(5, 2)] = 1.5F;
+  EXPECT_EQ(rules.table().rows(), 9);
+  EXPECT_TRUE((rules.table() == 0.0F).all());
+  rules.set_value(5, 2, 1.5F);
+  EXPECT_EQ(rules.value(5, 2), 1.5F);
+  EXPECT_EQ(rules.table()(5, 2), 1.5F);
   EXPECT_EQ(rules.values(5)[2], 1.5F);
-  EXPECT_EQ(std::accumulate(rules.table().begin(), rules.table().end(), 0.0F), 1.5F);
+  rules.table()(5, 3) = 2.5F;
+  EXPECT_EQ(rules.values(5)[3], 2.5F);
+  EXPECT_EQ(rules.table().sum(), 4.0F);
 }
 
 TEST(FuzzyRules, FiringAllocatesNothing) {

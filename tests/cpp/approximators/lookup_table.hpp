@@ -13,7 +13,7 @@ namespace sdnn::testing {
 
 /// A table Q(cell, action) over [0, 1]^l, every input cut into `n_cells` equal half-open parts.
 ///
-/// A correction writes its goal exactly.
+/// A correction writes (1 - rate) Q + rate target exactly.
 class LookupTable {
  public:
   LookupTable(std::size_t n_inputs, std::size_t n_cells, std::size_t n_actions)
@@ -32,8 +32,11 @@ class LookupTable {
   double value(std::span<const double> state, std::size_t action) const {
     return table_.at(row(state) + action);
   }
-  void correct(std::span<const double> state, std::size_t action, double goal) {
-    table_.at(row(state) + action) = goal;
+  void correct(std::span<const double> state, std::size_t action, double target,
+               double rate = 1.0) {
+    core::require(rate > 0.0 && rate <= 1.0, "rate", "in (0, 1]", rate);
+    double& q = table_.at(row(state) + action);
+    q = (1.0 - rate) * q + rate * target;
   }
 
   friend bool operator==(const LookupTable&, const LookupTable&) = default;

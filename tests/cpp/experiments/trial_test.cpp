@@ -129,7 +129,7 @@ struct Idle : Agent {
     return Agent::act(state, explore);
   }
   template <class Action>
-  double share(Action) const {
+  double normalized_action(Action) const {
     return 0.0;
   }
 

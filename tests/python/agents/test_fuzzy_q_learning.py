@@ -37,7 +37,7 @@ def positions(rng, d):
 def test_learning_agrees_with_its_definition_bit_for_bit(d, n_steps, tie_rule):
     learning = FuzzyQLearningConfig(tie_rule=tie_rule)
     rules = FuzzyRulesConfig(n_inputs=d)
-    agent = _core.FuzzyQLearning(rules=rules.to_core(), learning=learning.to_core(), seed=6)
+    agent = _core.FuzzyQLearning(approximator=rules.to_core(), learning=learning.to_core(), seed=6)
     slow = paper.FuzzyQLearning(
         d,
         n_sets=rules.n_sets,
@@ -176,9 +176,42 @@ def test_only_the_transition_of_the_last_exploring_act_is_learned():
     assert agent.value(here) > 0.0
 
 
+def test_a_changed_array_is_not_the_action_taken():
+    agent = FuzzyQLearning(OBSERVATIONS, TORQUES, seed=2)
+    here = [0.1, 0.2, 0.3]
+    action = agent.act(here)
+    copy = action.copy()
+    action[0] = 0.5 * (action[0] + 3.0)
+    with pytest.raises(ValueError, match="action must be that of the last exploring act"):
+        agent.learn(Transition(here, action, 1.0, here, False))
+    agent.learn(Transition(here, copy, 1.0, here, False))
+    assert agent.value(here) > 0.0
+
+
+def test_the_configurations_are_those_used():
+    agent = FuzzyQLearning(OBSERVATIONS, TORQUES, approximator=FuzzyRulesConfig(n_sets=5))
+    assert agent.approximator == FuzzyRulesConfig(n_inputs=3, n_sets=5)
+    assert agent.learning == FuzzyQLearningConfig()
+    assert agent.n_rules == 125
+
+
+# Episodes are the caller's: a terminated transition does not start the greedy first steps anew.
+def test_only_begin_episode_begins_an_episode():
+    learning = FuzzyQLearningConfig(epsilon=1.0, n_greedy_steps=1, tie_rule="lowest")
+    agent = FuzzyQLearning(OBSERVATIONS, TORQUES, learning=learning)
+    here = [0.0, 0.0, 0.0]
+    agent.begin_episode()
+    actions = []
+    for _ in range(50):
+        actions.append(float(agent.act(here)[0]))
+        agent.learn(Transition(here, actions[-1], -10.0, here, True))
+    assert actions[0] == -1.0
+    assert len(set(actions)) > 5
+
+
 def test_an_rbf_network_learns_discrete_actions_too():
     network = RBFNetworkConfig(n_bases=4, width=0.5)
-    agent = RBFQLearning(OBSERVATIONS, BUTTONS, network=network, seed=2)
+    agent = RBFQLearning(OBSERVATIONS, BUTTONS, approximator=network, seed=2)
     assert agent.n_actions == 4
     assert agent.actions.tolist() == [2, 3, 4, 5]
     observation = [0.5, -0.5, 0.0]

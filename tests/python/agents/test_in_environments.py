@@ -34,7 +34,7 @@ def live(env, agent, n_steps):
 
 @pytest.mark.parametrize(
     ("kind", "options"),
-    [(SDNNQLearning, {"network": SMALL}), (FuzzyQLearning, {}), (RBFQLearning, {})],
+    [(SDNNQLearning, {"approximator": SMALL}), (FuzzyQLearning, {}), (RBFQLearning, {})],
 )
 def test_it_lives_in_pendulum(kind, options):
     env = gym.make("Pendulum-v1")
@@ -51,12 +51,12 @@ def test_it_lives_in_pendulum(kind, options):
 def test_equal_lives_leave_equal_weights():
     env = gym.make("Pendulum-v1")
     agents = [
-        SDNNQLearning(env.observation_space, env.action_space, network=SMALL, seed=3)
+        SDNNQLearning(env.observation_space, env.action_space, approximator=SMALL, seed=3)
         for _ in range(3)
     ]
     for agent in agents[:2]:
         live(env, agent, 450)
-    first, second, fresh = (agent.core.network.weights() for agent in agents)
+    first, second, fresh = (agent.core.action_value.weights() for agent in agents)
     assert np.array_equal(first, second)
     assert not np.array_equal(first, fresh)
 
@@ -69,7 +69,7 @@ def test_it_lives_in_cart_pole_with_bounds_that_matter():
     agent = SDNNQLearning(
         gym.spaces.Box(-bounds, bounds, dtype=np.float64),
         env.action_space,
-        network=SMALL,
+        approximator=SMALL,
         seed=3,
     )
     assert agent.n_actions == 2

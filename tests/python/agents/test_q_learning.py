@@ -19,7 +19,7 @@ BUTTONS = gym.spaces.Discrete(4, start=2)
 
 
 def small_agent(actions=TORQUES, **options):
-    return SDNNQLearning(OBSERVATIONS, actions, network=SMALL, **options)
+    return SDNNQLearning(OBSERVATIONS, actions, approximator=SMALL, **options)
 
 
 # Against the transcription of the paper.
@@ -27,9 +27,9 @@ def small_agent(actions=TORQUES, **options):
 
 def learn_side_by_side(network, learning, n_steps, n_sensors=4, noise=0.0):
     """The core and the transcription live through the same acrobot episodes, as the agent acts."""
-    agent = _core.SDNNQLearning(network=network, learning=learning, seed=4)
+    agent = _core.SDNNQLearning(approximator=network, learning=learning, seed=4)
     slow = paper.QLearning(
-        transcribe(agent.network), alpha=learning.learning_rate, gamma=learning.discount
+        transcribe(agent.action_value), alpha=learning.learning_rate, gamma=learning.discount
     )
     acrobot = _core.Acrobot(_core.AcrobotConfig())
     sensors = _core.AcrobotSensors(
@@ -44,24 +44,24 @@ def learn_side_by_side(network, learning, n_steps, n_sensors=4, noise=0.0):
             in_episode = 0
             state = sensors.observe(acrobot.state())
         expected = slow.network.values(state)
-        assert np.array_equal(agent.network.values(state), expected), step
+        assert np.array_equal(agent.action_value.values(state), expected), step
         action = agent.act(state)
         if expected[action] != expected.max():
             n_random += 1
             assert in_episode >= learning.n_greedy_steps, "the first steps are greedy"
-        torque = _core.action_value(action, agent.network.n_actions, -10.0, 10.0)
+        torque = _core.action_value(action, agent.action_value.n_actions, -10.0, 10.0)
         reward, terminated, truncated = acrobot.step(torque, 0.05)
         following = sensors.observe(acrobot.state())
         agent.learn(state, action, reward, following, terminated)
         n_corrected += slow.learn(state, action, reward, following, terminated)
         if step % 1000 == 0:
-            assert np.array_equal(agent.network.weights(), slow.network.weights)
+            assert np.array_equal(agent.action_value.weights(), slow.network.weights)
         over = terminated or truncated
         state = following
         in_episode += 1
-    assert np.array_equal(agent.network.weights(), slow.network.weights)
-    assert np.array_equal(agent.network.thresholds(), slow.network.thresholds)
-    assert np.array_equal(agent.network.potentials(state), slow.network.potentials(state))
+    assert np.array_equal(agent.action_value.weights(), slow.network.weights)
+    assert np.array_equal(agent.action_value.thresholds(), slow.network.thresholds)
+    assert np.array_equal(agent.action_value.potentials(state), slow.network.potentials(state))
     return n_corrected, n_random
 
 
@@ -168,7 +168,7 @@ def test_impossible_settings_are_named(change, message):
 )
 def test_spaces_that_do_not_fit_are_named(observations, actions, error, message):
     with pytest.raises(error, match=message):
-        SDNNQLearning(observations, actions, network=SMALL)
+        SDNNQLearning(observations, actions, approximator=SMALL)
 
 
 def test_a_box_of_actions_is_cut_evenly():
@@ -183,12 +183,99 @@ def test_a_box_of_actions_is_cut_evenly():
     assert agent.q_values([0.0, 0.0, 0.0]).tolist() == [0.0] * 91
 
 
-def test_every_action_of_a_box_is_learned_as_itself():
+def learned_by(agent):
+    """The index of the one action whose value is no longer 0; alpha is 1 and the target 10."""
+    (changed,) = np.flatnonzero(agent.q_values([0.0, 0.0, 0.0]) > 9.0)
+    return changed
+
+
+def disjoint_agent(actions, **options):
+    """Each of its four actions has hidden units of its own."""
+    network = SDNNCConfig(n_pattern_units=40, n_hidden_units=120, n_active_units=30, n_actions=4)
+    learning = QLearningConfig(learning_rate=1.0, epsilon=1.0, n_greedy_steps=0)
+    return SDNNQLearning(OBSERVATIONS, actions, approximator=network, learning=learning, **options)
+
+
+def learn_a_lot(agent, action):
+    here = [0.0, 0.0, 0.0]
+    for _ in range(300):
+        agent.learn(Transition(here, action, 10.0, here, True))
+
+
+@pytest.mark.parametrize("index", range(4))
+@pytest.mark.parametrize("tell", [np.float32, np.float64, lambda a: [a], lambda a: [a + 0.4]])
+def test_an_action_of_a_box_is_learned_as_the_nearest_one(index, tell):
+    agent = disjoint_agent(gym.spaces.Box(-1.0, 3.0, (1,), np.float64))
+    learn_a_lot(agent, np.clip(tell(agent.actions[index]), -1.0, 3.0))
+    assert learned_by(agent) == index
+
+
+# 0, 2/3, 4/3 and 2 become 0, 0, 1 and 2: rounding these would never find the second action.
+def test_the_action_taken_is_learned_as_itself_whatever_the_space_makes_of_it():
+    actions = gym.spaces.Box(0, 2, (1,), np.int8)
+    seen = set()
+    for seed in range(20):
+        agent = disjoint_agent(actions, seed=seed)
+        taken = agent.act([0.0, 0.0, 0.0])
+        index = disjoint_agent(actions, seed=seed).core.act(np.full(3, 0.5))
+        assert taken.tolist() == [int(agent.actions[index])]
+        learn_a_lot(agent, taken)
+        assert learned_by(agent) == index
+        seen.add(index)
+    assert seen == {0, 1, 2, 3}
+
+
+@pytest.mark.parametrize("actions", [TORQUES, BUTTONS])
+def test_actions_that_were_not_taken_are_looked_up(actions):
+    agent = disjoint_agent(actions, seed=1)
+    taken = agent.act([0.0, 0.0, 0.0])
+    ordered = agent.actions.tolist()
+    first = int(np.argmin(np.abs(np.array(ordered) - np.asarray(taken).item())))
+    other = (first + 1) % 4
+    learn_a_lot(agent, ordered[other])
+    assert learned_by(agent) == other
+
+
+def test_a_changed_array_is_the_action_it_holds_now():
+    agent = disjoint_agent(TORQUES, seed=1)
+    taken = agent.act([0.0, 0.0, 0.0])
+    index = 0 if taken[0] > 1.0 else 3
+    taken[0] = agent.actions[index]
+    learn_a_lot(agent, taken)
+    assert learned_by(agent) == index
+
+
+def test_an_evaluated_action_is_not_the_one_taken():
+    agent = disjoint_agent(gym.spaces.Box(0, 2, (1,), np.int8), seed=1)
+    taken = agent.act([0.0, 0.0, 0.0])
+    index = disjoint_agent(gym.spaces.Box(0, 2, (1,), np.int8), seed=1).core.act(np.full(3, 0.5))
+    for _ in range(20):
+        agent.act([1.0, 1.0, 1.0], explore=False)
+    learn_a_lot(agent, taken)
+    assert learned_by(agent) == index
+
+
+def test_the_configurations_are_those_used():
     agent = small_agent()
-    for index, torque in enumerate(agent.actions):
-        for told in (np.array([torque], dtype=np.float32), [torque], torque):
-            agent_index = agent._actions.index(np.clip(told, -1.0, 3.0))
-            assert agent_index == index
+    assert agent.approximator == dataclasses.replace(SMALL, n_inputs=3, n_actions=91)
+    assert agent.learning == QLearningConfig()
+    assert agent.core.action_value.n_actions == 91
+    agent = small_agent(BUTTONS)
+    assert agent.approximator == dataclasses.replace(SMALL, n_inputs=3, n_actions=4)
+
+
+# Episodes are the caller's: a terminated transition does not start the greedy first steps anew.
+def test_only_begin_episode_begins_an_episode():
+    learning = QLearningConfig(epsilon=1.0, n_greedy_steps=1, tie_rule="lowest")
+    agent = small_agent(BUTTONS, learning=learning)
+    here = [0.0, 0.0, 0.0]
+    agent.begin_episode()
+    actions = []
+    for _ in range(100):
+        actions.append(agent.act(here))
+        agent.learn(Transition(here, 5, -10.0, here, True))
+    assert actions[0] == 2
+    assert {int(action) for action in actions} == {2, 3, 4, 5}
 
 
 def test_a_discrete_space_has_one_window_per_action():
@@ -211,7 +298,7 @@ def test_observations_are_scaled_by_the_bounds_and_saturate():
     assert np.array_equal(agent.q_values([7.0, -np.inf, 0.0]), inside)
     assert np.array_equal(agent.q_values(np.array([2, -2, 0], dtype=np.int8)), inside)
     assert np.array_equal(agent.q_values(np.float32([2.0, -2.0, 0.0])), inside)
-    core = agent._core.network
+    core = agent.core.action_value
     assert np.array_equal(core.values([1.0, 0.0, 0.5]), inside)
 
 
@@ -228,7 +315,7 @@ BAD_OBSERVATIONS = [
 def test_bad_observations_are_named_and_teach_nothing(observation, message):
     agent = small_agent()
     good = [0.0, 0.0, 0.0]
-    before = agent._core.network.weights()
+    before = agent.core.action_value.weights()
     for use in (
         lambda: agent.act(observation),
         lambda: agent.q_values(observation),
@@ -237,7 +324,7 @@ def test_bad_observations_are_named_and_teach_nothing(observation, message):
     ):
         with pytest.raises(ValueError, match=message):
             use()
-    assert np.array_equal(agent._core.network.weights(), before)
+    assert np.array_equal(agent.core.action_value.weights(), before)
 
 
 @pytest.mark.parametrize(
@@ -261,20 +348,20 @@ def test_bad_observations_are_named_and_teach_nothing(observation, message):
 def test_bad_actions_are_named_and_teach_nothing(actions, action):
     agent = small_agent(actions)
     good = [0.0, 0.0, 0.0]
-    before = agent._core.network.weights()
+    before = agent.core.action_value.weights()
     with pytest.raises(ValueError, match="action must be"):
         agent.learn(Transition(good, action, 1.0, good, False))
-    assert np.array_equal(agent._core.network.weights(), before)
+    assert np.array_equal(agent.core.action_value.weights(), before)
 
 
 @pytest.mark.parametrize("reward", [np.nan, np.inf, -np.inf])
 def test_bad_rewards_are_named_and_teach_nothing(reward):
     agent = small_agent()
     good = [0.0, 0.0, 0.0]
-    before = agent._core.network.weights()
+    before = agent.core.action_value.weights()
     with pytest.raises(ValueError, match="reward must be finite"):
         agent.learn(Transition(good, [0.0], reward, good, False))
-    assert np.array_equal(agent._core.network.weights(), before)
+    assert np.array_equal(agent.core.action_value.weights(), before)
 
 
 def test_evaluation_has_no_effect_on_learning():
@@ -291,7 +378,7 @@ def test_evaluation_has_no_effect_on_learning():
         assert np.array_equal(first, second)
         for agent in agents:
             agent.learn(Transition(observation, first, 1.0, following, False))
-    weights = [agent._core.network.weights() for agent in agents]
+    weights = [agent.core.action_value.weights() for agent in agents]
     assert np.array_equal(*weights)
 
 

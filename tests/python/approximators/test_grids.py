@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from grid_transcription import FuzzyQLearning, RBFNetwork
+from grid_transcription import FuzzyQLearning, RBFNetwork, joint_bases
 from sdnn import _core
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig
 
@@ -71,13 +71,34 @@ def test_the_rbf_network_agrees_with_its_definition_bit_for_bit(d, n_steps):
     ("d", "change"),
     [(2, {}), (4, {}), (3, {"n_bases": 5, "width": 0.3}), (2, {"n_bases": 3, "n_actions": 7})],
 )
-def test_the_plain_evaluation_agrees_within_its_tolerance(d, change):
+def test_values_are_the_mean_of_the_weights_over_all_joint_bases(d, change):
     net = _core.RBFNetwork(_core.RBFNetworkConfig(n_inputs=d, **change))
+    config = net.config
     rng = np.random.default_rng(5)
     net.set_weights(rng.uniform(-20.0, 20.0, net.n_joint_bases))
     for _ in range(10):
         state = rng.random(d)
-        assert np.abs(net.values_plainly(state) - net.values(state)).max() < 20.0 * 1e-12
+        values = net.values(state)
+        for action in rng.choice(config.n_actions, 5):
+            at = np.append(state, action / (config.n_actions - 1))
+            bases = joint_bases(at, n_bases=config.n_bases, width=config.width)
+            expected = (bases * net.weights()).sum() / bases.sum()
+            assert abs(values[action] - expected) < 20.0 * 1e-12
+
+
+def test_the_rbf_network_corrects_at_a_rate():
+    config = _core.RBFNetworkConfig(n_inputs=2)
+    at_a_rate, whole = _core.RBFNetwork(config), _core.RBFNetwork(config)
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        state, action = rng.random(2), int(rng.integers(config.n_actions))
+        target, rate = rng.uniform(-20, 20), rng.uniform(0.1, 1.0)
+        value = whole.values(state)[action]
+        whole.correct(state, action, (1.0 - rate) * value + rate * target)
+        at_a_rate.correct(state, action, target, rate=rate)
+        assert np.array_equal(whole.weights(), at_a_rate.weights())
+    with pytest.raises(ValueError, match=r"rate must be in \(0, 1\], got 0"):
+        whole.correct([0.5, 0.5], 0, 1.0, rate=0.0)
 
 
 def test_the_exponential_of_the_core_is_the_one_of_numpy_up_to_rounding():
@@ -111,7 +132,7 @@ def test_tables_that_are_too_large_are_refused():
 def test_bad_states_are_named(size):
     rules = _core.FuzzyRules(_core.FuzzyRulesConfig(n_inputs=2))
     net = _core.RBFNetwork(_core.RBFNetworkConfig(n_inputs=2))
-    for use in (rules.fire, net.values, net.values_plainly):
+    for use in (rules.fire, net.values):
         with pytest.raises(ValueError, match=f"state must be 2 values, got {size}"):
             use(np.zeros(size))
         with pytest.raises(ValueError, match=r"state\[1\] must be in \[0, 1\], got 1.5"):

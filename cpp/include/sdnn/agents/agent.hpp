@@ -16,16 +16,19 @@ namespace sdnn::agents {
 /// | agent.act(state, explore)                               | the action to take; without        |
 /// |                                                         | `explore` a best one, and then     |
 /// |                                                         | later learning is not affected     |
-/// | agent.share(action)                                     | the action as a number in [-1, 1], |
+/// | agent.normalized_action(action)                         | the action as a number in [-1, 1], |
 /// |                                                         | from one end of its range to the   |
 /// |                                                         | other                              |
 /// | agent.learn(state, action, reward, next, terminated)    | learns the transition              |
+///
+/// Who runs the episodes calls begin_episode at the start of each: learn never does, whether the
+/// transition terminated or not.
 template <class A>
 concept Agent = requires(A agent, const A& const_agent, std::span<const double> state,
                          double reward, bool flag) {
   { const_agent.n_inputs() } -> std::convertible_to<std::size_t>;
   agent.begin_episode();
-  { const_agent.share(agent.act(state, flag)) } -> std::convertible_to<double>;
+  { const_agent.normalized_action(agent.act(state, flag)) } -> std::convertible_to<double>;
   agent.learn(state, agent.act(state, flag), reward, state, flag);
 };
 

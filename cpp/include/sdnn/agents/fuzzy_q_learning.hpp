@@ -66,7 +66,6 @@ class FuzzyQLearning {
       : config_(config),
         rules_(std::move(rules)),
         policy_(config.policy, seed),
-        row_(rules_.n_actions()),
         state_(rules_.n_inputs()),
         fired_(rules_.no_rules()),
         other_fired_(rules_.no_rules()) {
@@ -76,8 +75,8 @@ class FuzzyQLearning {
     core::require_in_range("trace_decay", config.trace_decay, 0.0, 1.0);
     core::require(fading() <= kSlowestFading, "trace_decay", "at most 0.99 / discount",
                   config.trace_decay);
-    for (std::size_t action = 0; action < row_.size(); ++action) {
-      shares_.push_back(coding::action_value(action, row_.size(), -1.0, 1.0));
+    for (std::size_t action = 0; action < rules_.n_actions(); ++action) {
+      actions_.push_back(coding::action_value(action, rules_.n_actions(), -1.0, 1.0));
     }
     picked_.reserve(rules_.max_fired());
     traces_.reserve((trace_lifetime() + 1) * rules_.max_fired());
@@ -92,7 +91,8 @@ class FuzzyQLearning {
   const approximators::FiredRules& fired() const noexcept { return fired_; }
   std::span<const std::size_t> picked() const noexcept { return picked_; }
 
-  /// Starts counting the steps of an episode anew and forgets the traces.
+  /// Starts counting the steps of an episode anew and forgets the traces. The caller says when:
+  /// learning a terminated transition ends the traces only.
   void begin_episode() noexcept {
     step_ = 0;
     traces_.clear();
@@ -109,16 +109,12 @@ class FuzzyQLearning {
       std::copy(state.begin(), state.end(), state_.begin());
       picked_.clear();
     }
-    double weighted = 0.0, total = 0.0;
-    for (std::size_t i = 0; i < fired.size(); ++i) {
-      const auto values = rules_.values(fired.rules[i]);
-      std::copy(values.begin(), values.end(), row_.begin());
-      const std::size_t action = policy_.select(row_, step_, explore);
+    const double mean = mean_over(fired, [&](std::size_t i) {
+      const std::size_t action = policy_.select(rules_.values(fired.rules[i]), step_, explore);
       if (explore) picked_.push_back(action);
-      weighted += shares_[action] * fired.truth_values[i];
-      total += fired.truth_values[i];
-    }
-    const double action = std::clamp(weighted / total, -1.0, 1.0);
+      return actions_[action];
+    });
+    const double action = std::clamp(mean, -1.0, 1.0);
     if (explore) {
       ++step_;
       action_ = action;
@@ -126,20 +122,15 @@ class FuzzyQLearning {
     return action;
   }
 
-  /// The action itself: act gives a share of the range.
-  double share(double action) const noexcept { return action; }
+  /// The action itself: act gives a number in [-1, 1].
+  double normalized_action(double action) const noexcept { return action; }
 
   /// The value of `state`, sum max_a v_i[a] alpha_i / sum alpha_i. Throws as act does.
   double value(std::span<const double> state) {
     rules_.fire(state, other_fired_);
-    double weighted = 0.0, total = 0.0;
-    for (std::size_t i = 0; i < other_fired_.size(); ++i) {
-      const auto values = rules_.values(other_fired_.rules[i]);
-      weighted += static_cast<double>(*std::max_element(values.begin(), values.end())) *
-                  other_fired_.truth_values[i];
-      total += other_fired_.truth_values[i];
-    }
-    return weighted / total;
+    return mean_over(other_fired_, [this](std::size_t i) -> double {
+      return best_value(rules_.values(other_fired_.rules[i]));
+    });
   }
 
   /// Learns the transition that began with the last exploring act.
@@ -155,13 +146,10 @@ class FuzzyQLearning {
     core::require(action == action_, "action", "that of the last exploring act", action);
     core::require_finite("reward", reward);
     const double target = terminated ? reward : reward + config_.discount * value(next_state);
-    double weighted = 0.0, total = 0.0;
-    for (std::size_t i = 0; i < fired_.size(); ++i) {
-      const double picked = rules_.table()[rules_.cell(fired_.rules[i], picked_[i])];
-      weighted += picked * fired_.truth_values[i];
-      total += fired_.truth_values[i];
-    }
-    const double step = config_.learning_coefficient * (target - weighted / total);
+    const double value_of_picks = mean_over(fired_, [this](std::size_t i) -> double {
+      return rules_.value(fired_.rules[i], picked_[i]);
+    });
+    const double step = config_.learning_coefficient * (target - value_of_picks);
     renew_traces();
     for (const Trace& trace : traces_) {
       if (!(std::abs(moved(trace, step)) <= kLargest)) {
@@ -169,19 +157,31 @@ class FuzzyQLearning {
       }
     }
     for (const Trace& trace : traces_) {
-      rules_.table()[trace.cell] = static_cast<float>(moved(trace, step));
+      rules_.set_value(trace.rule, trace.action, static_cast<float>(moved(trace, step)));
     }
     if (terminated) traces_.clear();
   }
 
  private:
   struct Trace {
-    std::size_t cell;  // of the table
+    std::size_t rule;
+    std::size_t action;
     double eligibility;
   };
 
   static constexpr double kSlowestFading = 0.99;  // bounds the room for traces
   static constexpr double kLargest = std::numeric_limits<float>::max();
+
+  // sum value(i) alpha_i / sum alpha_i over the fired rules i, in their order.
+  template <class Value>
+  static double mean_over(const approximators::FiredRules& fired, Value&& value) {
+    double weighted = 0.0, total = 0.0;
+    for (std::size_t i = 0; i < fired.size(); ++i) {
+      weighted += value(i) * fired.truth_values[i];
+      total += fired.truth_values[i];
+    }
+    return weighted / total;
+  }
 
   double fading() const noexcept { return config_.discount * config_.trace_decay; }
 
@@ -193,7 +193,7 @@ class FuzzyQLearning {
   }
 
   double moved(const Trace& trace, double step) const noexcept {
-    return static_cast<double>(rules_.table()[trace.cell]) + step * trace.eligibility;
+    return static_cast<double>(rules_.value(trace.rule, trace.action)) + step * trace.eligibility;
   }
 
   // Fades the old traces and adds those of the picks, which are of different rules.
@@ -202,14 +202,15 @@ class FuzzyQLearning {
     std::erase_if(traces_, [](const Trace& t) { return !(t.eligibility >= kForgottenTrace); });
     const std::size_t n_old = traces_.size();
     for (std::size_t i = 0; i < fired_.size(); ++i) {
-      const std::size_t cell = rules_.cell(fired_.rules[i], picked_[i]);
+      const std::size_t rule = fired_.rules[i], action = picked_[i];
       const auto old_end = traces_.begin() + static_cast<std::ptrdiff_t>(n_old);
-      const auto old = std::find_if(traces_.begin(), old_end,
-                                    [cell](const Trace& trace) { return trace.cell == cell; });
+      const auto old = std::find_if(traces_.begin(), old_end, [&](const Trace& trace) {
+        return trace.rule == rule && trace.action == action;
+      });
       if (old != old_end) {
         old->eligibility += fired_.truth_values[i];
       } else {
-        traces_.push_back({cell, fired_.truth_values[i]});
+        traces_.push_back({rule, action, fired_.truth_values[i]});
       }
     }
   }
@@ -217,9 +218,8 @@ class FuzzyQLearning {
   FuzzyQLearningConfig config_;
   approximators::FuzzyRules rules_;
   EpsilonGreedy policy_;
-  std::vector<double> shares_;  // of every discrete action
-  std::vector<double> row_;     // values of one rule
-  std::vector<double> state_;   // of the last exploring act, with all below
+  std::vector<double> actions_;  // the discrete ones, in [-1, 1]
+  std::vector<double> state_;    // of the last exploring act, with all below
   approximators::FiredRules fired_;
   std::vector<std::size_t> picked_;
   double action_ = 0.0;

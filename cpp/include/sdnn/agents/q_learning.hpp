@@ -55,7 +55,8 @@ class QLearning {
 
   std::size_t n_inputs() const { return action_value_.n_inputs(); }
 
-  /// Starts counting the steps of an episode anew (for the greedy first steps).
+  /// Starts counting the steps of an episode anew, for the greedy first steps. The caller says
+  /// when: learning a terminated transition does not.
   void begin_episode() noexcept { step_ = 0; }
 
   /// Lets the approximator write to the memory that it will need, where it knows how.
@@ -73,7 +74,7 @@ class QLearning {
   }
 
   /// The action as a number in [-1, 1]: actions cut the range evenly.
-  double share(std::size_t action) const {
+  double normalized_action(std::size_t action) const {
     return coding::action_value(action, action_value_.n_actions(), -1.0, 1.0);
   }
 
@@ -83,14 +84,12 @@ class QLearning {
              std::span<const double> next_state, bool terminated) {
     core::require_finite("reward", reward);
     // The next state first: the network then remembers it, corrected, for the next decision.
-    double goal = reward;
+    double target = reward;
     if (!terminated) {
       action_value_.values(next_state, values_);
-      goal += config_.discount * best_value(values_);
+      target += config_.discount * best_value(std::span<const double>(values_));
     }
-    const double value = action_value_.value(state, action);
-    action_value_.correct(state, action,
-                          (1.0 - config_.learning_rate) * value + config_.learning_rate * goal);
+    action_value_.correct(state, action, target, config_.learning_rate);
   }
 
  private:

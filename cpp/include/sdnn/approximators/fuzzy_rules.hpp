@@ -1,6 +1,7 @@
 /// Fuzzy rules over a grid of triangular sets, each with a value for every discrete action.
 #pragma once
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cassert>
 #include <cstddef>
@@ -49,6 +50,9 @@ struct FiredRules {
 /// Source: spec section 3. The table has 4 n_actions n_sets^d bytes: 45 MB at d = 6.
 class FuzzyRules {
  public:
+  /// v(rule, action), a row per rule.
+  using Table = Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
   /// Throws std::invalid_argument naming the size that is impossible; std::length_error naming
   /// rules, bytes and limit, before any memory is asked for; std::bad_alloc.
   explicit FuzzyRules(const FuzzyRulesConfig& config)
@@ -102,20 +106,29 @@ class FuzzyRules {
     return fired;
   }
 
-  /// Where v(rule, action) is in `table`.
-  std::size_t cell(std::size_t rule, std::size_t action) const noexcept {
+  /// v(rule, action).
+  float value(std::size_t rule, std::size_t action) const noexcept {
     assert(rule < n_rules_ && action < n_actions());
-    return rule * n_actions() + action;
+    return table()(index(rule), index(action));
+  }
+  void set_value(std::size_t rule, std::size_t action, float value) noexcept {
+    assert(rule < n_rules_ && action < n_actions());
+    table()(index(rule), index(action)) = value;
   }
 
   /// v(rule, a) for every action. Shape: (n_actions,).
   std::span<const float> values(std::size_t rule) const noexcept {
-    return table_.span().subspan(cell(rule, 0), n_actions());
+    assert(rule < n_rules_);
+    return table_.span().subspan(rule * n_actions(), n_actions());
   }
 
-  /// All values, rule by rule. Shape: (n_rules * n_actions,).
-  std::span<float> table() noexcept { return table_.span(); }
-  std::span<const float> table() const noexcept { return table_.span(); }
+  /// All values. Shape: (n_rules, n_actions).
+  Eigen::Map<const Table, Eigen::Aligned64> table() const noexcept {
+    return {table_.data(), index(n_rules_), index(n_actions())};
+  }
+  Eigen::Map<Table, Eigen::Aligned64> table() noexcept {
+    return {table_.data(), index(n_rules_), index(n_actions())};
+  }
 
  private:
   static const FuzzyRulesConfig& checked(const FuzzyRulesConfig& config) {
@@ -124,6 +137,8 @@ class FuzzyRules {
     core::require_in_range("n_actions", config.n_actions, 1, 1 << 20);
     return config;
   }
+
+  static Eigen::Index index(std::size_t i) noexcept { return static_cast<Eigen::Index>(i); }
 
   FuzzyRulesConfig config_;
   std::size_t n_rules_;

@@ -1,8 +1,8 @@
 /// A network of radial basis functions over state and action: Q(s, a) linear in its weights.
 #pragma once
 
+#include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -45,14 +45,13 @@ struct RBFNetworkConfig {
 ///
 /// A joint basis is the product of one Gaussian per dimension, divided by the sum of all joint
 /// bases: n_bases^(d+1) in number. That sum is a product too, so a normalized joint basis is the
-/// product of Gaussians normalized in their own dimension. `values` uses this: it builds the
-/// normalized bases phi(s) of the state as an outer product, multiplies them once into the weights,
-/// u = phi(s)^T W, and gives every action psi(a)^T u. `values_plainly` computes every joint basis
-/// of every action as it is written. Both sum in a fixed order and are the same everywhere; they
-/// agree to 1e-12 of the largest |weight|.
+/// product of Gaussians normalized in their own dimension. Hence, with phi(s) the normalized bases
+/// of the state, an outer product, the weights are multiplied once, u = phi(s)^T W, and every
+/// action has psi(a)^T u. All sums start at 0 and add in the order of the bases: columns of Eigen's
+/// arrays, never its products, whose order depends on the instruction set.
 ///
-/// Source: spec section 4. Cost at d = 6: 16,384 multiply-adds for all actions, plainly 601 x
-/// 16,384 exponentials. An object must not be used by two threads at once: it holds its workspace.
+/// Source: spec section 4. Cost at d = 6: 16,384 multiply-adds for all actions. An object must not
+/// be used by two threads at once: it holds its workspace.
 class RBFNetwork {
  public:
   /// All weights 0. Throws std::invalid_argument naming the field that is impossible;
@@ -62,13 +61,14 @@ class RBFNetwork {
         n_joint_bases_(core::grid_cells("joint bases", n_bases(), n_inputs() + 1, sizeof(double),
                                         config.max_table_bytes)),
         weights_(n_joint_bases_),
-        state_bases_(n_joint_bases_ / n_bases()),
-        action_bases_(n_actions() * n_bases()),
-        one_dimension_(n_bases()),
-        mixed_(n_bases()),
+        state_bases_(index(n_joint_bases_ / n_bases())),
+        action_bases_(index(n_actions()), index(n_bases())),
+        one_dimension_(index(n_bases())),
+        mixed_(index(n_bases())),
         mixed_state_(n_inputs()) {
     for (std::size_t action = 0; action < n_actions(); ++action) {
-      normalized_bases(position(action), bases_of(action));
+      to_one_dimension(coding::action_value(action, n_actions(), 0.0, 1.0));
+      action_bases_.row(index(action)) = one_dimension_.transpose();
     }
   }
 
@@ -93,50 +93,51 @@ class RBFNetwork {
   ///
   /// Throws std::invalid_argument for a state of wrong size or outside [0, 1].
   void values(std::span<const double> state, std::span<double> out) {
-    require_room(out);
+    core::require(out.size() == n_actions(), "out", std::to_string(n_actions()) + " values",
+                  out.size());
     mix(state);
-    for (std::size_t action = 0; action < out.size(); ++action) out[action] = mixed(action);
+    Eigen::Map<Eigen::ArrayXd> q(out.data(), action_bases_.rows());
+    q.setZero();
+    for (Eigen::Index b = 0; b < mixed_.size(); ++b) q += mixed_[b] * action_bases_.col(b);
   }
 
   /// Q(state, action). Throws like values, and std::invalid_argument for an action out of range.
   double value(std::span<const double> state, std::size_t action) {
-    require_action(action);
+    core::require(action < n_actions(), "action", "less than " + std::to_string(n_actions()),
+                  action);
     mix(state);
-    return mixed(action);
+    const auto bases = action_bases_.row(index(action));
+    double q = 0.0;
+    for (Eigen::Index b = 0; b < bases.size(); ++b) q += mixed_[b] * bases[b];
+    return q;
   }
 
-  /// The same as values, without use of the product structure: every joint basis of every action.
-  void values_plainly(std::span<const double> state, std::span<double> out) {
-    require_room(out);
-    core::require_unit_values("state", state, n_inputs());
-    is_mixed_ = false;
-    const auto exponents = [this](double x, std::span<double> own) {
-      for (std::size_t k = 0; k < own.size(); ++k) own[k] = exponent(x, k);
-    };
-    outer(state, exponents, 0.0, [](double joint, double own) { return joint + own; });
-    for (std::size_t action = 0; action < out.size(); ++action) {
-      for (std::size_t k = 0; k < n_bases(); ++k) mixed_[k] = exponent(position(action), k);
-      out[action] = plain_value();
-    }
-  }
-
-  /// One gradient step: W += gradient_rate (target - Q(state, action)) phi(state, action).
+  /// One gradient step of Q = Q(state, action) towards q_hat = (1 - rate) Q + rate target:
+  /// W += gradient_rate (q_hat - Q) phi(state, action).
   ///
-  /// Throws std::invalid_argument like value and for a NaN target; std::overflow_error if the error
-  /// is not finite (the network has diverged, or target is infinite). Nothing has changed then.
-  void correct(std::span<const double> state, std::size_t action, double target) {
+  /// Throws std::invalid_argument like value, and for a NaN target or a rate outside (0, 1];
+  /// std::overflow_error if the error is not finite (the network has diverged, or target is
+  /// infinite). Nothing has changed then.
+  void correct(std::span<const double> state, std::size_t action, double target,
+               double rate = 1.0) {
     core::require(!std::isnan(target), "target", "a number", target);
-    const double step = config_.gradient_rate * (target - value(state, action));
+    core::require(rate > 0.0 && rate <= 1.0, "rate", "in (0, 1]", rate);
+    const double q = value(state, action);
+    const double q_hat = (1.0 - rate) * q + rate * target;
+    const double step = config_.gradient_rate * (q_hat - q);
     if (!std::isfinite(step)) throw std::overflow_error("the RBF network's weights diverge");
     is_mixed_ = false;
-    for (std::size_t b = 0; b < n_bases(); ++b) mixed_[b] = step * bases_of(action)[b];
-    double* weight = weights_.data();
-    for (std::size_t j = 0; j < state_bases_.size(); ++j) {
-      for (std::size_t b = 0; b < mixed_.size(); ++b) *weight++ += state_bases_[j] * mixed_[b];
+    mixed_ = step * action_bases_.row(index(action)).transpose();
+    if (mixed_.size() == kUnrolled) {
+      add_to_columns(Eigen::Array<double, kUnrolled, 1>(mixed_));
+    } else {
+      add_to_columns(mixed_);
     }
   }
 
  private:
+  static constexpr int kUnrolled = 4;  // the paper's n_bases
+
   static const RBFNetworkConfig& checked(const RBFNetworkConfig& config) {
     core::require_in_range("n_inputs", config.n_inputs, 1, 62);
     core::require_in_range("n_bases", config.n_bases, 2, 1 << 20);
@@ -146,56 +147,18 @@ class RBFNetwork {
     return config;
   }
 
-  void require_room(std::span<const double> out) const {
-    core::require(out.size() == n_actions(), "out", std::to_string(n_actions()) + " values",
-                  out.size());
-  }
+  static Eigen::Index index(std::size_t i) noexcept { return static_cast<Eigen::Index>(i); }
 
-  void require_action(std::size_t action) const {
-    core::require(action < n_actions(), "action", "less than " + std::to_string(n_actions()),
-                  action);
-  }
-
-  double position(std::size_t action) const noexcept {
-    return coding::action_value(action, n_actions(), 0.0, 1.0);
-  }
-
-  std::span<double> bases_of(std::size_t action) noexcept {
-    return action_bases_.span().subspan(action * n_bases(), n_bases());
-  }
-
-  // The logarithm of Gaussian k at x: -((x - centre) / width)^2 / 2, in units of the spacing.
-  double exponent(double x, std::size_t k) const noexcept {
-    const double distance =
-        (x * static_cast<double>(n_bases() - 1) - static_cast<double>(k)) / config_.width;
-    return -0.5 * distance * distance;
-  }
-
-  void normalized_bases(double x, std::span<double> out) const noexcept {
+  // one_dimension_ = the Gaussians of one dimension at x, divided by their sum.
+  void to_one_dimension(double x) noexcept {
     double total = 0.0;
-    for (std::size_t k = 0; k < out.size(); ++k) {
-      out[k] = core::exp(exponent(x, k));
-      total += out[k];
+    for (Eigen::Index k = 0; k < one_dimension_.size(); ++k) {
+      const double distance =
+          (x * static_cast<double>(n_bases() - 1) - static_cast<double>(k)) / config_.width;
+      one_dimension_[k] = core::exp(-0.5 * distance * distance);
+      total += one_dimension_[k];
     }
-    for (double& basis : out) basis /= total;
-  }
-
-  // Fills state_bases_ with own(x_1)[k_1] o own(x_2)[k_2] o ..., row-major, from the left.
-  template <class Own, class Join>
-  void outer(std::span<const double> state, const Own& own, double neutral, const Join& join) {
-    state_bases_[0] = neutral;
-    std::size_t size = 1;
-    for (const double x : state) {
-      own(x, std::span<double>(one_dimension_));
-      // From the back, so that one array is enough: entry i becomes entries i n .. i n + n - 1.
-      for (std::size_t i = size; i-- > 0;) {
-        const double joint = state_bases_[i];
-        for (std::size_t k = 0; k < n_bases(); ++k) {
-          state_bases_[i * n_bases() + k] = join(joint, one_dimension_[k]);
-        }
-      }
-      size *= n_bases();
-    }
+    one_dimension_ /= total;
   }
 
   // state_bases_ = phi(state), mixed_ = phi(state)^T W; nothing to do if they are those already.
@@ -204,65 +167,55 @@ class RBFNetwork {
     if (is_mixed_ && std::equal(state.begin(), state.end(), mixed_state_.begin())) return;
     std::copy(state.begin(), state.end(), mixed_state_.begin());
     is_mixed_ = true;
-    const auto bases = [this](double x, std::span<double> own) { normalized_bases(x, own); };
-    outer(state, bases, 1.0, [](double joint, double own) { return joint * own; });
-    if (n_bases() == kUnrolled) return mix_unrolled();
-    mixed_.assign(n_bases(), 0.0);
-    const double* weight = weights_.data();
-    for (std::size_t j = 0; j < state_bases_.size(); ++j) {
-      for (double& sum : mixed_) sum += state_bases_[j] * *weight++;
+    if (mixed_.size() == kUnrolled) {
+      Eigen::Array<double, kUnrolled, 1> sums;  // in registers
+      mix_into(sums);
+      mixed_ = sums;
+    } else {
+      mix_into(mixed_);
     }
   }
 
-  // The same sums in the same order with their number known to the compiler.
-  void mix_unrolled() noexcept {
-    std::array<double, kUnrolled> sums{};
-    const double* weight = weights_.data();
-    for (std::size_t j = 0; j < state_bases_.size(); ++j, weight += kUnrolled) {
-      for (std::size_t b = 0; b < kUnrolled; ++b) sums[b] += state_bases_[j] * weight[b];
-    }
-    for (std::size_t b = 0; b < kUnrolled; ++b) mixed_[b] = sums[b];
-  }
-
-  double mixed(std::size_t action) noexcept {
-    double sum = 0.0;
-    const auto bases = bases_of(action);
-    for (std::size_t b = 0; b < bases.size(); ++b) sum += bases[b] * mixed_[b];
-    return sum;
-  }
-
-  // sum W G / sum G over all joint bases, with exponents state_bases_[j] + mixed_[b]. A few
-  // exponentials at a time, so that the compiler can use vectors; the sums stay in order.
-  double plain_value() noexcept {
-    std::array<double, 64> bases;
-    double weighted = 0.0, total = 0.0;
-    for (std::size_t begin = 0; begin < n_joint_bases_; begin += bases.size()) {
-      const std::size_t n = std::min(bases.size(), n_joint_bases_ - begin);
-      std::size_t j = begin / n_bases(), b = begin % n_bases();
-      for (std::size_t i = 0; i < n; ++i) {
-        bases[i] = state_bases_[j] + mixed_[b];
-        if (++b < n_bases()) continue;
-        b = 0;
-        ++j;
+  // Fills state_bases_ and sums = phi^T W for the state mixed_state_.
+  template <class Sums>
+  void mix_into(Sums& sums) {
+    const auto n = Eigen::fix<Sums::RowsAtCompileTime>(config_.n_bases);
+    state_bases_[0] = 1.0;
+    Eigen::Index size = 1;
+    for (const double x : mixed_state_) {
+      to_one_dimension(x);
+      // From the back, so that one array is enough: entry i becomes entries i n .. i n + n - 1.
+      for (Eigen::Index i = size; i-- > 0;) {
+        state_bases_.segment(i * n, n) = state_bases_[i] * one_dimension_.head(n);
       }
-      for (std::size_t i = 0; i < n; ++i) bases[i] = core::exp(bases[i]);
-      for (std::size_t i = 0; i < n; ++i) {
-        weighted += bases[i] * weights_[begin + i];
-        total += bases[i];
-      }
+      size *= n;
     }
-    return weighted / total;
+    const auto columns = weight_columns<Sums::RowsAtCompileTime>();
+    sums.setZero();
+    for (Eigen::Index j = 0; j < columns.cols(); ++j) sums += state_bases_[j] * columns.col(j);
   }
 
-  static constexpr std::size_t kUnrolled = 4;  // the paper's n_bases
+  template <class Step>
+  void add_to_columns(const Step& step) {
+    auto columns = weight_columns<Step::RowsAtCompileTime>();
+    for (Eigen::Index j = 0; j < columns.cols(); ++j) columns.col(j) += state_bases_[j] * step;
+  }
+
+  // The weights, a row per basis of the action and a column per joint basis of the state.
+  template <int Rows>
+  auto weight_columns() noexcept {
+    using Columns = Eigen::Array<double, Rows, Eigen::Dynamic>;
+    return Eigen::Map<Columns, Eigen::Aligned64>(weights_.data(), mixed_.size(),
+                                                 state_bases_.size());
+  }
 
   RBFNetworkConfig config_;
   std::size_t n_joint_bases_;
   core::AlignedBuffer<double> weights_;
-  core::AlignedBuffer<double> state_bases_;   // phi(s), or the exponents of its Gaussians
-  core::AlignedBuffer<double> action_bases_;  // psi(a), row by row
-  std::vector<double> one_dimension_;
-  std::vector<double> mixed_;        // phi(s)^T W, or what goes with an action
+  Eigen::ArrayXd state_bases_;    // phi(s)
+  Eigen::ArrayXXd action_bases_;  // psi(a), a row per action
+  Eigen::ArrayXd one_dimension_;
+  Eigen::ArrayXd mixed_;             // phi(s)^T W, or what is to be added to it
   std::vector<double> mixed_state_;  // the state of both, if is_mixed_
   bool is_mixed_ = false;
 };

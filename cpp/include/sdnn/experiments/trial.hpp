@@ -42,7 +42,7 @@ struct TestRow {
 
 /// A learning agent on the acrobot swing-up; the same configs and seed give the same rows.
 ///
-/// The agent's action is its share of the largest torque. The sensors' noise has streams of its
+/// The agent's action, normalized, is its part of the largest torque. The sensors' noise has streams of its
 /// own, so that the same seed gives every agent the same noise, observation by observation.
 /// Source: spec section 5. A test episode is greedy, learns nothing, uses the current lambda, and
 /// draws from random streams of its own.
@@ -111,7 +111,7 @@ class AcrobotTrial {
     sensors.observe(acrobot_.state(), observed_);
     for (bool truncated = false; !row.solved && !truncated;) {
       const auto action = agent_.act(observed_, learning);
-      const auto result = acrobot_.step(max_torque_ * agent_.share(action), lambda);
+      const auto result = acrobot_.step(max_torque_ * agent_.normalized_action(action), lambda);
       sensors.observe(acrobot_.state(), next_observed_);
       if (learning) {
         agent_.learn(observed_, action, result.reward, next_observed_, result.terminated);

@@ -42,7 +42,7 @@ class Witness {
     states.emplace_back(state.begin(), state.end());
     return static_cast<int>(states.size()) - 1;
   }
-  double share(int) const { return 0.0; }
+  double normalized_action(int) const { return 0.0; }
   void learn(std::span<const double> state, int action, double reward,
              std::span<const double> next_state, bool terminated) {
     calls += terminated ? 't' : 'l';

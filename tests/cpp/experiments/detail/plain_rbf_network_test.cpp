@@ -3,13 +3,18 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <stdexcept>
 #include <vector>
 
+#include "allocation_count.hpp"
 #include "sdnn/agents/agent.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/action_value.hpp"
+#include "sdnn/core/random.hpp"
 
 namespace sdnn::experiments {
 namespace {
@@ -52,6 +57,86 @@ TEST(PlainRBFNetwork, GivesAndLearnsWhatTheFactoredOneDoes) {
     plain.correct(state, action, 0.5 * i);
   }
   EXPECT_TRUE(std::ranges::equal(plain.network().weights(), factored.weights()));
+}
+
+/// A network with weights of several sizes and signs, learned from random targets.
+PlainRBFNetwork taught(const RBFNetworkConfig& config, int n_corrections) {
+  PlainRBFNetwork network(config);
+  core::Random random(7, core::Stream::weights);
+  for (int i = 0; i < n_corrections; ++i) {
+    std::vector<double> state(network.n_inputs());
+    for (double& x : state) x = random.uniform();
+    const auto action = static_cast<std::size_t>(random.below(network.n_actions()));
+    network.correct(state, action, 20.0 * random.uniform() - 10.0);
+  }
+  return network;
+}
+
+// Two algorithms: every joint basis against the product over the dimensions.
+TEST(PlainRBFNetwork, AgreesWithTheFactoredOneAtEverySize) {
+  for (const int d : {1, 2, 3, 4}) {
+    for (const RBFNetworkConfig& config :
+         {RBFNetworkConfig{.n_inputs = d, .n_actions = 17},
+          RBFNetworkConfig{.n_inputs = d, .n_bases = 3, .n_actions = 5, .width = 0.4},
+          RBFNetworkConfig{
+              .n_inputs = d, .n_bases = 5, .n_actions = 2, .width = 0.1, .gradient_rate = 1.0}}) {
+      PlainRBFNetwork plain = taught(config, 300);
+      RBFNetwork factored = plain.network();
+      double largest = 0.0;
+      for (const double w : factored.weights()) largest = std::max(largest, std::abs(w));
+      ASSERT_GT(largest, 0.0);
+      core::Random random(2, core::Stream::ties);
+      std::vector<double> expected(plain.n_actions()), out(plain.n_actions());
+      for (int i = 0; i < 20; ++i) {
+        std::vector<double> state(plain.n_inputs());
+        for (double& x : state) x = random.uniform();
+        factored.values(state, expected);
+        plain.values(state, out);
+        for (std::size_t a = 0; a < out.size(); ++a) {
+          EXPECT_NEAR(out[a], expected[a], 1e-12 * largest);
+          EXPECT_EQ(factored.value(state, a), expected[a]);
+        }
+      }
+    }
+  }
+}
+
+// Normalized bases: equal weights give that weight everywhere.
+TEST(PlainRBFNetwork, TheBasesSumToOne) {
+  for (const double width : {0.1, 1.0, 100.0}) {
+    RBFNetwork equal({.n_inputs = 3, .n_actions = 11, .width = width});
+    equal.set_weights(std::vector<double>(256, 5.0));
+    PlainRBFNetwork network(equal);
+    core::Random random(1, core::Stream::ties);
+    std::vector<double> out(11);
+    for (int i = 0; i < 100; ++i) {
+      network.values(std::vector<double>{random.uniform(), random.uniform(), random.uniform()},
+                     out);
+      for (const double value : out) EXPECT_NEAR(value, 5.0, 1e-13);
+    }
+  }
+}
+
+TEST(PlainRBFNetwork, ValuesAllocateNothing) {
+  PlainRBFNetwork network({.n_inputs = 3});
+  const std::vector<double> state = {0.1, 0.2, 0.3};
+  std::vector<double> out(601);
+  const std::size_t before = testing::allocation_count();
+  network.values(state, out);
+  EXPECT_EQ(testing::allocation_count(), before);
+}
+
+// The bits are the same with every compiler and optimization level.
+TEST(PlainRBFNetwork, KeepsItsBits) {
+  PlainRBFNetwork network = taught({.width = 1.0}, 200);
+  std::uint64_t digest = 0;
+  for (const double w : network.network().weights()) {
+    digest = digest * 31 + std::bit_cast<std::uint64_t>(w);
+  }
+  std::vector<double> out(601);
+  network.values(std::vector<double>{0.3, 0.1, 0.7, 0.5}, out);
+  for (const double q : out) digest = digest * 31 + std::bit_cast<std::uint64_t>(q);
+  EXPECT_EQ(digest, 9187274102790421898U);
 }
 
 TEST(PlainRBFNetwork, RefusesWhatTheFactoredOneRefuses) {

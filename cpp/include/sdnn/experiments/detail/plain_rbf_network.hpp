@@ -1,38 +1,113 @@
 /// The RBF network without its product structure, for what that costs.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <span>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "sdnn/approximators/rbf_network.hpp"
+#include "sdnn/coding/action_code.hpp"
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/elementary.hpp"
 
 namespace sdnn::experiments {
 
 /// An RBF network whose `values` are evaluated as the definition says: every joint basis of every
-/// action (RBFNetwork::values_plainly). It learns what RBFNetwork learns, up to rounding.
+/// action. They agree with those of RBFNetwork to 1e-12 of the largest |weight|: a second algorithm
+/// for its tests. It learns what RBFNetwork learns, up to rounding.
 ///
 /// `value` and `correct` concern a single action; they stay as they are, and cost less than the
-/// n_actions-th part of `values`. Throws as RBFNetwork does.
+/// n_actions-th part of `values`. Throws as RBFNetwork does. Cost of `values` at d = 6: 601 x
+/// 16,384 exponentials.
 class PlainRBFNetwork {
  public:
-  explicit PlainRBFNetwork(const approximators::RBFNetworkConfig& config) : network_(config) {}
+  explicit PlainRBFNetwork(approximators::RBFNetwork network)
+      : network_(std::move(network)),
+        state_exponents_(network_.n_joint_bases() / network_.n_bases()),
+        exponents_(network_.n_bases()) {}
+  explicit PlainRBFNetwork(const approximators::RBFNetworkConfig& config)
+      : PlainRBFNetwork(approximators::RBFNetwork(config)) {}
 
   const approximators::RBFNetwork& network() const noexcept { return network_; }
   std::size_t n_inputs() const noexcept { return network_.n_inputs(); }
   std::size_t n_actions() const noexcept { return network_.n_actions(); }
 
   void values(std::span<const double> state, std::span<double> out) {
-    network_.values_plainly(state, out);
+    core::require(out.size() == n_actions(), "out", std::to_string(n_actions()) + " values",
+                  out.size());
+    core::require_unit_values("state", state, n_inputs());
+    add_up_exponents(state);
+    for (std::size_t action = 0; action < out.size(); ++action) {
+      set_exponents(coding::action_value(action, n_actions(), 0.0, 1.0));
+      out[action] = weighted_mean();
+    }
   }
   double value(std::span<const double> state, std::size_t action) {
     return network_.value(state, action);
   }
-  void correct(std::span<const double> state, std::size_t action, double target) {
-    network_.correct(state, action, target);
+  void correct(std::span<const double> state, std::size_t action, double target,
+               double rate = 1.0) {
+    network_.correct(state, action, target, rate);
   }
 
  private:
+  // exponents_ = logarithms of one dimension's Gaussians at x: -((x - centre) / width)^2 / 2, in
+  // units of the centres' spacing.
+  void set_exponents(double x) noexcept {
+    const double n_gaps = static_cast<double>(exponents_.size() - 1);
+    for (std::size_t k = 0; k < exponents_.size(); ++k) {
+      const double distance = (x * n_gaps - static_cast<double>(k)) / network_.config().width;
+      exponents_[k] = -0.5 * distance * distance;
+    }
+  }
+
+  // state_exponents_ = those of the joint bases of the state, row-major over the inputs.
+  void add_up_exponents(std::span<const double> state) noexcept {
+    state_exponents_[0] = 0.0;
+    std::size_t size = 1;
+    for (const double x : state) {
+      set_exponents(x);
+      const std::size_t n = exponents_.size();
+      // From the back, so that one array is enough: entry i becomes entries i n .. i n + n - 1.
+      for (std::size_t i = size; i-- > 0;) {
+        const double before = state_exponents_[i];
+        for (std::size_t k = 0; k < n; ++k) state_exponents_[i * n + k] = before + exponents_[k];
+      }
+      size *= n;
+    }
+  }
+
+  // sum W G / sum G over all joint bases, with exponents state_exponents_[j] + exponents_[b]. A few
+  // exponentials at a time, so that the compiler can use vectors; the sums stay in order.
+  double weighted_mean() const noexcept {
+    const std::span<const double> weights = network_.weights();
+    std::array<double, 64> bases;
+    double weighted = 0.0, total = 0.0;
+    for (std::size_t begin = 0; begin < weights.size(); begin += bases.size()) {
+      const std::size_t n = std::min(bases.size(), weights.size() - begin);
+      std::size_t j = begin / exponents_.size(), b = begin % exponents_.size();
+      for (std::size_t i = 0; i < n; ++i) {
+        bases[i] = state_exponents_[j] + exponents_[b];
+        if (++b < exponents_.size()) continue;
+        b = 0;
+        ++j;
+      }
+      for (std::size_t i = 0; i < n; ++i) bases[i] = core::exp(bases[i]);
+      for (std::size_t i = 0; i < n; ++i) {
+        weighted += bases[i] * weights[begin + i];
+        total += bases[i];
+      }
+    }
+    return weighted / total;
+  }
+
   approximators::RBFNetwork network_;
+  std::vector<double> state_exponents_;
+  std::vector<double> exponents_;
 };
 
 }  // namespace sdnn::experiments

@@ -1,0 +1,54 @@
+#include "sdnn/core/detail/kernel.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "instruction_sets.hpp"
+
+namespace sdnn::core::kernel_test {
+
+namespace detail {
+
+SDNN_INLINE int sum_body(const int* items, int n) noexcept {
+  int sum = 0;
+  for (int i = 0; i < n; ++i) sum += items[i];
+  return sum;
+}
+
+// Each version by hand, so that a test sees which one runs.
+inline std::string version_portable() { return "portable"; }
+inline std::string version_avx2() { return "avx2"; }
+inline std::string version_avx512() { return "avx512"; }
+
+SDNN_INLINE std::string mixed_body() { return "made"; }
+inline std::string mixed_avx2() { return "by hand"; }
+
+}  // namespace detail
+
+SDNN_KERNEL(int, sum, (const int* items, int n), (items, n))
+SDNN_DISPATCH(std::string, version, (), ())
+
+SDNN_KERNEL_PORTABLE(std::string, mixed, (), ())
+SDNN_KERNEL_AVX512(std::string, mixed, (), ())
+SDNN_DISPATCH(std::string, mixed, (), ())
+
+namespace {
+
+TEST(Kernel, GivesTheSameOnEveryInstructionSet) {
+  const int items[] = {1, 2, 3, 4, 5, 6, 7, 8, 9};
+  sdnn::testing::on_every_instruction_set(
+      [&](auto level) { EXPECT_EQ(sum(items, 9), 45) << level; });
+}
+
+TEST(Kernel, RunsTheVersionOfTheInstructionSetInUse) {
+  sdnn::testing::on_every_instruction_set([](auto level) { EXPECT_EQ(version(), level); });
+}
+
+TEST(Kernel, TakesAVersionThatIsWrittenByHand) {
+  sdnn::testing::on_every_instruction_set(
+      [](auto level) { EXPECT_EQ(mixed(), level == "avx2" ? "by hand" : "made") << level; });
+}
+
+}  // namespace
+}  // namespace sdnn::core::kernel_test
