@@ -11,7 +11,7 @@
 #include "bindings.hpp"
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/coding/anchor_patterns.hpp"
-#include "sdnn/coding/coded_samples.hpp"
+#include "sdnn/coding/detail/coded_samples.hpp"
 #include "sdnn/coding/correlation_matrix.hpp"
 #include "sdnn/coding/random_inverse.hpp"
 #include "sdnn/core/detail/check.hpp"

@@ -14,7 +14,6 @@
 #include "sdnn/approximators/sdnn_c.hpp"
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/coding/anchor_patterns.hpp"
-#include "sdnn/coding/coded_samples.hpp"
 #include "sdnn/coding/correlation_matrix.hpp"
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/coding/permutation.hpp"

@@ -26,7 +26,7 @@ class SDNNCConfig:
     n_inputs : int
         l, number of inputs, at least 2 (section 3.1).
     n_pattern_units : int
-        m, units per pattern, 2 to 4096 (section 4.2: 200).
+        m, units per pattern, 2 to 65536 (section 4.2: 200).
     n_anchor_patterns : int
         Random anchor patterns p_1, p_2, ... of a code book (section 3.1: 9). The last one is not
         assigned to a bin.

@@ -255,7 +255,7 @@ class SDNNC {
   static std::vector<coding::PatternTable> anchor_tables(const SDNNCConfig& config,
                                                          std::uint64_t seed) {
     const std::size_t l = checked_inputs(config);
-    core::require_in_range("n_pattern_units", config.n_pattern_units, 2, 1 << 20);
+    core::require_in_range("n_pattern_units", config.n_pattern_units, 2, 1 << 16);
     core::require(config.circular.empty() || config.circular.size() == l, "circular",
                   "empty or one flag per input", config.circular.size());
     std::vector<coding::PatternTable> tables;

@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-#include "sdnn/coding/coded_samples.hpp"
+#include "sdnn/coding/detail/coded_samples.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/estimators/detail/chunked_weights.hpp"

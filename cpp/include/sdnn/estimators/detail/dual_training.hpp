@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "sdnn/coding/coded_samples.hpp"
+#include "sdnn/coding/detail/coded_samples.hpp"
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"

@@ -1,4 +1,4 @@
-#include "sdnn/coding/coded_samples.hpp"
+#include "sdnn/coding/detail/coded_samples.hpp"
 
 #include <gtest/gtest.h>
 
