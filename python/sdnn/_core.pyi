@@ -217,7 +217,7 @@ class SDNNC:
         """
         Tables: patterns of each input, (n_bins, m) of -1, +1
         """
-    def correct(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def correct(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         """
         One step of error correction of Q(state, action) towards target
         """
@@ -1036,9 +1036,9 @@ class PlainRBFQLearning:
     def __init__(self, *, approximator: RBFNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
-    def network(self) -> RBFNetwork:
+    def action_value(self) -> RBFNetwork:
         """
-        A copy of the network
+        A copy of the network behind it
         """
 class BufferRead:
     """
@@ -1111,17 +1111,6 @@ class AcrobotDecisions:
     @property
     def n_integration_steps(self) -> int:
         ...
-class PlainRBFQLearning:
-    """
-    Q-learning with an RBF network evaluated without its product structure; only to be timed
-    """
-    def __init__(self, *, approximator: RBFNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def action_value(self) -> RBFNetwork:
-        """
-        A copy of the network behind it
-        """
 def action_value(action: typing.SupportsInt | typing.SupportsIndex, n_actions: typing.SupportsInt | typing.SupportsIndex, low: typing.SupportsFloat | typing.SupportsIndex, high: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     The value of an action in a range cut evenly
