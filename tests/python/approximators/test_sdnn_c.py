@@ -346,7 +346,7 @@ def test_configurations_are_frozen_and_keyword_only():
         ({"circular": (True,)}, "circular must be empty or one flag per input, got 1"),
         ({"u_low": -1}, "u_low must be"),
         ({"initial_weights": "large"}, "initial_weights must be one of 'ternary', 'uniform'"),
-        ({"n_pattern_units": 70000}, "n_pattern_units must be in [2, 65536], got 70000"),
+        ({"n_pattern_units": 70000}, r"n_pattern_units must be in \[2, 65536\], got 70000"),
         ({"initial_weights": "uniform", "initial_weight_limit": 1e300}, "initial_weight_limit"),
     ],
 )

@@ -211,3 +211,23 @@ def test_killed_run_resumes_to_the_same_content(tmp_path, fake, run):
     assert outcome.n_reused >= 3
     assert outcome.n_reused + outcome.n_run == len(plan) == 12
     assert resumed == run(tmp_path / "whole", plan)[1]
+
+
+def test_a_file_whose_making_was_killed_is_made_anew(tmp_path):
+    """A kill inside the very first transaction leaves a journal that has to be rolled back."""
+    path = tmp_path / "results.sqlite"
+    script = (
+        "import os, sqlite3, sys\n"
+        "connection = sqlite3.connect(sys.argv[1], isolation_level=None)\n"
+        "connection.execute('PRAGMA cache_size = 1')\n"
+        "connection.execute('BEGIN IMMEDIATE')\n"
+        "for i in range(500):\n"
+        "    connection.execute(f'CREATE TABLE t{i} (x)')\n"
+        "os._exit(0)\n"
+    )
+    subprocess.run([sys.executable, "-c", script, str(path)], check=True)
+    assert path.with_name("results.sqlite-journal").stat().st_size > 0
+    assert path.stat().st_size > 0
+    with ResultStore(tmp_path) as store:
+        store.add(make_record())
+        assert len(store.keys()) == 1
