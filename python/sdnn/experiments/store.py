@@ -297,14 +297,14 @@ def _inspect(path: Path) -> bool:
     The file is opened for reading only: what is not ours stays as it is, to the byte. Only what a
     killed process left half written is rolled back first, by SQLite's own journal.
     """
+    if path.with_name(f"{path.name}-journal").exists():
+        with closing(sqlite3.connect(path, timeout=BUSY_SECONDS)) as connection:
+            connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
     if not path.exists() or path.stat().st_size == 0:
         return True
     with path.open("rb") as file:
         if file.read(16) != b"SQLite format 3\0":
             raise sqlite3.DatabaseError("no SQLite file")
-    if path.with_name(f"{path.name}-journal").exists():
-        with closing(sqlite3.connect(path, timeout=BUSY_SECONDS)) as connection:
-            connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
     connection = sqlite3.connect(
         f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=BUSY_SECONDS
     )
