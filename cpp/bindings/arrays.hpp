@@ -66,6 +66,14 @@ inline coding::PatternTable table_of(const ArrayArgument<std::int8_t>& signs) {
                                           static_cast<std::size_t>(signs.shape(1)));
 }
 
+/// The tables of all inputs, of one pattern size. Shapes: (n_bins, n_units) each.
+inline std::vector<coding::PatternTable> tables_of(
+    const std::vector<ArrayArgument<std::int8_t>>& signs) {
+  std::vector<coding::PatternTable> tables;
+  for (const auto& one : signs) tables.push_back(table_of(one));
+  return tables;
+}
+
 /// Pairs (modified, modifier) of inputs. Shapes: (n_pairs, 2).
 inline std::vector<coding::InputPair> pairs_of(const ArrayArgument<std::int32_t>& pairs) {
   const auto inputs = matrix(pairs, "pairs", 2);

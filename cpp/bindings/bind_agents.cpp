@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <utility>
+#include <vector>
 
 #include "arrays.hpp"
 #include "bind_config.hpp"
@@ -89,9 +90,18 @@ void bind_agents(py::module_& module) {
   bindings::bind_config<FuzzyQLearningConfig>(module, "FuzzyQLearningConfig",
                                               "The parameters of fuzzy Q-learning");
 
-  def_q_learning<SDNNCConfig>(
-      py::class_<agents::QLearning<SDNNC>>(module, "SDNNQLearning", "Q-learning with SDNN-C"),
-      [](const SDNNCConfig& config, std::uint64_t seed) { return SDNNC(config, seed); });
+  using SDNNAgent = agents::QLearning<SDNNC>;
+  py::class_<SDNNAgent> sdnn_agent(module, "SDNNQLearning", "Q-learning with SDNN-C");
+  def_q_learning<SDNNCConfig>(sdnn_agent, [](const SDNNCConfig& config, std::uint64_t seed) {
+    return SDNNC(config, seed);
+  });
+  sdnn_agent.def(
+      py::init([](const SDNNCConfig& approximator, const QLearningConfig& learning,
+                  std::uint64_t seed, const std::vector<ArrayArgument<std::int8_t>>& tables) {
+        return SDNNAgent(SDNNC(approximator, bindings::tables_of(tables), seed), learning, seed);
+      }),
+      py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"),
+      py::arg("tables"), "With the patterns of each input: (n_bins, m) of -1, +1");
   def_q_learning<RBFNetworkConfig>(
       py::class_<agents::QLearning<RBFNetwork>>(module, "RBFQLearning",
                                                 "Q-learning with an RBF network"),

@@ -44,14 +44,6 @@ py::array_t<std::int32_t> thresholds(const SDNNC& network) {
   return out;
 }
 
-SDNNC make_network(const SDNNCConfig& config, std::uint64_t seed,
-                   const std::optional<std::vector<ArrayArgument<std::int8_t>>>& tables) {
-  if (!tables) return SDNNC(config, seed);
-  std::vector<coding::PatternTable> patterns;
-  for (const auto& table : *tables) patterns.push_back(bindings::table_of(table));
-  return SDNNC(config, std::move(patterns), seed);
-}
-
 void bind_fuzzy_rules(py::module_& module) {
   bindings::bind_config<FuzzyRulesConfig>(module, "FuzzyRulesConfig",
                                           "The sizes of a table of fuzzy rules");
@@ -127,8 +119,13 @@ void bind_approximators(py::module_& module) {
   bindings::bind_config<SDNNCConfig>(module, "SDNNCConfig", "Everything that defines an SDNN-C");
 
   py::class_<SDNNC>(module, "SDNNC", "A network that gives Q(s, a) for every action at once")
-      .def(py::init(&make_network), py::arg("config"), py::arg("seed"),
-           py::arg("tables") = py::none(), "Tables: patterns of each input, (n_bins, m) of -1, +1")
+      .def(py::init<const SDNNCConfig&, std::uint64_t>(), py::arg("config"), py::arg("seed"))
+      .def(py::init([](const SDNNCConfig& config, std::uint64_t seed,
+                       const std::vector<ArrayArgument<std::int8_t>>& tables) {
+             return SDNNC(config, bindings::tables_of(tables), seed);
+           }),
+           py::arg("config"), py::arg("seed"), py::arg("tables"),
+           "With the patterns of each input: (n_bins, m) of -1, +1")
       .def_property_readonly("config", [](const SDNNC& net) { return net.config(); })
       .def_property_readonly("n_inputs", &SDNNC::n_inputs)
       .def_property_readonly("n_actions", &SDNNC::n_actions)

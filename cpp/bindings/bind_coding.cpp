@@ -11,8 +11,8 @@
 #include "bindings.hpp"
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/coding/anchor_patterns.hpp"
-#include "sdnn/coding/detail/coded_samples.hpp"
 #include "sdnn/coding/correlation_matrix.hpp"
+#include "sdnn/coding/detail/coded_samples.hpp"
 #include "sdnn/coding/random_inverse.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
@@ -30,11 +30,7 @@ using Code = coding::SelectiveDesensitization;
 std::shared_ptr<Code> make_code(const std::vector<ArrayArgument<std::int8_t>>& modified,
                                 const std::vector<ArrayArgument<std::int8_t>>& modifiers,
                                 const ArrayArgument<std::int32_t>& pairs) {
-  std::vector<coding::PatternTable> modified_tables;
-  std::vector<coding::PatternTable> modifier_tables;
-  for (const auto& table : modified) modified_tables.push_back(bindings::table_of(table));
-  for (const auto& table : modifiers) modifier_tables.push_back(bindings::table_of(table));
-  return std::make_shared<Code>(std::move(modified_tables), std::move(modifier_tables),
+  return std::make_shared<Code>(bindings::tables_of(modified), bindings::tables_of(modifiers),
                                 bindings::pairs_of(pairs));
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+from collections.abc import Sequence
 from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
 import gymnasium as gym
@@ -14,7 +15,7 @@ from sdnn import _core
 from sdnn.agents.spaces import UnitObservations, discrete_actions
 from sdnn.agents.transition import Transition
 from sdnn.approximators.rbf_network import RBFNetworkConfig
-from sdnn.approximators.sdnn_c import SDNNCConfig
+from sdnn.approximators.sdnn_c import SDNNCConfig, pattern_tables
 from sdnn.arguments import seed_of
 from sdnn.config import to_core
 
@@ -168,6 +169,8 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
     learning : QLearningConfig, optional
     seed : int
         The root of every random stream of the agent.
+    tables : sequence of array_like, shape (n_bins, n_pattern_units), optional
+        Patterns for each observed variable, of any coding; see `sdnn.approximators.SDNNC`.
 
     Raises
     ------
@@ -208,14 +211,20 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         approximator: SDNNCConfig | None = None,
         learning: QLearningConfig | None = None,
         seed: int = 0,
+        tables: Sequence[ArrayLike] | None = None,
     ) -> None:
+        self._tables = None if tables is None else pattern_tables(tables)
         super().__init__(
             observation_space, action_space, approximator or SDNNCConfig(), learning, seed
         )
 
     def _make_core(self, approximator: SDNNCConfig, seed: int) -> _core.SDNNQLearning:
+        given = {} if self._tables is None else {"tables": self._tables}
         return _core.SDNNQLearning(
-            approximator=approximator.to_core(), learning=self.learning.to_core(), seed=seed
+            approximator=approximator.to_core(),
+            learning=self.learning.to_core(),
+            seed=seed,
+            **given,
         )
 
 

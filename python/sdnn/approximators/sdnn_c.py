@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -85,6 +86,20 @@ class SDNNCConfig:
         return to_core(self, _core.SDNNCConfig)
 
 
+def pattern_tables(tables: Sequence[ArrayLike]) -> list[NDArray[np.int8]]:
+    """Read the patterns of each input; ValueError for other entries than -1 and +1."""
+    read = []
+    for number, table in enumerate(tables):
+        signs = np.asarray(table)
+        if signs.ndim != 2 or not np.isin(signs, (-1, 1)).all():
+            raise ValueError(
+                f"tables[{number}] must be a matrix of -1 and +1, got one of shape {signs.shape}"
+                f" with the entries {np.unique(signs)[:5].tolist()}"
+            )
+        read.append(signs.astype(np.int8))
+    return read
+
+
 class SDNNC:
     """The network of section 3: layers 1 to 6, and its error correction.
 
@@ -94,11 +109,15 @@ class SDNNC:
         Sizes and readings; by default the paper's, with 4 inputs.
     seed : int
         Code books, permutations and initial weights follow from it (0 to 2**64 - 1).
+    tables : sequence of array_like, shape (n_bins, n_pattern_units), optional
+        Patterns of -1 and +1 for each input, instead of the anchors of ``config``: those of any
+        coding, such as ``sdnn.coding.Circular().patterns(200, seed=1)``. The range [0, 1] of an
+        input is cut into as many equal bins as its table has rows.
 
     Raises
     ------
     ValueError
-        If a size is impossible; the message names it.
+        If a size is impossible, or a table does not fit; the message names it.
 
     Examples
     --------
@@ -114,9 +133,16 @@ class SDNNC:
     5.1
     """
 
-    def __init__(self, config: SDNNCConfig | None = None, *, seed: int = 0) -> None:
+    def __init__(
+        self,
+        config: SDNNCConfig | None = None,
+        *,
+        seed: int = 0,
+        tables: Sequence[ArrayLike] | None = None,
+    ) -> None:
         self.config = config if config is not None else SDNNCConfig()
-        self._core = _core.SDNNC(self.config.to_core(), seed_of(seed))
+        given = {} if tables is None else {"tables": pattern_tables(tables)}
+        self._core = _core.SDNNC(self.config.to_core(), seed_of(seed), **given)
 
     @property
     def _lattice_step(self) -> np.float64:

@@ -11,6 +11,7 @@ from handed_over import transcribe
 from sdnn import _core
 from sdnn.agents import QLearningConfig, SDNNQLearning, Transition
 from sdnn.approximators import SDNNCConfig
+from sdnn.coding import Circular
 
 SMALL = SDNNCConfig(n_pattern_units=40, n_hidden_units=120, n_active_units=30)
 OBSERVATIONS = gym.spaces.Box(-2.0, 2.0, (3,), np.float64)
@@ -395,3 +396,17 @@ def test_docstrings():
     result = doctest.testmod(module)
     assert result.failed == 0
     assert result.attempted > 0
+
+
+def test_an_agent_takes_patterns_of_any_coding():
+    tables = [Circular().patterns(40, seed=number) for number in range(3)]
+    agent = small_agent(tables=tables)
+    np.testing.assert_array_equal(agent.core.action_value.table(2), tables[2])
+    observation = np.array([0.3, -1.0, 1.9])
+    for _ in range(20):
+        agent.learn(Transition(observation, [0.5], 3.0, observation, True))
+    assert agent.q_values(observation).max() > 1.0
+    around = agent.q_values(np.array([0.3, -1.0, -2.0]))  # on a circle the neighbour of 1.9
+    assert around.max() > 0.5
+    with pytest.raises(ValueError, match="tables must be one per input, got 2"):
+        small_agent(tables=tables[:2])

@@ -11,6 +11,7 @@ import paper_transcription as paper
 from handed_over import transcribe
 from sdnn import _core
 from sdnn.approximators import SDNNC, SDNNCConfig
+from sdnn.coding import Circular, Symbolic
 
 SMALL = {
     "n_inputs": 3,
@@ -432,3 +433,35 @@ def test_docstrings():
     result = doctest.testmod(module)
     assert result.failed == 0
     assert result.attempted > 0
+
+
+def test_patterns_of_any_coding_can_be_given():
+    tables = [
+        Circular().patterns(40, seed=1),
+        Symbolic(categories=("a", "b")).patterns(40, seed=2),
+    ]
+    config = SDNNCConfig(n_inputs=2, n_pattern_units=40, n_hidden_units=90, n_active_units=30)
+    network = SDNNC(config, seed=3, tables=tables)
+    network.correct([0.2, 0.1], 10, 8.0)
+    np.testing.assert_array_equal(network.values([0.2, 0.1]), network.values([0.2, 0.4]))  # "a"
+    assert (network.values([0.2, 0.1]) != network.values([0.2, 0.6])).any()
+    same = SDNNC(config, seed=3, tables=[table.tolist() for table in tables])
+    same.correct([0.2, 0.1], 10, 8.0)
+    np.testing.assert_array_equal(same.weights(), network.weights())
+
+
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    [
+        ([np.ones((3, 40))], "tables must be one per input, got 1"),
+        (
+            [np.ones((3, 40)), np.ones((3, 41))],
+            "tables must be of n_pattern_units = 40 units, got 41",
+        ),
+        ([np.ones((3, 40)), np.zeros((3, 40))], r"tables\[1\] must be a matrix of -1 and \+1"),
+        ([np.ones(40), np.ones((3, 40))], r"tables\[0\] must be a matrix"),
+    ],
+)
+def test_patterns_that_do_not_fit_are_refused(tables, message):
+    with pytest.raises(ValueError, match=message):
+        SDNNC(SDNNCConfig(n_inputs=2, n_pattern_units=40), tables=tables)
