@@ -213,9 +213,13 @@ class SDNNC:
     """
     A network that gives Q(s, a) for every action at once
     """
-    def __init__(self, config: SDNNCConfig, seed: typing.SupportsInt | typing.SupportsIndex, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] | None = None) -> None:
+    @typing.overload
+    def __init__(self, config: SDNNCConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @typing.overload
+    def __init__(self, config: SDNNCConfig, seed: typing.SupportsInt | typing.SupportsIndex, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]]) -> None:
         """
-        Tables: patterns of each input, (n_bins, m) of -1, +1
+        With the patterns of each input: (n_bins, m) of -1, +1
         """
     def correct(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         """
@@ -894,8 +898,14 @@ class SDNNQLearning:
     """
     Q-learning with SDNN-C
     """
+    @typing.overload
     def __init__(self, *, approximator: SDNNCConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
+    @typing.overload
+    def __init__(self, *, approximator: SDNNCConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]]) -> None:
+        """
+        With the patterns of each input: (n_bins, m) of -1, +1
+        """
     def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> int:
         ...
     def begin_episode(self) -> None:
