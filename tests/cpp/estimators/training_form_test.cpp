@@ -19,8 +19,8 @@ coding::SelectiveDesensitization demonstration_code() {
 }
 
 TEST(TrainingForm, NamesGoBothWays) {
-  for (const auto form :
-       {TrainingForm::automatic, TrainingForm::dual, TrainingForm::block, TrainingForm::plain}) {
+  ASSERT_EQ(estimators::kTrainingForms.size(), 4U);
+  for (const auto form : estimators::kTrainingForms) {
     EXPECT_EQ(estimators::training_form_named(estimators::name_of(form)), form);
   }
   EXPECT_THROW(estimators::training_form_named("primal"), std::invalid_argument);
@@ -28,12 +28,14 @@ TEST(TrainingForm, NamesGoBothWays) {
 
 TEST(TrainingForm, MemoryByHand) {
   const auto code = demonstration_code();
-  EXPECT_EQ(estimators::product_bytes(code), 2U);
+  EXPECT_EQ(estimators::with_product_type(code, []<class Product>() { return sizeof(Product); }),
+            2U);
   EXPECT_EQ(estimators::form_memory(TrainingForm::plain, 280, code, 2000), 0U);
   EXPECT_EQ(estimators::form_memory(TrainingForm::block, 280, code, 2000),
             4U * 288 * (4096 + 128 + 32) +
                 128U * (2 * 64 * 8 + 4096 + 4 * 288 + 2 * 128 + 2000 + 32 * 4));
-  EXPECT_EQ(estimators::plan_bytes(280, code, 2000),
+  EXPECT_EQ(estimators::form_memory(TrainingForm::block, 280, code, 2000, true) -
+                estimators::form_memory(TrainingForm::block, 280, code, 2000),
             384U * (2 * 64 * 8 + 4096 + 2 * 4 * 288 + 2000 + 32 * 4) + 2 * (512 * 512 - 128 * 128) +
                 2000U * (512 * 2 + 2000 + 32 * 4));
   EXPECT_EQ(estimators::form_memory(TrainingForm::dual, 280, code, 2000),

@@ -14,7 +14,8 @@
 
 namespace sdnn::estimators {
 
-/// The reference for the other forms: works on the layer's weights directly. Needs no memory.
+/// The reference for the other forms: works on the layer's weights directly, and takes no memory
+/// that grows with the problem.
 class PlainTraining {
  public:
   PlainTraining(std::shared_ptr<ParallelPerceptron> layer, std::span<const std::int32_t> bins,
@@ -50,12 +51,9 @@ class PlainTraining {
 
  private:
   void sum_potentials() {
-    auto& tiles = layer_->tiles();
     for (std::size_t i = 0; i < layer_->n_units(); ++i) potentials_[i] = -layer_->thresholds()[i];
-    for (std::size_t tile = 0; tile < tiles.n_tiles(); ++tile) {
-      add_rows(tiles.tile(tile), tiles.width(tile), slots_.plus(), slots_.minus(),
-               std::size_t{1} << 30, potentials_.data() + tile * kTileUnits);
-    }
+    layer_->tiles().add_columns(slots_.plus(), slots_.minus(), std::size_t{1} << 30,
+                                potentials_.data());
   }
 
   void correct(const Correction& correction) {
