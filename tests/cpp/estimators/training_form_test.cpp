@@ -11,9 +11,9 @@ using namespace sdnn;
 using estimators::TrainingForm;
 
 /// The demonstration problem's sizes: two pairs of n = 2000 units, half of them on.
-coding::SelectiveDesensitization demonstration_code() {
-  coding::PatternTable table(2, 2000);
-  for (std::size_t k = 0; k < 1000; ++k) table.flip(0, k);
+coding::SelectiveDesensitization demonstration_code(std::size_t n_pattern_units = 2000) {
+  coding::PatternTable table(2, n_pattern_units);
+  for (std::size_t k = 0; k < n_pattern_units / 2; ++k) table.flip(0, k);
   const std::vector tables(2, table);
   return {tables, tables, {{0, 1}, {1, 0}}};
 }
@@ -41,6 +41,17 @@ TEST(TrainingForm, MemoryByHand) {
   EXPECT_EQ(estimators::form_memory(TrainingForm::dual, 280, code, 2000),
             2000U * 2016 * 2 + 280U * 2016 * 4 + 2000U * 288 * 2 + 2000U * 2 * 64 * 8 +
                 4U * 288 * (128 + 32) + 2U * 128 * 128);
+}
+
+TEST(TrainingForm, CountsTheInnerProducts) {  // 16,000 columns of 20,000 samples take too long
+  const auto code = demonstration_code(8000);
+  const auto chosen = [&](std::size_t n_samples, std::size_t n_units) {
+    return estimators::choose_form(TrainingForm::automatic, n_units, code, n_samples,
+                                   std::size_t{64} << 30);
+  };
+  EXPECT_EQ(chosen(2000, 60), TrainingForm::dual);
+  EXPECT_EQ(chosen(6000, 280), TrainingForm::dual);
+  EXPECT_EQ(chosen(20000, 280), TrainingForm::block);
 }
 
 TEST(TrainingForm, SuitsTheSizeAndTheLimit) {

@@ -80,8 +80,9 @@ inline std::size_t form_memory(TrainingForm form, std::size_t n_units,
 }
 
 /// The form to use. An estimate of the time per presentation decides between dual and block: the
-/// one moves a row of n_samples for every corrected unit, the other reads all weights; beyond the
-/// caches a row costs some four times as much.
+/// one moves a row of n_samples for every corrected unit, three times as slowly beyond the caches,
+/// and has computed n_samples^2 / 2 inner products before, spread over some 30 epochs; the other
+/// reads all weights.
 ///
 /// Throws std::length_error if `form` is not automatic and needs more than `memory_limit` bytes.
 inline TrainingForm choose_form(TrainingForm form, std::size_t n_units,
@@ -97,8 +98,9 @@ inline TrainingForm choose_form(TrainingForm form, std::size_t n_units,
     return form;
   }
   const std::size_t padded_units = core::round_up(n_units, kTileStep);
-  const std::size_t row_factor = memory(TrainingForm::dual) > (std::size_t{32} << 20) ? 4 : 1;
-  const std::size_t dual_cost = row_factor * n_samples / 2 + n_units;
+  const std::size_t row_factor = memory(TrainingForm::dual) > (std::size_t{32} << 20) ? 3 : 1;
+  const std::size_t dual_cost =
+      row_factor * n_samples / 2 + n_units + n_samples * code.n_words() / 140;
   const std::size_t block_cost = code.n_slots() / 8 * (padded_units / 16) + code.n_slots();
   if (dual_cost <= block_cost && memory(TrainingForm::dual) <= memory_limit) {
     return TrainingForm::dual;
