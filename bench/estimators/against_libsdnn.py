@@ -27,7 +27,7 @@ def main(parameter_file, sample_file, n_iterations, n_runs):
         start = time.process_time()
         trainer = parameters.make_trainer(layer, sample[:, 1:], sample[:, 0])
         for _ in range(n_iterations):
-            trainer.epoch(order)
+            trainer.present(order)
         trainer.synchronize()
         seconds = time.process_time() - start
         each = 1e6 * seconds / (n_iterations * len(sample))

@@ -44,7 +44,7 @@ def run(n_pattern_units, seed):
     start = time.process_time()
     trainer = _core.PDeltaTrainer(layer, bins(points), counts)
     for _ in range(N_EPOCHS):
-        trainer.epoch(np.arange(N_TRAINING))
+        trainer.present(np.arange(N_TRAINING))
     trainer.synchronize()
     trained = time.process_time()
     predicted = STEP * layer.counts(bins(lattice()))[:, 0] + LOW

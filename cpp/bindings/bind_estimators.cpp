@@ -38,12 +38,8 @@ std::shared_ptr<ParallelPerceptron> make_layer(
 }
 
 Matrix weights_of(const ParallelPerceptron& layer) {
-  const std::size_t n_columns = layer.code().n_columns();
-  Matrix out({layer.n_units(), n_columns});
-  std::int32_t* const items = out.mutable_data();
-  for (std::size_t i = 0; i < layer.n_units(); ++i) {
-    for (std::size_t j = 0; j < n_columns; ++j) items[i * n_columns + j] = layer.weight(i, j);
-  }
+  Matrix out({layer.n_units(), layer.code().n_columns()});
+  layer.copy_weights({out.mutable_data(), static_cast<std::size_t>(out.size())});
   return out;
 }
 
@@ -71,18 +67,10 @@ Matrix counts_of(const ParallelPerceptron& layer, const Bins& bins, std::size_t 
   return out;
 }
 
-estimators::LibsdnnRandom libsdnn_random(const std::vector<std::uint32_t>& seed,
-                                         const std::string& library) {
-  core::require(library == "libstdc++" || library == "msvc", "library", "libstdc++ or msvc",
-                library);
-  return {seed, library == "msvc" ? estimators::StandardLibrary::msvc
-                                  : estimators::StandardLibrary::libstdcxx};
-}
-
 py::tuple libsdnn_tables(int n_units, const std::vector<std::pair<int, int>>& inputs,
                          const ArrayArgument<std::int32_t>& pairs,
                          const std::vector<std::uint32_t>& seed, const std::string& library) {
-  auto random = libsdnn_random(seed, library);
+  estimators::LibsdnnRandom random(seed, estimators::standard_library_named(library));
   std::vector<coding::RandomInverseConfig> configs;
   for (const auto& [n_bins, n_flipped] : inputs) configs.push_back({n_units, n_bins, n_flipped});
   const auto tables = estimators::libsdnn_tables(configs, bindings::pairs_of(pairs), random);
@@ -95,12 +83,31 @@ py::tuple libsdnn_tables(int n_units, const std::vector<std::pair<int, int>>& in
 
 py::tuple libsdnn_weights(std::size_t n_units, std::size_t n_columns, int low, int high,
                           const std::vector<std::uint32_t>& seed, const std::string& library) {
-  auto random = libsdnn_random(seed, library);
+  estimators::LibsdnnRandom random(seed, estimators::standard_library_named(library));
   const auto drawn = estimators::libsdnn_weights(n_units, n_columns, low, high, random);
   Matrix weights({n_units, n_columns});
   std::copy(drawn.weights.begin(), drawn.weights.end(), weights.mutable_data());
   return py::make_tuple(weights, py::array_t<std::int32_t>(static_cast<py::ssize_t>(n_units),
                                                            drawn.thresholds.data()));
+}
+
+/// The names of all of `values`.
+template <class Values>
+py::tuple names_of(const Values& values) {
+  py::list names;
+  for (const auto value : values) names.append(std::string(estimators::name_of(value)));
+  return py::tuple(names);
+}
+
+template <class Trainer, class Rule>
+std::shared_ptr<Trainer> make_trainer(std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
+                                      Rule rule, const std::string& form, std::size_t memory_limit,
+                                      int n_threads) {
+  const auto values = matrix(bins, "bins", layer->code().n_inputs());
+  const auto chosen = estimators::training_form_named(form);
+  const py::gil_scoped_release release;
+  return std::make_shared<Trainer>(std::move(layer), values, std::move(rule), chosen, memory_limit,
+                                   n_threads);
 }
 
 template <class Trainer>
@@ -110,7 +117,7 @@ void bind_trainer_methods(py::class_<Trainer, std::shared_ptr<Trainer>>& trainer
           "form", [](const Trainer& self) { return std::string(estimators::name_of(self.form())); })
       .def_property_readonly("memory", &Trainer::memory, "Bytes beside the layer")
       .def(
-          "epoch",
+          "present",
           [](Trainer& self, const ArrayArgument<std::int32_t>& order) {
             const auto items = bindings::vector(order, "order");
             const py::gil_scoped_release release;
@@ -140,59 +147,48 @@ void bind_estimators(py::module_& module) {
       .def("counts", &counts_of, py::arg("bins"), py::arg("n_groups") = 1, py::arg("n_threads") = 1,
            "How many units of each group fire");
 
-  constexpr std::size_t kMemoryLimit = std::size_t{1} << 30;
+  module.attr("TRAINING_FORMS") = names_of(estimators::kTrainingForms);
+  module.attr("CLASS_SCHEMES") = names_of(estimators::kClassSchemes);
+  module.def(
+      "n_units_for",
+      [](const std::string& scheme, std::size_t n_classes) {
+        return estimators::n_units_for(estimators::class_scheme_named(scheme), n_classes);
+      },
+      py::arg("scheme"), py::arg("n_classes"), "Units that tell so many classes apart");
+
   using estimators::PDeltaTrainer;
   py::class_<PDeltaTrainer, std::shared_ptr<PDeltaTrainer>> p_delta(
       module, "PDeltaTrainer", "Trains groups of units to fire in given numbers");
   p_delta.def(py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
                           const ArrayArgument<double>& targets, const std::string& form,
                           std::size_t memory_limit, int n_threads) {
-                const auto values = matrix(bins, "bins", layer->code().n_inputs());
                 estimators::PDeltaRule rule(layer->n_units(), matrix(targets, "targets"),
                                             static_cast<std::size_t>(targets.shape(1)));
-                const auto chosen = estimators::training_form_named(form);
-                const py::gil_scoped_release release;
-                return std::make_shared<PDeltaTrainer>(std::move(layer), values, std::move(rule),
-                                                       chosen, memory_limit, n_threads);
+                return make_trainer<PDeltaTrainer>(std::move(layer), bins, std::move(rule), form,
+                                                   memory_limit, n_threads);
               }),
               py::arg("layer"), py::arg("bins"), py::arg("targets"), py::arg("form") = "auto",
-              py::arg("memory_limit") = kMemoryLimit, py::arg("n_threads") = 1);
+              py::arg("memory_limit") = estimators::kMemoryLimit, py::arg("n_threads") = 1);
   bind_trainer_methods(p_delta);
 
   using estimators::PerceptronTrainer;
-  py::class_<PerceptronTrainer, std::shared_ptr<PerceptronTrainer>> error_correction(
+  py::class_<PerceptronTrainer, std::shared_ptr<PerceptronTrainer>> perceptron(
       module, "PerceptronTrainer", "Trains units to tell classes apart");
-  error_correction.def(
-      py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
-                  const ArrayArgument<std::int32_t>& labels, const std::string& scheme,
-                  const std::string& form, std::size_t memory_limit, int n_threads) {
-        const auto values = matrix(bins, "bins", layer->code().n_inputs());
-        const auto rest = scheme == "one_vs_rest";
-        core::require(rest || scheme == "one_vs_one", "scheme", "one_vs_rest or one_vs_one",
-                      scheme);
-        const auto class_scheme =
-            rest ? estimators::ClassScheme::one_vs_rest : estimators::ClassScheme::one_vs_one;
-        std::size_t n_classes = 2;
-        while (estimators::n_units_for(class_scheme, n_classes) < layer->n_units()) ++n_classes;
-        estimators::PerceptronRule rule(layer->n_units(), bindings::vector(labels, "labels"),
-                                        n_classes, class_scheme);
-        const auto chosen = estimators::training_form_named(form);
-        const py::gil_scoped_release release;
-        return std::make_shared<PerceptronTrainer>(std::move(layer), values, std::move(rule),
-                                                   chosen, memory_limit, n_threads);
-      }),
-      py::arg("layer"), py::arg("bins"), py::arg("labels"), py::arg("scheme"),
-      py::arg("form") = "auto", py::arg("memory_limit") = kMemoryLimit, py::arg("n_threads") = 1);
-  bind_trainer_methods(error_correction);
+  perceptron.def(py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
+                             const ArrayArgument<std::int32_t>& labels, std::size_t n_classes,
+                             const std::string& scheme, const std::string& form,
+                             std::size_t memory_limit, int n_threads) {
+                   estimators::PerceptronRule rule(layer->n_units(),
+                                                   bindings::vector(labels, "labels"), n_classes,
+                                                   estimators::class_scheme_named(scheme));
+                   return make_trainer<PerceptronTrainer>(std::move(layer), bins, std::move(rule),
+                                                          form, memory_limit, n_threads);
+                 }),
+                 py::arg("layer"), py::arg("bins"), py::arg("labels"), py::arg("n_classes"),
+                 py::arg("scheme"), py::arg("form") = "auto",
+                 py::arg("memory_limit") = estimators::kMemoryLimit, py::arg("n_threads") = 1);
+  bind_trainer_methods(perceptron);
 
-  module.def(
-      "training_memory",
-      [](const Code& code, std::size_t n_units, std::size_t n_samples, const std::string& form) {
-        return estimators::form_memory(estimators::training_form_named(form), n_units, code,
-                                       n_samples);
-      },
-      py::arg("code"), py::arg("n_units"), py::arg("n_samples"), py::arg("form"),
-      "Bytes that a form of training needs beside the layer");
   module.def("libsdnn_tables", &libsdnn_tables, py::arg("n_units"), py::arg("inputs"),
              py::arg("pairs"), py::arg("seed"), py::arg("library") = "libstdc++",
              "LIBSDNN's code tables, (modified, modifiers); inputs are (n_bins, n_flipped)");

@@ -723,7 +723,7 @@ class PDeltaTrainer:
     """
     def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
         ...
-    def epoch(self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> tuple[int, int]:
+    def present(self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> tuple[int, int]:
         """
         Presents samples in that order; returns how many corrected something, and how many units were corrected
         """
@@ -743,9 +743,9 @@ class PerceptronTrainer:
     """
     Trains units to tell classes apart
     """
-    def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], scheme: str, form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
+    def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_classes: typing.SupportsInt | typing.SupportsIndex, scheme: str, form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
         ...
-    def epoch(self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> tuple[int, int]:
+    def present(self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> tuple[int, int]:
         """
         Presents samples in that order; returns how many corrected something, and how many units were corrected
         """
@@ -1157,6 +1157,10 @@ def libsdnn_weights(n_units: typing.SupportsInt | typing.SupportsIndex, n_column
     """
 def log(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
+def n_units_for(scheme: str, n_classes: typing.SupportsInt | typing.SupportsIndex) -> int:
+    """
+    Units that tell so many classes apart
+    """
 def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
 def random_inverse_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, n_bins: typing.SupportsInt | typing.SupportsIndex, n_flipped: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
@@ -1193,8 +1197,6 @@ def time_decisions(trial: AcrobotTrial, n_episodes: typing.SupportsInt | typing.
     """
     Advances a trial; nanoseconds of every decision in it
     """
-def training_memory(code: SelectiveDesensitization, n_units: typing.SupportsInt | typing.SupportsIndex, n_samples: typing.SupportsInt | typing.SupportsIndex, form: str) -> int:
-    """
-    Bytes that a form of training needs beside the layer
-    """
+CLASS_SCHEMES: tuple = ('one_vs_rest', 'one_vs_one')
+TRAINING_FORMS: tuple = ('auto', 'dual', 'block', 'plain')
 __version__: str

@@ -13,8 +13,10 @@ from sklearn.base import BaseEstimator
 from sklearn.utils import assert_all_finite, check_random_state
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from sdnn import _core
 from sdnn.arguments import one_of, real, whole
 from sdnn.coding import Coding, RandomInverse, coding_named
+from sdnn.estimators import files
 from sdnn.estimators.columns import coding_entries, codings_of_columns, input_pairs
 from sdnn.estimators.input_code import draw_input_code, pattern_units_for
 from sdnn.estimators.network import Network
@@ -23,7 +25,6 @@ from sdnn.estimators.training import Trainer, run_epochs
 __all__ = ["BaseSDNN"]
 
 Self = TypeVar("Self", bound="BaseSDNN")
-TRAINING = ("auto", "dual", "block", "plain")
 LARGEST = 2**62
 WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
 
@@ -54,7 +55,7 @@ class BaseSDNN(BaseEstimator):
         whole("max_iter", self.max_iter, 1, LARGEST)
         whole("n_iter_no_change", self.n_iter_no_change, 1, LARGEST)
         whole("memory_limit", self.memory_limit, 0, LARGEST)
-        one_of("training", self.training, TRAINING)
+        one_of("training", self.training, _core.TRAINING_FORMS)
         if not 0 < real("validation_fraction", self.validation_fraction) < 1:
             raise ValueError(
                 f"validation_fraction must be between 0 and 1, got {self.validation_fraction!r}"
@@ -150,7 +151,7 @@ class BaseSDNN(BaseEstimator):
 
     def _pass_once(self, trainer: Trainer, n_samples: int) -> None:
         """Present every sample in its order."""
-        trainer.epoch(np.arange(n_samples, dtype=np.int32))
+        trainer.present(np.arange(n_samples, dtype=np.int32))
         trainer.synchronize()
         self.n_iter_ += 1
 
@@ -235,10 +236,8 @@ class BaseSDNN(BaseEstimator):
         OSError
             If the file cannot be written; one that was there before stays as it was.
         """
-        from sdnn.estimators.files import save
-
         check_is_fitted(self, "network_")
-        save(self, path)
+        files.save(self, path)
 
     @classmethod
     def load(cls: type[Self], path: str | Path) -> Self:
@@ -251,6 +250,4 @@ class BaseSDNN(BaseEstimator):
         OSError
             If the file cannot be read.
         """
-        from sdnn.estimators.files import load
-
-        return load(path, cls)
+        return files.load(path, cls)

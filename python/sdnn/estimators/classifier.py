@@ -16,13 +16,11 @@ from sdnn.estimators.training import Trainer
 
 __all__ = ["SDNNClassifier"]
 
-SCHEMES = ("one_vs_one", "one_vs_rest")
-
 Self = TypeVar("Self", bound="SDNNClassifier")
 
 
 def numbers_of(y: NDArray[Any], classes: NDArray[Any]) -> NDArray[np.int32]:
-    """Return the places of labels among the classes; ValueError for one that is not there."""
+    """Return the indices of labels among the classes; ValueError for one that is not there."""
     unseen = np.setdiff1d(y, classes)
     if len(unseen):
         raise ValueError(
@@ -59,10 +57,10 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     shuffle : bool, default=True
         Whether each epoch has a new random order; otherwise it is the order of the sample.
     early_stopping : bool, default=False
-        Whether to hold a share of the sample out, stop when its accuracy no longer rises, and
+        Whether to hold a fraction of the sample out, stop when its accuracy no longer rises, and
         keep the best weights.
     validation_fraction : float, default=0.1
-        The share that early stopping holds out.
+        The fraction that early stopping holds out.
     n_iter_no_change : int, default=10
         Epochs without improvement before early stopping.
     training : {"auto", "dual", "block", "plain"}, default="auto"
@@ -226,8 +224,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     def decision_function(self, X: ArrayLike) -> NDArray[np.float64]:
         """Return how much speaks for each class.
 
-        One-versus-rest: the potentials. One-versus-one: votes, and a share of less than half a
-        vote by the potentials, which decides between classes of equal votes.
+        One-versus-rest: the potentials. One-versus-one: votes, and less than half a vote
+        more by the potentials, which decides between classes of equal votes.
 
         Parameters
         ----------
@@ -275,14 +273,13 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         return table, y
 
     def _begin(self, X: Any, table: NDArray[Any], classes: Any) -> np.random.RandomState:
-        one_of("scheme", self.scheme, SCHEMES)
+        one_of("scheme", self.scheme, _core.CLASS_SCHEMES)
         self.classes_ = classes
         n_classes = len(self.classes_)
         if n_classes < 2:
             raise ValueError(f"at least two classes are needed, got one class: {classes!r}")
         self._scheme = self.scheme
-        one_vs_rest = self.scheme == "one_vs_rest"
-        return self._start(X, table, n_classes if one_vs_rest else n_classes * (n_classes - 1) // 2)
+        return self._start(X, table, _core.n_units_for(self.scheme, n_classes))
 
     def _trainer(self, table: NDArray[Any], labels: NDArray[np.int32]) -> Trainer:
         self._finite(table, self.codings_)
@@ -290,6 +287,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             self.network_.layer,
             self.network_.input_code.bins(table),
             labels,
+            len(self.classes_),
             self._scheme,
             **self._trainer_options(),
         )

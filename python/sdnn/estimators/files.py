@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +13,32 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save as to_bytes
 
 from sdnn.coding import Coding, from_dict, to_dict
-from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.input_code import InputCode
 from sdnn.estimators.network import Network
 from sdnn.whole_files import write_whole
 
-__all__ = ["load", "save"]
-
-Estimator = TypeVar("Estimator", bound=BaseSDNN)
+__all__ = ["Saved", "load", "save"]
 
 FORMAT = "sdnn-estimator-1"
 PLAIN = ("n_features_in_", "n_iter_", "n_outputs_", "training_form_", "training_memory_")
 PRIVATE = ("_flat", "_counts_of_range", "_scheme")
 ARRAYS = ("output_range_", "n_corrected_", "validation_scores_")
 NAMES = ("classes_", "feature_names_in_")
+
+
+class Saved(Protocol):
+    """What is saved: parameters, the network, and those of the attributes above that are there."""
+
+    network_: Network
+
+    def __init__(self, **parameters: Any) -> None:
+        """Take the parameters as `get_params` gave them."""
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Return the parameters by name."""
+
+
+Estimator = TypeVar("Estimator", bound=Saved)
 
 
 def plain(value: Any) -> Any:
@@ -74,7 +86,7 @@ def named(values: NDArray[Any]) -> dict[str, Any]:
     return {"type": kind, "values": values.tolist()}
 
 
-def save(estimator: BaseSDNN, path: str | Path) -> None:
+def save(estimator: Saved, path: str | Path) -> None:
     """Write a fitted estimator; see `BaseSDNN.save`."""
     network = estimator.network_
     code = network.input_code

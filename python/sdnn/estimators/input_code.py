@@ -53,8 +53,10 @@ class InputCode:
         self.modifiers = modifiers
         # Inputs that no pair mentions are validated and then ignored.
         self.used = sorted({index for pair in self.pairs for index in pair})
-        place = {index: number for number, index in enumerate(self.used)}
-        self.core_pairs = np.array([(place[mu], place[nu]) for mu, nu in self.pairs], np.int32)
+        number_of = {index: number for number, index in enumerate(self.used)}
+        self.core_pairs = np.array(
+            [(number_of[mu], number_of[nu]) for mu, nu in self.pairs], dtype=np.int32
+        )
         self.core = _core.SelectiveDesensitization(modified, modifiers, self.core_pairs)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -79,9 +81,9 @@ class InputCode:
             For a category that was not there in training; the message names the input.
         """
         bins = np.empty((len(table), len(self.used)), dtype=np.int32)
-        for place, index in enumerate(self.used):
+        for number, index in enumerate(self.used):
             try:
-                bins[:, place] = self.codings[index].bins(table[:, index])
+                bins[:, number] = self.codings[index].bins(table[:, index])
             except ValueError as error:
                 raise ValueError(f"{error} in column {index}") from None
         return bins

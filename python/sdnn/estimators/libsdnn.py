@@ -52,9 +52,7 @@ class LibsdnnParameters:
         if self.task == "regression":
             low, high = self.output_range
             return int((high - low) / self.step_size)
-        if self.scheme == "one_vs_rest":
-            return self.n_classes
-        return self.n_classes * (self.n_classes - 1) // 2
+        return _core.n_units_for(self.scheme, self.n_classes)
 
     def bins(self, inputs: npt.ArrayLike) -> npt.NDArray[np.int32]:
         """Return the bins of samples: ``int(n_bins * x)``, or ``int(x)`` of a symbol, clipped.
@@ -109,14 +107,14 @@ class LibsdnnParameters:
     def make_trainer(
         self, layer: _core.ParallelPerceptron, inputs: npt.ArrayLike, targets: npt.ArrayLike
     ) -> _core.PDeltaTrainer | _core.PerceptronTrainer:
-        """Return a trainer whose ``epoch(np.arange(n_samples))`` is one iteration of LIBSDNN."""
+        """Return a trainer whose ``present(np.arange(n_samples))`` is one iteration of LIBSDNN."""
         bins = self.bins(inputs)
         if self.task == "regression":
             low = self.output_range[0]
             counts = (np.asarray(targets, dtype=np.float64).reshape(-1, 1) - low) / self.step_size
             return _core.PDeltaTrainer(layer, bins, counts)
         labels = np.asarray(targets, dtype=np.int32)
-        return _core.PerceptronTrainer(layer, bins, labels, self.scheme)
+        return _core.PerceptronTrainer(layer, bins, labels, self.n_classes, self.scheme)
 
 
 @dataclass(frozen=True, kw_only=True)

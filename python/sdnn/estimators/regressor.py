@@ -16,7 +16,7 @@ from sdnn.estimators.training import Trainer
 __all__ = ["SDNNRegressor"]
 
 MARGIN = 0.2
-"""Share of the targets' range that a learned output range adds on either side."""
+"""Fraction of the targets' range that a learned output range adds on either side."""
 
 Self = TypeVar("Self", bound="SDNNRegressor")
 
@@ -54,10 +54,10 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     shuffle : bool, default=True
         Whether each epoch has a new random order; otherwise it is the order of the sample.
     early_stopping : bool, default=False
-        Whether to hold a share of the sample out, stop when its error no longer falls, and keep
+        Whether to hold a fraction of the sample out, stop when its error no longer falls, and keep
         the best weights.
     validation_fraction : float, default=0.1
-        The share that early stopping holds out.
+        The fraction that early stopping holds out.
     n_iter_no_change : int, default=10
         Epochs without improvement before early stopping.
     training : {"auto", "dual", "block", "plain"}, default="auto"

@@ -26,7 +26,7 @@ class Trainer(Protocol):
     def memory(self) -> int:
         """Bytes beside the layer."""
 
-    def epoch(self, order: NDArray[np.int32]) -> tuple[int, int]:
+    def present(self, order: NDArray[np.int32]) -> tuple[int, int]:
         """Present samples in that order; returns how many samples and units were corrected."""
 
     def synchronize(self) -> None:
@@ -105,7 +105,7 @@ def run_epochs(
     with progress_bar(verbose, max_iter) as advance:
         for epoch in range(max_iter):
             order = in_order if random is None else random.permutation(in_order)
-            n_corrected, _ = trainer.epoch(order)
+            n_corrected, _ = trainer.present(order)
             history.n_corrected.append(n_corrected)
             advance(n_corrected)
             if score is not None:

@@ -83,6 +83,16 @@ TEST(PDeltaRule, AgreesWithSorting) {
   }
 }
 
+TEST(ClassScheme, NamesGoBothWaysAndCountUnits) {
+  for (const auto scheme : estimators::kClassSchemes) {
+    EXPECT_EQ(estimators::class_scheme_named(estimators::name_of(scheme)), scheme);
+  }
+  EXPECT_EQ(estimators::n_units_for(estimators::class_scheme_named("one_vs_rest"), 4), 4U);
+  EXPECT_EQ(estimators::n_units_for(estimators::class_scheme_named("one_vs_one"), 4), 6U);
+  EXPECT_THROW(estimators::class_scheme_named("one_vs_two"), std::invalid_argument);
+  EXPECT_THROW(estimators::n_units_for(ClassScheme::one_vs_one, 1), std::invalid_argument);
+}
+
 TEST(PerceptronRule, OneVersusRest) {
   estimators::PerceptronRule rule(3, std::vector<std::int32_t>{1}, 3, ClassScheme::one_vs_rest);
   EXPECT_EQ(apply(rule, 0, {1, 0, -1}), (Pairs{{0, -1}, {1, 1}}));

@@ -67,6 +67,9 @@ TEST(Libsdnn, PatternsAreBalancedChains) {
 
 TEST(Libsdnn, RefusesBadArguments) {
   EXPECT_THROW(LibsdnnRandom({}, StandardLibrary::msvc), std::invalid_argument);
+  EXPECT_EQ(estimators::standard_library_named("msvc"), StandardLibrary::msvc);
+  EXPECT_EQ(estimators::standard_library_named("libstdc++"), StandardLibrary::libstdcxx);
+  EXPECT_THROW(estimators::standard_library_named("libc++"), std::invalid_argument);
   LibsdnnRandom random(kSeed, StandardLibrary::msvc);
   EXPECT_THROW(estimators::libsdnn_patterns({71, 3, 1}, random), std::invalid_argument);
   EXPECT_THROW(estimators::libsdnn_patterns({70, 3, 35}, random), std::invalid_argument);

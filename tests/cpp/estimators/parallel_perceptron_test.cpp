@@ -25,6 +25,9 @@ TEST(ParallelPerceptron, PotentialsByHand) {
   const std::vector<std::int32_t> weights{1, 2, 3, -4, 5, 6};
   const std::vector<std::int32_t> thresholds{1, -2};
   const ParallelPerceptron layer(small_code(), 2, weights, thresholds);
+  std::vector<std::int32_t> copied(6);
+  layer.copy_weights(copied);
+  EXPECT_EQ(copied, weights);
   const std::vector<std::int32_t> bins{0, 1};
   std::vector<std::int32_t> potentials(4);
   layer.potentials(bins, 1, potentials);

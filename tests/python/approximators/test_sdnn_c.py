@@ -442,11 +442,13 @@ def test_patterns_of_any_coding_can_be_given():
     ]
     config = SDNNCConfig(n_inputs=2, n_pattern_units=40, n_hidden_units=90, n_active_units=30)
     network = SDNNC(config, seed=3, tables=tables)
-    network.correct([0.2, 0.1], 10, 8.0)
+    for _ in range(20):
+        network.correct([0.2, 0.1], 10, 8.0)
     np.testing.assert_array_equal(network.values([0.2, 0.1]), network.values([0.2, 0.4]))  # "a"
     assert (network.values([0.2, 0.1]) != network.values([0.2, 0.6])).any()
     same = SDNNC(config, seed=3, tables=[table.tolist() for table in tables])
-    same.correct([0.2, 0.1], 10, 8.0)
+    for _ in range(20):
+        same.correct([0.2, 0.1], 10, 8.0)
     np.testing.assert_array_equal(same.weights(), network.weights())
 
 

@@ -79,7 +79,7 @@ def test_regression(problem, n_outputs, n_output_units):
     slow = estimator_transcription.PDeltaTrainer(layer, bins, counts)
     fast = model._trainer(X, y.astype(float))
     for order in orders:
-        assert tuple(fast.epoch(np.array(order, dtype=np.int32))) == slow.epoch(order)
+        assert tuple(fast.present(np.array(order, dtype=np.int32))) == slow.present(order)
     fast.synchronize()
     agree(model, layer, X)
     low, step = model.output_range_[:, 0], model._step()
@@ -94,11 +94,11 @@ def test_classification(problem, scheme):
     model, labels = untrained(SDNNClassifier(scheme=scheme, **options), X, y)
     layer = transcribed(model)
     slow = estimator_transcription.PerceptronTrainer(
-        layer, model.network_.input_code.bins(X), labels, scheme
+        layer, model.network_.input_code.bins(X), labels, len(model.classes_), scheme
     )
     fast = model._trainer(X, labels)
     for order in orders:
-        assert tuple(fast.epoch(np.array(order, dtype=np.int32))) == slow.epoch(order)
+        assert tuple(fast.present(np.array(order, dtype=np.int32))) == slow.present(order)
     fast.synchronize()
     agree(model, layer, X)
 
@@ -119,11 +119,11 @@ def test_fit_presents_the_orders_it_says(regression):
     slow = (
         estimator_transcription.PDeltaTrainer(layer, bins, targets)
         if regression
-        else estimator_transcription.PerceptronTrainer(layer, bins, targets, "one_vs_rest")
+        else estimator_transcription.PerceptronTrainer(layer, bins, targets, 3, "one_vs_rest")
     )
     orders = np.random.RandomState(11)
     orders.randint(2**31 - 1, size=2)
-    corrected = [slow.epoch(orders.permutation(30))[0] for _ in range(model.n_iter_)]
+    corrected = [slow.present(orders.permutation(30))[0] for _ in range(model.n_iter_)]
     assert model.n_corrected_.tolist() == corrected
     agree(model, layer, X)
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.datasets import load_iris
 
-from sdnn import SDNNClassifier, SDNNRegressor
+from sdnn import SDNNClassifier, SDNNRegressor, _core
 from sdnn.coding import Circular, RandomInverse
 
 RANDOM = np.random.RandomState(0)
@@ -205,3 +205,21 @@ def test_one_versus_one_counts_votes():
         votes[:, i] += potentials[:, unit] > 0
         votes[:, j] += potentials[:, unit] <= 0
     np.testing.assert_array_equal(np.round(model.decision_function(X)), votes)
+
+
+def test_words_and_unit_counts_are_those_of_the_core():
+    assert _core.TRAINING_FORMS == ("auto", "dual", "block", "plain")
+    assert _core.CLASS_SCHEMES == ("one_vs_rest", "one_vs_one")
+    assert [_core.n_units_for("one_vs_one", n) for n in (2, 3, 4)] == [1, 3, 6]
+    assert [_core.n_units_for("one_vs_rest", n) for n in (2, 3, 4)] == [2, 3, 4]
+    with pytest.raises(ValueError, match="scheme must be one_vs_rest or one_vs_one, got rest"):
+        _core.n_units_for("rest", 3)
+    with pytest.raises(ValueError, match=r"n_classes must be in \[2, 1024\], got 1"):
+        _core.n_units_for("one_vs_one", 1)
+
+
+def test_a_trainer_refuses_units_that_its_classes_do_not_need():
+    network = SDNNClassifier(**GIVEN, max_iter=1).fit(X, np.arange(len(X)) % 3).network_
+    bins = network.input_code.bins(X)
+    with pytest.raises(ValueError, match="n_units must be 6 for 4 classes, got 3"):
+        _core.PerceptronTrainer(network.layer, bins, np.zeros(len(X)), 4, "one_vs_one")

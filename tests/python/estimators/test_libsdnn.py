@@ -101,7 +101,7 @@ def test_the_demonstration_problem_has_libsdnns_weights(parameter_file, n_epochs
     layer = parameters.make_layer("libstdc++")
     trainer = parameters.make_trainer(layer, points, targets)
     for _ in range(n_epochs):
-        trainer.epoch(np.arange(2000))
+        trainer.present(np.arange(2000))
     trainer.synchronize()
     assert digest(layer) == expected
 

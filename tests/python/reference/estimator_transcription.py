@@ -73,7 +73,7 @@ class Trainer:
         self.memory = 0
         self.code = layer.code.transform(bins).astype(np.int32)
 
-    def epoch(self, order):
+    def present(self, order):
         n_samples = n_units = 0
         for t in order:
             x = self.code[t]
@@ -128,9 +128,12 @@ def class_pairs(n_classes):
 class PerceptronTrainer(Trainer):
     """Classification: corrects every unit that answers wrongly."""
 
-    def __init__(self, layer, bins, labels, scheme, form="auto", memory_limit=0, n_threads=1):
+    def __init__(
+        self, layer, bins, labels, n_classes, scheme, form="auto", memory_limit=0, n_threads=1
+    ):
         super().__init__(layer, bins)
         self.labels = np.asarray(labels)
+        self.n_classes = n_classes
         self.scheme = scheme
 
     def corrections(self, t, potentials):
@@ -138,10 +141,8 @@ class PerceptronTrainer(Trainer):
         if self.scheme == "one_vs_rest":
             wanted = np.where(np.arange(len(potentials)) == label, 1, -1)
         else:
-            n_classes = int((1 + np.sqrt(1 + 8 * len(potentials))) / 2)
-            wanted = np.array(
-                [1 if i == label else -1 if j == label else 0 for i, j in class_pairs(n_classes)]
-            )
+            pairs = class_pairs(self.n_classes)
+            wanted = np.array([1 if i == label else -1 if j == label else 0 for i, j in pairs])
         return np.where((potentials > 0) == (wanted > 0), 0, wanted).astype(np.int32)
 
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -9,7 +10,9 @@
 #include <cstdlib>
 #include <limits>
 #include <span>
+#include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -120,7 +123,22 @@ enum class ClassScheme {
   one_vs_one,   ///< units (0,1), (0,2), ..., (1,2), ...: fires for the first, silent for the second
 };
 
-/// The units that a scheme needs. Throws std::invalid_argument if there are fewer than 2 classes.
+inline constexpr std::array kClassSchemes{ClassScheme::one_vs_rest, ClassScheme::one_vs_one};
+
+inline std::string_view name_of(ClassScheme scheme) noexcept {
+  return scheme == ClassScheme::one_vs_rest ? "one_vs_rest" : "one_vs_one";
+}
+
+/// Throws std::invalid_argument if there is no such scheme.
+inline ClassScheme class_scheme_named(std::string_view name) {
+  for (const auto scheme : kClassSchemes) {
+    if (name == name_of(scheme)) return scheme;
+  }
+  throw std::invalid_argument("scheme must be one_vs_rest or one_vs_one, got " + std::string(name));
+}
+
+/// The units that a scheme needs. Throws std::invalid_argument if there are fewer than 2 classes or
+/// more than 1024.
 inline std::size_t n_units_for(ClassScheme scheme, std::size_t n_classes) {
   core::require_in_range("n_classes", n_classes, 2, 1024);
   return scheme == ClassScheme::one_vs_rest ? n_classes : n_classes * (n_classes - 1) / 2;

@@ -7,6 +7,7 @@
 #include <random>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -22,6 +23,13 @@ enum class StandardLibrary {
   libstdcxx,  ///< GCC 11 and later
   msvc,       ///< Visual Studio 2012 to 2019, as in LIBSDNN's own programs
 };
+
+/// "libstdc++" or "msvc". Throws std::invalid_argument for another name.
+inline StandardLibrary standard_library_named(std::string_view name) {
+  if (name == "libstdc++") return StandardLibrary::libstdcxx;
+  core::require(name == "msvc", "library", "libstdc++ or msvc", std::string(name));
+  return StandardLibrary::msvc;
+}
 
 /// LIBSDNN's generator: std::mt19937 from a std::seed_seq, both fully specified by the standard,
 /// and the uniform integers of one standard library, which are not.

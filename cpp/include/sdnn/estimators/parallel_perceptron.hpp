@@ -19,7 +19,6 @@
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/estimators/detail/query_order.hpp"
-#include "sdnn/estimators/detail/tile_rows.hpp"
 #include "sdnn/estimators/detail/unit_ranking.hpp"
 #include "sdnn/estimators/detail/weight_tiles.hpp"
 
@@ -87,6 +86,15 @@ class ParallelPerceptron {
   }
   std::int32_t threshold(std::size_t unit) const noexcept { return thresholds_[unit]; }
 
+  /// All weights, in the order of the columns. Shapes: out (n_units, n_columns).
+  void copy_weights(std::span<std::int32_t> out) const {
+    const std::vector<std::size_t> slots = slots_of_columns();
+    std::int32_t* weight = out.data();
+    for (std::size_t i = 0; i < n_units(); ++i) {
+      for (const std::size_t slot : slots) *weight++ = weights_.at(i, slot);
+    }
+  }
+
   /// What trainers write to; check_norms() holds them to the layer's promise.
   WeightTiles<std::int32_t>& tiles() noexcept { return weights_; }
   const WeightTiles<std::int32_t>& tiles() const noexcept { return weights_; }
@@ -127,7 +135,8 @@ class ParallelPerceptron {
   /// (n_padded_units,), of which the first n_units mean something. Throws std::invalid_argument for
   /// bins out of range or n_threads < 1.
   template <class Consume>
-  void visit(std::span<const std::int32_t> bins, int n_threads, const Consume& consume) const {
+  void for_each_query(std::span<const std::int32_t> bins, int n_threads,
+                      const Consume& consume) const {
     core::require_in_range("n_threads", n_threads, 1, 4096);
     code_->check_bins(bins);
     const std::size_t n_queries = bins.size() / code_->n_inputs();
@@ -139,30 +148,30 @@ class ParallelPerceptron {
       const WeightTiles<std::int16_t> narrow(weights_);
       const auto n_per_sum = static_cast<std::size_t>(std::numeric_limits<std::int16_t>::max() /
                                                       std::max<std::int64_t>(largest, 1));
-      visit_all(narrow, n_per_sum, bins, order, n_threads, consume);
+      answer_all(narrow, n_per_sum, bins, order, n_threads, consume);
     } else {
-      visit_all(weights_, std::size_t{1} << 30, bins, order, n_threads, consume);
+      answer_all(weights_, std::size_t{1} << 30, bins, order, n_threads, consume);
     }
   }
 
   /// Potentials in the order of the queries. Shapes: bins (n_queries, n_inputs), out
-  /// (n_queries, n_units). Throws like visit.
+  /// (n_queries, n_units). Throws like for_each_query.
   void potentials(std::span<const std::int32_t> bins, int n_threads,
                   std::span<std::int32_t> out) const {
-    visit(bins, n_threads, [&](std::size_t query, const std::int32_t* values) {
+    for_each_query(bins, n_threads, [&](std::size_t query, const std::int32_t* values) {
       std::copy_n(values, n_units(), out.data() + query * n_units());
     });
   }
 
   /// How many units fire in each of `n_groups` groups of equal size. Shapes: bins
   /// (n_queries, n_inputs), out (n_queries, n_groups). Throws std::invalid_argument unless n_groups
-  /// divides n_units, and like visit.
+  /// divides n_units, and like for_each_query.
   void counts(std::span<const std::int32_t> bins, std::size_t n_groups, int n_threads,
               std::span<std::int32_t> out) const {
     core::require(n_groups > 0 && n_units() % n_groups == 0, "n_groups",
                   "a divisor of n_units = " + std::to_string(n_units()), n_groups);
     const std::size_t size = n_units() / n_groups;
-    visit(bins, n_threads, [&](std::size_t query, const std::int32_t* values) {
+    for_each_query(bins, n_threads, [&](std::size_t query, const std::int32_t* values) {
       for (std::size_t g = 0; g < n_groups; ++g) {
         out[query * n_groups + g] = count_firing(values + g * size, size);
       }
@@ -184,9 +193,9 @@ class ParallelPerceptron {
   }
 
   template <class Weight, class Consume>
-  void visit_all(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
-                 std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
-                 int n_threads, const Consume& consume) const {
+  void answer_all(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
+                  std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
+                  int n_threads, const Consume& consume) const {
     const std::size_t n_parts =
         std::min(static_cast<std::size_t>(n_threads), (order.size() + 255) / 256);
     std::vector<std::jthread> threads;  // joined at the end of the scope
@@ -194,40 +203,37 @@ class ParallelPerceptron {
       const std::size_t begin = part * order.size() / n_parts;
       const std::size_t end = (part + 1) * order.size() / n_parts;
       threads.emplace_back([&, begin, end] {
-        visit_some(tiles, n_per_sum, bins, order.subspan(begin, end - begin), consume);
+        answer_some(tiles, n_per_sum, bins, order.subspan(begin, end - begin), consume);
       });
     }
-    visit_some(tiles, n_per_sum, bins, order.first(order.size() / n_parts), consume);
+    answer_some(tiles, n_per_sum, bins, order.first(order.size() / n_parts), consume);
   }
 
   template <class Weight, class Consume>
-  void visit_some(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
-                  std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
-                  const Consume& consume) const {
+  void answer_some(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
+                   std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
+                   const Consume& consume) const {
     const std::size_t n_words = code_->n_words();
     std::vector<std::uint64_t> words(4 * n_words);
     std::uint64_t* now = words.data();  // active, then positive
     std::uint64_t* before = now + 2 * n_words;
     std::vector<std::int32_t> values(n_padded_units());
-    const auto forget = [&] {  // the potentials of the code 0
+    const auto start_from_zero = [&] {  // the potentials of the code of zeros
       for (std::size_t i = 0; i < n_units(); ++i) values[i] = -thresholds_[i];
     };
-    forget();
+    start_from_zero();
     coding::ColumnLists slots(n_words);
     for (const std::uint32_t query : order) {
       code_->encode(bins.subspan(query * code_->n_inputs(), code_->n_inputs()), now, now + n_words);
       const coding::TernaryCode code{now, now + n_words};
       slots.read_changes({before, before + n_words}, code);
       // Counting costs too, and is worth it for codes that are far apart.
-      if (slots.columns().size() > code_->max_active() / 2 &&
-          slots.columns().size() > coding::n_active(code, n_words)) {
-        forget();
+      const std::size_t n_changes = slots.columns().size();
+      if (n_changes > code_->max_active() / 2 && n_changes > coding::n_active(code, n_words)) {
+        start_from_zero();
         slots.read(code);
       }
-      for (std::size_t tile = 0; tile < tiles.n_tiles(); ++tile) {
-        add_rows(tiles.tile(tile), tiles.width(tile), slots.columns().plus, slots.columns().minus,
-                 n_per_sum, values.data() + tile * kTileUnits);
-      }
+      tiles.add_columns(slots.columns(), n_per_sum, values.data());
       consume(query, values.data());
       std::swap(now, before);
     }

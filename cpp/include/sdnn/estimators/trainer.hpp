@@ -34,7 +34,8 @@ class Trainer {
   /// the rule knows another number of samples, std::length_error if `form` (other than automatic)
   /// needs more than `memory_limit` bytes.
   Trainer(std::shared_ptr<ParallelPerceptron> layer, std::span<const std::int32_t> bins, Rule rule,
-          TrainingForm form, std::size_t memory_limit, int n_threads)
+          TrainingForm form = TrainingForm::automatic, std::size_t memory_limit = kMemoryLimit,
+          int n_threads = 1)
       : layer_(std::move(layer)), rule_(std::move(rule)) {
     core::require_in_range("n_threads", n_threads, 1, 4096);
     layer_->code().check_bins(bins);
@@ -42,14 +43,13 @@ class Trainer {
     core::require(rule_.n_samples() == n_samples_, "targets or labels",
                   std::to_string(n_samples_) + " samples as bins has", rule_.n_samples());
     form_ = choose_form(form, layer_->n_units(), layer_->code(), n_samples_, memory_limit);
-    memory_ = form_memory(form_, layer_->n_units(), layer_->code(), n_samples_);
-    if (form_ == TrainingForm::block) {
-      const std::size_t more = plan_bytes(layer_->n_units(), layer_->code(), n_samples_);
-      keeps_plans_ = memory_ + more <= memory_limit;
-      memory_ += keeps_plans_ ? more : 0;
-    }
+    const auto memory = [&](bool keeps_plans) {
+      return form_memory(form_, layer_->n_units(), layer_->code(), n_samples_, keeps_plans);
+    };
+    const bool keeps_plans = form_ == TrainingForm::block && memory(true) <= memory_limit;
+    memory_ = memory(keeps_plans);
     renew_headroom();
-    make_training(bins, n_threads);
+    make_training(bins, n_threads, keeps_plans);
   }
 
   TrainingForm form() const noexcept { return form_; }
@@ -102,23 +102,20 @@ class Trainer {
     }
   }
 
-  void make_training(std::span<const std::int32_t> bins, int n_threads) {
-    const bool short_products = product_bytes(layer_->code()) == sizeof(std::int16_t);
+  void make_training(std::span<const std::int32_t> bins, int n_threads, bool keeps_plans) {
     const auto make = [&]<class Form>(std::in_place_type_t<Form> form, auto... more) {
       training_ = std::make_unique<Training>(form, layer_, bins, n_threads, more...);
     };
-    switch (form_) {
-      case TrainingForm::dual:
-        if (short_products) return make(std::in_place_type<DualTraining<std::int16_t>>);
-        return make(std::in_place_type<DualTraining<std::int32_t>>);
-      case TrainingForm::block:
-        if (short_products) {
-          return make(std::in_place_type<BlockTraining<std::int16_t>>, keeps_plans_);
-        }
-        return make(std::in_place_type<BlockTraining<std::int32_t>>, keeps_plans_);
-      default:
-        return make(std::in_place_type<PlainTraining>);
-    }
+    with_product_type(layer_->code(), [&]<class Product>() {
+      switch (form_) {
+        case TrainingForm::dual:
+          return make(std::in_place_type<DualTraining<Product>>);
+        case TrainingForm::block:
+          return make(std::in_place_type<BlockTraining<Product>>, keeps_plans);
+        default:
+          return make(std::in_place_type<PlainTraining>);
+      }
+    });
   }
 
   std::shared_ptr<ParallelPerceptron> layer_;
@@ -126,7 +123,6 @@ class Trainer {
   std::size_t n_samples_ = 0;
   TrainingForm form_ = TrainingForm::plain;
   std::size_t memory_ = 0;
-  bool keeps_plans_ = false;
   std::size_t headroom_ = 0;  // presentations that cannot overflow
   std::unique_ptr<Training> training_;
 };

@@ -13,9 +13,11 @@
 namespace sdnn {
 namespace {
 
+using estimators::ChunkedWeights;
 using estimators::CodeWalk;
 using estimators::kChunkColumns;
 using estimators::kChunkWords;
+using estimators::WeightTiles;
 
 std::vector<testing::Code> some_codes(std::size_t n_words, core::Random& random) {
   std::vector<testing::Code> codes{testing::random_code(n_words, random)};
@@ -43,7 +45,7 @@ void check_walk(std::int32_t largest) {
         ASSERT_EQ(walk.n_chunks(), n_words / kChunkWords);
         for (std::size_t chunk = 0; chunk < walk.n_chunks(); ++chunk) {
           std::vector<std::int32_t> potentials(codes.size() * stride, 11);
-          estimators::walk_chunk(rows.data(), width, walk.stops(), walk.changes(chunk),
+          estimators::walk_chunk(rows.data(), width, walk.steps(), walk.changes(chunk),
                                  potentials.data(), stride);
           for (std::size_t k = 0; k < codes.size(); ++k) {
             for (std::size_t i = 0; i < stride; ++i) {
@@ -65,29 +67,41 @@ TEST(CodeWalk, SumsWhatEachCodeAsksFor) {
   check_walk<std::int32_t>(1000000);
 }
 
-TEST(CodeWalk, StartsAfreshWhereThatIsNearer) {
+TEST(CodeWalk, StartsFromZeroWhereThatIsNearer) {
   core::Random random(9, core::Stream::weights);
   const auto codes = some_codes(4 * kChunkWords, random);
   std::vector<std::uint32_t> order(codes.size());
   std::iota(order.begin(), order.end(), 0U);
   const CodeWalk walk(order, 4 * kChunkWords, [&](std::uint32_t k) { return codes[k].words(); });
-  EXPECT_FALSE(walk.stops()[3].afresh);
-  EXPECT_TRUE(walk.stops().back().afresh);
+  EXPECT_FALSE(walk.steps()[3].from_zero);
+  EXPECT_TRUE(walk.steps().back().from_zero);
 }
 
-TEST(CodeWalk, ExpandsCodes) {
-  core::Random random(10, core::Stream::weights);
-  const auto code = testing::random_code(2 * kChunkWords, random);
-  testing::on_every_instruction_set([&](auto level) {
-    const std::size_t stride = 3 * kChunkColumns;
-    std::vector<std::int8_t> entries(2 * stride, 7);
-    estimators::expand_code(code.words(), 2 * kChunkWords, entries.data(), stride);
-    for (std::size_t slot = 0; slot < 2 * kChunkColumns; ++slot) {
-      ASSERT_EQ(entries[slot / kChunkColumns * stride + slot % kChunkColumns], code.at(slot))
-          << level;
-    }
-    EXPECT_EQ(entries[kChunkColumns], 7);
-  });
+TEST(ChunkedWeights, HoldTheTilesAndZerosBeyond) {
+  WeightTiles<std::int32_t> tiles(20, 3 * 64);
+  tiles.at(17, 130) = -300;
+  tiles.at(17, 131) = 40000;
+  const ChunkedWeights<std::int32_t> wide(tiles, 4);
+  EXPECT_EQ(wide.n_chunks(), 2U);
+  EXPECT_EQ(wide.n_padded_units(), 32U);
+  EXPECT_EQ(wide.chunk(1, 17)[130 - kChunkColumns], -300);
+  EXPECT_EQ(wide.chunk(1, 17)[127], 0);
+  EXPECT_EQ(wide.largest_chunk_norm(), 40300);
+  EXPECT_EQ(ChunkedWeights<std::int32_t>::bytes(32, 4), 4U * 32 * 256);
+}
+
+TEST(ChunkedWeights, GoThereAndBack) {
+  WeightTiles<std::int32_t> tiles(200, 128);
+  std::int32_t value = -10000;
+  for (std::size_t i = 0; i < 200; ++i) {
+    for (std::size_t slot = 0; slot < 128; ++slot) tiles.at(i, slot) = ++value;
+  }
+  const ChunkedWeights<std::int16_t> narrow(ChunkedWeights<std::int32_t>(tiles, 2));
+  WeightTiles<std::int32_t> back(200, 128);
+  narrow.copy_to(back);
+  for (std::size_t i = 0; i < 200; ++i) {
+    for (std::size_t slot = 0; slot < 128; ++slot) ASSERT_EQ(back.at(i, slot), tiles.at(i, slot));
+  }
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "estimators/codes.hpp"
 #include "instruction_sets.hpp"
 #include "sdnn/core/random.hpp"
 
@@ -52,6 +53,39 @@ TEST(SignedSums, OfNothingChangeNothing) {
   std::vector<std::int32_t> to(40, 9);
   estimators::add_signed(to.data(), to.size(), estimators::SignedRows<std::int16_t>(), 0, 8);
   EXPECT_EQ(to, std::vector<std::int32_t>(40, 9));
+}
+
+TEST(SignedSums, TakeCodesAsRows) {
+  core::Random random(10, core::Stream::weights);
+  constexpr std::size_t kChunkWords = 2;
+  constexpr std::size_t kColumns = 64 * kChunkWords;
+  const auto code = testing::random_code(2 * kChunkWords, random);
+  testing::on_every_instruction_set([&](auto level) {
+    const std::size_t stride = 3 * kColumns;
+    std::vector<std::int8_t> entries(2 * stride, 7);
+    estimators::expand_code(code.words(), 2 * kChunkWords, kChunkWords, entries.data(), stride);
+    for (std::size_t slot = 0; slot < 2 * kColumns; ++slot) {
+      ASSERT_EQ(entries[slot / kColumns * stride + slot % kColumns], code.at(slot)) << level;
+    }
+    EXPECT_EQ(entries[kColumns], 7);
+  });
+}
+
+template <class Product>
+void check_one_row() {
+  const std::vector<Product> row{3, -4, 5};
+  testing::on_every_instruction_set([&](auto level) {
+    std::vector<std::int32_t> to{1000000, 2, 3, 4};
+    estimators::add_row(to.data(), row.data(), 1, row.size());
+    EXPECT_EQ(to, (std::vector<std::int32_t>{1000003, -2, 8, 4})) << level;
+    estimators::add_row(to.data() + 1, row.data(), -1, row.size());
+    EXPECT_EQ(to, (std::vector<std::int32_t>{1000003, -5, 12, -1})) << level;
+  });
+}
+
+TEST(SignedSums, TakeARowAlone) {
+  check_one_row<std::int16_t>();
+  check_one_row<std::int32_t>();
 }
 
 }  // namespace

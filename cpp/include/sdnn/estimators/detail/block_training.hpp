@@ -9,20 +9,19 @@
 #include <memory>
 #include <span>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/worker_team.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
-#include "sdnn/estimators/detail/chunked_weights.hpp"
 #include "sdnn/estimators/detail/code_walk.hpp"
 #include "sdnn/estimators/detail/presentation_window.hpp"
 #include "sdnn/estimators/detail/query_order.hpp"
 #include "sdnn/estimators/detail/signed_sums.hpp"
 #include "sdnn/estimators/detail/transposition.hpp"
 #include "sdnn/estimators/parallel_perceptron.hpp"
-#include "sdnn/estimators/training_form.hpp"
 
 namespace sdnn::estimators {
 
@@ -34,8 +33,9 @@ namespace sdnn::estimators {
 /// the weights are corrected before the next pass, all corrections of a unit together. Weights are
 /// kept in 16 bits, in 32 as soon as a sum of them could leave 16.
 ///
-/// Blocks are large where the same ones come again in every round through the data and there is
-/// memory to keep what does not change of them. `Product` is an integer that holds every product.
+/// Blocks are large where the same ones come again in every epoch, in the order of the data, and
+/// there is memory to keep what does not change of them. `Product` is an integer that holds every
+/// product.
 template <class Product>
 class BlockTraining {
  public:
@@ -43,7 +43,7 @@ class BlockTraining {
                 int n_threads, bool keeps_plans)
       : layer_(std::move(layer)),
         bins_(bins.begin(), bins.end()),
-        n_words_(block_words(layer_->code())),
+        n_words_(words_for(layer_->code())),
         team_(static_cast<std::size_t>(n_threads)),
         most_samples_(keeps_plans ? kLargeBlock : kSmallBlock),
         keeps_plans_(keeps_plans),
@@ -51,20 +51,17 @@ class BlockTraining {
         entries_(64 * most_samples_ * n_words_),
         potentials_(most_samples_ * layer_->n_padded_units()),
         window_(layer_->n_padded_units(), most_samples_),
-        pending_(layer_->n_units()) {
-    wide_ = ChunkedWeights<std::int32_t>(layer_->tiles(), n_words_);
-    chunk_norm_ = wide_.largest_chunk_norm();
-    if (chunk_norm_ <= kLargestSum) {
-      narrow_ = ChunkedWeights<std::int16_t>(wide_);
-      wide_ = {};
-    }
+        pending_(layer_->n_units()),
+        weights_(std::in_place_type<Wide>, layer_->tiles(), n_words_),
+        chunk_norm_(std::get<Wide>(weights_).largest_chunk_norm()) {
+    if (chunk_norm_ <= kLargestSum) weights_ = Narrow(std::get<Wide>(weights_));
   }
 
   template <class Rule>
   TrainingCount present(std::span<const std::int32_t> order, Rule& rule) {
-    if (keeps_plans_ && is_whole_round(order)) {
-      if (had_a_round_) return present_round(order, rule);
-      had_a_round_ = true;  // it may be the only one
+    if (keeps_plans_ && is_epoch_in_data_order(order)) {
+      if (had_an_epoch_) return present_epoch(order, rule);
+      had_an_epoch_ = true;  // it may be the only one
     }
     TrainingCount count;
     while (!order.empty()) {
@@ -76,15 +73,40 @@ class BlockTraining {
     return count;
   }
 
+  /// Bytes beside the layer and the samples' bins; at most 1 % less than it takes.
+  static std::size_t bytes(std::size_t n_units, const coding::SelectiveDesensitization& code,
+                           std::size_t n_samples, bool keeps_plans) noexcept {
+    const std::size_t n_padded = core::round_up(n_units, kTileStep);
+    const std::size_t n_words = words_for(code);
+    const std::size_t size = keeps_plans ? kLargeBlock : kSmallBlock;
+    const auto plan_bytes = [&](std::size_t n) {
+      return sizeof(Product) * n * size + CodeWalk::bytes(n, n_words, code.max_active());
+    };
+    return Wide::bytes(n_padded, n_words)                // weights_, or half of it
+           + 2 * sizeof(std::uint64_t) * size * n_words  // words_
+           + 64 * size * n_words                         // entries_
+           + sizeof(std::int32_t) * size * n_padded      // potentials_
+           + PresentationWindow::bytes(n_padded, size)   // window_
+           + plan_bytes(size)                            // of the block at hand
+           + (keeps_plans ? plan_bytes(n_samples) : 0);  // plans_
+  }
+
   void synchronize() {
-    if (narrow_.empty()) {
-      wide_.copy_to(layer_->tiles());
-    } else {
-      narrow_.copy_to(layer_->tiles());
-    }
+    std::visit([&](const auto& weights) { weights.copy_to(layer_->tiles()); }, weights_);
   }
 
  private:
+  // Samples per pass over the weights: where plans are kept, and elsewhere.
+  static constexpr std::size_t kLargeBlock = 512;
+  static constexpr std::size_t kSmallBlock = 128;
+
+  /// Words of a code, filled up with zeros to whole chunks.
+  static std::size_t words_for(const coding::SelectiveDesensitization& code) noexcept {
+    return core::round_up(code.n_words(), 2 * kChunkWords);
+  }
+
+  using Narrow = ChunkedWeights<std::int16_t>;
+  using Wide = ChunkedWeights<std::int32_t>;
   static constexpr std::int64_t kLargestSum = std::numeric_limits<std::int16_t>::max();
   template <class Weight>
   using Columns = std::array<Weight, kChunkColumns * kMostUnits<Weight>>;
@@ -97,7 +119,7 @@ class BlockTraining {
   };
 
   /// Every sample once, in the order of the data?
-  bool is_whole_round(std::span<const std::int32_t> order) const noexcept {
+  bool is_epoch_in_data_order(std::span<const std::int32_t> order) const noexcept {
     if (order.size() != bins_.size() / layer_->code().n_inputs()) return false;
     for (std::size_t i = 0; i < order.size(); ++i) {
       if (static_cast<std::size_t>(order[i]) != i) return false;
@@ -105,9 +127,9 @@ class BlockTraining {
     return true;
   }
 
-  /// A whole round in large blocks, whose plans are kept for the next one.
+  /// An epoch in large blocks, whose plans are kept for the next one.
   template <class Rule>
-  TrainingCount present_round(std::span<const std::int32_t> order, Rule& rule) {
+  TrainingCount present_epoch(std::span<const std::int32_t> order, Rule& rule) {
     TrainingCount count;
     plans_.resize((order.size() + kLargeBlock - 1) / kLargeBlock);
     for (Plan& plan : plans_) {
@@ -124,9 +146,10 @@ class BlockTraining {
     if (plan->walk.empty()) make_plan(samples, plan);
     sum_potentials(samples.size(), plan->walk);
     const TrainingCount count = window_.present(
-        samples, plan->products.data(), plan->stride, rule, [&](std::size_t b, Correction made) {
-          pending_[made.unit].add(entries_.data() + kChunkColumns * b, made.direction);
-          layer_->thresholds()[made.unit] -= made.direction;
+        samples, plan->products.data(), plan->stride, rule,
+        [&](std::size_t b, Correction correction) {
+          pending_[correction.unit].add(entries_.data() + kChunkColumns * b, correction.direction);
+          layer_->thresholds()[correction.unit] -= correction.direction;
         });
     correct_weights();
     return count;
@@ -144,7 +167,7 @@ class BlockTraining {
       code.encode(std::span(bins_).subspan(static_cast<std::size_t>(samples[b]) * code.n_inputs(),
                                            code.n_inputs()),
                   active, active + n_words_);
-      expand_code(code_of(b), n_words_, entries_.data() + kChunkColumns * b,
+      expand_code(code_of(b), n_words_, kChunkWords, entries_.data() + kChunkColumns * b,
                   kChunkColumns * most_samples_);
     });
   }
@@ -176,11 +199,7 @@ class BlockTraining {
       std::int32_t* const values = &potentials_[b * n_padded];
       for (std::size_t i = 0; i < layer_->n_units(); ++i) values[i] = -layer_->thresholds()[i];
     }
-    if (narrow_.empty()) {
-      walk_over(wide_, walk);
-    } else {
-      walk_over(narrow_, walk);
-    }
+    std::visit([&](const auto& weights) { walk_over(weights, walk); }, weights_);
     transpose(potentials_.data(), n_padded, n_samples, n_padded, window_.row(0), window_.stride());
   }
 
@@ -196,7 +215,7 @@ class BlockTraining {
         for (std::size_t chunk = 0; chunk < walk.n_chunks(); ++chunk) {
           transpose(weights.chunk(chunk, first), kChunkColumns, n, kChunkColumns, columns.data(),
                     n);
-          walk_chunk(columns.data(), n, walk.stops(), walk.changes(chunk),
+          walk_chunk(columns.data(), n, walk.steps(), walk.changes(chunk),
                      potentials_.data() + first, n_padded);
         }
       }
@@ -204,33 +223,30 @@ class BlockTraining {
   }
 
   void correct_weights() {
-    keep_sums_in_16_bits();
-    team_.run_over(n_words_ / kChunkWords, [&](std::size_t chunk) {
-      const std::size_t offset = chunk * kChunkColumns * most_samples_;
-      for (std::size_t i = 0; i < layer_->n_units(); ++i) {
-        if (pending_[i].empty()) continue;
-        if (narrow_.empty()) {
-          add_signed(wide_.chunk(chunk, i), kChunkColumns, pending_[i], offset, kPerByte);
-        } else {
-          add_signed(narrow_.chunk(chunk, i), kChunkColumns, pending_[i], offset, kPerByte);
+    widen_before_sums_overflow();
+    const auto correct = [&](auto& weights) {
+      team_.run_over(weights.n_chunks(), [&](std::size_t chunk) {
+        const std::size_t offset = chunk * kChunkColumns * most_samples_;
+        for (std::size_t i = 0; i < layer_->n_units(); ++i) {
+          if (pending_[i].empty()) continue;
+          add_signed(weights.chunk(chunk, i), kChunkColumns, pending_[i], offset, kPerByte);
         }
-      }
-    });
+      });
+    };
+    std::visit(correct, weights_);
     for (auto& rows : pending_) rows.clear();
   }
 
   /// The sum of |weights| of a unit in a chunk grows by no more than its columns per correction.
-  void keep_sums_in_16_bits() {
-    if (narrow_.empty()) return;
+  void widen_before_sums_overflow() {
+    const auto* const narrow = std::get_if<Narrow>(&weights_);
+    if (narrow == nullptr) return;
     std::size_t most = 0;
     for (const auto& rows : pending_) most = std::max(most, rows.size());
     const auto growth = static_cast<std::int64_t>(most * kChunkColumns);
     if (chunk_norm_ + growth > kLargestSum) {
-      chunk_norm_ = narrow_.largest_chunk_norm();
-      if (chunk_norm_ + growth > kLargestSum) {
-        wide_ = ChunkedWeights<std::int32_t>(narrow_);
-        narrow_ = {};
-      }
+      chunk_norm_ = narrow->largest_chunk_norm();
+      if (chunk_norm_ + growth > kLargestSum) weights_ = Wide(*narrow);
     }
     chunk_norm_ += growth;
   }
@@ -243,16 +259,15 @@ class BlockTraining {
   core::WorkerTeam team_;
   std::size_t most_samples_;
   bool keeps_plans_;
-  bool had_a_round_ = false;  // in the order of the data
+  bool had_an_epoch_ = false;  // in the order of the data
   std::vector<Plan> plans_;
   std::vector<std::uint64_t> words_;          // (most_samples, active then positive, n_words)
   core::AlignedBuffer<std::int8_t> entries_;  // (chunks, most_samples, kChunkColumns): +1, 0, -1
   core::AlignedBuffer<std::int32_t> potentials_;  // (most_samples, n_padded_units)
   PresentationWindow window_;
   std::vector<SignedRows<std::int8_t>> pending_;  // of each unit, codes not yet in its weights
-  std::int64_t chunk_norm_ = 0;  // no unit's |weights| in a chunk have a larger sum
-  ChunkedWeights<std::int16_t> narrow_;
-  ChunkedWeights<std::int32_t> wide_;  // one of the two is empty
+  std::variant<Narrow, Wide> weights_;
+  std::int64_t chunk_norm_;  // while they are narrow: no unit's |weights| in a chunk sum up to more
 };
 
 }  // namespace sdnn::estimators

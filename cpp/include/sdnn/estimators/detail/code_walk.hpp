@@ -1,15 +1,19 @@
-/// Potentials of many samples, each from those of the sample before on a short walk.
+/// Potentials of many samples, each from those of the sample before on a short walk, and the
+/// weights in the order in which such a walk reads them.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <span>
 #include <vector>
 
 #include "sdnn/coding/detail/ternary_code.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/integer_register.hpp"
 #include "sdnn/core/detail/kernel.hpp"
-#include "sdnn/estimators/detail/tile_rows.hpp"
+#include "sdnn/estimators/detail/weight_tiles.hpp"
 
 namespace sdnn::estimators {
 
@@ -18,60 +22,80 @@ namespace sdnn::estimators {
 inline constexpr std::size_t kChunkWords = 2;
 inline constexpr std::size_t kChunkColumns = 64 * kChunkWords;
 
+/// The weights of many units in chunks of columns, in each chunk unit after unit: n_padded_units
+/// units and n_words * 64 slots, the ones that tiles lack all 0.
+template <class Weight>
+class ChunkedWeights {
+ public:
+  /// `n_words` is a multiple of kChunkWords, and at least the tiles'.
+  ChunkedWeights(const WeightTiles<std::int32_t>& tiles, std::size_t n_words)
+      : ChunkedWeights(tiles.n_padded_units(), n_words) {
+    for (std::size_t i = 0; i < tiles.n_units(); ++i) {
+      for (std::size_t slot = 0; slot < tiles.n_slots(); ++slot) {
+        chunk(slot / kChunkColumns, i)[slot % kChunkColumns] =
+            static_cast<Weight>(tiles.at(i, slot));
+      }
+    }
+  }
+  /// A copy in another type. The weights must fit.
+  template <class Other>
+  explicit ChunkedWeights(const ChunkedWeights<Other>& other)
+      : ChunkedWeights(other.n_padded_units(), other.n_chunks() * kChunkWords) {
+    std::transform(other.data(), other.data() + weights_.size(), weights_.data(),
+                   [](Other weight) { return static_cast<Weight>(weight); });
+  }
+
+  static std::size_t bytes(std::size_t n_padded_units, std::size_t n_words) noexcept {
+    return sizeof(Weight) * n_padded_units * 64 * n_words;
+  }
+
+  std::size_t n_padded_units() const noexcept { return n_padded_units_; }
+  std::size_t n_chunks() const noexcept { return n_chunks_; }
+  const Weight* data() const noexcept { return weights_.data(); }
+  /// kChunkColumns weights of a unit; the next unit's follow.
+  Weight* chunk(std::size_t chunk, std::size_t unit) noexcept {
+    return weights_.data() + (chunk * n_padded_units_ + unit) * kChunkColumns;
+  }
+  const Weight* chunk(std::size_t chunk, std::size_t unit) const noexcept {
+    return weights_.data() + (chunk * n_padded_units_ + unit) * kChunkColumns;
+  }
+
+  void copy_to(WeightTiles<std::int32_t>& tiles) const noexcept {
+    for (std::size_t i = 0; i < tiles.n_units(); ++i) {
+      for (std::size_t slot = 0; slot < tiles.n_slots(); ++slot) {
+        tiles.at(i, slot) = chunk(slot / kChunkColumns, i)[slot % kChunkColumns];
+      }
+    }
+  }
+
+  /// The largest sum of a unit's |weights| in a chunk.
+  std::int64_t largest_chunk_norm() const noexcept {
+    std::int64_t largest = 0;
+    for (std::size_t at = 0; at < weights_.size(); at += kChunkColumns) {
+      std::int64_t norm = 0;
+      for (std::size_t k = 0; k < kChunkColumns; ++k)
+        norm += std::abs(std::int64_t{weights_[at + k]});
+      largest = std::max(largest, norm);
+    }
+    return largest;
+  }
+
+ private:
+  ChunkedWeights(std::size_t n_padded_units, std::size_t n_words)
+      : n_padded_units_(n_padded_units),
+        n_chunks_(n_words / kChunkWords),
+        weights_(n_padded_units * 64 * n_words) {}
+
+  std::size_t n_padded_units_ = 0;
+  std::size_t n_chunks_ = 0;
+  core::AlignedBuffer<Weight> weights_;  // (n_chunks, n_padded_units, kChunkColumns)
+};
+
 /// Units that are added side by side, in six registers.
 template <class Weight>
 inline constexpr std::size_t kMostUnits = 6 * core::IntegerRegister<Weight>::kSize;
 
 namespace detail {
-
-#if SDNN_LANES && !defined(__clang__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpsabi"
-#endif
-
-/// entries[k] = bit k of `plus` less bit k of `minus`, for 32 bits.
-SDNN_INLINE void expand_bits(std::uint32_t plus, std::uint32_t minus,
-                             std::int8_t* entries) noexcept {
-#if SDNN_LANES
-  using Bytes = core::IntegerRegister<std::int8_t>;
-  typedef std::uint8_t Bits __attribute__((vector_size(32)));
-  constexpr Bits kOwn = {1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128,  //
-                         1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128};
-  const auto all_ones_if_set = [&](std::uint32_t bits) SDNN_INLINE_LAMBDA {
-    typedef std::uint32_t Copies __attribute__((vector_size(32)));
-    const Bits copies = (Bits)(Copies{} + bits);
-    const Bits own = __builtin_shufflevector(copies, copies,                                  //
-                                             0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1,  //
-                                             18, 18, 18, 18, 18, 18, 18, 18,                  //
-                                             19, 19, 19, 19, 19, 19, 19, 19);
-    return Bytes{(Bytes::Vector)((own & kOwn) == kOwn)};
-  };
-  Bytes{all_ones_if_set(minus).v - all_ones_if_set(plus).v}.store(entries);
-#else
-  for (int k = 0; k < 32; ++k) {
-    entries[k] = static_cast<std::int8_t>(static_cast<int>(plus >> k & 1) -
-                                          static_cast<int>(minus >> k & 1));
-  }
-#endif
-}
-
-#if SDNN_LANES && !defined(__clang__)
-#pragma GCC diagnostic pop
-#endif
-
-SDNN_INLINE void expand_code_body(const coding::TernaryCode& code, std::size_t n_words,
-                                  std::int8_t* entries, std::size_t chunk_stride) noexcept {
-  for (std::size_t w = 0; w < n_words; w += kChunkWords, entries += chunk_stride) {
-    for (std::size_t k = 0; k < kChunkWords; ++k) {
-      const std::uint64_t plus = code.positive[w + k];
-      const std::uint64_t minus = code.active[w + k] & ~plus;
-      for (const std::size_t half : {0, 1}) {
-        expand_bits(static_cast<std::uint32_t>(plus >> 32 * half),
-                    static_cast<std::uint32_t>(minus >> 32 * half), entries + 64 * k + 32 * half);
-      }
-    }
-  }
-}
 
 SDNN_INLINE std::uint8_t* list_chunk_changes_body(const coding::TernaryCode& from,
                                                   const coding::TernaryCode& to,
@@ -93,12 +117,6 @@ SDNN_INLINE std::uint8_t* list_chunk_changes_body(const coding::TernaryCode& fro
 
 }  // namespace detail
 
-/// entries[chunk * chunk_stride + k] = the code's +1, 0 or -1 in column k of a chunk.
-SDNN_KERNEL(void, expand_code,
-            (const coding::TernaryCode& code, std::size_t n_words, std::int8_t* entries,
-             std::size_t chunk_stride),
-            (code, n_words, entries, chunk_stride))
-
 /// Lists what leads from one code to another, chunk by chunk: the columns that rise, one that rises
 /// by 2 twice, then those that fall.
 ///
@@ -112,12 +130,12 @@ SDNN_KERNEL(std::uint8_t*, list_chunk_changes,
 /// Samples in the order of a walk, and the columns in which each code differs from the one before.
 class CodeWalk {
  public:
-  /// A sample of the walk.
-  struct Stop {
+  /// To a sample, from the one before or from the code of zeros.
+  struct Step {
     std::uint32_t sample;
-    bool afresh;  ///< from nothing, not from the sample before
+    bool from_zero;
   };
-  /// In one chunk, stop by stop: columns that rise, then columns that fall, and how many there are.
+  /// In one chunk, step by step: columns that rise, then columns that fall, and how many there are.
   struct Changes {
     struct Count {
       std::uint16_t rising;
@@ -133,10 +151,10 @@ class CodeWalk {
   template <class CodeOf>
   CodeWalk(std::span<const std::uint32_t> order, std::size_t n_words, const CodeOf& code_of)
       : chunks_(n_words / kChunkWords) {
-    const std::vector<std::uint64_t> nothing(n_words);
+    const std::vector<std::uint64_t> zeros(n_words);
     std::vector<std::uint8_t> columns(2 * 64 * n_words + 4);
     std::vector<std::uint8_t*> ends(2 * chunks_.size());
-    coding::TernaryCode last{nothing.data(), nothing.data()};
+    coding::TernaryCode last{zeros.data(), zeros.data()};
     for (const std::uint32_t sample : order) {
       const coding::TernaryCode code = code_of(sample);
       const auto list = [&](const coding::TernaryCode& from) {
@@ -144,12 +162,12 @@ class CodeWalk {
             list_chunk_changes(from, code, n_words, columns.data(), ends.data());
         return static_cast<std::size_t>(end - columns.data());
       };
-      bool afresh = stops_.empty();
+      bool from_zero = steps_.empty();
       if (list(last) > coding::n_active(code, n_words)) {
-        list({nothing.data(), nothing.data()});
-        afresh = true;
+        list({zeros.data(), zeros.data()});
+        from_zero = true;
       }
-      stops_.push_back({sample, afresh});
+      steps_.push_back({sample, from_zero});
       const std::uint8_t* begin = columns.data();
       for (std::size_t c = 0; c < chunks_.size(); ++c) {
         const std::uint8_t* const middle = ends[2 * c];
@@ -169,13 +187,13 @@ class CodeWalk {
     return n_samples * (most_active + n_words / kChunkWords * sizeof(Changes::Count));
   }
 
-  bool empty() const noexcept { return stops_.empty(); }
+  bool empty() const noexcept { return steps_.empty(); }
   std::size_t n_chunks() const noexcept { return chunks_.size(); }
-  std::span<const Stop> stops() const noexcept { return stops_; }
+  std::span<const Step> steps() const noexcept { return steps_; }
   const Changes& changes(std::size_t chunk) const noexcept { return chunks_[chunk]; }
 
  private:
-  std::vector<Stop> stops_;
+  std::vector<Step> steps_;
   std::vector<Changes> chunks_;
 };
 
@@ -183,7 +201,7 @@ namespace detail {
 
 template <class Weight>
 SDNN_INLINE void walk_chunk_body(const Weight* rows, std::size_t width,
-                                 std::span<const CodeWalk::Stop> stops,
+                                 std::span<const CodeWalk::Step> steps,
                                  const CodeWalk::Changes& changes, std::int32_t* potentials,
                                  std::size_t stride) noexcept {
   using Lane = core::IntegerRegister<Weight>;
@@ -193,8 +211,8 @@ SDNN_INLINE void walk_chunk_body(const Weight* rows, std::size_t width,
     core::unrolled<kRegisters>([&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].clear(); });
     const std::uint8_t* column = changes.columns.data();
     const CodeWalk::Changes::Count* count = changes.counts.data();
-    for (const CodeWalk::Stop& stop : stops) {
-      if (stop.afresh) {
+    for (const CodeWalk::Step& step : steps) {
+      if (step.from_zero) {
         core::unrolled<kRegisters>([&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].clear(); });
       }
       for (const std::uint8_t* const end = column + count->rising; column != end; ++column) {
@@ -208,7 +226,7 @@ SDNN_INLINE void walk_chunk_body(const Weight* rows, std::size_t width,
             [&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].subtract(row + r * Lane::kSize); });
       }
       ++count;
-      std::int32_t* const to = potentials + stop.sample * stride;
+      std::int32_t* const to = potentials + step.sample * stride;
       core::unrolled<kRegisters>([&](std::size_t r)
                                      SDNN_INLINE_LAMBDA { sum[r].add_to(to + r * Lane::kSize); });
     }
@@ -223,12 +241,12 @@ SDNN_INLINE void walk_chunk_body(const Weight* rows, std::size_t width,
 ///
 /// Shapes: rows (kChunkColumns, width).
 SDNN_KERNEL(void, walk_chunk,
-            (const std::int16_t* rows, std::size_t width, std::span<const CodeWalk::Stop> stops,
+            (const std::int16_t* rows, std::size_t width, std::span<const CodeWalk::Step> steps,
              const CodeWalk::Changes& changes, std::int32_t* potentials, std::size_t stride),
-            (rows, width, stops, changes, potentials, stride))
+            (rows, width, steps, changes, potentials, stride))
 SDNN_KERNEL(void, walk_chunk,
-            (const std::int32_t* rows, std::size_t width, std::span<const CodeWalk::Stop> stops,
+            (const std::int32_t* rows, std::size_t width, std::span<const CodeWalk::Step> steps,
              const CodeWalk::Changes& changes, std::int32_t* potentials, std::size_t stride),
-            (rows, width, stops, changes, potentials, stride))
+            (rows, width, steps, changes, potentials, stride))
 
 }  // namespace sdnn::estimators

@@ -20,9 +20,8 @@
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/detail/presentation_window.hpp"
 #include "sdnn/estimators/detail/signed_sums.hpp"
-#include "sdnn/estimators/detail/tile_rows.hpp"
+#include "sdnn/estimators/detail/weight_tiles.hpp"
 #include "sdnn/estimators/parallel_perceptron.hpp"
-#include "sdnn/estimators/training_form.hpp"
 
 namespace sdnn::estimators {
 
@@ -41,22 +40,22 @@ class DualTraining {
                int n_threads)
       : layer_(std::move(layer)),
         coded_(layer_->code(), bins),
-        row_size_(dual_row_size(coded_.size())),
+        row_size_(row_size_for(coded_.size())),
         n_per_sum_(std::numeric_limits<Product>::max() / (layer_->code().max_active() + 1)),
         team_(static_cast<std::size_t>(n_threads)),
         products_(coded_.size() * row_size_),
         potentials_(layer_->n_units() * row_size_),
         pending_(layer_->n_units()),
         coefficients_(coded_.size() * layer_->n_padded_units()),
-        window_(layer_->n_padded_units(), kSmallBlock),
-        gathered_(kSmallBlock * kSmallBlock) {
+        window_(layer_->n_padded_units(), kWindow),
+        gathered_(kWindow * kWindow) {
     // Blocks of rows get cheaper towards the end: threads take them in turn.
     team_.run([&](std::size_t part) {
       for (std::size_t t = kRows * part; t < coded_.size(); t += kRows * team_.size()) {
         fill_products(t, std::min(t + kRows, coded_.size()));
       }
     });
-    layer_->visit(bins, n_threads, [&](std::size_t t, const std::int32_t* values) {
+    layer_->for_each_query(bins, n_threads, [&](std::size_t t, const std::int32_t* values) {
       for (std::size_t i = 0; i < layer_->n_units(); ++i) {
         potentials_[i * row_size_ + t] = values[i];
       }
@@ -70,19 +69,32 @@ class DualTraining {
         std::adjacent_find(order.begin(), order.end(),
                            [](auto one, auto next) { return next != one + 1; }) == order.end();
     // Corrections may wait where a window's share of their rows lies side by side.
-    const std::size_t patience = in_data_order ? kPatience : 1;
-    for (std::size_t waiting = 0; !order.empty(); waiting += kSmallBlock) {
-      if (waiting >= patience || full_) {
+    const std::size_t interval = in_data_order ? kFlushInterval : 1;
+    for (std::size_t waiting = 0; !order.empty(); waiting += kWindow) {
+      if (waiting >= interval || full_) {
         flush();
         waiting = 0;
       }
       if (full_) synchronize();
-      const auto now = order.first(std::min(order.size(), kSmallBlock));
+      const auto now = order.first(std::min(order.size(), kWindow));
       count += in_data_order ? present_row(now, rule) : present_some(now, rule);
       order = order.subspan(now.size());
     }
     flush();
     return count;
+  }
+
+  /// Bytes beside the layer and the samples' bins; at most 1 % less than it takes.
+  static std::size_t bytes(std::size_t n_units, const coding::SelectiveDesensitization& code,
+                           std::size_t n_samples) noexcept {
+    const std::size_t n_padded = core::round_up(n_units, kTileStep);
+    const std::size_t row_size = row_size_for(n_samples);
+    return coding::CodedSamples::bytes(code, n_samples)    // coded_
+           + sizeof(Product) * n_samples * row_size        // products_
+           + sizeof(std::int32_t) * n_units * row_size     // potentials_
+           + sizeof(std::int16_t) * n_samples * n_padded   // coefficients_
+           + PresentationWindow::bytes(n_padded, kWindow)  // window_
+           + sizeof(Product) * kWindow * kWindow;          // gathered_
   }
 
   /// weights += sum over samples of coefficient * x_SD, tile by tile and 64 slots at a time.
@@ -184,10 +196,10 @@ class DualTraining {
     for (std::size_t b = 0; b < now.size(); ++b) {
       const Product* const row = &products_[static_cast<std::size_t>(now[b]) * row_size_];
       for (std::size_t e = b; e < now.size(); ++e) {
-        gathered_[b * kSmallBlock + e] = row[static_cast<std::size_t>(now[e])];
+        gathered_[b * kWindow + e] = row[static_cast<std::size_t>(now[e])];
       }
     }
-    return present_window(now, gathered_.data(), kSmallBlock, rule);
+    return present_window(now, gathered_.data(), kWindow, rule);
   }
 
   template <class Rule>
@@ -203,9 +215,14 @@ class DualTraining {
     });
   }
 
-  static constexpr std::size_t kPatience = 4 * kSmallBlock;
-  static constexpr int kFullCoefficient =
-      std::numeric_limits<std::int16_t>::max() - int{kSmallBlock};
+  /// Entries of a row: room for a window from any sample on.
+  static constexpr std::size_t row_size_for(std::size_t n_samples) noexcept {
+    return core::round_up(n_samples + PresentationWindow::kAtOnce - 1, 32);
+  }
+
+  static constexpr std::size_t kWindow = 128;  // samples that are presented together
+  static constexpr std::size_t kFlushInterval = 4 * kWindow;
+  static constexpr int kFullCoefficient = std::numeric_limits<std::int16_t>::max() - int{kWindow};
   static constexpr std::size_t kRows = 8;
   static constexpr std::size_t kColumns = 256;
 
@@ -219,8 +236,7 @@ class DualTraining {
   std::vector<SignedRows<Product>> pending_;        // of each unit: not in all potentials yet
   core::AlignedBuffer<std::int16_t> coefficients_;  // (n_samples, n_padded_units)
   PresentationWindow window_;
-  core::AlignedBuffer<Product>
-      gathered_;       // (kSmallBlock, kSmallBlock): products of scattered samples
+  core::AlignedBuffer<Product> gathered_;  // (kWindow, kWindow): products of scattered samples
   bool full_ = false;  // another window could take a coefficient beyond its range
 };
 

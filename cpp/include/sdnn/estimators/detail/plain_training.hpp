@@ -14,7 +14,8 @@
 
 namespace sdnn::estimators {
 
-/// The reference for the other forms: works on the layer's weights directly. Needs no memory.
+/// The reference for the other forms: works on the layer's weights directly, and takes no memory
+/// that grows with the problem.
 class PlainTraining {
  public:
   PlainTraining(std::shared_ptr<ParallelPerceptron> layer, std::span<const std::int32_t> bins,
@@ -50,22 +51,17 @@ class PlainTraining {
 
  private:
   void sum_potentials() {
-    auto& tiles = layer_->tiles();
     for (std::size_t i = 0; i < layer_->n_units(); ++i) potentials_[i] = -layer_->thresholds()[i];
-    for (std::size_t tile = 0; tile < tiles.n_tiles(); ++tile) {
-      add_rows(tiles.tile(tile), tiles.width(tile), slots_.columns().plus, slots_.columns().minus,
-               std::size_t{1} << 30, potentials_.data() + tile * kTileUnits);
-    }
+    layer_->tiles().add_columns(slots_.columns(), std::size_t{1} << 30, potentials_.data());
   }
 
   void correct(const Correction& correction) {
     auto& tiles = layer_->tiles();
     std::int32_t* const first = &tiles.at(correction.unit, 0);
     const std::size_t width = tiles.width(correction.unit / kTileUnits);
-    for (const std::uint32_t slot : slots_.columns().plus)
-      first[slot * width] += correction.direction;
-    for (const std::uint32_t slot : slots_.columns().minus)
-      first[slot * width] -= correction.direction;
+    const auto [plus, minus] = slots_.columns();
+    for (const std::uint32_t slot : plus) first[slot * width] += correction.direction;
+    for (const std::uint32_t slot : minus) first[slot * width] -= correction.direction;
     layer_->thresholds()[correction.unit] -= correction.direction;
   }
 

@@ -1,4 +1,5 @@
-/// Sums of some rows minus the sum of others: how corrections reach potentials and weights.
+/// Sums of some rows minus the sum of others: how corrections reach potentials and weights. Rows
+/// are inner products of codes, or codes.
 #pragma once
 
 #include <algorithm>
@@ -6,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/integer_register.hpp"
 #include "sdnn/core/detail/kernel.hpp"
 
@@ -78,6 +80,66 @@ SDNN_INLINE void add_signed_body(To* to, std::size_t size, const SignedRows<Entr
   }
 }
 
+template <class Product>
+SDNN_INLINE void add_row_body(std::int32_t* to, const Product* row, std::int32_t direction,
+                              std::size_t size) noexcept {
+  if (direction > 0) {
+    for (std::size_t i = 0; i < size; ++i) to[i] += row[i];
+  } else {
+    for (std::size_t i = 0; i < size; ++i) to[i] -= row[i];
+  }
+}
+
+#if SDNN_LANES && !defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpsabi"
+#endif
+
+/// entries[k] = bit k of `plus` less bit k of `minus`, for 32 bits.
+SDNN_INLINE void expand_bits(std::uint32_t plus, std::uint32_t minus,
+                             std::int8_t* entries) noexcept {
+#if SDNN_LANES
+  using Bytes = core::IntegerRegister<std::int8_t>;
+  typedef std::uint8_t Bits __attribute__((vector_size(32)));
+  constexpr Bits kOwn = {1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128,  //
+                         1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128};
+  const auto all_ones_if_set = [&](std::uint32_t bits) SDNN_INLINE_LAMBDA {
+    typedef std::uint32_t Copies __attribute__((vector_size(32)));
+    const Bits copies = (Bits)(Copies{} + bits);
+    const Bits own = __builtin_shufflevector(copies, copies,                                  //
+                                             0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1,  //
+                                             18, 18, 18, 18, 18, 18, 18, 18,                  //
+                                             19, 19, 19, 19, 19, 19, 19, 19);
+    return Bytes{(Bytes::Vector)((own & kOwn) == kOwn)};
+  };
+  Bytes{all_ones_if_set(minus).v - all_ones_if_set(plus).v}.store(entries);
+#else
+  for (int k = 0; k < 32; ++k) {
+    entries[k] = static_cast<std::int8_t>(static_cast<int>(plus >> k & 1) -
+                                          static_cast<int>(minus >> k & 1));
+  }
+#endif
+}
+
+#if SDNN_LANES && !defined(__clang__)
+#pragma GCC diagnostic pop
+#endif
+
+SDNN_INLINE void expand_code_body(const coding::TernaryCode& code, std::size_t n_words,
+                                  std::size_t chunk_words, std::int8_t* entries,
+                                  std::size_t chunk_stride) noexcept {
+  for (std::size_t w = 0; w < n_words; w += chunk_words, entries += chunk_stride) {
+    for (std::size_t k = 0; k < chunk_words; ++k) {
+      const std::uint64_t plus = code.positive[w + k];
+      const std::uint64_t minus = code.active[w + k] & ~plus;
+      for (const std::size_t half : {0, 1}) {
+        expand_bits(static_cast<std::uint32_t>(plus >> 32 * half),
+                    static_cast<std::uint32_t>(minus >> 32 * half), entries + 64 * k + 32 * half);
+      }
+    }
+  }
+}
+
 }  // namespace detail
 
 /// to[i] += sum of row[offset + i] over the rows to add, minus that over those to subtract.
@@ -99,5 +161,20 @@ SDNN_KERNEL(void, add_signed,
             (std::int32_t* to, std::size_t size, const SignedRows<std::int32_t>& rows,
              std::size_t offset, std::size_t n_per_sum),
             (to, size, rows, offset, n_per_sum))
+
+/// to[i] += direction (+1 or -1) * row[i].
+SDNN_KERNEL(void, add_row,
+            (std::int32_t* to, const std::int16_t* row, std::int32_t direction, std::size_t size),
+            (to, row, direction, size))
+SDNN_KERNEL(void, add_row,
+            (std::int32_t* to, const std::int32_t* row, std::int32_t direction, std::size_t size),
+            (to, row, direction, size))
+
+/// A code as rows to add, a chunk of `chunk_words` words of it in each: entries[c * chunk_stride +
+/// k] is its +1, 0 or -1 in column k of chunk c. `n_words` is a multiple of `chunk_words`.
+SDNN_KERNEL(void, expand_code,
+            (const coding::TernaryCode& code, std::size_t n_words, std::size_t chunk_words,
+             std::int8_t* entries, std::size_t chunk_stride),
+            (code, n_words, chunk_words, entries, chunk_stride))
 
 }  // namespace sdnn::estimators

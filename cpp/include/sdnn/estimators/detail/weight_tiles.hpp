@@ -1,17 +1,130 @@
-/// The weights of many units, laid out so that a column of all units is a few cache lines.
+/// The weights of many units, laid out so that a column of all units is a few cache lines, and the
+/// sums over these columns.
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
+#include <span>
+#include <type_traits>
 
+#include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
-#include "sdnn/estimators/detail/tile_rows.hpp"
+#include "sdnn/core/detail/integer_register.hpp"
+#include "sdnn/core/detail/kernel.hpp"
 
 namespace sdnn::estimators {
 
-/// Weights in tiles of up to kTileUnits: inside a tile, slot after slot, the units side by side.
+/// Units whose weights lie side by side: the width of a full tile.
+inline constexpr std::size_t kTileUnits = 96;
+/// The widths of tiles are multiples of this.
+inline constexpr std::size_t kTileStep = 16;
+
+namespace detail {
+
+template <std::size_t Value>
+using Size = std::integral_constant<std::size_t, Value>;
+
+/// Calls function(Size<width>()), so that the width, a multiple of 16 up to Most, is known when it
+/// is compiled.
+template <std::size_t Most, std::size_t Width = kTileStep, class Function>
+SDNN_INLINE void for_width(std::size_t width, const Function& function) noexcept {
+  if constexpr (Width < Most) {
+    if (width > Width) return for_width<Most, Width + kTileStep>(width, function);
+  }
+  function(Size<Width>());
+}
+
+using Slots = std::span<const std::uint32_t>;
+
+template <class Weight, std::size_t Width>
+SDNN_INLINE void add_rows_of_width(const Weight* tile, Slots plus, Slots minus,
+                                   std::size_t n_per_sum, std::int32_t* sums) noexcept {
+  using Lane = core::IntegerRegister<Weight>;
+  constexpr std::size_t kRegisters = Width / Lane::kSize;
+  while (plus.size() + minus.size() > 0) {
+    const std::size_t some_plus = std::min(plus.size(), n_per_sum);
+    const std::size_t some_minus = std::min(minus.size(), n_per_sum - some_plus);
+    Lane sum[kRegisters];
+    core::unrolled<kRegisters>([&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].clear(); });
+    for (std::size_t c = 0; c < some_plus; ++c) {
+      const Weight* const row = tile + std::size_t{plus[c]} * Width;
+      core::unrolled<kRegisters>([&](std::size_t r)
+                                     SDNN_INLINE_LAMBDA { sum[r].add(row + r * Lane::kSize); });
+    }
+    for (std::size_t c = 0; c < some_minus; ++c) {
+      const Weight* const row = tile + std::size_t{minus[c]} * Width;
+      core::unrolled<kRegisters>(
+          [&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].subtract(row + r * Lane::kSize); });
+    }
+    core::unrolled<kRegisters>([&](std::size_t r)
+                                   SDNN_INLINE_LAMBDA { sum[r].add_to(sums + r * Lane::kSize); });
+    plus = plus.subspan(some_plus);
+    minus = minus.subspan(some_minus);
+  }
+}
+
+template <class Weight>
+SDNN_INLINE void add_rows_body(const Weight* tile, std::size_t width, Slots plus, Slots minus,
+                               std::size_t n_per_sum, std::int32_t* sums) noexcept {
+  for_width<kTileUnits>(width, [&]<std::size_t Width>(Size<Width>) SDNN_INLINE_LAMBDA {
+    add_rows_of_width<Weight, Width>(tile, plus, minus, n_per_sum, sums);
+  });
+}
+
+SDNN_INLINE void add_outer_body(std::int16_t* rows, std::size_t width,
+                                const std::int16_t* coefficients, std::uint64_t active,
+                                std::uint64_t positive) noexcept {
+  for_width<kTileUnits>(width, [&]<std::size_t Width>(Size<Width>) SDNN_INLINE_LAMBDA {
+    using Lane = core::IntegerRegister<std::int16_t>;
+    constexpr std::size_t kRegisters = Width / Lane::kSize;
+    Lane values[kRegisters];
+    core::unrolled<kRegisters>(
+        [&](std::size_t r) SDNN_INLINE_LAMBDA { values[r].load(coefficients + r * Lane::kSize); });
+    for (std::uint64_t bits = positive; bits != 0; bits &= bits - 1) {
+      std::int16_t* const row = rows + static_cast<std::size_t>(std::countr_zero(bits)) * Width;
+      core::unrolled<kRegisters>([&](std::size_t r) SDNN_INLINE_LAMBDA {
+        Lane sum = values[r];
+        sum.add(row + r * Lane::kSize);
+        sum.store(row + r * Lane::kSize);
+      });
+    }
+    for (std::uint64_t bits = active & ~positive; bits != 0; bits &= bits - 1) {
+      std::int16_t* const row = rows + static_cast<std::size_t>(std::countr_zero(bits)) * Width;
+      core::unrolled<kRegisters>([&](std::size_t r) SDNN_INLINE_LAMBDA {
+        Lane sum;
+        sum.load(row + r * Lane::kSize);
+        sum.subtract(coefficients + r * Lane::kSize);
+        sum.store(row + r * Lane::kSize);
+      });
+    }
+  });
+}
+
+}  // namespace detail
+
+/// Adds the coefficients to the rows of the set bits of `positive`, subtracts them from those of
+/// the other bits of `active`. 64 rows of `width` units.
+SDNN_KERNEL(void, add_outer,
+            (std::int16_t* rows, std::size_t width, const std::int16_t* coefficients,
+             std::uint64_t active, std::uint64_t positive),
+            (rows, width, coefficients, active, positive))
+
+/// sums[i] += the rows `plus` of a tile, -= its rows `minus`, i = 0 .. width - 1; at most
+/// `n_per_sum` rows are added before the sum is widened.
+SDNN_KERNEL(void, add_rows,
+            (const std::int16_t* tile, std::size_t width, std::span<const std::uint32_t> plus,
+             std::span<const std::uint32_t> minus, std::size_t n_per_sum, std::int32_t* sums),
+            (tile, width, plus, minus, n_per_sum, sums))
+SDNN_KERNEL(void, add_rows,
+            (const std::int32_t* tile, std::size_t width, std::span<const std::uint32_t> plus,
+             std::span<const std::uint32_t> minus, std::size_t n_per_sum, std::int32_t* sums),
+            (tile, width, plus, minus, n_per_sum, sums))
+
+/// Weights in tiles of up to kTileUnits: inside a tile, slot after slot, the units side by side. A
+/// slot is a column's number when every pair's columns are padded to whole 64-bit words, so that
+/// slot s is bit s % 64 of word s / 64 of a code.
 ///
 /// All tiles are kTileUnits wide but the last, whose width is the least multiple of 16 that holds
 /// the rest. Memory: sizeof(Weight) * n_slots * round_up(n_units, 16).
@@ -32,10 +145,6 @@ class WeightTiles {
                    [](Other weight) { return static_cast<Weight>(weight); });
   }
 
-  static std::size_t bytes(std::size_t n_units, std::size_t n_slots) noexcept {
-    return sizeof(Weight) * core::round_up(n_units, kTileStep) * n_slots;
-  }
-
   std::size_t n_units() const noexcept { return n_units_; }
   std::size_t n_slots() const noexcept { return n_slots_; }
   std::size_t n_padded_units() const noexcept { return core::round_up(n_units_, kTileStep); }
@@ -53,6 +162,16 @@ class WeightTiles {
   }
   Weight& at(std::size_t unit, std::size_t slot) noexcept {
     return tile(unit / kTileUnits)[slot * width(unit / kTileUnits) + unit % kTileUnits];
+  }
+
+  /// sums[i] += unit i's weights in the slots to add, -= those to subtract; at most `n_per_sum` of
+  /// them, whose sum fits into Weight, are added before the sum is widened.
+  /// Shapes: sums (n_padded_units,).
+  void add_columns(const coding::SignedColumns& slots, std::size_t n_per_sum,
+                   std::int32_t* sums) const {
+    for (std::size_t t = 0; t < n_tiles(); ++t) {
+      add_rows(tile(t), width(t), slots.plus, slots.minus, n_per_sum, sums + t * kTileUnits);
+    }
   }
 
   /// The largest |weight|.
