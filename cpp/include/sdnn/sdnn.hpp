@@ -12,6 +12,7 @@
 #include "sdnn/approximators/output_scale.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
+#include "sdnn/approximators/sdnn_c_config.hpp"
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/coding/anchor_patterns.hpp"
 #include "sdnn/coding/correlation_matrix.hpp"

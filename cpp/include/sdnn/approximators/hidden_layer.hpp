@@ -13,9 +13,9 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/approximators/detail/column_set.hpp"
 #include "sdnn/approximators/detail/column_sums.hpp"
 #include "sdnn/coding/detail/ternary_code.hpp"
-#include "sdnn/core/bit_layer.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
 
@@ -46,8 +46,8 @@ class HiddenLayer {
     n_blocks_ = core::round_up(n_units, kBlockUnits) / kBlockUnits;
     bytes_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * block_bytes());
     high_bytes_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * block_bytes());
-    high_columns_.assign(n_blocks_, Columns(n_columns));
-    high_anywhere_ = Columns(n_columns);
+    high_columns_.assign(n_blocks_, ColumnSet(n_columns));
+    high_anywhere_ = ColumnSet(n_columns);
     thresholds_.assign(n_units, 0);
     largest_weight_.assign(n_units, 0);
     group_of_block_.assign(n_blocks_, kLargestGroup);
@@ -59,7 +59,7 @@ class HiddenLayer {
   /// The columns that a pass reads high bytes of, summed over blocks.
   std::size_t n_high_columns() const noexcept {
     std::size_t n = 0;
-    for (const Columns& columns : high_columns_) n += columns.size();
+    for (const ColumnSet& columns : high_columns_) n += columns.size();
     return n;
   }
   /// The largest |weight| that is held before std::overflow_error.
@@ -146,33 +146,6 @@ class HiddenLayer {
   static constexpr std::int32_t kHighByte = 128;
   static constexpr std::int32_t kWeightLimit = kByteLimit * kHighByte + kByteLimit;
   static constexpr int kLargestGroup = 4;
-
-  /// A set of columns.
-  class Columns {
-   public:
-    Columns() = default;
-    explicit Columns(std::size_t n_columns) : words_(core::n_bit_words(n_columns)) {}
-
-    std::size_t size() const noexcept { return size_; }
-    bool holds(std::size_t column) const noexcept { return words_[column / 64][column % 64]; }
-    void add(std::size_t column) noexcept {
-      size_ += holds(column) ? 0 : 1;
-      words_[column / 64][column % 64] = true;
-    }
-    /// Writes those of `columns` that are in the set; returns how many.
-    std::size_t select(std::span<const std::uint32_t> columns, std::uint32_t* out) const noexcept {
-      std::size_t n = 0;
-      for (const std::uint32_t column : columns) {
-        out[n] = column;
-        n += holds(column) ? 1 : 0;
-      }
-      return n;
-    }
-
-   private:
-    std::vector<core::BitWord> words_;
-    std::size_t size_ = 0;
-  };
 
   using SomeColumns = std::array<std::uint32_t, ColumnPlaces::kMost>;
 
@@ -356,8 +329,8 @@ class HiddenLayer {
   std::int32_t weight_limit_;
   core::AlignedBuffer<std::int8_t> bytes_;       ///< [block][column, then zeros][unit in block]
   core::AlignedBuffer<std::int8_t> high_bytes_;  ///< the same, in multiples of kHighByte
-  std::vector<Columns> high_columns_;            ///< of each block: those with high bytes, ever
-  Columns high_anywhere_;                        ///< their union
+  std::vector<ColumnSet> high_columns_;          ///< of each block: those with high bytes, ever
+  ColumnSet high_anywhere_;                      ///< their union
   std::vector<std::int32_t> thresholds_;
   std::vector<std::int32_t> largest_weight_;  ///< an upper bound of max_j |w_ij|
   std::vector<int> group_of_block_;           ///< columns of a block that may be added in 8 bits

@@ -1,0 +1,61 @@
+/// Everything that defines an SDNN-C.
+#pragma once
+
+#include <optional>
+#include <tuple>
+#include <vector>
+
+#include "sdnn/core/config_fields.hpp"
+
+namespace sdnn::approximators {
+
+/// How the weights start (spec section 1, "Start").
+enum class InitialWeights {
+  ternary,  ///< -1, 0 or +1 lattice steps with probabilities 1/4, 1/2, 1/4
+  uniform,  ///< uniform within +- initial_weight_limit, rounded to the lattice
+};
+
+/// Everything that defines an SDNN-C; the defaults are the paper's values.
+struct SDNNCConfig {
+  int n_inputs = 4;                 ///< l >= 2
+  int n_pattern_units = 200;        ///< m
+  int n_anchor_patterns = 9;        ///< p_1 .. p_9
+  int n_interpolated = 44;          ///< patterns between neighbouring anchors
+  bool balanced_anchors = true;     ///< reading: anchors have as many +1 as -1
+  std::vector<bool> circular = {};  ///< per input; empty: none (reading: p_9 independent of p_1)
+  int n_hidden_units = 900;         ///< n
+  int n_active_units = 300;         ///< n', units in an action's window
+  int n_actions = 0;                ///< 0: all n - n' + 1 windows
+  double q_low = -20.0;             ///< g saturates at these values ...
+  double q_high = 20.0;
+  std::optional<int> u_low = {};      ///< ... at these counts; none: n' / 15 rounded down (20),
+  std::optional<int> u_high = {};     ///< and n' - u_low (280)
+  double learning_coefficient = 0.1;  ///< c; scales weights only, never decisions
+  int lattice = 1;                    ///< weights are multiples of c / lattice
+  double initial_threshold = 200.0;   ///< |w_i0| at the start, in units of c
+  InitialWeights initial_weights = InitialWeights::ternary;
+  double initial_weight_limit = 0.1;  ///< of InitialWeights::uniform, in units of c
+
+  static constexpr auto fields() noexcept {
+    return std::tuple(
+        core::field("n_inputs", &SDNNCConfig::n_inputs),
+        core::field("n_pattern_units", &SDNNCConfig::n_pattern_units),
+        core::field("n_anchor_patterns", &SDNNCConfig::n_anchor_patterns),
+        core::field("n_interpolated", &SDNNCConfig::n_interpolated),
+        core::field("balanced_anchors", &SDNNCConfig::balanced_anchors),
+        core::field("circular", &SDNNCConfig::circular),
+        core::field("n_hidden_units", &SDNNCConfig::n_hidden_units),
+        core::field("n_active_units", &SDNNCConfig::n_active_units),
+        core::field("n_actions", &SDNNCConfig::n_actions),
+        core::field("q_low", &SDNNCConfig::q_low), core::field("q_high", &SDNNCConfig::q_high),
+        core::field("u_low", &SDNNCConfig::u_low), core::field("u_high", &SDNNCConfig::u_high),
+        core::field("learning_coefficient", &SDNNCConfig::learning_coefficient),
+        core::field("lattice", &SDNNCConfig::lattice),
+        core::field("initial_threshold", &SDNNCConfig::initial_threshold),
+        core::field("initial_weights", &SDNNCConfig::initial_weights),
+        core::field("initial_weight_limit", &SDNNCConfig::initial_weight_limit));
+  }
+  bool operator==(const SDNNCConfig&) const = default;
+};
+
+}  // namespace sdnn::approximators
