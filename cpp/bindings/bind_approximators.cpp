@@ -68,7 +68,8 @@ py::array_t<std::int32_t> thresholds(const DynamicSDNNC& network) {
 }
 
 void bind_fuzzy_rules(py::module_& module) {
-  bindings::bind_config<FuzzyRulesConfig>(module, "FuzzyRulesConfig", "The sizes of a table of fuzzy rules");
+  bindings::bind_config<FuzzyRulesConfig>(module, "FuzzyRulesConfig",
+                                          "The sizes of a table of fuzzy rules");
 
   py::class_<FuzzyRules>(module, "FuzzyRules", "Rules over a grid of triangular sets")
       .def(py::init<const FuzzyRulesConfig&>(), py::arg("config"))
@@ -96,7 +97,8 @@ void bind_fuzzy_rules(py::module_& module) {
 }
 
 void bind_rbf_network(py::module_& module) {
-  bindings::bind_config<RBFNetworkConfig>(module, "RBFNetworkConfig", "The sizes of an RBF network");
+  bindings::bind_config<RBFNetworkConfig>(module, "RBFNetworkConfig",
+                                          "The sizes of an RBF network");
 
   py::class_<RBFNetwork>(module, "RBFNetwork", "Q(s, a) linear in normalized Gaussian bases")
       .def(py::init<const RBFNetworkConfig&>(), py::arg("config"))

@@ -70,7 +70,8 @@ void bind_acrobot(py::module_& module) {
   py::enum_<GoalTest>(module, "GoalTest", "When the goal is looked for")
       .value("every_step", GoalTest::every_step)
       .value("decision_instant", GoalTest::decision_instant);
-  bindings::bind_config<AcrobotConfig>(module, "AcrobotConfig", "The numbers of the acrobot's task");
+  bindings::bind_config<AcrobotConfig>(module, "AcrobotConfig",
+                                       "The numbers of the acrobot's task");
 
   py::class_<Acrobot>(module, "Acrobot", "Dynamics, reward and episode end of the acrobot")
       .def(py::init<const AcrobotConfig&>(), py::arg("config"))
@@ -204,7 +205,8 @@ void bind_sensors(py::module_& module) {
             return array(noisy);
           },
           py::arg("values"), "A noisy copy");
-  bindings::bind_config<SensorConfig>(module, "SensorConfig", "Which sensors there are and how noisy");
+  bindings::bind_config<SensorConfig>(module, "SensorConfig",
+                                      "Which sensors there are and how noisy");
   py::class_<AcrobotSensors>(module, "AcrobotSensors", "s1..s4, s5 and s6 with their noise")
       .def(py::init<const SensorConfig&, std::uint64_t, core::Stream>(), py::arg("config"),
            py::arg("seed"), py::arg("stream"))

@@ -162,8 +162,8 @@ class SDNNC {
   /// One step of error correction: Q = Q(state, action) moves towards
   /// q_hat = (1 - rate) Q + rate * target.
   ///
-  /// Source: Fig. 2, Eqs. (1) to (3); spec section 1, "Learning". Throws std::invalid_argument for a
-  /// bad state, action or rate or a NaN target, std::overflow_error; then nothing has changed.
+  /// Source: Fig. 2, Eqs. (1) to (3); spec section 1, "Learning". Throws std::invalid_argument for
+  /// a bad state, action or rate or a NaN target, std::overflow_error; then nothing has changed.
   void correct(std::span<const double> state, std::size_t action, double target,
                double rate = 1.0) {
     core::require(!std::isnan(target), "target", "a number", target);
