@@ -1,6 +1,7 @@
-"""The C++ tests as one test of the Python suite: nobody has to remember to run both."""
+"""The C++ tests as tests of the Python suite: nobody has to remember to run both."""
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -11,21 +12,29 @@ ROOT = Path(__file__).parents[2]
 @pytest.fixture
 def build_folder(request, tmp_path):
     """A folder that outlives the session where pytest keeps a cache: the next build is short."""
-    cache = getattr(request.config, "cache", None)
-    return Path(cache.mkdir("cpp_suite")) if cache is not None else tmp_path
+
+    def _build_folder(preset):
+        cache = getattr(request.config, "cache", None)
+        return Path(cache.mkdir(f"cpp_suite_{preset}")) if cache is not None else tmp_path
+
+    return _build_folder
 
 
 @pytest.mark.timeout(1800)
-def test_the_cpp_suite_passes(cmake, configure, build_folder, skip_unless_ci):
-    configured = configure(ROOT, build_folder, "-DSDNN_BUILD_TESTS=ON", "-DSDNN_WERROR=ON")
+@pytest.mark.parametrize(
+    ("preset", "compiler"), [("gcc", "g++"), ("clang", "clang++"), ("sanitize", "clang++")]
+)
+def test_the_cpp_suite_passes(preset, compiler, cmake, configure, build_folder, skip_unless_ci):
+    if shutil.which(compiler) is None:
+        skip_unless_ci(f"needs {compiler}")
+    build = build_folder(preset)
+    configured = configure(ROOT, build, "--preset", preset)
     if "the C++ tests need GoogleTest" in configured.stderr:
         skip_unless_ci("needs GoogleTest: apt install libgtest-dev, or -DGTEST_SOURCE_DIR")
     assert configured.returncode == 0, configured.stdout + configured.stderr
     jobs = str(os.cpu_count() or 1)
-    built = cmake("--build", build_folder, "--parallel", jobs)
+    built = cmake("--build", build, "--parallel", jobs)
     assert built.returncode == 0, (built.stdout + built.stderr)[-8000:]
-    tested = cmake(
-        "--test-dir", build_folder, "--output-on-failure", "--parallel", jobs, tool="ctest"
-    )
+    tested = cmake("--test-dir", build, "--output-on-failure", "--parallel", jobs, tool="ctest")
     assert tested.returncode == 0, tested.stdout[-8000:]
     assert "No tests were found" not in tested.stdout + tested.stderr

@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+import sysconfig
 import tarfile
 import zipfile
 from pathlib import Path
@@ -80,6 +81,25 @@ def test_the_cpp_example_builds_against_the_installed_package(cmake, configure, 
     assert Path(found).resolve() == Path(folder).resolve()
 
 
+def test_eigen_is_found_in_the_python_that_the_shell_would_start(
+    configure, skip_unless_ci, tmp_path, monkeypatch
+):
+    site = Path(sysconfig.get_path("purelib"))
+    if not (site / "cmeel.prefix").is_dir():
+        skip_unless_ci("needs Eigen as a wheel: pip install cmeel-eigen")
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.21)\nproject(finder LANGUAGES NONE)\n"
+        f"include({(ROOT / 'cmake' / 'FindEigenAnyway.cmake').as_posix()})\n"
+    )
+    monkeypatch.setenv("PATH", "")  # the folder of this Python is put before it
+    monkeypatch.delenv("CMAKE_PREFIX_PATH", raising=False)
+    build = tmp_path / "build"
+    done = configure(tmp_path, build, "-DCMAKE_FIND_USE_CMAKE_SYSTEM_PATH=OFF")
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = re.search(r"^Eigen3_DIR:PATH=(.*)$", (build / "CMakeCache.txt").read_text(), re.M)[1]
+    assert site.resolve() in Path(found).resolve().parents
+
+
 def test_no_build_is_tied_to_the_machine_it_ran_on():
     for path in (*ROOT.rglob("CMakeLists.txt"), *ROOT.glob("cmake/*"), ROOT / "pyproject.toml"):
         if "build" not in path.relative_to(ROOT).parts:
@@ -122,9 +142,10 @@ def test_the_type_stub_is_up_to_date():
 # What is shipped.
 
 SHIPPED = (
-    r"PKG-INFO|CMakeLists\.txt|pyproject\.toml|\.gitignore|LICENSE|CITATION\.cff|[A-Z]+\.md",
+    r"PKG-INFO|CMakeLists\.txt|pyproject\.toml|LICENSE|CITATION\.cff|[A-Z]+\.md",
+    r"CMakePresets\.json|\.gitignore|\.clang-(format|tidy)",
     r"cmake/[^/]+\.cmake(\.in)?",
-    r"cpp/include/sdnn/([a-z_]+/)?[a-z0-9_]+\.hpp",
+    r"cpp/include/sdnn/([a-z_]+/){0,2}[a-z0-9_]+\.hpp",
     r"cpp/bindings/([a-z_]+\.[ch]pp|CMakeLists\.txt)",
     r"python/sdnn/([a-z_]+/)?[a-z_]+\.pyi?|python/sdnn/py\.typed",
     r"python/sdnn/experiments/report\.html\.jinja",
@@ -134,6 +155,7 @@ SHIPPED = (
 
 NEEDED = (
     "CMakeLists.txt",
+    "CMakePresets.json",
     "pyproject.toml",
     "README.md",
     "LICENSE",

@@ -1,4 +1,4 @@
-"""Style and types of the Python code, by the tools' own judgement."""
+"""Style and types of the code, by the tools' own judgement."""
 
 import os
 import subprocess
@@ -10,6 +10,11 @@ import pytest
 import sdnn
 
 ROOT = Path(__file__).parents[2]
+CPP_FILES = sorted(
+    path
+    for folder in ("cpp", "tests/cpp", "bench", "docs/examples/cpp")
+    for path in (ROOT / folder).rglob("*.[ch]pp")
+)
 
 
 @pytest.mark.parametrize(
@@ -30,3 +35,45 @@ def test_tools_find_nothing(command, tmp_path):
         [sys.executable, "-m", *command], cwd=ROOT, env=environment, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.fixture
+def pinned(skip_unless_ci):
+    """A tool of this environment, in the version of the `test` extra: others judge otherwise."""
+
+    def _pinned(name):
+        tool = Path(sys.executable).with_name(name)
+        if not tool.exists():
+            skip_unless_ci(f'needs {name}: pip install ".[test]"')
+        return tool
+
+    return _pinned
+
+
+def test_clang_format_changes_nothing(pinned):
+    assert len(CPP_FILES) > 100
+    done = subprocess.run(
+        [pinned("clang-format"), "--dry-run", "-Werror", *CPP_FILES], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr[-8000:]
+
+
+def slow_unless_ci(test):
+    """Half a minute is too slow for every turn, not for CI."""
+    return test if os.environ.get("CI") else pytest.mark.slow(test)
+
+
+@slow_unless_ci
+@pytest.mark.timeout(1800)
+def test_clang_tidy_finds_nothing(pinned, configure, skip_unless_ci, tmp_path):
+    configured = configure(ROOT, tmp_path, "--preset", "tidy")
+    if "the C++ tests need GoogleTest" in configured.stderr:
+        skip_unless_ci("needs GoogleTest: apt install libgtest-dev, or -DGTEST_SOURCE_DIR")
+    assert configured.returncode == 0, configured.stdout + configured.stderr
+    command = [sys.executable, pinned("run-clang-tidy.py"), "-quiet", "-p", tmp_path]
+    options = [
+        f"-clang-tidy-binary={pinned('clang-tidy')}",
+        f"-config-file={ROOT / '.clang-tidy'}",
+    ]
+    done = subprocess.run([*command, *options], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-8000:]

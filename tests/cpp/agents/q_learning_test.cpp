@@ -16,10 +16,10 @@ namespace {
 
 using testing::LookupTable;
 using Agent = QLearning<LookupTable>;
-using State = std::array<double, 1>;
+using Position = std::array<double, 1>;
 
 /// The middle of cell `i` of five.
-State cell(int i) { return {(i + 0.5) / 5.0}; }
+Position cell(int i) { return {(i + 0.5) / 5.0}; }
 
 TEST(QLearning, EquationOneByHand) {
   Agent agent(LookupTable(1, 5, 2), {}, 1);  // alpha = 0.5, gamma = 0.9
@@ -124,8 +124,8 @@ TEST(QLearning, EvaluationDoesNotDisturbLearning) {
     evaluated.begin_episode();
     for (int step = 0; step < 6; ++step) {
       for (int i = 0; i < episode % 3; ++i) (void)evaluated.act(cell(i % 5), false);
-      const State state = cell(static_cast<int>(world.below(5)));
-      const State next = cell(static_cast<int>(world.below(5)));
+      const Position state = cell(static_cast<int>(world.below(5)));
+      const Position next = cell(static_cast<int>(world.below(5)));
       const std::size_t action = alone.act(state);
       ASSERT_EQ(action, evaluated.act(state));
       const double reward = world.uniform() < 0.1 ? 1.0 : 0.0;
@@ -158,8 +158,8 @@ TEST(QLearning, ABadTransitionTeachesNothing) {
   for (const double reward : {std::nan(""), std::numeric_limits<double>::infinity()}) {
     EXPECT_THROW(agent.learn(cell(0), 0, reward, cell(1), false), std::invalid_argument);
   }
-  EXPECT_THROW(agent.learn(State{2.0}, 0, 1.0, cell(1), false), std::invalid_argument);
-  EXPECT_THROW(agent.learn(cell(0), 0, 1.0, State{-0.1}, false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(Position{2.0}, 0, 1.0, cell(1), false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(cell(0), 0, 1.0, Position{-0.1}, false), std::invalid_argument);
   EXPECT_THROW(agent.learn(std::vector<double>{0.1, 0.2}, 0, 1.0, cell(1), false),
                std::invalid_argument);
   EXPECT_EQ(agent.action_value(), before);

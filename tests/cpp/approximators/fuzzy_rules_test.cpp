@@ -112,7 +112,7 @@ TEST(FuzzyRules, FiringAllocatesNothing) {
 }
 
 template <class Error>
-std::string message(const FuzzyRulesConfig& config) {
+std::string refusal(const FuzzyRulesConfig& config) {
   try {
     FuzzyRules rules(config);
   } catch (const Error& error) {
@@ -122,19 +122,19 @@ std::string message(const FuzzyRulesConfig& config) {
 }
 
 TEST(FuzzyRules, TooLargeATableIsRefusedBeforeMemoryIsAskedFor) {
-  EXPECT_EQ(message<std::length_error>({.n_inputs = 9}),
+  EXPECT_EQ(refusal<std::length_error>({.n_inputs = 9}),
             "a table of 9^9 = 387420489 rules needs 32543321076 bytes, but max_table_bytes is "
             "1073741824");
-  EXPECT_EQ(message<std::length_error>({.n_inputs = 2, .max_table_bytes = 81 * 84 - 1}),
+  EXPECT_EQ(refusal<std::length_error>({.n_inputs = 2, .max_table_bytes = 81 * 84 - 1}),
             "a table of 9^2 = 81 rules needs 6804 bytes, but max_table_bytes is 6803");
-  EXPECT_EQ(message<std::length_error>({.n_inputs = 2, .max_table_bytes = 81 * 84}), "no error");
+  EXPECT_EQ(refusal<std::length_error>({.n_inputs = 2, .max_table_bytes = 81 * 84}), "no error");
 }
 
 TEST(FuzzyRules, NamesWhatIsImpossible) {
   using Error = std::invalid_argument;
-  EXPECT_EQ(message<Error>({.n_inputs = 0}), "n_inputs must be in [1, 62], got 0");
-  EXPECT_EQ(message<Error>({.n_sets = 1}), "n_sets must be in [2, 1048576], got 1");
-  EXPECT_EQ(message<Error>({.n_actions = 0}), "n_actions must be in [1, 1048576], got 0");
+  EXPECT_EQ(refusal<Error>({.n_inputs = 0}), "n_inputs must be in [1, 62], got 0");
+  EXPECT_EQ(refusal<Error>({.n_sets = 1}), "n_sets must be in [2, 1048576], got 1");
+  EXPECT_EQ(refusal<Error>({.n_actions = 0}), "n_actions must be in [1, 1048576], got 0");
   const FuzzyRules rules({.n_inputs = 2});
   FiredRules fired = fire(rules, {0.3, 0.4});
   const auto before = fired.rules;

@@ -59,7 +59,7 @@ Sums plain(const Problem& p) {
   return sums;
 }
 
-class EveryLevel : public testing::TestWithParam<core::InstructionSet> {
+class EveryLevel : public ::testing::TestWithParam<core::InstructionSet> {
  protected:
   void SetUp() override {
     if (GetParam() > core::best_instruction_set()) {
@@ -91,8 +91,9 @@ TEST_P(EveryLevel, EqualsPlainSumsOn100000RandomProblems) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Levels, EveryLevel,
-                         testing::Values(core::InstructionSet::portable, core::InstructionSet::avx2,
-                                         core::InstructionSet::avx512),
+                         ::testing::Values(core::InstructionSet::portable,
+                                           core::InstructionSet::avx2,
+                                           core::InstructionSet::avx512),
                          [](const auto& info) { return std::string(core::name_of(info.param)); });
 
 }  // namespace

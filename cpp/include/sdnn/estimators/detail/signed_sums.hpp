@@ -132,7 +132,7 @@ SDNN_INLINE void expand_code_body(const coding::TernaryCode& code, std::size_t n
     for (std::size_t k = 0; k < chunk_words; ++k) {
       const std::uint64_t plus = code.positive[w + k];
       const std::uint64_t minus = code.active[w + k] & ~plus;
-      for (const std::size_t half : {0, 1}) {
+      for (const std::size_t half : {0U, 1U}) {
         expand_bits(static_cast<std::uint32_t>(plus >> 32 * half),
                     static_cast<std::uint32_t>(minus >> 32 * half), entries + 64 * k + 32 * half);
       }
