@@ -66,7 +66,7 @@ TEST(EpsilonGreedy, UniformTakesEveryTiedActionEquallyOften) {
   for (int i = 0; i < n; ++i) ++taken[policy.select(values, 0, true)];
   EXPECT_EQ(taken[1] + taken[4], 0);
   const double sigma = std::sqrt(n * 0.25 * 0.75);
-  for (const std::size_t action : {0U, 2U, 3U, 5U}) EXPECT_NEAR(taken[action], n / 4, 5 * sigma);
+  for (const std::size_t action : {0U, 2U, 3U, 5U}) EXPECT_NEAR(taken[action], 0.25 * n, 5 * sigma);
 }
 
 // The rules of fuzzy Q-learning keep floats: the same picks and the same draws as from doubles.
@@ -108,7 +108,7 @@ TEST(EpsilonGreedy, RandomActionsAreUniformOverAllActions) {
   std::array<int, 5> taken{};
   const int n = 40000;
   for (int i = 0; i < n; ++i) ++taken[policy.select(values, 0, true)];
-  for (const int count : taken) EXPECT_NEAR(count, n / 5, 5 * std::sqrt(n * 0.2 * 0.8));
+  for (const int count : taken) EXPECT_NEAR(count, 0.2 * n, 5 * std::sqrt(n * 0.2 * 0.8));
 }
 
 TEST(EpsilonGreedy, WithoutExplorationEveryStepIsGreedy) {

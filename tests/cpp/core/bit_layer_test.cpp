@@ -38,8 +38,7 @@ TEST(BitLayer, TheDistanceCountsUnitsThatDiffer) {
   EXPECT_EQ(one.distance(other), 4U);
   EXPECT_EQ(one.distance(one), 0U);
   EXPECT_NE(one, other);
-  const auto copy = a;
-  EXPECT_EQ(one, BitLayer(copy.data(), 101));
+  EXPECT_EQ(one, BitLayer(words({1, 2, 100}, 101).data(), 101));
 }
 
 TEST(BitLayer, WordsNeededAreRoundedUp) {

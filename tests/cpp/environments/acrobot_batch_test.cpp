@@ -10,33 +10,13 @@
 #include <vector>
 
 #include "allocation_count.hpp"
+#include "instruction_sets.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::environments {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-/// Runs the rest of a test at one level, then goes back.
-class AtLevel {
- public:
-  explicit AtLevel(core::InstructionSet level) : before_(core::instruction_set()) {
-    core::set_instruction_set(core::name_of(level));
-  }
-  ~AtLevel() { core::set_instruction_set(core::name_of(before_)); }
-
- private:
-  core::InstructionSet before_;
-};
-
-std::vector<core::InstructionSet> offered_levels() {
-  std::vector<core::InstructionSet> levels;
-  for (const auto level :
-       {core::InstructionSet::portable, core::InstructionSet::avx2, core::InstructionSet::avx512}) {
-    if (level <= core::best_instruction_set()) levels.push_back(level);
-  }
-  return levels;
-}
 
 bool same_bits(const AcrobotState& a, const AcrobotState& b) {
   for (Eigen::Index i = 0; i < 4; ++i) {
@@ -104,15 +84,15 @@ int compare_with_single(const AcrobotConfig& config, std::size_t n, int n_steps,
 }
 
 TEST(AcrobotBatch, KeepsTheBitsOfASingleOneAtEveryLevel) {
-  for (const auto level : offered_levels()) {
-    const AtLevel at(level);
+  sdnn::testing::on_every_instruction_set([&](auto level) {
+    SCOPED_TRACE(level);
     int n_episodes = 0, n_goals = 0;
     for (const std::size_t n : {1u, 2u, 3u, 4u, 5u, 7u, 8u, 9u, 15u, 16u, 17u, 61u}) {
       n_episodes += compare_with_single({}, n, 300, n, n_goals);
     }
-    EXPECT_GT(n_episodes, 1500) << core::name_of(level);
+    EXPECT_GT(n_episodes, 1500);
     EXPECT_GT(n_goals, 750);
-  }
+  });
 }
 
 TEST(AcrobotBatch, KeepsTheBitsWithOtherConfigurations) {
@@ -126,20 +106,20 @@ TEST(AcrobotBatch, KeepsTheBitsWithOtherConfigurations) {
   config.max_decisions = 7;
   config.goal_height = 1.0;
   config.idle_angle = 0.5;
-  for (const auto level : offered_levels()) {
-    const AtLevel at(level);
+  sdnn::testing::on_every_instruction_set([&](auto level) {
+    SCOPED_TRACE(level);
     int n_goals = 0;
     EXPECT_GT(compare_with_single(config, 37, 200, 2, n_goals), 1000);
     EXPECT_GT(n_goals, 100);
     config.goal_test = GoalTest::every_step;
     EXPECT_GT(compare_with_single(config, 37, 200, 2, n_goals), 1000);
-  }
+  });
 }
 
 // The angle of a fast acrobot leaves the range of sin_cos in one lane only.
 TEST(AcrobotBatch, OneOverflowLeavesTheOthersAlone) {
-  for (const auto level : offered_levels()) {
-    const AtLevel at(level);
+  sdnn::testing::on_every_instruction_set([&](auto level) {
+    SCOPED_TRACE(level);
     AcrobotBatch batch({}, 5);
     batch.set_state(3, {0.0, 0.0, 1e300, 0.0});
     batch.set_state(4, {1.0, 2.0, 3.0, 4.0});
@@ -159,7 +139,7 @@ TEST(AcrobotBatch, OneOverflowLeavesTheOthersAlone) {
     EXPECT_THROW(step.of(batch), std::logic_error);  // 3 is over
     batch.reset(3);
     EXPECT_NO_THROW(step.of(batch));
-  }
+  });
 }
 
 TEST(AcrobotBatch, RejectsBadArgumentsBeforeAnythingMoves) {

@@ -63,7 +63,7 @@ TEST(PDeltaRule, AgreesWithSorting) {
     const auto n_firing =
         std::count_if(potentials.begin(), potentials.end(), [](auto p) { return p > 0; });
     const auto deficit =
-        static_cast<std::int32_t>(target + 0.5) - static_cast<std::int32_t>(n_firing);
+        static_cast<std::int32_t>(std::floor(target + 0.5)) - static_cast<std::int32_t>(n_firing);
     Pairs ranked;
     for (std::uint32_t i = 0; i < n; ++i) {
       if ((potentials[i] > 0) == (deficit < 0)) {

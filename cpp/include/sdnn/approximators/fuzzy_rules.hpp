@@ -131,7 +131,7 @@ class FuzzyRules {
   }
 
  private:
-  static const FuzzyRulesConfig& checked(const FuzzyRulesConfig& config) {
+  static FuzzyRulesConfig checked(const FuzzyRulesConfig& config) {
     core::require_in_range("n_inputs", config.n_inputs, 1, 62);
     core::require_in_range("n_sets", config.n_sets, 2, 1 << 20);
     core::require_in_range("n_actions", config.n_actions, 1, 1 << 20);

@@ -138,7 +138,7 @@ class RBFNetwork {
  private:
   static constexpr int kUnrolled = 4;  // the paper's n_bases
 
-  static const RBFNetworkConfig& checked(const RBFNetworkConfig& config) {
+  static RBFNetworkConfig checked(const RBFNetworkConfig& config) {
     core::require_in_range("n_inputs", config.n_inputs, 1, 62);
     core::require_in_range("n_bases", config.n_bases, 2, 1 << 20);
     core::require_in_range("n_actions", config.n_actions, 1, 1 << 20);

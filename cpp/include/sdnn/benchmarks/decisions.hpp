@@ -1,6 +1,7 @@
 /// Whole decisions, and the acrobot's share of them.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -42,7 +43,7 @@ class AcrobotDecisions {
   /// Integration steps in one decision.
   int n_integration_steps() const noexcept {
     const auto& config = acrobot_.config();
-    return static_cast<int>(config.decision_interval / config.integration_step + 0.5);
+    return static_cast<int>(std::lround(config.decision_interval / config.integration_step));
   }
 
   const environments::Acrobot& acrobot() const noexcept { return acrobot_; }

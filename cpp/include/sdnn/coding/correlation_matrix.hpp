@@ -50,7 +50,7 @@ class CorrelationSearch {
     }
     for (std::size_t j = 0; j < i; ++j) {
       std::int64_t product = 0;
-      for (std::size_t k = 0; k < n_units_; ++k) product += pattern[k] * signs(j)[k];
+      for (std::size_t k = 0; k < n_units_; ++k) product += std::int64_t{pattern[k]} * signs(j)[k];
       products_[i * n_bins_ + j] = products_[j * n_bins_ + i] = product;
     }
   }
@@ -91,7 +91,7 @@ class CorrelationSearch {
   }
   /// How the product of patterns i and j moves when units k and l of pattern i swap.
   std::int64_t product_step(std::size_t i, std::size_t j, std::size_t k, std::size_t l) noexcept {
-    return (signs(i)[l] - signs(i)[k]) * (signs(j)[k] - signs(j)[l]);
+    return std::int64_t{signs(i)[l] - signs(i)[k]} * (signs(j)[k] - signs(j)[l]);
   }
 
   std::size_t n_bins_;

@@ -106,7 +106,7 @@ class Trainer {
     const auto make = [&]<class Form>(std::in_place_type_t<Form> form, auto... more) {
       training_ = std::make_unique<Training>(form, layer_, bins, n_threads, more...);
     };
-    with_product_type(layer_->code(), [&]<class Product>() {
+    with_product_type(layer_->code(), [&]<class Product> {
       switch (form_) {
         case TrainingForm::dual:
           return make(std::in_place_type<DualTraining<Product>>);

@@ -17,21 +17,21 @@ SDNN_INLINE int sum_body(const int* items, int n) noexcept {
 }
 
 // Each version by hand, so that a test sees which one runs.
-inline std::string version_portable() { return "portable"; }
-inline std::string version_avx2() { return "avx2"; }
-inline std::string version_avx512() { return "avx512"; }
+inline std::string_view version_portable() { return "portable"; }
+inline std::string_view version_avx2() { return "avx2"; }
+inline std::string_view version_avx512() { return "avx512"; }
 
-SDNN_INLINE std::string mixed_body() { return "made"; }
-inline std::string mixed_avx2() { return "by hand"; }
+SDNN_INLINE std::string_view mixed_body() { return "made"; }
+inline std::string_view mixed_avx2() { return "by hand"; }
 
 }  // namespace detail
 
 SDNN_KERNEL(int, sum, (const int* items, int n), (items, n))
-SDNN_DISPATCH(std::string, version, (), ())
+SDNN_DISPATCH(std::string_view, version, (), ())
 
-SDNN_KERNEL_PORTABLE(std::string, mixed, (), ())
-SDNN_KERNEL_AVX512(std::string, mixed, (), ())
-SDNN_DISPATCH(std::string, mixed, (), ())
+SDNN_KERNEL_PORTABLE(std::string_view, mixed, (), ())
+SDNN_KERNEL_AVX512(std::string_view, mixed, (), ())
+SDNN_DISPATCH(std::string_view, mixed, (), ())
 
 namespace {
 

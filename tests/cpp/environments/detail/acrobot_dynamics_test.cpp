@@ -55,13 +55,14 @@ TEST(AcrobotDynamicsForms, KeepTheirBits) {
     for (int i = 0; i < 2000; ++i) {
       One::State one;
       for (double& value : one) value = 6.0 * random.uniform() - 3.0;
-      PairedForm::State paired{core::Lanes<2>::load(&one[0]), core::Lanes<2>::load(&one[2])};
+      PairedForm::State paired{core::Lanes<2>::load(one.data()),
+                               core::Lanes<2>::load(one.data() + 2)};
       const double torque = 20.0 * random.uniform() - 10.0, limit = 15.0 * random.uniform();
       const bool goal = dynamics.integrate<One>(one, torque, limit, limit, true);
       EXPECT_EQ(goal, (dynamics.integrate<PairedForm>(paired, torque, limit, limit, true)));
       One::State other;
-      paired[0].store(&other[0]);
-      paired[1].store(&other[2]);
+      paired[0].store(other.data());
+      paired[1].store(other.data() + 2);
       ASSERT_EQ(one, other);
       n_goals += goal;
     }

@@ -22,7 +22,7 @@ TEST(WeightTiles, LastTileIsAsWideAsNeeded) {
   EXPECT_EQ(tiles.width(1), 16U);
   tiles.at(97, 2) = -7;
   EXPECT_EQ(tiles.tile(1)[2 * 16 + 1], -7);
-  EXPECT_EQ(tiles.tile(1), tiles.data() + 96 * 3);
+  EXPECT_EQ(tiles.tile(1), tiles.data() + std::size_t{96} * 3);
   tiles.at(95, 1) = 6;
   EXPECT_EQ(tiles.tile(0)[96 + 95], 6);
   EXPECT_EQ(tiles.largest(), 7);

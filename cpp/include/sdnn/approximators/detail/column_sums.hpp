@@ -134,16 +134,17 @@ inline void add_columns_portable(const std::int8_t* block, const ColumnPlaces& p
 
 [[SDNN_TARGET_AVX2, gnu::always_inline]] inline __m256i group_sum_avx2(const std::int8_t* block,
                                                                        const std::uint32_t* places,
-                                                                       int group, int half) {
-  const auto bytes = [block, places, half](int k) __attribute__((always_inline)) {
+                                                                       std::size_t group,
+                                                                       std::size_t half) {
+  const auto bytes = [block, places, half](std::size_t k) __attribute__((always_inline)) {
     return reinterpret_cast<const __m256i*>(column_at(block, places[k])) + half;
   };
   __m256i sum = _mm256_load_si256(bytes(0));
-  for (int k = 1; k < group; ++k) sum = _mm256_add_epi8(sum, _mm256_load_si256(bytes(k)));
+  for (std::size_t k = 1; k < group; ++k) sum = _mm256_add_epi8(sum, _mm256_load_si256(bytes(k)));
   return sum;
 }
 
-template <int Group>
+template <std::size_t Group>
 [[SDNN_TARGET_AVX2]] void add_groups_avx2(const std::int8_t* block, const ColumnPlaces& places,
                                           int factor, std::int32_t* sums) {
   const __m256i ones = _mm256_set1_epi8(1);
@@ -155,7 +156,7 @@ template <int Group>
     for (; begin != part_end; begin += ColumnPlaces::kAtOnce) {
       prefetch_ahead(block, begin);
       for (std::size_t k = 0; k < ColumnPlaces::kAtOnce; k += 2 * Group) {
-        for (int half = 0; half < 2; ++half) {
+        for (std::size_t half = 0; half < 2; ++half) {
           const __m256i first = group_sum_avx2(block, begin + k, Group, half);
           const __m256i second = group_sum_avx2(block, begin + k + Group, Group, half);
           wide[2 * half] = _mm256_add_epi16(
@@ -165,8 +166,8 @@ template <int Group>
         }
       }
     }
-    for (int quarter = 0; quarter < 8; ++quarter) {  // eight units each, in unit order
-      const int half = quarter / 4;
+    for (std::size_t quarter = 0; quarter < 8; ++quarter) {  // eight units each, in unit order
+      const std::size_t half = quarter / 4;
       const __m256i sixteen = wide[2 * half + quarter % 2];
       const __m128i eight =
           quarter % 4 < 2 ? _mm256_castsi256_si128(sixteen) : _mm256_extracti128_si256(sixteen, 1);
@@ -197,17 +198,16 @@ template <int Group>
 #pragma GCC diagnostic ignored "-Wuninitialized"
 #endif
 
-[[SDNN_TARGET_AVX512,
-  gnu::always_inline]] inline __m512i group_sum_avx512(const std::int8_t* block,
-                                                       const std::uint32_t* places, int group) {
+[[SDNN_TARGET_AVX512, gnu::always_inline]] inline __m512i group_sum_avx512(
+    const std::int8_t* block, const std::uint32_t* places, std::size_t group) {
   __m512i sum = _mm512_load_si512(column_at(block, places[0]));
-  for (int k = 1; k < group; ++k) {
+  for (std::size_t k = 1; k < group; ++k) {
     sum = _mm512_add_epi8(sum, _mm512_load_si512(column_at(block, places[k])));
   }
   return sum;
 }
 
-template <int Group>
+template <std::size_t Group>
 [[SDNN_TARGET_AVX512]] void add_groups_avx512(const std::int8_t* block, const ColumnPlaces& places,
                                               int factor, std::int32_t* sums) {
   const __m512i ones = _mm512_set1_epi8(1);

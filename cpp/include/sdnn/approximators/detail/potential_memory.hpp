@@ -65,7 +65,8 @@ class PotentialMemory {
     const double differing = static_cast<double>(table[0].distance(
                                  table[std::min<std::size_t>(10, table.n_bins() - 1)])) /
                              10.0;
-    const double columns_of_modifier = static_cast<double>(code.n_inputs() / 2);
+    const std::size_t half_of_inputs = code.n_inputs() / 2;
+    const double columns_of_modifier = static_cast<double>(half_of_inputs);
     columns_per_bin_ = (l - 1.0 + columns_of_modifier) * std::max(differing, 0.05);
     columns_per_correction_ = 0.15 * l * (l - 1.0);
     columns_of_pass_ = 0.5 * l * static_cast<double>(code.n_pattern_units()) * columns_of_modifier;
@@ -202,7 +203,7 @@ class PotentialMemory {
   }
 
   /// Marks a slot as used now and brings its potentials up to date.
-  Entry use(const coding::StateCode& code, std::size_t slot) noexcept {
+  Entry use(const coding::StateCode& code, std::size_t slot) {
     const Entry entry{bins_of(slot), {potentials_.data() + slot * n_units_, n_units_}};
     std::int32_t* const potentials = potentials_.data() + slot * n_units_;
     for (std::uint64_t& next = up_to_[slot]; next < n_corrections_; ++next) {

@@ -126,7 +126,7 @@ class DualTraining {
  private:
   /// The products of the samples [begin, end) with themselves and all later ones; the codes of
   /// these few stay in the cache while those of the others pass.
-  void fill_products(std::size_t begin, std::size_t end) noexcept {
+  void fill_products(std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < coded_.size(); ++s) {
       for (std::size_t t = begin; t < std::min(end, s + 1); ++t) {
         const auto product =
@@ -138,9 +138,8 @@ class DualTraining {
   }
 
   /// Adds word w of the samples to 64 rows of a tile, in 16 bits as long as these hold the sum.
-  void add_samples(
-      std::int32_t* rows, std::size_t width, std::size_t tile, std::size_t w,
-      const std::vector<std::pair<std::size_t, std::int32_t>>& samples) const noexcept {
+  void add_samples(std::int32_t* rows, std::size_t width, std::size_t tile, std::size_t w,
+                   const std::vector<std::pair<std::size_t, std::int32_t>>& samples) const {
     alignas(core::kCacheLine) std::array<std::int16_t, 64 * kTileUnits> sums{};
     const auto widen = [&] {
       for (std::size_t i = 0; i < 64 * width; ++i) rows[i] += sums[i];
