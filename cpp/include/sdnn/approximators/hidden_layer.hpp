@@ -48,6 +48,7 @@ class HiddenLayer {
     high_bytes_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * block_bytes());
     high_columns_.assign(n_blocks_, ColumnSet(n_columns));
     high_anywhere_ = ColumnSet(n_columns);
+    may_have_high_.assign(n_units, 0);
     thresholds_.assign(n_units, 0);
     largest_weight_.assign(n_units, 0);
     group_of_block_.assign(n_blocks_, kLargestGroup);
@@ -67,7 +68,7 @@ class HiddenLayer {
 
   std::int32_t weight(std::size_t unit, std::size_t column) const noexcept {
     const std::size_t at = byte_index(unit, column);
-    return bytes_[at] + kHighByte * high_bytes_[at];
+    return bytes_[at] + (may_have_high_[unit] ? kHighByte * high_bytes_[at] : 0);
   }
   std::int32_t threshold(std::size_t unit) const noexcept { return thresholds_[unit]; }
 
@@ -75,7 +76,8 @@ class HiddenLayer {
   void set_weight(std::size_t unit, std::size_t column, std::int32_t value) {
     core::require_in_range("weight", value, -weight_limit_, weight_limit_);
     if (std::abs(value) > largest_weight_[unit]) note_largest(unit, std::abs(value));
-    high_bytes_[byte_index(unit, column)] = 0;
+    // Written only where there is one: pages of both layers in turn would share cache sets.
+    if (may_have_high_[unit]) high_bytes_[byte_index(unit, column)] = 0;
     store(unit, column, value);
   }
   /// Throws std::invalid_argument if |value| reaches 2^30.
@@ -256,6 +258,7 @@ class HiddenLayer {
       const std::int32_t change = value / kHighByte;  // towards 0
       value -= change * kHighByte;
       high_bytes_[at] = static_cast<std::int8_t>(high_bytes_[at] + change);
+      may_have_high_[unit] = 1;
       high_columns_[unit / kBlockUnits].add(column);
       high_anywhere_.add(column);
     }
@@ -331,6 +334,7 @@ class HiddenLayer {
   core::AlignedBuffer<std::int8_t> high_bytes_;  ///< the same, in multiples of kHighByte
   std::vector<ColumnSet> high_columns_;          ///< of each block: those with high bytes, ever
   ColumnSet high_anywhere_;                      ///< their union
+  std::vector<std::uint8_t> may_have_high_;      ///< whether a unit ever had a high byte
   std::vector<std::int32_t> thresholds_;
   std::vector<std::int32_t> largest_weight_;  ///< an upper bound of max_j |w_ij|
   std::vector<int> group_of_block_;           ///< columns of a block that may be added in 8 bits

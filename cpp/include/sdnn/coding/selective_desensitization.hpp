@@ -108,6 +108,7 @@ class SelectiveDesensitization {
   SelectiveDesensitization(SharedTables modified, SharedTables modifiers,
                            std::vector<InputPair> pairs)
       : modified_(std::move(modified)), modifiers_(std::move(modifiers)), pairs_(std::move(pairs)) {
+    core::instruction_set();  // an unusable level throws here, not later in a thread or kernel
     core::require(!pairs_.empty(), "pairs", "at least one pair", pairs_.size());
     core::require(modified_.size() == pairs_.size(), "modified", "one table per pair",
                   modified_.size());
