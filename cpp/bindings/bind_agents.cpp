@@ -67,8 +67,7 @@ void bind_agents(py::module_& module) {
           py::arg("values"), py::arg("step"), py::arg("explore") = true);
   bindings::bind_config<QLearningConfig>(module, "QLearningConfig", "The parameters of Q-learning");
 
-  bindings::bind_config<FuzzyQLearningConfig>(module, "FuzzyQLearningConfig",
-                                              "The parameters of fuzzy Q-learning");
+  bindings::bind_config<FuzzyQLearningConfig>(module, "FuzzyQLearningConfig", "The parameters of fuzzy Q-learning");
 
   using SDNNAgent = agents::QLearning<DynamicSDNNC>;
   def_agent(py::class_<SDNNAgent>(module, "SDNNQLearning", "Q-learning with SDNN-C")
