@@ -65,7 +65,7 @@ SDNN_INLINE void expand_code_body(const coding::CodeWords& code, std::size_t n_w
     for (std::size_t k = 0; k < kChunkWords; ++k) {
       const std::uint64_t plus = code.positive[w + k];
       const std::uint64_t minus = code.active[w + k] & ~plus;
-      for (const std::size_t half : {0U, 1U}) {
+      for (const std::size_t half : {0, 1}) {
         expand_bits(static_cast<std::uint32_t>(plus >> 32 * half),
                     static_cast<std::uint32_t>(minus >> 32 * half), entries + 64 * k + 32 * half);
       }
