@@ -111,3 +111,24 @@ def test_the_environment_variable_chooses(value, said):
 
 def test_examples():
     assert doctest.testmod(instruction_sets).failed == 0
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "sdnn.SDNNRegressor(max_iter=1).fit([[0.0], [1.0]], [0.0, 1.0])",
+        "sdnn.approximators.SDNNC()",
+        "sdnn.environments.AcrobotSwingUpVectorEnv(num_envs=2).reset()[0] is not None "
+        "and sdnn.instruction_set()",
+    ],
+)
+def test_an_unusable_level_in_the_environment_is_an_error_not_an_abort(call):
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sdnn, sdnn.approximators, sdnn.environments\n{call}"],
+        env=os.environ | {"SDNN_INSTRUCTION_SET": "foo"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "ValueError: instruction set must be portable, avx2 or avx512, got foo" in done.stderr

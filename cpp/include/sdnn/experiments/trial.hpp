@@ -42,10 +42,10 @@ struct TestRow {
 
 /// A learning agent on the acrobot swing-up; the same configs and seed give the same rows.
 ///
-/// The agent's action, normalized, is its part of the largest torque. The sensors' noise has streams of its
-/// own, so that the same seed gives every agent the same noise, observation by observation.
-/// Source: spec section 5. A test episode is greedy, learns nothing, uses the current lambda, and
-/// draws from random streams of its own.
+/// The agent's action, normalized, is its part of the largest torque. The sensors' noise has
+/// streams of its own, so that the same seed gives every agent the same noise, observation by
+/// observation. Source: spec section 5. A test episode is greedy, learns nothing, uses the current
+/// lambda, and draws from random streams of its own.
 template <agents::Agent Agent>
 class AcrobotTrial {
  public:
