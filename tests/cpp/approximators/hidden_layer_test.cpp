@@ -127,6 +127,7 @@ TEST(HiddenLayer, AWeightOutsideAByteHasAHighByte) {
   EXPECT_EQ(p.n_high_columns(), 2U);
   for (int i = 500; i > 0; --i) p.correct(unit, x, -1);
   EXPECT_EQ(p.weight(2, 0), 0);
+  EXPECT_EQ(p.n_high_columns(), 0U);
   for (int i = 0; i > -500; --i) p.correct(unit, x, -1);
   EXPECT_EQ(p.weight(2, 0), -500);
   EXPECT_EQ(p.weight(0, 0), 0);

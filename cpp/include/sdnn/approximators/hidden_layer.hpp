@@ -47,22 +47,18 @@ class HiddenLayer {
     bytes_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * block_bytes());
     high_bytes_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * block_bytes());
     high_columns_.assign(n_blocks_, ColumnSet(n_columns));
-    high_anywhere_ = ColumnSet(n_columns);
     may_have_high_.assign(n_units, 0);
     thresholds_.assign(n_units, 0);
     largest_weight_.assign(n_units, 0);
     group_of_block_.assign(n_blocks_, kLargestGroup);
+    high_group_of_block_.assign(n_blocks_, kLargestGroup);
   }
 
   std::size_t n_units() const noexcept { return n_units_; }
   std::size_t n_columns() const noexcept { return n_columns_; }
   std::size_t n_double_columns() const noexcept { return n_double_; }
   /// The columns that a pass reads high bytes of, summed over blocks.
-  std::size_t n_high_columns() const noexcept {
-    std::size_t n = 0;
-    for (const ColumnSet& columns : high_columns_) n += columns.size();
-    return n;
-  }
+  std::size_t n_high_columns() const noexcept { return n_high_columns_; }
   /// The largest |weight| that is held before std::overflow_error.
   std::int32_t weight_limit() const noexcept { return weight_limit_; }
 
@@ -77,7 +73,10 @@ class HiddenLayer {
     core::require_in_range("weight", value, -weight_limit_, weight_limit_);
     if (std::abs(value) > largest_weight_[unit]) note_largest(unit, std::abs(value));
     // Written only where there is one: pages of both layers in turn would share cache sets.
-    if (may_have_high_[unit]) high_bytes_[byte_index(unit, column)] = 0;
+    if (may_have_high_[unit]) {
+      high_bytes_[byte_index(unit, column)] = 0;
+      note_high(unit / kBlockUnits, column, false);
+    }
     store(unit, column, value);
   }
   /// Throws std::invalid_argument if |value| reaches 2^30.
@@ -149,7 +148,7 @@ class HiddenLayer {
   static constexpr std::int32_t kWeightLimit = kByteLimit * kHighByte + kByteLimit;
   static constexpr int kLargestGroup = 4;
 
-  using SomeColumns = std::array<std::uint32_t, ColumnPlaces::kMost>;
+  using Listed = ListedColumns<ColumnPlaces::kMost>;
 
   std::size_t byte_index(std::size_t unit, std::size_t column) const noexcept {
     return unit / kBlockUnits * block_bytes() + column * kBlockUnits + unit % kBlockUnits;
@@ -165,9 +164,7 @@ class HiddenLayer {
       const auto some = columns.first(std::min(ColumnPlaces::kMost, columns.size()));
       columns = columns.subspan(some.size());
       const ColumnPlaces places(some, n_columns_);
-      SomeColumns high;
-      const std::size_t n_high =
-          high_anywhere_.size() == 0 ? 0 : high_anywhere_.select(some, high.data());
+      const Listed listed(n_high_columns_ > 0 ? some : some.first(0));
       for (std::size_t b = 0; b < n_blocks_; ++b) {
         alignas(core::kCacheLine) std::array<std::int32_t, kBlockUnits> padded;
         const std::size_t first = b * kBlockUnits;
@@ -175,26 +172,25 @@ class HiddenLayer {
         if (!whole) padded.fill(0);
         std::int32_t* const sums = whole ? out.data() + first : padded.data();
         add_columns(bytes_.data() + b * block_bytes(), places, group_of_block_[b], sign, sums);
-        if (n_high > 0 && high_columns_[b].size() > 0) {
-          add_high_bytes(b, std::span(high).first(n_high), sign, sums);
-        }
+        if (high_columns_[b].size() > 0) add_high_bytes(b, places, listed, sign, sums);
         for (std::size_t i = first; !whole && i < n_units_; ++i) out[i] += padded[i - first];
       }
     }
   }
 
   /// The part of high bytes. Where many columns have some, telling which costs more than it saves.
-  void add_high_bytes(std::size_t block, std::span<const std::uint32_t> columns, int sign,
+  void add_high_bytes(std::size_t block, const ColumnPlaces& all, const Listed& listed, int sign,
                       std::int32_t* sums) const {
-    SomeColumns own;
-    if (high_columns_[block].size() < n_columns_ / 4) {
-      columns = {own.data(), high_columns_[block].select(columns, own.data())};
+    const int group = high_group_of_block_[block];
+    const std::int8_t* const bytes = high_bytes_.data() + block * block_bytes();
+    if (high_columns_[block].size() >= n_columns_ / 4) {
+      return add_columns(bytes, all, group, sign * kHighByte, sums);
     }
-    const std::int32_t bound = (largest_of_block(block) + kByteLimit) / kHighByte;
-    int group = kLargestGroup;
-    while (group > 1 && bound > kByteLimit / group) group /= 2;
-    add_columns(high_bytes_.data() + block * block_bytes(), ColumnPlaces(columns, n_columns_),
-                group, sign * kHighByte, sums);
+    std::array<std::uint32_t, ColumnPlaces::kMost> own;
+    const std::size_t n = listed.in(high_columns_[block], own.data());
+    if (n == 0) return;
+    add_columns(bytes, ColumnPlaces(std::span(own).first(n), n_columns_), group, sign * kHighByte,
+                sums);
   }
 
   /// Columns of an input whose weights a correction changes alike.
@@ -259,18 +255,24 @@ class HiddenLayer {
       value -= change * kHighByte;
       high_bytes_[at] = static_cast<std::int8_t>(high_bytes_[at] + change);
       may_have_high_[unit] = 1;
-      high_columns_[unit / kBlockUnits].add(column);
-      high_anywhere_.add(column);
+      note_high(unit / kBlockUnits, column, high_bytes_[at] != 0);
     }
     bytes_[at] = static_cast<std::int8_t>(value);
   }
 
-  /// A bound of the |weights| of a block.
-  std::int32_t largest_of_block(std::size_t block) const noexcept {
-    const std::size_t end = std::min(n_units_, (block + 1) * kBlockUnits);
-    return *std::max_element(
-        largest_weight_.begin() + static_cast<std::ptrdiff_t>(block * kBlockUnits),
-        largest_weight_.begin() + static_cast<std::ptrdiff_t>(end));
+  /// Keeps the set of a block's columns with high bytes, after one of them has changed.
+  void note_high(std::size_t block, std::size_t column, bool is_there) noexcept {
+    ColumnSet& columns = high_columns_[block];
+    n_high_columns_ -= columns.size();
+    if (is_there) {
+      columns.add(column);
+    } else {
+      const std::int8_t* const line = high_bytes_.data() + byte_index(block * kBlockUnits, column);
+      if (std::all_of(line, line + kBlockUnits, [](std::int8_t b) { return b == 0; })) {
+        columns.remove(column);
+      }
+    }
+    n_high_columns_ += columns.size();
   }
 
   std::int32_t largest_weight(std::size_t unit) const noexcept {
@@ -284,8 +286,11 @@ class HiddenLayer {
   /// Keeps the bound of a unit, and how many columns of its block may be added in 8 bits.
   void note_largest(std::size_t unit, std::int32_t bound) noexcept {
     largest_weight_[unit] = bound;
-    int& group = group_of_block_[unit / kBlockUnits];
-    while (group > 1 && bound > kByteLimit / group) group /= 2;
+    const auto narrow = [](int& group, std::int32_t limit) {
+      while (group > 1 && limit > kByteLimit / group) group /= 2;
+    };
+    narrow(group_of_block_[unit / kBlockUnits], bound);
+    narrow(high_group_of_block_[unit / kBlockUnits], (bound + kByteLimit) / kHighByte);
   }
 
   /// Throws unless the correction keeps the unit in range. The bound kept per unit only grows, so
@@ -332,12 +337,13 @@ class HiddenLayer {
   std::int32_t weight_limit_;
   core::AlignedBuffer<std::int8_t> bytes_;       ///< [block][column, then zeros][unit in block]
   core::AlignedBuffer<std::int8_t> high_bytes_;  ///< the same, in multiples of kHighByte
-  std::vector<ColumnSet> high_columns_;          ///< of each block: those with high bytes, ever
-  ColumnSet high_anywhere_;                      ///< their union
+  std::vector<ColumnSet> high_columns_;          ///< of each block: those with high bytes
+  std::size_t n_high_columns_ = 0;               ///< in all blocks
   std::vector<std::uint8_t> may_have_high_;      ///< whether a unit ever had a high byte
   std::vector<std::int32_t> thresholds_;
   std::vector<std::int32_t> largest_weight_;  ///< an upper bound of max_j |w_ij|
   std::vector<int> group_of_block_;           ///< columns of a block that may be added in 8 bits
+  std::vector<int> high_group_of_block_;      ///< the same of high bytes
 };
 
 }  // namespace sdnn::approximators

@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
+
+#include "instruction_sets.hpp"
 
 namespace sdnn::approximators {
 namespace {
@@ -17,16 +21,30 @@ TEST(ColumnSet, HoldsWhatWasAddedOnce) {
   EXPECT_FALSE(set.holds(1) || set.holds(128));
 }
 
-TEST(ColumnSet, SelectsInTheOrderGiven) {
-  ColumnSet set(100);
-  set.add(7);
-  set.add(70);
-  const std::vector<std::uint32_t> columns = {70, 1, 7, 70, 99};
-  std::vector<std::uint32_t> out(columns.size());
-  ASSERT_EQ(set.select(columns, out.data()), 3U);
-  out.resize(3);
-  EXPECT_EQ(out, (std::vector<std::uint32_t>{70, 7, 70}));
-  EXPECT_EQ(ColumnSet(100).select(columns, std::vector<std::uint32_t>(5).data()), 0U);
+TEST(ColumnSet, RemovesWhatItHolds) {
+  ColumnSet set(70);
+  set.add(3);
+  set.add(69);
+  set.remove(3);
+  set.remove(4);
+  EXPECT_EQ(set.size(), 1U);
+  EXPECT_EQ(set.words()[0].to_ullong(), 0U);
+  EXPECT_EQ(set.words()[1].to_ullong(), std::uint64_t{1} << 5);
+}
+
+TEST(ListedColumns, FindsThoseInASetAsOftenAsTheyCome) {
+  ColumnSet set(200);
+  for (const std::size_t column : {7U, 70U, 130U, 199U}) set.add(column);
+  const std::vector<std::uint32_t> columns = {1, 7, 7, 8, 70, 130, 131, 130, 2};
+  std::array<std::uint32_t, 17> out{};
+  const ListedColumns<16> listed(columns);
+  sdnn::testing::on_every_instruction_set([&](auto level) {
+    const auto n = static_cast<std::ptrdiff_t>(listed.in(set, out.data()));
+    EXPECT_EQ(std::vector<std::uint32_t>(out.begin(), out.begin() + n),
+              (std::vector<std::uint32_t>{7, 7, 70, 130, 130}))
+        << level;
+  });
+  EXPECT_EQ(listed.in(ColumnSet(200), out.data()), 0U);
 }
 
 }  // namespace
