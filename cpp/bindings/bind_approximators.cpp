@@ -44,6 +44,28 @@ py::array_t<std::int32_t> thresholds(const SDNNC& network) {
   return out;
 }
 
+/// What all networks that give Q(s, a) for every action have in common.
+template <class Network>
+py::class_<Network> bind_network(py::module_& module, const char* name, const char* doc) {
+  return py::class_<Network>(module, name, doc)
+      .def_property_readonly("config", [](const Network& net) { return net.config(); })
+      .def_property_readonly("n_actions", &Network::n_actions)
+      .def(
+          "values",
+          [](Network& net, const ArrayArgument<double>& state) {
+            py::array_t<double> out(static_cast<py::ssize_t>(net.n_actions()));
+            net.values(bindings::vector(state, "state"), {out.mutable_data(), net.n_actions()});
+            return out;
+          },
+          py::arg("state"), "Q(state, a) for every action; shapes (n_inputs,) -> (n_actions,)")
+      .def(
+          "correct",
+          [](Network& net, const ArrayArgument<double>& state, std::size_t action, double target,
+             double rate) { net.correct(bindings::vector(state, "state"), action, target, rate); },
+          py::arg("state"), py::arg("action"), py::arg("target"), py::arg("rate") = 1.0,
+          "One correction of Q = Q(state, action) towards (1 - rate) Q + rate target");
+}
+
 void bind_fuzzy_rules(py::module_& module) {
   bindings::bind_config<FuzzyRulesConfig>(module, "FuzzyRulesConfig",
                                           "The sizes of a table of fuzzy rules");
@@ -76,25 +98,9 @@ void bind_rbf_network(py::module_& module) {
   bindings::bind_config<RBFNetworkConfig>(module, "RBFNetworkConfig",
                                           "The sizes of an RBF network");
 
-  py::class_<RBFNetwork>(module, "RBFNetwork", "Q(s, a) linear in normalized Gaussian bases")
+  bind_network<RBFNetwork>(module, "RBFNetwork", "Q(s, a) linear in normalized Gaussian bases")
       .def(py::init<const RBFNetworkConfig&>(), py::arg("config"))
-      .def_property_readonly("config", [](const RBFNetwork& net) { return net.config(); })
-      .def_property_readonly("n_actions", &RBFNetwork::n_actions)
       .def_property_readonly("n_joint_bases", &RBFNetwork::n_joint_bases)
-      .def(
-          "values",
-          [](RBFNetwork& net, const ArrayArgument<double>& state) {
-            py::array_t<double> out(static_cast<py::ssize_t>(net.n_actions()));
-            net.values(bindings::vector(state, "state"), {out.mutable_data(), net.n_actions()});
-            return out;
-          },
-          py::arg("state"), "Q(state, a) for every action; shapes (d,) -> (n_actions,)")
-      .def(
-          "correct",
-          [](RBFNetwork& net, const ArrayArgument<double>& state, std::size_t action, double target,
-             double rate) { net.correct(bindings::vector(state, "state"), action, target, rate); },
-          py::arg("state"), py::arg("action"), py::arg("target"), py::arg("rate") = 1.0,
-          "One gradient step of Q = Q(state, action) towards (1 - rate) Q + rate target")
       .def(
           "weights",
           [](const RBFNetwork& net) {
@@ -118,7 +124,7 @@ void bind_approximators(py::module_& module) {
       .value("uniform", approximators::InitialWeights::uniform);
   bindings::bind_config<SDNNCConfig>(module, "SDNNCConfig", "Everything that defines an SDNN-C");
 
-  py::class_<SDNNC>(module, "SDNNC", "A network that gives Q(s, a) for every action at once")
+  bind_network<SDNNC>(module, "SDNNC", "A network that gives Q(s, a) for every action at once")
       .def(py::init<const SDNNCConfig&, std::uint64_t>(), py::arg("config"), py::arg("seed"))
       .def(py::init([](const SDNNCConfig& config, std::uint64_t seed,
                        const std::vector<ArrayArgument<std::int8_t>>& tables) {
@@ -126,31 +132,15 @@ void bind_approximators(py::module_& module) {
            }),
            py::arg("config"), py::arg("seed"), py::arg("tables"),
            "With the patterns of each input: (n_bins, m) of -1, +1")
-      .def_property_readonly("config", [](const SDNNC& net) { return net.config(); })
       .def_property_readonly("n_inputs", &SDNNC::n_inputs)
-      .def_property_readonly("n_actions", &SDNNC::n_actions)
       .def_property_readonly("u_low", [](const SDNNC& net) { return net.output_scale().u_low(); })
       .def_property_readonly("u_high", [](const SDNNC& net) { return net.output_scale().u_high(); })
-      .def(
-          "values",
-          [](SDNNC& net, const ArrayArgument<double>& state) {
-            py::array_t<double> out(static_cast<py::ssize_t>(net.n_actions()));
-            net.values(bindings::vector(state, "state"), {out.mutable_data(), net.n_actions()});
-            return out;
-          },
-          py::arg("state"), "Q(state, a) for every action; shapes (l,) -> (n_actions,)")
       .def(
           "value",
           [](SDNNC& net, const ArrayArgument<double>& state, std::size_t action) {
             return net.value(bindings::vector(state, "state"), action);
           },
           py::arg("state"), py::arg("action"))
-      .def(
-          "correct",
-          [](SDNNC& net, const ArrayArgument<double>& state, std::size_t action, double target,
-             double rate) { net.correct(bindings::vector(state, "state"), action, target, rate); },
-          py::arg("state"), py::arg("action"), py::arg("target"), py::arg("rate") = 1.0,
-          "One step of error correction of Q(state, action) towards target")
       .def(
           "potentials",
           [](const SDNNC& net, const ArrayArgument<double>& state) {

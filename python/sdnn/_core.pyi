@@ -223,7 +223,7 @@ class SDNNC:
         """
     def correct(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         """
-        One step of error correction of Q(state, action) towards target
+        One correction of Q = Q(state, action) towards (1 - rate) Q + rate target
         """
     def permutation(self, mu: typing.SupportsInt | typing.SupportsIndex, nu: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.uint32]:
         """
@@ -247,7 +247,7 @@ class SDNNC:
         ...
     def values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Q(state, a) for every action; shapes (l,) -> (n_actions,)
+        Q(state, a) for every action; shapes (n_inputs,) -> (n_actions,)
         """
     def weights(self) -> numpy.typing.NDArray[numpy.int32]:
         """
@@ -345,13 +345,13 @@ class RBFNetwork:
         ...
     def correct(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         """
-        One gradient step of Q = Q(state, action) towards (1 - rate) Q + rate target
+        One correction of Q = Q(state, action) towards (1 - rate) Q + rate target
         """
     def set_weights(self, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         ...
     def values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Q(state, a) for every action; shapes (d,) -> (n_actions,)
+        Q(state, a) for every action; shapes (n_inputs,) -> (n_actions,)
         """
     def weights(self) -> numpy.typing.NDArray[numpy.float64]:
         """
