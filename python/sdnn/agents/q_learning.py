@@ -17,7 +17,7 @@ from sdnn.agents.transition import Transition
 from sdnn.approximators.rbf_network import RBFNetworkConfig
 from sdnn.approximators.sdnn_c import SDNNCConfig, pattern_tables
 from sdnn.arguments import seed_of
-from sdnn.config import to_core
+from sdnn.config import added_later, to_core
 
 __all__ = ["QLearningConfig", "RBFQLearning", "SDNNQLearning"]
 
@@ -39,6 +39,12 @@ class QLearningConfig:
     tie_rule : {"uniform", "lowest", "middle"}
         Which of several best actions is taken: any with the same probability, the one with the
         lowest index, or the middle of the widest run of neighbours. A reading.
+    tie_tolerance : float
+        Values at most this far below the best tie with it, >= 0. Not in the paper: with
+        ``"middle"`` the agent acts from the middle of the widest high plateau.
+    n_steps : int
+        Rewards in a target before it bootstraps, 1 to 1000. Not in the paper, which has 1: with
+        more, a transition is learned, once, when so many steps are known or the episode ends.
     """
 
     learning_rate: float = 0.5
@@ -46,6 +52,8 @@ class QLearningConfig:
     epsilon: float = 0.1
     n_greedy_steps: int = 10
     tie_rule: Literal["uniform", "lowest", "middle"] = "uniform"
+    tie_tolerance: float = added_later(0.0)
+    n_steps: int = added_later(1)
 
     def to_core(self) -> _core.QLearningConfig:
         """Make the core's struct of the same values; see `sdnn.config.to_core`."""

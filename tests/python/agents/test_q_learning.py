@@ -127,7 +127,13 @@ def test_the_defaults_are_those_of_the_core():
 
 def test_every_field_reaches_the_core():
     other = QLearningConfig(
-        learning_rate=0.25, discount=0.5, epsilon=0.75, n_greedy_steps=3, tie_rule="lowest"
+        learning_rate=0.25,
+        discount=0.5,
+        epsilon=0.75,
+        n_greedy_steps=3,
+        tie_rule="lowest",
+        tie_tolerance=0.5,
+        n_steps=3,
     )
     core = other.to_core()
     for field in dataclasses.fields(QLearningConfig):

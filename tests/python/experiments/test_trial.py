@@ -62,8 +62,13 @@ def test_the_settings_of_the_task_reach_it(monkeypatch):
     config = config_of("fql")
     config = replace(
         config,
+        approximator=replace(config.approximator, n_inputs=6),
         acrobot=replace(config.acrobot, max_decisions=3, penalty=-1.0),
         goal=replace(config.goal, kind="constant", constant_value=0.1),
+        sensors=replace(
+            config.sensors, noise=0.02, noise_entry="basic_sensors", n_constant=1, n_random=1
+        ),
+        protocol=replace(config.protocol, limit_bootstraps=False, noisy_tests=False),
     )
     core, trial = config.make_trial(SEED), python_trial(config, monkeypatch)
     core.advance(20)
@@ -88,7 +93,7 @@ def test_before_its_first_test_it_has_no_rows(monkeypatch):
     [
         ({"protocol": ProtocolConfig(n_learning_episodes=0)}, "n_learning_episodes"),
         ({"protocol": ProtocolConfig(test_interval=0)}, "test_interval"),
-        ({"sensors": {"n_sensors": 5}}, "n_inputs must be n_sensors of the sensors"),
+        ({"sensors": {"n_sensors": 5}}, "n_inputs must be the number of inputs of the sensors, 5"),
         ({"sensors": {"n_sensors": 7}, "approximator": {"n_inputs": 7}}, "n_sensors"),
         ({"sensors": {"n_sensors": 3}, "approximator": {"n_inputs": 3}}, "n_sensors"),
     ],
