@@ -958,7 +958,7 @@ class QLearningConfig:
     __hash__: typing.ClassVar[None] = None
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, learning_rate: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, n_steps: typing.SupportsInt | typing.SupportsIndex = 1, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform, tie_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __init__(self, *, learning_rate: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform, tie_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0, n_steps: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -1112,6 +1112,11 @@ class AcrobotTrial:
         Columns of the test episodes so far
         """
     @property
+    def agent(self) -> SDNNQLearning:
+        """
+        The agent at work: asking for values changes nothing that follows
+        """
+    @property
     def episode(self) -> int:
         ...
     @property
@@ -1135,6 +1140,11 @@ class FuzzyAcrobotTrial:
         Columns of the test episodes so far
         """
     @property
+    def agent(self) -> FuzzyQLearning:
+        """
+        The agent at work: asking for values changes nothing that follows
+        """
+    @property
     def episode(self) -> int:
         ...
     @property
@@ -1156,6 +1166,11 @@ class RBFAcrobotTrial:
     def test_rows(self) -> dict[str, numpy.ndarray]:
         """
         Columns of the test episodes so far
+        """
+    @property
+    def agent(self) -> RBFQLearning:
+        """
+        The agent at work: asking for values changes nothing that follows
         """
     @property
     def episode(self) -> int:

@@ -142,8 +142,8 @@ def case_config(case: Case, agent: str, protocol: ProtocolConfig | None = None) 
     entry = agent_entry(agent)
     return TrialConfig(
         agent=agent,
-        approximator=entry.approximator(n_inputs=case.n_sensors),
-        learning=entry.learning(),
+        approximator=entry.approximator_settings(case.n_sensors),
+        learning=entry.learning_settings(),
         sensors=SensorConfig(n_sensors=case.n_sensors, noise=case.noise),
         protocol=ProtocolConfig() if protocol is None else protocol,
     )

@@ -84,6 +84,9 @@ class AcrobotTrial {
   std::int64_t n_decisions() const noexcept { return n_decisions_; }
   std::span<const TestRow> rows() const noexcept { return rows_; }
   const Agent& agent() const noexcept { return agent_; }
+  /// To look inside while it learns: asking for values changes nothing that follows, acting and
+  /// learning do.
+  Agent& agent() noexcept { return agent_; }
 
   /// Runs up to `n_episodes` more learning episodes, with the test episodes that fall due.
   void advance(int n_episodes) {
