@@ -167,7 +167,7 @@ def test_agents_are_looked_up_by_id():
         ("sdnn-c-robust", "SDNN-C, robust"),
     ]  # fmt: skip
     assert all(agent_entry(name) is entry for name, entry in AGENTS.items())
-    with pytest.raises(ValueError, match="one of sdnn-c, fql, rbfn, got 'dqn'"):
+    with pytest.raises(ValueError, match="one of sdnn-c, fql, rbfn, sdnn-c-robust, got 'dqn'"):
         agent_entry("dqn")
 
 
