@@ -207,22 +207,25 @@ def final_share_solved(solved: ArrayLike, config: MeasureConfig = DEFAULT_MEASUR
     return float(np.mean(np.asarray(solved, np.float64)[-config.final_window :]))
 
 
-def final_return(episode_return: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES) -> float:
-    """Mean return of the last `final_window` test episodes, or of all if there are fewer.
+FINAL_PART = 10
+"""The last return is measured over one in so many of the tests, the last ones."""
+
+
+def final_return(episode_return: ArrayLike) -> float:
+    """Mean return of the last tenth of the test episodes, at least of one.
 
     Parameters
     ----------
     episode_return : (n_tests,)
         Sum of rewards of each test episode.
-    config
-        Constants.
 
     Examples
     --------
-    >>> final_return(100 * [-20.0] + 50 * [8.0])
-    8.0
+    >>> final_return(18 * [-20.0] + [8.0, 9.0])
+    8.5
     """
-    return float(np.mean(np.asarray(episode_return, np.float64)[-config.final_window :]))
+    returns = np.asarray(episode_return, np.float64)
+    return float(np.mean(returns[-max(1, returns.size // FINAL_PART) :]))
 
 
 def mean_return(episode_return: ArrayLike) -> float:

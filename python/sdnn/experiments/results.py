@@ -220,6 +220,6 @@ _MEASURE: dict[MeasureName, Callable[[TrialRows, MeasureConfig], float]] = {
     ),
     "final_steps": lambda rows, config: measures.final_steps(rows.steps, config),
     "final_share_solved": lambda rows, config: measures.final_share_solved(rows.solved, config),
-    "final_return": lambda rows, config: measures.final_return(rows.episode_return, config),
+    "final_return": lambda rows, _config: measures.final_return(rows.episode_return),
     "mean_return": lambda rows, _config: measures.mean_return(rows.episode_return),
 }

@@ -20,6 +20,9 @@ from sdnn.experiments.statistics import Estimate, estimate_mean
 from sdnn.experiments.sweep.study import PAPER_CASES, Combination, Study, StudyCase, StudyVariant
 from sdnn.experiments.verdicts import ClaimOutcome, Verdict, judge_claims
 
+MIN_TRIALS_TO_DIFFER = 6
+"""Fewer paired trials are all on one side by chance more often than once in twenty times."""
+
 
 @dataclass(frozen=True)
 class Measured:
@@ -44,6 +47,17 @@ class Measured:
     def measures(self) -> tuple[MeasureName, ...]:
         """What is measured in a task of this kind."""
         return tuple(self.summary.values)
+
+    def differs(self, measure: MeasureName) -> bool:
+        """Whether a measure differs from the reference's by more than chance.
+
+        That is where the interval of the difference leaves 0 out, over at least
+        `MIN_TRIALS_TO_DIFFER` trials.
+        """
+        difference = self.differences.get(measure)
+        if difference is None or self.summary.result.n_trials < MIN_TRIALS_TO_DIFFER:
+            return False
+        return difference.lower > 0 or difference.upper < 0
 
     @property
     def solved_at_end(self) -> NDArray[np.bool_] | None:

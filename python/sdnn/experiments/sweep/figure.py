@@ -11,7 +11,7 @@ from sdnn.experiments.figures import COLORS, FAINT, INK, require_matplotlib
 from sdnn.experiments.measures import MeasureName
 from sdnn.experiments.registry import AGENTS
 from sdnn.experiments.sweep.comparison import Comparison, Measured
-from sdnn.experiments.sweep.report import end_solved, is_distinct
+from sdnn.experiments.sweep.report import end_solved
 from sdnn.experiments.sweep.study import StudyCase
 
 if TYPE_CHECKING:
@@ -137,8 +137,7 @@ def _draw_variant(
         scale * (last if np.isinf(x) else x) for x in (median.value, median.lower, median.upper)
     )
     axes.plot([lower, upper], [line, line], color=color, linewidth=1.6, zorder=3)
-    difference = measured.differences.get(name)
-    is_filled = is_reference or (difference is not None and is_distinct(difference))
+    is_filled = is_reference or measured.differs(name)
     axes.plot(
         value, line, "o", markersize=5.5, color=color, zorder=4, clip_on=False,
         markerfacecolor=color if is_filled else "white", markeredgewidth=1.3,

@@ -18,10 +18,15 @@ from sdnn.experiments.report import (
     format_estimate,
 )
 from sdnn.experiments.statistics import DEFAULT_BOOTSTRAP, Estimate
-from sdnn.experiments.sweep.comparison import Comparison, Measured, VariantClaim
+from sdnn.experiments.sweep.comparison import (
+    MIN_TRIALS_TO_DIFFER,
+    Comparison,
+    Measured,
+    VariantClaim,
+)
 
 RETURN_MEASURE_TEXTS: dict[MeasureName, str] = {
-    "final_return": f"mean return of the last {DEFAULT_MEASURES.final_window} tests",
+    "final_return": "mean return of the last tenth of the tests",
     "mean_return": "mean return of all tests: the area under the learning curve",
 }
 """What the measures of environments other than the acrobot mean, for a reader."""
@@ -33,8 +38,8 @@ _PERCENT = f"{100 * DEFAULT_BOOTSTRAP.confidence:.0f} %"
 DIFFERENCE_NOTE = (
     "Differences are paired: a trial less the reference's trial of the same number, which has the"
     f" same seed; the mean over trials with its {_PERCENT} bootstrap interval over trials, censored"
-    " episodes as the last one. * marks intervals without 0; of many such intervals about one in"
-    " twenty leaves 0 out by chance."
+    f" episodes as the last one. * marks intervals without 0 over at least {MIN_TRIALS_TO_DIFFER}"
+    " trials; where nothing differs, about one in twenty of them does so by chance."
 )
 SOLVED_NOTE = (
     "end solved: trials that solve at least"
@@ -260,16 +265,12 @@ def _difference_row(measured: Measured, names: Sequence[MeasureName]) -> tuple[s
         measured.combination.variant.title,
         *(
             format_difference(measured.differences[name], name)
+            + (" *" if measured.differs(name) else "")
             if name in measured.differences
             else "-"
             for name in names
         ),
     )
-
-
-def is_distinct(difference: Estimate) -> bool:
-    """Whether the interval of a difference leaves 0 out."""
-    return difference.lower > 0 or difference.upper < 0
 
 
 def format_difference(difference: Estimate, measure: MeasureName) -> str:
@@ -278,7 +279,7 @@ def format_difference(difference: Estimate, measure: MeasureName) -> str:
     Examples
     --------
     >>> format_difference(Estimate(0.25, 0.1, 0.4), "final_share_solved")
-    '+25 % [+10, +40] *'
+    '+25 % [+10, +40]'
     >>> format_difference(Estimate(-0.5, -2.0, 1.0), "final_steps")
     '-0.5 [-2, +1]'
     """
@@ -292,10 +293,8 @@ def format_difference(difference: Estimate, measure: MeasureName) -> str:
         return "-"
     if math.isnan(difference.lower):
         return number(difference.value) + unit
-    star = " *" if is_distinct(difference) else ""
     return (
-        f"{number(difference.value)}{unit}"
-        f" [{number(difference.lower)}, {number(difference.upper)}]{star}"
+        f"{number(difference.value)}{unit} [{number(difference.lower)}, {number(difference.upper)}]"
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 import sys
 import types
 from collections.abc import Iterable, Mapping
@@ -78,7 +79,9 @@ class StudyFile:
         except UnicodeDecodeError as error:
             raise StudyError(f"{path}: must be UTF-8: {error}") from error
         except tomllib.TOMLDecodeError as error:
-            raise StudyError(f"{path}: must be TOML: {error}") from error
+            line = re.search(r"at line (\d+)", str(error))
+            place = f"{path}:{line[1]}" if line else str(path)
+            raise StudyError(f"{place}: must be TOML: {error}") from error
         return cls(path, text, content)
 
     @cached_property
