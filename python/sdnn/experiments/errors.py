@@ -13,3 +13,7 @@ class StoreError(ExperimentError):
 
 class PlotUnavailableError(ExperimentError):
     """Figures were asked for, but matplotlib is not installed."""
+
+
+class StudyError(ExperimentError):
+    """A study file says something that cannot be run."""

@@ -117,6 +117,25 @@ class TrialRecord:
     rows: TrialRows
 
 
+@dataclass(frozen=True, kw_only=True)
+class TrialTime:
+    """How long a finished trial took.
+
+    Parameters
+    ----------
+    key
+        Which trial it is.
+    seconds
+        Its processor time.
+    n_episodes
+        Learning episodes before its last test.
+    """
+
+    key: TrialKey
+    seconds: float
+    n_episodes: int
+
+
 def records_digest(records: Iterable[TrialRecord]) -> str:
     """SHA-256 of the results of trials, to compare runs.
 
