@@ -90,8 +90,7 @@ class _Probe:
         return Duration(
             lower,
             (n_episodes + n_tests) * longest * self.seconds / self.n_decisions,
-            f"a probe: if all episodes are as short as the first {self.n_episodes}, or as long as"
-            " allowed",
+            f"a probe: episodes as short as the first {self.n_episodes}, to as long as allowed",
         )
 
 
