@@ -1,5 +1,7 @@
 """The studies of the repository and of its documents can be run."""
 
+import doctest
+import importlib
 import re
 import sys
 from pathlib import Path
@@ -31,7 +33,7 @@ def test_the_studies_of_the_page_can_be_run(study, number):
 
 @pytest.mark.parametrize("name", ["tie-rules", "pendulum"])
 def test_the_page_shows_the_studies_as_they_are(name):
-    text = (ROOT / "studies" / f"{name}.toml").read_text()
+    text = (ROOT / "docs" / "studies" / f"{name}.toml").read_text()
     assert text.partition("[study]")[2] in PAGE
 
 
@@ -50,3 +52,17 @@ def test_the_agent_of_the_page_runs(tmp_path, monkeypatch):
     assert result.exit_code == 0, result.output
     assert "random actions" in result.stdout
     assert "3 of 3 trials are stored" in result.stdout
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "environments.unit_sensors", "experiments.environment_trial", "experiments.measures",
+        "experiments.page", "experiments.statistics", "experiments.sweep.report",
+        "experiments.sweep.settings", "experiments.sweep.toml_lines",
+    ],
+)  # fmt: skip
+def test_examples_in_docstrings(name):
+    result = doctest.testmod(importlib.import_module(f"sdnn.{name}"))
+    assert result.failed == 0
+    assert result.attempted > 0
