@@ -14,13 +14,20 @@ if TYPE_CHECKING:
     from sdnn.experiments.config import (
         PlannedTrial,
         TrialConfig,
+        TrialSettings,
         case_config,
         plan_trials,
         trial_seed,
     )
     from sdnn.experiments.cost import CostConfig
     from sdnn.experiments.engine import Observer, run_trials
-    from sdnn.experiments.errors import ExperimentError, PlotUnavailableError, StoreError
+    from sdnn.experiments.environment_trial import EnvironmentConfig, EnvironmentTrialConfig
+    from sdnn.experiments.errors import (
+        ExperimentError,
+        PlotUnavailableError,
+        StoreError,
+        StudyError,
+    )
     from sdnn.experiments.figures import draw_cost, draw_experiment
     from sdnn.experiments.measures import MeasureConfig
     from sdnn.experiments.records import CostRecord, TrialKey, TrialRecord, TrialRows
@@ -46,6 +53,7 @@ _HOMES = {
     "config": (
         "PlannedTrial",
         "TrialConfig",
+        "TrialSettings",
         "case_config",
         "plan_trials",
         "trial_seed",
@@ -55,10 +63,15 @@ _HOMES = {
         "Observer",
         "run_trials",
     ),
+    "environment_trial": (
+        "EnvironmentConfig",
+        "EnvironmentTrialConfig",
+    ),
     "errors": (
         "ExperimentError",
         "PlotUnavailableError",
         "StoreError",
+        "StudyError",
     ),
     "figures": (
         "draw_cost",
@@ -112,6 +125,8 @@ __all__ = [
     "CostConfig",
     "CostRecord",
     "CostSeries",
+    "EnvironmentConfig",
+    "EnvironmentTrialConfig",
     "Estimate",
     "Experiment",
     "ExperimentError",
@@ -126,11 +141,13 @@ __all__ = [
     "Reproduction",
     "ResultStore",
     "StoreError",
+    "StudyError",
     "Trial",
     "TrialConfig",
     "TrialKey",
     "TrialRecord",
     "TrialRows",
+    "TrialSettings",
     "agent_entry",
     "case_config",
     "collect",

@@ -129,11 +129,14 @@ class TrialTime:
         Its processor time.
     n_episodes
         Learning episodes before its last test.
+    n_decisions
+        Decisions in learning and test episodes.
     """
 
     key: TrialKey
     seconds: float
     n_episodes: int
+    n_decisions: int
 
 
 def records_digest(records: Iterable[TrialRecord]) -> str:

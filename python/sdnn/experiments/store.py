@@ -183,12 +183,17 @@ class ResultStore:
         """Return how long the stored trials took, without reading their rows."""
         with _as_store_error(self.path):
             found = self._connection.execute(
-                "SELECT case_id, agent, trial, seed, config_hash, seconds,"
+                "SELECT case_id, agent, trial, seed, config_hash, seconds, n_decisions,"
                 " (SELECT max(episode) FROM rows WHERE trial_id = trials.id)"
                 " FROM trials ORDER BY id"
             ).fetchall()
         return tuple(
-            TrialTime(key=TrialKey(*row[:5]), seconds=row[5], n_episodes=row[6] or 0)
+            TrialTime(
+                key=TrialKey(*row[:5]),
+                seconds=row[5],
+                n_episodes=row[7] or 0,
+                n_decisions=row[6],
+            )
             for row in found
         )
 

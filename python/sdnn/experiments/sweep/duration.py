@@ -34,6 +34,11 @@ class Duration:
 class Durations:
     """Estimates the processor time of trials.
 
+    Trials of the same configuration count first, then those of the same case and agent. If there
+    are none, a trial is begun. Shorter ones give a range, since later episodes are longer where the
+    task gets harder or is lost: at least, all episodes are as short as theirs; at most, as long as
+    allowed.
+
     Parameters
     ----------
     times
@@ -41,15 +46,11 @@ class Durations:
     """
 
     def __init__(self, times: Iterable[TrialTime]) -> None:
-        self._times = tuple(t for t in times if t.n_episodes)
-        self._probes: dict[tuple[str, str], _Probe] = {}
+        self._times = tuple(t for t in times if t.n_episodes and t.n_decisions)
+        self._probes: dict[tuple[str, str], TrialTime] = {}
 
     def of_trial(self, key: TrialKey, config: TrialSettings) -> Duration:
         """Estimate the time of a trial.
-
-        Trials of the same configuration count first, then those of the same case and agent. Else a
-        trial is begun: if all its episodes were as short as the first ones, which are easy, that is
-        the least; if all were as long as allowed, the most.
 
         Parameters
         ----------
@@ -58,60 +59,53 @@ class Durations:
         config
             Its settings.
         """
-        n_episodes = config.protocol.n_learning_episodes
         alike = [t for t in self._times if t.key[:2] == key[:2]]
         same = [t for t in alike if t.key.config_hash == key.config_hash]
         for found, words in ((same, "this configuration"), (alike, "this case and agent")):
             if found:
-                seconds = n_episodes * _seconds_per_episode(found)
-                counted = f"{len(found)} stored trial{'s' if len(found) > 1 else ''}"
-                return Duration(seconds, seconds, f"{counted} of {words}")
+                chosen = [t for t in found if t.n_episodes >= _last_test(config)] or found
+                counted = f"{len(chosen)} stored trial{'s' if len(chosen) > 1 else ''}"
+                return _duration(chosen, config, f"{counted} of {words}")
         pair = (key.case_id, key.agent)
         if pair not in self._probes:
-            self._probes[pair] = _probe(config, key.seed)
-        return self._probes[pair].of_trial(config)
+            self._probes[pair] = _probe(key, config)
+        return _duration([self._probes[pair]], config, "a probe")
 
 
-@dataclass(frozen=True)
-class _Probe:
-    n_episodes: int
-    n_decisions: int
-    seconds: float
-    max_decisions: int | None
-    n_whole: int
-
-    def of_trial(self, config: TrialSettings) -> Duration:
-        n_episodes = config.protocol.n_learning_episodes
-        lower = n_episodes * self.seconds / self.n_episodes
-        if self.n_episodes == self.n_whole:
-            return Duration(lower, lower, "a whole trial as a probe")
-        n_tests = n_episodes // config.protocol.test_interval
-        longest = math.inf if self.max_decisions is None else self.max_decisions
-        return Duration(
-            lower,
-            (n_episodes + n_tests) * longest * self.seconds / self.n_decisions,
-            f"a probe: if all episodes are as short as the first {self.n_episodes}, or as long as"
-            " allowed",
-        )
+def _last_test(config: TrialSettings) -> int:
+    protocol = config.protocol
+    return protocol.n_learning_episodes // protocol.test_interval * protocol.test_interval
 
 
-def _seconds_per_episode(times: Sequence[TrialTime]) -> float:
-    return sum(t.seconds for t in times) / sum(t.n_episodes for t in times)
+def _duration(times: Sequence[TrialTime], config: TrialSettings, source: str) -> Duration:
+    n_episodes = config.protocol.n_learning_episodes
+    seconds = sum(t.seconds for t in times)
+    lower = n_episodes * seconds / sum(t.n_episodes for t in times)
+    shortest = min(t.n_episodes for t in times)
+    if shortest >= _last_test(config):
+        return Duration(lower, lower, source)
+    n_tests = n_episodes // config.protocol.test_interval
+    longest = config.max_decisions
+    of_decision = seconds / sum(t.n_decisions for t in times)
+    upper = math.inf if longest is None else (n_episodes + n_tests) * longest * of_decision
+    return Duration(
+        lower, upper, f"{source}: episodes as short as the first {shortest}, to as long as allowed"
+    )
 
 
-def _probe(config: TrialSettings, seed: int) -> _Probe:
-    trial = config.make_trial(seed)
+def _probe(key: TrialKey, config: TrialSettings) -> TrialTime:
+    """Run the start of a trial."""
+    trial = config.make_trial(key.seed)
     begin = time.thread_time()
     seconds = 0.0
     while seconds < PROBE_SECONDS and not trial.finished:
         trial.advance(config.protocol.test_interval)
         seconds = time.thread_time() - begin
-    return _Probe(
+    return TrialTime(
+        key=key,
+        seconds=seconds,
         n_episodes=int(trial.episode),
         n_decisions=int(trial.n_decisions),
-        seconds=seconds,
-        max_decisions=config.max_decisions,
-        n_whole=config.protocol.n_learning_episodes,
     )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sdnn.experiments.figures import COLORS, FAINT, INK, require_matplotlib
 from sdnn.experiments.measures import MeasureName
 from sdnn.experiments.registry import AGENTS
+from sdnn.experiments.statistics import estimate_mean
 from sdnn.experiments.sweep.comparison import Comparison, Measured
 from sdnn.experiments.sweep.report import end_solved
 from sdnn.experiments.sweep.study import StudyCase
@@ -38,8 +39,9 @@ _SPREAD = 0.3
 def draw_study(comparison: Comparison, footer: str) -> Figure:
     """Draw a study: for each case two panels, one below the other, with a line for each variant.
 
-    Faint dots are trials, since outcomes often lie in two heaps; a large dot is their median and a
-    bar its interval. It is filled where the paired difference from the reference is distinct.
+    Faint dots are trials, since outcomes often lie in two heaps; a large dot is their median, of
+    shares their mean, and a bar its interval. It is filled where a variant differs from the
+    reference.
 
     Parameters
     ----------
@@ -88,8 +90,9 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
     )  # fmt: skip
     figure.text(
         0.012, 0.07 / height,
-        "Faint dots: trials. Large dot: their median with its 95 % interval; filled: differs from"
-        " the reference trial by trial\n(the interval of the mean paired difference leaves 0 out)."
+        "Faint dots: trials. Large dot: their median (of the share solved: mean) with its 95 %"
+        " interval; filled: differs from the reference\ntrial by trial (the interval of the mean"
+        " paired difference leaves 0 out)."
         " Numbers at the right: trials that end solved.\n" + footer,
         fontsize=6.5, va="bottom", color=FAINT, linespacing=1.4,
     )  # fmt: skip
@@ -132,9 +135,13 @@ def _draw_variant(
     order = np.argsort(np.argsort(values, kind="stable"))
     offsets = np.linspace(-_SPREAD, _SPREAD, values.size)[order] if values.size > 1 else 0.0
     axes.scatter(values, line + offsets, s=9, color=color, alpha=0.28, linewidths=0, zorder=2)
-    median = summary.medians[name]
+    estimate = summary.medians[name]
+    if name == "final_share_solved":
+        # Most trials end near 0 or 1: their median would jump from one to the other.
+        estimate = estimate_mean(summary.values[name])
     value, lower, upper = (
-        scale * (last if np.isinf(x) else x) for x in (median.value, median.lower, median.upper)
+        scale * (last if np.isinf(x) else x)
+        for x in (estimate.value, estimate.lower, estimate.upper)
     )
     axes.plot([lower, upper], [line, line], color=color, linewidth=1.6, zorder=3)
     is_filled = is_reference or measured.differs(name)

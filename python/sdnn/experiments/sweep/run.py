@@ -23,7 +23,7 @@ from sdnn.experiments.sweep.figure import draw_study
 from sdnn.experiments.sweep.page import to_html, to_markdown
 from sdnn.experiments.sweep.report import StudyReport, to_json
 from sdnn.experiments.sweep.study import Study, read_study
-from sdnn.whole_files import csv_pieces, remove_partial_files, write_whole
+from sdnn.whole_files import csv_pieces, gzip_pieces, remove_partial_files, write_whole
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -179,7 +179,7 @@ def _write(
         "results.md": to_markdown(report).encode(),
         "table.json": (json.dumps(table, indent=2, allow_nan=False) + "\n").encode(),
         "trials.csv": csv_pieces(*_trial_table(comparison)),
-        "results.csv": csv_pieces(("variant", *ROW_HEADER), _test_rows(comparison)),
+        "results.csv.gz": gzip_pieces(csv_pieces(("variant", *ROW_HEADER), _test_rows(comparison))),
         "report.html": to_html(report, svg, call).encode(),
     }
     for name, content in contents.items():

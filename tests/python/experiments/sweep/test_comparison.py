@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from sdnn.experiments.figures import figure_bytes
+from sdnn.experiments.page import Call
 from sdnn.experiments.records import TrialRecord, TrialRows
 from sdnn.experiments.sweep.comparison import compare
 from sdnn.experiments.sweep.figure import draw_study
-from sdnn.experiments.sweep.page import to_markdown
+from sdnn.experiments.sweep.page import to_html, to_markdown
 from sdnn.experiments.sweep.report import StudyReport, to_json
 from sdnn.experiments.verdicts import Verdict
 
@@ -154,6 +155,11 @@ def test_claims_are_judged_for_each_variant(study):
     assert rows[1] == (
         "new", "-", "-", "does not hold (moved)", "does not hold (moved)", "holds",
     )  # fmt: skip
+    call = Call(machine="a machine", seconds=1.0, n_run=120, n_planned=120, processor_seconds=2.0)
+    page = to_html(report, b"<svg/>", call)
+    assert page.count('<td class="verdict bad">does not hold (moved)</td>') == 2
+    assert page.count('<td class="verdict good">holds</td>') == 5
+    assert "<summary>Claim 6: SDNN-C in Case III keeps solving until later" in page
     table = to_json(report)
     assert {(c["variant"], c["number"], c["moved"]) for c in table["claims"]} >= {
         ("new", 5, True), ("new", 7, False), ("old", 5, None),
