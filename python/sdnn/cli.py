@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
-from sdnn.experiments.cases import WORDS, includes_cost, select_experiments
+from sdnn.experiments.cases import PRESET_AGENTS, WORDS, includes_cost, select_experiments
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -116,6 +116,13 @@ def main() -> None:
     multiple=True,
     help="Run this agent in every case instead of the case's own; may be repeated.",
 )
+@click.option(
+    "--preset",
+    "presets",
+    type=click.Choice(tuple(PRESET_AGENTS)),
+    multiple=True,
+    help="Draw SDNN-C under these settings beside the paper's; may be repeated.",
+)
 @click.pass_context
 def reproduce(
     context: click.Context,
@@ -129,6 +136,7 @@ def reproduce(
     as_json: bool,
     dry_run: bool,
     agents: tuple[str, ...],
+    presets: tuple[str, ...],
 ) -> None:
     """Run the paper's experiments and write a report with its figures and claims.
 
@@ -150,6 +158,7 @@ def reproduce(
         jobs=jobs,
         quick=quick,
         agents=agents,
+        presets=presets,
     )
     try:
         _ = request.plan
