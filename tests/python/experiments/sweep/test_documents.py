@@ -16,7 +16,7 @@ from sdnn.experiments.sweep.study import read_study
 ROOT = Path(__file__).parents[4]
 PAGE = (ROOT / "docs" / "sweep.md").read_text()
 BLOCKS = re.findall(r"```(toml|python)\n(.*?)```", PAGE, re.DOTALL)
-STUDIES = sorted((ROOT / "studies").glob("*.toml"))
+STUDIES = sorted((ROOT / "docs" / "studies").glob("*.toml"))
 
 
 @pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.stem)
