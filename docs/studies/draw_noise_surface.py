@@ -1,7 +1,7 @@
-"""Draw a heat map for each agent of studies/noise-surface.toml: share solved over noise and inputs.
+"""Draw a heat map for each agent: share solved over noise and inputs.
 
-    sdnn sweep studies/noise-surface.toml --out results
-    python studies/draw_noise_surface.py --kept results --out docs
+    sdnn sweep docs/studies/noise-surface.toml --out results
+    python docs/studies/draw_noise_surface.py --kept results --out docs
 
 A cell is the median over trials of the share of the last 50 test episodes that were solved, and
 below it how many trials solve at least nine of ten. Cells without a stored trial stay empty.

@@ -1,7 +1,7 @@
 """Show why trials collapse: look inside the network at work, draw the figures of docs/collapse.md.
 
-    python studies/why_trials_collapse.py                 # measure what is missing, draw all
-    python studies/why_trials_collapse.py --draw-only     # draw from what is stored
+    python docs/studies/why_trials_collapse.py                 # measure what is missing, draw all
+    python docs/studies/why_trials_collapse.py --draw-only     # draw from what is stored
 
 Everything measured is kept in OUT/collapse.npz, from which alone the figures are drawn. Trials are
 those of Case II (4 noisy inputs) of ``sdnn reproduce b``: the same seeds, the same rows.
