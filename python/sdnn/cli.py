@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
+from sdnn.executor_options import executor_options
 from sdnn.experiments.cases import WORDS, includes_cost, select_experiments
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from sdnn.experiments.executor import Executor
     from sdnn.experiments.report import Report
     from sdnn.experiments.reproduce import ReproduceRequest, Reproduction
 
@@ -83,11 +85,7 @@ def main() -> None:
     type=click.IntRange(min=1),
     help="Learning episodes per trial.  [default: 15000, as in the paper]",
 )
-@click.option(
-    "--jobs",
-    type=click.IntRange(min=1),
-    help="Trials to run at the same time.  [default: all cores]",
-)
+@executor_options
 @click.option(
     "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Root of all seeds."
 )
@@ -118,7 +116,7 @@ def reproduce(
     experiment: str,
     trials: int | None,
     episodes: int | None,
-    jobs: int | None,
+    executor: Executor,
     seed: int,
     out: Path,
     quick: bool,
@@ -143,7 +141,7 @@ def reproduce(
         n_trials=trials,
         n_episodes=episodes,
         seed=seed,
-        jobs=jobs,
+        executor=executor,
         quick=quick,
         agents=agents,
     )

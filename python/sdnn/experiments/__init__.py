@@ -19,8 +19,16 @@ if TYPE_CHECKING:
         trial_seed,
     )
     from sdnn.experiments.cost import CostConfig
+    from sdnn.experiments.dask_executor import DaskExecutor
     from sdnn.experiments.engine import Observer, run_trials
-    from sdnn.experiments.errors import ExperimentError, PlotUnavailableError, StoreError
+    from sdnn.experiments.errors import (
+        ClusterError,
+        ExperimentError,
+        PlotUnavailableError,
+        StoreError,
+        WorkerLostError,
+    )
+    from sdnn.experiments.executor import Executor
     from sdnn.experiments.figures import draw_cost, draw_experiment
     from sdnn.experiments.measures import MeasureConfig
     from sdnn.experiments.records import CostRecord, TrialKey, TrialRecord, TrialRows
@@ -29,6 +37,7 @@ if TYPE_CHECKING:
     from sdnn.experiments.results import CaseResult, CaseSummary, collect, summarize
     from sdnn.experiments.statistics import Estimate
     from sdnn.experiments.store import ResultStore
+    from sdnn.experiments.thread_executor import ThreadExecutor
     from sdnn.experiments.trial import LearningAgent, ProtocolConfig, PythonTrial, Trial
     from sdnn.experiments.verdicts import judge_claims
 
@@ -51,15 +60,19 @@ _HOMES = {
         "trial_seed",
     ),
     "cost": ("CostConfig",),
+    "dask_executor": ("DaskExecutor",),
     "engine": (
         "Observer",
         "run_trials",
     ),
     "errors": (
+        "ClusterError",
         "ExperimentError",
         "PlotUnavailableError",
         "StoreError",
+        "WorkerLostError",
     ),
+    "executor": ("Executor",),
     "figures": (
         "draw_cost",
         "draw_experiment",
@@ -90,6 +103,7 @@ _HOMES = {
     ),
     "statistics": ("Estimate",),
     "store": ("ResultStore",),
+    "thread_executor": ("ThreadExecutor",),
     "trial": (
         "LearningAgent",
         "ProtocolConfig",
@@ -109,10 +123,13 @@ __all__ = [
     "CaseResult",
     "CaseSummary",
     "Claim",
+    "ClusterError",
     "CostConfig",
     "CostRecord",
     "CostSeries",
+    "DaskExecutor",
     "Estimate",
+    "Executor",
     "Experiment",
     "ExperimentError",
     "LearningAgent",
@@ -126,11 +143,13 @@ __all__ = [
     "Reproduction",
     "ResultStore",
     "StoreError",
+    "ThreadExecutor",
     "Trial",
     "TrialConfig",
     "TrialKey",
     "TrialRecord",
     "TrialRows",
+    "WorkerLostError",
     "agent_entry",
     "case_config",
     "collect",

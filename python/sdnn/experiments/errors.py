@@ -13,3 +13,11 @@ class StoreError(ExperimentError):
 
 class PlotUnavailableError(ExperimentError):
     """Figures were asked for, but matplotlib is not installed."""
+
+
+class ClusterError(ExperimentError):
+    """A cluster was asked for, but it cannot be reached or has no worker that fits."""
+
+
+class WorkerLostError(ExperimentError):
+    """A trial was given up because worker after worker was lost while running it."""

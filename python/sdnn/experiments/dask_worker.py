@@ -1,0 +1,100 @@
+"""What a Dask worker is asked to do: prove that it computes the same, and run trials.
+
+Arguments that a worker of another version could not read come as bytes, so that it can still say
+which version it is.
+"""
+
+from __future__ import annotations
+
+import pickle
+import time
+from dataclasses import dataclass
+
+from sdnn import _core
+from sdnn.experiments.config import PlannedTrial
+from sdnn.experiments.executor import run_to_end
+from sdnn.experiments.records import TrialRecord, TrialRows
+from sdnn.experiments.trial import PythonTrial
+
+PROBE_EPISODES = 10
+"""Learning episodes of a probe: few, but every part of agent and task takes part."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How a task tells its progress.
+
+    Parameters
+    ----------
+    topic
+        Topic of the events.
+    attempt
+        Number that the events carry.
+    seconds
+        Least time between two of them.
+    """
+
+    topic: str
+    attempt: int
+    seconds: float
+
+
+def probe(planned: PlannedTrial) -> str:
+    """Run the beginning of a trial and return what must be the same on every machine.
+
+    A trial in C++ gives the same bits everywhere, so its settings and first rows are returned. One
+    in Python may be long and owes nobody the same bits: it is only made.
+
+    Raises
+    ------
+    Exception
+        Whatever the trial raises; an agent that is not registered is a ValueError.
+    """
+    trial = planned.config.make_trial(planned.key.seed)
+    if isinstance(trial, PythonTrial):
+        return planned.config.canonical_json()
+    trial.advance(PROBE_EPISODES)
+    rows = TrialRows.from_arrays(trial.test_rows())
+    return f"{planned.config.canonical_json()} {trial.n_decisions} {rows.digest()}"
+
+
+def probe_worker(version: str, pickled: bytes) -> tuple[str, list[str]]:
+    """Return the worker's version and, if it is the asked one, what its probes give.
+
+    Parameters
+    ----------
+    version
+        The driver's version.
+    pickled
+        The trials to probe.
+    """
+    own: str = _core.__version__
+    if own != version:
+        return own, []
+    return own, [probe(planned) for planned in pickle.loads(pickled)]
+
+
+def run_on_worker(planned: PlannedTrial, progress: Progress) -> TrialRecord | None:
+    """Run one trial; there is no record if it is not wanted any more.
+
+    The GIL is free while a trial in C++ advances, so the worker's heartbeat goes on.
+    """
+    from distributed import get_worker
+
+    worker = get_worker()
+    key = worker.get_current_task()
+    reported = time.monotonic()
+
+    def wanted() -> bool:
+        # A task whose driver gave it up, or is gone, is no longer "executing".
+        task = worker.state.tasks.get(key)
+        return task is not None and task.state == "executing"
+
+    def advanced(episode: int) -> None:
+        nonlocal reported
+        now = time.monotonic()
+        if now - reported >= progress.seconds:
+            reported = now
+            worker.log_event(progress.topic, {"attempt": progress.attempt, "episode": episode})
+
+    return run_to_end(planned, wanted=wanted, advanced=advanced)
