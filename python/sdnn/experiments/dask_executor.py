@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 
 from sdnn import _core
 from sdnn.experiments.config import PlannedTrial
-from sdnn.experiments.dask_worker import Progress, probe, probe_worker, run_on_worker
+from sdnn.experiments.dask_worker import PROBE_WORKER, probe, run_on_worker
 from sdnn.experiments.errors import ClusterError, WorkerLostError
 from sdnn.experiments.executor import (
     POLL_SECONDS,
@@ -290,8 +290,8 @@ class _Run:
             where = self.executor.scheduler
             try:
                 client = Client(
-                    self._address(), asynchronous=True, timeout=CONNECT_SECONDS,
-                    set_as_default=False, name=self.name,
+                    self._address(), asynchronous=True, set_as_default=False, name=self.name,
+                    timeout=min(CONNECT_SECONDS, self.executor.scheduler_timeout),
                 )  # fmt: skip
                 await client
             except ValueError as error:
@@ -309,7 +309,7 @@ class _Run:
 
     def _address(self) -> str:
         text = self.executor.scheduler
-        if re.fullmatch(r"\w+://.+|[^/\\]+:\d+", text):
+        if re.fullmatch(r"[\w.+-]+://.+|[^/\\]+:\d+", text):
             return text
         try:
             return str(json.loads(Path(text).read_text())["address"])
@@ -441,8 +441,9 @@ class _Session:
         """Let a worker serve if it computes as this process does."""
         try:
             version, found = await self._result(
-                worker, "probe", probe_worker, _core.__version__, pickle.dumps(self._run.probes)
-            )
+                worker, "probe", eval, PROBE_WORKER,
+                {"arguments": (_core.__version__, pickle.dumps(self._run.probes))},
+            )  # fmt: skip
         except _WorkerDiedError:
             return
         except _TaskError as raised:
@@ -483,8 +484,10 @@ class _Session:
                 worker,
                 f"{key.case_id}-{key.agent}-{key.trial}-{key.config_hash}-{attempt}",
                 run_on_worker,
-                planned,
-                Progress(run.name, attempt, self._progress_seconds()),
+                pickle.dumps(planned),
+                run.name,
+                attempt,
+                self._progress_seconds(),
             )
         except asyncio.CancelledError:
             run.put_back(trial, worker.address if worker.given_up else None)

@@ -1,14 +1,14 @@
 """What a Dask worker is asked to do: prove that it computes the same, and run trials.
 
-Arguments that a worker of another version could not read come as bytes, so that it can still say
-which version it is.
+A worker that cannot unpickle a task falls silent instead of reporting an error. So trials come as
+bytes and are unpickled by the task itself; then an agent that the worker cannot import, or a
+missing library, is an error like any other.
 """
 
 from __future__ import annotations
 
 import pickle
 import time
-from dataclasses import dataclass
 
 from sdnn import _core
 from sdnn.experiments.config import PlannedTrial
@@ -19,24 +19,8 @@ from sdnn.experiments.trial import PythonTrial
 PROBE_EPISODES = 10
 """Learning episodes of a probe: few, but every part of agent and task takes part."""
 
-
-@dataclass(frozen=True)
-class Progress:
-    """How a task tells its progress.
-
-    Parameters
-    ----------
-    topic
-        Topic of the events.
-    attempt
-        Number that the events carry.
-    seconds
-        Least time between two of them.
-    """
-
-    topic: str
-    attempt: int
-    seconds: float
+PROBE_WORKER = f"__import__('importlib').import_module({__name__!r}).probe_worker(*arguments)"
+"""To be evaluated where the library may be missing, with `arguments` for `probe_worker`."""
 
 
 def probe(planned: PlannedTrial) -> str:
@@ -74,13 +58,29 @@ def probe_worker(version: str, pickled: bytes) -> tuple[str, list[str]]:
     return own, [probe(planned) for planned in pickle.loads(pickled)]
 
 
-def run_on_worker(planned: PlannedTrial, progress: Progress) -> TrialRecord | None:
+def run_on_worker(
+    pickled: bytes, topic: str, attempt: int, progress_seconds: float
+) -> TrialRecord | None:
     """Run one trial; there is no record if it is not wanted any more.
 
+    Parameters
+    ----------
+    pickled
+        The trial.
+    topic
+        Topic of the events that tell its progress.
+    attempt
+        Number that the events carry.
+    progress_seconds
+        Least time between two of them.
+
+    Notes
+    -----
     The GIL is free while a trial in C++ advances, so the worker's heartbeat goes on.
     """
     from distributed import get_worker
 
+    planned: PlannedTrial = pickle.loads(pickled)
     worker = get_worker()
     key = worker.get_current_task()
     reported = time.monotonic()
@@ -93,8 +93,8 @@ def run_on_worker(planned: PlannedTrial, progress: Progress) -> TrialRecord | No
     def advanced(episode: int) -> None:
         nonlocal reported
         now = time.monotonic()
-        if now - reported >= progress.seconds:
+        if now - reported >= progress_seconds:
             reported = now
-            worker.log_event(progress.topic, {"attempt": progress.attempt, "episode": episode})
+            worker.log_event(topic, {"attempt": attempt, "episode": episode})
 
     return run_to_end(planned, wanted=wanted, advanced=advanced)
