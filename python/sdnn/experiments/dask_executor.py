@@ -130,6 +130,8 @@ class DaskExecutor:
         ClusterError
             If there was no scheduler or no fitting worker for too long.
         """
+        import distributed  # noqa: F401  (before `_quiet`, for it sets up logging)
+
         run = _Run(self, planned)
         thread = threading.Thread(target=run.in_thread, name="dask driver", daemon=True)
         with _quiet():
@@ -192,8 +194,7 @@ class _Run:
             self.waiting.put_nowait(trial)
         self.woken = asyncio.Event()
         self.attempts = count()
-        self.probes: list[PlannedTrial] = []
-        self.expected: list[str] = []
+        self.probes: list[tuple[str, bytes, str]] = []
         self.served_at = time.monotonic()
         self.has_served = False
         self._n_lost: Counter[int] = Counter()
@@ -226,7 +227,7 @@ class _Run:
         """Tell the user."""
         self.messages.put(Noted(text))
 
-    def finish(self, trial: int, message: Message) -> None:
+    def finish(self, message: Finished | Failed) -> None:
         """Close a trial with its last message."""
         self.messages.put(message)
         self.n_open -= 1
@@ -244,7 +245,7 @@ class _Run:
         error = WorkerLostError(
             f"workers lost while they had it: {self._n_lost[trial]}, the last one {lost_with}"
         )
-        self.finish(trial, Failed(planned, error))
+        self.finish(Failed(planned, error))
 
     def patience_ends(self, reason: str, seconds: float) -> None:
         """Raise the error that ends a run, if nothing was served for `seconds`."""
@@ -265,21 +266,20 @@ class _Run:
             try:
                 await _Session(self, client).serve()
             except (_SchedulerLostError, OSError, asyncio.TimeoutError) as error:
-                self.note(f"lost the scheduler at {self.executor.scheduler}: {_in_words(error)}")
+                self.note(f"lost the scheduler at {self.executor.scheduler} ({_in_words(error)})")
                 await asyncio.sleep(RETRY_SECONDS)
             finally:
                 with suppress(Exception):
                     await asyncio.wait_for(client.close(), CONNECT_SECONDS)
 
     def _make_probes(self) -> None:
-        """Choose one trial of each agent and see what it gives here."""
+        """Choose one trial of each agent and see what it gives here: agent, trial, outcome."""
         agents: set[str] = set()
         for planned in self.planned:
             if planned.key.agent not in agents:
                 # A trial that raises here fails later, as everywhere.
                 with suppress(Exception):
-                    self.expected.append(probe(planned))
-                    self.probes.append(planned)
+                    self.probes.append((planned.key.agent, pickle.dumps(planned), probe(planned)))
                     agents.add(planned.key.agent)
 
     async def _connect(self) -> Client:
@@ -442,7 +442,7 @@ class _Session:
         try:
             version, found = await self._result(
                 worker, "probe", eval, PROBE_WORKER,
-                {"arguments": (_core.__version__, pickle.dumps(self._run.probes))},
+                {"arguments": (_core.__version__, [trial for _, trial, _ in self._run.probes])},
             )  # fmt: skip
         except _WorkerDiedError:
             return
@@ -452,12 +452,12 @@ class _Session:
         if version != _core.__version__:
             self._refuse(worker, f"it has sdnn {version}, this is sdnn {_core.__version__}")
             return
-        for planned, ours, theirs in zip(self._run.probes, self._run.expected, found, strict=True):
+        for (agent, _, ours), theirs in zip(self._run.probes, found, strict=True):
             if ours != theirs:
                 self._refuse(
                     worker,
                     f"its build of sdnn {version} does not give the rows of this one for agent"
-                    f" {planned.key.agent}",
+                    f" {agent}",
                 )
                 return
         worker.serves = True
@@ -475,6 +475,11 @@ class _Session:
 
     async def _run_trial(self, worker: _Worker, trial: int) -> None:
         run, planned = self._run, self._run.planned[trial]
+        try:
+            pickled = pickle.dumps(planned)
+        except Exception as error:
+            run.finish(Failed(planned, error))
+            return
         attempt = next(run.attempts)
         self._running[attempt] = planned
         run.messages.put(Started(planned))
@@ -484,7 +489,7 @@ class _Session:
                 worker,
                 f"{key.case_id}-{key.agent}-{key.trial}-{key.config_hash}-{attempt}",
                 run_on_worker,
-                pickle.dumps(planned),
+                pickled,
                 run.name,
                 attempt,
                 self._progress_seconds(),
@@ -495,7 +500,7 @@ class _Session:
         except _WorkerDiedError:
             run.put_back(trial, worker.address)
         except _TaskError as raised:
-            run.finish(trial, Failed(planned, raised.error))
+            run.finish(Failed(planned, raised.error))
         except Exception:
             run.put_back(trial)
             raise
@@ -504,7 +509,7 @@ class _Session:
                 run.put_back(trial)
             else:
                 run.messages.put(Advanced(planned, planned.config.protocol.n_learning_episodes))
-                run.finish(trial, Finished(planned, record))
+                run.finish(Finished(planned, record))
         finally:
             del self._running[attempt]
 
@@ -528,7 +533,7 @@ class _Session:
         except Exception as error:
             if future.status == "error":
                 raise _TaskError(error) from error
-            raise _SchedulerLostError(_in_words(error)) from error
+            raise _SchedulerLostError from error
         finally:
             future.release()
 
@@ -545,5 +550,7 @@ class _Session:
 
 def _in_words(error: BaseException) -> str:
     """One line about an error."""
+    if isinstance(error, _SchedulerLostError):
+        return "it does not know the trials any more"
     text = str(error).partition("\n")[0]
     return f"{type(error).__name__}: {text}" if text else type(error).__name__

@@ -42,7 +42,7 @@ def probe(planned: PlannedTrial) -> str:
     return f"{planned.config.canonical_json()} {trial.n_decisions} {rows.digest()}"
 
 
-def probe_worker(version: str, pickled: bytes) -> tuple[str, list[str]]:
+def probe_worker(version: str, pickled: list[bytes]) -> tuple[str, list[str]]:
     """Return the worker's version and, if it is the asked one, what its probes give.
 
     Parameters
@@ -50,12 +50,12 @@ def probe_worker(version: str, pickled: bytes) -> tuple[str, list[str]]:
     version
         The driver's version.
     pickled
-        The trials to probe.
+        The trials to probe, one by one.
     """
     own: str = _core.__version__
     if own != version:
         return own, []
-    return own, [probe(planned) for planned in pickle.loads(pickled)]
+    return own, [probe(pickle.loads(one)) for one in pickled]
 
 
 def run_on_worker(

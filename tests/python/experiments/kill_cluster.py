@@ -69,7 +69,7 @@ class Cluster:
         options, environment = self._arguments[number]
         self.workers[number] = self._start(
             "worker", "--scheduler-file", str(self.file), "--host", "127.0.0.1", "--nthreads", "1",
-            "--dashboard-address", "127.0.0.1:0", "--death-timeout", "5",
+            "--dashboard-address", "127.0.0.1:0", "--death-timeout", "15",
             "--local-directory", str(self.folder),
             *options, **environment,
         )  # fmt: skip

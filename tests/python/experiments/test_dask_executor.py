@@ -315,9 +315,7 @@ def test_the_scheduler_may_die_and_come_back(cluster, tmp_path):
     recorder = Killer()
     outcome, digest = run(tmp_path / "out", plan, cluster, recorder)
     assert outcome.n_run == 16
-    assert any(
-        note.startswith(f"lost the scheduler at {cluster.file}: ") for note in recorder.notes
-    )
+    assert any(note.startswith("lost the scheduler at ") for note in recorder.notes)
     assert digest == run(tmp_path / "here", plan)[1]
 
 
