@@ -56,7 +56,7 @@ ANSWER_SECONDS = 30.0
 PATIENCE_SECONDS = 5.0
 """How long to wait for a worker before saying so."""
 REFUSAL_SECONDS = 10.0
-"""How long to wait for a fitting worker where there were only others from the beginning."""
+"""How long to wait for a fitting worker after the last refusal, where none has fitted yet."""
 LOOK_SECONDS = 1.0
 """How often the list of workers is asked for ..."""
 LOOK_SECONDS_PER_WORKER = 0.01
@@ -247,9 +247,9 @@ class _Run:
         )
         self.finish(Failed(planned, error))
 
-    def patience_ends(self, reason: str, seconds: float) -> None:
-        """Raise the error that ends a run, if nothing was served for `seconds`."""
-        if time.monotonic() - self.served_at > seconds:
+    def be_patient(self, reason: str, since: float, seconds: float) -> None:
+        """Raise the error that ends a run, if `since` is more than so many seconds ago."""
+        if time.monotonic() - since > seconds:
             raise ClusterError(
                 f"{reason}; waited {seconds:g} s. What was finished is stored,"
                 " the same command goes on from there"
@@ -269,8 +269,7 @@ class _Run:
                 self.note(f"lost the scheduler at {self.executor.scheduler} ({_in_words(error)})")
                 await asyncio.sleep(RETRY_SECONDS)
             finally:
-                with suppress(Exception):
-                    await asyncio.wait_for(client.close(), CONNECT_SECONDS)
+                await _close(client)
 
     def _make_probes(self) -> None:
         """Choose one trial of each agent and see what it gives here: agent, trial, outcome."""
@@ -283,29 +282,34 @@ class _Run:
                     agents.add(planned.key.agent)
 
     async def _connect(self) -> Client:
-        from distributed import Client
-
         noted = False
         while True:
             where = self.executor.scheduler
             try:
-                client = Client(
-                    self._address(), asynchronous=True, set_as_default=False, name=self.name,
-                    timeout=min(CONNECT_SECONDS, self.executor.scheduler_timeout),
-                )  # fmt: skip
-                await client
+                return await self._try_to_connect()
             except ValueError as error:
                 raise ClusterError(f"cannot use {where} as scheduler: {error}") from error
             except Exception as error:
                 reason = f"no scheduler at {where}: {_in_words(error)}"
-                self.patience_ends(reason, self.executor.scheduler_timeout)
+                self.be_patient(reason, self.served_at, self.executor.scheduler_timeout)
                 if not noted:
                     left = self.executor.scheduler_timeout - (time.monotonic() - self.served_at)
                     self.note(f"{reason}; waiting for up to {left:.0f} s")
                     noted = True
                 await asyncio.sleep(RETRY_SECONDS)
-            else:
-                return client
+
+    async def _try_to_connect(self) -> Client:
+        from distributed import Client
+
+        client = Client(
+            self._address(), asynchronous=True, set_as_default=False, name=self.name,
+            timeout=min(CONNECT_SECONDS, self.executor.scheduler_timeout),
+        )  # fmt: skip
+        try:
+            return await client
+        except BaseException:
+            await _close(client)
+            raise
 
     def _address(self) -> str:
         text = self.executor.scheduler
@@ -317,6 +321,18 @@ class _Run:
             raise OSError(f"{text} is not (yet) a scheduler file") from error
 
 
+async def _close(client: Client) -> None:
+    """Close a connection to its end, or Dask complains when it is collected."""
+    closing = asyncio.ensure_future(asyncio.wait_for(client.close(), CONNECT_SECONDS))
+    with suppress(Exception):  # what cannot be closed is lost already
+        try:
+            await asyncio.shield(closing)
+        except asyncio.CancelledError:
+            with suppress(Exception):
+                await closing
+            raise
+
+
 @dataclass(eq=False)
 class _Worker:
     """A worker as the driver sees it, from its joining to its loss."""
@@ -326,6 +342,7 @@ class _Worker:
     last_seen: float
     heard_at: float
     refused: str = ""
+    refused_at: float = 0.0
     serves: bool = False
     given_up: bool = False
     available: asyncio.Event = field(default_factory=asyncio.Event)
@@ -408,22 +425,23 @@ class _Session:
 
     def _be_patient(self, now: float) -> None:
         """Raise an error if there was no fitting worker for too long."""
-        run = self._run
+        run, seconds = self._run, self._run.executor.scheduler_timeout
         if any(worker.serves for worker in self._workers.values()):
             run.served_at, run.has_served = now, True
             return
         where = run.executor.scheduler
-        refused = [worker.refused for worker in self._workers.values() if worker.refused]
+        refused = [worker for worker in self._workers.values() if worker.refused]
         if not refused:
-            run.patience_ends(f"no worker at {where}", run.executor.scheduler_timeout)
+            run.be_patient(f"no worker at {where}", run.served_at, seconds)
             if not self._noted and now - run.served_at > PATIENCE_SECONDS:
                 run.note(f"waiting for workers at {where}")
                 self._noted = True
             return
-        seconds = run.executor.scheduler_timeout
+        reason = f"no worker at {where} fits: {refused[-1].refused}"
+        run.be_patient(reason, run.served_at, seconds)
         if not run.has_served and len(refused) == len(self._workers):
-            seconds = min(seconds, REFUSAL_SECONDS)
-        run.patience_ends(f"no worker at {where} fits: {refused[-1]}", seconds)
+            since = max(worker.refused_at for worker in refused)
+            run.be_patient(reason, since, REFUSAL_SECONDS)
 
     def _task(
         self, function: Callable[[_Worker], Coroutine[Any, Any, None]], worker: _Worker
@@ -465,6 +483,7 @@ class _Session:
 
     def _refuse(self, worker: _Worker, reason: str) -> None:
         worker.refused = f"worker {worker.address} was refused, {reason}"
+        worker.refused_at = time.monotonic()
         self._run.note(worker.refused)
 
     async def _keep_busy(self, worker: _Worker) -> None:

@@ -116,7 +116,7 @@ def run(folder, plan, cluster=None, observer=None, **options):
     """Run a plan, on a cluster or here; returns outcome and digest."""
     executor = None
     if cluster is not None:
-        executor = DaskExecutor(str(cluster.file), **{"scheduler_timeout": 30.0} | options)
+        executor = DaskExecutor(str(cluster.file), **{"scheduler_timeout": 60.0} | options)
     with ResultStore(folder) as store:
         outcome = run_trials(plan, store, executor=executor, observer=observer)
         return outcome, records_digest(store.load())
@@ -222,6 +222,7 @@ def test_workers_that_do_not_fit_get_no_trials(cluster, preload, tmp_path, monke
     recorder = Recorder()
     with pytest.raises(ClusterError, match=r"^no worker at .* fits: worker tcp://.*same command"):
         run(tmp_path / "out", make_plan(), cluster, recorder)
+    monkeypatch.setattr("sdnn.experiments.dask_executor.REFUSAL_SECONDS", 60.0)
     cluster.add_worker("--no-nanny")
     outcome, digest = run(tmp_path / "out", make_plan(6), cluster, recorder)
     assert outcome.n_run == 12
