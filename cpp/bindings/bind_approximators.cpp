@@ -122,6 +122,10 @@ void bind_approximators(py::module_& module) {
   py::enum_<approximators::InitialWeights>(module, "InitialWeights", "How the weights start")
       .value("ternary", approximators::InitialWeights::ternary)
       .value("uniform", approximators::InitialWeights::uniform);
+  py::enum_<approximators::Rounding>(module, "Rounding", "How numbers of units are rounded")
+      .value("half_up", approximators::Rounding::half_up)
+      .value("random", approximators::Rounding::random)
+      .value("away", approximators::Rounding::away);
   bindings::bind_config<SDNNCConfig>(module, "SDNNCConfig", "Everything that defines an SDNN-C");
 
   bind_network<SDNNC>(module, "SDNNC", "A network that gives Q(s, a) for every action at once")

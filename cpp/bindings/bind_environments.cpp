@@ -163,13 +163,16 @@ void bind_sensors(py::module_& module) {
           "apply",
           [](SensorNoise& noise, const ArrayArgument<double>& values) {
             const auto clean = bindings::vector(values, "values");
-            core::require(clean.size() == static_cast<std::size_t>(noise.n_channels()), "values",
+            core::require(clean.size() == noise.n_channels(), "values",
                           "of " + std::to_string(noise.n_channels()) + " numbers", clean.size());
             std::vector<double> noisy(clean.begin(), clean.end());
             noise.apply(noisy);
             return array(noisy);
           },
           py::arg("values"), "A noisy copy");
+  py::enum_<NoiseEntry>(module, "NoiseEntry", "Where noise enters")
+      .value("every_sensor", NoiseEntry::every_sensor)
+      .value("basic_sensors", NoiseEntry::basic_sensors);
   bindings::bind_config<SensorConfig>(module, "SensorConfig",
                                       "Which sensors there are and how noisy");
   py::class_<AcrobotSensors>(module, "AcrobotSensors", "s1..s4, s5 and s6 with their noise")
@@ -178,7 +181,7 @@ void bind_sensors(py::module_& module) {
       .def(
           "observe",
           [](AcrobotSensors& sensors, const ArrayArgument<double>& state) {
-            std::vector<double> out(static_cast<std::size_t>(sensors.n_sensors()));
+            std::vector<double> out(sensors.n_inputs());
             sensors.observe(state_vector(state), out);
             return array(out);
           },

@@ -99,6 +99,10 @@ py::class_<AcrobotTrial<Agent>> def_trial(py::module_& module, const char* name,
       .def_property_readonly("episode", &Trial::episode)
       .def_property_readonly("finished", &Trial::finished)
       .def_property_readonly("n_decisions", &Trial::n_decisions)
+      .def_property_readonly(
+          "agent", [](Trial& self) -> Agent& { return self.agent(); },
+          py::return_value_policy::reference_internal,
+          "The agent at work: asking for values changes nothing that follows")
       .def(
           "advance", [](Trial& self, int n_episodes) { self.advance(n_episodes); },
           py::arg("n_episodes"), py::call_guard<py::gil_scoped_release>(),

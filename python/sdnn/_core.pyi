@@ -144,6 +144,56 @@ class InitialWeights:
     @property
     def value(self) -> int:
         ...
+class Rounding:
+    """
+    How numbers of units are rounded
+    
+    Members:
+    
+      half_up
+    
+      random
+    
+      away
+    """
+    __members__: typing.ClassVar[dict[str, Rounding]]
+    away: typing.ClassVar[Rounding]
+    half_up: typing.ClassVar[Rounding]
+    random: typing.ClassVar[Rounding]
+    @typing.overload
+    def __eq__(self, other: Rounding) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: Rounding) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
 class SDNNCConfig:
     """
     Everything that defines an SDNN-C
@@ -151,7 +201,7 @@ class SDNNCConfig:
     __hash__: typing.ClassVar[None] = None
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_pattern_units: typing.SupportsInt | typing.SupportsIndex = 200, n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex = 9, n_interpolated: typing.SupportsInt | typing.SupportsIndex = 44, balanced_anchors: bool = True, circular: collections.abc.Sequence[bool] = [], n_hidden_units: typing.SupportsInt | typing.SupportsIndex = 900, n_active_units: typing.SupportsInt | typing.SupportsIndex = 300, n_actions: typing.SupportsInt | typing.SupportsIndex = 0, q_low: typing.SupportsFloat | typing.SupportsIndex = -20.0, q_high: typing.SupportsFloat | typing.SupportsIndex = 20.0, u_low: typing.SupportsInt | typing.SupportsIndex | None = None, u_high: typing.SupportsInt | typing.SupportsIndex | None = None, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.1, lattice: typing.SupportsInt | typing.SupportsIndex = 1, initial_threshold: typing.SupportsFloat | typing.SupportsIndex = 200.0, initial_weights: InitialWeights = InitialWeights.ternary, initial_weight_limit: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
+    def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_pattern_units: typing.SupportsInt | typing.SupportsIndex = 200, n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex = 9, n_interpolated: typing.SupportsInt | typing.SupportsIndex = 44, balanced_anchors: bool = True, circular: collections.abc.Sequence[bool] = [], n_hidden_units: typing.SupportsInt | typing.SupportsIndex = 900, n_active_units: typing.SupportsInt | typing.SupportsIndex = 300, n_actions: typing.SupportsInt | typing.SupportsIndex = 0, q_low: typing.SupportsFloat | typing.SupportsIndex = -20.0, q_high: typing.SupportsFloat | typing.SupportsIndex = 20.0, u_low: typing.SupportsInt | typing.SupportsIndex | None = None, u_high: typing.SupportsInt | typing.SupportsIndex | None = None, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.1, lattice: typing.SupportsInt | typing.SupportsIndex = 1, initial_threshold: typing.SupportsFloat | typing.SupportsIndex = 200.0, initial_weights: InitialWeights = InitialWeights.ternary, initial_weight_limit: typing.SupportsFloat | typing.SupportsIndex = 0.1, rounding: Rounding = Rounding.half_up) -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -202,6 +252,9 @@ class SDNNCConfig:
         ...
     @property
     def q_low(self) -> float:
+        ...
+    @property
+    def rounding(self) -> Rounding:
         ...
     @property
     def u_high(self) -> int | None:
@@ -671,6 +724,53 @@ class SensorNoise:
         """
         A noisy copy
         """
+class NoiseEntry:
+    """
+    Where noise enters
+    
+    Members:
+    
+      every_sensor
+    
+      basic_sensors
+    """
+    __members__: typing.ClassVar[dict[str, NoiseEntry]]
+    basic_sensors: typing.ClassVar[NoiseEntry]
+    every_sensor: typing.ClassVar[NoiseEntry]
+    @typing.overload
+    def __eq__(self, other: NoiseEntry) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: NoiseEntry) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
 class SensorConfig:
     """
     Which sensors there are and how noisy
@@ -678,15 +778,24 @@ class SensorConfig:
     __hash__: typing.ClassVar[None] = None
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, n_sensors: typing.SupportsInt | typing.SupportsIndex = 4, noise: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __init__(self, *, n_sensors: typing.SupportsInt | typing.SupportsIndex = 4, noise: typing.SupportsFloat | typing.SupportsIndex = 0.0, noise_entry: NoiseEntry = NoiseEntry.every_sensor, n_constant: typing.SupportsInt | typing.SupportsIndex = 0, n_random: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def __repr__(self) -> str:
+        ...
+    @property
+    def n_constant(self) -> int:
+        ...
+    @property
+    def n_random(self) -> int:
         ...
     @property
     def n_sensors(self) -> int:
         ...
     @property
     def noise(self) -> float:
+        ...
+    @property
+    def noise_entry(self) -> NoiseEntry:
         ...
 class AcrobotSensors:
     """
@@ -818,7 +927,7 @@ class EpsilonGreedyConfig:
     __hash__: typing.ClassVar[None] = None
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform) -> None:
+    def __init__(self, *, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform, tie_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -830,6 +939,9 @@ class EpsilonGreedyConfig:
         ...
     @property
     def tie_rule(self) -> TieRule:
+        ...
+    @property
+    def tie_tolerance(self) -> float:
         ...
 class EpsilonGreedy:
     """
@@ -846,7 +958,7 @@ class QLearningConfig:
     __hash__: typing.ClassVar[None] = None
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, learning_rate: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform) -> None:
+    def __init__(self, *, learning_rate: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform, tie_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0, n_steps: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -863,7 +975,13 @@ class QLearningConfig:
     def n_greedy_steps(self) -> int:
         ...
     @property
+    def n_steps(self) -> int:
+        ...
+    @property
     def tie_rule(self) -> TieRule:
+        ...
+    @property
+    def tie_tolerance(self) -> float:
         ...
 class FuzzyQLearningConfig:
     """
@@ -872,7 +990,7 @@ class FuzzyQLearningConfig:
     __hash__: typing.ClassVar[None] = None
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, trace_decay: typing.SupportsFloat | typing.SupportsIndex = 0.0, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform) -> None:
+    def __init__(self, *, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, trace_decay: typing.SupportsFloat | typing.SupportsIndex = 0.0, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform, tie_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -890,6 +1008,9 @@ class FuzzyQLearningConfig:
         ...
     @property
     def tie_rule(self) -> TieRule:
+        ...
+    @property
+    def tie_tolerance(self) -> float:
         ...
     @property
     def trace_decay(self) -> float:
@@ -956,12 +1077,18 @@ class ProtocolConfig:
     __hash__: typing.ClassVar[None] = None
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, n_learning_episodes: typing.SupportsInt | typing.SupportsIndex = 15000, test_interval: typing.SupportsInt | typing.SupportsIndex = 10) -> None:
+    def __init__(self, *, n_learning_episodes: typing.SupportsInt | typing.SupportsIndex = 15000, test_interval: typing.SupportsInt | typing.SupportsIndex = 10, limit_bootstraps: bool = True, noisy_tests: bool = True) -> None:
         ...
     def __repr__(self) -> str:
         ...
     @property
+    def limit_bootstraps(self) -> bool:
+        ...
+    @property
     def n_learning_episodes(self) -> int:
+        ...
+    @property
+    def noisy_tests(self) -> bool:
         ...
     @property
     def test_interval(self) -> int:
@@ -983,6 +1110,11 @@ class AcrobotTrial:
     def test_rows(self) -> dict[str, numpy.ndarray]:
         """
         Columns of the test episodes so far
+        """
+    @property
+    def agent(self) -> SDNNQLearning:
+        """
+        The agent at work: asking for values changes nothing that follows
         """
     @property
     def episode(self) -> int:
@@ -1008,6 +1140,11 @@ class FuzzyAcrobotTrial:
         Columns of the test episodes so far
         """
     @property
+    def agent(self) -> FuzzyQLearning:
+        """
+        The agent at work: asking for values changes nothing that follows
+        """
+    @property
     def episode(self) -> int:
         ...
     @property
@@ -1029,6 +1166,11 @@ class RBFAcrobotTrial:
     def test_rows(self) -> dict[str, numpy.ndarray]:
         """
         Columns of the test episodes so far
+        """
+    @property
+    def agent(self) -> RBFQLearning:
+        """
+        The agent at work: asking for values changes nothing that follows
         """
     @property
     def episode(self) -> int:

@@ -14,7 +14,7 @@ from sdnn.agents.spaces import ContinuousActions, UnitObservations
 from sdnn.agents.transition import Transition
 from sdnn.approximators.fuzzy_rules import FuzzyRulesConfig
 from sdnn.arguments import seed_of
-from sdnn.config import to_core
+from sdnn.config import added_later, to_core
 
 __all__ = ["FuzzyQLearning", "FuzzyQLearningConfig"]
 
@@ -37,6 +37,8 @@ class FuzzyQLearningConfig:
         First steps of an episode in which epsilon is 0.
     tie_rule : {"uniform", "lowest", "middle"}
         Which of several best actions a rule picks; see `QLearningConfig`. A reading.
+    tie_tolerance : float
+        Values at most this far below the best tie with it, >= 0.
     """
 
     learning_coefficient: float = 0.5
@@ -45,6 +47,7 @@ class FuzzyQLearningConfig:
     epsilon: float = 0.1
     n_greedy_steps: int = 10
     tie_rule: Literal["uniform", "lowest", "middle"] = "uniform"
+    tie_tolerance: float = added_later(0.0)
 
     def to_core(self) -> _core.FuzzyQLearningConfig:
         """Make the core's struct of the same values; see `sdnn.config.to_core`."""

@@ -5,51 +5,22 @@ from __future__ import annotations
 import abc
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, Generic, Literal, TypeAlias, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
+from sdnn.agents.presets import PRESETS
+from sdnn.agents.q_learning_config import QLearningConfig
 from sdnn.agents.spaces import UnitObservations, discrete_actions
 from sdnn.agents.transition import Transition
 from sdnn.approximators.rbf_network import RBFNetworkConfig
 from sdnn.approximators.sdnn_c import SDNNCConfig, pattern_tables
-from sdnn.arguments import seed_of
-from sdnn.config import to_core
+from sdnn.arguments import choice, seed_of
 
-__all__ = ["QLearningConfig", "RBFQLearning", "SDNNQLearning"]
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class QLearningConfig:
-    """The parameters of Q-learning; the defaults are the paper's (section 4.2).
-
-    Attributes
-    ----------
-    learning_rate : float
-        alpha, in (0, 1].
-    discount : float
-        gamma, in [0, 1].
-    epsilon : float
-        Probability of a random action, in [0, 1].
-    n_greedy_steps : int
-        First steps of an episode in which epsilon is 0.
-    tie_rule : {"uniform", "lowest", "middle"}
-        Which of several best actions is taken: any with the same probability, the one with the
-        lowest index, or the middle of the widest run of neighbours. A reading.
-    """
-
-    learning_rate: float = 0.5
-    discount: float = 0.9
-    epsilon: float = 0.1
-    n_greedy_steps: int = 10
-    tie_rule: Literal["uniform", "lowest", "middle"] = "uniform"
-
-    def to_core(self) -> _core.QLearningConfig:
-        """Make the core's struct of the same values; see `sdnn.config.to_core`."""
-        return to_core(self, _core.QLearningConfig)
+__all__ = ["RBFQLearning", "SDNNQLearning"]
 
 
 CoreAgent: TypeAlias = _core.SDNNQLearning | _core.RBFQLearning
@@ -156,7 +127,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
     """An agent that learns Q(s, a) with SDNN-C, one transition at a time.
 
     Observations are scaled to [0, 1] by the bounds of the observation space; values outside
-    saturate. A one-dimensional ``Box`` of actions is cut evenly into the network's actions, 601 by
+    saturate. A one-dimensional ``Box`` of actions is cut evenly into the network's actions, 61 by
     default; a ``Discrete`` space gives one window of hidden units per action.
 
     Parameters
@@ -165,12 +136,17 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         Finite bounds, l >= 2.
     action_space : gymnasium.spaces.Box of shape (1,) or gymnasium.spaces.Discrete
     approximator : SDNNCConfig, optional
-        ``n_inputs`` (and ``n_actions``, for a Discrete space) are taken from the spaces.
+        ``n_inputs`` (and ``n_actions``, for a Discrete space) are taken from the spaces. By default
+        that of the preset.
     learning : QLearningConfig, optional
+        By default that of the preset.
     seed : int
         The root of every random stream of the agent.
     tables : sequence of array_like, shape (n_bins, n_pattern_units), optional
         Patterns for each observed variable, of any coding; see `sdnn.approximators.SDNNC`.
+    preset : {"robust", "paper"}
+        What is used where no settings are given: those recommended, or the paper's; see
+        `sdnn.agents.PRESETS`.
 
     Raises
     ------
@@ -200,7 +176,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
     ...     agent.learn(Transition(observation, action, reward, following, terminated))
     ...     observation = following
     >>> agent.q_values(observation).shape
-    (601,)
+    (61,)
     """
 
     def __init__(
@@ -212,10 +188,16 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         learning: QLearningConfig | None = None,
         seed: int = 0,
         tables: Sequence[ArrayLike] | None = None,
+        preset: str = "robust",
     ) -> None:
         self._tables = None if tables is None else pattern_tables(tables)
+        chosen = choice("preset", preset, PRESETS)
         super().__init__(
-            observation_space, action_space, approximator or SDNNCConfig(), learning, seed
+            observation_space,
+            action_space,
+            approximator or chosen.approximator,
+            learning or chosen.learning,
+            seed,
         )
 
     def _make_core(self, approximator: SDNNCConfig, seed: int) -> _core.SDNNQLearning:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.arguments import seed_of
-from sdnn.config import to_core
+from sdnn.config import added_later, to_core
 
 __all__ = ["SDNNC", "SDNNCConfig"]
 
@@ -60,6 +60,10 @@ class SDNNCConfig:
         reading.
     initial_weight_limit : float
         Of ``"uniform"``, in units of c.
+    rounding : {"half_up", "random", "away"}
+        Of the number of units that are to fire: to the nearest; up or down at random in proportion,
+        so that no small change is lost on average; or in the direction of the change by at least
+        one unit. A reading.
     """
 
     n_inputs: int = 4
@@ -80,6 +84,7 @@ class SDNNCConfig:
     initial_threshold: float = 200.0
     initial_weights: Literal["ternary", "uniform"] = "ternary"
     initial_weight_limit: float = 0.1
+    rounding: Literal["half_up", "random", "away"] = added_later("half_up")
 
     def to_core(self) -> _core.SDNNCConfig:
         """Make the core's struct of the same values; see `sdnn.config.to_core`."""

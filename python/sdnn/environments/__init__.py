@@ -21,12 +21,13 @@ import gymnasium as gym
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.config import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.environments.goal_schedule import GoalSchedule
-from sdnn.environments.sensors import NoisySensors, RedundantSensors
+from sdnn.environments.sensors import AcrobotSensors, NoisySensors, RedundantSensors
 from sdnn.environments.tightening_goal import TighteningGoal
 from sdnn.environments.vector_env import AcrobotSwingUpVectorEnv
 
 __all__ = [
     "AcrobotConfig",
+    "AcrobotSensors",
     "AcrobotSwingUpEnv",
     "AcrobotSwingUpVectorEnv",
     "GoalSchedule",

@@ -258,6 +258,11 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
             self.render()
         return self._observation(), reward, terminated, truncated, self._info()
 
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """The true state: theta1, theta2 in [-pi, pi), their speeds in rad/s, shape (4,)."""
+        return self._acrobot.state()
+
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the present state: shape (500, 500, 3) for ``"rgb_array"``, else None."""
         if self.render_mode is None:

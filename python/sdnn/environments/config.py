@@ -7,7 +7,7 @@ import math
 from typing import Literal
 
 from sdnn import _core
-from sdnn.config import to_core
+from sdnn.config import added_later, to_core
 
 __all__ = ["AcrobotConfig", "GoalScheduleConfig", "SensorConfig"]
 
@@ -123,10 +123,24 @@ class SensorConfig:
         4: s1..s4; 5: s5, the energy, too; 6: s6, the height, too.
     noise : float
         Standard deviation of the noise on every sensor, >= 0; 0.02 in the paper's noisy cases.
+    noise_entry : {"every_sensor", "basic_sensors"}
+        Where noise enters: s5 and s6 are computed from the true s1..s4 and get noise of their own,
+        or they are computed from the noisy ones. A reading.
+    n_constant, n_random : int
+        Useless inputs besides, 0 to 100 of each: always 1/2, with noise as on the sensors; or a new
+        uniform number each time. Not in the paper.
     """
 
     n_sensors: int = 4
     noise: float = 0.0
+    noise_entry: Literal["every_sensor", "basic_sensors"] = added_later("every_sensor")
+    n_constant: int = added_later(0)
+    n_random: int = added_later(0)
+
+    @property
+    def n_inputs(self) -> int:
+        """Numbers in an observation."""
+        return self.n_sensors + self.n_constant + self.n_random
 
     def to_core(self) -> _core.SensorConfig:
         """Make the core's struct of the same values; see `sdnn.config.to_core`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import gymnasium as gym
 import numpy as np
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.arguments import choice, seed_of
+from sdnn.environments.config import SensorConfig
 
-__all__ = ["NoisySensors", "RedundantSensors"]
+__all__ = ["AcrobotSensors", "NoisySensors", "RedundantSensors"]
 
 Observation = NDArray[Any]
 SensorFunction = Callable[[Observation], float]
@@ -143,9 +144,7 @@ class NoisySensors(
             raise ValueError(f"edge must have {n_channels} entries, got {len(words)}")
         self.sigma = sigma
         self._edges = [choice("edge", word, _core.SensorEdge.__members__) for word in words]
-        self._stream = choice(
-            "stream", stream, {name: _core.Stream.__members__[name] for name in _STREAMS}
-        )
+        self._stream = _stream(stream)
         self._restart(seed)
         self.observation_space = gym.spaces.Box(0.0, 1.0, (n_channels,), _float_type(space))
 
@@ -166,7 +165,75 @@ class NoisySensors(
         self._noise = _core.SensorNoise(self.sigma, self._edges, seed_of(seed), self._stream)
 
 
+class AcrobotSensors(
+    gym.ObservationWrapper[Observation, Any, Observation], gym.utils.RecordConstructorArgs
+):
+    """All that a `SensorConfig` can say, over the acrobot: what a compiled trial observes.
+
+    The same numbers as `NoisySensors` over `RedundantSensors`, and the inputs and the entry of
+    noise that these do not know. Observations have the order s1..s6, constant, random.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        An `AcrobotSwingUpEnv`, in wrappers or not: the state is read from it.
+    config : SensorConfig
+    seed : int
+        Where noise and random inputs start; ``reset(seed=...)`` with a number starts them anew.
+    stream : {"sensor_noise", "evaluation_sensor_noise"}
+        Which of the core's streams: that of a trial's learning episodes or of its test episodes.
+
+    Raises
+    ------
+    ValueError
+        For numbers out of range or an unknown word.
+
+    Examples
+    --------
+    >>> from sdnn.environments import AcrobotSensors, AcrobotSwingUpEnv, SensorConfig
+    >>> env = AcrobotSensors(AcrobotSwingUpEnv(), SensorConfig(n_sensors=5, n_constant=1))
+    >>> env.reset()[0].tolist()
+    [0.5, 0.5, 0.5, 0.5, 0.0, 0.5]
+    """
+
+    def __init__(
+        self,
+        env: gym.Env[Observation, Any],
+        config: SensorConfig,
+        seed: int = 0,
+        stream: Literal["sensor_noise", "evaluation_sensor_noise"] = "sensor_noise",
+    ) -> None:
+        gym.utils.RecordConstructorArgs.__init__(self, config=config, seed=seed, stream=stream)
+        super().__init__(env)
+        self._float = _float_type(_vector_space(env))
+        self._config = config.to_core()
+        self._stream = _stream(stream)
+        self._restart(seed)
+        self.observation_space = gym.spaces.Box(0.0, 1.0, (config.n_inputs,), self._float)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Reset the environment; a ``seed`` starts noise and random inputs anew too."""
+        if seed is not None:
+            self._restart(seed)
+        return super().reset(seed=seed, options=options)
+
+    def observation(self, observation: Observation) -> Observation:
+        """Observe the environment's state, shape (n_inputs,); the observation is not used."""
+        seen: Observation = self._sensors.observe(cast(Any, self.unwrapped).state)
+        return seen.astype(self._float)
+
+    def _restart(self, seed: int) -> None:
+        self._sensors = _core.AcrobotSensors(self._config, seed_of(seed), self._stream)
+
+
 _STREAMS = ("sensor_noise", "evaluation_sensor_noise")
+
+
+def _stream(name: str) -> _core.Stream:
+    known = {member: _core.Stream.__members__[member] for member in _STREAMS}
+    return choice("stream", name, known)
 
 
 def _vector_space(env: gym.Env[Observation, Any]) -> gym.spaces.Box:

@@ -6,13 +6,14 @@ import hashlib
 import json
 import zlib
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
 from sdnn.agents import QLearningConfig
 from sdnn.approximators import SDNNCConfig
+from sdnn.config import plain_values
 from sdnn.environments import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.experiments.cases import Case
 from sdnn.experiments.records import TrialKey
@@ -81,7 +82,7 @@ class TrialConfig:
         Equal settings give equal text, however they were typed.
         """
         return json.dumps(
-            _canonical(asdict(self)), sort_keys=True, separators=(",", ":"), allow_nan=False
+            _canonical(plain_values(self)), sort_keys=True, separators=(",", ":"), allow_nan=False
         )
 
     @property
@@ -141,8 +142,8 @@ def case_config(case: Case, agent: str, protocol: ProtocolConfig | None = None) 
     entry = agent_entry(agent)
     return TrialConfig(
         agent=agent,
-        approximator=entry.approximator(n_inputs=case.n_sensors),
-        learning=entry.learning(),
+        approximator=entry.approximator_settings(case.n_sensors),
+        learning=entry.learning_settings(),
         sensors=SensorConfig(n_sensors=case.n_sensors, noise=case.noise),
         protocol=ProtocolConfig() if protocol is None else protocol,
     )

@@ -10,15 +10,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import gymnasium as gym
 
 from sdnn import _core
 from sdnn.agents import (
+    PRESETS,
     FuzzyQLearning,
     FuzzyQLearningConfig,
+    Preset,
     QLearningConfig,
     RBFQLearning,
     SDNNQLearning,
@@ -76,6 +78,9 @@ class AgentEntry:
         are those of the experiments; it has a field ``n_inputs``.
     learning
         Settings of how the agent learns and explores: another such dataclass.
+    preset
+        Settings of both that are not their defaults: an object with ``approximator`` and
+        ``learning``.
     agent
         The agent in Python, a `LearningAgent`: made from an observation space, an action space and
         ``approximator=``, ``learning=``, ``seed=``.
@@ -93,7 +98,18 @@ class AgentEntry:
     learning: type[Any]
     agent: Callable[..., LearningAgent]
     core_trial: Callable[..., Trial] | None = None
+    preset: Preset | None = None
     costs: tuple[CostSeries, ...] = ()
+
+    def approximator_settings(self, n_inputs: int) -> Any:
+        """Return the approximator's settings in experiments, for so many inputs."""
+        if self.preset is None:
+            return self.approximator(n_inputs=n_inputs)
+        return replace(self.preset.approximator, n_inputs=n_inputs)
+
+    def learning_settings(self) -> Any:
+        """Return the agent's settings in experiments."""
+        return self.learning() if self.preset is None else self.preset.learning
 
     def make_agent(
         self,
@@ -245,3 +261,16 @@ register(
         ),
     )
 )
+for _name, _preset in PRESETS.items():
+    if _name != "paper":
+        register(
+            AgentEntry(
+                id=f"sdnn-c-{_name}",
+                title=f"SDNN-C, {_name}",
+                approximator=SDNNCConfig,
+                learning=QLearningConfig,
+                agent=SDNNQLearning,
+                core_trial=_core.AcrobotTrial,
+                preset=_preset,
+            )
+        )

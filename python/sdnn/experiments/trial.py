@@ -7,7 +7,7 @@ the same protocol, bit for bit.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import gymnasium as gym
@@ -16,20 +16,16 @@ from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.agents import Transition
-from sdnn.config import to_core
+from sdnn.config import added_later, to_core
 from sdnn.environments import (
     AcrobotConfig,
+    AcrobotSensors,
     AcrobotSwingUpEnv,
     GoalSchedule,
     GoalScheduleConfig,
-    NoisySensors,
-    RedundantSensors,
     SensorConfig,
     TighteningGoal,
 )
-
-BASIC_SENSORS = 4
-"""Observed variables without the redundant ones, s1 to s4."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,10 +38,17 @@ class ProtocolConfig:
         Learning episodes in a trial, at least 1.
     test_interval
         One test episode follows every so many learning episodes, at least 1.
+    limit_bootstraps
+        Whether the last transition before the time limit bootstraps, as one that goes on; else it
+        counts as terminated. A reading.
+    noisy_tests
+        Whether the sensors are as noisy in test episodes as in learning ones. A reading.
     """
 
     n_learning_episodes: int = 15_000
     test_interval: int = 10
+    limit_bootstraps: bool = added_later(True)
+    noisy_tests: bool = added_later(True)
 
     def to_core(self) -> _core.ProtocolConfig:
         """Make the core's struct of the same values; see `sdnn.config.to_core`."""
@@ -126,14 +129,15 @@ class PythonTrial:
         for name in ("n_learning_episodes", "test_interval"):
             if getattr(protocol, name) < 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(protocol, name)}")
-        if approximator.n_inputs != sensors.n_sensors:
+        if approximator.n_inputs != sensors.n_inputs:
             raise ValueError(
-                f"n_inputs must be n_sensors of the sensors ({sensors.n_sensors}),"
+                f"n_inputs must be the number of inputs of the sensors, {sensors.n_inputs},"
                 f" got {approximator.n_inputs}"
             )
         self._protocol = protocol
         self._env = _environment(acrobot, goal, sensors, seed, "sensor_noise")
-        self._test_env = _environment(acrobot, goal, sensors, seed, "evaluation_sensor_noise")
+        tested = sensors if protocol.noisy_tests else replace(sensors, noise=0.0)
+        self._test_env = _environment(acrobot, goal, tested, seed, "evaluation_sensor_noise")
         self._agent = make_agent(
             self._env.observation_space,
             self._env.action_space,
@@ -201,9 +205,8 @@ class PythonTrial:
             action = self._agent.act(observation, explore=learning)
             following, reward, terminated, truncated, _ = env.step(action)
             if learning:
-                self._agent.learn(
-                    Transition(observation, action, float(reward), following, terminated)
-                )
+                ends = terminated or (truncated and not self._protocol.limit_bootstraps)
+                self._agent.learn(Transition(observation, action, float(reward), following, ends))
             observation = following
             steps += 1
             episode_return += float(reward)
@@ -214,13 +217,6 @@ class PythonTrial:
 def _environment(
     acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, seed: int, stream: Any
 ) -> gym.Env[NDArray[np.float64], Any]:
-    """Stack the task as the core does: redundancy first, then noise on all sensors."""
-    redundant = ("energy", "height")
-    n_redundant = sensors.n_sensors - BASIC_SENSORS
-    if not 0 <= n_redundant <= len(redundant):
-        raise ValueError(f"n_sensors must be in [4, 6], got {sensors.n_sensors}")
+    """Stack the task as the core does."""
     env = TighteningGoal(AcrobotSwingUpEnv(config=acrobot, dtype="float64"), GoalSchedule(goal))
-    return NoisySensors(
-        RedundantSensors(env, redundant[:n_redundant]),
-        sigma=sensors.noise, seed=seed, stream=stream,
-    )  # fmt: skip
+    return AcrobotSensors(env, sensors, seed=seed, stream=stream)

@@ -58,6 +58,25 @@ TEST(EpsilonGreedy, MiddleTakesTheMiddleOfTheFirstWidestRun) {
   EXPECT_EQ(best_by(TieRule::middle, {1, 0, 1, 0, 2}), 4U);
 }
 
+TEST(EpsilonGreedy, WithinTheToleranceOfTheBestIsATie) {
+  const Row values = {0.0, 0.75, 0.75, 0.5, 0.0, 1.0, 0.0};
+  const auto taken = [&](TieRule rule, double tolerance) {
+    return EpsilonGreedy({.tie_rule = rule, .tie_tolerance = tolerance}, 1).select(values, 0, true);
+  };
+  EXPECT_EQ(taken(TieRule::middle, 0.0), 5U);
+  EXPECT_EQ(taken(TieRule::middle, 0.25), 1U);
+  EXPECT_EQ(taken(TieRule::middle, 0.5), 2U);
+  EXPECT_EQ(taken(TieRule::lowest, 0.5), 1U);
+  EpsilonGreedy uniform({.tie_tolerance = 0.25}, 1);
+  std::array<int, 7> counts{};
+  for (int i = 0; i < 3000; ++i) ++counts[uniform.select(values, 0, true)];
+  EXPECT_EQ(counts[1] + counts[2] + counts[5], 3000);
+  for (const std::size_t action : {1U, 2U, 5U}) EXPECT_NEAR(counts[action], 1000, 130);
+  for (const double bad : {-0.1, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    EXPECT_THROW(EpsilonGreedy({.tie_tolerance = bad}, 1), std::invalid_argument);
+  }
+}
+
 TEST(EpsilonGreedy, UniformTakesEveryTiedActionEquallyOften) {
   EpsilonGreedy policy({.tie_rule = TieRule::uniform}, 5);
   const Row values = {1, 0, 1, 1, 0, 1};

@@ -56,6 +56,55 @@ TEST(QLearning, ATransitionToItselfUsesTheOldValue) {
   EXPECT_DOUBLE_EQ(agent.action_value().value(cell(3), 0), 0.5 * 4.0 + 0.5 * (2.0 + 0.9 * 4.0));
 }
 
+// Rewards 1, 2, 4, then the goal with 8; gamma = 1/2, alpha = 1: every number is exact.
+TEST(QLearning, OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown) {
+  LookupTable table(1, 5, 2);
+  table.correct(cell(2), 1, 16.0);
+  Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 2}, 1);
+  const auto q = [&](int s) { return agent.action_value().value(cell(s), 0); };
+  agent.begin_episode();
+  agent.learn(cell(0), 0, 1.0, cell(1), false);
+  EXPECT_EQ(q(0), 0.0);  // waits
+  agent.learn(cell(1), 0, 2.0, cell(2), false);
+  EXPECT_EQ(q(0), 1.0 + 0.5 * 2.0 + 0.25 * 16.0);
+  EXPECT_EQ(q(1), 0.0);
+  agent.learn(cell(2), 0, 4.0, cell(3), false);
+  EXPECT_EQ(q(1), 2.0 + 0.5 * 4.0);  // Q of cell 3 is 0
+  agent.learn(cell(3), 0, 8.0, cell(4), true);
+  EXPECT_EQ(q(2), 4.0 + 0.5 * 8.0);
+  EXPECT_EQ(q(3), 8.0);
+  const LookupTable learned = agent.action_value();
+  agent.begin_episode();  // nothing waits after a termination
+  EXPECT_EQ(agent.action_value(), learned);
+}
+
+TEST(QLearning, WhatWaitsAtTheTimeLimitIsLearnedWhenTheNextEpisodeBegins) {
+  LookupTable table(1, 5, 2);
+  table.correct(cell(2), 1, 16.0);
+  Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 5}, 1);
+  const auto q = [&](int s) { return agent.action_value().value(cell(s), 0); };
+  agent.learn(cell(0), 0, 1.0, cell(1), false);
+  agent.learn(cell(1), 0, 2.0, cell(2), false);
+  EXPECT_EQ(agent.action_value(), table);
+  agent.begin_episode();
+  EXPECT_EQ(q(0), 1.0 + 0.5 * 2.0 + 0.25 * 16.0);
+  EXPECT_EQ(q(1), 2.0 + 0.5 * 16.0);
+  agent.learn(cell(3), 0, 8.0, cell(4), true);  // of another episode
+  EXPECT_EQ(q(3), 8.0);
+  EXPECT_EQ(q(1), 2.0 + 0.5 * 16.0);
+}
+
+TEST(QLearning, WhatCouldNotBeLearnedLaterIsRefusedAtOnce) {
+  Agent agent(LookupTable(1, 5, 2), {.n_steps = 3}, 1);
+  EXPECT_THROW(agent.learn(Position{1.5}, 0, 1.0, cell(1), false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(cell(0), 0, 1.0, Position{1.5}, false), std::invalid_argument);
+  agent.begin_episode();
+  EXPECT_EQ(agent.action_value(), LookupTable(1, 5, 2));
+  for (const int bad : {0, -1, 1001}) {
+    EXPECT_THROW(Agent(LookupTable(1, 5, 2), {.n_steps = bad}, 1), std::invalid_argument);
+  }
+}
+
 /// A corridor of five cells; action 1 goes right, 0 left (not past the ends). Leaving cell 3 to the
 /// right ends in the goal, with reward 1.
 struct Corridor {

@@ -19,6 +19,7 @@ struct WithoutCorrect {
   std::size_t n_actions() const { return 1; }
   std::size_t n_inputs() const { return 1; }
   void values(std::span<const double>, std::span<double>) const {}
+  double value(std::span<const double>, std::size_t) const { return 0.0; }
 };
 
 struct Complete : WithoutCorrect {

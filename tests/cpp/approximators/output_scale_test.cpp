@@ -32,6 +32,14 @@ TEST(OutputScale, HalvesAreRoundedUp) {
   EXPECT_EQ(scale.inverse(7.5), 8);
 }
 
+TEST(OutputScale, TheExactInverseLiesBetweenCounts) {
+  const OutputScale scale(0, 10, 0.0, 10.0);
+  EXPECT_EQ(scale.exact_inverse(2.25), 2.25);
+  EXPECT_EQ(scale.exact_inverse(-3.0), 0.0);
+  EXPECT_EQ(scale.exact_inverse(INFINITY), 10.0);
+  for (int u = 20; u <= 280; ++u) EXPECT_NEAR(kPaper.exact_inverse(kPaper(u)), u, 1e-9);
+}
+
 TEST(OutputScale, RefusesAnEmptyLine) {
   EXPECT_THROW(OutputScale(20, 20, -1, 1), std::invalid_argument);
   EXPECT_THROW(OutputScale(-1, 20, -1, 1), std::invalid_argument);

@@ -171,6 +171,41 @@ TEST(SDNNC, NothingHappensWhenTheCountIsRightAlready) {
   expect_equal_parameters(network, before);
 }
 
+// A quarter of a unit is missing: it is lost, or made up for by a whole unit, always or in a
+// quarter of all cases.
+TEST(SDNNC, RoundingDecidesWhatBecomesOfPartsOfAUnit) {
+  const State state = {0.1, 0.5, 0.9};
+  const auto moved = [&](Rounding rounding, double units, std::uint64_t seed) {
+    SDNNCConfig config = small();
+    config.initial_threshold = 2.0;  // less than a correction, so that each makes a unit fire
+    config.rounding = rounding;
+    Network network(config, seed);
+    const double unit = network.output_scale()(31) - network.output_scale()(30);
+    const double before = network.value(state, 3);
+    network.correct(state, 3, before + units * unit);
+    return static_cast<int>(std::lround((network.value(state, 3) - before) / unit));
+  };
+  EXPECT_EQ(moved(Rounding::half_up, 0.25, 5), 0);
+  EXPECT_EQ(moved(Rounding::half_up, 0.5, 5), 1);
+  EXPECT_EQ(moved(Rounding::half_up, -0.5, 5), 0);
+  EXPECT_EQ(moved(Rounding::away, 0.25, 5), 1);
+  EXPECT_EQ(moved(Rounding::away, -0.25, 5), -1);
+  EXPECT_EQ(moved(Rounding::away, 2.0, 5), 2);
+  EXPECT_EQ(moved(Rounding::away, 0.0, 5), 0);
+  int up = 0;
+  int down = 0;
+  constexpr int kNetworks = 400;
+  for (std::uint64_t seed = 0; seed < kNetworks; ++seed) {
+    const int rise = moved(Rounding::random, 0.25, seed);
+    EXPECT_TRUE(rise == 0 || rise == 1);
+    up += rise;
+    down -= moved(Rounding::random, -1.75, seed);
+  }
+  const double sigma = std::sqrt(kNetworks * 0.25 * 0.75);
+  EXPECT_NEAR(up, 0.25 * kNetworks, 5 * sigma);
+  EXPECT_NEAR(down, 1.75 * kNetworks, 5 * sigma);
+}
+
 TEST(SDNNC, CorrectionsReachAnyTargetAndSaturateBeyond) {
   Network network(small(), 5);
   const State state = {0.3, 0.6, 0.2};

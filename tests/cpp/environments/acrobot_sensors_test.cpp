@@ -15,7 +15,7 @@ using sdnn::core::kPi;
 using sdnn::core::Stream;
 
 std::vector<double> observe(AcrobotSensors& sensors, const AcrobotState& state) {
-  std::vector<double> out(static_cast<std::size_t>(sensors.n_sensors()));
+  std::vector<double> out(sensors.n_inputs());
   sensors.observe(state, out);
   return out;
 }
@@ -125,7 +125,48 @@ TEST(AcrobotSensors, NoiseWrapsAnglesAndSaturatesTheRest) {
   EXPECT_GT(floor, 850);
 }
 
+TEST(AcrobotSensors, NoiseMayEnterBeforeRedundantVariablesAreComputed) {
+  const AcrobotState state{0.3, -1.0, 2.0, -3.0};
+  AcrobotSensors basic({4, 0.02}, 42, Stream::sensor_noise);
+  AcrobotSensors all({6, 0.02, NoiseEntry::basic_sensors}, 42, Stream::sensor_noise);
+  for (int i = 0; i < 10; ++i) {
+    const auto noisy = observe(basic, state);
+    const auto seen = observe(all, state);
+    for (std::size_t j = 0; j < 4; ++j) EXPECT_EQ(seen[j], noisy[j]);
+    EXPECT_EQ(seen[4], energy_sensor(noisy[2], noisy[3]));
+    EXPECT_EQ(seen[5], height_sensor(noisy[0], noisy[1]));
+  }
+}
+
+TEST(AcrobotSensors, UselessInputsComeLastAndLeaveTheOthersAsTheyAre) {
+  const AcrobotState state{0.3, -1.0, 2.0, -3.0};
+  AcrobotSensors without({5, 0.02}, 42, Stream::sensor_noise);
+  AcrobotSensors clean({.n_sensors = 4, .n_constant = 2, .n_random = 1}, 42, Stream::sensor_noise);
+  AcrobotSensors random_only({.n_sensors = 5, .noise = 0.02, .n_random = 2}, 42,
+                             Stream::sensor_noise);
+  double last = -1.0;
+  for (int i = 0; i < 10; ++i) {
+    const auto seen = observe(clean, state);
+    ASSERT_EQ(seen.size(), 7U);
+    EXPECT_EQ(seen[4], 0.5);
+    EXPECT_EQ(seen[5], 0.5);
+    EXPECT_NE(seen[6], last);
+    last = seen[6];
+    const auto expected = observe(without, state);
+    const auto noisy = observe(random_only, state);
+    for (std::size_t j = 0; j < 5; ++j) EXPECT_EQ(noisy[j], expected[j]);
+  }
+  AcrobotSensors constant({.n_sensors = 4, .noise = 0.02, .n_constant = 1}, 42,
+                          Stream::sensor_noise);
+  EXPECT_NE(observe(constant, state)[4], 0.5);
+}
+
 TEST(AcrobotSensors, RejectsBadArguments) {
+  for (const int bad : {-1, 101}) {
+    EXPECT_THROW(AcrobotSensors({.n_constant = bad}, 1, Stream::sensor_noise),
+                 std::invalid_argument);
+    EXPECT_THROW(AcrobotSensors({.n_random = bad}, 1, Stream::sensor_noise), std::invalid_argument);
+  }
   for (const int bad : {3, 7, -1}) {
     EXPECT_THROW(AcrobotSensors({bad, 0.0}, 1, Stream::sensor_noise), std::invalid_argument);
   }

@@ -239,6 +239,46 @@ TEST(AcrobotTrial, AnEpisodeAllocatesNothing) {
   expect_no_allocation(agent_trial(fuzzy_agent(setting), setting));
 }
 
+/// Takes action 0 and keeps how the transitions it learned ended.
+struct Recorder {
+  std::size_t n_inputs() const { return 4; }
+  void begin_episode() {}
+  std::size_t act(std::span<const double> state, bool explore) {
+    if (!explore) tested.emplace_back(state.begin(), state.end());
+    return 0;
+  }
+  double normalized_action(std::size_t) const { return 0.0; }
+  void learn(std::span<const double>, std::size_t, double, std::span<const double>,
+             bool terminated) {
+    ends.push_back(terminated);
+  }
+  std::vector<std::vector<double>> tested;
+  std::vector<bool> ends;
+};
+
+TEST(AcrobotTrial, TheTimeLimitIsATerminationOnlyIfAskedFor) {
+  for (const bool bootstraps : {true, false}) {
+    auto run = agent_trial(
+        Recorder{}, {.acrobot = {.max_decisions = 3},
+                     .protocol = {.n_learning_episodes = 2, .limit_bootstraps = bootstraps}});
+    run.advance(2);
+    const bool last = !bootstraps;
+    EXPECT_EQ(run.agent().ends, (std::vector{false, false, last, false, false, last}));
+  }
+}
+
+TEST(AcrobotTrial, TestsAreNoisyUnlessSaidOtherwise) {
+  for (const bool noisy : {true, false}) {
+    auto run =
+        agent_trial(Recorder{}, {.acrobot = {.max_decisions = 1},
+                                 .sensors = {.noise = 0.02},
+                                 .protocol = {.n_learning_episodes = 10, .noisy_tests = noisy}});
+    run.advance(10);
+    ASSERT_EQ(run.agent().tested.size(), 1U);
+    EXPECT_EQ(run.agent().tested[0] == std::vector<double>(4, 0.5), !noisy);
+  }
+}
+
 #if defined(__linux__) && !defined(__SANITIZE_ADDRESS__)
 
 long n_page_faults() {
@@ -279,7 +319,7 @@ TEST(AcrobotTrial, NamesWhatIsImpossible) {
   EXPECT_EQ(message([] { table_trial({.protocol = {.test_interval = 0}}); }),
             "test_interval must be in [1, 1073741824], got 0");
   EXPECT_EQ(message([] { trial(LookupTable(5, 2, 3), {}); }),
-            "n_inputs must be n_sensors of the sensors (4), got 5");
+            "n_inputs must be the number of inputs of the sensors, 4, got 5");
   EXPECT_EQ(message([] { trial(LookupTable(4, 2, 3), {.sensors = {.n_sensors = 7}}); }),
             "n_sensors must be in [4, 6], got 7");
   EXPECT_EQ(message([] { table_trial({}).advance(-1); }),

@@ -91,6 +91,7 @@ def test_every_field_reaches_the_core():
         epsilon=0.75,
         n_greedy_steps=3,
         tie_rule="lowest",
+        tie_tolerance=0.5,
     )
     core = other.to_core()
     for field in dataclasses.fields(FuzzyQLearningConfig):

@@ -9,7 +9,7 @@ import pytest
 import paper_transcription as paper
 from handed_over import transcribe
 from sdnn import _core
-from sdnn.agents import QLearningConfig, SDNNQLearning, Transition
+from sdnn.agents import PRESETS, QLearningConfig, SDNNQLearning, Transition
 from sdnn.approximators import SDNNCConfig
 from sdnn.coding import Circular
 
@@ -127,7 +127,13 @@ def test_the_defaults_are_those_of_the_core():
 
 def test_every_field_reaches_the_core():
     other = QLearningConfig(
-        learning_rate=0.25, discount=0.5, epsilon=0.75, n_greedy_steps=3, tie_rule="lowest"
+        learning_rate=0.25,
+        discount=0.5,
+        epsilon=0.75,
+        n_greedy_steps=3,
+        tie_rule="lowest",
+        tie_tolerance=0.5,
+        n_steps=3,
     )
     core = other.to_core()
     for field in dataclasses.fields(QLearningConfig):
@@ -259,10 +265,24 @@ def test_an_evaluated_action_is_not_the_one_taken():
 def test_the_configurations_are_those_used():
     agent = small_agent()
     assert agent.approximator == dataclasses.replace(SMALL, n_inputs=3, n_actions=91)
-    assert agent.learning == QLearningConfig()
+    assert agent.learning == PRESETS["robust"].learning
     assert agent.core.action_value.n_actions == 91
     agent = small_agent(BUTTONS)
     assert agent.approximator == dataclasses.replace(SMALL, n_inputs=3, n_actions=4)
+
+
+def test_a_preset_is_used_where_nothing_is_given():
+    robust = SDNNQLearning(OBSERVATIONS, TORQUES)
+    assert (robust.n_actions, robust.learning.n_steps) == (61, 5)
+    paper_agent = SDNNQLearning(OBSERVATIONS, TORQUES, preset="paper")
+    assert paper_agent.n_actions == 601
+    assert paper_agent.learning == QLearningConfig()
+    given = SDNNQLearning(
+        OBSERVATIONS, TORQUES, learning=QLearningConfig(discount=0.5), preset="robust"
+    )
+    assert (given.n_actions, given.learning) == (61, QLearningConfig(discount=0.5))
+    with pytest.raises(ValueError, match="preset must be one of 'paper', 'robust', got 'best'"):
+        SDNNQLearning(OBSERVATIONS, TORQUES, preset="best")
 
 
 # Episodes are the caller's: a terminated transition does not start the greedy first steps anew.

@@ -39,6 +39,7 @@ ODD_SIZES = {
         "initial_threshold": 10.0,
         "lattice": 8,
     },
+    "rounded away": {"n_inputs": 2, "rounding": _core.Rounding.away},
     "few actions": {"n_inputs": 2, "n_actions": 3, "n_hidden_units": 97},
     "one action": {"n_inputs": 2, "n_actions": 1},
     "another output line": {"n_inputs": 2, "q_low": -1.5, "q_high": 4.0, "u_low": 0, "u_high": 33},
@@ -291,7 +292,7 @@ def test_the_defaults_are_those_of_the_core():
         value = getattr(core, field.name)
         if field.name == "circular":
             value = tuple(value)
-        if field.name == "initial_weights":
+        if field.name in ("initial_weights", "rounding"):
             value = value.name
         assert getattr(config, field.name) == value, field.name
     public = {name for name in dir(core) if not name.startswith("_")}
@@ -318,6 +319,7 @@ def test_every_field_reaches_the_core():
         initial_threshold=50.25,
         initial_weights="uniform",
         initial_weight_limit=0.75,
+        rounding="random",
     )
     core = other.to_core()
     for field in dataclasses.fields(SDNNCConfig):
@@ -326,7 +328,7 @@ def test_every_field_reaches_the_core():
         expected = getattr(other, field.name)
         if field.name == "circular":
             expected = list(expected)
-        if field.name == "initial_weights":
+        if field.name in ("initial_weights", "rounding"):
             value = value.name
         assert value == expected, field.name
     assert SDNNC(other, seed=1).n_actions == 9

@@ -76,7 +76,12 @@ def test_protocol_defaults_are_the_papers_and_the_cores():
     from sdnn import _core
 
     core = _core.ProtocolConfig()
-    assert asdict(ProtocolConfig()) == {"n_learning_episodes": 15000, "test_interval": 10}
+    assert asdict(ProtocolConfig()) == {
+        "n_learning_episodes": 15000,
+        "test_interval": 10,
+        "limit_bootstraps": True,
+        "noisy_tests": True,
+    }
     assert core.n_learning_episodes == 15000
     assert core.test_interval == 10
     assert ProtocolConfig(n_learning_episodes=20).to_core().n_learning_episodes == 20
@@ -91,6 +96,21 @@ def test_canonical_json_is_sorted_and_does_not_depend_on_how_numbers_are_typed()
         replace(config, sensors=replace(config.sensors, noise=n)).config_hash for n in noise_typed
     }
     assert hashes == {config.config_hash}
+
+
+def test_a_setting_added_later_counts_where_it_is_not_the_default():
+    config = TrialConfig()
+    assert config.config_hash == "75969d030c881084"  # as it was before there were such settings
+    for part, name, value in [
+        ("approximator", "rounding", "random"),
+        ("learning", "tie_tolerance", 0.5),
+        ("sensors", "n_random", 1),
+        ("protocol", "noisy_tests", False),
+    ]:
+        assert f'"{name}"' not in config.canonical_json()
+        other = replace(config, **{part: replace(getattr(config, part), **{name: value})})
+        assert f'"{name}"' in other.canonical_json()
+        assert other.config_hash != config.config_hash
 
 
 def test_config_hash_sees_every_room():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sdnn import _core
+from sdnn.agents import PRESETS
 from sdnn.experiments import (
     AGENTS,
     AgentEntry,
@@ -36,7 +37,7 @@ def python_trial(config, monkeypatch):
     return trial
 
 
-@pytest.mark.parametrize("agent", ["sdnn-c", "fql", "rbfn"])
+@pytest.mark.parametrize("agent", ["sdnn-c", "sdnn-c-robust", "fql", "rbfn"])
 @pytest.mark.parametrize(("n_sensors", "noise"), [(4, 0.0), (4, 0.02), (5, 0.02), (6, 0.02)])
 def test_it_reproduces_the_compiled_trial_bit_for_bit(agent, n_sensors, noise, monkeypatch):
     config = config_of(agent, n_sensors, noise)
@@ -62,8 +63,13 @@ def test_the_settings_of_the_task_reach_it(monkeypatch):
     config = config_of("fql")
     config = replace(
         config,
+        approximator=replace(config.approximator, n_inputs=6),
         acrobot=replace(config.acrobot, max_decisions=3, penalty=-1.0),
         goal=replace(config.goal, kind="constant", constant_value=0.1),
+        sensors=replace(
+            config.sensors, noise=0.02, noise_entry="basic_sensors", n_constant=1, n_random=1
+        ),
+        protocol=replace(config.protocol, limit_bootstraps=False, noisy_tests=False),
     )
     core, trial = config.make_trial(SEED), python_trial(config, monkeypatch)
     core.advance(20)
@@ -88,7 +94,7 @@ def test_before_its_first_test_it_has_no_rows(monkeypatch):
     [
         ({"protocol": ProtocolConfig(n_learning_episodes=0)}, "n_learning_episodes"),
         ({"protocol": ProtocolConfig(test_interval=0)}, "test_interval"),
-        ({"sensors": {"n_sensors": 5}}, "n_inputs must be n_sensors of the sensors"),
+        ({"sensors": {"n_sensors": 5}}, "n_inputs must be the number of inputs of the sensors, 5"),
         ({"sensors": {"n_sensors": 7}, "approximator": {"n_inputs": 7}}, "n_sensors"),
         ({"sensors": {"n_sensors": 3}, "approximator": {"n_inputs": 3}}, "n_sensors"),
     ],
@@ -124,6 +130,24 @@ def entry_of(agent_id, *series):
     )
 
 
+def test_an_agent_may_have_other_settings_than_the_defaults():
+    config = config_of("sdnn-c-robust", n_sensors=5)
+    assert config.approximator == replace(PRESETS["robust"].approximator, n_inputs=5)
+    assert config.learning == PRESETS["robust"].learning
+    assert config_of("sdnn-c").learning == PRESETS["paper"].learning
+
+
+def test_asking_a_trials_agent_for_values_changes_nothing_that_follows():
+    asked, alone = (config_of("sdnn-c", noise=0.02).make_trial(SEED) for _ in range(2))
+    for _ in range(60):
+        asked.advance(1)
+        values = asked.agent.action_value.values([0.5, 0.5, 0.5, 0.5])
+        assert values.shape == (601,)
+    alone.advance(60)
+    for name, column in alone.test_rows().items():
+        np.testing.assert_array_equal(asked.test_rows()[name], column)
+
+
 def test_ids_are_registered_once():
     before = dict(AGENTS)
     with pytest.raises(ValueError, match="agent 'fql' is already registered"):
@@ -140,9 +164,10 @@ def test_ids_are_registered_once():
 def test_agents_are_looked_up_by_id():
     assert [(entry.id, entry.title) for entry in AGENTS.values()] == [
         ("sdnn-c", "SDNN-C"), ("fql", "FQL"), ("rbfn", "RBFN"),
+        ("sdnn-c-robust", "SDNN-C, robust"),
     ]  # fmt: skip
     assert all(agent_entry(name) is entry for name, entry in AGENTS.items())
-    with pytest.raises(ValueError, match="one of sdnn-c, fql, rbfn, got 'dqn'"):
+    with pytest.raises(ValueError, match="one of sdnn-c, fql, rbfn, sdnn-c-robust, got 'dqn'"):
         agent_entry("dqn")
 
 

@@ -32,4 +32,5 @@ def transcribe(core: _core.SDNNC) -> paper.SDNNC:
         q_low=config.q_low,
         q_high=config.q_high,
         step=config.lattice,
+        always_moves=config.rounding == _core.Rounding.away,
     )

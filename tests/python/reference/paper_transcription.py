@@ -63,6 +63,18 @@ def g_inverse(q: float, u_low: int, u_high: int, q_low: float, q_high: float) ->
     return math.floor(u_low + (clipped - q_low) * (u_high - u_low) / (q_high - q_low) + 0.5)
 
 
+def next_count(u: int, q_hat: float, line: tuple[int, int, float, float]) -> int:
+    """The count of units for a value, at least one unit from u towards it: another rounding."""
+    u_low, u_high, q_low, q_high = line
+    clipped = Fraction(min(max(q_hat, q_low), q_high))
+    exact = u_low + (clipped - Fraction(q_low)) * (u_high - u_low) / (
+        Fraction(q_high) - Fraction(q_low)
+    )
+    if abs(exact - u) < Fraction(1, 10**9):
+        return u
+    return math.ceil(exact) if exact > u else math.floor(exact)
+
+
 class SDNNC:
     """Layers 1 to 6 of section 3.1 and the learning procedure of Fig. 2.
 
@@ -74,6 +86,8 @@ class SDNNC:
     weights, thresholds : arrays of whole numbers, shapes (n, D) and (n,)
     first_units : sequence of n_actions numbers
         Where the window of each action begins.
+    always_moves
+        Round u_hat by `next_count` instead of to the nearest.
     """
 
     def __init__(
@@ -90,6 +104,7 @@ class SDNNC:
         q_low: float,
         q_high: float,
         step: int,
+        always_moves: bool = False,
     ) -> None:
         self.code_books = code_books
         self.permutations = permutations
@@ -102,6 +117,7 @@ class SDNNC:
         self.line = (u_low, u_high, q_low, q_high)
         self.value_of_count = np.array([g(u, *self.line) for u in range(n_active_units + 1)])
         self.step = step
+        self.always_moves = always_moves
 
     def pattern(self, mu: int, value: float) -> NDArray[np.int8]:
         """Layers 1 and 2: the range [0, 1] is cut into equal half-open bins; 1 is in the last."""
@@ -139,7 +155,11 @@ class SDNNC:
         h = self.potentials(state)
         first = self.first_units[action]
         window = h[first : first + self.n_active_units]
-        d = g_inverse(q_hat, *self.line) - int((window > 0).sum())
+        u = int((window > 0).sum())
+        u_hat = (
+            next_count(u, q_hat, self.line) if self.always_moves else g_inverse(q_hat, *self.line)
+        )
+        d = u_hat - u
         x_sd = self.x_sd(state)
         sign = 1 if d > 0 else -1
         n_corrected = 0

@@ -27,11 +27,13 @@ struct EpsilonGreedyConfig {
   double epsilon = 0.1;     ///< probability of a random action, in [0, 1]
   int n_greedy_steps = 10;  ///< first steps of an episode without random actions
   TieRule tie_rule = TieRule::uniform;
+  double tie_tolerance = 0.0;  ///< values at most this far below the best tie with it; >= 0
 
   static constexpr auto fields() noexcept {
     return std::tuple(core::field("epsilon", &EpsilonGreedyConfig::epsilon),
                       core::field("n_greedy_steps", &EpsilonGreedyConfig::n_greedy_steps),
-                      core::field("tie_rule", &EpsilonGreedyConfig::tie_rule));
+                      core::field("tie_rule", &EpsilonGreedyConfig::tie_rule),
+                      core::field("tie_tolerance", &EpsilonGreedyConfig::tie_tolerance));
   }
   bool operator==(const EpsilonGreedyConfig&) const = default;
 };
@@ -66,6 +68,8 @@ class EpsilonGreedy {
         evaluation_ties_(seed, core::Stream::evaluation_ties) {
     core::require_in_range("epsilon", config.epsilon, 0.0, 1.0);
     core::require_in_range("n_greedy_steps", config.n_greedy_steps, 0, 1 << 30);
+    core::require(std::isfinite(config.tie_tolerance) && config.tie_tolerance >= 0.0,
+                  "tie_tolerance", "finite and at least 0", config.tie_tolerance);
   }
 
   const EpsilonGreedyConfig& config() const noexcept { return config_; }
@@ -95,37 +99,42 @@ class EpsilonGreedy {
   std::size_t greedy(std::span<const Value> values, core::Random& ties) const {
     const Value best = best_value(values);
     core::require(!std::isnan(best), "values", "numbers", best);
+    const Value least = static_cast<Value>(best - config_.tie_tolerance);
     switch (config_.tie_rule) {
       case TieRule::lowest:
-        return first_of(values, best);
+        return first_of(values, least);
       case TieRule::middle:
-        return middle_of_widest_run(values, best);
+        return middle_of_widest_run(values, least);
       case TieRule::uniform:
         break;
     }
-    const auto n_tied = static_cast<std::uint64_t>(std::count(values.begin(), values.end(), best));
+    const auto ties_with_best = [least](Value value) { return value >= least; };
+    const auto n_tied =
+        static_cast<std::uint64_t>(std::count_if(values.begin(), values.end(), ties_with_best));
     std::uint64_t skip = n_tied > 1 ? ties.below(n_tied) : 0;
-    std::size_t action = first_of(values, best);
+    std::size_t action = first_of(values, least);
     for (; skip > 0; --skip) {
       do {
         ++action;
-      } while (values[action] != best);
+      } while (!ties_with_best(values[action]));
     }
     return action;
   }
 
   template <class Value>
-  static std::size_t first_of(std::span<const Value> values, Value best) noexcept {
-    return static_cast<std::size_t>(std::find(values.begin(), values.end(), best) - values.begin());
+  static std::size_t first_of(std::span<const Value> values, Value least) noexcept {
+    const auto found =
+        std::find_if(values.begin(), values.end(), [least](Value value) { return value >= least; });
+    return static_cast<std::size_t>(found - values.begin());
   }
 
   template <class Value>
-  static std::size_t middle_of_widest_run(std::span<const Value> values, Value best) noexcept {
+  static std::size_t middle_of_widest_run(std::span<const Value> values, Value least) noexcept {
     std::size_t widest = 0;
     std::size_t middle = 0;
     std::size_t run = 0;
     for (std::size_t action = 0; action < values.size(); ++action) {
-      run = values[action] == best ? run + 1 : 0;
+      run = values[action] >= least ? run + 1 : 0;
       if (run > widest) {
         widest = run;
         middle = action - run / 2;  // of actions action - run + 1 .. action, rounded down

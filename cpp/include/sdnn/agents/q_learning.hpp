@@ -1,6 +1,7 @@
 /// Q-learning over any approximator of action values.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -22,11 +23,13 @@ struct QLearningConfig {
   double learning_rate = 0.5;  ///< alpha, in (0, 1]
   double discount = 0.9;       ///< gamma, in [0, 1]
   EpsilonGreedyConfig policy = {};
+  int n_steps = 1;  ///< rewards in a target before it bootstraps, in [1, 1000]
 
   static constexpr auto fields() noexcept {
     return std::tuple_cat(std::tuple(core::field("learning_rate", &QLearningConfig::learning_rate),
                                      core::field("discount", &QLearningConfig::discount)),
-                          core::nested_fields(&QLearningConfig::policy));
+                          core::nested_fields(&QLearningConfig::policy),
+                          std::tuple(core::field("n_steps", &QLearningConfig::n_steps)));
   }
   bool operator==(const QLearningConfig&) const = default;
 };
@@ -35,6 +38,13 @@ struct QLearningConfig {
 ///
 /// q_hat = (1 - alpha) Q(s, a) + alpha (r + gamma max_a' Q(s', a')); a terminated transition has
 /// target r alone. A time limit is no termination: it bootstraps.
+///
+/// With n_steps = n > 1 (not in the paper) the target is r_1 + gamma r_2 + ... + gamma^n max_a' Q:
+/// a transition waits until n steps are known, or the episode ends, and is then corrected, once, as
+/// before. A success thus reaches the n states before it in the episode that had it. Targets are
+/// not corrected for actions taken at random in between. Source: Watkins, C. (1989). Learning from
+/// delayed rewards (corrected n-step returns); Sutton, R., Barto, A. (2018). Reinforcement
+/// learning, section 7.1.
 template <approximators::ActionValue Q>
 class QLearning {
  public:
@@ -43,10 +53,14 @@ class QLearning {
       : config_(config),
         action_value_(std::move(action_value)),
         policy_(config.policy, seed),
-        values_(action_value_.n_actions()) {
+        values_(action_value_.n_actions()),
+        next_state_(action_value_.n_inputs()) {
     core::require(config.learning_rate > 0.0 && config.learning_rate <= 1.0, "learning_rate",
                   "in (0, 1]", config.learning_rate);
     core::require_in_range("discount", config.discount, 0.0, 1.0);
+    core::require_in_range("n_steps", config.n_steps, 1, 1000);
+    waiting_.resize(static_cast<std::size_t>(config.n_steps));
+    for (Step& step : waiting_) step.state.resize(action_value_.n_inputs());
   }
 
   const QLearningConfig& config() const noexcept { return config_; }
@@ -55,9 +69,13 @@ class QLearning {
 
   std::size_t n_inputs() const { return action_value_.n_inputs(); }
 
-  /// Starts counting the steps of an episode anew, for the greedy first steps. The caller says
-  /// when: learning a terminated transition does not.
-  void begin_episode() noexcept { step_ = 0; }
+  /// Starts counting the steps of an episode anew, for the greedy first steps, and learns what
+  /// still waits of an episode that did not terminate. The caller says when: learning a terminated
+  /// transition does not. Throws as learn does.
+  void begin_episode() {
+    step_ = 0;
+    if (n_waiting_ > 0) learn_all_waiting(state_value(next_state_));
+  }
 
   /// Lets the approximator write to the memory that it will need, where it knows how.
   void warm_caches()
@@ -84,19 +102,67 @@ class QLearning {
              std::span<const double> next_state, bool terminated) {
     core::require_finite("reward", reward);
     // The next state first: the network then remembers it, corrected, for the next decision.
-    double target = reward;
-    if (!terminated) {
-      action_value_.values(next_state, values_);
-      target += config_.discount * best_value(std::span<const double>(values_));
+    const double next_value = terminated ? 0.0 : state_value(next_state);
+    if (config_.n_steps == 1) {
+      const double target = terminated ? reward : reward + config_.discount * next_value;
+      action_value_.correct(state, action, target, config_.learning_rate);
+      return;
     }
-    action_value_.correct(state, action, target, config_.learning_rate);
+    (void)action_value_.value(state, action);  // refuses what could not be learned later
+    Step& newest = waiting_[(first_ + n_waiting_) % waiting_.size()];
+    std::copy(state.begin(), state.end(), newest.state.begin());
+    newest.action = action;
+    newest.reward = reward;
+    ++n_waiting_;
+    if (terminated) {
+      learn_all_waiting(0.0);
+      return;
+    }
+    std::copy(next_state.begin(), next_state.end(), next_state_.begin());
+    if (n_waiting_ == waiting_.size()) learn_oldest(next_value);
   }
 
  private:
+  /// A transition whose target is not known yet.
+  struct Step {
+    std::vector<double> state;
+    std::size_t action;
+    double reward;
+  };
+
+  double state_value(std::span<const double> state) {
+    action_value_.values(state, values_);
+    return best_value(std::span<const double>(values_));
+  }
+
+  /// The target of the oldest waiting step: all rewards since, then `value`.
+  double waiting_return(double value) const noexcept {
+    for (std::size_t i = n_waiting_; i-- > 0;) {
+      value = waiting_[(first_ + i) % waiting_.size()].reward + config_.discount * value;
+    }
+    return value;
+  }
+
+  void learn_oldest(double value) {
+    const double target = waiting_return(value);
+    const Step& oldest = waiting_[first_];
+    first_ = (first_ + 1) % waiting_.size();
+    --n_waiting_;
+    action_value_.correct(oldest.state, oldest.action, target, config_.learning_rate);
+  }
+
+  void learn_all_waiting(double value) {
+    while (n_waiting_ > 0) learn_oldest(value);
+  }
+
   QLearningConfig config_;
   Q action_value_;
   EpsilonGreedy policy_;
   std::vector<double> values_;
+  std::vector<Step> waiting_;  ///< a ring of n_steps
+  std::size_t first_ = 0;      ///< the oldest one in it
+  std::size_t n_waiting_ = 0;
+  std::vector<double> next_state_;  ///< of the newest
   int step_ = 0;
 };
 

@@ -38,13 +38,18 @@ class OutputScale {
     return (q_low_ * (u_high_ - n_firing) + q_high_ * (n_firing - u_low_)) / (u_high_ - u_low_);
   }
 
-  /// The number of units whose value is nearest to `value` clipped to [q_low, q_high]; halves are
-  /// rounded up. For every u in [u_low, u_high], inverse(g(u)) == u. Requires a finite value.
-  int inverse(double value) const noexcept {
+  /// Where on the line `value`, clipped to [q_low, q_high], lies: a number of units, not rounded.
+  /// For every u in [u_low, u_high], exact_inverse(g(u)) is within 1e-9 of u. Requires a number.
+  double exact_inverse(double value) const noexcept {
     assert(!std::isnan(value));
     const double clipped = std::clamp(value, q_low_, q_high_);
-    const double exact = u_low_ + (clipped - q_low_) * (u_high_ - u_low_) / (q_high_ - q_low_);
-    return static_cast<int>(std::floor(exact + 0.5));
+    return u_low_ + (clipped - q_low_) * (u_high_ - u_low_) / (q_high_ - q_low_);
+  }
+
+  /// The number of units whose value is nearest to `value` clipped to [q_low, q_high]; halves are
+  /// rounded up. For every u in [u_low, u_high], inverse(g(u)) == u. Requires a number.
+  int inverse(double value) const noexcept {
+    return static_cast<int>(std::floor(exact_inverse(value) + 0.5));
   }
 
  private:

@@ -48,6 +48,7 @@ class SDNNC {
         actions_(config.n_hidden_units, config.n_active_units, config.n_actions),
         scale_(make_scale(config)),
         hidden_layer_(actions_.n_hidden_units(), code_->n_columns(), code_->n_double_columns()),
+        rounding_(seed, core::Stream::rounding),
         memory_(*code_, actions_.n_hidden_units(), actions_.n_active_units()) {
     core::require_positive("learning_coefficient", config.learning_coefficient);
     core::require_in_range("lattice", config.lattice, 1, 64);
@@ -124,7 +125,7 @@ class SDNNC {
     const Remembered entry = recall(state);
     const int n_firing = count_in_window(entry.potentials, action);
     const double wanted = (1.0 - rate) * scale_(n_firing) + rate * target;
-    const int deficit = scale_.inverse(wanted) - n_firing;
+    const int deficit = rounded_count(wanted, n_firing) - n_firing;
     if (deficit == 0) return;
     const std::size_t first = actions_.first_unit(action);
     select_units(std::span(entry.potentials).subspan(first, actions_.n_active_units()), deficit,
@@ -302,6 +303,18 @@ class SDNNC {
     return memory_.recall(*code_, hidden_layer_, bins_);
   }
 
+  /// How many units are to fire for the value `wanted`, where `n_firing` do.
+  int rounded_count(double wanted, int n_firing) {
+    if (config_.rounding == Rounding::half_up) return scale_.inverse(wanted);
+    const double exact = scale_.exact_inverse(wanted);
+    if (config_.rounding == Rounding::random) {
+      return static_cast<int>(std::floor(exact + rounding_.uniform()));
+    }
+    constexpr double kNothing = 1e-9;  // what rounding errors may leave of no change
+    return static_cast<int>(exact > n_firing ? std::ceil(exact - kNothing)
+                                             : std::floor(exact + kNothing));
+  }
+
   int count_in_window(std::span<const std::int32_t> potentials, std::size_t action) const {
     if (action >= n_actions()) {
       core::require(false, "action", "less than " + std::to_string(n_actions()), action);
@@ -319,6 +332,7 @@ class SDNNC {
   coding::ActionCode actions_;
   OutputScale scale_;
   HiddenLayer hidden_layer_;
+  core::Random rounding_;
   std::vector<double> value_of_count_;
 
   // Workspace: sized once, so that a step allocates nothing.

@@ -15,6 +15,13 @@ enum class InitialWeights {
   uniform,  ///< uniform within +- initial_weight_limit, rounded to the lattice
 };
 
+/// To which whole number of firing units a wanted value is rounded (reading: the paper is silent).
+enum class Rounding {
+  half_up,  ///< the nearest; halves up. A change of less than half a unit is lost
+  random,   ///< up or down at random, in proportion: right on average, nothing is lost
+  away,     ///< the next one in the direction of the change: always at least one unit
+};
+
 /// Everything that defines an SDNN-C; the defaults are the paper's values.
 struct SDNNCConfig {
   int n_inputs = 4;                 ///< l >= 2
@@ -34,7 +41,8 @@ struct SDNNCConfig {
   int lattice = 1;                    ///< weights are multiples of c / lattice
   double initial_threshold = 200.0;   ///< |w_i0| at the start, in units of c
   InitialWeights initial_weights = InitialWeights::ternary;
-  double initial_weight_limit = 0.1;  ///< of InitialWeights::uniform, in units of c
+  double initial_weight_limit = 0.1;      ///< of InitialWeights::uniform, in units of c
+  Rounding rounding = Rounding::half_up;  ///< of the number of units that are to fire
 
   static constexpr auto fields() noexcept {
     return std::tuple(
@@ -53,7 +61,8 @@ struct SDNNCConfig {
         core::field("lattice", &SDNNCConfig::lattice),
         core::field("initial_threshold", &SDNNCConfig::initial_threshold),
         core::field("initial_weights", &SDNNCConfig::initial_weights),
-        core::field("initial_weight_limit", &SDNNCConfig::initial_weight_limit));
+        core::field("initial_weight_limit", &SDNNCConfig::initial_weight_limit),
+        core::field("rounding", &SDNNCConfig::rounding));
   }
   bool operator==(const SDNNCConfig&) const = default;
 };

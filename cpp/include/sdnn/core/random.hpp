@@ -24,6 +24,8 @@ enum class Stream : std::uint64_t {
   sensor_noise = 6,
   evaluation_ties = 7,
   evaluation_sensor_noise = 8,
+  rounding = 9,
+  useless_inputs = 10,
 };
 
 /// xoshiro256** (Blackman, Vigna 2018), seeded by SplitMix64 from (seed, stream, index).

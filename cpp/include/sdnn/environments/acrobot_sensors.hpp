@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string_view>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -77,7 +78,7 @@ class SensorNoise {
     }
   }
 
-  int n_channels() const noexcept { return static_cast<int>(edges_.size()); }
+  std::size_t n_channels() const noexcept { return edges_.size(); }
 
  private:
   double sigma_;
@@ -85,54 +86,86 @@ class SensorNoise {
   core::Random random_;
 };
 
+/// Where noise enters (reading).
+enum class NoiseEntry {
+  every_sensor,   ///< s5 and s6 are computed from the true s1..s4 and have noise of their own
+  basic_sensors,  ///< on s1..s4 alone: s5 and s6 are computed from the noisy ones
+};
+
 struct SensorConfig {
   int n_sensors = 4;   ///< 4: s1..s4; 5: with s5; 6: with s5 and s6
   double noise = 0.0;  ///< standard deviation on every sensor; the paper's noisy cases have 0.02
+  NoiseEntry noise_entry = NoiseEntry::every_sensor;
+  int n_constant = 0;  ///< useless inputs besides: always 1/2, with noise as the sensors
+  int n_random = 0;    ///< useless inputs besides: a new uniform number each time
 
   static constexpr auto fields() noexcept {
     return std::tuple(core::field("n_sensors", &SensorConfig::n_sensors),
-                      core::field("noise", &SensorConfig::noise));
+                      core::field("noise", &SensorConfig::noise),
+                      core::field("noise_entry", &SensorConfig::noise_entry),
+                      core::field("n_constant", &SensorConfig::n_constant),
+                      core::field("n_random", &SensorConfig::n_random));
   }
   bool operator==(const SensorConfig&) const = default;
 };
 
-/// s1..s4 and, if asked for, s5 and s6, each with its own noise.
+/// s1..s4 and, if asked for, s5 and s6, with their noise, and inputs that say nothing.
 ///
-/// s5 and s6 are computed from the true s1..s4. Source: the paper's sections on the acrobot task
-/// and on noisy and redundant inputs.
+/// Source: the paper's sections on the acrobot task and on noisy and redundant inputs; useless
+/// inputs are not in the paper. They come last: the constant ones, then the random ones.
 class AcrobotSensors {
  public:
   /// Throws std::invalid_argument if a number is outside its range.
   AcrobotSensors(const SensorConfig& config, std::uint64_t seed, core::Stream stream)
-      : n_sensors_(checked(config.n_sensors)),
-        noise_(config.noise, edges(config.n_sensors), seed, stream) {}
+      : n_sensors_(checked("n_sensors", config.n_sensors, kBasic, kBasic + 2)),
+        n_constant_(checked("n_constant", config.n_constant, 0, kMaxUseless)),
+        n_random_(checked("n_random", config.n_random, 0, kMaxUseless)),
+        noise_entry_(config.noise_entry),
+        noise_(config.noise, edges(config), seed, stream),
+        random_(seed, core::Stream::useless_inputs, static_cast<std::uint64_t>(stream)) {}
 
-  /// Writes one observation of `state`. Shapes: out (n_sensors,), every entry in [0, 1].
+  /// Writes one observation of `state`. Shapes: out (n_inputs,), every entry in [0, 1].
   void observe(const AcrobotState& state, std::span<double> out) noexcept {
-    assert(out.size() == n_sensors_);
+    assert(out.size() == n_inputs());
     const Eigen::Vector4d basic = basic_observation(state);
     std::copy(basic.begin(), basic.end(), out.begin());
-    if (n_sensors_ > 4) out[4] = energy_sensor(basic[2], basic[3]);
-    if (n_sensors_ > 5) out[5] = height_sensor(basic[0], basic[1]);
-    noise_.apply(out);
+    const std::span<double> noisy = out.first(noise_.n_channels());
+    if (noise_entry_ == NoiseEntry::basic_sensors) noise_.apply(noisy);
+    if (n_sensors_ > kBasic) out[kBasic] = energy_sensor(out[2], out[3]);
+    if (n_sensors_ > kBasic + 1) out[kBasic + 1] = height_sensor(out[0], out[1]);
+    std::ranges::fill(out.subspan(n_sensors_, n_constant_), 0.5);
+    if (noise_entry_ == NoiseEntry::every_sensor) noise_.apply(noisy);
+    for (double& value : out.last(n_random_)) value = random_.uniform();
   }
 
-  int n_sensors() const noexcept { return static_cast<int>(n_sensors_); }
+  /// Numbers in an observation.
+  std::size_t n_inputs() const noexcept { return n_sensors_ + n_constant_ + n_random_; }
 
  private:
-  static std::size_t checked(int n_sensors) {
-    core::require_in_range("n_sensors", n_sensors, 4, 6);
-    return static_cast<std::size_t>(n_sensors);
+  static constexpr int kBasic = 4;
+  static constexpr int kMaxUseless = 100;
+
+  static std::size_t checked(std::string_view name, int value, int low, int high) {
+    core::require_in_range(name, value, low, high);
+    return static_cast<std::size_t>(value);
   }
 
-  static std::vector<SensorEdge> edges(int n_sensors) {
-    std::vector<SensorEdge> result(checked(n_sensors), SensorEdge::saturate);
+  /// One for each input that has noise; checked before.
+  static std::vector<SensorEdge> edges(const SensorConfig& config) {
+    const int n_noisy = config.noise_entry == NoiseEntry::basic_sensors
+                            ? kBasic
+                            : config.n_sensors + config.n_constant;
+    std::vector<SensorEdge> result(static_cast<std::size_t>(n_noisy), SensorEdge::saturate);
     result[0] = result[1] = SensorEdge::wrap;
     return result;
   }
 
   std::size_t n_sensors_;
+  std::size_t n_constant_;
+  std::size_t n_random_;
+  NoiseEntry noise_entry_;
   SensorNoise noise_;
+  core::Random random_;
 };
 
 }  // namespace sdnn::environments

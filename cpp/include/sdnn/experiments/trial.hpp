@@ -23,11 +23,15 @@ namespace sdnn::experiments {
 /// How long a trial is, and how often the agent is tested (section 4.2).
 struct ProtocolConfig {
   int n_learning_episodes = 15000;
-  int test_interval = 10;  ///< learning episodes between two test episodes
+  int test_interval = 10;        ///< learning episodes between two test episodes
+  bool limit_bootstraps = true;  ///< reading: the time limit is no termination for the agent
+  bool noisy_tests = true;       ///< reading: sensors are as noisy in test episodes
 
   static constexpr auto fields() noexcept {
     return std::tuple(core::field("n_learning_episodes", &ProtocolConfig::n_learning_episodes),
-                      core::field("test_interval", &ProtocolConfig::test_interval));
+                      core::field("test_interval", &ProtocolConfig::test_interval),
+                      core::field("limit_bootstraps", &ProtocolConfig::limit_bootstraps),
+                      core::field("noisy_tests", &ProtocolConfig::noisy_tests));
   }
   bool operator==(const ProtocolConfig&) const = default;
 };
@@ -59,14 +63,14 @@ class AcrobotTrial {
         acrobot_(acrobot),
         goal_(goal),
         sensors_(sensors, seed, core::Stream::sensor_noise),
-        test_sensors_(sensors, seed, core::Stream::evaluation_sensor_noise),
+        test_sensors_(of_tests(sensors, protocol), seed, core::Stream::evaluation_sensor_noise),
         protocol_(protocol),
-        observed_(static_cast<std::size_t>(sensors.n_sensors)),
+        observed_(sensors_.n_inputs()),
         next_observed_(observed_.size()) {
     core::require_in_range("n_learning_episodes", protocol.n_learning_episodes, 1, 1 << 30);
     core::require_in_range("test_interval", protocol.test_interval, 1, 1 << 30);
     core::require(agent_.n_inputs() == observed_.size(), "n_inputs",
-                  "n_sensors of the sensors (" + std::to_string(observed_.size()) + ")",
+                  "the number of inputs of the sensors, " + std::to_string(observed_.size()),
                   agent_.n_inputs());
     // No decision is to wait for memory it is the first to use: that of the agent, room for rows.
     if constexpr (requires { agent_.warm_caches(); }) agent_.warm_caches();
@@ -80,6 +84,9 @@ class AcrobotTrial {
   std::int64_t n_decisions() const noexcept { return n_decisions_; }
   std::span<const TestRow> rows() const noexcept { return rows_; }
   const Agent& agent() const noexcept { return agent_; }
+  /// To look inside while it learns: asking for values changes nothing that follows, acting and
+  /// learning do.
+  Agent& agent() noexcept { return agent_; }
 
   /// Runs up to `n_episodes` more learning episodes, with the test episodes that fall due.
   void advance(int n_episodes) {
@@ -101,6 +108,12 @@ class AcrobotTrial {
   }
 
  private:
+  static environments::SensorConfig of_tests(environments::SensorConfig sensors,
+                                             const ProtocolConfig& protocol) noexcept {
+    if (!protocol.noisy_tests) sensors.noise = 0.0;
+    return sensors;
+  }
+
   template <class AfterDecision>
   TestRow run_episode(environments::AcrobotSensors& sensors, bool learning,
                       AfterDecision& after_decision) {
@@ -114,7 +127,8 @@ class AcrobotTrial {
       const auto result = acrobot_.step(max_torque_ * agent_.normalized_action(action), lambda);
       sensors.observe(acrobot_.state(), next_observed_);
       if (learning) {
-        agent_.learn(observed_, action, result.reward, next_observed_, result.terminated);
+        agent_.learn(observed_, action, result.reward, next_observed_,
+                     result.terminated || (result.truncated && !protocol_.limit_bootstraps));
       }
       std::swap(observed_, next_observed_);
       ++row.steps;
