@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 
 from sdnn import _core
 from sdnn.experiments.config import PlannedTrial
-from sdnn.experiments.dask_worker import PROBE_WORKER, probe, run_on_worker
+from sdnn.experiments.dask_worker import PROBE_WORKER, MismatchError, probe, run_on_worker
 from sdnn.experiments.errors import ClusterError, WorkerLostError
 from sdnn.experiments.executor import (
     POLL_SECONDS,
@@ -405,7 +405,7 @@ class _Session:
             worker = self._workers.get(key)
             if worker is not None and info["last_seen"] != worker.last_seen:
                 worker.last_seen, worker.heard_at = info["last_seen"], now
-                if worker.given_up:
+                if worker.given_up and not worker.refused:
                     worker = None  # it was frozen, and is back
             if worker is None:
                 worker = _Worker(key[0], info["nthreads"], info["last_seen"], now)
@@ -495,7 +495,7 @@ class _Session:
     async def _run_trial(self, worker: _Worker, trial: int) -> None:
         run, planned = self._run, self._run.planned[trial]
         try:
-            pickled = pickle.dumps(planned)
+            settings, pickled = planned.config.canonical_json(), pickle.dumps(planned)
         except Exception as error:
             run.finish(Failed(planned, error))
             return
@@ -508,6 +508,8 @@ class _Session:
                 worker,
                 f"{key.case_id}-{key.agent}-{key.trial}-{key.config_hash}-{attempt}",
                 run_on_worker,
+                _core.__version__,
+                settings,
                 pickled,
                 run.name,
                 attempt,
@@ -519,7 +521,12 @@ class _Session:
         except _WorkerDiedError:
             run.put_back(trial, worker.address)
         except _TaskError as raised:
-            run.finish(Failed(planned, raised.error))
+            if isinstance(raised.error, MismatchError):
+                self._refuse(worker, str(raised.error))
+                run.put_back(trial)
+                worker.give_up()
+            else:
+                run.finish(Failed(planned, raised.error))
         except Exception:
             run.put_back(trial)
             raise

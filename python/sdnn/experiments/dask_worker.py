@@ -12,6 +12,7 @@ import time
 
 from sdnn import _core
 from sdnn.experiments.config import PlannedTrial
+from sdnn.experiments.errors import ExperimentError
 from sdnn.experiments.executor import run_to_end
 from sdnn.experiments.records import TrialRecord, TrialRows
 from sdnn.experiments.trial import PythonTrial
@@ -58,13 +59,21 @@ def probe_worker(version: str, pickled: list[bytes]) -> tuple[str, list[str]]:
     return own, [probe(pickle.loads(one)) for one in pickled]
 
 
+class MismatchError(ExperimentError):
+    """A worker has another version, or reads other settings out of a trial."""
+
+
 def run_on_worker(
-    pickled: bytes, topic: str, attempt: int, progress_seconds: float
+    version: str, settings: str, pickled: bytes, topic: str, attempt: int, progress_seconds: float
 ) -> TrialRecord | None:
     """Run one trial; there is no record if it is not wanted any more.
 
     Parameters
     ----------
+    version
+        The driver's version.
+    settings
+        The trial's settings as the driver writes them.
     pickled
         The trial.
     topic
@@ -74,13 +83,24 @@ def run_on_worker(
     progress_seconds
         Least time between two of them.
 
+    Raises
+    ------
+    MismatchError
+        If version or settings are not the driver's: a build that lacks a setting would ignore it.
+
     Notes
     -----
     The GIL is free while a trial in C++ advances, so the worker's heartbeat goes on.
     """
     from distributed import get_worker
 
+    if _core.__version__ != version:
+        raise MismatchError(f"it has sdnn {_core.__version__}, this is sdnn {version}")
     planned: PlannedTrial = pickle.loads(pickled)
+    if planned.config.canonical_json() != settings:
+        raise MismatchError(
+            f"its build of sdnn {version} does not know all settings of agent {planned.key.agent}"
+        )
     worker = get_worker()
     key = worker.get_current_task()
     reported = time.monotonic()

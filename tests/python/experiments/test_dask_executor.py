@@ -232,6 +232,31 @@ def test_workers_that_do_not_fit_get_no_trials(cluster, preload, tmp_path, monke
     assert "failed" not in {event[0] for event in recorder.events}
 
 
+LACKS_A_SETTING = """
+import re
+from sdnn.experiments import TrialConfig
+
+TrialConfig.whole = getattr(TrialConfig, "whole", TrialConfig.canonical_json)
+TrialConfig.canonical_json = lambda self: re.sub('"discount":0.8,', "", self.whole())
+"""
+
+
+def test_a_build_that_lacks_a_setting_is_refused_when_one_comes(cluster, preload, tmp_path):
+    """A build may pass the probe and yet ignore what only later trials set."""
+    plan = make_plan(2)
+    other = replace(plan[3].config, learning=replace(plan[3].config.learning, discount=0.8))
+    plan = (
+        *plan[:3], PlannedTrial(plan[3].key._replace(config_hash=other.config_hash), other)
+    )  # fmt: skip
+    cluster.add_worker(*preload(LACKS_A_SETTING))
+    with pytest.raises(ClusterError, match="does not know all settings of agent sdnn-c; waited 5"):
+        run(tmp_path / "out", plan, cluster, scheduler_timeout=5.0)
+    cluster.add_worker("--no-nanny")
+    outcome, digest = run(tmp_path / "out", plan, cluster)
+    assert (outcome.n_reused, outcome.n_run) == (3, 1)
+    assert digest == run(tmp_path / "here", plan)[1]
+
+
 POISON = """
 import os
 from dataclasses import replace
