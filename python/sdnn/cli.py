@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 import click
 
 from sdnn.executor_options import executor_options
-from sdnn.experiments.cases import WORDS, includes_cost, select_experiments
+from sdnn.experiments.cases import PRESET_AGENTS, WORDS, includes_cost, select_experiments
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from sdnn.experiments.engine import RunOutcome
     from sdnn.experiments.executor import Executor
     from sdnn.experiments.report import Report
     from sdnn.experiments.reproduce import ReproduceRequest, Reproduction
+    from sdnn.experiments.sweep.report import StudyReport
+    from sdnn.experiments.sweep.run import Sweep, SweepRequest
 
 EXIT_FAILURE = 1
 EXIT_INTERRUPTED = 130
@@ -110,19 +114,28 @@ def main() -> None:
     multiple=True,
     help="Run this agent in every case instead of the case's own; may be repeated.",
 )
+@click.option(
+    "--preset",
+    "presets",
+    type=click.Choice(tuple(PRESET_AGENTS)),
+    multiple=True,
+    help="Draw SDNN-C under these settings beside the paper's; may be repeated.",
+)
 @click.pass_context
 def reproduce(
     context: click.Context,
     experiment: str,
     trials: int | None,
     episodes: int | None,
-    executor: Executor,
+    jobs: int | None,
+    executor: Executor | None,
     seed: int,
     out: Path,
     quick: bool,
     as_json: bool,
     dry_run: bool,
     agents: tuple[str, ...],
+    presets: tuple[str, ...],
 ) -> None:
     """Run the paper's experiments and write a report with its figures and claims.
 
@@ -141,9 +154,11 @@ def reproduce(
         n_trials=trials,
         n_episodes=episodes,
         seed=seed,
+        jobs=jobs,
         executor=executor,
         quick=quick,
         agents=agents,
+        presets=presets,
     )
     try:
         _ = request.plan
@@ -154,6 +169,79 @@ def reproduce(
             _print_plan(request, as_json)
         else:
             _finish(context, _run(request), out, as_json)
+    except (ExperimentError, OSError) as error:
+        raise click.ClickException(str(error)) from error
+    except KeyboardInterrupt:
+        _exit_interrupted(context, "interrupted; what was finished is stored")
+
+
+@main.command()
+@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option(
+    "--trials",
+    type=click.IntRange(min=1),
+    help="Trials per case and variant, instead of the file's.",
+)
+@click.option(
+    "--seed", type=click.IntRange(min=0), help="Root of all seeds, instead of the file's."
+)
+@executor_options
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("results"),
+    show_default=True,
+    help="Folder for the result file, figure, tables and page.",
+)
+@click.option(
+    "--only", metavar="VARIANT", multiple=True, help="Run this variant only; may be repeated."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
+@click.option("--dry-run", is_flag=True, help="Only say what would be run, and how long it takes.")
+@click.pass_context
+def sweep(
+    context: click.Context,
+    file: Path,
+    trials: int | None,
+    seed: int | None,
+    jobs: int | None,
+    executor: Executor | None,
+    out: Path,
+    only: tuple[str, ...],
+    as_json: bool,
+    dry_run: bool,
+) -> None:
+    """Run the study in FILE: variants of any setting, compared trial by trial.
+
+    FILE is TOML; docs/sweep.md describes it. Tables, a figure and a page are written to OUT under
+    the name of the file.
+
+    Finished trials are kept in OUT/results.sqlite, which `reproduce` may share; the same command
+    goes on where it stopped.
+    """
+    from sdnn.experiments.errors import ExperimentError, StudyError
+    from sdnn.experiments.sweep.run import SweepRequest
+
+    request = SweepRequest(
+        file=file,
+        out=out,
+        n_trials=trials,
+        seed=seed,
+        jobs=jobs,
+        executor=executor,
+        only=tuple(dict.fromkeys(only)),
+    )
+    try:
+        _ = request.plan
+    except (StudyError, ValueError) as error:
+        raise click.UsageError(str(error)) from error
+    try:
+        if dry_run:
+            _print_forecast(request, as_json)
+        else:
+            _finish_sweep(context, _run_sweep(request), out, as_json)
+    except StudyError as error:
+        raise click.UsageError(str(error)) from error
     except (ExperimentError, OSError) as error:
         raise click.ClickException(str(error)) from error
     except KeyboardInterrupt:
@@ -219,17 +307,8 @@ def _print_plan(request: ReproduceRequest, as_json: bool) -> None:
 
 
 def _finish(context: click.Context, done: Reproduction, out: Path, as_json: bool) -> None:
-    from sdnn.experiments.progress import describe
-
-    outcome = done.outcome
-    n_stored = outcome.n_reused + outcome.n_run
-    stored = f"{n_stored} of {outcome.n_planned} trials are stored in {out}"
-    for failure in outcome.failures:
-        message = f"{type(failure.error).__name__}: {failure.error}"
-        click.echo(f"Error: {describe(failure.key)} failed: {message}", err=True)
-    if outcome.interrupted:
-        _exit_interrupted(context, f"interrupted; {stored}; the same command goes on from there")
-    if outcome.failures:
+    stored = _report_outcome(context, done.outcome, out)
+    if done.outcome.failures:
         click.echo(f"Error: no figure drawn; {stored}", err=True)
         context.exit(EXIT_FAILURE)
     if as_json:
@@ -237,28 +316,98 @@ def _finish(context: click.Context, done: Reproduction, out: Path, as_json: bool
         return
     if done.report is not None:
         _print_report(done.report)
-    page = next(str(file) for file in done.files if file.suffix == ".html")
+    _print_files(done.outcome, done.files, stored)
+
+
+def _report_outcome(context: click.Context, outcome: RunOutcome, out: Path) -> str:
+    """Tell what failed, exit if interrupted, and say how much is stored."""
+    from sdnn.experiments.progress import describe
+
+    n_stored = outcome.n_reused + outcome.n_run
+    stored = f"{n_stored} of {outcome.n_planned} trials are stored in {out}"
+    for failure in outcome.failures:
+        message = f"{type(failure.error).__name__}: {failure.error}"
+        click.echo(f"Error: {describe(failure.key)} failed: {message}", err=True)
+    if outcome.interrupted:
+        _exit_interrupted(context, f"interrupted; {stored}; the same command goes on from there")
+    return stored
+
+
+def _print_files(outcome: RunOutcome, files: tuple[Path, ...], stored: str) -> None:
+    page = next(str(file) for file in files if file.suffix == ".html")
     done_now = f"{stored} ({outcome.n_run} run now); " if outcome.n_planned else ""
-    click.echo(f"{done_now}wrote {len(done.files)} files: see {page}")
+    click.echo(f"{done_now}wrote {len(files)} files: see {page}")
 
 
 def _print_report(report: Report) -> None:
-    from rich import box
-    from rich.table import Table
-
+    mark = " (QUICK LOOK, not the result)" if report.quick else ""
     console = _console()
     if note := report.agents_note():
         console.print(note, highlight=False)
-    for title, header, rows in report.tables():
-        mark = " (QUICK LOOK, not the result)" if report.quick else ""
-        table = Table(title=title + mark, title_justify="left", box=box.SIMPLE_HEAD)
+    _print_tables(console, report.tables(), report.notes(), mark)
+
+
+def _print_tables(
+    console: Console,
+    tables: Iterable[tuple[str, Sequence[str], Sequence[Sequence[str]]]],
+    notes: Iterable[str],
+    mark: str = "",
+) -> None:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    for title, header, rows in tables:
+        table = Table(title=Text(title + mark), title_justify="left", box=box.SIMPLE_HEAD)
         for column in header:
-            table.add_column(column)
+            table.add_column(Text(column), overflow="fold")
         for row in rows:
-            table.add_row(*row)
+            table.add_row(*map(Text, row))
         console.print(table)
-    for note in report.notes():
-        console.print(note, style="dim", highlight=False)
+    for note in notes:
+        console.print(note, style="dim", highlight=False, markup=False)
+
+
+def _run_sweep(request: SweepRequest) -> Sweep:
+    from rich.console import Console
+
+    from sdnn.experiments.progress import ProgressObserver
+    from sdnn.experiments.sweep.run import sweep as run
+
+    with ProgressObserver(Console(stderr=True)) as observer:
+        return run(request, observer=observer)
+
+
+def _print_forecast(request: SweepRequest, as_json: bool) -> None:
+    from sdnn.experiments.sweep.forecast import forecast, forecast_json, forecast_lines
+
+    found = forecast(request)
+    if as_json:
+        click.echo(json.dumps(forecast_json(found), indent=2))
+        return
+    for line in forecast_lines(found, request.out):
+        click.echo(line)
+
+
+def _finish_sweep(context: click.Context, done: Sweep, out: Path, as_json: bool) -> None:
+    stored = _report_outcome(context, done.outcome, out)
+    if done.report is None:
+        click.echo(f"Error: nothing is complete; {stored}", err=True)
+        context.exit(EXIT_FAILURE)
+    if as_json:
+        click.echo(json.dumps(done.table, indent=2))
+    else:
+        _print_study(done.report)
+        _print_files(done.outcome, done.files, stored)
+    if done.outcome.failures:
+        context.exit(EXIT_FAILURE)
+
+
+def _print_study(report: StudyReport) -> None:
+    console = _console()
+    lines = [report.title, report.scope(), *filter(None, [report.missing()])]
+    console.print("\n".join(lines), highlight=False, markup=False)
+    _print_tables(console, report.tables(), report.notes())
 
 
 def _console() -> Console:

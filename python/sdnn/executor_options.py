@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from sdnn.experiments.dask_executor import DaskExecutor
 
 EXECUTORS = ("threads", "dask")
 
@@ -53,37 +56,35 @@ _OF_DASK = ("scheduler", "scheduler_timeout", "worker_timeout", "attempts")
 
 
 def executor_options(command: Function) -> Function:
-    """Add the options to a command, which is given `executor`.
+    """Add the options to a command, which is given `jobs` and `executor`.
 
-    It is an `sdnn.experiments.executor.Executor`, made when the command is called.
+    They are what `sdnn.experiments.run_trials` takes: without an executor, threads of this process.
     """
 
     @functools.wraps(command)
     def wrapped(*arguments: Any, where: str, jobs: int | None, **options: Any) -> Any:
         of_dask = {name: options.pop(name) for name in _OF_DASK}
         given = {name: value for name, value in of_dask.items() if value is not None}
-        return command(*arguments, executor=_make_executor(where, jobs, given), **options)
+        executor = _make_executor(where, jobs, given)
+        return command(*arguments, jobs=jobs, executor=executor, **options)
 
     for option in reversed(_OPTIONS):
         wrapped = option(wrapped)
     return wrapped
 
 
-def _make_executor(where: str, jobs: int | None, of_dask: dict[str, Any]) -> Any:
-    from sdnn.experiments.errors import ClusterError
-
+def _make_executor(where: str, jobs: int | None, of_dask: dict[str, Any]) -> DaskExecutor | None:
     if where == "threads":
         if of_dask:
             name = next(iter(of_dask)).replace("_", "-")
             raise click.UsageError(f"--{name} needs --executor dask")
-        from sdnn.experiments.thread_executor import ThreadExecutor
-
-        return ThreadExecutor(jobs)
+        return None
     if jobs is not None:
         raise click.UsageError("--jobs is for threads; a cluster runs one trial a worker thread")
     if "scheduler" not in of_dask:
         raise click.UsageError("--executor dask needs --scheduler ADDRESS")
     from sdnn.experiments.dask_executor import DaskExecutor
+    from sdnn.experiments.errors import ClusterError
 
     try:
         return DaskExecutor(of_dask.pop("scheduler"), **of_dask)

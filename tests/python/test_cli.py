@@ -200,6 +200,18 @@ def test_other_agents_have_files_of_their_own(invoke, tmp_path, no_costs):
     assert [claim["number"] for claim in table["claims"]] == [3]
 
 
+def test_a_preset_is_drawn_beside_the_papers_agents(invoke, tmp_path, no_costs):
+    result = invoke("reproduce", "a", "--quick", "--out", "out", "--preset", "robust", "--json")
+    table = json.loads(result.stdout)
+    assert [(case["case"], case["agent"]) for case in table["experiments"][0]["cases"]] == [
+        ("s4", "sdnn-c"), ("s4", "sdnn-c-robust"), ("s6", "sdnn-c"), ("s6", "sdnn-c-robust"),
+    ]  # fmt: skip
+    assert (tmp_path / "out" / "experiment-a-robust-quick.png").exists()
+    again = invoke("reproduce", "a", "--quick", "--out", "out", "--preset", "paper", "--dry-run")
+    assert again.stdout.count("2 trials x 300 episodes, 2 of them stored") == 2
+    assert "robust" not in again.stdout
+
+
 def test_costs_of_other_agents(invoke, no_costs):
     dry = invoke("reproduce", "cost", "--agent", "rbfn", "--dry-run")
     assert dry.stdout == "cost of a step: 14 measurements, 0 of them stored in results\n"

@@ -147,9 +147,9 @@ SHIPPED = (
     r"cmake/[^/]+\.cmake(\.in)?",
     r"cpp/include/sdnn/([a-z_]+/){0,2}[a-z0-9_]+\.hpp",
     r"cpp/bindings/([a-z_]+\.[ch]pp|CMakeLists\.txt)",
-    r"python/sdnn/([a-z_]+/)?[a-z_]+\.pyi?|python/sdnn/py\.typed",
-    r"python/sdnn/experiments/report\.html\.jinja",
-    r"(tests|bench|docs)/.*\.(py|cpp|hpp|txt|md|json|csv|png|svg|ipynb|bin)",
+    r"python/sdnn/([a-z_]+/){0,2}[a-z_]+\.pyi?|python/sdnn/py\.typed",
+    r"python/sdnn/experiments/(sweep/)?[a-z]+\.html\.jinja",
+    r"(tests|bench|docs)/.*\.(py|cpp|hpp|txt|md|json|csv|png|svg|toml|ipynb|bin)",
 )
 """Every file of a source distribution matches one of these."""
 
@@ -163,6 +163,7 @@ NEEDED = (
     "cpp/include/**/*.hpp",
     "cpp/bindings/*",
     "python/sdnn/**/*.py",
+    "python/sdnn/**/*.jinja",
     "python/sdnn/_core.pyi",
     "python/sdnn/py.typed",
 )

@@ -23,6 +23,7 @@ from sdnn.environments.config import AcrobotConfig, GoalScheduleConfig, SensorCo
 from sdnn.environments.goal_schedule import GoalSchedule
 from sdnn.environments.sensors import AcrobotSensors, NoisySensors, RedundantSensors
 from sdnn.environments.tightening_goal import TighteningGoal
+from sdnn.environments.unit_sensors import UnitSensors
 from sdnn.environments.vector_env import AcrobotSwingUpVectorEnv
 
 __all__ = [
@@ -36,6 +37,7 @@ __all__ = [
     "RedundantSensors",
     "SensorConfig",
     "TighteningGoal",
+    "UnitSensors",
     "register_environments",
 ]
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from sdnn.experiments.config import (
         PlannedTrial,
         TrialConfig,
+        TrialSettings,
         case_config,
         plan_trials,
         trial_seed,
@@ -21,11 +22,13 @@ if TYPE_CHECKING:
     from sdnn.experiments.cost import CostConfig
     from sdnn.experiments.dask_executor import DaskExecutor
     from sdnn.experiments.engine import Observer, run_trials
+    from sdnn.experiments.environment_trial import EnvironmentConfig, EnvironmentTrialConfig
     from sdnn.experiments.errors import (
         ClusterError,
         ExperimentError,
         PlotUnavailableError,
         StoreError,
+        StudyError,
         WorkerLostError,
     )
     from sdnn.experiments.executor import Executor
@@ -55,6 +58,7 @@ _HOMES = {
     "config": (
         "PlannedTrial",
         "TrialConfig",
+        "TrialSettings",
         "case_config",
         "plan_trials",
         "trial_seed",
@@ -65,11 +69,16 @@ _HOMES = {
         "Observer",
         "run_trials",
     ),
+    "environment_trial": (
+        "EnvironmentConfig",
+        "EnvironmentTrialConfig",
+    ),
     "errors": (
         "ClusterError",
         "ExperimentError",
         "PlotUnavailableError",
         "StoreError",
+        "StudyError",
         "WorkerLostError",
     ),
     "executor": ("Executor",),
@@ -128,6 +137,8 @@ __all__ = [
     "CostRecord",
     "CostSeries",
     "DaskExecutor",
+    "EnvironmentConfig",
+    "EnvironmentTrialConfig",
     "Estimate",
     "Executor",
     "Experiment",
@@ -143,12 +154,14 @@ __all__ = [
     "Reproduction",
     "ResultStore",
     "StoreError",
+    "StudyError",
     "ThreadExecutor",
     "Trial",
     "TrialConfig",
     "TrialKey",
     "TrialRecord",
     "TrialRows",
+    "TrialSettings",
     "WorkerLostError",
     "agent_entry",
     "case_config",

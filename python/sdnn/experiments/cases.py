@@ -82,6 +82,18 @@ class Experiment:
             return self
         return replace(self, cases=tuple(replace(case, agents=others) for case in self.cases))
 
+    def with_presets(self, presets: Iterable[str]) -> Experiment:
+        """Return the experiment with SDNN-C under some of `PRESET_AGENTS` beside its agents."""
+        added = tuple(PRESET_AGENTS[name] for name in presets)
+        cases = tuple(
+            replace(case, agents=tuple(dict.fromkeys((*case.agents, *added))))
+            for case in self.cases
+        )
+        return replace(self, cases=cases)
+
+
+PRESET_AGENTS = {"paper": "sdnn-c", "robust": "sdnn-c-robust"}
+"""The agents that are SDNN-C under the settings of `sdnn.agents.PRESETS`."""
 
 BOTH = ("sdnn-c", "fql")
 

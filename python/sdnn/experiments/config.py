@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import zlib
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -24,9 +25,75 @@ CONFIG_HASH_DIGITS = 16
 """Hexadecimal digits kept of a configuration's SHA-256: 64 bits."""
 
 
+class TrialSettings(ABC):
+    """Everything that fixes the outcome of a trial but its seed, whatever the task is.
+
+    Subclasses are frozen dataclasses of plain values and of such dataclasses.
+    """
+
+    agent: str
+    approximator: Any
+    learning: Any
+    protocol: ProtocolConfig
+
+    @abstractmethod
+    def make_trial(self, seed: int) -> Trial:
+        """Make the trial of a seed.
+
+        Raises
+        ------
+        ValueError
+            If a value of the configuration is out of its range.
+        """
+
+    @property
+    @abstractmethod
+    def is_compiled(self) -> bool:
+        """Whether the trial runs in C++, where it holds no GIL."""
+
+    @property
+    @abstractmethod
+    def max_decisions(self) -> int | None:
+        """Decisions in an episode at most; None if nobody knows."""
+
+    def check_agent(self) -> None:
+        """Check that there is such an agent, and that the settings are its own.
+
+        Raises
+        ------
+        ValueError
+            If no agent has that id.
+        TypeError
+            If approximator or learning are those of another agent.
+        """
+        entry = agent_entry(self.agent)
+        for name, kind in (("approximator", entry.approximator), ("learning", entry.learning)):
+            value = getattr(self, name)
+            if not isinstance(value, kind):
+                raise TypeError(
+                    f"{name} of {self.agent} must be a {kind.__name__},"
+                    f" got a {type(value).__name__}"
+                )
+
+    def canonical_json(self) -> str:
+        """All values as one line of JSON: keys sorted, no spaces, 1.0 written as 1.
+
+        Equal settings give equal text, however they were typed.
+        """
+        return json.dumps(
+            _canonical(plain_values(self)), sort_keys=True, separators=(",", ":"), allow_nan=False
+        )
+
+    @property
+    def config_hash(self) -> str:
+        """First 16 hexadecimal digits of the SHA-256 of `canonical_json`."""
+        digest = hashlib.sha256(self.canonical_json().encode()).hexdigest()
+        return digest[:CONFIG_HASH_DIGITS]
+
+
 @dataclass(frozen=True, kw_only=True)
-class TrialConfig:
-    """Everything that fixes the outcome of a trial but its seed.
+class TrialConfig(TrialSettings):
+    """A trial of an agent on the acrobot.
 
     Parameters
     ----------
@@ -67,29 +134,17 @@ class TrialConfig:
     protocol: ProtocolConfig = field(default_factory=ProtocolConfig)
 
     def __post_init__(self) -> None:
-        entry = agent_entry(self.agent)
-        for name, kind in (("approximator", entry.approximator), ("learning", entry.learning)):
-            value = getattr(self, name)
-            if not isinstance(value, kind):
-                raise TypeError(
-                    f"{name} of {self.agent} must be a {kind.__name__},"
-                    f" got a {type(value).__name__}"
-                )
-
-    def canonical_json(self) -> str:
-        """All values as one line of JSON: keys sorted, no spaces, 1.0 written as 1.
-
-        Equal settings give equal text, however they were typed.
-        """
-        return json.dumps(
-            _canonical(plain_values(self)), sort_keys=True, separators=(",", ":"), allow_nan=False
-        )
+        self.check_agent()
 
     @property
-    def config_hash(self) -> str:
-        """First 16 hexadecimal digits of the SHA-256 of `canonical_json`."""
-        digest = hashlib.sha256(self.canonical_json().encode()).hexdigest()
-        return digest[:CONFIG_HASH_DIGITS]
+    def is_compiled(self) -> bool:
+        """Whether the agent has a trial in C++."""
+        return agent_entry(self.agent).core_trial is not None
+
+    @property
+    def max_decisions(self) -> int:
+        """Decisions in an episode at most."""
+        return self.acrobot.max_decisions
 
     def make_trial(self, seed: int) -> Trial:
         """Make the trial: in C++ if the agent has one there, else in Python.
@@ -189,7 +244,7 @@ class PlannedTrial:
     """
 
     key: TrialKey
-    config: TrialConfig
+    config: TrialSettings
 
 
 def plan_trials(

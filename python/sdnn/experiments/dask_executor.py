@@ -272,14 +272,15 @@ class _Run:
                 await _close(client)
 
     def _make_probes(self) -> None:
-        """Choose one trial of each agent and see what it gives here: agent, trial, outcome."""
-        agents: set[str] = set()
+        """Choose one trial of each agent and kind, with what it gives here."""
+        probed: set[tuple[str, type]] = set()
         for planned in self.planned:
-            if planned.key.agent not in agents:
+            agent, kind = planned.key.agent, type(planned.config)
+            if (agent, kind) not in probed:
                 # A trial that raises here fails later, as everywhere.
                 with suppress(Exception):
-                    self.probes.append((planned.key.agent, pickle.dumps(planned), probe(planned)))
-                    agents.add(planned.key.agent)
+                    self.probes.append((agent, pickle.dumps(planned), probe(planned)))
+                    probed.add((agent, kind))
 
     async def _connect(self) -> Client:
         noted = False

@@ -15,7 +15,6 @@ from sdnn.experiments.config import PlannedTrial
 from sdnn.experiments.errors import ExperimentError
 from sdnn.experiments.executor import run_to_end
 from sdnn.experiments.records import TrialRecord, TrialRows
-from sdnn.experiments.trial import PythonTrial
 
 PROBE_EPISODES = 10
 """Learning episodes of a probe: few, but every part of agent and task takes part."""
@@ -36,7 +35,7 @@ def probe(planned: PlannedTrial) -> str:
         Whatever the trial raises; an agent that is not registered is a ValueError.
     """
     trial = planned.config.make_trial(planned.key.seed)
-    if isinstance(trial, PythonTrial):
+    if not planned.config.is_compiled:
         return planned.config.canonical_json()
     trial.advance(PROBE_EPISODES)
     rows = TrialRows.from_arrays(trial.test_rows())

@@ -21,3 +21,7 @@ class ClusterError(ExperimentError):
 
 class WorkerLostError(ExperimentError):
     """A trial was given up because worker after worker was lost while running it."""
+
+
+class StudyError(ExperimentError):
+    """A study file says something that cannot be run."""

@@ -15,8 +15,22 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
 MeasureName = Literal[
-    "episodes_to_learn", "early_steps", "episode_of_collapse", "final_steps", "final_share_solved"
+    "episodes_to_learn",
+    "early_steps",
+    "episode_of_collapse",
+    "final_steps",
+    "final_share_solved",
+    "final_return",
+    "mean_return",
 ]
+
+STEP_MEASURES: tuple[MeasureName, ...] = (
+    "episodes_to_learn", "early_steps", "episode_of_collapse", "final_steps", "final_share_solved"
+)  # fmt: skip
+"""Of tasks that are to be solved in few steps, as the acrobot's."""
+
+RETURN_MEASURES: tuple[MeasureName, ...] = ("final_return", "mean_return")
+"""Of any task."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,3 +205,40 @@ def final_share_solved(solved: ArrayLike, config: MeasureConfig = DEFAULT_MEASUR
     0.75
     """
     return float(np.mean(np.asarray(solved, np.float64)[-config.final_window :]))
+
+
+FINAL_PART = 10
+"""The last return is measured over one in so many of the tests, the last ones."""
+
+
+def final_return(episode_return: ArrayLike) -> float:
+    """Mean return of the last tenth of the test episodes, at least of one.
+
+    Parameters
+    ----------
+    episode_return : (n_tests,)
+        Sum of rewards of each test episode.
+
+    Examples
+    --------
+    >>> final_return(18 * [-20.0] + [8.0, 9.0])
+    8.5
+    """
+    returns = np.asarray(episode_return, np.float64)
+    return float(np.mean(returns[-max(1, returns.size // FINAL_PART) :]))
+
+
+def mean_return(episode_return: ArrayLike) -> float:
+    """Mean return of all test episodes: the area under the learning curve, per episode.
+
+    Parameters
+    ----------
+    episode_return : (n_tests,)
+        Sum of rewards of each test episode.
+
+    Examples
+    --------
+    >>> mean_return([-20.0, 8.0])
+    -6.0
+    """
+    return float(np.mean(np.asarray(episode_return, np.float64)))

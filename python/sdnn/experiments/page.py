@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
+from typing import Any
 
 from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS
 from sdnn.experiments.errors import PlotUnavailableError
@@ -28,11 +29,12 @@ from sdnn.experiments.report import (
     cost_header,
     cost_rows,
 )
+from sdnn.experiments.results import CaseResult
 from sdnn.experiments.verdicts import Verdict
 
 _TEMPLATE = "report.html.jinja"
 
-_KINDS = {
+VERDICT_KINDS = {
     Verdict.HOLDS: "good",
     Verdict.FAILS: "bad",
     Verdict.UNDECIDED: "open",
@@ -68,13 +70,13 @@ class Call:
 
     def describe(self) -> str:
         """Say how long it took."""
-        of_trials = f"Processor time of the trials shown: {_duration(self.processor_seconds)}."
+        of_trials = f"Processor time of the trials shown: {duration_words(self.processor_seconds)}."
         if self.n_run < self.n_planned:
             return (
                 f"{of_trials} {self.n_planned - self.n_run} of {self.n_planned} trials were stored"
                 " before the call that made this page."
             )
-        return f"Everything asked for was run in {_duration(self.seconds)}. {of_trials}"
+        return f"Everything asked for was run in {duration_words(self.seconds)}. {of_trials}"
 
 
 def require_jinja() -> None:
@@ -108,37 +110,28 @@ def to_html(report: Report, pictures: Mapping[str, bytes], call: Call) -> str:
     PlotUnavailableError
         If Jinja is not installed.
     """
-    require_jinja()
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("sdnn.experiments", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     summaries = [summary for one in report.experiments for summary in one.summaries]
-    verdicts = {verdict.value: kind for verdict, kind in _KINDS.items()}
-    return environment.get_template(_TEMPLATE).render(
+    verdicts = {verdict.value: kind for verdict, kind in VERDICT_KINDS.items()}
+    return render(
+        _TEMPLATE,
         report=report,
         call=call,
         warning=QUICK_WARNING,
         is_paper_scale=all(summary.result.is_paper_scale for summary in summaries),
         paper_scale=f"{PAPER_TRIALS} trials x {PAPER_EPISODES:,} episodes",
         n_claims={
-            kind: sum(_KINDS[outcome.verdict] == kind for outcome in report.claims)
+            kind: sum(VERDICT_KINDS[outcome.verdict] == kind for outcome in report.claims)
             for kind in ("good", "bad", "open", "none")
         },
         sections=[
             {
                 "title": one.experiment.title,
-                "picture": _data_url(pictures[f"experiment-{one.experiment.id}"]),
+                "picture": data_url(pictures[f"experiment-{one.experiment.id}"]),
                 "rows": case_rows(one.summaries),
             }
             for one in report.experiments
         ],
-        cost_picture=_data_url(pictures["cost"]) if report.costs else None,
+        cost_picture=data_url(pictures["cost"]) if report.costs else None,
         cost_header=cost_header(),
         cost_rows=cost_rows(report.costs),
         case_header=CASE_HEADER,
@@ -150,53 +143,116 @@ def to_html(report: Report, pictures: Mapping[str, bytes], call: Call) -> str:
         rule_note=RULE_NOTE,
         cost_note=COST_NOTE,
         settings=[
-            {
-                "title": f"{agent_entry(summary.result.agent).title}, {summary.result.case.title}",
-                "hash": summary.result.config_hash,
-                "seeds": [record.key.seed for record in summary.result.records],
-                "versions": sorted({record.version for record in summary.result.records}),
-                "config": json.dumps(json.loads(summary.result.records[0].config), indent=2),
-            }
-            for summary in summaries
+            settings_of(f"{agent_entry(s.result.agent).title}, {s.result.case.title}", s.result)
+            for s in summaries
         ],
     )
 
 
 def to_markdown(report: Report) -> str:
     """Write the tables as Markdown."""
+    head = [f"**{QUICK_WARNING}**"] if report.quick else []
+    if note := report.agents_note():
+        head.append(note)
+    return markdown_page(
+        "The paper's experiments",
+        head,
+        report.tables(),
+        report.notes(),
+        f"Root seed {report.seed}; digest of the rows {report.digest[:16]}; sdnn {report.version}.",
+    )
+
+
+def markdown_page(
+    title: str,
+    head: Sequence[str],
+    tables: Iterable[tuple[str, Sequence[str], Sequence[Sequence[str]]]],
+    notes: Iterable[str],
+    end: str,
+) -> str:
+    """Write a page of tables as Markdown.
+
+    Parameters
+    ----------
+    title
+        Its title.
+    head
+        Paragraphs before the tables.
+    tables
+        Title, header and rows of each.
+    notes
+        A list below them.
+    end
+        The last line.
+    """
 
     def line(cells: Sequence[str]) -> str:
         return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
-    lines = ["# The paper's experiments", ""]
-    if report.quick:
-        lines += [f"**{QUICK_WARNING}**", ""]
-    if note := report.agents_note():
-        lines += [note, ""]
-    for title, header, rows in report.tables():
-        lines += [f"## {title}", "", line(header), "|" + "---|" * len(header)]
+    lines = [f"# {title}", ""]
+    for text in head:
+        lines += [text, ""]
+    for table, header, rows in tables:
+        lines += [f"## {table}", "", line(header), "|" + "---|" * len(header)]
         lines += [*map(line, rows), ""]
-    lines += [f"- {text}" for text in report.notes()]
-    lines += [
-        "",
-        f"Root seed {report.seed}; digest of the rows {report.digest[:16]}; sdnn {report.version}.",
-        "",
-    ]
-    return "\n".join(lines)
+    lines += [f"- {text}" for text in notes]
+    return "\n".join([*lines, "", end, ""])
 
 
-def _data_url(svg: bytes) -> str:
+def render(template: str, **values: Any) -> str:
+    """Fill a template of this package.
+
+    Parameters
+    ----------
+    template
+        Its path from here.
+    values
+        What it speaks of.
+
+    Raises
+    ------
+    PlotUnavailableError
+        If Jinja is not installed.
+    """
+    require_jinja()
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("sdnn.experiments", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(template).render(**values)
+
+
+def settings_of(title: str, result: CaseResult) -> dict[str, Any]:
+    """Say for a page what fixes the rows of a result."""
+    return {
+        "title": title,
+        "hash": result.config_hash,
+        "seeds": [record.key.seed for record in result.records],
+        "versions": sorted({record.version for record in result.records}),
+        "config": json.dumps(json.loads(result.records[0].config), indent=2),
+    }
+
+
+def data_url(svg: bytes) -> str:
     """Put a picture into the page: its names then cannot clash with those of another."""
     return "data:image/svg+xml;base64," + base64.b64encode(svg).decode()
 
 
-def _duration(seconds: float) -> str:
+def duration_words(seconds: float) -> str:
     """Write a time for a reader.
 
     Examples
     --------
-    >>> _duration(61.4)
-    '1 min 1 s'
+    >>> duration_words(61.4), duration_words(3661.4)
+    ('1 min 1 s', '1 h 1 min')
     """
+    if seconds >= 3600:
+        hours, minutes = divmod(round(seconds / 60), 60)
+        return f"{hours} h {minutes} min"
     minutes, rest = divmod(round(seconds), 60)
     return f"{minutes} min {rest} s" if minutes else f"{rest} s"

@@ -117,6 +117,28 @@ class TrialRecord:
     rows: TrialRows
 
 
+@dataclass(frozen=True, kw_only=True)
+class TrialTime:
+    """How long a finished trial took.
+
+    Parameters
+    ----------
+    key
+        Which trial it is.
+    seconds
+        Its processor time.
+    n_episodes
+        Learning episodes before its last test.
+    n_decisions
+        Decisions in learning and test episodes.
+    """
+
+    key: TrialKey
+    seconds: float
+    n_episodes: int
+    n_decisions: int
+
+
 def records_digest(records: Iterable[TrialRecord]) -> str:
     """SHA-256 of the results of trials, to compare runs.
 

@@ -26,6 +26,7 @@ from sdnn.agents import (
     SDNNQLearning,
 )
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.experiments.cases import PRESET_AGENTS
 from sdnn.experiments.trial import LearningAgent, Trial
 
 _BYTES_OF_FLOAT, _BYTES_OF_DOUBLE = 4, 8
@@ -261,16 +262,16 @@ register(
         ),
     )
 )
-for _name, _preset in PRESETS.items():
-    if _name != "paper":
+for _name, _id in PRESET_AGENTS.items():
+    if _id not in AGENTS:
         register(
             AgentEntry(
-                id=f"sdnn-c-{_name}",
+                id=_id,
                 title=f"SDNN-C, {_name}",
                 approximator=SDNNCConfig,
                 learning=QLearningConfig,
                 agent=SDNNQLearning,
                 core_trial=_core.AcrobotTrial,
-                preset=_preset,
+                preset=PRESETS[_name],
             )
         )

@@ -83,6 +83,9 @@ class ReproduceRequest:
         Whether this is a look at a fraction; its files are named and marked so.
     agents
         Ids of the agents to run in every case instead of the case's own; files are named so.
+    presets
+        Names of settings under which SDNN-C runs beside the agents of every case; files are named
+        so.
     """
 
     experiments: tuple[Experiment, ...]
@@ -95,9 +98,11 @@ class ReproduceRequest:
     executor: Executor | None = None
     quick: bool = False
     agents: tuple[str, ...] = ()
+    presets: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "agents", tuple(dict.fromkeys(self.agents)))
+        object.__setattr__(self, "presets", tuple(dict.fromkeys(self.presets)))
 
     @cached_property
     def protocol(self) -> ProtocolConfig:
@@ -129,7 +134,10 @@ class ReproduceRequest:
         """
         n_trials = self.n_trials or (QUICK_TRIALS if self.quick else PAPER_TRIALS)
         by_id = {experiment.id: experiment for experiment in (*EXPERIMENTS, *self.experiments)}
-        known = [experiment.with_agents(self.agents) for experiment in by_id.values()]
+        known = [
+            experiment.with_agents(self.agents).with_presets(self.presets)
+            for experiment in by_id.values()
+        ]
         cases = [case for experiment in known for case in experiment.cases]
         planned = plan_trials(cases, n_trials, self.seed, self.protocol)
         asked = {experiment.id for experiment in self.experiments}
@@ -157,7 +165,8 @@ class ReproduceRequest:
     def file_name(self, name: str) -> str:
         """Name of a file of this request, such as ``table-rbfn-quick.json``."""
         stem, _, kind = name.rpartition(".")
-        return "-".join([stem, *self.agents, *(["quick"] if self.quick else [])]) + f".{kind}"
+        marks = [*self.agents, *self.presets, *(["quick"] if self.quick else [])]
+        return "-".join([stem, *marks]) + f".{kind}"
 
 
 @dataclass(frozen=True)

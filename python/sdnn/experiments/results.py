@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,8 +13,13 @@ from numpy.typing import NDArray
 
 from sdnn.experiments import measures, statistics
 from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, Case, Experiment
-from sdnn.experiments.measures import DEFAULT_MEASURES, MeasureConfig, MeasureName
-from sdnn.experiments.records import TrialRecord
+from sdnn.experiments.measures import (
+    DEFAULT_MEASURES,
+    STEP_MEASURES,
+    MeasureConfig,
+    MeasureName,
+)
+from sdnn.experiments.records import TrialRecord, TrialRows
 from sdnn.experiments.statistics import Curve, Estimate, json_number
 
 
@@ -122,7 +127,8 @@ class CaseSummary:
 
     def uncensored(self, measure: MeasureName) -> NDArray[np.float64]:
         """Return a measure of each trial, (n_trials,), infinite ones as the last episode."""
-        return np.minimum(self.values[measure], self.result.last_episode)
+        values = self.values[measure]
+        return np.where(np.isposinf(values), self.result.last_episode, values)
 
     def to_json(self) -> dict[str, Any]:
         """Return it as values that JSON can hold."""
@@ -174,33 +180,46 @@ def collect(experiment: Experiment, records: Iterable[TrialRecord]) -> tuple[Cas
     )
 
 
-def summarize(result: CaseResult, config: MeasureConfig = DEFAULT_MEASURES) -> CaseSummary:
-    """Measure every trial of a result, then take medians over trials."""
-    episode = result.episode
+def summarize(
+    result: CaseResult,
+    config: MeasureConfig = DEFAULT_MEASURES,
+    names: Iterable[MeasureName] = STEP_MEASURES,
+) -> CaseSummary:
+    """Measure every trial of a result, then take medians over trials.
+
+    Parameters
+    ----------
+    result
+        The trials.
+    config
+        Constants of the measures.
+    names
+        Which measures.
+    """
     values: dict[MeasureName, NDArray[np.float64]] = {
-        "episodes_to_learn": _of_all(
-            measures.episodes_to_learn(episode, steps, config) for steps in result.steps
-        ),
-        "early_steps": _of_all(
-            measures.early_steps(episode, steps, config) for steps in result.steps
-        ),
-        "episode_of_collapse": _of_all(
-            measures.episode_of_collapse(episode, steps, config) for steps in result.steps
-        ),
-        "final_steps": _of_all(measures.final_steps(steps, config) for steps in result.steps),
-        "final_share_solved": _of_all(
-            measures.final_share_solved(record.rows.solved, config) for record in result.records
-        ),
+        name: np.array([_MEASURE[name](record.rows, config) for record in result.records])
+        for name in names
     }
     return CaseSummary(
         result=result,
         values=values,
         medians={name: statistics.estimate_median(v) for name, v in values.items()},
         median_curve_episodes_to_learn=measures.episodes_to_learn(
-            episode, result.curve.median, config
+            result.episode, result.curve.median, config
         ),
     )
 
 
-def _of_all(values: Iterable[float]) -> NDArray[np.float64]:
-    return np.fromiter(values, np.float64)
+_MEASURE: dict[MeasureName, Callable[[TrialRows, MeasureConfig], float]] = {
+    "episodes_to_learn": lambda rows, config: measures.episodes_to_learn(
+        rows.episode, rows.steps, config
+    ),
+    "early_steps": lambda rows, config: measures.early_steps(rows.episode, rows.steps, config),
+    "episode_of_collapse": lambda rows, config: measures.episode_of_collapse(
+        rows.episode, rows.steps, config
+    ),
+    "final_steps": lambda rows, config: measures.final_steps(rows.steps, config),
+    "final_share_solved": lambda rows, config: measures.final_share_solved(rows.solved, config),
+    "final_return": lambda rows, _config: measures.final_return(rows.episode_return),
+    "mean_return": lambda rows, _config: measures.mean_return(rows.episode_return),
+}

@@ -165,6 +165,36 @@ def estimate_median(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTR
     return _with_interval(value, _median(_resampled(sample, generator, config)), config)
 
 
+def estimate_mean(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTRAP) -> Estimate:
+    """Return the mean over trials with its percentile bootstrap interval; as `estimate_median`.
+
+    Parameters
+    ----------
+    values : (n_trials,)
+        One value per trial, none of them infinite; NaN gives NaN.
+    config
+        Constants.
+
+    Raises
+    ------
+    ValueError
+        If there are no values, or an infinite one.
+
+    Examples
+    --------
+    >>> estimate_mean([3.0, 3.0])
+    Estimate(value=3.0, lower=3.0, upper=3.0)
+    """
+    sample = _sample(values)
+    if np.isinf(sample).any():
+        raise ValueError("averaged values must not be infinite; cap censored ones first")
+    value = float(np.mean(sample))
+    if sample.size == 1:
+        return Estimate(value, math.nan, math.nan)
+    generator = np.random.default_rng(config.seed)
+    return _with_interval(value, np.mean(_resampled(sample, generator, config), axis=-1), config)
+
+
 def estimate_contrast(
     values: ArrayLike,
     others: ArrayLike,

@@ -23,6 +23,7 @@ from sdnn.experiments.records import (
     TrialKey,
     TrialRecord,
     TrialRows,
+    TrialTime,
 )
 
 STORE_NAME = "results.sqlite"
@@ -177,6 +178,24 @@ class ResultStore:
                     "SELECT case_id, agent, trial, seed, config_hash FROM trials"
                 )
             }
+
+    def times(self) -> tuple[TrialTime, ...]:
+        """Return how long the stored trials took, without reading their rows."""
+        with _as_store_error(self.path):
+            found = self._connection.execute(
+                "SELECT case_id, agent, trial, seed, config_hash, seconds, n_decisions,"
+                " (SELECT max(episode) FROM rows WHERE trial_id = trials.id)"
+                " FROM trials ORDER BY id"
+            ).fetchall()
+        return tuple(
+            TrialTime(
+                key=TrialKey(*row[:5]),
+                seconds=row[5],
+                n_episodes=row[7] or 0,
+                n_decisions=row[6],
+            )
+            for row in found
+        )
 
     def load(self, keys: Iterable[TrialKey] | None = None) -> tuple[TrialRecord, ...]:
         """Return the stored trials of the given keys (default: all), sorted by key.

@@ -1,4 +1,4 @@
-"""One trial: what the engine asks of it, and the trial of an agent that is written in Python.
+"""One trial: what the engine asks of it, its loop over Gymnasium environments, and the acrobot's.
 
 The trials of the core's agents are computed in C++ (``_core.AcrobotTrial`` and its siblings), by
 the same protocol, bit for bit.
@@ -90,61 +90,33 @@ class LearningAgent(Protocol):
         """Learn one step."""
 
 
-class PythonTrial:
-    """The protocol of the core's `AcrobotTrial` for an agent in Python, on Gymnasium environments.
+class EpisodeLoop:
+    """A trial over Gymnasium environments: learning episodes, and test episodes between them.
 
-    For the same agent and seed it gives the rows of the compiled trial, bit for bit. It holds the
-    GIL, so trials of this kind do not run faster on several threads.
+    It holds the GIL, so trials of this kind do not run faster on several threads.
 
     Parameters
     ----------
-    make_agent
-        Makes the agent from an observation space, an action space and ``approximator=``,
-        ``learning=``, ``seed=``.
-    approximator, learning
-        The agent's settings. ``approximator.n_inputs`` must be the number of sensors.
-    acrobot, goal, sensors, protocol
-        The task's settings.
-    seed
-        The same seed gives every agent the same sensor noise, observation by observation.
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its range, or agent and sensors do not fit.
+    agent
+        Acts in both environments and learns in the first.
+    env, test_env
+        The task of the learning and of the test episodes; with own random streams, so that tests
+        change nothing that is learned later.
+    protocol
+        Learning and test episodes.
     """
 
     def __init__(
         self,
-        make_agent: Callable[..., LearningAgent],
-        *,
-        approximator: Any,
-        learning: Any,
-        acrobot: AcrobotConfig,
-        goal: GoalScheduleConfig,
-        sensors: SensorConfig,
+        agent: LearningAgent,
+        env: gym.Env[NDArray[np.float64], Any],
+        test_env: gym.Env[NDArray[np.float64], Any],
         protocol: ProtocolConfig,
-        seed: int,
     ) -> None:
-        for name in ("n_learning_episodes", "test_interval"):
-            if getattr(protocol, name) < 1:
-                raise ValueError(f"{name} must be at least 1, got {getattr(protocol, name)}")
-        if approximator.n_inputs != sensors.n_inputs:
-            raise ValueError(
-                f"n_inputs must be the number of inputs of the sensors, {sensors.n_inputs},"
-                f" got {approximator.n_inputs}"
-            )
+        self._agent = agent
+        self._env = env
+        self._test_env = test_env
         self._protocol = protocol
-        self._env = _environment(acrobot, goal, sensors, seed, "sensor_noise")
-        tested = sensors if protocol.noisy_tests else replace(sensors, noise=0.0)
-        self._test_env = _environment(acrobot, goal, tested, seed, "evaluation_sensor_noise")
-        self._agent = make_agent(
-            self._env.observation_space,
-            self._env.action_space,
-            approximator=approximator,
-            learning=learning,
-            seed=seed,
-        )
         self._rows: list[tuple[int, int, float, bool]] = []
         self._episode = 0
         self._n_decisions = 0
@@ -180,6 +152,9 @@ class PythonTrial:
             self._run_episode(self._env, learning=True)
             if self._episode % self._protocol.test_interval == 0:
                 self._rows.append(self._run_episode(self._test_env, learning=False))
+        if self.finished:
+            self._env.close()
+            self._test_env.close()
 
     def test_rows(self) -> dict[str, NDArray[Any]]:
         """Test episodes so far: arrays `episode`, `steps`, `episode_return`, `solved`, (n,)."""
@@ -194,10 +169,14 @@ class PythonTrial:
             for column, (name, kind) in enumerate(types.items())
         }
 
+    def _reset(self, env: gym.Env[NDArray[np.float64], Any]) -> NDArray[np.float64]:
+        """Begin an episode of an environment."""
+        return env.reset()[0]
+
     def _run_episode(
         self, env: gym.Env[NDArray[np.float64], Any], *, learning: bool
     ) -> tuple[int, int, float, bool]:
-        observation, _ = env.reset(options={"episode": self._episode})
+        observation = self._reset(env)
         self._agent.begin_episode()
         steps, episode_return = 0, 0.0
         terminated = truncated = False
@@ -212,6 +191,76 @@ class PythonTrial:
             episode_return += float(reward)
         self._n_decisions += steps
         return self._episode, steps, episode_return, terminated
+
+
+class PythonTrial(EpisodeLoop):
+    """The protocol of the core's `AcrobotTrial` for an agent in Python, on Gymnasium environments.
+
+    For the same agent and seed it gives the rows of the compiled trial, bit for bit.
+
+    Parameters
+    ----------
+    make_agent
+        Makes the agent from an observation space, an action space and ``approximator=``,
+        ``learning=``, ``seed=``.
+    approximator, learning
+        The agent's settings. ``approximator.n_inputs`` must be the number of sensors.
+    acrobot, goal, sensors, protocol
+        The task's settings.
+    seed
+        The same seed gives every agent the same sensor noise, observation by observation.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range, or agent and sensors do not fit.
+    """
+
+    def __init__(
+        self,
+        make_agent: Callable[..., LearningAgent],
+        *,
+        approximator: Any,
+        learning: Any,
+        acrobot: AcrobotConfig,
+        goal: GoalScheduleConfig,
+        sensors: SensorConfig,
+        protocol: ProtocolConfig,
+        seed: int,
+    ) -> None:
+        check_protocol(protocol)
+        if approximator.n_inputs != sensors.n_inputs:
+            raise ValueError(
+                f"n_inputs must be the number of inputs of the sensors, {sensors.n_inputs},"
+                f" got {approximator.n_inputs}"
+            )
+        tested = sensors if protocol.noisy_tests else replace(sensors, noise=0.0)
+        env = _environment(acrobot, goal, sensors, seed, "sensor_noise")
+        test_env = _environment(acrobot, goal, tested, seed, "evaluation_sensor_noise")
+        agent = make_agent(
+            env.observation_space,
+            env.action_space,
+            approximator=approximator,
+            learning=learning,
+            seed=seed,
+        )
+        super().__init__(agent, env, test_env, protocol)
+
+    def _reset(self, env: gym.Env[NDArray[np.float64], Any]) -> NDArray[np.float64]:
+        return env.reset(options={"episode": self._episode})[0]
+
+
+def check_protocol(protocol: ProtocolConfig) -> None:
+    """Check what the core checks of a trial in C++.
+
+    Raises
+    ------
+    ValueError
+        If a number of the protocol is less than 1.
+    """
+    for name in ("n_learning_episodes", "test_interval"):
+        if getattr(protocol, name) < 1:
+            raise ValueError(f"{name} must be at least 1, got {getattr(protocol, name)}")
 
 
 def _environment(

@@ -1,6 +1,15 @@
+import gzip
+
 import pytest
 
-from sdnn.whole_files import PARTIAL_SUFFIX, csv_bytes, remove_partial_files, write_whole
+from sdnn.whole_files import (
+    PARTIAL_SUFFIX,
+    csv_bytes,
+    csv_pieces,
+    gzip_pieces,
+    remove_partial_files,
+    write_whole,
+)
 
 
 def test_a_file_is_written_as_a_whole(tmp_path):
@@ -30,3 +39,25 @@ def test_what_a_kill_left_is_removed_and_nothing_else(tmp_path):
 
 def test_csv_quotes_what_needs_it():
     assert csv_bytes(("a", "b"), [(1, "x, y"), (2.5, "µ")]) == 'a,b\n1,"x, y"\n2.5,µ\n'.encode()
+
+
+def test_large_tables_are_written_in_pieces(tmp_path):
+    rows = [(number, "x" * 100) for number in range(30_000)]
+    pieces = list(csv_pieces(("a", "b"), rows))
+    assert len(pieces) > 2
+    assert b"".join(pieces) == csv_bytes(("a", "b"), rows)
+    assert len(list(csv_pieces(("a",), []))) == 1
+    path = tmp_path / "rows.csv.gz"
+    write_whole(path, gzip_pieces(pieces))
+    assert gzip.decompress(path.read_bytes()) == b"".join(pieces)
+    assert b"".join(gzip_pieces(pieces)) == path.read_bytes()
+
+
+def test_pieces_that_fail_leave_no_file(tmp_path):
+    def pieces():
+        yield b"one"
+        raise ValueError("no second piece")
+
+    with pytest.raises(ValueError, match="second"):
+        write_whole(tmp_path / "rows.csv", pieces())
+    assert list(tmp_path.iterdir()) == []

@@ -4,7 +4,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from sdnn.agents import FuzzyQLearningConfig
+from sdnn.agents import PRESETS, FuzzyQLearningConfig
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig
 from sdnn.environments import SensorConfig
 from sdnn.experiments import (
@@ -17,6 +17,7 @@ from sdnn.experiments import (
     select_experiments,
     trial_seed,
 )
+from sdnn.experiments.cases import PRESET_AGENTS
 
 
 def test_experiment_a_is_the_one_of_the_paper():
@@ -70,6 +71,22 @@ def test_rows_that_share_an_id_observe_the_same():
 def test_unknown_experiment_is_named():
     with pytest.raises(ValueError, match="got 'z'"):
         select_experiments("z")
+
+
+def test_every_preset_has_an_agent_of_its_settings():
+    assert PRESET_AGENTS.keys() == PRESETS.keys()
+    for name, agent in PRESET_AGENTS.items():
+        entry = AGENTS[agent]
+        settings = PRESETS[name]
+        assert entry.learning_settings() == settings.learning
+        assert entry.approximator_settings(6) == replace(settings.approximator, n_inputs=6)
+
+
+def test_presets_run_beside_the_agents_of_a_case():
+    experiment = EXPERIMENTS[0]
+    both = experiment.with_presets(["robust", "paper", "robust"])
+    assert [case.agents for case in both.cases] == 2 * [("sdnn-c", "sdnn-c-robust")]
+    assert experiment.with_presets([]) == experiment
 
 
 def test_protocol_defaults_are_the_papers_and_the_cores():

@@ -13,11 +13,14 @@ import pytest
 from click.testing import CliRunner
 
 import sdnn
+from sdnn.approximators import SDNNCConfig
 from sdnn.cli import main
 from sdnn.experiments import (
     AGENTS,
     ClusterError,
     DaskExecutor,
+    EnvironmentConfig,
+    EnvironmentTrialConfig,
     Observer,
     PlannedTrial,
     ProtocolConfig,
@@ -176,6 +179,47 @@ def test_the_command_prints_the_same_table(pair, tmp_path, monkeypatch):
     assert there.exit_code == 0
     assert there.stderr == ""
     assert json.loads(there.stdout)["digest"] == json.loads(here.stdout)["digest"]
+
+
+STUDY = """
+[study]
+title = "Ties"
+trials = 2
+cases = ["s4"]
+
+[base]
+protocol.n_learning_episodes = 10
+
+[axes]
+learning.tie_rule = ["lowest", "middle"]
+"""
+
+
+def test_a_sweep_runs_there_too(pair, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("study.toml").write_text(STUDY)
+
+    def invoke(*options):
+        arguments = ["sweep", "study.toml", "--json", *options]
+        return CliRunner().invoke(main, arguments, catch_exceptions=False)
+
+    there = ("--executor", "dask", "--scheduler", str(pair.file))
+    found = json.loads(invoke("--out", "there", *there).stdout)
+    assert found["digest"] == json.loads(invoke("--out", "here").stdout)["digest"]
+    assert json.loads(invoke("--dry-run", *there).stdout)["jobs"] == 1
+
+
+def test_a_gymnasium_environment_runs_there_too(pair, tmp_path):
+    config = EnvironmentTrialConfig(
+        environment=EnvironmentConfig(id="Pendulum-v1", kwargs={"max_episode_steps": 20}),
+        approximator=SDNNCConfig(n_inputs=3),
+        protocol=ProtocolConfig(n_learning_episodes=2, test_interval=1),
+    )
+    plan = [
+        PlannedTrial(TrialKey("pendulum", "sdnn-c", trial, trial, config.config_hash), config)
+        for trial in range(2)
+    ]
+    assert run(tmp_path / "there", plan, pair)[1] == run(tmp_path / "here", plan)[1]
 
 
 def test_a_trial_that_raises_is_reported_and_the_others_are_done(pair, tmp_path):

@@ -8,8 +8,10 @@ from sdnn.experiments.measures import (
     early_steps,
     episode_of_collapse,
     episodes_to_learn,
+    final_return,
     final_share_solved,
     final_steps,
+    mean_return,
 )
 
 
@@ -100,3 +102,11 @@ def test_measures_take_trials_of_any_length(n_tests):
     assert episodes_to_learn(episodes(steps), steps) > 0
     assert 1 <= final_steps(steps) <= 50
     assert 0 <= final_share_solved(steps < 50) <= 1
+
+
+def test_returns_are_averaged_over_all_tests_or_the_last_tenth():
+    returns = np.arange(40.0)
+    assert mean_return(returns) == 19.5
+    assert final_return(returns) == 37.5  # 36 to 39
+    assert final_return(returns[:19]) == 18.0
+    assert final_return([-3.0]) == mean_return([-3.0]) == -3.0

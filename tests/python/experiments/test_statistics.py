@@ -7,6 +7,7 @@ from sdnn.experiments.statistics import (
     BootstrapConfig,
     Estimate,
     estimate_contrast,
+    estimate_mean,
     estimate_median,
     learning_curve,
     running_median,
@@ -89,3 +90,28 @@ def test_contrast_wants_values_that_are_not_infinite():
         estimate_contrast([1.0, math.inf], [2.0, 3.0])
     with pytest.raises(ValueError, match=r"shape \(0,\)"):
         estimate_contrast([1.0], [])
+
+
+def test_bootstrap_of_the_mean_of_two_values_is_exact():
+    # Resamples of {0, 1}: means 0, 1/2, 1 with probabilities 1/4, 1/2, 1/4.
+    assert estimate_mean([0.0, 1.0]) == Estimate(0.5, 0.0, 1.0)
+    assert estimate_mean([0.0, 1.0], BootstrapConfig(confidence=0.4)) == Estimate(0.5, 0.5, 0.5)
+
+
+def test_bootstrap_of_the_mean_agrees_with_the_normal_interval():
+    values = np.random.default_rng(1).normal(3.0, 2.0, 400)
+    estimate = estimate_mean(values)
+    half = 1.96 * values.std() / np.sqrt(values.size)
+    np.testing.assert_allclose(
+        (estimate.lower, estimate.upper), (values.mean() - half, values.mean() + half), atol=0.02
+    )
+
+
+def test_means_refuse_what_has_none():
+    one = estimate_mean([2.0])
+    assert (one.value, math.isnan(one.lower), math.isnan(one.upper)) == (2.0, True, True)
+    with pytest.raises(ValueError, match="infinite"):
+        estimate_mean([1.0, math.inf])
+    with pytest.raises(ValueError, match="one per trial"):
+        estimate_mean([])
+    assert math.isnan(estimate_mean([1.0, math.nan]).value)

@@ -53,6 +53,18 @@ def test_stored_trial_comes_back_exactly(tmp_path):
         assert column.dtype == getattr(expected.rows, name).dtype
 
 
+def test_times_are_read_without_rows(tmp_path):
+    with ResultStore(tmp_path) as store:
+        assert store.times() == ()
+        store.add(make_record(0))
+        store.add(make_record(1, steps=(), seconds=2.0))
+        times = store.times()
+    assert [(t.key.trial, t.seconds, t.n_decisions, t.n_episodes) for t in times] == [
+        (0, 0.5, 57, 20), (1, 2.0, 57, 0),
+    ]  # fmt: skip
+    assert times[0].key == make_record(0).key
+
+
 def test_every_row_reaches_its_labels(tmp_path):
     path, _ = filled(tmp_path, 2)
     with sqlite3.connect(path) as connection:

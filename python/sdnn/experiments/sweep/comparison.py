@@ -1,0 +1,228 @@
+"""What the trials of a study say: measures of each variant, differences, verdicts about claims."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.experiments.cases import Case
+from sdnn.experiments.claims import SHARE_STABLE, Claim
+from sdnn.experiments.config import TrialConfig
+from sdnn.experiments.environment_trial import EnvironmentTrialConfig
+from sdnn.experiments.measures import RETURN_MEASURES, STEP_MEASURES, MeasureName
+from sdnn.experiments.records import TrialKey, TrialRecord
+from sdnn.experiments.results import CaseResult, CaseSummary, summarize
+from sdnn.experiments.statistics import Estimate, estimate_mean
+from sdnn.experiments.sweep.study import PAPER_CASES, Combination, Study, StudyCase, StudyVariant
+from sdnn.experiments.verdicts import ClaimOutcome, Verdict, judge_claims
+
+MIN_TRIALS_TO_DIFFER = 6
+"""Fewer paired trials are all on one side by chance more often than once in twenty times."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A variant in a case, measured.
+
+    Parameters
+    ----------
+    combination
+        Which.
+    summary
+        Its measures over trials.
+    differences
+        Mean over trials of what a measure is more than in the reference's trial of the same number,
+        censored values as the last episode; empty for the reference itself and without it.
+    """
+
+    combination: Combination
+    summary: CaseSummary
+    differences: Mapping[MeasureName, Estimate]
+
+    @property
+    def measures(self) -> tuple[MeasureName, ...]:
+        """What is measured in a task of this kind."""
+        return tuple(self.summary.values)
+
+    def differs(self, measure: MeasureName) -> bool:
+        """Whether a measure differs from the reference's by more than chance.
+
+        That is where the interval of the difference leaves 0 out, over at least
+        `MIN_TRIALS_TO_DIFFER` trials.
+        """
+        difference = self.differences.get(measure)
+        if difference is None or self.summary.result.n_trials < MIN_TRIALS_TO_DIFFER:
+            return False
+        return difference.lower > 0 or difference.upper < 0
+
+    @property
+    def solved_at_end(self) -> NDArray[np.bool_] | None:
+        """Which trials end solved, (n_trials,); None where tasks are judged by their return."""
+        shares = self.summary.values.get("final_share_solved")
+        return None if shares is None else shares >= SHARE_STABLE
+
+
+@dataclass(frozen=True)
+class VariantClaim:
+    """A claim of the paper about a variant.
+
+    Parameters
+    ----------
+    outcome
+        The verdict and the quantities behind it.
+    moved
+        Whether the verdict about the reference is another one; None where there is none.
+    """
+
+    outcome: ClaimOutcome
+    moved: bool | None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Everything that is complete of a study.
+
+    Parameters
+    ----------
+    study
+        The study.
+    measured
+        By ids of case and variant, those of which every trial is there.
+    """
+
+    study: Study
+    measured: Mapping[tuple[str, str], Measured]
+
+    @property
+    def cases(self) -> tuple[StudyCase, ...]:
+        """Cases of which something is there."""
+        shown = {case for case, _ in self.measured}
+        return tuple(case for case in self.study.cases if case.id in shown)
+
+    @property
+    def variants(self) -> tuple[StudyVariant, ...]:
+        """Variants of which something is there."""
+        shown = {variant for _, variant in self.measured}
+        return tuple(variant for variant in self.study.variants if variant.id in shown)
+
+    def of_case(self, case_id: str) -> tuple[Measured, ...]:
+        """List what is measured in a case, in the order of the variants."""
+        return tuple(
+            self.measured[case_id, variant.id]
+            for variant in self.study.variants
+            if (case_id, variant.id) in self.measured
+        )
+
+    @cached_property
+    def claims(self) -> Mapping[str, Mapping[int, VariantClaim]]:
+        """Claims of which every quantity is measured, by variant and number of the claim.
+
+        A case counts as the paper's by its id, an agent by its own: what a variant has changed is
+        what is judged.
+        """
+        outcomes = {v.id: self._outcomes(v.id) for v in self.variants}
+        reference = outcomes.get(self.study.reference, {})
+        return {
+            variant: {
+                number: VariantClaim(
+                    outcome,
+                    _moved(outcome, reference.get(number))
+                    if variant != self.study.reference
+                    else None,
+                )
+                for number, outcome in of_variant.items()
+            }
+            for variant, of_variant in outcomes.items()
+        }
+
+    @property
+    def claims_shown(self) -> tuple[Claim, ...]:
+        """The claims about any variant."""
+        found = {n: c.outcome.claim for of in self.claims.values() for n, c in of.items()}
+        return tuple(found[number] for number in sorted(found))
+
+    def _outcomes(self, variant_id: str) -> dict[int, ClaimOutcome]:
+        summaries = [
+            measured.summary
+            for (_, variant), measured in self.measured.items()
+            if variant == variant_id
+            and measured.combination.case.id in PAPER_CASES
+            and isinstance(measured.combination.config, TrialConfig)
+        ]
+        return {
+            outcome.claim.number: outcome
+            for outcome in judge_claims(summaries, ())
+            if outcome.verdict is not Verdict.NOT_RUN
+            and all(checked.estimate is not None for checked in outcome.checks)
+        }
+
+
+def _moved(outcome: ClaimOutcome, reference: ClaimOutcome | None) -> bool | None:
+    if reference is None or Verdict.NOT_JUDGED in (outcome.verdict, reference.verdict):
+        return None
+    return outcome.verdict is not reference.verdict
+
+
+def compare(study: Study, records: Iterable[TrialRecord]) -> Comparison:
+    """Measure every variant in every case of which all trials are there.
+
+    Parameters
+    ----------
+    study
+        What was to be run.
+    records
+        Its trials.
+    """
+    by_key = {record.key: record for record in records}
+    summaries = {
+        pair: _summary(combination, study.keys(*pair), by_key)
+        for pair, combination in study.combinations.items()
+        if by_key.keys() >= set(study.keys(*pair))
+    }
+    return Comparison(
+        study,
+        {
+            (case, variant): Measured(
+                study.combinations[case, variant],
+                summary,
+                {}
+                if variant == study.reference
+                else _differences(summary, summaries.get((case, study.reference))),
+            )
+            for (case, variant), summary in summaries.items()
+        },
+    )
+
+
+def _summary(
+    combination: Combination,
+    keys: Iterable[TrialKey],
+    records: Mapping[TrialKey, TrialRecord],
+) -> CaseSummary:
+    config = combination.config
+    if isinstance(config, EnvironmentTrialConfig):
+        n_sensors, noise = config.approximator.n_inputs, config.environment.noise
+        names = RETURN_MEASURES
+    else:
+        assert isinstance(config, TrialConfig)
+        n_sensors, noise, names = config.sensors.n_sensors, config.sensors.noise, STEP_MEASURES
+    case = Case(combination.case.id, combination.case.title, n_sensors, noise, (config.agent,), "")
+    result = CaseResult(case, config.agent, tuple(records[key] for key in keys))
+    return summarize(result, names=names)
+
+
+def _differences(
+    summary: CaseSummary, reference: CaseSummary | None
+) -> dict[MeasureName, Estimate]:
+    """Compare trial by trial: those of one number have the same seed."""
+    if reference is None:
+        return {}
+    return {
+        name: estimate_mean(summary.uncensored(name) - reference.uncensored(name))
+        for name in summary.values
+        if name in reference.values
+    }

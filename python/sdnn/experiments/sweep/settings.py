@@ -1,0 +1,355 @@
+"""Settings in a study file: where each stands, what it may be, and configurations made of them."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import sys
+import types
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal, TypeAlias, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from sdnn.experiments.errors import StudyError
+from sdnn.experiments.sweep.toml_lines import KeyPath, key_lines, line_of
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+Config = TypeVar("Config")
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A value of a study file.
+
+    Parameters
+    ----------
+    value
+        As TOML has it.
+    where
+        Its place in the file.
+    """
+
+    value: Any
+    where: KeyPath
+
+
+Settings: TypeAlias = dict[tuple[str, ...], Setting]
+"""Settings by their names: ``("learning", "discount")``."""
+
+
+@dataclass(frozen=True)
+class StudyFile:
+    """The text of a study, and errors about its places.
+
+    Parameters
+    ----------
+    path
+        Its file.
+    text
+        Its content.
+    content
+        The values in it.
+    """
+
+    path: Path
+    text: str
+    content: dict[str, Any]
+
+    @classmethod
+    def read(cls, path: Path) -> StudyFile:
+        """Read a file.
+
+        Raises
+        ------
+        StudyError
+            If it cannot be read or is no TOML.
+        """
+        try:
+            text = path.read_bytes().decode()
+            content = tomllib.loads(text)
+        except OSError as error:
+            raise StudyError(f"{path}: {error.strerror}") from error
+        except UnicodeDecodeError as error:
+            raise StudyError(f"{path}: must be UTF-8: {error}") from error
+        except tomllib.TOMLDecodeError as error:
+            line = re.search(r"at line (\d+)", str(error))
+            place = f"{path}:{line[1]}" if line else str(path)
+            raise StudyError(f"{place}: must be TOML: {error}") from error
+        return cls(path, text, content)
+
+    @cached_property
+    def _lines(self) -> dict[KeyPath, int]:
+        return key_lines(self.text)
+
+    def error(self, where: KeyPath, message: str) -> StudyError:
+        """Make the error that names file, line and key."""
+        line = line_of(self._lines, where)
+        place = str(self.path) if line is None else f"{self.path}:{line}"
+        return StudyError(
+            f"{place}: {dotted(where)}: {message}" if where else f"{place}: {message}"
+        )
+
+    def table(self, where: KeyPath, value: Any) -> dict[str, Any]:
+        """Check that a value is a table.
+
+        Raises
+        ------
+        StudyError
+            If it is none.
+        """
+        if not isinstance(value, dict):
+            raise self.error(where, f"must be a table, got {_words(value)}")
+        return value
+
+    def check_keys(self, where: KeyPath, table: Mapping[str, Any], known: Iterable[str]) -> None:
+        """Check that a table has no other keys.
+
+        Raises
+        ------
+        StudyError
+            If it has; possible ones are named, the most similar first.
+        """
+        for key in table:
+            if key not in (possible := tuple(known)):
+                raise self.error((*where, key), f"unknown key; {possible_words(key, possible)}")
+
+    def value(self, where: KeyPath, kind: Any, value: Any) -> Any:
+        """Convert a value to a type.
+
+        Raises
+        ------
+        StudyError
+            If it does not fit.
+        """
+        try:
+            return convert(kind, value)
+        except ValueError as error:
+            raise self.error(where, str(error)) from error
+
+    def settings(self, where: KeyPath, table: Mapping[str, Any]) -> Settings:
+        """Read a table of settings: nested, with dotted keys, or with quoted dotted keys.
+
+        Raises
+        ------
+        StudyError
+            If a setting is there twice.
+        """
+        found: Settings = {}
+        self._collect(where, table, (), found)
+        return found
+
+    def _collect(
+        self, where: KeyPath, table: Mapping[str, Any], prefix: tuple[str, ...], found: Settings
+    ) -> None:
+        for key, value in table.items():
+            name, place = (*prefix, *key.split(".")), (*where, key)
+            if isinstance(value, dict) and len(name) < _depth(name):
+                self._collect(place, value, name, found)
+                continue
+            if name == ("environment",):
+                name = ("environment", "id")
+            if name in found:
+                raise self.error(place, f"{'.'.join(name)} is set twice")
+            found[name] = Setting(value, place)
+
+
+def _depth(name: tuple[str, ...]) -> int:
+    """Count the words in the name of a setting; deeper tables are values."""
+    return 3 if name[:2] == ("environment", "kwargs") else 2
+
+
+def dotted(where: KeyPath) -> str:
+    """Write a place as TOML would.
+
+    Examples
+    --------
+    >>> dotted(("axes", "learning.tie_rule", 1))
+    'axes."learning.tie_rule"[1]'
+    """
+    text = ""
+    for key in where:
+        if isinstance(key, int):
+            text += f"[{key}]"
+        else:
+            bare = key.replace("-", "").replace("_", "").isalnum() and key.isascii()
+            text += ("." if text else "") + (key if bare else f'"{key}"')
+    return text
+
+
+def possible_words(word: str, possible: Iterable[str]) -> str:
+    """List what is possible, the most similar to a word first.
+
+    Examples
+    --------
+    >>> possible_words("discont", ("epsilon", "discount"))
+    'possible: discount, epsilon'
+    """
+    known = tuple(possible)
+    near = difflib.get_close_matches(word, known, n=3, cutoff=0.5)
+    return "possible: " + (", ".join([*near, *(w for w in known if w not in near)]) or "none")
+
+
+def build(
+    file: StudyFile,
+    section: str,
+    defaults: Config | type[Config],
+    settings: Settings,
+    given: Collection[str],
+    hint: str = "",
+) -> Config:
+    """Make a configuration of the settings of a section.
+
+    Parameters
+    ----------
+    file
+        Where they stand.
+    section
+        First word of their names.
+    defaults
+        A frozen dataclass: what is not set stays as it is here; or the class, for its own defaults.
+    settings
+        Settings of all sections.
+    given
+        Names of the values that follow from others and may not be set.
+    hint
+        Said about unknown settings.
+
+    Raises
+    ------
+    StudyError
+        If a setting is unknown, follows from others or has the wrong type.
+    """
+    kind = defaults if isinstance(defaults, type) else type(defaults)
+    hints = _hints(kind)
+    possible = [f.name for f in fields(kind) if f.init and f.name not in given]  # type: ignore[arg-type]
+    values: dict[str, Any] = {}
+    for name, setting in settings.items():
+        if name[0] != section:
+            continue
+        if len(name) == 1:
+            raise file.error(
+                setting.where, f"must be a table of settings, got {_words(setting.value)}"
+            )
+        key = name[1]
+        if key in given:
+            raise file.error(
+                setting.where,
+                f"follows from the observations ({getattr(defaults, key)}): omit it",
+            )
+        if key not in possible:
+            raise file.error(
+                setting.where,
+                f"{kind.__name__} has no such setting; {possible_words(key, possible)}{hint}",
+            )
+        if len(name) > 2:
+            values.setdefault(key, {})[name[2]] = setting.value
+        else:
+            values[key] = file.value(setting.where, hints.get(key, Any), setting.value)
+    if isinstance(defaults, type):
+        return defaults(**values)
+    return replace(defaults, **values)  # type: ignore[type-var]
+
+
+def _hints(kind: type[Any]) -> dict[str, Any]:
+    try:
+        return get_type_hints(kind)
+    except (NameError, TypeError):
+        return {}  # an agent from elsewhere: its values are taken as they are
+
+
+def convert(kind: Any, value: Any) -> Any:
+    """Convert a value of TOML to a type as configurations have: arrays to tuples, 1 to 1.0.
+
+    Parameters
+    ----------
+    kind
+        A type: bool, int, float, str, a Literal, a tuple, a mapping, or a union of these.
+    value
+        What TOML has.
+
+    Raises
+    ------
+    ValueError
+        If it does not fit; the message says what would.
+
+    Examples
+    --------
+    >>> convert(tuple[bool, ...], [True, False])
+    (True, False)
+    """
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin is Literal:
+        if isinstance(value, str | int) and value in inner:
+            return value
+        words = ", ".join(map(repr, inner))
+        raise ValueError(f"must be one of {words}, got {_words(value)}")
+    if origin in (Union, types.UnionType):
+        return _convert_to_one_of(tuple(k for k in inner if k is not type(None)), value)
+    if kind is float and isinstance(value, int | float) and not isinstance(value, bool):
+        if not math.isfinite(value):
+            raise ValueError(f"must be a finite number, got {value}")
+        return float(value)
+    if kind is int and isinstance(value, int) and not isinstance(value, bool):
+        return value
+    if kind in (bool, str) and isinstance(value, kind):
+        return value
+    if (origin or kind) is tuple and isinstance(value, list):
+        return _convert_array(inner, value)
+    if isinstance(origin or kind, type) and issubclass(origin or kind, Mapping):
+        if isinstance(value, dict):
+            return value
+    elif kind not in (float, int, bool, str) and (origin or kind) is not tuple:
+        return tuple(value) if isinstance(value, list) else value  # any type
+    raise ValueError(f"must be {_type_words(kind)}, got {_words(value)}")
+
+
+def _convert_to_one_of(kinds: tuple[Any, ...], value: Any) -> Any:
+    messages = []
+    for kind in kinds:
+        try:
+            return convert(kind, value)
+        except ValueError as error:
+            messages.append(str(error))
+    raise ValueError(" or ".join(dict.fromkeys(messages)))
+
+
+def _convert_array(kinds: tuple[Any, ...], value: list[Any]) -> tuple[Any, ...]:
+    if not kinds:
+        return tuple(value)
+    if len(kinds) == 2 and kinds[1] is Ellipsis:
+        kinds = kinds[:1] * len(value)
+    if len(kinds) != len(value):
+        raise ValueError(f"must be an array of {len(kinds)}, got {len(value)}")
+    converted = []
+    for number, (kind, item) in enumerate(zip(kinds, value, strict=True)):
+        try:
+            converted.append(convert(kind, item))
+        except ValueError as error:
+            raise ValueError(f"number {number + 1} of the array {error}") from error
+    return tuple(converted)
+
+
+def _type_words(kind: Any) -> str:
+    words = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
+    if kind in words:
+        return words[kind]
+    if (get_origin(kind) or kind) is tuple:
+        inner = get_args(kind)
+        return f"an array, each {_type_words(inner[0])}" if inner else "an array"
+    return "a table"
+
+
+def _words(value: Any) -> str:
+    """Write a value of TOML for a reader."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, dict):
+        return "a table"
+    return repr(value)

@@ -1,0 +1,65 @@
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from sdnn.environments import NoisySensors, UnitSensors
+
+
+class Fixed(gym.Env):
+    """Observes what it is told to."""
+
+    def __init__(self, low, high, observation=None):
+        self.observation_space = gym.spaces.Box(
+            np.array(low, np.float32), np.array(high, np.float32)
+        )
+        self.action_space = gym.spaces.Discrete(2)
+        self._observation = np.array(observation, np.float32)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return self._observation, {}
+
+
+def test_ranges_become_the_unit_interval_and_values_outside_saturate():
+    env = UnitSensors(Fixed([-2, 0, -1], [2, 8, 1], [-1, 6, 3]))
+    observation, _ = env.reset()
+    assert observation.tolist() == [0.25, 0.75, 1.0]
+    assert observation.dtype == np.float64
+    assert env.observation_space == gym.spaces.Box(0.0, 1.0, (3,), np.float64)
+
+
+def test_given_ranges_come_before_the_bounds_of_the_space():
+    env = Fixed([-np.inf, 0], [4, 8], [1, 2])
+    assert UnitSensors(env, observation_low=[-4, 0]).reset()[0].tolist() == [0.625, 0.25]
+
+
+@pytest.mark.parametrize("large", [np.inf, np.finfo(np.float32).max])
+def test_unbounded_observations_need_a_range(large):
+    env = Fixed([-large, 0], [large, 8], [1, 2])
+    with pytest.raises(ValueError, match=r"observation_low must be given .*variables 0 of 2"):
+        UnitSensors(env)
+    unit = UnitSensors(env, observation_low=[-3, 0], observation_high=[5, 4])
+    assert unit.reset()[0].tolist() == [0.5, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"observation_low": [0]}, "observation_low must have 2 numbers"),
+        ({"observation_high": [0, 8]}, "observation_low must be below observation_high"),
+    ],
+)
+def test_ranges_that_do_not_fit(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        UnitSensors(Fixed([0, 0], [1, 8], [1, 2]), **arguments)
+
+
+def test_other_observations_are_refused():
+    with pytest.raises(ValueError, match="one-dimensional Box"):
+        UnitSensors(gym.make("FrozenLake-v1"))
+
+
+def test_noise_is_in_parts_of_each_range():
+    env = NoisySensors(UnitSensors(Fixed([0, 0], [1, 1000], [0.5, 500])), 0.01, "saturate", seed=3)
+    deviations = np.array([env.reset()[0] for _ in range(2000)]) - 0.5
+    np.testing.assert_allclose(deviations.std(axis=0), 0.01, rtol=0.06)

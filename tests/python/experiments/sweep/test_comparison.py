@@ -1,0 +1,277 @@
+"""What hand-made trials say: measures, paired differences, ends solved, claims, tables, figure."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from sdnn.experiments.figures import figure_bytes
+from sdnn.experiments.page import Call
+from sdnn.experiments.records import TrialRecord, TrialRows
+from sdnn.experiments.sweep.comparison import compare
+from sdnn.experiments.sweep.figure import draw_study
+from sdnn.experiments.sweep.page import to_html, to_markdown
+from sdnn.experiments.sweep.report import StudyReport, to_json
+from sdnn.experiments.verdicts import Verdict
+
+
+def record(study, case, variant, number, steps, returns=None, interval=10):
+    """A trial whose tests took so many steps; 50 is not solved."""
+    steps = np.asarray(steps, np.int32)
+    rows = TrialRows(
+        episode=interval * np.arange(1, steps.size + 1, dtype=np.int32),
+        steps=steps,
+        episode_return=np.zeros(steps.size) if returns is None else np.asarray(returns, float),
+        solved=steps < 50,
+    )
+    key = study.keys(case, variant)[number]
+    return TrialRecord(
+        key=key,
+        config=study.combinations[case, variant].config.canonical_json(),
+        version="1",
+        n_decisions=100,
+        seconds=1.0,
+        finished_at="",
+        rows=rows,
+    )
+
+
+def steps_of(*runs):
+    """Steps of tests, from pairs of a number of tests and their steps."""
+    return np.concatenate([np.full(n, steps) for n, steps in runs])
+
+
+TWO = """
+[study]
+trials = 4
+cases = ["s4-noise"]
+reference = "old"
+[variants.old]
+[variants.new]
+title = "the new one"
+learning.discount = 0.8
+"""
+OLD = [((100, 4),), ((100, 4),), ((60, 4), (40, 50)), ((100, 50),)]
+NEW = [((100, 4),), ((50, 50), (50, 4)), ((100, 4),), ((95, 4), (5, 50))]
+
+
+def records_of_two(study):
+    return [
+        record(study, "s4-noise", variant, number, steps_of(*runs))
+        for variant, trials in (("old", OLD), ("new", NEW))
+        for number, runs in enumerate(trials)
+    ]
+
+
+def test_differences_are_paired_by_trial(study):
+    found = compare(mine := study(TWO), records_of_two(mine))
+    old, new = (found.measured["s4-noise", name] for name in ("old", "new"))
+    assert old.summary.values["final_share_solved"].tolist() == [1.0, 1.0, 0.2, 0.0]
+    assert new.summary.values["final_share_solved"].tolist() == [1.0, 1.0, 1.0, 0.9]
+    assert old.solved_at_end.tolist() == [True, True, False, False]
+    assert new.solved_at_end.tolist() == [True, True, True, True]
+    assert old.differences == {}
+    share = new.differences["final_share_solved"]
+    assert share.value == pytest.approx((0 + 0 + 0.8 + 0.9) / 4)
+    # Means of four draws out of 0, 0, 0.8, 0.9: all of them 0 or 0.9 with probability 1/256.
+    assert share.lower == 0.0
+    assert 0.8 <= share.upper <= 0.9
+    # 26 of 50 tests in a row must be good: for the last time those that end with test 84.
+    assert old.summary.values["episode_of_collapse"].tolist() == [math.inf, math.inf, 840.0, 0.0]
+    assert new.summary.values["episode_of_collapse"].tolist() == 4 * [math.inf]
+    # Censored: as the last episode, 1000.
+    assert new.differences["episode_of_collapse"].value == (0 + 0 + 160 + 1000) / 4
+
+
+def test_few_trials_are_never_called_different(study):
+    for n_trials, differs in ((5, False), (6, True)):
+        mine = study(TWO, n_trials=n_trials)
+        records = [
+            record(mine, "s4-noise", variant, n, steps_of((60, steps)))
+            for variant, steps in (("old", 50), ("new", 4))
+            for n in range(n_trials)
+        ]
+        found = compare(mine, records).measured["s4-noise", "new"]
+        assert found.differences["final_steps"].upper == -46.0
+        assert found.differs("final_steps") is differs
+        assert not found.differs("mean_return")
+
+
+def test_what_is_not_complete_is_left_out_and_said_so(study):
+    mine = study(TWO)
+    records = records_of_two(mine)
+    found = compare(mine, records[:-1])
+    assert list(found.measured) == [("s4-noise", "old")]
+    report = StudyReport(comparison=found, version="1", digest="0")
+    assert report.missing().startswith("Not complete: 1 of 2 combinations")
+    found = compare(mine, records[4:])
+    assert found.measured["s4-noise", "new"].differences == {}
+    assert compare(mine, ()).measured == {}
+
+
+CLAIMED = """
+[study]
+trials = 10
+cases = ["s4", "s4-noise", "s5-noise", "s6-noise"]
+[variants.old]
+[variants.new]
+learning.discount = 0.8
+[variants.fql]
+agent = "fql"
+"""
+
+
+def claimed_records(study):
+    """As the paper's curves: Case II collapses at about 7,500; but not with `new`."""
+    good, lost = steps_of((1500, 4)), steps_of((750, 4), (750, 50))
+    for variant in ("old", "new", "fql"):
+        for case in ("s4", "s4-noise", "s5-noise", "s6-noise"):
+            steps = lost if case == "s4-noise" and variant == "old" else good
+            for number in range(10):
+                yield record(study, case, variant, number, steps)
+
+
+def test_claims_are_judged_for_each_variant(study):
+    mine = study(CLAIMED)
+    found = compare(mine, claimed_records(mine))
+    verdicts = {
+        variant: {n: (c.outcome.verdict, c.moved) for n, c in claims.items()}
+        for variant, claims in found.claims.items()
+    }
+    assert verdicts == {
+        "old": {
+            5: (Verdict.HOLDS, None), 6: (Verdict.HOLDS, None), 7: (Verdict.HOLDS, None),
+        },
+        "new": {
+            5: (Verdict.FAILS, True), 6: (Verdict.FAILS, True), 7: (Verdict.HOLDS, False),
+        },
+        "fql": {3: (Verdict.HOLDS, None), 4: (Verdict.FAILS, None)},
+    }  # fmt: skip
+    assert [claim.number for claim in found.claims_shown] == [3, 4, 5, 6, 7]
+    report = StudyReport(comparison=found, version="1", digest="0")
+    _, header, rows = report.claim_overview()
+    assert header == ("variant", "claim 3", "claim 4", "claim 5", "claim 6", "claim 7")
+    assert rows[1] == (
+        "new", "-", "-", "does not hold (moved)", "does not hold (moved)", "holds",
+    )  # fmt: skip
+    call = Call(machine="a machine", seconds=1.0, n_run=120, n_planned=120, processor_seconds=2.0)
+    page = to_html(report, b"<svg/>", call)
+    assert page.count('<td class="verdict bad">does not hold (moved)</td>') == 2
+    assert page.count('<td class="verdict good">holds</td>') == 5
+    assert "<summary>Claim 6: SDNN-C in Case III keeps solving until later" in page
+    table = to_json(report)
+    assert {(c["variant"], c["number"], c["moved"]) for c in table["claims"]} >= {
+        ("new", 5, True), ("new", 7, False), ("old", 5, None),
+    }  # fmt: skip
+
+
+def test_small_runs_are_not_judged_and_claims_without_their_cases_not_shown(study):
+    mine = study(CLAIMED, n_trials=2)
+    records = [r for r in claimed_records_of(mine, 2) if r.key.case_id != "s5-noise"]
+    found = compare(mine, records)
+    assert [claim.number for claim in found.claims_shown] == [3, 5, 7]
+    outcomes = [c for claims in found.claims.values() for c in claims.values()]
+    assert {c.outcome.verdict for c in outcomes} == {Verdict.NOT_JUDGED}
+    assert {c.moved for c in outcomes} == {None}
+
+
+def claimed_records_of(study, n_trials):
+    for case, variant in study.combinations:
+        for number in range(n_trials):
+            yield record(study, case, variant, number, steps_of((60, 4)))
+
+
+def test_a_case_that_is_not_the_papers_has_no_claims(study):
+    mine = study("[study]\ntrials = 10\n[cases.mine]\n[variants.a]\n")
+    records = [record(mine, "mine", "a", n, steps_of((1500, 4))) for n in range(10)]
+    assert compare(mine, records).claims_shown == ()
+
+
+MIXED = """
+[study]
+title = "Both | kinds"
+trials = 2
+[cases.s4]
+[cases.swing]
+title = "A pendulum"
+environment.id = "Pendulum-v1"
+[variants.a]
+[variants.b]
+learning.discount = 0.5
+[variants.c]
+learning.discount = 0.9
+"""
+
+
+@pytest.fixture
+def mixed(study):
+    mine = study(MIXED)
+    records = [
+        record(mine, case, variant, number, steps_of((20, 4 + number)), shift + np.arange(20.0))
+        for case in ("s4", "swing")
+        for variant, shift in (("a", 0.0), ("b", 10.0))
+        for number in range(2)
+    ]
+    return StudyReport(comparison=compare(mine, records), version="1", digest="abc")
+
+
+def test_environments_are_judged_by_their_return(mixed):
+    swing = mixed.comparison.measured["swing", "b"]
+    assert swing.measures == ("final_return", "mean_return")
+    assert swing.summary.values["final_return"].tolist() == [28.5, 28.5]  # the last 2 of 20
+    assert swing.summary.values["mean_return"].tolist() == [19.5, 19.5]
+    assert swing.differences["mean_return"].value == 10.0
+    assert swing.solved_at_end is None
+
+
+def test_tables_have_a_row_for_each_variant_in_each_case(mixed):
+    tables = {title: (header, rows) for title, header, rows in mixed.tables()}
+    header, rows = tables["Case I: 4 inputs, no noise"]
+    assert header[:5] == ("variant", "agent", "trials", "end solved", "episodes to learn")
+    # The discount of c is that of a: the same trials.
+    assert [row[0] for row in rows] == ["a", "b", "c"]
+    assert rows[0][:5] == ("a", "SDNN-C", "2", "2 of 2", "10 [10, 10]")
+    header, rows = tables["A pendulum: less a, trial by trial"]
+    assert header == ("variant", "final return", "mean return")
+    assert rows == [
+        ("b", "+10 [+10, +10]", "+10 [+10, +10]"), ("c", "0 [0, 0]", "0 [0, 0]"),
+    ]  # fmt: skip
+    assert "c is the same as a." in mixed.notes()
+    assert mixed.missing() is None
+    text = to_markdown(mixed)
+    assert text.startswith("# Both | kinds\n\n3 variants in 2 cases, 2 trials each; reference: a.")
+    assert "| b | +10 [+10, +10] | +10 [+10, +10] |" in text
+
+
+def test_the_table_is_json(mixed):
+    table = json.loads(json.dumps(to_json(mixed), allow_nan=False))
+    assert [(r["case"], r["variant"], r["n_end_solved"]) for r in table["results"]] == [
+        ("s4", "a", 2), ("s4", "b", 2), ("s4", "c", 2),
+        ("swing", "a", None), ("swing", "b", None), ("swing", "c", None),
+    ]  # fmt: skip
+    assert table["variants"][2] == {"id": "c", "title": "c", "same_as": "a"}
+    swing = table["results"][4]
+    assert swing["measures"]["mean_return"]["trials"] == [19.5, 19.5]
+    assert swing["differences"]["mean_return"] == {"value": 10.0, "lower": 10.0, "upper": 10.0}
+
+
+def test_the_figure_is_the_same_each_time_and_shows_every_trial(mixed):
+    figure = draw_study(mixed.comparison, "footer")
+    assert figure_bytes(figure) == figure_bytes(draw_study(mixed.comparison, "footer"))
+    assert len(figure.axes) == 4
+    assert [axes.get_title("left") for axes in figure.axes] == [
+        "Case I: 4 inputs, no noise", "A pendulum", "", "",
+    ]  # fmt: skip
+    for axes in figure.axes:
+        assert len(axes.collections) == 3
+        assert all(dots.get_offsets().shape == (2, 2) for dots in axes.collections)
+    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["a", "b", "c"]
+
+
+def test_many_cases_go_on_below(study):
+    mine = study("[study]\ntrials = 1\n" + "".join(f"[cases.c{i}]\n" for i in range(7)))
+    records = [record(mine, f"c{i}", "base", 0, steps_of((60, 4))) for i in range(7)]
+    figure = draw_study(compare(mine, records), "")
+    assert len(figure.axes) == 4 * 5
+    assert sum(axes.get_visible() for axes in figure.axes) == 2 * 7
