@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
+from sdnn.executor_options import executor_options
 from sdnn.experiments.cases import PRESET_AGENTS, WORDS, includes_cost, select_experiments
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from sdnn.experiments.engine import RunOutcome
+    from sdnn.experiments.executor import Executor
     from sdnn.experiments.report import Report
     from sdnn.experiments.reproduce import ReproduceRequest, Reproduction
     from sdnn.experiments.sweep.report import StudyReport
@@ -87,11 +89,7 @@ def main() -> None:
     type=click.IntRange(min=1),
     help="Learning episodes per trial.  [default: 15000, as in the paper]",
 )
-@click.option(
-    "--jobs",
-    type=click.IntRange(min=1),
-    help="Trials to run at the same time.  [default: all cores]",
-)
+@executor_options
 @click.option(
     "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Root of all seeds."
 )
@@ -130,6 +128,7 @@ def reproduce(
     trials: int | None,
     episodes: int | None,
     jobs: int | None,
+    executor: Executor | None,
     seed: int,
     out: Path,
     quick: bool,
@@ -156,6 +155,7 @@ def reproduce(
         n_episodes=episodes,
         seed=seed,
         jobs=jobs,
+        executor=executor,
         quick=quick,
         agents=agents,
         presets=presets,
@@ -185,11 +185,7 @@ def reproduce(
 @click.option(
     "--seed", type=click.IntRange(min=0), help="Root of all seeds, instead of the file's."
 )
-@click.option(
-    "--jobs",
-    type=click.IntRange(min=1),
-    help="Trials to run at the same time.  [default: all cores]",
-)
+@executor_options
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
@@ -209,6 +205,7 @@ def sweep(
     trials: int | None,
     seed: int | None,
     jobs: int | None,
+    executor: Executor | None,
     out: Path,
     only: tuple[str, ...],
     as_json: bool,
@@ -226,7 +223,13 @@ def sweep(
     from sdnn.experiments.sweep.run import SweepRequest
 
     request = SweepRequest(
-        file=file, out=out, n_trials=trials, seed=seed, jobs=jobs, only=tuple(dict.fromkeys(only))
+        file=file,
+        out=out,
+        n_trials=trials,
+        seed=seed,
+        jobs=jobs,
+        executor=executor,
+        only=tuple(dict.fromkeys(only)),
     )
     try:
         _ = request.plan

@@ -38,6 +38,7 @@ PYTHON_MODULES = {
     "__init__": "sdnn",
     "__main__": "sdnn",
     "cli": "sdnn",
+    "executor_options": "sdnn",
     "arguments": "core",
     "config": "core",
     "kernel": "coding",

@@ -20,14 +20,18 @@ if TYPE_CHECKING:
         trial_seed,
     )
     from sdnn.experiments.cost import CostConfig
+    from sdnn.experiments.dask_executor import DaskExecutor
     from sdnn.experiments.engine import Observer, run_trials
     from sdnn.experiments.environment_trial import EnvironmentConfig, EnvironmentTrialConfig
     from sdnn.experiments.errors import (
+        ClusterError,
         ExperimentError,
         PlotUnavailableError,
         StoreError,
         StudyError,
+        WorkerLostError,
     )
+    from sdnn.experiments.executor import Executor
     from sdnn.experiments.figures import draw_cost, draw_experiment
     from sdnn.experiments.measures import MeasureConfig
     from sdnn.experiments.records import CostRecord, TrialKey, TrialRecord, TrialRows
@@ -36,6 +40,7 @@ if TYPE_CHECKING:
     from sdnn.experiments.results import CaseResult, CaseSummary, collect, summarize
     from sdnn.experiments.statistics import Estimate
     from sdnn.experiments.store import ResultStore
+    from sdnn.experiments.thread_executor import ThreadExecutor
     from sdnn.experiments.trial import LearningAgent, ProtocolConfig, PythonTrial, Trial
     from sdnn.experiments.verdicts import judge_claims
 
@@ -59,6 +64,7 @@ _HOMES = {
         "trial_seed",
     ),
     "cost": ("CostConfig",),
+    "dask_executor": ("DaskExecutor",),
     "engine": (
         "Observer",
         "run_trials",
@@ -68,11 +74,14 @@ _HOMES = {
         "EnvironmentTrialConfig",
     ),
     "errors": (
+        "ClusterError",
         "ExperimentError",
         "PlotUnavailableError",
         "StoreError",
         "StudyError",
+        "WorkerLostError",
     ),
+    "executor": ("Executor",),
     "figures": (
         "draw_cost",
         "draw_experiment",
@@ -103,6 +112,7 @@ _HOMES = {
     ),
     "statistics": ("Estimate",),
     "store": ("ResultStore",),
+    "thread_executor": ("ThreadExecutor",),
     "trial": (
         "LearningAgent",
         "ProtocolConfig",
@@ -122,12 +132,15 @@ __all__ = [
     "CaseResult",
     "CaseSummary",
     "Claim",
+    "ClusterError",
     "CostConfig",
     "CostRecord",
     "CostSeries",
+    "DaskExecutor",
     "EnvironmentConfig",
     "EnvironmentTrialConfig",
     "Estimate",
+    "Executor",
     "Experiment",
     "ExperimentError",
     "LearningAgent",
@@ -142,12 +155,14 @@ __all__ = [
     "ResultStore",
     "StoreError",
     "StudyError",
+    "ThreadExecutor",
     "Trial",
     "TrialConfig",
     "TrialKey",
     "TrialRecord",
     "TrialRows",
     "TrialSettings",
+    "WorkerLostError",
     "agent_entry",
     "case_config",
     "collect",

@@ -15,5 +15,13 @@ class PlotUnavailableError(ExperimentError):
     """Figures were asked for, but matplotlib is not installed."""
 
 
+class ClusterError(ExperimentError):
+    """A cluster was asked for, but it cannot be reached or has no worker that fits."""
+
+
+class WorkerLostError(ExperimentError):
+    """A trial was given up because worker after worker was lost while running it."""
+
+
 class StudyError(ExperimentError):
     """A study file says something that cannot be run."""

@@ -88,6 +88,11 @@ class ProgressObserver(Observer):
         if self._total is not None:
             self._progress.advance(self._total, step)
 
+    def lost(self, planned: PlannedTrial) -> None:
+        """Take a trial's bar away, and its episodes off the whole one."""
+        self.advanced(planned, 0)
+        self._progress.remove_task(self._tasks.pop(planned.key))
+
     def finished(self, planned: PlannedTrial) -> None:
         """Close a trial's bar."""
         self._close(planned)
@@ -96,6 +101,10 @@ class ProgressObserver(Observer):
         """Close a trial's bar and count its episodes as passed."""
         self.advanced(planned, planned.config.protocol.n_learning_episodes)
         self._close(planned)
+
+    def noted(self, text: str) -> None:
+        """Print a line above the bars, on a terminal or not."""
+        self._progress.console.print(text, markup=False, highlight=False, soft_wrap=True)
 
     def costs_begun(self, n_missing: int) -> None:
         """Open the bar of the costs."""

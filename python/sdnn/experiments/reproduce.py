@@ -15,6 +15,7 @@ from sdnn.experiments.cases import EXPERIMENTS, PAPER_EPISODES, PAPER_TRIALS, Ex
 from sdnn.experiments.config import PlannedTrial, plan_trials
 from sdnn.experiments.cost import QUICK_COST, CostConfig, cost_keys, measure_costs
 from sdnn.experiments.engine import Observer, RunOutcome, run_trials
+from sdnn.experiments.executor import Executor
 from sdnn.experiments.records import (
     COST_ROW_HEADER,
     ROW_HEADER,
@@ -76,6 +77,8 @@ class ReproduceRequest:
         Root of all seeds.
     jobs
         Trials at the same time; default one for each core.
+    executor
+        Where trials run; default threads of this process. Costs are always measured here.
     quick
         Whether this is a look at a fraction; its files are named and marked so.
     agents
@@ -92,6 +95,7 @@ class ReproduceRequest:
     n_episodes: int | None = None
     seed: int = 0
     jobs: int | None = None
+    executor: Executor | None = None
     quick: bool = False
     agents: tuple[str, ...] = ()
     presets: tuple[str, ...] = ()
@@ -242,6 +246,8 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
         If matplotlib or Jinja is not installed; no trial is run then.
     StoreError
         If the result file cannot be used.
+    ClusterError
+        If the cluster cannot run trials any more; what was finished is stored.
     """
     figures.require_matplotlib()
     page.require_jinja()
@@ -250,7 +256,9 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
     plan = request.plan
     with ResultStore(request.out) as store:
         remove_partial_files(request.out)
-        outcome = run_trials(plan.trials, store, jobs=request.jobs, observer=watcher)
+        outcome = run_trials(
+            plan.trials, store, executor=request.executor, jobs=request.jobs, observer=watcher
+        )
         if outcome.failures or outcome.interrupted:
             return Reproduction(outcome)
         measure_costs(plan.costs, request.cost_config, store, watcher)

@@ -1,10 +1,15 @@
+import io
 import os
 import signal
 import time
 
 import pytest
+from rich.console import Console
 
-from sdnn.experiments import Observer, ResultStore, StoreError
+from sdnn.experiments import Observer, ResultStore, StoreError, WorkerLostError
+from sdnn.experiments.executor import Advanced, Failed, Finished, Lost, Noted, Started
+from sdnn.experiments.progress import ProgressObserver
+from sdnn.experiments.thread_executor import ThreadExecutor
 
 
 class Recorder(Observer):
@@ -23,8 +28,14 @@ class Recorder(Observer):
     def finished(self, planned):
         self.events.append(("finished", planned.key))
 
+    def lost(self, planned):
+        self.events.append(("lost", planned.key))
+
     def failed(self, planned, error):
         self.events.append(("failed", planned.key))
+
+    def noted(self, text):
+        self.events.append(("noted", text))
 
 
 def test_jobs_do_not_change_the_content(tmp_path, run):
@@ -140,3 +151,70 @@ def test_unwritable_store_stops_the_run(tmp_path, fake, use_trial):
 def test_jobs_must_be_positive(tmp_path, run):
     with pytest.raises(ValueError, match="jobs must be at least 1, got 0"):
         run(tmp_path, jobs=0)
+    with pytest.raises(ValueError, match="jobs must be left out where an executor is given, got 2"):
+        run(tmp_path, executor=ThreadExecutor(), jobs=2)
+
+
+class Scripted:
+    """Says what it is told to say, about the trials in their order."""
+
+    def __init__(self, *script):
+        self.script = script
+        self.closed = False
+
+    def run(self, planned, stop):
+        try:
+            yield from (message(*planned) for message in self.script)
+        finally:
+            self.closed = True
+
+
+@pytest.fixture
+def record(fake, tmp_path, run):
+    """The first trial's record, as another run gave it."""
+    run(tmp_path / "other", fake.make_plan(1))
+    with ResultStore(tmp_path / "other") as store:
+        return store.load([fake.make_plan(1)[0].key])[0]
+
+
+def test_an_executor_tells_and_the_engine_stores(tmp_path, fake, run, record):
+    plan = fake.make_plan(1)
+    lost = WorkerLostError("gone")
+    script = (
+        lambda a, b: Noted("hear"),
+        lambda a, b: Started(a),
+        lambda a, b: Started(b),
+        lambda a, b: Advanced(a, 100),
+        lambda a, b: Lost(a),
+        lambda a, b: Started(a),
+        lambda a, b: Failed(b, lost),
+        lambda a, b: Finished(a, record),
+    )
+    recorder = Recorder()
+    outcome, _ = run(tmp_path, plan, executor=Scripted(*script), observer=recorder)
+    assert (outcome.n_run, outcome.interrupted) == (1, False)
+    assert [(f.key, f.error) for f in outcome.failures] == [(plan[1].key, lost)]
+    first, second = (planned.key for planned in plan)
+    assert recorder.events[1:] == [
+        ("noted", "hear"), ("started", first), ("started", second), ("advanced", first, 100),
+        ("lost", first), ("started", first), ("failed", second), ("finished", first),
+    ]  # fmt: skip
+    # On a terminal, bars of lost trials go and come again.
+    text = io.StringIO()
+    with ProgressObserver(Console(file=text, force_terminal=True, width=80)) as observer:
+        run(tmp_path / "shown", plan, executor=Scripted(*script), observer=observer)
+    assert "hear" in text.getvalue()
+    assert "all (0 to go)" in text.getvalue()
+
+
+def test_an_executor_is_closed_when_the_store_fails(tmp_path, fake, run, record, monkeypatch):
+    def full(store, record):
+        raise StoreError("disk full")
+
+    executor = Scripted(lambda a, b: Finished(a, record), lambda a, b: pytest.fail("asked again"))
+    monkeypatch.setattr(ResultStore, "add", full)
+    with pytest.raises(StoreError, match="disk full"):
+        run(tmp_path, fake.make_plan(1), executor=executor)
+    assert executor.closed
+    nobody = Scripted(lambda: pytest.fail("asked without need"))
+    assert run(tmp_path, [], executor=nobody)[0].n_planned == 0

@@ -48,7 +48,7 @@ class Forecast:
     n_planned, n_stored
         Trials in all; variants that are the same share theirs.
     jobs
-        Trials at the same time.
+        Trials at the same time; 1 on a cluster, whose size is not known.
     lower, upper
         Seconds that will pass, least and most.
     """
@@ -96,6 +96,8 @@ def forecast(request: SweepRequest) -> Forecast:
             by_hash[case_id, keys[0].config_hash] = one
         works.append(PlannedWork(combination, len(keys), n_stored, one))
     jobs = machine.n_cores() if request.jobs is None else request.jobs
+    if request.executor is not None:
+        jobs = 1
     lower, upper = wall_seconds(
         (
             (by_hash[key.case_id, key.config_hash], config.is_compiled)

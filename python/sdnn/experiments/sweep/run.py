@@ -15,6 +15,7 @@ from sdnn.experiments import figures
 from sdnn.experiments import page as pages
 from sdnn.experiments.config import PlannedTrial
 from sdnn.experiments.engine import Observer, RunOutcome, run_trials
+from sdnn.experiments.executor import Executor
 from sdnn.experiments.measures import MeasureName
 from sdnn.experiments.records import ROW_HEADER, TrialKey, TrialRecord, records_digest, trial_rows
 from sdnn.experiments.store import STORE_NAME, ResultStore
@@ -42,6 +43,8 @@ class SweepRequest:
         Root of all seeds, instead of the file's.
     jobs
         Trials at the same time; default one for each core.
+    executor
+        Where trials run; default threads of this process.
     only
         Ids of the variants to run; none: all.
     """
@@ -51,6 +54,7 @@ class SweepRequest:
     n_trials: int | None = None
     seed: int | None = None
     jobs: int | None = None
+    executor: Executor | None = None
     only: tuple[str, ...] = ()
 
     @cached_property
@@ -128,6 +132,8 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Sweep:
         If matplotlib or Jinja is not installed; no trial is run then.
     StoreError
         If the result file cannot be used.
+    ClusterError
+        If the cluster cannot run trials any more; what was finished is stored.
     """
     figures.require_matplotlib()
     pages.require_jinja()
@@ -139,7 +145,9 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Sweep:
     with ResultStore(request.out) as store:
         study.check(store.keys())
         remove_partial_files(request.out)
-        outcome = run_trials(plan, store, jobs=request.jobs, observer=observer)
+        outcome = run_trials(
+            plan, store, executor=request.executor, jobs=request.jobs, observer=observer
+        )
         if outcome.interrupted:
             return Sweep(outcome)
         wanted = {key for pair in study.combinations for key in study.keys(*pair)}
