@@ -57,7 +57,10 @@ def test_help_and_version(invoke):
         (["reproduce", "a", "--jobs", 0], "--jobs"),
         (["reproduce", "a", "--seed", -1], "--seed"),
         (["reproduce", "a", "--fast"], "--fast"),
-        (["reproduce", "a", "--agent", "dqn"], "one of sdnn-c, fql, rbfn, sdnn-c-robust, got 'dqn'"),
+        (
+            ["reproduce", "a", "--agent", "dqn"],
+            "one of sdnn-c, fql, rbfn, sdnn-c-robust, got 'dqn'",
+        ),
         (["learn"], "learn"),
     ],
 )
