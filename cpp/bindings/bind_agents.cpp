@@ -9,6 +9,7 @@
 #include "bind_config.hpp"
 #include "bindings.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/presets.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
@@ -89,6 +90,16 @@ void bind_agents(py::module_& module) {
   bindings::bind_config<QLearningConfig>(module, "QLearningConfig", "The parameters of Q-learning");
   bindings::bind_config<FuzzyQLearningConfig>(module, "FuzzyQLearningConfig",
                                               "The parameters of fuzzy Q-learning");
+
+  const auto parts = [](agents::Preset preset) {
+    return std::pair(std::move(preset.approximator), preset.learning);
+  };
+  module.def(
+      "paper_preset", [parts](int n_inputs) { return parts(agents::paper_preset(n_inputs)); },
+      py::arg("n_inputs"), "Settings of approximator and learning, as in the paper");
+  module.def(
+      "robust_preset", [parts](int n_inputs) { return parts(agents::robust_preset(n_inputs)); },
+      py::arg("n_inputs"), "Settings of approximator and learning, as recommended");
 
   using SDNNAgent = agents::QLearning<SDNNC>;
   py::class_<SDNNAgent> sdnn_agent(module, "SDNNQLearning", "Q-learning with SDNN-C");

@@ -1305,8 +1305,16 @@ def n_units_for(scheme: str, n_classes: typing.SupportsInt | typing.SupportsInde
     """
 def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
+def paper_preset(n_inputs: typing.SupportsInt | typing.SupportsIndex) -> tuple[SDNNCConfig, QLearningConfig]:
+    """
+    Settings of approximator and learning, as in the paper
+    """
 def random_inverse_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, n_bins: typing.SupportsInt | typing.SupportsIndex, n_flipped: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
     ...
+def robust_preset(n_inputs: typing.SupportsInt | typing.SupportsIndex) -> tuple[SDNNCConfig, QLearningConfig]:
+    """
+    Settings of approximator and learning, as recommended
+    """
 def set_instruction_set(name: str) -> None:
     """
     Forces an instruction set, for the whole process

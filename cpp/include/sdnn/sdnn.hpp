@@ -4,6 +4,7 @@
 #include "sdnn/agents/agent.hpp"
 #include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/presets.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/action_value.hpp"
 #include "sdnn/approximators/error_correction.hpp"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, cast
 
@@ -85,9 +86,25 @@ class RedundantSensors(
         return np.append(observation, extra).astype(observation.dtype)
 
 
-class NoisySensors(
-    gym.ObservationWrapper[Observation, Any, Observation], gym.utils.RecordConstructorArgs
+class _RandomSensors(
+    gym.ObservationWrapper[Observation, Any, Observation], gym.utils.RecordConstructorArgs, abc.ABC
 ):
+    """Sensors with a random stream of their own."""
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Reset the environment; a ``seed`` starts what the sensors draw at random anew, too."""
+        if seed is not None:
+            self._restart(seed)
+        return super().reset(seed=seed, options=options)
+
+    @abc.abstractmethod
+    def _restart(self, seed: int) -> None:
+        """Start the stream anew."""
+
+
+class NoisySensors(_RandomSensors):
     """Adds independent Gaussian noise to every channel of every observation.
 
     The numbers come from a stream of their own, the same as in a compiled trial with the same
@@ -148,14 +165,6 @@ class NoisySensors(
         self._restart(seed)
         self.observation_space = gym.spaces.Box(0.0, 1.0, (n_channels,), _float_type(space))
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Reset the environment; a ``seed`` starts the noise anew too."""
-        if seed is not None:
-            self._restart(seed)
-        return super().reset(seed=seed, options=options)
-
     def observation(self, observation: Observation) -> Observation:
         """Add the noise, shape (l,)."""
         noisy: Observation = self._noise.apply(observation)
@@ -165,9 +174,7 @@ class NoisySensors(
         self._noise = _core.SensorNoise(self.sigma, self._edges, seed_of(seed), self._stream)
 
 
-class AcrobotSensors(
-    gym.ObservationWrapper[Observation, Any, Observation], gym.utils.RecordConstructorArgs
-):
+class AcrobotSensors(_RandomSensors):
     """All that a `SensorConfig` can say, over the acrobot: what a compiled trial observes.
 
     The same numbers as `NoisySensors` over `RedundantSensors`, and the inputs and the entry of
@@ -210,14 +217,6 @@ class AcrobotSensors(
         self._stream = _stream(stream)
         self._restart(seed)
         self.observation_space = gym.spaces.Box(0.0, 1.0, (config.n_inputs,), self._float)
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Reset the environment; a ``seed`` starts noise and random inputs anew too."""
-        if seed is not None:
-            self._restart(seed)
-        return super().reset(seed=seed, options=options)
 
     def observation(self, observation: Observation) -> Observation:
         """Observe the environment's state, shape (n_inputs,); the observation is not used."""

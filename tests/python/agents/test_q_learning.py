@@ -281,6 +281,9 @@ def test_a_preset_is_used_where_nothing_is_given():
         OBSERVATIONS, TORQUES, learning=QLearningConfig(discount=0.5), preset="robust"
     )
     assert (given.n_actions, given.learning) == (61, QLearningConfig(discount=0.5))
+    for name, chosen in PRESETS.items():
+        core = getattr(_core, f"{name}_preset")(4)
+        assert core == (chosen.approximator.to_core(), chosen.learning.to_core())
     with pytest.raises(ValueError, match="preset must be one of 'paper', 'robust', got 'best'"):
         SDNNQLearning(OBSERVATIONS, TORQUES, preset="best")
 
