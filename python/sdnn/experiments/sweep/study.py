@@ -16,7 +16,7 @@ from typing import Any, Literal
 import gymnasium as gym
 
 from sdnn.environments import AcrobotConfig, GoalScheduleConfig, SensorConfig
-from sdnn.experiments.cases import EXPERIMENTS, PAPER_TRIALS, Case
+from sdnn.experiments.cases import EXPERIMENTS, PAPER_TRIALS, PRESET_AGENTS, Case
 from sdnn.experiments.config import PlannedTrial, TrialConfig, TrialSettings, trial_seed
 from sdnn.experiments.environment_trial import EnvironmentConfig, EnvironmentTrialConfig
 from sdnn.experiments.records import TrialKey
@@ -509,8 +509,10 @@ class _Reader:
             If a setting is unknown, has the wrong type or does not go with another.
         """
         own = (case.settings, variant.settings, variant.case_settings.get(case.id, {}))
-        chosen = Setting("sdnn-c", ())
-        for layer in (self._base, *own):
+        layers = (self._base, *own)
+        elsewhere = any(name[0] == "environment" for layer in layers for name in layer)
+        chosen = Setting(PRESET_AGENTS["robust" if elsewhere else "paper"], ())
+        for layer in layers:
             chosen = layer.get(("agent",), chosen)
         if not isinstance(chosen.value, str) or chosen.value not in AGENTS:
             raise self._file.error(
