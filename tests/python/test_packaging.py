@@ -34,9 +34,10 @@ def run_example(cmake, configure, build, *options):
 
 def rows_of_trial():
     """What the example should print: a trial of the same length and seed."""
+    approximator, learning = _core.robust_preset(4)
     trial = _core.AcrobotTrial(
-        approximator=_core.SDNNCConfig(),
-        learning=_core.QLearningConfig(),
+        approximator=approximator,
+        learning=learning,
         acrobot=_core.AcrobotConfig(),
         goal=_core.GoalScheduleConfig(),
         sensors=_core.SensorConfig(),

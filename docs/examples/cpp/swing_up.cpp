@@ -13,7 +13,7 @@
 
 namespace {
 
-using Network = sdnn::approximators::SDNNC;  // patterns of up to 256 units
+using Network = sdnn::approximators::SDNNC;
 
 struct Outcome {
   int n_decisions = 0;
@@ -23,7 +23,7 @@ struct Outcome {
 Outcome run_episode(sdnn::agents::QLearning<Network>& agent, sdnn::environments::Acrobot& acrobot,
                     sdnn::environments::AcrobotSensors& sensors, double lambda, bool learning) {
   const double max_torque = acrobot.config().max_torque;
-  std::vector<double> observed(static_cast<std::size_t>(sensors.n_sensors()));
+  std::vector<double> observed(sensors.n_inputs());
   std::vector<double> next_observed(observed.size());
   Outcome outcome;
   acrobot.reset();
@@ -49,7 +49,8 @@ int main(int argc, char** argv) try {
   const std::uint64_t seed = argc > 2 ? std::stoull(argv[2]) : 1;
 
   const sdnn::environments::SensorConfig seen{.n_sensors = 4, .noise = 0.0};
-  sdnn::agents::QLearning<Network> agent(Network({.n_inputs = seen.n_sensors}, seed), {}, seed);
+  const auto preset = sdnn::agents::robust_preset(seen.n_sensors);
+  sdnn::agents::QLearning agent(Network(preset.approximator, seed), preset.learning, seed);
   sdnn::environments::Acrobot acrobot;
   sdnn::environments::AcrobotSensors sensors(seen, seed, sdnn::core::Stream::sensor_noise);
   sdnn::environments::AcrobotSensors test_sensors(seen, seed,
