@@ -101,7 +101,10 @@ class _QLearning(abc.ABC, Generic[Approximator]):
         """Learn one transition by Eq. (1).
 
         Any action of the space can be learned, not only that of the last `act`; of a ``Box`` the
-        nearest one is. A terminated transition begins no episode.
+        nearest one is. A terminated transition begins no episode. With ``n_steps`` above 1 a
+        transition waits for those that follow; one that does not begin where the one before it
+        ended (another ``observation`` than the last ``next_observation``) begins anew, and
+        `begin_episode` learns what still waits.
 
         Raises
         ------

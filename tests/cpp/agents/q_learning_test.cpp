@@ -94,6 +94,20 @@ TEST(QLearning, WhatWaitsAtTheTimeLimitIsLearnedWhenTheNextEpisodeBegins) {
   EXPECT_EQ(q(1), 2.0 + 0.5 * 16.0);
 }
 
+TEST(QLearning, ATransitionFromElsewhereBeginsAnew) {
+  LookupTable table(1, 5, 2);
+  table.correct(cell(2), 1, 16.0);
+  Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 3}, 1);
+  const auto q = [&](int s) { return agent.action_value().value(cell(s), 0); };
+  agent.learn(cell(0), 0, 1.0, cell(1), false);
+  agent.learn(cell(1), 0, 2.0, cell(2), false);
+  EXPECT_EQ(agent.action_value(), table);
+  agent.learn(cell(3), 0, 8.0, cell(4), true);  // not from cell 2
+  EXPECT_EQ(q(0), 1.0 + 0.5 * 2.0 + 0.25 * 16.0);
+  EXPECT_EQ(q(1), 2.0 + 0.5 * 16.0);
+  EXPECT_EQ(q(3), 8.0);
+}
+
 TEST(QLearning, WhatCouldNotBeLearnedLaterIsRefusedAtOnce) {
   Agent agent(LookupTable(1, 5, 2), {.n_steps = 3}, 1);
   EXPECT_THROW(agent.learn(Position{1.5}, 0, 1.0, cell(1), false), std::invalid_argument);

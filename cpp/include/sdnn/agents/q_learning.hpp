@@ -41,10 +41,11 @@ struct QLearningConfig {
 ///
 /// With n_steps = n > 1 (not in the paper) the target is r_1 + gamma r_2 + ... + gamma^n max_a' Q:
 /// a transition waits until n steps are known, or the episode ends, and is then corrected, once, as
-/// before. A success thus reaches the n states before it in the episode that had it. Targets are
-/// not corrected for actions taken at random in between. Source: Watkins, C. (1989). Learning from
-/// delayed rewards (corrected n-step returns); Sutton, R., Barto, A. (2018). Reinforcement
-/// learning, section 7.1.
+/// before. A success thus reaches the n states before it in the episode that had it. A transition
+/// that does not begin where the one before it ended begins anew: what waits is then learned with
+/// the steps it has. Targets are not corrected for actions taken at random in between. Source:
+/// Watkins, C. (1989). Learning from delayed rewards (corrected n-step returns); Sutton, R., Barto,
+/// A. (2018). Reinforcement learning, section 7.1.
 template <approximators::ActionValue Q>
 class QLearning {
  public:
@@ -109,6 +110,9 @@ class QLearning {
       return;
     }
     (void)action_value_.value(state, action);  // refuses what could not be learned later
+    if (n_waiting_ > 0 && !std::ranges::equal(state, next_state_)) {
+      learn_all_waiting(state_value(next_state_));
+    }
     Step& newest = waiting_[(first_ + n_waiting_) % waiting_.size()];
     std::copy(state.begin(), state.end(), newest.state.begin());
     newest.action = action;
