@@ -2,6 +2,7 @@
 #include <pybind11/stl.h>
 
 #include <cstdint>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -11,9 +12,11 @@
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/presets.hpp"
 #include "sdnn/agents/q_learning.hpp"
+#include "sdnn/approximators/decoupled.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
+#include "states.hpp"
 
 namespace py = pybind11;
 using namespace sdnn;
@@ -32,7 +35,7 @@ namespace {
 
 /// What all agents have in common.
 template <class Agent>
-void def_agent(py::class_<Agent> agent) {
+void def_agent(py::class_<Agent>& agent) {
   using Action = decltype(std::declval<Agent&>().act({}));
   agent.def("begin_episode", &Agent::begin_episode)
       .def(
@@ -43,19 +46,47 @@ void def_agent(py::class_<Agent> agent) {
           py::arg("state"), py::arg("explore") = true)
       .def(
           "learn",
-          [](Agent& self, const ArrayArgument<double>& state, Action action, double reward,
+          [](Agent& self, const ArrayArgument<double>& state, const Action& action, double reward,
              const ArrayArgument<double>& next_state, bool terminated) {
             self.learn(bindings::vector(state, "state"), action, reward,
                        bindings::vector(next_state, "next_state"), terminated);
           },
           py::arg("state"), py::arg("action"), py::arg("reward"), py::arg("next_state"),
           py::arg("terminated"));
+  bindings::def_state(agent);
 }
 
-/// Q-learning with an approximator that `make(approximator, seed)` makes of its configuration.
+/// What agents that learn by Q-learning have in common.
+template <class Agent>
+void def_q_learning(py::class_<Agent>& agent) {
+  agent.def("set_progress", &Agent::set_progress, py::arg("progress"))
+      .def_property_readonly("progress", &Agent::progress)
+      .def_property_readonly("learning_rate", &Agent::learning_rate)
+      .def_property_readonly("epsilon", &Agent::epsilon);
+  def_agent(agent);
+}
+
+/// The networks of an action's dimensions, made by `make(config, seed)`: alike but for their
+/// numbers of actions, and all random.
+template <class Approximator, class Config, class Make>
+approximators::Decoupled<Approximator> decoupled(const Config& config,
+                                                 const std::vector<int>& n_actions,
+                                                 std::uint64_t seed, const Make& make) {
+  std::vector<Approximator> parts;
+  for (std::size_t d = 0; d < n_actions.size(); ++d) {
+    Config of_dimension = config;
+    of_dimension.n_actions = n_actions[d];
+    parts.push_back(make(of_dimension, approximators::seed_of_dimension(seed, d)));
+  }
+  return approximators::Decoupled<Approximator>(std::move(parts));
+}
+
+/// Binds Q-learning with an approximator.
 template <class Config, class Approximator, class Make>
-void def_q_learning(py::class_<agents::QLearning<Approximator>> agent, Make make) {
+py::class_<agents::QLearning<Approximator>> bind_q_learning(py::module_& module, const char* name,
+                                                            const char* doc, const Make& make) {
   using Agent = agents::QLearning<Approximator>;
+  py::class_<Agent> agent(module, name, doc);
   agent
       .def(py::init([make](const Config& approximator, const QLearningConfig& learning,
                            std::uint64_t seed) {
@@ -65,7 +96,33 @@ void def_q_learning(py::class_<agents::QLearning<Approximator>> agent, Make make
       .def_property_readonly(
           "action_value", [](Agent& self) -> Approximator& { return self.action_value(); },
           py::return_value_policy::reference_internal);
-  def_agent(agent);
+  def_q_learning(agent);
+  return agent;
+}
+
+/// Binds Q-learning with an approximator for each dimension of the action.
+template <class Config, class Approximator, class Make>
+void bind_decoupled_q_learning(py::module_& module, const char* name, const char* doc,
+                               const Make& make) {
+  using Agent = agents::QLearning<approximators::Decoupled<Approximator>>;
+  py::class_<Agent> agent(module, name, doc);
+  agent
+      .def(py::init([make](const Config& approximator, const std::vector<int>& n_actions,
+                           const QLearningConfig& learning, std::uint64_t seed) {
+             return Agent(decoupled<Approximator>(approximator, n_actions, seed, make), learning,
+                          seed);
+           }),
+           py::kw_only(), py::arg("approximator"), py::arg("n_actions"), py::arg("learning"),
+           py::arg("seed"))
+      .def(
+          "action_value",
+          [](Agent& self, std::size_t dimension) -> Approximator& {
+            core::require(dimension < self.n_dimensions(), "dimension",
+                          "less than " + std::to_string(self.n_dimensions()), dimension);
+            return self.action_value().part(dimension);
+          },
+          py::arg("dimension"), py::return_value_policy::reference_internal);
+  def_q_learning(agent);
 }
 
 }  // namespace
@@ -87,6 +144,9 @@ void bind_agents(py::module_& module) {
             return policy.select(bindings::vector(values, "values"), step, explore);
           },
           py::arg("values"), py::arg("step"), py::arg("explore") = true);
+  py::enum_<agents::ValueRange>(module, "ValueRange", "Whether the range of values is fixed")
+      .value("given", agents::ValueRange::given)
+      .value("seen", agents::ValueRange::seen);
   bindings::bind_config<QLearningConfig>(module, "QLearningConfig", "The parameters of Q-learning");
   bindings::bind_config<FuzzyQLearningConfig>(module, "FuzzyQLearningConfig",
                                               "The parameters of fuzzy Q-learning");
@@ -98,39 +158,53 @@ void bind_agents(py::module_& module) {
       "paper_preset", [parts](int n_inputs) { return parts(agents::paper_preset(n_inputs)); },
       py::arg("n_inputs"), "Settings of approximator and learning, as in the paper");
   module.def(
+      "general_preset", [parts](int n_inputs) { return parts(agents::general_preset(n_inputs)); },
+      py::arg("n_inputs"), "Settings of approximator and learning, as recommended for any task");
+  module.def(
       "robust_preset", [parts](int n_inputs) { return parts(agents::robust_preset(n_inputs)); },
       py::arg("n_inputs"), "Settings of approximator and learning, as recommended");
 
+  module.def("seed_of_dimension", &approximators::seed_of_dimension, py::arg("seed"), py::arg("d"),
+             "The seed of the network of a dimension of the action");
+
   using SDNNAgent = agents::QLearning<SDNNC>;
-  py::class_<SDNNAgent> sdnn_agent(module, "SDNNQLearning", "Q-learning with SDNN-C");
-  def_q_learning<SDNNCConfig>(sdnn_agent, [](const SDNNCConfig& config, std::uint64_t seed) {
+  const auto make_sdnn = [](const SDNNCConfig& config, std::uint64_t seed) {
     return SDNNC(config, seed);
-  });
-  sdnn_agent.def(
-      py::init([](const SDNNCConfig& approximator, const QLearningConfig& learning,
-                  std::uint64_t seed, const std::vector<ArrayArgument<std::int8_t>>& tables) {
-        return SDNNAgent(SDNNC(approximator, bindings::tables_of(tables), seed), learning, seed);
-      }),
-      py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"),
-      py::arg("tables"), "With the patterns of each input: (n_bins, m) of -1, +1");
-  def_q_learning<RBFNetworkConfig>(
-      py::class_<agents::QLearning<RBFNetwork>>(module, "RBFQLearning",
-                                                "Q-learning with an RBF network"),
-      [](const RBFNetworkConfig& config, std::uint64_t) { return RBFNetwork(config); });
-  def_agent(py::class_<FuzzyQLearning>(module, "FuzzyQLearning",
-                                       "Fuzzy Q-learning; actions are numbers in [-1, 1]")
-                .def(py::init([](const FuzzyRulesConfig& approximator,
-                                 const FuzzyQLearningConfig& learning, std::uint64_t seed) {
-                       return FuzzyQLearning(FuzzyRules(approximator), learning, seed);
-                     }),
-                     py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"))
-                .def_property_readonly(
-                    "rules", [](FuzzyQLearning& agent) -> FuzzyRules& { return agent.rules(); },
-                    py::return_value_policy::reference_internal)
-                .def(
-                    "value",
-                    [](FuzzyQLearning& agent, const ArrayArgument<double>& state) {
-                      return agent.value(bindings::vector(state, "state"));
-                    },
-                    py::arg("state"), "V(state)"));
+  };
+  bind_q_learning<SDNNCConfig, SDNNC>(module, "SDNNQLearning", "Q-learning with SDNN-C", make_sdnn)
+      .def(py::init([](const SDNNCConfig& approximator, const QLearningConfig& learning,
+                       std::uint64_t seed, const std::vector<ArrayArgument<std::int8_t>>& tables) {
+             return SDNNAgent(SDNNC(approximator, bindings::tables_of(tables), seed), learning,
+                              seed);
+           }),
+           py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"),
+           py::arg("tables"), "With the patterns of each input: (n_bins, m) of -1, +1");
+  bind_decoupled_q_learning<SDNNCConfig, SDNNC>(
+      module, "DecoupledSDNNQLearning", "Q-learning with an SDNN-C per dimension", make_sdnn);
+  const auto make_rbf = [](const RBFNetworkConfig& config, std::uint64_t) {
+    return RBFNetwork(config);
+  };
+  bind_q_learning<RBFNetworkConfig, RBFNetwork>(module, "RBFQLearning",
+                                                "Q-learning with an RBF network", make_rbf);
+  bind_decoupled_q_learning<RBFNetworkConfig, RBFNetwork>(
+      module, "DecoupledRBFQLearning", "Q-learning with an RBF network per dimension", make_rbf);
+  py::class_<FuzzyQLearning> fuzzy_agent(module, "FuzzyQLearning",
+                                         "Fuzzy Q-learning; actions are numbers in [-1, 1]");
+  fuzzy_agent
+      .def(py::init([](const FuzzyRulesConfig& approximator, const FuzzyQLearningConfig& learning,
+                       std::uint64_t seed) {
+             return FuzzyQLearning(FuzzyRules(approximator), learning, seed);
+           }),
+           py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"))
+      .def_property_readonly(
+          "rules", [](FuzzyQLearning& agent) -> FuzzyRules& { return agent.rules(); },
+          py::return_value_policy::reference_internal)
+      .def_property_readonly("last_action", &FuzzyQLearning::last_action)
+      .def(
+          "value",
+          [](FuzzyQLearning& agent, const ArrayArgument<double>& state) {
+            return agent.value(bindings::vector(state, "state"));
+          },
+          py::arg("state"), "V(state)");
+  def_agent(fuzzy_agent);
 }

@@ -1,6 +1,9 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <tuple>
+#include <utility>
+
 #include "arrays.hpp"
 #include "bind_config.hpp"
 #include "bindings.hpp"
@@ -163,6 +166,22 @@ void bind_approximators(py::module_& module) {
       .def("permutation", &permutation, py::arg("mu"), py::arg("nu"), "sigma_mu_nu: (m,)")
       .def("weights", &weights, "A copy, in lattice steps: (n, D)")
       .def("thresholds", &thresholds, "A copy, in lattice steps: (n,)")
+      .def_property_readonly(
+          "output_range",
+          [](const SDNNC& net) {
+            const auto& scale = net.output_scale();
+            return std::pair(scale.q_low(), scale.q_high());
+          },
+          "(q_low, q_high) as they are now")
+      .def_property_readonly(
+          "correction_counts",
+          [](const SDNNC& net) {
+            const auto& counts = net.correction_counts();
+            return std::tuple(counts.changed, counts.rounded_away, counts.out_of_range,
+                              counts.asked);
+          },
+          "Corrections that changed units, that were rounded to no change, "
+          "that wanted values outside the range, and all of them")
       .def(
           "set_parameters",
           [](SDNNC& net, const ArrayArgument<std::int32_t>& new_weights,

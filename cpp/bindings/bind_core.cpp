@@ -55,6 +55,8 @@ void bind_elementary(py::module_& module) {
       py::arg("x"), "(sin x, cos x), item by item");
   module.def("exp", py::vectorize([](double x) { return core::exp(x); }), py::arg("x"));
   module.def("log", py::vectorize([](double x) { return core::log(x); }), py::arg("x"));
+  module.def("atan2", py::vectorize([](double y, double x) { return core::atan2(y, x); }),
+             py::arg("y"), py::arg("x"));
   module.def("normal_quantile", py::vectorize([](double p) { return core::normal_quantile(p); }),
              py::arg("p"));
 }

@@ -4,12 +4,15 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <vector>
 
+#include "agents/lives.hpp"
 #include "allocation_count.hpp"
 #include "sdnn/core/random.hpp"
+#include "states.hpp"
 
 namespace sdnn::agents {
 namespace {
@@ -231,6 +234,74 @@ TEST(FuzzyQLearning, ABadTransitionTeachesNothing) {
   EXPECT_THROW((void)agent.act(bad), std::invalid_argument);
   for (const float value : table(agent)) EXPECT_EQ(value, 0.0F);
   EXPECT_EQ(learn(state, action, 1.0, other), "no error");
+}
+
+FuzzyQLearning traced_agent() {
+  return {FuzzyRules({.n_inputs = 2, .n_sets = 4, .n_actions = 5}),
+          {.trace_decay = 0.8, .policy = {.epsilon = 0.3, .n_greedy_steps = 2}},
+          3};
+}
+
+TEST(FuzzyQLearning, ALifeCanBeCutAnywhere) {
+  testing::expect_that_a_life_can_be_cut(traced_agent);
+}
+
+TEST(FuzzyQLearning, ARestoredAgentAllocatesNothing) {
+  testing::expect_that_a_restored_agent_allocates_nothing(traced_agent, testing::allocation_count);
+}
+
+TEST(FuzzyQLearning, AStateWithoutAnActForgetsTheLast) {
+  FuzzyQLearning agent = traced_agent();
+  const core::State fresh = core::state_of(agent);
+  const State state = {0.3, 0.6};
+  const double action = agent.act(state);
+  core::restore(agent, fresh);
+  EXPECT_THROW(agent.learn(state, action, 1.0, state, false), std::invalid_argument);
+  EXPECT_EQ(agent.act(state), action);
+}
+
+TEST(FuzzyQLearning, RefusesAStateThatDoesNotFit) {
+  FuzzyQLearning agent = traced_agent();
+  agent.begin_episode();
+  for (const State& state : {State{0.3, 0.6}, State{0.9, 0.1}}) {
+    const double action = agent.act(state);
+    agent.learn(state, action, 1.0, State{0.9, 0.1}, false);
+  }
+  (void)agent.act(State{0.2, 0.3});
+  testing::expect_that_damage_is_refused(agent);
+  const core::State good = core::state_of(agent);
+  ASSERT_EQ(good.at("eligibilities").size(), 8U);
+  using testing::with_number;
+  const auto refused = [&](const core::State& bad, const std::string& message) {
+    testing::expect_refused(agent, bad, "state: " + message);
+  };
+  refused(with_number(good, "step", -1), "step must be 0 or more");
+  refused(with_number(good, "rules.values", std::numeric_limits<float>::infinity(), 7),
+          "rules.values must be finite");
+  refused(with_number(good, "rules.values", std::nanf(""), 7), "rules.values must be finite");
+  for (const double bad : {testing::kNaN, -1.5, 1.5}) {
+    refused(with_number(good, "last_state", bad, 1), "last_state must be in [0, 1]");
+    refused(with_number(good, "last_action", bad), "last_action must be in [-1, 1]");
+  }
+  for (const double bad : {testing::kNaN, testing::kInfinity, -0.5}) {
+    refused(with_number(good, "eligibilities", bad, 2), "eligibilities must be finite");
+  }
+  for (const std::int64_t bad : {std::int64_t{-1}, std::int64_t{16}}) {
+    refused(with_number(good, "traced", bad, 2), "traced must be of rules and actions");
+  }
+  for (const std::int64_t bad : {std::int64_t{-1}, std::int64_t{5}}) {
+    refused(with_number(good, "traced", bad, 3), "traced must be of rules and actions");
+    refused(with_number(good, "picked", bad, 3), "picked must be of actions");
+  }
+  core::State bad = good;
+  bad["picked"] = testing::tensor_of<std::int64_t>({0, 0});
+  refused(bad, "picked must be one per rule that fired");
+  bad = good;
+  bad["traced"] = testing::tensor_of<std::int64_t>({0, 0});
+  refused(bad, "traced must be two per eligibility");
+  bad["traced"] = testing::tensor_of(std::vector<std::int64_t>(200000, 0));
+  bad["eligibilities"] = testing::tensor_of(std::vector<double>(100000, 1.0));
+  refused(bad, "eligibilities must be not too many");
 }
 
 }  // namespace

@@ -4,12 +4,21 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "agents/lives.hpp"
+#include "allocation_count.hpp"
 #include "approximators/lookup_table.hpp"
+#include "sdnn/approximators/decoupled.hpp"
+#include "sdnn/approximators/rbf_network.hpp"
+#include "sdnn/approximators/sdnn_c.hpp"
 #include "sdnn/core/random.hpp"
+#include "states.hpp"
 
 namespace sdnn::agents {
 namespace {
@@ -226,6 +235,269 @@ TEST(QLearning, ABadTransitionTeachesNothing) {
   EXPECT_THROW(agent.learn(std::vector<double>{0.1, 0.2}, 0, 1.0, cell(1), false),
                std::invalid_argument);
   EXPECT_EQ(agent.action_value(), before);
+}
+
+using approximators::Decoupled;
+using approximators::RBFNetwork;
+using approximators::SDNNC;
+using Indices = std::vector<std::size_t>;
+
+TEST(QLearning, ABadTransitionLeavesTheWholeStateAsItWas) {
+  using Vectors = QLearning<Decoupled<RBFNetwork>>;
+  Vectors agent(Decoupled<RBFNetwork>({RBFNetwork({.n_inputs = 1, .n_actions = 3}),
+                                       RBFNetwork({.n_inputs = 1, .n_actions = 2})}),
+                {.value_range = ValueRange::seen}, 1);
+  agent.learn(cell(0), Indices{2, 1}, 1.0, cell(1), false);
+  const core::State before = core::state_of(agent);
+  for (const Indices& bad : {Indices{}, Indices{1}, Indices(40, 0), Indices{3, 0}, Indices{0, 2}}) {
+    EXPECT_THROW(agent.learn(cell(0), bad, 1.0, cell(1), false), std::invalid_argument);
+  }
+  const std::vector<double> longer(40, 0.5), shorter;
+  EXPECT_THROW(agent.learn(longer, Indices{0, 0}, 1.0, cell(1), false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(shorter, Indices{0, 0}, 1.0, cell(1), false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(cell(0), Indices{0, 0}, 1.0, longer, false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(cell(0), Indices{0, 0}, testing::kNaN, cell(1), false),
+               std::invalid_argument);
+  EXPECT_THROW((void)agent.act(longer), std::invalid_argument);
+  EXPECT_THROW((void)agent.act(Position{testing::kNaN}), std::invalid_argument);
+  EXPECT_THROW((void)agent.act(shorter, false), std::invalid_argument);
+  EXPECT_EQ(core::state_of(agent), before);
+}
+
+// With so many actions two drawn one after the other are the same hardly ever.
+TEST(QLearning, ARandomActionLastsKStepsWithProbabilityOneKth) {
+  constexpr int kLongest = 8, kDraws = 20000;
+  Agent agent(LookupTable(1, 1, 1 << 17),
+              {.policy = {.epsilon = 1.0, .n_greedy_steps = 0}, .max_repetitions = kLongest}, 4);
+  std::array<int, kLongest + 1> at_least{};
+  std::size_t last = agent.act(cell(0));
+  int lasted = 1;
+  for (int n = 0; n < kDraws;) {
+    const std::size_t action = agent.act(cell(0));
+    if (action == last) {
+      ASSERT_LT(lasted++, kLongest);
+      continue;
+    }
+    for (std::size_t k = 1; k <= static_cast<std::size_t>(lasted); ++k) ++at_least[k];
+    last = action;
+    lasted = 1;
+    ++n;
+  }
+  for (int k = 1; k <= kLongest; ++k) {
+    const double p = 1.0 / k;
+    EXPECT_NEAR(at_least[static_cast<std::size_t>(k)], kDraws * p,
+                5.0 * std::sqrt(kDraws * p * (1.0 - p)) + 1e-9)
+        << k;
+  }
+}
+
+TEST(QLearning, AKeptActionEndsWithTheEpisodeAndEvaluationDoesNotUseItUp) {
+  LookupTable table(1, 1, 1 << 17);
+  table.correct(cell(0), 5, 1.0);
+  Agent agent(table, {.policy = {.epsilon = 1.0, .n_greedy_steps = 0}, .max_repetitions = 1000}, 1);
+  int n_kept = 0;
+  for (int i = 0; i < 200; ++i) {
+    agent.begin_episode();
+    const std::size_t action = agent.act(cell(0));
+    for (int j = 0; j < 3; ++j) EXPECT_EQ(agent.act(cell(0), false), 5U);
+    n_kept += agent.act(cell(0)) == action;
+    Agent begun = agent;
+    begun.begin_episode();
+    EXPECT_NE(begun.act(cell(0)), action);
+  }
+  EXPECT_NEAR(n_kept, 100, 36);  // P(d >= 2)
+}
+
+TEST(QLearning, WithoutRepetitionsTheirStreamIsNotTouched) {
+  QLearning<RBFNetwork> agent(RBFNetwork({.n_inputs = 1}),
+                              {.policy = {.epsilon = 1.0, .n_greedy_steps = 0}}, 1);
+  const core::State before = core::state_of(agent);
+  for (int i = 0; i < 10; ++i) (void)agent.act(cell(0));
+  const core::State after = core::state_of(agent);
+  EXPECT_EQ(after.at("repetitions.words"), before.at("repetitions.words"));
+  EXPECT_NE(after.at("policy.exploration.words"), before.at("policy.exploration.words"));
+}
+
+TEST(QLearning, RatesGoInAStraightLineWithProgress) {
+  Agent agent(LookupTable(1, 5, 2),
+              {.learning_rate = 0.5,
+               .policy = {.epsilon = 0.75},
+               .final_learning_rate = 0.25,
+               .final_epsilon = 0.0},
+              1);
+  EXPECT_EQ(agent.progress(), 0.0);
+  EXPECT_EQ(agent.learning_rate(), 0.5);
+  EXPECT_EQ(agent.epsilon(), 0.75);
+  agent.set_progress(0.25);
+  EXPECT_EQ(agent.learning_rate(), 0.4375);
+  EXPECT_EQ(agent.epsilon(), 0.5625);
+  agent.learn(cell(0), 0, 16.0, cell(1), true);
+  EXPECT_EQ(agent.action_value().value(cell(0), 0), 7.0);
+  agent.set_progress(1.0);
+  EXPECT_EQ(agent.learning_rate(), 0.25);
+  EXPECT_EQ(agent.epsilon(), 0.0);
+  for (const double bad : {-1e-9, 1.0000001, testing::kNaN}) {
+    EXPECT_THROW(agent.set_progress(bad), std::invalid_argument);
+  }
+  EXPECT_EQ(agent.progress(), 1.0);
+  agent.set_progress(0.0);  // nothing is left of what was
+  EXPECT_EQ(agent.learning_rate(), 0.5);
+  Agent steady(LookupTable(1, 5, 2), {}, 1);
+  steady.set_progress(0.9);
+  EXPECT_EQ(steady.learning_rate(), 0.5);
+  EXPECT_EQ(steady.epsilon(), 0.1);
+}
+
+TEST(QLearning, NamesWhatIsImpossibleOfWhatIsNotInThePaper) {
+  EXPECT_EQ(message({.max_repetitions = 0}), "max_repetitions must be in [1, 1000000], got 0");
+  EXPECT_EQ(message({.final_learning_rate = 0.0}), "final_learning_rate must be in (0, 1], got 0");
+  EXPECT_EQ(message({.final_learning_rate = testing::kNaN}),
+            "final_learning_rate must be in (0, 1], got nan");
+  EXPECT_EQ(message({.final_epsilon = 1.5}), "final_epsilon must be in [0, 1], got 1.5");
+}
+
+/// A network of which counts from 4 to 36 stand for values from -16 to 16: all whole numbers.
+approximators::SDNNCConfig network() {
+  return {.n_inputs = 2,
+          .n_pattern_units = 16,
+          .n_anchor_patterns = 3,
+          .n_interpolated = 3,
+          .n_hidden_units = 60,
+          .n_active_units = 40,
+          .n_actions = 7,
+          .q_low = -16.0,
+          .q_high = 16.0,
+          .u_low = 4,
+          .u_high = 36};
+}
+
+// gamma = 1/2: the first sum is 8, so the range is 8 and a quarter more.
+TEST(QLearning, TheRangeOfValuesFollowsTheRewards) {
+  QLearning<SDNNC> agent(SDNNC(network(), 1), {.discount = 0.5, .value_range = ValueRange::seen},
+                         1);
+  const auto expect_range = [&agent](double low, double high) {
+    EXPECT_EQ(agent.action_value().output_scale().q_low(), low);
+    EXPECT_EQ(agent.action_value().output_scale().q_high(), high);
+  };
+  const std::vector<double> state = {0.3, 0.6};
+  agent.learn(state, 0, 0.0, state, false);
+  expect_range(-16.0, 16.0);  // nothing is known yet
+  agent.learn(state, 0, 8.0, state, false);
+  expect_range(0.0, 10.0);
+  agent.learn(state, 0, -20.0, state, false);  // -20 + 8 / 2 = -16, and (10 + 16) / 4
+  expect_range(-22.5, 10.0);
+  agent.begin_episode();
+  agent.learn(state, 0, 10.0, state, false);
+  expect_range(-22.5, 10.0);
+
+  QLearning<SDNNC> given(SDNNC(network(), 1), {.discount = 0.5}, 1);
+  given.learn(state, 0, 1000.0, state, false);
+  EXPECT_EQ(given.action_value().output_scale().q_high(), 16.0);
+}
+
+QLearningConfig everything() {
+  return {.policy = {.epsilon = 0.3, .n_greedy_steps = 2},
+          .n_steps = 4,
+          .max_repetitions = 5,
+          .final_learning_rate = 0.25,
+          .final_epsilon = 0.0,
+          .value_range = ValueRange::seen};
+}
+
+QLearning<SDNNC> sdnn_agent() {
+  approximators::SDNNCConfig config = network();
+  config.rounding = approximators::Rounding::random;
+  return {SDNNC(config, 3), everything(), 3};
+}
+
+QLearning<RBFNetwork> rbf_agent() {
+  return {RBFNetwork({.n_inputs = 2, .n_bases = 3, .n_actions = 7, .gradient_rate = 0.5}),
+          everything(), 3};
+}
+
+QLearning<Decoupled<SDNNC>> vector_agent() {
+  approximators::SDNNCConfig config = network();
+  config.rounding = approximators::Rounding::random;
+  std::vector<SDNNC> parts = {SDNNC(config, 3)};
+  config.n_actions = 5;
+  parts.emplace_back(config, approximators::seed_of_dimension(3, 1));
+  return {Decoupled<SDNNC>(std::move(parts)), everything(), 3};
+}
+
+TEST(QLearning, ALifeCanBeCutAnywhere) {
+  testing::expect_that_a_life_can_be_cut(sdnn_agent);
+  testing::expect_that_a_life_can_be_cut(rbf_agent);
+  testing::expect_that_a_life_can_be_cut(vector_agent);
+}
+
+TEST(QLearning, ARestoredAgentAllocatesNothing) {
+  testing::expect_that_a_restored_agent_allocates_nothing(sdnn_agent, testing::allocation_count);
+  testing::expect_that_a_restored_agent_allocates_nothing(rbf_agent, testing::allocation_count);
+}
+
+// All numbers are multiples of 1/4: the errors of one dimension have no rounding.
+TEST(QLearning, OfOneDimensionDoesWhatAnAgentWithoutDimensionsDoes) {
+  const QLearningConfig config{
+      .discount = 0.5, .policy = {.epsilon = 0.3, .n_greedy_steps = 2}, .max_repetitions = 3};
+  QLearning<SDNNC> plain(SDNNC(network(), 3), config, 3);
+  QLearning<Decoupled<SDNNC>> decoupled(Decoupled<SDNNC>({SDNNC(network(), 3)}), config, 3);
+  testing::World<QLearning<SDNNC>> world(2, 9);
+  testing::World<QLearning<Decoupled<SDNNC>>> same_world(2, 9);
+  for (int t = 0; t < 4000; ++t) {
+    const auto action = world.tick(plain);
+    const auto same = same_world.tick(decoupled);
+    ASSERT_EQ(same, action ? std::optional(Indices{*action}) : std::nullopt) << t;
+  }
+  EXPECT_GT(plain.action_value().correction_counts().changed, 1000U);
+  core::State state;
+  for (const auto& [name, tensor] : core::state_of(decoupled)) {
+    const std::string part = "action_value.0.";
+    state.emplace(name.starts_with(part) ? "action_value." + name.substr(part.size()) : name,
+                  tensor);
+  }
+  EXPECT_EQ(core::state_of(plain), state);
+}
+
+TEST(QLearning, RefusesAStateThatDoesNotFit) {
+  auto agent = sdnn_agent();
+  testing::World<QLearning<SDNNC>> world(2, 7);
+  while (testing::number_of<std::int32_t>(core::state_of(agent), "n_kept") == 0 ||
+         core::state_of(agent).at("waiting.rewards").size() < 2) {
+    world.tick(agent);
+  }
+  testing::expect_that_damage_is_refused(agent);
+  const core::State good = core::state_of(agent);
+  using testing::with_number;
+  const auto refused = [&](const core::State& bad, const std::string& message) {
+    testing::expect_refused(agent, bad, "state: " + message);
+  };
+  for (const std::int64_t bad : {-1, 7}) {
+    refused(with_number(good, "waiting.actions", bad, 1), "waiting.actions must be of actions");
+    refused(with_number(good, "kept_action", bad), "kept_action must be an action");
+  }
+  refused(with_number(good, "waiting.rewards", testing::kNaN, 1), "waiting.rewards must be finite");
+  refused(with_number(good, "waiting.states", testing::kNaN, 3),
+          "waiting.states must be in [0, 1]");
+  refused(with_number(good, "step", -1), "step must be 0 or more");
+  refused(with_number(good, "n_kept", -1), "n_kept must be in [0, max_repetitions)");
+  refused(with_number(good, "n_kept", 5), "n_kept must be in [0, max_repetitions)");
+  for (const double bad : {testing::kNaN, -0.1, 1.1}) {
+    refused(with_number(good, "progress", bad), "progress must be in [0, 1]");
+  }
+  refused(with_number(good, "range.low", testing::kNaN), "range.low must be finite");
+  core::State bad = good;
+  bad["kept_action"] = testing::tensor_of<std::int64_t>({0, 0});
+  refused(bad, "kept_action must be one per dimension");
+  bad = good;  // as many as the ring has places: the next would have none
+  bad["waiting.rewards"] = testing::tensor_of(std::vector<double>(4, 0.0));
+  bad["waiting.actions"] = testing::tensor_of(std::vector<std::int64_t>(4, 0));
+  bad["waiting.states"] = testing::tensor_of(std::vector<double>(8, 0.0));
+  refused(bad, "waiting.rewards must be fewer than n_steps");
+  bad = good;
+  for (std::size_t i = 0; i < 4; ++i) {
+    bad = with_number(bad, "policy.ties.words", std::uint64_t{0}, i);
+  }
+  refused(bad, "policy.ties.words must be not all 0");
 }
 
 }  // namespace

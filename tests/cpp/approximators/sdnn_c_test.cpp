@@ -6,12 +6,14 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "allocation_count.hpp"
 #include "sdnn/coding/anchor_patterns.hpp"
 #include "sdnn/coding/random_inverse.hpp"
 #include "sdnn/core/random.hpp"
+#include "states.hpp"
 
 namespace sdnn::approximators {
 namespace {
@@ -524,6 +526,81 @@ TEST(SDNNC, ABadArgumentChangesNothing) {
   EXPECT_THROW(network.values(good, short_row), std::invalid_argument);
   expect_equal_parameters(network, before);
   EXPECT_EQ(values(network, good), values_by_masks(network, good));
+}
+
+TEST(SDNNC, AnotherRangeMovesValuesButNotTheirPlaceInIt) {
+  Network network(small(), 1);
+  core::Random random(6, core::Stream::ties);
+  const State state = random_state(3, random);
+  network.correct(state, 3, 9.0);
+  const std::vector<double> before = values(network, state);
+  const double low = network.output_scale().q_low(), high = network.output_scale().q_high();
+  network.set_output_range(100.0, 300.0);
+  const std::vector<double> after = values(network, state);
+  for (std::size_t a = 0; a < before.size(); ++a) {
+    EXPECT_NEAR((after[a] - 100.0) / 200.0, (before[a] - low) / (high - low), 1e-12);
+    EXPECT_EQ(after[a], network.value(state, a));
+  }
+  for (const auto& [bad_low, bad_high] : {std::pair(1.0, 1.0), std::pair(std::nan(""), 2.0),
+                                          std::pair(-1e302, 1.0), std::pair(0.0, 1e302)}) {
+    EXPECT_THROW(network.set_output_range(bad_low, bad_high), std::invalid_argument);
+  }
+  EXPECT_EQ(values(network, state), after);
+  network.set_output_range(low, high);
+  EXPECT_EQ(values(network, state), before);
+}
+
+// 30 units for values from 0 to 30; Q = 15 everywhere at the start.
+TEST(SDNNC, CountsWhatBecomesOfCorrections) {
+  Network network({.n_inputs = 2,
+                   .n_pattern_units = 40,
+                   .n_hidden_units = 60,
+                   .n_active_units = 30,
+                   .q_low = 0.0,
+                   .q_high = 30.0,
+                   .u_low = 0,
+                   .u_high = 30},
+                  1);
+  const State state = {0.2, 0.7};
+  const auto expect_counts = [&network](unsigned changed, unsigned rounded, unsigned outside) {
+    EXPECT_EQ(network.correction_counts().changed, changed);
+    EXPECT_EQ(network.correction_counts().rounded_away, rounded);
+    EXPECT_EQ(network.correction_counts().out_of_range, outside);
+  };
+  ASSERT_EQ(network.value(state, 0), 15.0);
+  network.correct(state, 0, 15.0);
+  expect_counts(0, 0, 0);  // nothing was wanted
+  network.correct(state, 0, 15.4);
+  expect_counts(0, 1, 0);
+  network.correct(state, 0, 16.0);
+  expect_counts(1, 1, 0);
+  network.correct(state, 0, 31.0);
+  expect_counts(2, 1, 1);
+}
+
+TEST(SDNNC, RefusesAStateThatDoesNotFit) {
+  Network network({.n_inputs = 2,
+                   .n_pattern_units = 8,
+                   .n_anchor_patterns = 3,
+                   .n_interpolated = 3,
+                   .n_hidden_units = 12,
+                   .n_active_units = 6},
+                  1);
+  testing::expect_that_damage_is_refused(network);
+  const core::State good = core::state_of(network);
+  EXPECT_EQ(good.at("weights").shape, (std::vector<std::size_t>{12, 16}));
+  const auto refused = [&](const core::State& bad, const std::string& message) {
+    testing::expect_refused(network, bad, "state: " + message);
+  };
+  using testing::with_number;
+  refused(with_number(good, "weights", std::int16_t{32767}, 100), "weights must be such that ");
+  refused(with_number(good, "weights", std::int16_t{-32768}, 100), "weights must be such that ");
+  refused(with_number(good, "thresholds", std::int32_t{1} << 30, 3), "thresholds must be of less");
+  refused(with_number(good, "thresholds", std::numeric_limits<std::int32_t>::min(), 3),
+          "thresholds must be of less");
+  for (const double bad : {std::nan(""), 20.0, -std::numeric_limits<double>::infinity(), 1e302}) {
+    refused(with_number(good, "output_range", bad, 0), "output_range must be such that q_");
+  }
 }
 
 }  // namespace

@@ -162,6 +162,64 @@ TEST(Exp, KeepsItsBits) {
   EXPECT_EQ(digest, 2816221857222245310U);
 }
 
+// References: mpmath with 200 bits, rounded once.
+TEST(Atan2, IsWithinTwoUlpAtRepresentativeAndHardPoints) {
+  struct Row {
+    double y, x, angle;
+  };
+  constexpr Row kRows[] = {
+      {0.1, 1.0, 0x1.983e282e2cc4dp-4},           {1.0, 1.0, 0x1.921fb54442d18p-1},
+      {0.5, 1.0, 0x1.dac670561bb4fp-2},           {0.5000001, 1.0, 0x1.dac675b47f69ep-2},
+      {1.0, 0.5, 0x1.1b6e192ebbe44p+0},           {-0.25, 0.97, -0x1.024bd8cd329cep-2},
+      {0.6, -0.8, 0x1.3fc176b7a8560p+1},          {-0.6, -0.8, -0x1.3fc176b7a8560p+1},
+      {0.99, -0.01, 0x1.94b5aa54e9ab2p+0},        {-1.0, -1e-09, -0x1.921fb5488e548p+0},
+      {1e-09, -1.0, 0x1.921fb5421d100p+1},        {3e-320, 2e-310, 0x1.49d98d8cd7e40p-33},
+      {1.7e+308, 1.6e+308, 0x1.a1a25f2c82506p-1}, {-1e+308, -1.7e+308, -0x1.4e102c80931dcp+1},
+      {5e-324, 1.0, 0x0.0000000000001p-1022},     {1e+300, 1e-300, 0x1.921fb54442d18p+0},
+      {0.241963, 0.475877, 0x1.e1adff68a6490p-2}, {-0.577, 0.9991, -0x1.0c25ccc51e68bp-1},
+  };
+  for (const auto& row : kRows) {
+    const double got = sdnn::core::atan2(row.y, row.x);
+    const double next = std::nextafter(row.angle, got);
+    EXPECT_TRUE(adjacent(got, row.angle) || adjacent(got, next)) << row.y << " " << row.x;
+  }
+}
+
+TEST(Atan2, IsWithinTwoUlpOfALongerFormat) {
+  if (std::numeric_limits<long double>::digits < 64) GTEST_SKIP() << "there is none here";
+  for (int i = 0; i < 200000; ++i) {
+    const double turn = 3.7e-5 * i, length = std::ldexp(1.0, i % 600 - 300);
+    const double y = length * std::sin(turn), x = length * std::cos(turn);
+    const long double exact = std::atan2(static_cast<long double>(y), static_cast<long double>(x));
+    const double nearest = static_cast<double>(exact);
+    const double ulp = std::nextafter(std::abs(nearest), kInfinity) - std::abs(nearest);
+    ASSERT_LE(std::abs(static_cast<double>(sdnn::core::atan2(y, x) - exact)), 2.0 * ulp) << turn;
+  }
+}
+
+TEST(Atan2, TreatsZerosAndInfinitiesAsTheCLibraryDoes) {
+  for (const double y : {0.0, -0.0, 1.0, -1.0, 5e-324, -5e-324, kInfinity, -kInfinity}) {
+    for (const double x : {0.0, -0.0, 2.0, -2.0, 1.7e308, -1.7e308, kInfinity, -kInfinity}) {
+      const double got = sdnn::core::atan2(y, x), expected = std::atan2(y, x);
+      EXPECT_DOUBLE_EQ(got, expected) << y << " " << x;
+      EXPECT_EQ(std::signbit(got), std::signbit(expected)) << y << " " << x;
+      EXPECT_LE(std::abs(got), sdnn::core::kPi);
+    }
+  }
+  EXPECT_TRUE(std::isnan(sdnn::core::atan2(kNaN, 1.0)));
+  EXPECT_TRUE(std::isnan(sdnn::core::atan2(1.0, kNaN)));
+}
+
+// The bits are the same with every compiler and optimization level.
+TEST(Atan2, KeepsItsBits) {
+  std::uint64_t digest = 0;
+  for (int i = -50000; i < 50000; ++i) {
+    const double y = 0.37 * (i % 313) + 0.01, x = 0.73 * (i % 97) - 0.02 * i;
+    digest = digest * 31 + std::bit_cast<std::uint64_t>(sdnn::core::atan2(y, x));
+  }
+  EXPECT_EQ(digest, 11845609870576631536U);
+}
+
 TEST(NormalQuantile, AgreesWithTheInvertedDistributionFunction) {
   constexpr std::pair<double, double> kRows[] = {
       {0.5, 0.0},

@@ -11,6 +11,9 @@
 #include <span>
 #include <vector>
 
+#include "sdnn/core/state.hpp"
+#include "states.hpp"
+
 namespace {
 
 using sdnn::core::Random;
@@ -131,6 +134,23 @@ TEST(Random, ShuffleReachesEveryOrderEquallyOften) {
       EXPECT_NEAR(count, 10000, 5 * 91.3);
     }
   }
+}
+
+TEST(Random, GoesOnFromItsState) {
+  Random random(1, Stream::weights);
+  for (int i = 0; i < 100; ++i) (void)random.bits();
+  Random other(2, Stream::ties);
+  sdnn::core::restore(other, sdnn::core::state_of(random));
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(other.bits(), random.bits());
+}
+
+// Of zeros alone come zeros for ever, and below(3) would wait for another number.
+TEST(Random, RefusesAStateOfZeros) {
+  Random random(1, Stream::weights);
+  sdnn::testing::expect_that_damage_is_refused(random);
+  auto bad = sdnn::core::state_of(random);
+  for (std::byte& byte : bad.at("words").bytes) byte = std::byte{0};
+  sdnn::testing::expect_refused(random, bad, "state: words must be not all 0");
 }
 
 }  // namespace

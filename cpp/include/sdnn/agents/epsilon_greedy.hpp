@@ -74,6 +74,34 @@ class EpsilonGreedy {
 
   const EpsilonGreedyConfig& config() const noexcept { return config_; }
 
+  /// Another probability of random actions. Throws std::invalid_argument outside [0, 1].
+  void set_epsilon(double epsilon) {
+    core::require_in_range("epsilon", epsilon, 0.0, 1.0);
+    config_.epsilon = epsilon;
+  }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void exchange(Self& self, Archive& archive) {
+    archive.part("exploration", self.exploration_);
+    archive.part("ties", self.ties_);
+    archive.part("evaluation_ties", self.evaluation_ties_);
+  }
+
+  /// Whether step number `step` (from 0) of an episode is to take a random action: drawn anew.
+  bool explores(int step) noexcept {
+    return step >= config_.n_greedy_steps && config_.epsilon > 0.0 &&
+           exploration_.uniform() < config_.epsilon;
+  }
+  /// Any of `n_actions` actions, with the same probability. Requires n_actions > 0.
+  std::size_t random_action(std::size_t n_actions) noexcept {
+    return static_cast<std::size_t>(exploration_.below(n_actions));
+  }
+  /// One of the best actions. Shape: values (n_actions,). Throws as select does.
+  std::size_t best_action(std::span<const double> values, bool explore) {
+    return greedy(values, explore ? ties_ : evaluation_ties_);
+  }
+
   /// The action for step number `step` (from 0) of an episode; without `explore` always a best one.
   ///
   /// Shape: values (n_actions,). Throws std::invalid_argument if it is empty or the best is NaN.
@@ -88,10 +116,7 @@ class EpsilonGreedy {
   template <class Value>
   std::size_t select_from(std::span<const Value> values, int step, bool explore) {
     core::require(!values.empty(), "values", "not empty", values.size());
-    if (explore && step >= config_.n_greedy_steps && config_.epsilon > 0.0 &&
-        exploration_.uniform() < config_.epsilon) {
-      return static_cast<std::size_t>(exploration_.below(values.size()));
-    }
+    if (explore && explores(step)) return random_action(values.size());
     return greedy(values, explore ? ties_ : evaluation_ties_);
   }
 

@@ -78,8 +78,7 @@ class FuzzyQLearning {
     for (std::size_t action = 0; action < rules_.n_actions(); ++action) {
       actions_.push_back(coding::action_value(action, rules_.n_actions(), -1.0, 1.0));
     }
-    picked_.reserve(rules_.max_fired());
-    traces_.reserve((trace_lifetime() + 1) * rules_.max_fired());
+    make_room();
   }
 
   const FuzzyQLearningConfig& config() const noexcept { return config_; }
@@ -90,6 +89,8 @@ class FuzzyQLearning {
   /// The rules that fired in the last exploring act, and the actions they picked.
   const approximators::FiredRules& fired() const noexcept { return fired_; }
   std::span<const std::size_t> picked() const noexcept { return picked_; }
+  /// The action that came of it.
+  double last_action() const noexcept { return action_; }
 
   /// Starts counting the steps of an episode anew and forgets the traces. The caller says when:
   /// learning a terminated transition ends the traces only.
@@ -162,12 +163,70 @@ class FuzzyQLearning {
     if (terminated) traces_.clear();
   }
 
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void exchange(Self& self, Archive& archive) {
+    archive.part("rules", self.rules_);
+    archive.part("policy", self.policy_);
+    archive.number("step", self.step_);
+    archive.fixed("last_state", {self.state_.size()}, self.state_);
+    archive.number("last_action", self.action_);
+    std::vector<std::int64_t> picked(self.picked_.begin(), self.picked_.end());
+    archive.numbers("picked", picked);
+    std::vector<std::int64_t> traced;
+    std::vector<double> eligibilities;
+    for (const Trace& trace : self.traces_) {
+      traced.push_back(static_cast<std::int64_t>(trace.rule));
+      traced.push_back(static_cast<std::int64_t>(trace.action));
+      eligibilities.push_back(trace.eligibility);
+    }
+    archive.numbers("traced", traced);
+    archive.numbers("eligibilities", eligibilities);
+    if constexpr (Archive::kReads) self.take(archive, picked, traced, eligibilities);
+  }
+
  private:
   struct Trace {
     std::size_t rule;
     std::size_t action;
     double eligibility;
   };
+
+  /// Takes over what was read, after checks.
+  template <class Archive>
+  void take(const Archive& archive, const std::vector<std::int64_t>& picked,
+            const std::vector<std::int64_t>& traced, const std::vector<double>& eligibilities) {
+    const auto is_below = [](std::int64_t number, std::size_t end) {
+      return number >= 0 && static_cast<std::uint64_t>(number) < end;
+    };
+    archive.expect(step_ >= 0, "step", "0 or more");
+    for (const double x : state_) archive.expect(x >= 0.0 && x <= 1.0, "last_state", "in [0, 1]");
+    archive.expect(action_ >= -1.0 && action_ <= 1.0, "last_action", "in [-1, 1]");
+    fired_ = rules_.no_rules();  // a copy has no room for what may fire
+    other_fired_ = rules_.no_rules();
+    picked_.clear();
+    if (!picked.empty()) {
+      rules_.fire(state_, fired_);
+      archive.expect(picked.size() == fired_.size(), "picked", "one per rule that fired");
+      for (const std::int64_t action : picked) {
+        archive.expect(is_below(action, rules_.n_actions()), "picked", "of actions");
+        picked_.push_back(static_cast<std::size_t>(action));
+      }
+    }
+    archive.expect(traced.size() == 2 * eligibilities.size(), "traced", "two per eligibility");
+    make_room();  // a copy has none
+    archive.expect(eligibilities.size() <= most_traces(), "eligibilities", "not too many");
+    traces_.clear();
+    for (std::size_t i = 0; i < eligibilities.size(); ++i) {
+      archive.expect(is_below(traced[2 * i], rules_.n_rules()) &&
+                         is_below(traced[2 * i + 1], rules_.n_actions()),
+                     "traced", "of rules and actions");
+      archive.expect(std::isfinite(eligibilities[i]) && eligibilities[i] >= 0.0, "eligibilities",
+                     "finite and 0 or more");
+      traces_.push_back({static_cast<std::size_t>(traced[2 * i]),
+                         static_cast<std::size_t>(traced[2 * i + 1]), eligibilities[i]});
+    }
+  }
 
   static constexpr double kSlowestFading = 0.99;  // bounds the room for traces
   static constexpr double kLargest = std::numeric_limits<float>::max();
@@ -190,6 +249,13 @@ class FuzzyQLearning {
     if (fading() == 0.0) return 0;
     return static_cast<std::size_t>(
         std::ceil(core::log(kForgottenTrace * (1.0 - fading())) / core::log(fading())));
+  }
+
+  std::size_t most_traces() const noexcept { return (trace_lifetime() + 1) * rules_.max_fired(); }
+
+  void make_room() {
+    picked_.reserve(rules_.max_fired());
+    traces_.reserve(most_traces());
   }
 
   double moved(const Trace& trace, double step) const noexcept {

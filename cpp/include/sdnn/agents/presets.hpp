@@ -15,8 +15,24 @@ struct Preset {
 /// As in the paper (section 4.2): the defaults.
 inline Preset paper_preset(int n_inputs) { return {.approximator = {.n_inputs = n_inputs}}; }
 
-/// Steady with noisy sensors: few actions part the best one from its neighbours by more than noise
-/// blurs, and a success that reaches the whole path at once is not forgotten (docs/collapse.md).
+/// For any task: a full step each time, then, as progress is told, ever smaller ones, which
+/// rounding stills one by one; targets of five steps; exploration that goes somewhere
+/// (docs/agents.md).
+inline Preset general_preset(int n_inputs) {
+  return {.approximator = {.n_inputs = n_inputs, .n_actions = 5},
+          .learning = {.learning_rate = 1.0,
+                       .discount = 0.99,
+                       .policy = {.epsilon = 0.1, .n_greedy_steps = 0},
+                       .n_steps = 5,
+                       .max_repetitions = 100,
+                       .final_learning_rate = 0.1,
+                       .final_epsilon = 0.01,
+                       .value_range = ValueRange::seen}};
+}
+
+/// Steady with noisy sensors in the paper's task: few actions part the best one from its neighbours
+/// by more than noise blurs, and a success that reaches the whole path at once is not forgotten
+/// (docs/collapse.md).
 inline Preset robust_preset(int n_inputs) {
   return {.approximator = {.n_inputs = n_inputs, .n_actions = 61}, .learning = {.n_steps = 5}};
 }

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -67,6 +68,17 @@ class FuzzyRules {
   std::size_t n_actions() const noexcept { return static_cast<std::size_t>(config_.n_actions); }
   std::size_t n_rules() const noexcept { return n_rules_; }
   std::size_t max_fired() const noexcept { return std::size_t{1} << n_inputs(); }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void exchange(Self& self, Archive& archive) {
+    archive.fixed("values", {self.n_rules_, self.n_actions()}, self.table_.span());
+    if constexpr (Archive::kReads) {
+      for (const float value : self.table_.span()) {
+        archive.expect(std::isfinite(value), "values", "finite");
+      }
+    }
+  }
 
   /// Writes the rules that fire in `state`. Rule numbers are row-major in the sets (last input
   /// fastest); where an input lies between two centres the rules of the lower one come first, and

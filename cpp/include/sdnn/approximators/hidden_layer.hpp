@@ -79,6 +79,10 @@ class HiddenLayer {
     }
     store(unit, column, value);
   }
+  /// Whether |value| is below 2^30.
+  static constexpr bool is_threshold(std::int32_t value) noexcept {
+    return value >= -kThresholdLimit && value <= kThresholdLimit;
+  }
   /// Throws std::invalid_argument if |value| reaches 2^30.
   void set_threshold(std::size_t unit, std::int32_t value) {
     core::require_in_range("threshold", value, -kThresholdLimit, kThresholdLimit);

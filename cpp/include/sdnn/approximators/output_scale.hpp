@@ -15,13 +15,16 @@ namespace sdnn::approximators {
 /// Source: section 4.2 (the paper's g: 20 <= u <= 280 onto [-20, 20]); spec section 1, item 6.
 class OutputScale {
  public:
-  /// Throws std::invalid_argument unless u_low < u_high and q_low < q_high, both finite.
+  /// Throws std::invalid_argument unless u_low < u_high and q_low < q_high, both within +- 1e301:
+  /// beyond, what lies between them would overflow.
   OutputScale(int u_low, int u_high, double q_low, double q_high)
       : u_low_(u_low), u_high_(u_high), q_low_(q_low), q_high_(q_high) {
     core::require_in_range("u_low", u_low, 0, 1 << 20);
     core::require(u_high > u_low, "u_high", "greater than u_low", u_high);
     core::require_finite("q_low", q_low);
     core::require_finite("q_high", q_high);
+    core::require_in_range("q_low", q_low, -kLargest, kLargest);
+    core::require_in_range("q_high", q_high, -kLargest, kLargest);
     core::require(q_high > q_low, "q_high", "greater than q_low", q_high);
   }
 
@@ -53,6 +56,8 @@ class OutputScale {
   }
 
  private:
+  static constexpr double kLargest = 1e301;
+
   int u_low_;
   int u_high_;
   double q_low_;

@@ -89,6 +89,18 @@ class RBFNetwork {
     is_mixed_ = false;
   }
 
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void exchange(Self& self, Archive& archive) {
+    archive.fixed("weights", {self.n_joint_bases_}, self.weights_.span());
+    if constexpr (Archive::kReads) {
+      self.is_mixed_ = false;
+      for (const double weight : self.weights()) {
+        archive.expect(std::isfinite(weight), "weights", "finite");
+      }
+    }
+  }
+
   /// Q(state, a) for every action. Shapes: state (d,) in [0, 1], out (n_actions,).
   ///
   /// Throws std::invalid_argument for a state of wrong size or outside [0, 1].

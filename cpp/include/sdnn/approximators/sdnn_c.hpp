@@ -1,6 +1,7 @@
 /// SDNN-C: a network that gives Q(s, a) for every action at once.
 #pragma once
 
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
@@ -25,6 +26,14 @@
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::approximators {
+
+/// What became of the corrections that a network was asked for.
+struct CorrectionCounts {
+  std::uint64_t asked = 0;         ///< all of them
+  std::uint64_t changed = 0;       ///< units were corrected
+  std::uint64_t rounded_away = 0;  ///< another value was wanted, nearer than the next count's
+  std::uint64_t out_of_range = 0;  ///< wanted were values outside [q_low, q_high]
+};
 
 /// The network of section 3.
 ///
@@ -52,10 +61,7 @@ class SDNNC {
         memory_(*code_, actions_.n_hidden_units(), actions_.n_active_units()) {
     core::require_positive("learning_coefficient", config.learning_coefficient);
     core::require_in_range("lattice", config.lattice, 1, 64);
-    value_of_count_.resize(actions_.n_active_units() + 1);
-    for (std::size_t u = 0; u < value_of_count_.size(); ++u) {
-      value_of_count_[u] = scale_(static_cast<int>(u));
-    }
+    tabulate_values();
     initialize_weights(seed);
     initialize_thresholds();
     bins_.resize(code_->n_inputs());
@@ -69,6 +75,7 @@ class SDNNC {
   const OutputScale& output_scale() const noexcept { return scale_; }
   const HiddenLayer& hidden_layer() const noexcept { return hidden_layer_; }
   const PotentialMemory& memory() const noexcept { return memory_; }
+  const CorrectionCounts& correction_counts() const noexcept { return counts_; }
   std::size_t n_inputs() const noexcept { return code_->n_inputs(); }
   std::size_t n_actions() const noexcept { return actions_.n_actions(); }
 
@@ -126,7 +133,12 @@ class SDNNC {
     const int n_firing = count_in_window(entry.potentials, action);
     const double wanted = (1.0 - rate) * scale_(n_firing) + rate * target;
     const int deficit = rounded_count(wanted, n_firing) - n_firing;
-    if (deficit == 0) return;
+    ++counts_.asked;
+    if (wanted < scale_.q_low() || wanted > scale_.q_high()) ++counts_.out_of_range;
+    if (deficit == 0) {
+      counts_.rounded_away += wanted != scale_(n_firing) ? 1 : 0;
+      return;
+    }
     const std::size_t first = actions_.first_unit(action);
     select_units(std::span(entry.potentials).subspan(first, actions_.n_active_units()), deficit,
                  selected_);
@@ -136,6 +148,7 @@ class SDNNC {
     const std::int32_t step = deficit > 0 ? config_.lattice : -config_.lattice;
     hidden_layer_.correct(selected_, memory_.columns(*code_, entry.bins), step);
     memory_.corrected(entry.bins, selected_, step);
+    ++counts_.changed;
   }
 
   /// The inner potentials in lattice steps (c / lattice), by a full pass. Shape: out (n,).
@@ -178,19 +191,51 @@ class SDNNC {
     for (const std::int32_t weight : weights) {
       core::require_in_range("weight", weight, -largest_initial_weight(), largest_initial_weight());
     }
-    HiddenLayer replaced(hidden_layer_.n_units(), hidden_layer_.n_columns(),
-                         hidden_layer_.n_double_columns());
-    for (std::size_t j = 0; j < n_columns; ++j) {
-      const auto columns = code_->columns_of(j);
-      for (std::size_t unit = 0; unit < hidden_layer_.n_units(); ++unit) {
-        add_weight(replaced, unit, columns, weights[unit * n_columns + j]);
+    replace_parameters(weights, thresholds);
+  }
+
+  /// Gives the range of values other ends. What was learned keeps its place in the range, and so
+  /// its order. Throws std::invalid_argument naming q_low or q_high, and then nothing has changed.
+  void set_output_range(double q_low, double q_high) {
+    scale_ = OutputScale(scale_.u_low(), scale_.u_high(), q_low, q_high);
+    tabulate_values();
+  }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void exchange(Self& self, Archive& archive) {
+    const std::size_t n_units = self.hidden_layer_.n_units();
+    const std::size_t n_columns = self.code_->n_columns();
+    std::vector<std::int16_t> weights(n_units * n_columns);  // weight_limit() is below 2^15
+    std::vector<std::int32_t> thresholds(n_units);
+    std::array<double, 2> range{self.scale_.q_low(), self.scale_.q_high()};
+    if constexpr (!Archive::kReads) {
+      for (std::size_t unit = 0; unit < n_units; ++unit) {
+        thresholds[unit] = self.hidden_layer_.threshold(unit);
+        for (std::size_t j = 0; j < n_columns; ++j) {
+          weights[unit * n_columns + j] = static_cast<std::int16_t>(self.weight(unit, j));
+        }
       }
     }
-    for (std::size_t unit = 0; unit < hidden_layer_.n_units(); ++unit) {
-      replaced.set_threshold(unit, thresholds[unit]);
+    archive.fixed("weights", {n_units, n_columns}, weights);
+    archive.fixed("thresholds", {n_units}, thresholds);
+    archive.fixed("output_range", {2}, range);
+    archive.part("rounding", self.rounding_);
+    archive.number("n_asked", self.counts_.asked);
+    archive.number("n_changed", self.counts_.changed);
+    archive.number("n_rounded_away", self.counts_.rounded_away);
+    archive.number("n_out_of_range", self.counts_.out_of_range);
+    if constexpr (Archive::kReads) {
+      archive.taking("output_range", [&] { self.set_output_range(range[0], range[1]); });
+      for (const std::int32_t threshold : thresholds) {
+        archive.expect(HiddenLayer::is_threshold(threshold), "thresholds", "of less than 2^30");
+      }
+      archive.taking("weights", [&] {
+        self.replace_parameters(std::vector<std::int32_t>(weights.begin(), weights.end()),
+                                thresholds);
+      });
+      self.selected_.reserve(self.actions_.n_active_units());  // a copy has no room
     }
-    hidden_layer_ = std::move(replaced);
-    memory_.forget();
   }
 
  private:
@@ -245,6 +290,33 @@ class SDNNC {
     const int u_high = config.u_high.value_or(config.n_active_units - u_low);
     core::require_in_range("u_high", u_high, 0, config.n_active_units);
     return {u_low, u_high, config.q_low, config.q_high};
+  }
+
+  void tabulate_values() {
+    value_of_count_.resize(actions_.n_active_units() + 1);
+    for (std::size_t u = 0; u < value_of_count_.size(); ++u) {
+      value_of_count_[u] = scale_(static_cast<int>(u));
+    }
+  }
+
+  /// Shapes: weights (n, D), in the paper's order, thresholds (n,). Throws std::invalid_argument
+  /// for a weight or threshold out of range, and then nothing has changed.
+  void replace_parameters(std::span<const std::int32_t> weights,
+                          std::span<const std::int32_t> thresholds) {
+    const std::size_t n_columns = code_->n_columns();
+    HiddenLayer replaced(hidden_layer_.n_units(), hidden_layer_.n_columns(),
+                         hidden_layer_.n_double_columns());
+    for (std::size_t j = 0; j < n_columns; ++j) {
+      const auto columns = code_->columns_of(j);
+      for (std::size_t unit = 0; unit < hidden_layer_.n_units(); ++unit) {
+        add_weight(replaced, unit, columns, weights[unit * n_columns + j]);
+      }
+    }
+    for (std::size_t unit = 0; unit < hidden_layer_.n_units(); ++unit) {
+      replaced.set_threshold(unit, thresholds[unit]);
+    }
+    hidden_layer_ = std::move(replaced);
+    memory_.forget();
   }
 
   /// Two weights make a sum that has to fit.
@@ -334,6 +406,7 @@ class SDNNC {
   HiddenLayer hidden_layer_;
   core::Random rounding_;
   std::vector<double> value_of_count_;
+  CorrectionCounts counts_;
 
   // Workspace: sized once, so that a step allocates nothing.
   PotentialMemory memory_;

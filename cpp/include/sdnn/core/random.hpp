@@ -26,6 +26,8 @@ enum class Stream : std::uint64_t {
   evaluation_sensor_noise = 8,
   rounding = 9,
   useless_inputs = 10,
+  repetitions = 11,
+  dimensions = 12,
 };
 
 /// xoshiro256** (Blackman, Vigna 2018), seeded by SplitMix64 from (seed, stream, index).
@@ -39,6 +41,15 @@ class Random {
     mixed = split_mix(mixed) ^ static_cast<std::uint64_t>(stream);
     mixed = split_mix(mixed) ^ index;
     for (auto& word : state_) word = split_mix(mixed);
+  }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void exchange(Self& self, Archive& archive) {
+    archive.fixed("words", {self.state_.size()}, self.state_);
+    if constexpr (Archive::kReads) {  // of zeros alone come zeros for ever
+      archive.expect(self.state_ != std::array<std::uint64_t, 4>{}, "words", "not all 0");
+    }
   }
 
   /// 64 uniformly random bits.

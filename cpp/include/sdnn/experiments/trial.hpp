@@ -99,6 +99,10 @@ class AcrobotTrial {
     core::require_in_range("n_episodes", n_episodes, 0, 1 << 30);
     const int last = episode_ + std::min(n_episodes, protocol_.n_learning_episodes - episode_);
     while (episode_ < last) {
+      if constexpr (requires { agent_.set_progress(0.0); }) {
+        agent_.set_progress(static_cast<double>(episode_) /
+                            static_cast<double>(protocol_.n_learning_episodes));
+      }
       ++episode_;
       run_episode(sensors_, true, after_decision);
       if (episode_ % protocol_.test_interval == 0) {

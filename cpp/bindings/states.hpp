@@ -1,0 +1,72 @@
+/// Between an object's state and a dictionary of NumPy arrays.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstring>
+#include <string>
+#include <utility>
+
+#include "sdnn/core/state.hpp"
+
+namespace sdnn::bindings {
+
+/// NumPy's letters of the tensor types, in their order.
+inline constexpr std::array<const char*, 8> kDtypes{"<i1", "<u1", "<i2", "<i4",
+                                                    "<i8", "<u8", "<f4", "<f8"};
+
+/// Copies.
+inline pybind11::dict arrays_of(const core::State& state) {
+  pybind11::dict arrays;
+  for (const auto& [name, tensor] : state) {
+    const pybind11::dtype dtype(kDtypes[static_cast<std::size_t>(tensor.type)]);
+    pybind11::array array(dtype, tensor.shape);
+    if (!tensor.bytes.empty()) {
+      std::memcpy(array.mutable_data(), tensor.bytes.data(), tensor.bytes.size());
+    }
+    arrays[pybind11::str(name)] = std::move(array);
+  }
+  return arrays;
+}
+
+/// Copies. Throws std::invalid_argument naming an array of a type that no tensor has.
+inline core::State state_from(const pybind11::dict& arrays) {
+  core::State state;
+  for (const auto& [key, value] : arrays) {
+    const auto name = pybind11::cast<std::string>(key);
+    const auto array =
+        pybind11::array::ensure(value, pybind11::array::c_style);  // nothing is converted
+    core::Tensor tensor;
+    const auto found = std::ranges::find_if(kDtypes, [&array](const char* dtype) {
+      return array && array.dtype().equal(pybind11::dtype(dtype));
+    });
+    if (found == kDtypes.end()) {
+      throw std::invalid_argument("state: " + name + " must be an array of whole or real numbers");
+    }
+    tensor.type = static_cast<core::TensorType>(found - kDtypes.begin());
+    tensor.shape.assign(array.shape(), array.shape() + array.ndim());
+    const auto* const bytes = static_cast<const std::byte*>(array.data());
+    tensor.bytes.assign(bytes, bytes + array.nbytes());
+    state.insert_or_assign(name, std::move(tensor));
+  }
+  return state;
+}
+
+/// Binds an object's state: `state()` and `restore(state)`.
+template <class Object, class... Options>
+void def_state(pybind11::class_<Object, Options...>& type) {
+  type.def(
+          "state", [](const Object& self) { return arrays_of(core::state_of(self)); },
+          "What it remembers: arrays by name")
+      .def(
+          "restore",
+          [](Object& self, const pybind11::dict& state) { core::restore(self, state_from(state)); },
+          pybind11::arg("state"),
+          "Take what `state` of one with the same settings gave; on an error nothing changes");
+}
+
+}  // namespace sdnn::bindings

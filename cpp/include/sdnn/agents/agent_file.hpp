@@ -1,0 +1,406 @@
+/// Agents in files: written and read without Python. Needs the library nlohmann/json.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/q_learning.hpp"
+#include "sdnn/approximators/decoupled.hpp"
+#include "sdnn/approximators/fuzzy_rules.hpp"
+#include "sdnn/approximators/rbf_network.hpp"
+#include "sdnn/approximators/sdnn_c.hpp"
+#include "sdnn/core/safetensors.hpp"
+#include "sdnn/core/state.hpp"
+#include "sdnn/core/version.hpp"
+
+namespace sdnn::agents {
+
+/// An agent's file: what is in it of an agent, and of what this library does not know.
+struct AgentFile {
+  /// The JSON text of the metadata "sdnn": format, version, class, seed, approximator, learning,
+  /// n_actions; all else is its writer's (observation and action are the controller's).
+  nlohmann::json settings = nlohmann::json::object();
+  core::State tensors;                          ///< the agent's state with "agent." before, others
+  std::map<std::string, std::string> metadata;  ///< all but "sdnn"
+};
+
+/// Any agent that a file may hold.
+using AnyAgent =
+    std::variant<QLearning<approximators::SDNNC>,
+                 QLearning<approximators::Decoupled<approximators::SDNNC>>,
+                 QLearning<approximators::RBFNetwork>,
+                 QLearning<approximators::Decoupled<approximators::RBFNetwork>>, FuzzyQLearning>;
+
+/// The format that is written, and the only one that is read.
+inline constexpr std::string_view kAgentFormat = "sdnn-agent-1";
+
+namespace detail {
+
+inline constexpr std::string_view kStatePrefix = "agent.";
+
+template <class T>
+struct IsOptional : std::false_type {};
+template <class T>
+struct IsOptional<std::optional<T>> : std::true_type {};
+
+/// The words of enumerations, in the order of their values.
+constexpr std::array<std::string_view, 3> words_of(TieRule) noexcept {
+  return {"uniform", "lowest", "middle"};
+}
+constexpr std::array<std::string_view, 2> words_of(ValueRange) noexcept {
+  return {"given", "seen"};
+}
+constexpr std::array<std::string_view, 2> words_of(approximators::InitialWeights) noexcept {
+  return {"ternary", "uniform"};
+}
+constexpr std::array<std::string_view, 3> words_of(approximators::Rounding) noexcept {
+  return {"half_up", "random", "away"};
+}
+
+template <class Value>
+nlohmann::json json_of(const Value& value) {
+  if constexpr (IsOptional<Value>::value) {
+    return value ? json_of(*value) : nlohmann::json(nullptr);
+  } else if constexpr (std::is_enum_v<Value>) {
+    return words_of(value).at(static_cast<std::size_t>(value));
+  } else {
+    return value;
+  }
+}
+
+[[noreturn]] inline void refuse(const std::string& name, const std::string& expected,
+                                const nlohmann::json& value) {
+  std::string shown = value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  if (shown.size() > 60) shown = shown.substr(0, 57) + "...";
+  throw std::invalid_argument(name + " must be " + expected + ", got " + shown);
+}
+
+/// Reads a value. Throws std::invalid_argument naming it where it is of another type.
+template <class Value>
+Value value_from(const nlohmann::json& json, const std::string& name) {
+  if constexpr (IsOptional<Value>::value) {
+    if (json.is_null()) return std::nullopt;
+    return value_from<typename Value::value_type>(json, name);
+  } else if constexpr (std::is_enum_v<Value>) {
+    const auto words = words_of(Value{});
+    const auto word = std::ranges::find_if(words, [&json](auto known) { return json == known; });
+    std::string expected = "one of";
+    for (const auto known : words) (expected += ' ') += known;
+    if (word == words.end()) refuse(name, expected, json);
+    return static_cast<Value>(word - words.begin());
+  } else if constexpr (std::is_same_v<Value, bool>) {
+    if (!json.is_boolean()) refuse(name, "true or false", json);
+    return json.get<bool>();
+  } else if constexpr (std::is_same_v<Value, std::uint64_t>) {
+    const bool is_whole =
+        json.is_number_unsigned() || (json.is_number_integer() && json.get<std::int64_t>() >= 0);
+    if (!is_whole) refuse(name, "a whole number of 0 or more", json);
+    return json.get<std::uint64_t>();
+  } else if constexpr (std::is_same_v<Value, int>) {
+    constexpr std::int64_t kLargest = std::numeric_limits<int>::max();
+    const bool is_whole = json.is_number_unsigned()
+                              ? json.get<std::uint64_t>() <= static_cast<std::uint64_t>(kLargest)
+                              : json.is_number_integer() && json.get<std::int64_t>() >= -kLargest;
+    if (!is_whole) refuse(name, "a whole number", json);
+    return json.get<int>();
+  } else if constexpr (std::is_same_v<Value, double>) {
+    if (!json.is_number()) refuse(name, "a number", json);
+    return json.get<double>();
+  } else if constexpr (std::is_same_v<Value, std::string>) {
+    if (!json.is_string()) refuse(name, "a text", json);
+    return json.get<std::string>();
+  } else {  // a list
+    if (!json.is_array()) refuse(name, "a list", json);
+    Value values;
+    for (const auto& item : json) {
+      values.push_back(value_from<typename Value::value_type>(
+          item, name + "[" + std::to_string(values.size()) + "]"));
+    }
+    return values;
+  }
+}
+
+/// A member of an object. Throws std::invalid_argument naming it where it is missing.
+inline const nlohmann::json& member(const nlohmann::json& object, const char* key,
+                                    const std::string& name) {
+  if (!object.is_object()) refuse(name, "an object", object);
+  const auto found = object.find(key);
+  if (found == object.end()) throw std::invalid_argument(name + "." + key + " must be there");
+  return *found;
+}
+
+/// The class of an agent, as files name it.
+template <class Agent>
+constexpr const char* class_of() noexcept {
+  using approximators::Decoupled;
+  if constexpr (std::is_same_v<Agent, FuzzyQLearning>) {
+    return "FuzzyQLearning";
+  } else if constexpr (std::is_same_v<Agent, QLearning<approximators::RBFNetwork>> ||
+                       std::is_same_v<Agent, QLearning<Decoupled<approximators::RBFNetwork>>>) {
+    return "RBFQLearning";
+  } else {
+    return "SDNNQLearning";
+  }
+}
+
+}  // namespace detail
+
+/// A configuration as a JSON object: a member per field.
+template <class Config>
+nlohmann::json config_to_json(const Config& config) {
+  nlohmann::json object = nlohmann::json::object();
+  std::apply(
+      [&](const auto&... field) {
+        ((object[field.name] = detail::json_of(field.of(config))), ...);
+      },
+      Config::fields());
+  return object;
+}
+
+/// The configuration in a JSON object; what is missing keeps its default. Throws
+/// std::invalid_argument naming a member, after `name`, that is unknown or of another type.
+template <class Config>
+Config config_from_json(const nlohmann::json& object, const std::string& name) {
+  if (!object.is_object()) detail::refuse(name, "an object", object);
+  Config config;
+  std::size_t n_known = 0;
+  const auto read = [&](const auto& field) {
+    const auto found = object.find(field.name);
+    if (found == object.end()) return;
+    using Value = core::FieldValue<std::remove_cvref_t<decltype(field)>, Config>;
+    field.of(config) = detail::value_from<Value>(*found, name + "." + field.name);
+    ++n_known;
+  };
+  const auto is_known = [](const std::string& key) {
+    return std::apply([&](const auto&... field) { return ((key == field.name) || ...); },
+                      Config::fields());
+  };
+  std::apply([&](const auto&... field) { (read(field), ...); }, Config::fields());
+  if (n_known == object.size()) return config;
+  for (const auto& [key, value] : object.items()) {
+    if (is_known(key)) continue;
+    std::string message = name;
+    throw std::invalid_argument(message.append(".").append(key).append(" is not known"));
+  }
+  return config;
+}
+
+/// What a file of this agent holds, with nothing of others. `seed` is that of its construction.
+template <class Agent>
+AgentFile agent_file_of(const Agent& agent, std::uint64_t seed) {
+  AgentFile file;
+  std::vector<std::size_t> n_actions;
+  if constexpr (std::is_same_v<Agent, FuzzyQLearning>) {
+    file.settings["approximator"] = config_to_json(agent.rules().config());
+    n_actions.push_back(agent.rules().n_actions());
+  } else {
+    if constexpr (Agent::kDecoupled) {
+      file.settings["approximator"] = config_to_json(agent.action_value().part(0).config());
+    } else {
+      file.settings["approximator"] = config_to_json(agent.action_value().config());
+    }
+    for (std::size_t d = 0; d < agent.n_dimensions(); ++d) n_actions.push_back(agent.n_actions(d));
+  }
+  file.settings["format"] = kAgentFormat;
+  file.settings["version"] = core::kVersion;
+  file.settings["class"] = detail::class_of<Agent>();
+  file.settings["seed"] = seed;
+  file.settings["learning"] = config_to_json(agent.config());
+  file.settings["n_actions"] = n_actions;
+  for (auto& [name, tensor] : core::state_of(agent)) {
+    file.tensors.emplace(std::string(detail::kStatePrefix) + name, std::move(tensor));
+  }
+  return file;
+}
+
+/// Puts an agent's state in the place of the one that the file has.
+template <class Agent>
+void update_state(AgentFile& file, const Agent& agent) {
+  std::erase_if(file.tensors,
+                [](const auto& item) { return item.first.starts_with(detail::kStatePrefix); });
+  for (auto& [name, tensor] : core::state_of(agent)) {
+    file.tensors.insert_or_assign(std::string(detail::kStatePrefix) + name, std::move(tensor));
+  }
+}
+
+namespace detail {
+
+/// Puts together an agent of what a file says.
+class AgentMaker {
+ public:
+  explicit AgentMaker(const AgentFile& file) : settings_(file.settings) {
+    const auto text = value_from<std::string>(member(settings_, "format", "sdnn"), "sdnn.format");
+    if (text != kAgentFormat) {
+      throw std::invalid_argument("its format is \"" + text + "\", this library (" +
+                                  core::kVersion + ") reads \"" + std::string(kAgentFormat) +
+                                  "\": it may be of a newer library");
+    }
+    for (const auto& [name, tensor] : file.tensors) {
+      if (!name.starts_with(kStatePrefix)) continue;
+      state_.emplace(name.substr(kStatePrefix.size()), tensor);
+    }
+    seed_ = value_from<std::uint64_t>(member(settings_, "seed", "sdnn"), "seed");
+    if (settings_.value("n_tables", nlohmann::json(0)) != 0) {
+      throw std::invalid_argument("n_tables must be 0: patterns of its own are for Python only");
+    }
+  }
+
+  AnyAgent make() const {
+    using namespace approximators;
+    const auto name = value_from<std::string>(member(settings_, "class", "sdnn"), "class");
+    if (name == "SDNNQLearning") {
+      return q_learning<SDNNC, SDNNCConfig>(
+          [](const SDNNCConfig& config, std::uint64_t seed) { return SDNNC(config, seed); });
+    }
+    if (name == "RBFQLearning") {
+      return q_learning<RBFNetwork, RBFNetworkConfig>(
+          [](const RBFNetworkConfig& config, std::uint64_t) { return RBFNetwork(config); });
+    }
+    if (name != "FuzzyQLearning") {
+      refuse("class", "SDNNQLearning, RBFQLearning or FuzzyQLearning", name);
+    }
+    const auto config = config_from_json<FuzzyRulesConfig>(approximator(), "approximator");
+    expect_size("rules.values",
+                power(config.n_sets, config.n_inputs) * static_cast<double>(config.n_actions));
+    FuzzyQLearning agent(FuzzyRules(config), learning<FuzzyQLearningConfig>(), seed_);
+    core::restore(agent, state_);
+    return agent;
+  }
+
+ private:
+  const nlohmann::json& approximator() const { return member(settings_, "approximator", "sdnn"); }
+  template <class Config>
+  Config learning() const {
+    return config_from_json<Config>(member(settings_, "learning", "sdnn"), "learning");
+  }
+
+  /// The agent has one network, or one for each of its dimensions where the state says so.
+  template <class Q, class Config, class Make>
+  AnyAgent q_learning(const Make& make) const {
+    const auto config = config_from_json<Config>(approximator(), "approximator");
+    const auto n_actions =
+        value_from<std::vector<int>>(member(settings_, "n_actions", "sdnn"), "n_actions");
+    if (n_actions.empty()) refuse("n_actions", "one number per dimension", settings_["n_actions"]);
+    if (!state_.contains("action_value.0.weights")) {
+      expect_weights("action_value.weights", config);
+      QLearning<Q> agent(make(config, seed_), learning<QLearningConfig>(), seed_);
+      if (n_actions.size() != 1 || agent.n_actions(0) != static_cast<std::size_t>(n_actions[0])) {
+        refuse("n_actions", "[" + std::to_string(agent.n_actions(0)) + "], as the approximator's",
+               settings_["n_actions"]);
+      }
+      core::restore(agent, state_);
+      return agent;
+    }
+    std::vector<Q> parts;
+    for (std::size_t d = 0; d < n_actions.size(); ++d) {
+      Config of_dimension = config;
+      of_dimension.n_actions = n_actions[d];
+      expect_weights("action_value." + std::to_string(d) + ".weights", of_dimension);
+      parts.push_back(make(of_dimension, approximators::seed_of_dimension(seed_, d)));
+    }
+    QLearning<approximators::Decoupled<Q>> agent(approximators::Decoupled<Q>(std::move(parts)),
+                                                 learning<QLearningConfig>(), seed_);
+    core::restore(agent, state_);
+    return agent;
+  }
+
+  void expect_weights(const std::string& name, const approximators::SDNNCConfig& config) const {
+    // A code book has 10^8 patterns at most; those of agents have some hundred.
+    const double n_patterns = (config.n_anchor_patterns * 1.0) * (config.n_interpolated + 1.0);
+    core::require(n_patterns * config.n_pattern_units <= kMostCodeBytes,
+                  "approximator.n_interpolated", "smaller: a code book would not fit",
+                  config.n_interpolated);
+    const double l = config.n_inputs;
+    expect_size(name, 1.0 * config.n_hidden_units * config.n_pattern_units * l * (l - 1.0));
+  }
+  void expect_weights(const std::string& name,
+                      const approximators::RBFNetworkConfig& config) const {
+    expect_size(name, power(config.n_bases, config.n_inputs + 1));
+  }
+
+  /// A configuration may ask for no more memory than the file's tensors are large.
+  void expect_size(const std::string& name, double size) const {
+    const auto found = state_.find(name);
+    if (found == state_.end()) throw std::invalid_argument("state: " + name + " must be there");
+    if (static_cast<double>(found->second.size()) != size) {
+      throw std::invalid_argument("state: " + name + " must be as large as the approximator's");
+    }
+  }
+
+  static double power(int base, int exponent) {
+    double product = 1.0;
+    for (int i = 0; i < exponent && product < 1e300; ++i) product *= base;
+    return product;
+  }
+
+  static constexpr double kMostCodeBytes = 1e9;
+
+  const nlohmann::json& settings_;
+  core::State state_;
+  std::uint64_t seed_ = 0;
+};
+
+}  // namespace detail
+
+/// The agent in a file: as it was when it was written. Throws std::invalid_argument naming what
+/// does not fit; std::length_error, std::bad_alloc.
+inline AnyAgent make_agent(const AgentFile& file) { return detail::AgentMaker(file).make(); }
+
+/// Reads a file. Throws std::runtime_error naming the file and what is wrong with it.
+inline AgentFile read_agent_file(const std::filesystem::path& path) {
+  core::Safetensors content = core::read_safetensors(path);
+  const auto text = content.metadata.find("sdnn");
+  if (text == content.metadata.end()) {
+    throw std::runtime_error(path.string() + ": holds no agent: its metadata have no \"sdnn\"");
+  }
+  AgentFile file;
+  try {
+    file.settings = core::parse_json(text->second);
+  } catch (const std::exception& error) {
+    throw std::runtime_error(path.string() + ": metadata \"sdnn\": " + error.what());
+  }
+  content.metadata.erase(text);
+  file.tensors = std::move(content.tensors);
+  file.metadata = std::move(content.metadata);
+  return file;
+}
+
+/// Reads an agent. Throws std::runtime_error naming the file and what is wrong with it.
+inline AnyAgent read_agent(const std::filesystem::path& path) {
+  const AgentFile file = read_agent_file(path);
+  try {
+    return make_agent(file);
+  } catch (const std::exception& error) {
+    throw std::runtime_error(path.string() + ": " + error.what());
+  }
+}
+
+/// Writes a file, whole or not at all. Throws std::runtime_error naming the file.
+inline void write_agent_file(const std::filesystem::path& path, const AgentFile& file) {
+  core::Safetensors content{file.metadata, file.tensors};
+  try {
+    content.metadata["sdnn"] = file.settings.dump();
+  } catch (const nlohmann::json::exception& error) {  // no UTF-8
+    throw std::runtime_error(path.string() + ": cannot be written: " + error.what());
+  }
+  core::write_safetensors(path, content);
+}
+
+}  // namespace sdnn::agents

@@ -1,0 +1,330 @@
+/// A saved agent at work: observations in, actions in the units of the task out. Needs the library
+/// nlohmann/json.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "sdnn/agents/agent_file.hpp"
+#include "sdnn/coding/action_code.hpp"
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/elementary.hpp"
+
+namespace sdnn::agents {
+
+/// From what is observed to what an agent sees: numbers in [0, 1].
+///
+/// As the file's "observation" says it: {"low": [..], "high": [..], "inputs": [..]}, with a range
+/// per observed variable and a list of what each input of the network is:
+///
+/// | input               | value                                                               |
+/// |---------------------|---------------------------------------------------------------------|
+/// | {"variable": i}     | (x_i - low_i) / (high_i - low_i), clipped to [0, 1]                 |
+/// | {"angle": [i, j]}   | (atan2(x_j, x_i) + pi) / (2 pi): x_i is the cosine, x_j the sine    |
+/// | {"circular": i}     | u - floor(u) with u = (x_i - low_i) / (high_i - low_i)              |
+class ObservationScale {
+ public:
+  /// Throws std::invalid_argument naming the member that does not fit.
+  explicit ObservationScale(const nlohmann::json& observation) {
+    const auto numbers = [&observation](const char* key) {
+      return detail::value_from<std::vector<double>>(
+          detail::member(observation, key, "observation"), std::string("observation.") + key);
+    };
+    low_ = numbers("low");
+    high_ = numbers("high");
+    core::require(low_.size() == high_.size(), "observation.high", "as long as observation.low",
+                  high_.size());
+    for (std::size_t i = 0; i < low_.size(); ++i) {
+      core::require(std::isfinite(high_[i] - low_[i]) && low_[i] < high_[i],
+                    "observation.high[" + std::to_string(i) + "]",
+                    "finite and greater than observation.low", high_[i]);
+    }
+    const auto& inputs = detail::member(observation, "inputs", "observation");
+    if (!inputs.is_array()) detail::refuse("observation.inputs", "a list", inputs);
+    for (const auto& input : inputs) inputs_.push_back(read_input(input));
+  }
+
+  std::size_t n_observed() const noexcept { return low_.size(); }
+  std::size_t n_inputs() const noexcept { return inputs_.size(); }
+
+  /// Shapes: observation (n_observed,), state (n_inputs,). Throws std::invalid_argument naming a
+  /// number that is not finite.
+  void operator()(std::span<const double> observation, std::span<double> state) const {
+    if (observation.size() != n_observed()) {
+      core::require(false, "observation", std::to_string(n_observed()) + " numbers",
+                    observation.size());
+    }
+    for (std::size_t i = 0; i < observation.size(); ++i) {
+      if (std::isfinite(observation[i])) continue;
+      core::require_finite("observation[" + std::to_string(i) + "]", observation[i]);
+    }
+    for (std::size_t i = 0; i < inputs_.size(); ++i) state[i] = value(inputs_[i], observation);
+  }
+
+ private:
+  enum class Kind { variable, angle, circular };
+  struct Input {
+    Kind kind;
+    std::size_t first;
+    std::size_t second;  ///< of an angle
+  };
+
+  Input read_input(const nlohmann::json& input) const {
+    const std::string name = "observation.inputs[" + std::to_string(inputs_.size()) + "]";
+    const auto index = [&](const nlohmann::json& number) {
+      const auto i = detail::value_from<std::uint64_t>(number, name);
+      core::require(i < n_observed(), name, "of a variable below " + std::to_string(n_observed()),
+                    i);
+      return static_cast<std::size_t>(i);
+    };
+    if (input.is_object() && input.size() == 1) {
+      const std::string& key = input.begin().key();
+      const nlohmann::json& value = input.begin().value();
+      if (key == "variable") return {Kind::variable, index(value), 0};
+      if (key == "circular") return {Kind::circular, index(value), 0};
+      if (key == "angle" && value.is_array() && value.size() == 2) {
+        return {Kind::angle, index(value[0]), index(value[1])};
+      }
+    }
+    detail::refuse(name, "a variable, an angle of two, or circular", input);
+  }
+
+  double value(const Input& input, std::span<const double> observation) const noexcept {
+    const std::size_t i = input.first;
+    if (input.kind == Kind::angle) {
+      return (core::atan2(observation[input.second], observation[i]) + core::kPi) / core::kTwoPi;
+    }
+    const double u = (observation[i] - low_[i]) / (high_[i] - low_[i]);
+    if (input.kind == Kind::variable) return std::clamp(u, 0.0, 1.0);
+    return std::isfinite(u) ? u - std::floor(u) : 0.0;  // beyond the range of numbers
+  }
+
+  std::vector<double> low_, high_;
+  std::vector<Input> inputs_;
+};
+
+/// From an agent's actions to those of the task, and back.
+///
+/// As the file's "action" says it: {"kind": "box", "low": [..], "high": [..], "shape": [..]}, where
+/// dimension d has n_actions[d] values evenly from low to high (coding::action_value), or an action
+/// a in [-1, 1] is (low + high) / 2 + (high - low) / 2 a; or {"kind": "discrete", "start": [..]},
+/// where it is start and the index.
+class ActionScale {
+ public:
+  /// For an agent with so many actions in each dimension; none: one number in [-1, 1]. Throws
+  /// std::invalid_argument naming the member that does not fit.
+  ActionScale(const nlohmann::json& action, std::vector<std::size_t> n_actions)
+      : n_actions_(std::move(n_actions)) {
+    const auto kind =
+        detail::value_from<std::string>(detail::member(action, "kind", "action"), "action.kind");
+    const auto numbers = [&](const char* key) {
+      auto values = detail::value_from<std::vector<double>>(detail::member(action, key, "action"),
+                                                            std::string("action.") + key);
+      core::require(values.size() == n_dimensions(), std::string("action.") + key,
+                    std::to_string(n_dimensions()) + " numbers", values.size());
+      for (const double value : values) {
+        core::require_finite(std::string("action.") + key, value);
+      }
+      return values;
+    };
+    if (kind == "discrete" && !n_actions_.empty()) {
+      is_discrete_ = true;
+      low_ = numbers("start");
+      return;
+    }
+    if (kind != "box") detail::refuse("action.kind", R"("box" or "discrete")", kind);
+    low_ = numbers("low");
+    high_ = numbers("high");
+    for (std::size_t d = 0; d < low_.size(); ++d) {
+      core::require(low_[d] <= high_[d] && std::isfinite(high_[d] - low_[d]), "action.high",
+                    "at least action.low", high_[d]);
+    }
+  }
+
+  std::size_t n_dimensions() const noexcept { return std::max<std::size_t>(n_actions_.size(), 1); }
+
+  /// Of action number `index` in dimension d.
+  double of_index(std::size_t index, std::size_t d) const noexcept {
+    if (is_discrete_) return low_[d] + static_cast<double>(index);
+    return coding::action_value(index, n_actions_[d], low_[d], high_[d]);
+  }
+  /// Of an action in [-1, 1].
+  double of_normalized(double action) const noexcept {
+    const double middle = 0.5 * (low_[0] + high_[0]);
+    const double half = 0.5 * (high_[0] - low_[0]);
+    return std::clamp(middle + half * action, low_[0], high_[0]);
+  }
+  /// The number of an action. Throws std::invalid_argument if there is none like it.
+  std::size_t index_of(double action, std::size_t d) const {
+    for (std::size_t index = nearest(action, d), end = std::min(index + 2, n_actions_[d]);
+         index < end; ++index) {
+      if (of_index(index, d) == action) return index;
+    }
+    core::require(false, "action[" + std::to_string(d) + "]", "one that the agent can take",
+                  action);
+    return 0;
+  }
+
+ private:
+  /// The number of the action that is the next one below, or about that.
+  std::size_t nearest(double action, std::size_t d) const noexcept {
+    const double step = is_discrete_
+                            ? 1.0
+                            : (high_[d] - low_[d]) /
+                                  static_cast<double>(std::max<std::size_t>(n_actions_[d] - 1, 1));
+    const double position = std::floor((action - low_[d]) / step + 0.25);
+    const double last = static_cast<double>(n_actions_[d] - 1);
+    return position > 0.0 ? static_cast<std::size_t>(std::min(position, last)) : 0;
+  }
+
+  bool is_discrete_ = false;
+  std::vector<std::size_t> n_actions_;
+  std::vector<double> low_, high_;  ///< low_ is where discrete actions start
+};
+
+/// An agent of any kind, in the units of its task: read from a file, at work, saved again.
+///
+/// What its file has besides the agent's state is kept. An object must not be used by two threads
+/// at once.
+class Controller {
+ public:
+  /// Throws std::runtime_error naming the file and what is wrong with it.
+  explicit Controller(const std::filesystem::path& path)
+      : Controller(read_agent_file(path), path.string() + ": ") {}
+  /// Throws std::runtime_error saying what is wrong with the file.
+  explicit Controller(AgentFile file) : Controller(std::move(file), "") {}
+
+  /// The agent in itself: whatever it is, with states in [0, 1].
+  AnyAgent& agent() noexcept { return parts_.agent; }
+  const AnyAgent& agent() const noexcept { return parts_.agent; }
+  /// What else the file says.
+  const nlohmann::json& settings() const noexcept { return file_.settings; }
+
+  /// Numbers of an observation, and of an action.
+  std::size_t n_observed() const noexcept { return parts_.observation.n_observed(); }
+  std::size_t n_dimensions() const noexcept { return parts_.action.n_dimensions(); }
+
+  /// The next act is an episode's first.
+  void begin_episode() {
+    std::visit([](auto& agent) { agent.begin_episode(); }, parts_.agent);
+  }
+
+  /// The action to take, in the units of the task; without `explore` a best one. The span is valid
+  /// until the next act. Shapes: observation (n_observed,), the action (n_dimensions,). Throws
+  /// std::invalid_argument naming a number that is not finite; then nothing has changed.
+  std::span<const double> act(std::span<const double> observation, bool explore = true) {
+    parts_.observation(observation, state_);
+    std::visit(
+        [&](auto& agent) {
+          const auto action = agent.act(state_, explore);
+          if constexpr (std::is_same_v<decltype(action), const double>) {
+            action_[0] = parts_.action.of_normalized(action);
+          } else if constexpr (std::is_same_v<decltype(action), const std::size_t>) {
+            action_[0] = parts_.action.of_index(action, 0);
+          } else {
+            for (std::size_t d = 0; d < action_.size(); ++d) {
+              action_[d] = parts_.action.of_index(action[d], d);
+            }
+          }
+        },
+        parts_.agent);
+    return action_;
+  }
+
+  /// Learns a transition. The action is one that act gave; of fuzzy Q-learning, the last one with
+  /// `explore`. Shapes as in act. Throws std::invalid_argument for others and for numbers that are
+  /// not finite, and then nothing has changed; as the agent does.
+  void learn(std::span<const double> observation, std::span<const double> action, double reward,
+             std::span<const double> next_observation, bool terminated) {
+    parts_.observation(observation, state_);
+    parts_.observation(next_observation, next_state_);
+    if (action.size() != n_dimensions()) {
+      core::require(false, "action", std::to_string(n_dimensions()) + " numbers", action.size());
+    }
+    std::visit(
+        [&](auto& agent) {
+          using Agent = std::remove_cvref_t<decltype(agent)>;
+          if constexpr (std::is_same_v<Agent, FuzzyQLearning>) {
+            core::require(action[0] == parts_.action.of_normalized(agent.last_action()), "action",
+                          "that of the last exploring act", action[0]);
+            agent.learn(state_, agent.last_action(), reward, next_state_, terminated);
+          } else if constexpr (Agent::kDecoupled) {
+            for (std::size_t d = 0; d < action.size(); ++d) {
+              indices_[d] = parts_.action.index_of(action[d], d);
+            }
+            agent.learn(state_, indices_, reward, next_state_, terminated);
+          } else {
+            agent.learn(state_, parts_.action.index_of(action[0], 0), reward, next_state_,
+                        terminated);
+          }
+        },
+        parts_.agent);
+  }
+
+  /// Saves it as it is now, whole or not at all. Throws std::runtime_error naming the file.
+  void write(const std::filesystem::path& path) const {
+    AgentFile file = file_;
+    std::visit([&file](const auto& agent) { update_state(file, agent); }, parts_.agent);
+    write_agent_file(path, file);
+  }
+
+ private:
+  struct Parts {
+    AnyAgent agent;
+    ObservationScale observation;
+    ActionScale action;
+  };
+
+  Controller(AgentFile file, const std::string& name)
+      : file_(std::move(file)), parts_(parts_of(file_, name)) {
+    state_.resize(parts_.observation.n_inputs());
+    next_state_.resize(state_.size());
+    action_.resize(n_dimensions());
+    indices_.resize(n_dimensions());
+    std::erase_if(file_.tensors, [](const auto& item) {  // the agent has them
+      return item.first.starts_with(detail::kStatePrefix);
+    });
+  }
+
+  static Parts parts_of(const AgentFile& file, const std::string& name) {
+    try {
+      AnyAgent agent = make_agent(file);
+      ObservationScale observation(detail::member(file.settings, "observation", "sdnn"));
+      std::vector<std::size_t> n_actions;
+      std::visit(
+          [&](const auto& known) {
+            core::require(observation.n_inputs() == known.n_inputs(), "observation.inputs",
+                          std::to_string(known.n_inputs()) + ", as the agent's",
+                          observation.n_inputs());
+            if constexpr (!std::is_same_v<decltype(known), const FuzzyQLearning&>) {
+              for (std::size_t d = 0; d < known.n_dimensions(); ++d) {
+                n_actions.push_back(known.n_actions(d));
+              }
+            }
+          },
+          agent);
+      ActionScale action(detail::member(file.settings, "action", "sdnn"), std::move(n_actions));
+      return {std::move(agent), std::move(observation), std::move(action)};
+    } catch (const std::exception& error) {
+      throw std::runtime_error(name + error.what());
+    }
+  }
+
+  AgentFile file_;  ///< all of it but the agent's state
+  Parts parts_;
+  std::vector<double> state_, next_state_, action_;
+  std::vector<std::size_t> indices_;
+};
+
+}  // namespace sdnn::agents

@@ -1,0 +1,128 @@
+/// Transitions whose targets are not known yet: a ring of the last n steps.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace sdnn::agents {
+
+/// Up to n steps (state, action, reward) of an episode, the oldest first. Allocates nothing after
+/// it is made. An action is one number or several: `n_dimensions`.
+class WaitingSteps {
+ public:
+  struct Step {
+    std::vector<double> state;
+    std::vector<std::size_t> action;
+    double reward = 0.0;
+  };
+
+  WaitingSteps(std::size_t n_steps, std::size_t n_inputs, std::size_t n_dimensions)
+      : steps_(n_steps), next_state_(n_inputs) {
+    for (Step& step : steps_) {
+      step.state.resize(n_inputs);
+      step.action.resize(n_dimensions);
+    }
+  }
+
+  std::size_t size() const noexcept { return n_waiting_; }
+  bool is_full() const noexcept { return n_waiting_ == steps_.size(); }
+  /// Where the newest step led.
+  std::span<const double> next_state() const noexcept { return next_state_; }
+  /// Whether a step from `state` goes on where the newest one led.
+  bool is_continued_by(std::span<const double> state) const noexcept {
+    return n_waiting_ == 0 || std::ranges::equal(state, next_state_);
+  }
+
+  /// Requires room for it, and shapes as in the constructor.
+  void add(std::span<const double> state, std::span<const std::size_t> action, double reward,
+           std::span<const double> next_state) noexcept {
+    assert(!is_full());
+    Step& newest = steps_[(first_ + n_waiting_) % steps_.size()];
+    std::ranges::copy(state, newest.state.begin());
+    std::ranges::copy(action, newest.action.begin());
+    newest.reward = reward;
+    std::ranges::copy(next_state, next_state_.begin());
+    ++n_waiting_;
+  }
+
+  /// The return of the oldest step: all rewards since, discounted, then `value`.
+  double return_of_oldest(double value, double discount) const noexcept {
+    for (std::size_t i = n_waiting_; i-- > 0;) {
+      value = steps_[(first_ + i) % steps_.size()].reward + discount * value;
+    }
+    return value;
+  }
+
+  /// Takes the oldest one out; valid until the next add. Requires one.
+  const Step& take_oldest() noexcept {
+    assert(n_waiting_ > 0);
+    const Step& oldest = steps_[first_];
+    first_ = (first_ + 1) % steps_.size();
+    --n_waiting_;
+    return oldest;
+  }
+
+  /// Whether all of them, the oldest first, satisfy a condition.
+  template <class Condition>
+  bool each_is(const Condition& condition) const {
+    for (std::size_t i = 0; i < n_waiting_; ++i) {
+      if (!condition(steps_[(first_ + i) % steps_.size()])) return false;
+    }
+    return true;
+  }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void exchange(Self& self, Archive& archive) {
+    std::vector<double> states;
+    std::vector<std::int64_t> actions;
+    std::vector<double> rewards;
+    for (std::size_t i = 0; i < self.n_waiting_; ++i) {
+      const Step& step = self.steps_[(self.first_ + i) % self.steps_.size()];
+      states.insert(states.end(), step.state.begin(), step.state.end());
+      for (const std::size_t a : step.action) actions.push_back(static_cast<std::int64_t>(a));
+      rewards.push_back(step.reward);
+    }
+    archive.numbers("states", states);
+    archive.numbers("actions", actions);
+    archive.numbers("rewards", rewards);
+    archive.fixed("next_state", {self.next_state_.size()}, self.next_state_);
+    if constexpr (Archive::kReads) {
+      const std::size_t n_inputs = self.next_state_.size();
+      const std::size_t n_dimensions = self.steps_.front().action.size();
+      const std::size_t n = rewards.size();
+      archive.expect(n <= self.steps_.size(), "rewards", "no more than n_steps");
+      archive.expect(states.size() == n * n_inputs, "states", "n_inputs per reward");
+      archive.expect(actions.size() == n * n_dimensions, "actions", "those of every reward");
+      const auto is_unit = [](double x) { return x >= 0.0 && x <= 1.0; };
+      const auto is_finite = [](double x) { return std::isfinite(x); };
+      archive.expect(std::ranges::all_of(rewards, is_finite), "rewards", "finite");
+      archive.expect(std::ranges::all_of(states, is_unit), "states", "in [0, 1]");
+      archive.expect(std::ranges::all_of(self.next_state_, is_unit), "next_state", "in [0, 1]");
+      self.first_ = 0;
+      self.n_waiting_ = n;
+      for (std::size_t i = 0; i < n; ++i) {
+        std::copy_n(states.begin() + static_cast<std::ptrdiff_t>(i * n_inputs), n_inputs,
+                    self.steps_[i].state.begin());
+        for (std::size_t d = 0; d < n_dimensions; ++d) {
+          self.steps_[i].action[d] = static_cast<std::size_t>(actions[i * n_dimensions + d]);
+        }
+        self.steps_[i].reward = rewards[i];
+      }
+    }
+  }
+
+ private:
+  std::vector<Step> steps_;
+  std::size_t first_ = 0;
+  std::size_t n_waiting_ = 0;
+  std::vector<double> next_state_;
+};
+
+}  // namespace sdnn::agents

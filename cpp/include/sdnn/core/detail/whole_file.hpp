@@ -1,0 +1,126 @@
+/// Files that are there as a whole or not at all, also after a kill.
+#pragma once
+
+#include <atomic>
+#include <cerrno>
+#include <cstddef>
+#include <cstdio>
+#include <filesystem>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+
+#if defined(__unix__) || defined(__APPLE__)
+#define SDNN_HAS_POSIX_FILES 1
+#include <fcntl.h>
+#include <unistd.h>
+#else
+#define SDNN_HAS_POSIX_FILES 0
+#include <fstream>
+#endif
+
+namespace sdnn::core {
+
+/// A file that is written under another name in the same folder, and gets its own at the end.
+///
+/// `write` may be called many times; `finish` makes the file be there. Without it, or after an
+/// error, what was there before stays, and nothing else is left. Throws std::runtime_error naming
+/// the file and what the system says. On POSIX systems content and name are on the disk when
+/// `finish` returns.
+class WholeFile {
+ public:
+  explicit WholeFile(std::filesystem::path path) : path_(std::move(path)), partial_(path_) {
+    static std::atomic<unsigned> counter{0};
+#if SDNN_HAS_POSIX_FILES
+    (partial_ += '.') += std::to_string(::getpid());
+#endif
+    (partial_ += '.') += std::to_string(counter++);
+    partial_ += ".partial";
+#if SDNN_HAS_POSIX_FILES
+    file_ = ::open(partial_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    if (file_ < 0) fail("cannot be written");
+#else
+    file_.open(partial_, std::ios::binary | std::ios::trunc);
+    if (!file_) fail("cannot be written");
+#endif
+    is_under_way_ = true;
+  }
+  WholeFile(const WholeFile&) = delete;
+  WholeFile& operator=(const WholeFile&) = delete;
+  ~WholeFile() {
+    close();
+    if (!is_under_way_) return;
+    std::error_code ignored;
+    std::filesystem::remove(partial_, ignored);
+  }
+
+  void write(std::span<const std::byte> bytes) {
+#if SDNN_HAS_POSIX_FILES
+    while (!bytes.empty()) {
+      const auto n = ::write(file_, bytes.data(), bytes.size());
+      if (n < 0) {
+        if (errno == EINTR) continue;
+        fail("cannot be written");
+      }
+      bytes = bytes.subspan(static_cast<std::size_t>(n));
+    }
+#else
+    file_.write(reinterpret_cast<const char*>(bytes.data()),
+                static_cast<std::streamsize>(bytes.size()));
+    if (!file_) fail("cannot be written");
+#endif
+  }
+
+  void finish() {
+#if SDNN_HAS_POSIX_FILES
+    if (::fsync(file_) != 0) fail("cannot be written");
+#else
+    file_.flush();
+    if (!file_) fail("cannot be written");
+#endif
+    if (!close()) fail("cannot be written");
+    std::error_code error;
+    std::filesystem::rename(partial_, path_, error);
+    if (error) {
+      errno = error.value();
+      fail("cannot be written");
+    }
+    is_under_way_ = false;
+#if SDNN_HAS_POSIX_FILES
+    const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
+    const int descriptor = ::open(folder.c_str(), O_RDONLY | O_CLOEXEC);
+    if (descriptor < 0) return;  // a folder that may not be read: the name is there all the same
+    (void)::fsync(descriptor);
+    (void)::close(descriptor);
+#endif
+  }
+
+ private:
+  [[noreturn]] void fail(const char* what) const {
+    throw std::runtime_error(path_.string() + ": " + what + ": " +
+                             std::generic_category().message(errno));
+  }
+
+  bool close() noexcept {
+#if SDNN_HAS_POSIX_FILES
+    const int descriptor = file_;
+    file_ = -1;
+    return descriptor < 0 || ::close(descriptor) == 0;
+#else
+    if (file_.is_open()) file_.close();
+    return static_cast<bool>(file_);
+#endif
+  }
+
+  std::filesystem::path path_;
+  std::filesystem::path partial_;
+  bool is_under_way_ = false;
+#if SDNN_HAS_POSIX_FILES
+  int file_ = -1;
+#else
+  std::ofstream file_;
+#endif
+};
+
+}  // namespace sdnn::core

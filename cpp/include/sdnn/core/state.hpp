@@ -1,0 +1,252 @@
+/// What an object has to remember, by name: to be saved, and put back.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <set>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace sdnn::core {
+
+/// The types of numbers that a tensor may hold, named as in the safetensors format.
+enum class TensorType { i8, u8, i16, i32, i64, u64, f32, f64 };
+
+/// The type of a tensor of T.
+template <class T>
+constexpr TensorType tensor_type() noexcept {
+  if constexpr (std::is_same_v<T, double>) return TensorType::f64;
+  if constexpr (std::is_same_v<T, float>) return TensorType::f32;
+  if constexpr (std::is_same_v<T, std::int8_t>) return TensorType::i8;
+  if constexpr (std::is_same_v<T, std::uint8_t>) return TensorType::u8;
+  if constexpr (std::is_same_v<T, std::int16_t>) return TensorType::i16;
+  if constexpr (std::is_same_v<T, std::int32_t>) return TensorType::i32;
+  if constexpr (std::is_same_v<T, std::int64_t>) return TensorType::i64;
+  if constexpr (std::is_same_v<T, std::uint64_t>) return TensorType::u64;
+}
+
+/// Its name, and the bytes of one number.
+struct TensorTypeFacts {
+  const char* name;
+  std::size_t n_bytes;
+};
+
+constexpr TensorTypeFacts facts_of(TensorType type) noexcept {
+  constexpr TensorTypeFacts kFacts[] = {{"I8", 1},  {"U8", 1},  {"I16", 2}, {"I32", 4},
+                                        {"I64", 8}, {"U64", 8}, {"F32", 4}, {"F64", 8}};
+  return kFacts[static_cast<std::size_t>(type)];
+}
+
+/// Numbers of one type in a shape, row by row, as they lie in memory.
+struct Tensor {
+  TensorType type = TensorType::f64;
+  std::vector<std::size_t> shape;
+  std::vector<std::byte> bytes;
+
+  std::size_t size() const noexcept { return bytes.size() / facts_of(type).n_bytes; }
+  bool operator==(const Tensor&) const = default;
+};
+
+/// A state: tensors by name, in the order of their names.
+using State = std::map<std::string, Tensor, std::less<>>;
+
+namespace detail {
+
+/// Names what a class lists with a prefix, for the parts of an object.
+template <class Archive>
+class Prefixed {
+ public:
+  Prefixed(Archive& archive, std::string_view prefix) : archive_(archive), before_(prefix) {
+    std::swap(before_, archive.prefix);
+    archive.prefix = before_ + archive.prefix + ".";
+  }
+  Prefixed(const Prefixed&) = delete;
+  Prefixed& operator=(const Prefixed&) = delete;
+  ~Prefixed() { archive_.prefix = std::move(before_); }
+
+ private:
+  Archive& archive_;
+  std::string before_;
+};
+
+}  // namespace detail
+
+/// Collects a state. A class that has one lists its members once, for writing and for reading:
+///
+///     template <class Self, class Archive>
+///     static void exchange(Self& self, Archive& archive) {
+///       archive.number("step", self.step_);
+///       archive.numbers("rewards", self.rewards_);
+///       archive.part("network", self.network_);
+///     }
+class StateWriter {
+ public:
+  static constexpr bool kReads = false;
+
+  /// One number. Shape: ().
+  template <class T>
+  void number(std::string_view name, const T& value) {
+    if constexpr (std::is_same_v<T, bool>) {
+      number(name, static_cast<std::uint8_t>(value));
+    } else {
+      add<T>(name, {}, std::span<const T>(&value, 1));
+    }
+  }
+  /// As many as there are. Shape: (n,).
+  template <class T>
+  void numbers(std::string_view name, const std::vector<T>& values) {
+    add<T>(name, {values.size()}, values);
+  }
+  /// Of a shape that is known beforehand: anything with data() and size().
+  template <class Values>
+  void fixed(std::string_view name, std::vector<std::size_t> shape, const Values& values) {
+    using T = std::remove_cvref_t<decltype(*values.data())>;
+    add<T>(name, std::move(shape), {values.data(), values.size()});
+  }
+  template <class Part>
+  void part(std::string_view name, const Part& part) {
+    const detail::Prefixed prefixed(*this, name);
+    Part::exchange(part, *this);
+  }
+
+  State state;
+  std::string prefix;
+
+ private:
+  template <class T>
+  void add(std::string_view name, std::vector<std::size_t> shape, std::span<const T> values) {
+    Tensor tensor{tensor_type<T>(), std::move(shape), {}};
+    const auto bytes = std::as_bytes(values);
+    tensor.bytes.assign(bytes.begin(), bytes.end());
+    state.insert_or_assign(prefix + std::string(name), std::move(tensor));
+  }
+};
+
+/// Puts a state back. Every member throws std::invalid_argument that names the tensor that is
+/// missing or does not fit: read into a copy, and move that where all went well.
+class StateReader {
+ public:
+  static constexpr bool kReads = true;
+
+  explicit StateReader(const State& state) : state_(state) {}
+
+  template <class T>
+  void number(std::string_view name, T& value) {
+    if constexpr (std::is_same_v<T, bool>) {
+      std::uint8_t byte = 0;
+      number(name, byte);
+      expect(byte <= 1, name, "0 or 1");
+      value = byte == 1;
+    } else {
+      copy<T>(find<T>(name, {}), {&value, 1});
+    }
+  }
+  template <class T>
+  void numbers(std::string_view name, std::vector<T>& values) {
+    const Tensor& tensor = find<T>(name);
+    expect(tensor.shape.size() == 1, name, "of one dimension");
+    values.resize(tensor.size());
+    copy<T>(tensor, values);
+  }
+  template <class Values>
+  void fixed(std::string_view name, const std::vector<std::size_t>& shape, Values&& values) {
+    using T = std::remove_cvref_t<decltype(*values.data())>;
+    copy<T>(find<T>(name, shape), {values.data(), values.size()});
+  }
+  template <class Part>
+  void part(std::string_view name, Part& part) {
+    const detail::Prefixed prefixed(*this, name);
+    Part::exchange(part, *this);
+  }
+
+  /// Throws unless `holds`, naming the tensor and what it must be.
+  void expect(bool holds, std::string_view name, std::string_view what) const {
+    if (holds) return;
+    throw std::invalid_argument("state: " + prefix + std::string(name) + " must be " +
+                                std::string(what));
+  }
+
+  /// Does what takes a tensor over; where that throws std::invalid_argument, names the tensor.
+  template <class Take>
+  void taking(std::string_view name, const Take& take) const {
+    try {
+      take();
+    } catch (const std::invalid_argument& error) {
+      expect(false, name, std::string("such that ") + error.what());
+    }
+  }
+
+  /// Throws if the state has a tensor that nobody asked for.
+  void finish() const {
+    for (const auto& [name, tensor] : state_) {
+      if (read_.contains(&tensor)) continue;
+      throw std::invalid_argument("state: " + name + " must not be there");
+    }
+  }
+
+  std::string prefix;
+
+ private:
+  template <class T>
+  const Tensor& find(std::string_view name) {
+    const auto found = state_.find(prefix + std::string(name));
+    expect(found != state_.end(), name, "there");
+    const Tensor& tensor = found->second;
+    expect(tensor.type == tensor_type<T>(), name, facts_of(tensor_type<T>()).name);
+    std::size_t size = 1;
+    for (const std::size_t extent : tensor.shape) {
+      expect(extent == 0 || size <= tensor.bytes.size() / extent, name, "as large as its shape");
+      size *= extent;
+    }
+    expect(size * sizeof(T) == tensor.bytes.size(), name, "as large as its shape");
+    read_.insert(&tensor);
+    return tensor;
+  }
+  template <class T>
+  const Tensor& find(std::string_view name, const std::vector<std::size_t>& shape) {
+    const Tensor& tensor = find<T>(name);
+    if (tensor.shape != shape) {
+      std::string wanted;
+      for (const std::size_t extent : shape) wanted += std::to_string(extent) + ", ";
+      expect(false, name, "of shape (" + wanted + ")");
+    }
+    return tensor;
+  }
+  template <class T>
+  static void copy(const Tensor& tensor, std::span<T> values) noexcept {
+    if (!values.empty()) std::memcpy(values.data(), tensor.bytes.data(), tensor.bytes.size());
+  }
+
+  const State& state_;
+  std::set<const Tensor*> read_;
+};
+
+/// The state of an object.
+template <class Object>
+State state_of(const Object& object) {
+  StateWriter writer;
+  Object::exchange(object, writer);
+  return std::move(writer.state);
+}
+
+/// Gives an object a state that state_of made of one of the same configuration and seed. Throws
+/// std::invalid_argument naming what does not fit, and then nothing has changed.
+template <class Object>
+void restore(Object& object, const State& state) {
+  Object restored = object;
+  StateReader reader(state);
+  Object::exchange(restored, reader);
+  reader.finish();
+  object = std::move(restored);
+}
+
+}  // namespace sdnn::core

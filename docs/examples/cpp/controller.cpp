@@ -1,0 +1,107 @@
+// A controller without Python: an agent learns to swing up an acrobot at a fixed rate, is saved,
+// and taken up again from its file, by this program or by Python.
+//
+// Usage: controller FILE [n_episodes] [seed] [rate]. Learns, saves, loads, and runs one greedy
+// episode with `rate` decisions a second (0: as fast as it goes). Prints the decisions that the
+// loaded agent used, whether it reached the goal, and how many came too late.
+#include "sdnn/agents/controller.hpp"
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "sdnn/sdnn.hpp"
+
+namespace {
+
+using namespace sdnn;
+using Clock = std::chrono::steady_clock;
+
+constexpr double kSpeed = 9.0;  // rad/s that the controller tells apart
+
+// What the robot's own sensors would say: two angles and two speeds.
+std::array<double, 4> observe(const environments::Acrobot& acrobot) {
+  const auto& state = acrobot.state();
+  return {state[0], state[1], state[2], state[3]};
+}
+
+agents::Controller new_controller(double max_torque, std::uint64_t seed) {
+  auto preset = agents::robust_preset(4);
+  preset.approximator.circular = {true, true, false, false};
+  const agents::QLearning agent(approximators::SDNNC(preset.approximator, seed), preset.learning,
+                                seed);
+  agents::AgentFile file = agents::agent_file_of(agent, seed);
+  file.settings["observation"] = {
+      {"low", {-core::kPi, -core::kPi, -kSpeed, -kSpeed}},
+      {"high", {core::kPi, core::kPi, kSpeed, kSpeed}},
+      {"inputs", {{{"circular", 0}}, {{"circular", 1}}, {{"variable", 2}}, {{"variable", 3}}}}};
+  file.settings["action"] = {
+      {"kind", "box"}, {"low", {-max_torque}}, {"high", {max_torque}}, {"shape", {1}}};
+  return agents::Controller(file);
+}
+
+struct Outcome {
+  int n_decisions = 0;
+  int n_late = 0;
+  bool solved = false;
+};
+
+Outcome run_episode(agents::Controller& controller, environments::Acrobot& acrobot, double lambda,
+                    bool learning, double rate) {
+  Outcome outcome;
+  acrobot.reset();
+  controller.begin_episode();
+  auto observed = observe(acrobot);
+  const auto period = std::chrono::duration_cast<Clock::duration>(
+      std::chrono::duration<double>(rate > 0.0 ? 1.0 / rate : 0.0));
+  auto deadline = Clock::now();
+  for (bool over = false; !over;) {
+    const std::array<double, 1> torque = {controller.act(observed, learning)[0]};
+    const auto result = acrobot.step(torque[0], lambda);
+    const auto next = observe(acrobot);
+    if (learning) controller.learn(observed, torque, result.reward, next, result.terminated);
+    observed = next;
+    ++outcome.n_decisions;
+    outcome.solved = result.terminated;
+    over = result.terminated || result.truncated;
+    if (rate <= 0.0) continue;
+    deadline += period;
+    outcome.n_late += Clock::now() > deadline ? 1 : 0;
+    std::this_thread::sleep_until(deadline);
+  }
+  return outcome;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  if (argc < 2) {
+    std::fprintf(stderr, "usage: controller FILE [n_episodes] [seed] [rate]\n");
+    return 2;
+  }
+  const std::filesystem::path path = argv[1];
+  const int n_episodes = argc > 2 ? std::stoi(argv[2]) : 100;
+  const std::uint64_t seed = argc > 3 ? std::stoull(argv[3]) : 1;
+  const double rate = argc > 4 ? std::stod(argv[4]) : 0.0;
+
+  environments::Acrobot acrobot;
+  sdnn::agents::Controller learner = new_controller(acrobot.config().max_torque, seed);
+  const environments::GoalSchedule lambda;
+  for (int episode = 1; episode <= n_episodes; ++episode) {
+    run_episode(learner, acrobot, lambda(episode), true, 0.0);
+  }
+  learner.write(path);
+
+  sdnn::agents::Controller controller(path);
+  const Outcome test = run_episode(controller, acrobot, lambda(n_episodes), false, rate);
+  std::printf("%d %s %d\n", test.n_decisions, test.solved ? "solved" : "-", test.n_late);
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "controller: %s\n", error.what());
+  return 1;
+}

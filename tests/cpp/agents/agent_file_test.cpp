@@ -1,0 +1,217 @@
+#include "sdnn/agents/agent_file.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "agents/lives.hpp"
+#include "folders.hpp"
+#include "states.hpp"
+
+namespace sdnn::agents {
+namespace {
+
+using approximators::Decoupled;
+using approximators::FuzzyRules;
+using approximators::RBFNetwork;
+using approximators::SDNNC;
+using nlohmann::json;
+
+constexpr std::uint64_t kSeed = 18446744073709551615U;  // the largest there is
+
+approximators::SDNNCConfig small_network() {
+  return {.n_inputs = 2,
+          .n_pattern_units = 16,
+          .n_anchor_patterns = 3,
+          .n_interpolated = 3,
+          .circular = {false, true},
+          .n_hidden_units = 60,
+          .n_active_units = 40,
+          .n_actions = 5,
+          .u_high = 36,
+          .rounding = approximators::Rounding::random};
+}
+
+QLearning<SDNNC> small_sdnn() {
+  return {SDNNC(small_network(), kSeed),
+          {.n_steps = 3, .final_epsilon = 0.1, .value_range = ValueRange::seen},
+          kSeed};
+}
+
+QLearning<Decoupled<SDNNC>> small_vector() {
+  auto config = small_network();
+  std::vector<SDNNC> parts = {SDNNC(config, kSeed)};
+  config.n_actions = 7;
+  parts.emplace_back(config, approximators::seed_of_dimension(kSeed, 1));
+  return {Decoupled<SDNNC>(std::move(parts)), {.max_repetitions = 3}, kSeed};
+}
+
+QLearning<RBFNetwork> small_rbf() {
+  return {
+      RBFNetwork({.n_inputs = 2, .n_bases = 3, .n_actions = 7, .gradient_rate = 0.5}), {}, kSeed};
+}
+
+QLearning<Decoupled<RBFNetwork>> small_rbf_vector() {
+  const approximators::RBFNetworkConfig config{
+      .n_inputs = 1, .n_bases = 3, .n_actions = 7, .gradient_rate = 0.5};
+  return {Decoupled<RBFNetwork>({RBFNetwork(config)}), {}, kSeed};
+}
+
+FuzzyQLearning fuzzy_agent() {
+  return {FuzzyRules({.n_inputs = 2, .n_sets = 4, .n_actions = 5}), {.trace_decay = 0.8}, kSeed};
+}
+
+/// Lives, is written in the middle, and goes on as the one that is read does.
+template <class Agent>
+void expect_that_a_file_goes_on(Agent agent, const char* name) {
+  const testing::Folder folder;
+  testing::World<Agent> world(agent.n_inputs(), 5);
+  for (int t = 0; t < 203; ++t) world.tick(agent);
+  write_agent_file(folder / "agent", agent_file_of(agent, kSeed));
+  const AgentFile file = read_agent_file(folder / "agent");
+  EXPECT_EQ(file.settings["class"], name);
+  EXPECT_EQ(file.settings["seed"], kSeed);
+  EXPECT_EQ(file.settings["format"], "sdnn-agent-1");
+  EXPECT_EQ(file.settings["version"], core::kVersion);
+  AnyAgent any = read_agent(folder / "agent");
+  ASSERT_TRUE(std::holds_alternative<Agent>(any));
+  Agent& read = std::get<Agent>(any);
+  EXPECT_EQ(read.config(), agent.config());
+  EXPECT_EQ(core::state_of(read), core::state_of(agent));
+  testing::World<Agent> same = world;
+  for (int t = 0; t < 200; ++t) {
+    world.tick(agent);
+    same.tick(read);
+  }
+  EXPECT_EQ(core::state_of(read), core::state_of(agent));
+}
+
+TEST(AgentFile, TheAgentThatIsReadGoesOnAsTheOneThatWasWritten) {
+  expect_that_a_file_goes_on(small_sdnn(), "SDNNQLearning");
+  expect_that_a_file_goes_on(small_vector(), "SDNNQLearning");
+  expect_that_a_file_goes_on(small_rbf(), "RBFQLearning");
+  expect_that_a_file_goes_on(small_rbf_vector(), "RBFQLearning");
+  expect_that_a_file_goes_on(fuzzy_agent(), "FuzzyQLearning");
+}
+
+TEST(AgentFile, SettingsHaveTheNamesAndWordsOfTheConfigurations) {
+  const json settings = agent_file_of(small_vector(), 7).settings;
+  EXPECT_EQ(settings["n_actions"], json({5, 7}));
+  EXPECT_EQ(settings["seed"], 7);
+  const json& approximator = settings["approximator"];
+  EXPECT_EQ(approximator["n_hidden_units"], 60);
+  EXPECT_EQ(approximator["circular"], json({false, true}));
+  EXPECT_EQ(approximator["u_low"], nullptr);
+  EXPECT_EQ(approximator["u_high"], 36);
+  EXPECT_EQ(approximator["rounding"], "random");
+  EXPECT_EQ(approximator["initial_weights"], "ternary");
+  EXPECT_EQ(settings["learning"]["tie_rule"], "uniform");
+  EXPECT_EQ(settings["learning"]["value_range"], "given");
+  EXPECT_EQ(settings["learning"]["learning_rate"], 0.5);
+  EXPECT_EQ(settings["learning"]["final_epsilon"], nullptr);
+  EXPECT_EQ(config_from_json<approximators::SDNNCConfig>(approximator, "x"), small_network());
+}
+
+TEST(AgentFile, WhatTheLibraryDoesNotKnowIsKept) {
+  const testing::Folder folder;
+  AgentFile file = agent_file_of(small_rbf(), 7);
+  file.settings["observation"] = {{"low", {-1.5}}, {"note", "für später"}};
+  file.metadata["format"] = "np";
+  file.tensors["ranges.low"] = testing::tensor_of<double>({-1.5});
+  write_agent_file(folder / "agent", file);
+  AgentFile read = read_agent_file(folder / "agent");
+  EXPECT_EQ(read.settings, file.settings);
+  EXPECT_EQ(read.metadata, file.metadata);
+  EXPECT_EQ(read.tensors, file.tensors);
+  QLearning<RBFNetwork> agent = small_rbf();
+  agent.learn(std::vector<double>{0.1, 0.2}, 3, 1.0, std::vector<double>{0.1, 0.2}, true);
+  update_state(read, agent);
+  EXPECT_NE(read.tensors.at("agent.action_value.weights"),
+            file.tensors.at("agent.action_value.weights"));
+  EXPECT_EQ(read.tensors.at("ranges.low"), file.tensors.at("ranges.low"));
+  EXPECT_EQ(read.tensors.size(), file.tensors.size());
+}
+
+TEST(AgentFile, SaysWhatDoesNotFit) {
+  const testing::Folder folder;
+  const auto path = folder / "agent";
+  const AgentFile good = agent_file_of(small_vector(), kSeed);
+  const auto error_of = [&](const AgentFile& file) {
+    write_agent_file(path, file);
+    const std::string error = testing::runtime_error_of([&] { (void)read_agent(path); });
+    EXPECT_EQ(error.rfind(path.string() + ": ", 0), 0U) << error;
+    return error.substr(path.string().size() + 2);
+  };
+  const auto with = [&](const char* pointer, const json& value) {
+    AgentFile file = good;
+    file.settings[json::json_pointer(pointer)] = value;
+    return error_of(file);
+  };
+  EXPECT_EQ(
+      with("/format", "sdnn-agent-2"),
+      "its format is \"sdnn-agent-2\", this library (0.1.0) reads \"sdnn-agent-1\": it may be "
+      "of a newer library");
+  EXPECT_EQ(with("/format", 1), "sdnn.format must be a text, got 1");
+  EXPECT_EQ(with("/class", "Sarsa"),
+            "class must be SDNNQLearning, RBFQLearning or FuzzyQLearning, got \"Sarsa\"");
+  EXPECT_EQ(with("/seed", -1), "seed must be a whole number of 0 or more, got -1");
+  EXPECT_EQ(with("/approximator", 3), "approximator must be an object, got 3");
+  EXPECT_EQ(with("/approximator/n_scales", 3), "approximator.n_scales is not known");
+  EXPECT_EQ(with("/approximator/n_inputs", 2.5),
+            "approximator.n_inputs must be a whole number, got 2.5");
+  EXPECT_EQ(with("/approximator/n_inputs", 4294967298),
+            "approximator.n_inputs must be a whole number, got 4294967298");
+  EXPECT_EQ(with("/approximator/q_low", "low"), "approximator.q_low must be a number, got \"low\"");
+  EXPECT_EQ(with("/approximator/circular", {1, 0}),
+            "approximator.circular[0] must be true or false, got 1");
+  EXPECT_EQ(with("/approximator/rounding", "up"),
+            "approximator.rounding must be one of half_up random away, got \"up\"");
+  EXPECT_EQ(with("/learning/epsilon", nullptr), "learning.epsilon must be a number, got null");
+  EXPECT_EQ(with("/learning/discount", 1.5), "discount must be in [0, 1], got 1.5");
+  EXPECT_EQ(with("/n_actions", json::array()),
+            "n_actions must be one number per dimension, got []");
+  EXPECT_EQ(with("/n_actions", {5}), "state: kept_action must be one per dimension");
+  EXPECT_EQ(with("/n_actions", {5, 7, 3}), "state: action_value.2.weights must be there");
+  // Larger than the file's tensors: refused before such a network is made.
+  EXPECT_EQ(with("/approximator/n_hidden_units", 1000000),
+            "state: action_value.0.weights must be as large as the approximator's");
+  EXPECT_EQ(with("/approximator/n_interpolated", 2000000000),
+            "approximator.n_interpolated must be smaller: a code book would not fit, got "
+            "2000000000");
+  AgentFile file = good;
+  file.settings.erase("seed");
+  EXPECT_EQ(error_of(file), "sdnn.seed must be there");
+  file = good;
+  file.tensors.erase("agent.step");
+  EXPECT_EQ(error_of(file), "state: step must be there");
+  file = good;
+  file.settings = {1, 2};
+  EXPECT_EQ(error_of(file), "sdnn must be an object, got [1,2]");
+  file = agent_file_of(fuzzy_agent(), 1);
+  file.settings["approximator"]["n_inputs"] = 40;
+  file.settings["approximator"]["max_table_bytes"] = kSeed;
+  EXPECT_EQ(error_of(file), "state: rules.values must be as large as the approximator's");
+  file = agent_file_of(small_rbf(), 1);
+  file.settings["n_actions"] = {8};
+  EXPECT_EQ(error_of(file), "n_actions must be [7], as the approximator's, got [8]");
+}
+
+TEST(AgentFile, SaysWhereThereIsNoAgent) {
+  const testing::Folder folder;
+  const auto path = folder / "other";
+  const auto error_of = [&path] {
+    return testing::runtime_error_of([&path] { (void)read_agent(path); });
+  };
+  EXPECT_EQ(error_of(), path.string() + ": is not there");
+  core::write_safetensors(path, {{{"format", "pt"}}, {}});
+  EXPECT_EQ(error_of(), path.string() + ": holds no agent: its metadata have no \"sdnn\"");
+  core::write_safetensors(path, {{{"sdnn", "{\"seed\": NaN}"}}, {}});
+  EXPECT_EQ(error_of().rfind(path.string() + ": metadata \"sdnn\": its JSON is damaged", 0), 0U);
+}
+
+}  // namespace
+}  // namespace sdnn::agents

@@ -1,0 +1,116 @@
+/// Random lives of agents, which may be cut anywhere.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "instruction_sets.hpp"
+#include "sdnn/core/random.hpp"
+#include "sdnn/core/state.hpp"
+
+namespace sdnn::testing {
+
+/// A world of random states and rewards. Copies go on alike.
+template <class Agent>
+class World {
+ public:
+  using Action = decltype(std::declval<Agent&>().act({}));
+
+  World(std::size_t n_inputs, std::uint64_t seed)
+      : random_(seed, core::Stream::sensor_noise), state_(n_inputs, 0.5) {}
+
+  /// The next thing that happens to an agent: an episode begins, it acts, or it learns. Returns
+  /// the action that it took, if any.
+  std::optional<Action> tick(Agent& agent) {
+    if (begins_) {
+      agent.begin_episode();
+      begins_ = false;
+      return std::nullopt;
+    }
+    if (!has_acted_) {
+      if (random_.below(8) == 0) (void)agent.act(state_, false);
+      action_ = agent.act(state_);
+      has_acted_ = true;
+      return action_;
+    }
+    has_acted_ = false;
+    std::vector<double> next(state_.size());
+    for (double& x : next) x = static_cast<double>(random_.below(9)) / 8.0;
+    const bool terminated = random_.below(16) == 0;
+    // Now and then a larger one, so that ranges which follow the rewards grow.
+    const double scale = random_.below(32) == 0 ? 32.0 : 4.0;
+    const double reward = scale * static_cast<double>(random_.below(5)) - 2.0 * scale;
+    agent.learn(state_, action_, reward, next, terminated);
+    state_ = std::move(next);
+    begins_ = terminated || random_.below(16) == 0;
+    if constexpr (requires { agent.set_progress(0.0); }) {
+      if (random_.below(8) == 0) agent.set_progress(random_.uniform());
+    }
+    return std::nullopt;
+  }
+
+ private:
+  core::Random random_;
+  std::vector<double> state_;
+  Action action_{};
+  bool has_acted_ = false;  // and not learned yet
+  bool begins_ = true;
+};
+
+/// Expects that a life that was cut and taken up by another agent made by `make` ends as the whole
+/// one, for 120 random cuts, wherever it is cut and under whatever instruction sets.
+template <class Make>
+void expect_that_a_life_can_be_cut(const Make& make) {
+  using Agent = decltype(make());
+  constexpr std::uint64_t kTicks = 400;
+  Agent whole = make();
+  World<Agent> world(whole.n_inputs(), 7);
+  struct Cut {
+    core::State state;
+    World<Agent> world;
+  };
+  std::vector<Cut> cuts;
+  for (std::uint64_t t = 0; t < kTicks; ++t) {
+    cuts.push_back({core::state_of(whole), world});
+    world.tick(whole);
+  }
+  const core::State end = core::state_of(whole);
+  core::Random random(11, core::Stream::weights);
+  on_every_instruction_set([&](auto) {
+    for (int i = 0; i < 120; ++i) {
+      const std::uint64_t at = random.below(kTicks);
+      Agent resumed = make();
+      core::restore(resumed, cuts[at].state);
+      ASSERT_EQ(core::state_of(resumed), cuts[at].state) << at;
+      World<Agent> rest = cuts[at].world;
+      for (std::uint64_t t = at; t < kTicks; ++t) rest.tick(resumed);
+      ASSERT_EQ(core::state_of(resumed), end) << at;
+    }
+  });
+}
+
+/// Expects that the agent allocates nothing as it goes on from a state that it was given, where
+/// acting and learning do not.
+template <class Make>
+void expect_that_a_restored_agent_allocates_nothing(const Make& make, auto allocation_count) {
+  auto agent = make();
+  World<decltype(make())> world(agent.n_inputs(), 7);
+  for (int t = 0; t < 100; ++t) world.tick(agent);
+  core::restore(agent, core::state_of(agent));
+  agent.begin_episode();
+  core::Random random(5, core::Stream::weights);
+  std::vector<double> state(agent.n_inputs()), next(agent.n_inputs());
+  const std::size_t before = allocation_count();
+  for (int t = 0; t < 300; ++t) {
+    for (double& x : next) x = random.uniform();
+    agent.learn(state, agent.act(state), 4.0 * random.uniform(), next, false);
+    state.swap(next);
+  }
+  EXPECT_EQ(allocation_count(), before);
+}
+
+}  // namespace sdnn::testing

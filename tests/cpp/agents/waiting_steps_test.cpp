@@ -1,0 +1,136 @@
+#include "sdnn/agents/waiting_steps.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "states.hpp"
+
+namespace sdnn::agents {
+namespace {
+
+using Numbers = std::vector<double>;
+using Indices = std::vector<std::size_t>;
+
+/// Step number i of a path: from i / 16 to (i + 1) / 16, action (i, 2 i), reward 2^i.
+void add(WaitingSteps& steps, int i) {
+  const auto n = static_cast<std::size_t>(i);
+  steps.add(Numbers{i / 16.0}, Indices{n, 2 * n}, static_cast<double>(1 << i),
+            Numbers{(i + 1) / 16.0});
+}
+
+void expect_oldest(WaitingSteps& steps, int i) {
+  const auto n = static_cast<std::size_t>(i);
+  const WaitingSteps::Step& oldest = steps.take_oldest();
+  EXPECT_EQ(oldest.state, Numbers{i / 16.0});
+  EXPECT_EQ(oldest.action, (Indices{n, 2 * n}));
+  EXPECT_EQ(oldest.reward, static_cast<double>(1 << i));
+}
+
+TEST(WaitingSteps, GiveTheOldestFirstWhileTheRingWraps) {
+  WaitingSteps steps(3, 1, 2);
+  EXPECT_EQ(steps.size(), 0U);
+  add(steps, 0);
+  add(steps, 1);
+  EXPECT_FALSE(steps.is_full());
+  add(steps, 2);
+  for (int i = 3; i < 9; ++i) {
+    EXPECT_TRUE(steps.is_full());
+    expect_oldest(steps, i - 3);
+    add(steps, i);
+  }
+  for (int i = 6; i < 9; ++i) expect_oldest(steps, i);
+  EXPECT_EQ(steps.size(), 0U);
+}
+
+// Rewards 1, 2, 4, then 8, 16; gamma = 1/2: every number is exact.
+TEST(WaitingSteps, TheReturnOfTheOldestDiscountsWhatCameSince) {
+  WaitingSteps steps(3, 1, 2);
+  EXPECT_EQ(steps.return_of_oldest(5.0, 0.5), 5.0);
+  for (int i = 0; i < 3; ++i) add(steps, i);
+  EXPECT_EQ(steps.return_of_oldest(16.0, 0.5), 1.0 + 1.0 + 1.0 + 2.0);
+  EXPECT_EQ(steps.return_of_oldest(16.0, 0.0), 1.0);
+  for (int i = 3; i < 5; ++i) {
+    steps.take_oldest();
+    add(steps, i);
+  }
+  EXPECT_EQ(steps.return_of_oldest(-8.0, 0.5), 4.0 + 4.0 + 4.0 - 1.0);  // 4, 8, 16
+  steps.take_oldest();
+  EXPECT_EQ(steps.return_of_oldest(-8.0, 0.5), 8.0 + 8.0 - 2.0);
+}
+
+TEST(WaitingSteps, KnowWhereTheNewestLed) {
+  WaitingSteps steps(2, 1, 2);
+  EXPECT_TRUE(steps.is_continued_by(Numbers{0.9}));  // nothing waits
+  add(steps, 3);
+  EXPECT_TRUE(steps.is_continued_by(Numbers{0.25}));
+  EXPECT_FALSE(steps.is_continued_by(Numbers{0.26}));
+  steps.take_oldest();
+  EXPECT_TRUE(steps.is_continued_by(Numbers{0.26}));
+}
+
+TEST(WaitingSteps, EachIsAskedOnceAndOnlyThoseThatWait) {
+  WaitingSteps steps(3, 1, 2);
+  for (int i = 0; i < 3; ++i) add(steps, i);
+  steps.take_oldest();
+  Numbers rewards;
+  EXPECT_TRUE(steps.each_is([&](const WaitingSteps::Step& step) {
+    rewards.push_back(step.reward);
+    return true;
+  }));
+  EXPECT_EQ(rewards, (Numbers{2.0, 4.0}));
+  EXPECT_FALSE(steps.each_is([](const WaitingSteps::Step& step) { return step.reward < 4.0; }));
+}
+
+TEST(WaitingSteps, AreRestoredInTheMiddleOfTheRing) {
+  WaitingSteps steps(4, 1, 2);
+  for (int i = 0; i < 4; ++i) add(steps, i);
+  for (int i = 4; i < 7; ++i) {
+    steps.take_oldest();
+    add(steps, i);
+  }
+  steps.take_oldest();  // 4, 5, 6 wait; the oldest is at place 0 of the ring, now at place 1
+  steps.take_oldest();
+  WaitingSteps other(4, 1, 2);
+  add(other, 9);
+  core::restore(other, core::state_of(steps));
+  EXPECT_EQ(other.size(), 2U);
+  EXPECT_EQ(other.return_of_oldest(64.0, 0.5), steps.return_of_oldest(64.0, 0.5));
+  for (int i = 7; i < 9; ++i) {
+    add(steps, i);
+    add(other, i);
+  }
+  EXPECT_EQ(core::state_of(other), core::state_of(steps));
+  for (int i = 5; i < 9; ++i) expect_oldest(other, i);
+}
+
+TEST(WaitingSteps, RefuseWhatCannotWait) {
+  WaitingSteps steps(3, 1, 2);
+  for (int i = 0; i < 2; ++i) add(steps, i);
+  testing::expect_that_damage_is_refused(steps);
+  using testing::with_number;
+  const core::State good = core::state_of(steps);
+  for (const double bad : {testing::kNaN, -0.1, 1.1}) {
+    testing::expect_refused(steps, with_number(good, "states", bad, 1),
+                            "state: states must be in [0, 1]");
+    testing::expect_refused(steps, with_number(good, "next_state", bad),
+                            "state: next_state must be in [0, 1]");
+  }
+  for (const double bad : {testing::kNaN, testing::kInfinity}) {
+    testing::expect_refused(steps, with_number(good, "rewards", bad),
+                            "state: rewards must be finite");
+  }
+  core::State bad = good;
+  bad["rewards"] = testing::tensor_of(Numbers(4, 0.0));
+  testing::expect_refused(steps, bad, "state: rewards must be no more than n_steps");
+  bad["rewards"] = testing::tensor_of(Numbers(1, 0.0));
+  testing::expect_refused(steps, bad, "state: states must be n_inputs per reward");
+  bad = good;
+  bad["actions"] = testing::tensor_of(std::vector<std::int64_t>(3, 0));
+  testing::expect_refused(steps, bad, "state: actions must be those of every reward");
+}
+
+}  // namespace
+}  // namespace sdnn::agents

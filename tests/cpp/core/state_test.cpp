@@ -1,0 +1,128 @@
+#include "sdnn/core/state.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "states.hpp"
+
+namespace sdnn::core {
+namespace {
+
+struct Inner {
+  double value = 0.5;
+
+  template <class Self, class Archive>
+  static void exchange(Self& self, Archive& archive) {
+    archive.number("value", self.value);
+  }
+};
+
+struct Outer {
+  int step = 3;
+  bool is_on = true;
+  std::vector<std::int64_t> list = {1, -2};
+  std::array<float, 6> grid{1, 2, 3, 4, 5, 6};
+  Inner first, second;
+
+  template <class Self, class Archive>
+  static void exchange(Self& self, Archive& archive) {
+    archive.number("step", self.step);
+    archive.number("is_on", self.is_on);
+    archive.part("first", self.first);
+    archive.numbers("list", self.list);
+    archive.fixed("grid", {2, 3}, self.grid);
+    archive.part("second", self.second);
+    if constexpr (Archive::kReads) archive.expect(self.step >= 0, "step", "0 or more");
+  }
+};
+
+using Names = std::vector<std::string>;
+
+TEST(State, HasATensorOfEveryMemberInTheOrderOfTheNames) {
+  const State state = state_of(Outer{});
+  Names names;
+  for (const auto& [name, tensor] : state) names.push_back(name);
+  EXPECT_EQ(names, (Names{"first.value", "grid", "is_on", "list", "second.value", "step"}));
+  const Tensor& step = state.at("step");
+  EXPECT_EQ(step.type, TensorType::i32);
+  EXPECT_EQ(step.shape, std::vector<std::size_t>{});
+  EXPECT_EQ(step.bytes,
+            (std::vector<std::byte>{std::byte{3}, std::byte{0}, std::byte{0}, std::byte{0}}));
+  EXPECT_EQ(step.size(), 1U);
+  EXPECT_EQ(state.at("is_on").type, TensorType::u8);
+  EXPECT_EQ(state.at("list").shape, std::vector<std::size_t>{2});
+  EXPECT_EQ(state.at("grid").type, TensorType::f32);
+  EXPECT_EQ(state.at("grid").shape, (std::vector<std::size_t>{2, 3}));
+  EXPECT_EQ(state.at("grid").size(), 6U);
+  EXPECT_EQ(testing::number_of<float>(state, "grid", 4), 5.0F);
+}
+
+TEST(State, IsPutBack) {
+  Outer changed;
+  changed.step = 8;
+  changed.is_on = false;
+  changed.list = {7, 8, 9};
+  changed.grid[5] = -1.0F;
+  changed.second.value = testing::kNaN;
+  Outer other;
+  restore(other, state_of(changed));
+  EXPECT_EQ(other.step, 8);
+  EXPECT_FALSE(other.is_on);
+  EXPECT_EQ(other.list, changed.list);
+  EXPECT_EQ(other.grid, changed.grid);
+  EXPECT_EQ(other.first.value, 0.5);
+  EXPECT_EQ(state_of(other), state_of(changed));  // the bits of a NaN too
+  changed.list.clear();
+  restore(other, state_of(changed));
+  EXPECT_TRUE(other.list.empty());
+}
+
+TEST(State, WhatDoesNotFitIsNamedAndChangesNothing) {
+  Outer object;
+  testing::expect_that_damage_is_refused(object);
+  const State good = state_of(object);
+  testing::expect_refused(object, testing::with_number(good, "step", -1),
+                          "state: step must be 0 or more");
+  testing::expect_refused(object, testing::with_number(good, "is_on", std::uint8_t{2}),
+                          "state: is_on must be 0 or 1");
+  State bad = good;
+  bad["grid"].shape = {3, 2};
+  testing::expect_refused(object, bad, "state: grid must be of shape (2, 3, )");
+  bad = good;
+  bad["list"].shape = {1, 2};
+  testing::expect_refused(object, bad, "state: list must be of one dimension");
+  bad["list"].shape = {0, 7};
+  testing::expect_refused(object, bad, "state: list must be as large as its shape");
+}
+
+TEST(StateReader, NamesTheTensorOfWhatCouldNotBeTaken) {
+  const State state;
+  StateReader reader(state);
+  reader.prefix = "net.";
+  EXPECT_NO_THROW(reader.taking("weights", [] {}));
+  try {
+    reader.taking("weights", [] { throw std::invalid_argument("weight must be small, got 9"); });
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "state: net.weights must be such that weight must be small, got 9");
+  }
+}
+
+TEST(Tensor, TypesHaveTheNamesAndSizesOfSafetensors) {
+  EXPECT_STREQ(facts_of(tensor_type<std::int8_t>()).name, "I8");
+  EXPECT_STREQ(facts_of(tensor_type<std::uint8_t>()).name, "U8");
+  EXPECT_STREQ(facts_of(tensor_type<std::int16_t>()).name, "I16");
+  EXPECT_STREQ(facts_of(tensor_type<std::uint64_t>()).name, "U64");
+  EXPECT_STREQ(facts_of(tensor_type<double>()).name, "F64");
+  EXPECT_EQ(facts_of(TensorType::i16).n_bytes, sizeof(std::int16_t));
+  EXPECT_EQ(facts_of(TensorType::i32).n_bytes, sizeof(std::int32_t));
+  EXPECT_EQ(facts_of(TensorType::f32).n_bytes, sizeof(float));
+}
+
+}  // namespace
+}  // namespace sdnn::core
