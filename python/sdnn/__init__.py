@@ -9,6 +9,7 @@ Rooms, from the network up (each is imported when first used):
   ``sdnn.kernel``: what generalizes to what
 - ``sdnn.environments``: the acrobot swing-up, redundant and noisy sensors
 - ``sdnn.experiments``: the paper's experiments, also as the command ``sdnn reproduce``
+- ``sdnn.runs``: agents that learn in folders of their own, also as the command ``sdnn train``
 - ``sdnn.benchmarks``: how quick all this is here, also as the command ``sdnn bench``
 
 ``sdnn.instruction_set()`` and ``sdnn.set_instruction_set(name)``: which vector instructions the
@@ -25,7 +26,16 @@ from sdnn._core import __version__
 from sdnn.instruction_sets import instruction_set, set_instruction_set
 
 if TYPE_CHECKING:
-    from sdnn import agents, approximators, benchmarks, coding, estimators, experiments, kernel
+    from sdnn import (
+        agents,
+        approximators,
+        benchmarks,
+        coding,
+        estimators,
+        experiments,
+        kernel,
+        runs,
+    )
     from sdnn.estimators import SDNNClassifier, SDNNRegressor
 
 __all__ = [
@@ -41,6 +51,7 @@ __all__ = [
     "experiments",
     "instruction_set",
     "kernel",
+    "runs",
     "set_instruction_set",
 ]
 

@@ -310,11 +310,21 @@ class SDNNC:
     def config(self) -> SDNNCConfig:
         ...
     @property
+    def correction_counts(self) -> tuple[int, int, int, int]:
+        """
+        Corrections that changed units, that were rounded to no change, that wanted values outside the range, and all of them
+        """
+    @property
     def n_actions(self) -> int:
         ...
     @property
     def n_inputs(self) -> int:
         ...
+    @property
+    def output_range(self) -> tuple[float, float]:
+        """
+        (q_low, q_high) as they are now
+        """
     @property
     def u_high(self) -> int:
         ...
@@ -951,6 +961,53 @@ class EpsilonGreedy:
         ...
     def select(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step: typing.SupportsInt | typing.SupportsIndex, explore: bool = True) -> int:
         ...
+class ValueRange:
+    """
+    Whether the range of values is fixed
+    
+    Members:
+    
+      given
+    
+      seen
+    """
+    __members__: typing.ClassVar[dict[str, ValueRange]]
+    given: typing.ClassVar[ValueRange]
+    seen: typing.ClassVar[ValueRange]
+    @typing.overload
+    def __eq__(self, other: ValueRange) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: ValueRange) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
 class QLearningConfig:
     """
     The parameters of Q-learning
@@ -958,7 +1015,7 @@ class QLearningConfig:
     __hash__: typing.ClassVar[None] = None
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, learning_rate: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform, tie_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0, n_steps: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
+    def __init__(self, *, learning_rate: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform, tie_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0, n_steps: typing.SupportsInt | typing.SupportsIndex = 1, max_repetitions: typing.SupportsInt | typing.SupportsIndex = 1, final_learning_rate: typing.SupportsFloat | typing.SupportsIndex | None = None, final_epsilon: typing.SupportsFloat | typing.SupportsIndex | None = None, value_range: ValueRange = ValueRange.given) -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -969,7 +1026,16 @@ class QLearningConfig:
     def epsilon(self) -> float:
         ...
     @property
+    def final_epsilon(self) -> float | None:
+        ...
+    @property
+    def final_learning_rate(self) -> float | None:
+        ...
+    @property
     def learning_rate(self) -> float:
+        ...
+    @property
+    def max_repetitions(self) -> int:
         ...
     @property
     def n_greedy_steps(self) -> int:
@@ -982,6 +1048,9 @@ class QLearningConfig:
         ...
     @property
     def tie_tolerance(self) -> float:
+        ...
+    @property
+    def value_range(self) -> ValueRange:
         ...
 class FuzzyQLearningConfig:
     """
@@ -1033,8 +1102,60 @@ class SDNNQLearning:
         ...
     def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
         ...
+    def restore(self, state: dict) -> None:
+        """
+        Take what `state` of one with the same settings gave; on an error nothing changes
+        """
+    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def state(self) -> dict:
+        """
+        What it remembers: arrays by name
+        """
     @property
     def action_value(self) -> SDNNC:
+        ...
+    @property
+    def epsilon(self) -> float:
+        ...
+    @property
+    def learning_rate(self) -> float:
+        ...
+    @property
+    def progress(self) -> float:
+        ...
+class DecoupledSDNNQLearning:
+    """
+    Q-learning with an SDNN-C per dimension
+    """
+    def __init__(self, *, approximator: SDNNCConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> list[int]:
+        ...
+    def action_value(self, dimension: typing.SupportsInt | typing.SupportsIndex) -> SDNNC:
+        ...
+    def begin_episode(self) -> None:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
+        ...
+    def restore(self, state: dict) -> None:
+        """
+        Take what `state` of one with the same settings gave; on an error nothing changes
+        """
+    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def state(self) -> dict:
+        """
+        What it remembers: arrays by name
+        """
+    @property
+    def epsilon(self) -> float:
+        ...
+    @property
+    def learning_rate(self) -> float:
+        ...
+    @property
+    def progress(self) -> float:
         ...
 class RBFQLearning:
     """
@@ -1048,8 +1169,60 @@ class RBFQLearning:
         ...
     def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
         ...
+    def restore(self, state: dict) -> None:
+        """
+        Take what `state` of one with the same settings gave; on an error nothing changes
+        """
+    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def state(self) -> dict:
+        """
+        What it remembers: arrays by name
+        """
     @property
     def action_value(self) -> RBFNetwork:
+        ...
+    @property
+    def epsilon(self) -> float:
+        ...
+    @property
+    def learning_rate(self) -> float:
+        ...
+    @property
+    def progress(self) -> float:
+        ...
+class DecoupledRBFQLearning:
+    """
+    Q-learning with an RBF network per dimension
+    """
+    def __init__(self, *, approximator: RBFNetworkConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> list[int]:
+        ...
+    def action_value(self, dimension: typing.SupportsInt | typing.SupportsIndex) -> RBFNetwork:
+        ...
+    def begin_episode(self) -> None:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
+        ...
+    def restore(self, state: dict) -> None:
+        """
+        Take what `state` of one with the same settings gave; on an error nothing changes
+        """
+    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def state(self) -> dict:
+        """
+        What it remembers: arrays by name
+        """
+    @property
+    def epsilon(self) -> float:
+        ...
+    @property
+    def learning_rate(self) -> float:
+        ...
+    @property
+    def progress(self) -> float:
         ...
 class FuzzyQLearning:
     """
@@ -1063,10 +1236,21 @@ class FuzzyQLearning:
         ...
     def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsFloat | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
         ...
+    def restore(self, state: dict) -> None:
+        """
+        Take what `state` of one with the same settings gave; on an error nothing changes
+        """
+    def state(self) -> dict:
+        """
+        What it remembers: arrays by name
+        """
     def value(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> float:
         """
         V(state)
         """
+    @property
+    def last_action(self) -> float:
+        ...
     @property
     def rules(self) -> FuzzyRules:
         ...
@@ -1269,6 +1453,8 @@ def action_value(action: typing.SupportsInt | typing.SupportsIndex, n_actions: t
     """
 def anchor_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex, n_interpolated: typing.SupportsInt | typing.SupportsIndex, circular: bool, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
     ...
+def atan2(y: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    ...
 def basic_observation(state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
     s1..s4 of a state
@@ -1283,6 +1469,10 @@ def energy_sensor(s3: typing.SupportsFloat | typing.SupportsIndex, s4: typing.Su
     ...
 def exp(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
+def general_preset(n_inputs: typing.SupportsInt | typing.SupportsIndex) -> tuple[SDNNCConfig, QLearningConfig]:
+    """
+    Settings of approximator and learning, as recommended for any task
+    """
 def height_sensor(s1: typing.SupportsFloat | typing.SupportsIndex, s2: typing.SupportsFloat | typing.SupportsIndex) -> float:
     ...
 def instruction_set() -> str:
@@ -1314,6 +1504,10 @@ def random_inverse_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, 
 def robust_preset(n_inputs: typing.SupportsInt | typing.SupportsIndex) -> tuple[SDNNCConfig, QLearningConfig]:
     """
     Settings of approximator and learning, as recommended
+    """
+def seed_of_dimension(seed: typing.SupportsInt | typing.SupportsIndex, d: typing.SupportsInt | typing.SupportsIndex) -> int:
+    """
+    The seed of the network of a dimension of the action
     """
 def set_instruction_set(name: str) -> None:
     """

@@ -1,18 +1,33 @@
-"""Agents: ``act(observation)`` and ``learn(transition)``."""
+"""Agents: ``agent.train(env, steps=...)``, or ``act(observation)`` and ``learn(transition)``."""
 
+from sdnn.agents.agent import Agent, load_agent
+from sdnn.agents.callbacks import Checkpoints, EarlyStop, JSONLines, TensorBoard
+from sdnn.agents.evaluation import Evaluation, evaluate
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning, FuzzyQLearningConfig
 from sdnn.agents.presets import PRESETS, Preset
 from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.agents.q_learning_config import QLearningConfig
+from sdnn.agents.training import Callback, Training, TrainingResult
 from sdnn.agents.transition import Transition
 
 __all__ = [
     "PRESETS",
+    "Agent",
+    "Callback",
+    "Checkpoints",
+    "EarlyStop",
+    "Evaluation",
     "FuzzyQLearning",
     "FuzzyQLearningConfig",
+    "JSONLines",
     "Preset",
     "QLearningConfig",
     "RBFQLearning",
     "SDNNQLearning",
+    "TensorBoard",
+    "Training",
+    "TrainingResult",
     "Transition",
+    "evaluate",
+    "load_agent",
 ]

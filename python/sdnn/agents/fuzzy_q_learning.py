@@ -1,8 +1,9 @@
-"""Fuzzy Q-learning, for any Gymnasium environment with one continuous action."""
+"""Fuzzy Q-learning, for any Gymnasium environment with continuous actions."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import gymnasium as gym
@@ -10,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.agents.spaces import ContinuousActions, UnitObservations
-from sdnn.agents.transition import Transition
+from sdnn.agents.actions import Actions, ContinuousActions
+from sdnn.agents.agent import Agent, check_shape
+from sdnn.agents.observations import AnglePairs, Range
 from sdnn.approximators.fuzzy_rules import FuzzyRulesConfig
-from sdnn.arguments import seed_of
 from sdnn.config import added_later, to_core
 
 __all__ = ["FuzzyQLearning", "FuzzyQLearningConfig"]
@@ -54,32 +55,37 @@ class FuzzyQLearningConfig:
         return to_core(self, _core.FuzzyQLearningConfig)
 
 
-class FuzzyQLearning:
+class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     """An agent that learns by Jouffe's fuzzy Q-learning, one transition at a time.
 
     Every fired rule picks one of its discrete actions; the action taken is their mean, weighted by
-    the truth values, hence continuous. Observations are scaled to [0, 1] by the bounds of the
-    observation space; values outside saturate.
+    the truth values, hence continuous. Each dimension of an action has rules of its own, which
+    learn as if the others were part of the environment.
+
+    Only the transition of the last exploring `act` can be learned: which rule picked what is known
+    of no other. What a warm-up did is therefore not learned.
 
     Parameters
     ----------
-    observation_space : gymnasium.spaces.Box, shape (d,)
-        Finite bounds.
-    action_space : gymnasium.spaces.Box, shape (1,)
+    observation_space : gymnasium.Space
+        See `Agent`.
+    action_space : gymnasium.spaces.Box
         Finite bounds.
     approximator : FuzzyRulesConfig, optional
         ``n_inputs`` is taken from the observation space.
     learning : FuzzyQLearningConfig, optional
     seed : int
         The root of every random stream of the agent.
+    observation_range, angles, angle_pairs, warm_up_steps
+        See `Agent`. An angle is scaled like any other variable: the rules know no circle.
 
     Raises
     ------
     TypeError
         For spaces of another kind.
     ValueError
-        For spaces of another shape or without finite bounds, impossible settings, or a larger table
-        than ``approximator.max_table_bytes`` allows.
+        For spaces, ranges or settings that are impossible, or a larger table than
+        ``approximator.max_table_bytes`` allows.
 
     Attributes
     ----------
@@ -105,6 +111,10 @@ class FuzzyQLearning:
     6561
     """
 
+    approximator_type = FuzzyRulesConfig
+    learning_type = FuzzyQLearningConfig
+    learns_any_transition = False
+
     def __init__(
         self,
         observation_space: gym.Space[Any],
@@ -113,84 +123,92 @@ class FuzzyQLearning:
         approximator: FuzzyRulesConfig | None = None,
         learning: FuzzyQLearningConfig | None = None,
         seed: int = 0,
+        observation_range: Range | None = None,
+        angles: Sequence[int] = (),
+        angle_pairs: AnglePairs = "none",
+        warm_up_steps: int = 1000,
     ) -> None:
-        self._scaled = UnitObservations(observation_space)
-        self._actions = ContinuousActions(action_space)
-        self.action_space = action_space
+        super().__init__(
+            observation_space,
+            action_space,
+            approximator or FuzzyRulesConfig(),
+            learning or FuzzyQLearningConfig(),
+            seed=seed,
+            observation_range=observation_range,
+            angles=angles,
+            angle_pairs=angle_pairs,
+            warm_up_steps=warm_up_steps,
+        )
+
+    def _make_actions(self, space: gym.Space[Any]) -> Actions:
+        return ContinuousActions(space)
+
+    def _make_parts(self) -> list[Any]:
         self.approximator = dataclasses.replace(
-            approximator or FuzzyRulesConfig(), n_inputs=self._scaled.n_inputs
+            self.approximator, n_inputs=self._observations.n_inputs
         )
-        self.learning = learning or FuzzyQLearningConfig()
-        self._core = _core.FuzzyQLearning(
-            approximator=self.approximator.to_core(),
-            learning=self.learning.to_core(),
-            seed=seed_of(seed),
-        )
+        return [
+            _core.FuzzyQLearning(
+                approximator=self.approximator.to_core(),
+                learning=self.learning.to_core(),
+                seed=_core.seed_of_dimension(self.seed, dimension),
+            )
+            for dimension in range(self._actions.n_dimensions)
+        ]
+
+    def _remember_action(self) -> None:
+        self._actions.take([part.last_action for part in self._parts])
+
+    def _act(self, state: NDArray[np.float64], explore: bool) -> list[Any]:
+        return [part.act(state, explore) for part in self._parts]
+
+    def _learn(
+        self,
+        state: NDArray[np.float64],
+        numbers: list[Any],
+        reward: float,
+        following: NDArray[np.float64],
+        terminated: bool,
+    ) -> None:
+        for part, number in zip(self._parts, numbers, strict=True):
+            part.learn(state, number, reward, following, terminated)
+
+    def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        sizes = self.approximator
+        shape = (sizes.n_sets**self._observations.n_inputs, sizes.n_actions)
+        n = self._actions.n_dimensions
+        for prefix in [""] if n == 1 else [f"{dimension}." for dimension in range(n)]:
+            check_shape(state, f"{prefix}rules.values", shape)
 
     @property
-    def core(self) -> _core.FuzzyQLearning:
+    def core(self) -> Any:
         """The compiled agent, which shares all that is learned: states [0, 1], actions [-1, 1].
 
-        ``core.rules`` is its table of rules.
+        ``core.rules`` is its table of rules. Of the first dimension, where there are several.
+
+        Raises
+        ------
+        RuntimeError
+            While the agent is warming up.
         """
-        return self._core
+        return self._born()[0]
 
     @property
     def n_rules(self) -> int:
-        """Number of rules, ``n_sets ** n_inputs``."""
-        return self._core.rules.n_rules
-
-    def begin_episode(self) -> None:
-        """Start counting steps anew, for the greedy first steps of an episode; forget traces.
-
-        To be called at the start of each episode: `learn` never does.
-        """
-        self._core.begin_episode()
-
-    def act(self, observation: ArrayLike, explore: bool = True) -> Any:
-        """Choose the action to take, an element of the action space.
-
-        Parameters
-        ----------
-        observation : array_like, shape (d,)
-        explore : bool
-            False: every rule picks a best action, and nothing is remembered: `learn` still waits
-            for the transition of the last exploring act.
-
-        Raises
-        ------
-        ValueError
-            If the observation has another shape or holds NaN.
-        """
-        action = self._core.act(self._scaled("observation", observation), explore)
-        return self._actions.take(action) if explore else self._actions.element(action)
-
-    def learn(self, transition: Transition) -> None:
-        """Learn the transition that began with the last exploring `act`.
-
-        Other transitions cannot be learned: which rule picked what is known of that act only. A
-        terminated transition ends the eligibility traces, but begins no episode.
-
-        Raises
-        ------
-        ValueError
-            If observation and action are not those of the last exploring act, or the next
-            observation or the reward is not usable; nothing is learned then.
-        OverflowError
-            If a value would leave the range of 32-bit floats; nothing is learned then.
-        """
-        self._core.learn(
-            self._scaled("observation", transition.observation),
-            self._actions.core_action(transition.action),
-            float(transition.reward),
-            self._scaled("next_observation", transition.next_observation),
-            bool(transition.terminated),
-        )
+        """Number of rules of a dimension, ``n_sets ** n_inputs``."""
+        n_rules: int = self.core.rules.n_rules
+        return n_rules
 
     def value(self, observation: ArrayLike) -> float:
-        """V(observation): the truth-weighted mean of every fired rule's best value."""
-        return self._core.value(self._scaled("observation", observation))
+        """V(observation): the truth-weighted mean of every fired rule's best value.
+
+        The mean over the dimensions, where there are several.
+        """
+        state = self._state("observation", observation)
+        values = [part.value(state) for part in self._parts]
+        return float(values[0]) if len(values) == 1 else float(np.mean(values))
 
     def rule_values(self, rule: int) -> NDArray[np.float32]:
-        """v(rule, a) of every discrete action, shape (n_actions,)."""
-        return self._core.rules.values(rule)
+        """v(rule, a) of every discrete action, shape (n_actions,); of the first dimension."""
+        values: NDArray[np.float32] = self.core.rules.values(rule)
+        return values

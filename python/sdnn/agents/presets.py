@@ -34,13 +34,30 @@ class Preset:
 PRESETS: Mapping[str, Preset] = MappingProxyType(
     {
         "paper": Preset(title="as in the paper"),
+        # A full step each time, then ever smaller ones, which rounding stills one by one; targets
+        # of five steps; exploration that goes somewhere: docs/agents.md.
+        "general": Preset(
+            title="as recommended for any task",
+            approximator=SDNNCConfig(n_actions=5),
+            learning=QLearningConfig(
+                learning_rate=1.0,
+                final_learning_rate=0.1,
+                discount=0.99,
+                epsilon=0.1,
+                final_epsilon=0.01,
+                n_greedy_steps=0,
+                n_steps=5,
+                max_repetitions=100,
+                value_range="seen",
+            ),
+        ),
         # Few actions part the best one from its neighbours by more than sensor noise blurs, and a
         # success that reaches the whole path at once is not forgotten: docs/readings.md.
         "robust": Preset(
-            title="as recommended: steady with noisy sensors",
+            title="as recommended for the paper's task: steady with noisy sensors",
             approximator=SDNNCConfig(n_actions=61),
             learning=QLearningConfig(n_steps=5),
         ),
     }
 )
-"""By name: ``"paper"`` and ``"robust"``."""
+"""By name: ``"paper"``, ``"general"`` and ``"robust"``."""

@@ -1,10 +1,10 @@
-"""Q-learning, for any Gymnasium environment with one action dimension."""
+"""Q-learning, for any Gymnasium environment."""
 
 from __future__ import annotations
 
 import abc
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Generic, TypeAlias, TypeVar
 
 import gymnasium as gym
@@ -12,156 +12,174 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
+from sdnn.agents.actions import Actions, IndexedActions
+from sdnn.agents.agent import Agent, check_shape
+from sdnn.agents.observations import AnglePairs, Range
 from sdnn.agents.presets import PRESETS
 from sdnn.agents.q_learning_config import QLearningConfig
-from sdnn.agents.spaces import UnitObservations, discrete_actions
-from sdnn.agents.transition import Transition
 from sdnn.approximators.rbf_network import RBFNetworkConfig
 from sdnn.approximators.sdnn_c import SDNNCConfig, pattern_tables
-from sdnn.arguments import choice, seed_of
+from sdnn.arguments import choice
 
 __all__ = ["RBFQLearning", "SDNNQLearning"]
 
 
 CoreAgent: TypeAlias = _core.SDNNQLearning | _core.RBFQLearning
-"""The agents of the C++ core."""
+"""The agents of the C++ core whose actions have one dimension."""
+
+CoreVectorAgent: TypeAlias = _core.DecoupledSDNNQLearning | _core.DecoupledRBFQLearning
+"""Those whose actions have several."""
 
 Approximator = TypeVar("Approximator", SDNNCConfig, RBFNetworkConfig)
 
 
-class _QLearning(abc.ABC, Generic[Approximator]):
+class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approximator]):
     """What Q-learning with any approximator has in common: spaces in, spaces out."""
 
-    def __init__(
-        self,
-        observation_space: gym.Space[Any],
-        action_space: gym.Space[Any],
-        approximator: Approximator,
-        learning: QLearningConfig | None,
-        seed: int,
-    ) -> None:
-        self._scaled = UnitObservations(observation_space)
-        approximator = dataclasses.replace(approximator, n_inputs=self._scaled.n_inputs)
-        if isinstance(action_space, gym.spaces.Discrete):
-            approximator = dataclasses.replace(approximator, n_actions=int(action_space.n))
-        self.action_space = action_space
-        self.learning = learning or QLearningConfig()
-        self._core = self._make_core(approximator, seed_of(seed))
-        n_actions = self._core.action_value.n_actions
-        self.approximator: Approximator = dataclasses.replace(approximator, n_actions=n_actions)
-        self._actions = discrete_actions(action_space, n_actions)
+    learning_type = QLearningConfig
+    _actions: IndexedActions
+
+    def _make_actions(self, space: gym.Space[Any]) -> Actions:
+        return IndexedActions(space, self._n_actions_of_a_box())
+
+    def _n_actions_of_a_box(self) -> int:
+        return self.approximator.n_actions
+
+    def _make_parts(self) -> list[Any]:
+        n_actions = self._actions.n_actions
+        sizes: dict[str, Any] = {"n_inputs": self._observations.n_inputs}
+        if len(n_actions) == 1 and not self._actions.is_box:
+            sizes["n_actions"] = n_actions[0]
+        self.approximator = dataclasses.replace(self.approximator, **sizes)
+        return [self._make_core()]
 
     @abc.abstractmethod
-    def _make_core(self, approximator: Approximator, seed: int) -> CoreAgent:
-        """Make the compiled agent; ``learning`` is known."""
+    def _make_core(self) -> CoreAgent | CoreVectorAgent:
+        """Make the compiled agent; the approximator's sizes are known."""
+
+    def _act(self, state: NDArray[np.float64], explore: bool) -> list[Any]:
+        chosen = self._parts[0].act(state, explore)
+        return chosen if self._actions.n_dimensions > 1 else [chosen]
+
+    def _learn(
+        self,
+        state: NDArray[np.float64],
+        numbers: list[Any],
+        reward: float,
+        following: NDArray[np.float64],
+        terminated: bool,
+    ) -> None:
+        action = numbers if self._actions.n_dimensions > 1 else numbers[0]
+        self._parts[0].learn(state, action, reward, following, terminated)
 
     @property
-    def core(self) -> CoreAgent:
+    def core(self) -> Any:
         """The compiled agent, which shares all that is learned: states in [0, 1], indices.
 
-        ``core.action_value`` is its approximator.
+        ``core.action_value`` is its approximator; where actions have several dimensions,
+        ``core.action_value(dimension)``.
+
+        Raises
+        ------
+        RuntimeError
+            While the agent is warming up.
         """
-        return self._core
+        return self._born()[0]
 
     @property
-    def n_actions(self) -> int:
-        """Number of actions the agent chooses from."""
-        return self._core.action_value.n_actions
+    def n_dimensions(self) -> int:
+        """Dimensions of an action."""
+        return self._actions.n_dimensions
+
+    @property
+    def n_actions(self) -> int | list[int]:
+        """Number of actions the agent chooses from, of each dimension where there are several."""
+        n_actions = self._actions.n_actions
+        return n_actions[0] if len(n_actions) == 1 else list(n_actions)
 
     @property
     def actions(self) -> NDArray[Any]:
-        """The actions in order, shape (n_actions,): what ``q_values`` are the values of."""
-        return self._actions.values
+        """The actions in order, shape (n_actions,): what ``q_values`` are the values of.
 
-    def begin_episode(self) -> None:
-        """Start counting steps anew, for the greedy first steps of an episode.
-
-        To be called at the start of each episode: `learn` never does.
+        Those of the first dimension, where there are several: see `actions_of`.
         """
-        self._core.begin_episode()
+        return self._actions.values(0)
 
-    def act(self, observation: ArrayLike, explore: bool = True) -> Any:
-        """Choose the action to take, an element of the action space.
+    def actions_of(self, dimension: int) -> NDArray[Any]:
+        """Give the actions of a dimension in order, shape (n_actions[dimension],)."""
+        return self._actions.values(self._dimension(dimension))
 
-        Parameters
-        ----------
-        observation : array_like, shape (l,)
-        explore : bool
-            False: always a best action, and no effect on the agent's later learning.
+    def q_values(self, observation: ArrayLike, dimension: int = 0) -> NDArray[np.float64]:
+        """Q(observation, a) of every action of a dimension, shape (n_actions[dimension],).
 
         Raises
         ------
+        RuntimeError
+            While the agent is warming up.
         ValueError
-            If the observation has another shape or holds NaN.
+            If the observation is not usable, or there is no such dimension.
         """
-        action = self._core.act(self._scaled("observation", observation), explore)
-        return self._actions.take(action) if explore else self._actions.element(action)
+        state = self._state("observation", observation)
+        values: NDArray[np.float64] = self._network(self._dimension(dimension)).values(state)
+        return values
 
-    def learn(self, transition: Transition) -> None:
-        """Learn one transition by Eq. (1).
+    def _dimension(self, dimension: int) -> int:
+        if not 0 <= dimension < self.n_dimensions:
+            raise ValueError(f"dimension must be in [0, {self.n_dimensions}), got {dimension}")
+        return dimension
 
-        Any action of the space can be learned, not only that of the last `act`; of a ``Box`` the
-        nearest one is. A terminated transition begins no episode. With ``n_steps`` above 1 a
-        transition waits for those that follow; one that does not begin where the one before it
-        ended (another ``observation`` than the last ``next_observation``) begins anew, and
-        `begin_episode` learns what still waits.
-
-        Raises
-        ------
-        ValueError
-            If an observation, the action or the reward is not usable; nothing is learned then.
-        OverflowError
-            If a weight would leave its range; nothing is learned then.
-        """
-        self._core.learn(
-            self._scaled("observation", transition.observation),
-            self._actions.core_action(transition.action),
-            float(transition.reward),
-            self._scaled("next_observation", transition.next_observation),
-            bool(transition.terminated),
+    def _network(self, dimension: int) -> Any:
+        """Find the approximator of a dimension."""
+        return (
+            self.core.action_value if self.n_dimensions == 1 else self.core.action_value(dimension)
         )
 
-    def q_values(self, observation: ArrayLike) -> NDArray[np.float64]:
-        """Q(observation, a) of every action, shape (n_actions,)."""
-        return self._core.action_value.values(self._scaled("observation", observation))
+    def _prefixes(self) -> list[str]:
+        """Names of the approximators' parts in the state, one per dimension."""
+        if self.n_dimensions == 1:
+            return ["action_value."]
+        return [f"action_value.{dimension}." for dimension in range(self.n_dimensions)]
 
 
 class SDNNQLearning(_QLearning[SDNNCConfig]):
     """An agent that learns Q(s, a) with SDNN-C, one transition at a time.
 
-    Observations are scaled to [0, 1] by the bounds of the observation space; values outside
-    saturate. A one-dimensional ``Box`` of actions is cut evenly into the network's actions, 61 by
-    default; a ``Discrete`` space gives one window of hidden units per action.
+    A ``Box`` of actions is cut evenly into the network's actions, 5 in each dimension by default;
+    a ``Discrete`` space gives one window of hidden units per action. Actions of several dimensions
+    have a network each, and Q(s, a) is the mean of their values: the best action is exact, one pass
+    per dimension; see docs/agents.md.
 
     Parameters
     ----------
-    observation_space : gymnasium.spaces.Box, shape (l,)
-        Finite bounds, l >= 2.
-    action_space : gymnasium.spaces.Box of shape (1,) or gymnasium.spaces.Discrete
+    observation_space, action_space : gymnasium.Space
+        See `Agent`.
     approximator : SDNNCConfig, optional
-        ``n_inputs`` (and ``n_actions``, for a Discrete space) are taken from the spaces. By default
-        that of the preset.
+        ``n_inputs`` (and ``n_actions``, unless actions are a Box) are taken from the spaces. By
+        default that of the preset.
     learning : QLearningConfig, optional
         By default that of the preset.
     seed : int
         The root of every random stream of the agent.
     tables : sequence of array_like, shape (n_bins, n_pattern_units), optional
-        Patterns for each observed variable, of any coding; see `sdnn.approximators.SDNNC`.
-    preset : {"robust", "paper"}
-        What is used where no settings are given: those recommended, or the paper's; see
-        `sdnn.agents.PRESETS`.
+        Patterns for each input, of any coding; see `sdnn.approximators.SDNNC`. Not where actions
+        have several dimensions.
+    preset : {"general", "robust", "paper"}
+        What is used where no settings are given: those for any task, those that stay steady in the
+        paper's task, or the paper's; see `sdnn.agents.PRESETS`.
+    observation_range, angles, angle_pairs, warm_up_steps
+        See `Agent`.
 
     Raises
     ------
     TypeError
         For spaces of another kind.
     ValueError
-        For spaces of another shape or without finite bounds, or impossible settings.
+        For spaces, ranges or settings that are impossible.
 
     Attributes
     ----------
     approximator : SDNNCConfig
-        As used, with ``n_inputs`` and ``n_actions`` filled in.
+        As used, with the sizes filled in.
     learning : QLearningConfig
         As used.
 
@@ -179,8 +197,11 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
     ...     agent.learn(Transition(observation, action, reward, following, terminated))
     ...     observation = following
     >>> agent.q_values(observation).shape
-    (61,)
+    (5,)
     """
+
+    approximator_type = SDNNCConfig
+    least_inputs = 2
 
     def __init__(
         self,
@@ -191,7 +212,11 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         learning: QLearningConfig | None = None,
         seed: int = 0,
         tables: Sequence[ArrayLike] | None = None,
-        preset: str = "robust",
+        preset: str = "general",
+        observation_range: Range | None = None,
+        angles: Sequence[int] = (),
+        angle_pairs: AnglePairs = "none",
+        warm_up_steps: int = 1000,
     ) -> None:
         self._tables = None if tables is None else pattern_tables(tables)
         chosen = choice("preset", preset, PRESETS)
@@ -200,17 +225,75 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
             action_space,
             approximator or chosen.approximator,
             learning or chosen.learning,
-            seed,
+            seed=seed,
+            observation_range=observation_range,
+            angles=angles,
+            angle_pairs=angle_pairs,
+            warm_up_steps=warm_up_steps,
         )
 
-    def _make_core(self, approximator: SDNNCConfig, seed: int) -> _core.SDNNQLearning:
+    def _n_actions_of_a_box(self) -> int:
+        sizes = self.approximator
+        return sizes.n_actions or max(sizes.n_hidden_units - sizes.n_active_units + 1, 1)
+
+    def _make_core(self) -> CoreAgent | CoreVectorAgent:
+        if any(self._observations.circular) and not self.approximator.circular:
+            self.approximator = dataclasses.replace(
+                self.approximator, circular=self._observations.circular
+            )
+        config, learning = self.approximator.to_core(), self.learning.to_core()
+        if self.n_dimensions > 1:
+            if self._tables is not None:
+                raise ValueError("tables must be None where actions have several dimensions")
+            return _core.DecoupledSDNNQLearning(
+                approximator=config,
+                n_actions=self._actions.n_actions,
+                learning=learning,
+                seed=self.seed,
+            )
         given = {} if self._tables is None else {"tables": self._tables}
-        return _core.SDNNQLearning(
-            approximator=approximator.to_core(),
-            learning=self.learning.to_core(),
-            seed=seed,
-            **given,
+        core = _core.SDNNQLearning(approximator=config, learning=learning, seed=self.seed, **given)
+        self.approximator = dataclasses.replace(
+            self.approximator, n_actions=core.action_value.n_actions
         )
+        return core
+
+    def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        sizes = self.approximator
+        n_groups = self._observations.n_inputs * (self._observations.n_inputs - 1)
+        shape = (sizes.n_hidden_units, n_groups * sizes.n_pattern_units)
+        for prefix in self._prefixes():
+            check_shape(state, prefix + "weights", shape)
+
+    def learning_report(self) -> dict[str, Any]:
+        """Say what became of the corrections so far, to find settings that cannot work.
+
+        Returns
+        -------
+        dict
+            ``n_corrections``: transitions learned, times dimensions; ``share_changed``: those that
+            changed weights; ``share_rounded_away``: those that wanted a
+            value between two that the network can give, nearer to the one it gave (a larger
+            ``learning_rate``, more units or another ``rounding`` help);
+            ``share_out_of_range``: those that wanted a value outside ``q_range`` (a wider range, or
+            ``value_range="seen"``); ``q_range``: (low, high) as it is.
+
+        Raises
+        ------
+        RuntimeError
+            While the agent is warming up.
+        """
+        networks = [self._network(dimension) for dimension in range(self.n_dimensions)]
+        changed, rounded_away, out_of_range, asked = np.sum(
+            [network.correction_counts for network in networks], axis=0
+        ).tolist()
+        return {
+            "n_corrections": asked,
+            "share_changed": changed / max(asked, 1),
+            "share_rounded_away": rounded_away / max(asked, 1),
+            "share_out_of_range": out_of_range / max(asked, 1),
+            "q_range": networks[0].output_range,
+        }
 
 
 class RBFQLearning(_QLearning[RBFNetworkConfig]):
@@ -222,22 +305,23 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
 
     Parameters
     ----------
-    observation_space : gymnasium.spaces.Box, shape (d,)
-        Finite bounds.
-    action_space : gymnasium.spaces.Box of shape (1,) or gymnasium.spaces.Discrete
+    observation_space, action_space : gymnasium.Space
+        See `Agent`.
     approximator : RBFNetworkConfig, optional
-        ``n_inputs`` (and ``n_actions``, for a Discrete space) are taken from the spaces.
+        ``n_inputs`` (and ``n_actions``, unless actions are a Box) are taken from the spaces.
     learning : QLearningConfig, optional
     seed : int
         The root of every random stream of the agent.
+    observation_range, angles, angle_pairs, warm_up_steps
+        See `Agent`. An angle is scaled like any other variable: the bases know no circle.
 
     Raises
     ------
     TypeError
         For spaces of another kind.
     ValueError
-        For spaces of another shape or without finite bounds, impossible settings, or more weights
-        than ``approximator.max_table_bytes`` allows.
+        For spaces, ranges or settings that are impossible, or more weights than
+        ``approximator.max_table_bytes`` allows.
 
     Attributes
     ----------
@@ -263,6 +347,8 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
     (601,)
     """
 
+    approximator_type = RBFNetworkConfig
+
     def __init__(
         self,
         observation_space: gym.Space[Any],
@@ -271,12 +357,35 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
         approximator: RBFNetworkConfig | None = None,
         learning: QLearningConfig | None = None,
         seed: int = 0,
+        observation_range: Range | None = None,
+        angles: Sequence[int] = (),
+        angle_pairs: AnglePairs = "none",
+        warm_up_steps: int = 1000,
     ) -> None:
         super().__init__(
-            observation_space, action_space, approximator or RBFNetworkConfig(), learning, seed
+            observation_space,
+            action_space,
+            approximator or RBFNetworkConfig(),
+            learning or QLearningConfig(),
+            seed=seed,
+            observation_range=observation_range,
+            angles=angles,
+            angle_pairs=angle_pairs,
+            warm_up_steps=warm_up_steps,
         )
 
-    def _make_core(self, approximator: RBFNetworkConfig, seed: int) -> _core.RBFQLearning:
-        return _core.RBFQLearning(
-            approximator=approximator.to_core(), learning=self.learning.to_core(), seed=seed
-        )
+    def _make_core(self) -> CoreAgent | CoreVectorAgent:
+        config, learning = self.approximator.to_core(), self.learning.to_core()
+        if self.n_dimensions > 1:
+            return _core.DecoupledRBFQLearning(
+                approximator=config,
+                n_actions=self._actions.n_actions,
+                learning=learning,
+                seed=self.seed,
+            )
+        return _core.RBFQLearning(approximator=config, learning=learning, seed=self.seed)
+
+    def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        n_weights = self.approximator.n_bases ** (self._observations.n_inputs + 1)
+        for prefix in self._prefixes():
+            check_shape(state, prefix + "weights", (n_weights,))

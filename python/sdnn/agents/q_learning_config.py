@@ -34,6 +34,15 @@ class QLearningConfig:
     n_steps : int
         Rewards in a target before it bootstraps, 1 to 1000. Not in the paper, which has 1: with
         more, a transition is learned, once, when so many steps are known or the episode ends.
+    max_repetitions : int
+        Steps that a random action may last, 1 to 10**6. Not in the paper, which has 1: with more,
+        it is kept for at least k steps with probability 1 / k.
+    final_learning_rate, final_epsilon : float, optional
+        What alpha and epsilon become, in a straight line, as the agent's progress goes from 0 to 1;
+        None: they stay. Not in the paper.
+    value_range : {"given", "seen"}
+        Whether Q has the approximator's range, ``q_low`` to ``q_high``, or one that grows with the
+        discounted sums of the rewards that come. Not in the paper.
     """
 
     learning_rate: float = 0.5
@@ -43,6 +52,10 @@ class QLearningConfig:
     tie_rule: Literal["uniform", "lowest", "middle"] = "uniform"
     tie_tolerance: float = added_later(0.0)
     n_steps: int = added_later(1)
+    max_repetitions: int = added_later(1)
+    final_learning_rate: float | None = added_later(None)
+    final_epsilon: float | None = added_later(None)
+    value_range: Literal["given", "seen"] = added_later("given")
 
     def to_core(self) -> _core.QLearningConfig:
         """Make the core's struct of the same values; see `sdnn.config.to_core`."""

@@ -8,6 +8,8 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sdnn.bounds import with_infinities
+
 __all__ = ["UnitSensors"]
 
 
@@ -68,13 +70,12 @@ class UnitSensors(
 
 def _ends(name: str, given: ArrayLike | None, bounds: NDArray[Any]) -> NDArray[np.float64]:
     """Lower or upper ends of all ranges, shape (l,)."""
-    ends = np.asarray(bounds if given is None else given, np.float64)
+    ends = with_infinities(np.asarray(bounds if given is None else given, np.float64))
     if ends.shape != bounds.shape:
         raise ValueError(
             f"{name} must have {bounds.size} numbers, one per observed variable, got {given!r}"
         )
-    # Some environments write the largest float where they mean infinity.
-    is_bounded = np.abs(ends) < np.finfo(np.float32).max
+    is_bounded = np.isfinite(ends)
     if not is_bounded.all():
         unbounded = ", ".join(str(i) for i in np.flatnonzero(~is_bounded))
         raise ValueError(

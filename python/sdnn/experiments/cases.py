@@ -92,7 +92,7 @@ class Experiment:
         return replace(self, cases=cases)
 
 
-PRESET_AGENTS = {"paper": "sdnn-c", "robust": "sdnn-c-robust"}
+PRESET_AGENTS = {"paper": "sdnn-c", "robust": "sdnn-c-robust", "general": "sdnn-c-general"}
 """The agents that are SDNN-C under the settings of `sdnn.agents.PRESETS`."""
 
 BOTH = ("sdnn-c", "fql")

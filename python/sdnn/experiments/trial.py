@@ -148,6 +148,8 @@ class EpisodeLoop:
             raise ValueError(f"n_episodes must be at least 0, got {n_episodes}")
         last = min(self._episode + n_episodes, self._protocol.n_learning_episodes)
         while self._episode < last:
+            if hasattr(self._agent, "progress"):
+                self._agent.progress = self._episode / self._protocol.n_learning_episodes
             self._episode += 1
             self._run_episode(self._env, learning=True)
             if self._episode % self._protocol.test_interval == 0:

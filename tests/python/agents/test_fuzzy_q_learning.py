@@ -13,6 +13,7 @@ from sdnn.agents.q_learning import RBFQLearning
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig
 
 OBSERVATIONS = gym.spaces.Box(-2.0, 2.0, (3,), np.float64)
+LISTS = gym.spaces.Sequence(gym.spaces.Discrete(2))
 TORQUES = gym.spaces.Box(-1.0, 3.0, (1,), np.float32)
 BUTTONS = gym.spaces.Discrete(4, start=2)
 
@@ -118,10 +119,8 @@ def test_impossible_settings_are_named(change, message):
 @pytest.mark.parametrize(
     ("observations", "actions", "error", "message"),
     [
-        (gym.spaces.Discrete(3), TORQUES, TypeError, "observation_space must be a Box"),
-        (gym.spaces.Box(-np.inf, np.inf, (2,)), TORQUES, ValueError, "finite bounds"),
+        (LISTS, TORQUES, TypeError, "observation_space must be a space that Gym"),
         (OBSERVATIONS, BUTTONS, TypeError, "action_space must be a Box, got Discrete"),
-        (OBSERVATIONS, gym.spaces.Box(0, 1, (2,)), ValueError, "action_space must have 1 dim"),
         (gym.spaces.Box(0, 1, (9,)), TORQUES, ValueError, r"9\^9 = 387420489 rules"),
     ],
 )
@@ -164,7 +163,7 @@ def test_only_the_transition_of_the_last_exploring_act_is_learned():
     for transition, message in [
         (Transition(there, action, 1.0, here, False), "state must be that of the last exploring"),
         (Transition(here, action + 0.5, 1.0, there, False), "action must be"),
-        (Transition(here, [7.0], 1.0, there, False), "action must be one number in"),
+        (Transition(here, [7.0], 1.0, there, False), "action must be in Box"),
         (Transition(here, action, np.nan, there, False), "reward must be finite"),
         (Transition(here, action, 1.0, [0.0], False), "next_observation must have shape"),
     ]:

@@ -75,6 +75,17 @@ def test_exp_is_within_its_error():
     assert worst_ulp(_core.exp(subnormal), exact) < 1.0
 
 
+def test_atan2_is_within_its_error():
+    rng = np.random.default_rng(5)
+    y, x = rng.uniform(-1.0, 1.0, (2, 6000))
+    y[:2000] *= 2.0 ** rng.uniform(-300, 300, 2000)
+    y[2000:3000] = 0.5 * np.abs(x[2000:3000]) * (1.0 + rng.uniform(-1e-3, 1e-3, 1000))
+    exact = [
+        mpmath.atan2(mpmath.mpf(float(b)), mpmath.mpf(float(a))) for b, a in zip(y, x, strict=True)
+    ]
+    assert worst_ulp(_core.atan2(y, x), exact) < 1.5
+
+
 def test_exp_of_bad_and_far_numbers():
     x = np.array([-np.inf, -800.0, -0.0, 0.0, 710.0, np.inf])
     np.testing.assert_array_equal(_core.exp(x), [0, 0, 1, 1, np.inf, np.inf])

@@ -26,10 +26,10 @@ from sdnn.experiments.sweep.settings import (
     Settings,
     StudyFile,
     build,
-    possible_words,
 )
-from sdnn.experiments.sweep.toml_lines import KeyPath
 from sdnn.experiments.trial import ProtocolConfig
+from sdnn.toml_lines import KeyPath
+from sdnn.typed_values import possible_words
 
 PAPER_CASES: dict[str, Case] = {case.id: case for e in EXPERIMENTS for case in e.cases}
 """The paper's cases by their ids; a case of two figures has the title of the later one."""

@@ -59,7 +59,7 @@ def test_the_agent_of_the_page_runs(tmp_path, monkeypatch):
     [
         "environments.unit_sensors", "experiments.environment_trial", "experiments.measures",
         "experiments.page", "experiments.statistics", "experiments.sweep.report",
-        "experiments.sweep.settings", "experiments.sweep.toml_lines",
+        "experiments.sweep.settings", "toml_lines", "typed_values",
     ],
 )  # fmt: skip
 def test_examples_in_docstrings(name):

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from sdnn.experiments.sweep.toml_lines import key_lines, line_of
+from sdnn.toml_lines import key_lines, line_of
 
 if sys.version_info >= (3, 11):
     import tomllib

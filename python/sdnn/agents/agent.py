@@ -1,0 +1,515 @@
+"""What all agents have in common: observations in, actions out, whatever the spaces are."""
+
+from __future__ import annotations
+
+import abc
+import copy
+import dataclasses
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.agents.actions import Actions
+from sdnn.agents.files import Arrays, Description, from_file, read, rebuilt, register, write
+from sdnn.agents.observations import AnglePairs, Range, UnitObservations
+from sdnn.agents.spaces import space_data, space_of
+from sdnn.agents.training import Callback, Training, TrainingResult
+from sdnn.agents.transition import Transition
+from sdnn.agents.warm_up import WarmUp
+from sdnn.arguments import seed_of, whole
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["Agent", "check_shape", "load_agent"]
+
+# Beginnings of the names of arrays that are saved.
+_CORE = "agent."
+_WARM_UP = "warm_up."
+_TABLE = "table."
+
+Approximator = TypeVar("Approximator")
+Learning = TypeVar("Learning")
+
+
+class Agent(abc.ABC, Generic[Approximator, Learning]):
+    """An agent in a Gymnasium environment that learns one transition at a time.
+
+    A loop over an environment is ``train``; a robot that brings its own loop calls
+    `begin_episode`, `act` and `learn`.
+
+    An agent whose observations have no known ranges begins with a *warm-up*: it acts at random
+    for a while, takes the ranges from what it saw, and then learns what it did, in order. From
+    then on the ranges stay.
+
+    Parameters
+    ----------
+    observation_space : gymnasium.Space
+        What Gymnasium flattens to a vector: Box, Dict, Tuple, Discrete, ...
+    action_space : gymnasium.Space
+        Box with finite bounds, Discrete, MultiDiscrete or MultiBinary.
+    approximator, learning
+        Settings of the agent's parts.
+    seed : int
+        The root of every random stream of the agent.
+    observation_range : (low, high), optional
+        Of the observed variables, two numbers or two for each; values outside saturate. By default
+        the bounds of the space, and what the warm-up sees where these are infinite.
+    angles : sequence of int
+        Numbers of variables that are angles: their ranges wrap around.
+    angle_pairs : "none", "find" or sequence of (int, int)
+        Pairs of variables that are the cosine and the sine of an angle, which becomes one input.
+        ``"find"``: those that the warm-up finds on the unit circle.
+    warm_up_steps : int
+        Transitions of the warm-up, where there is one.
+
+    Raises
+    ------
+    TypeError
+        For spaces of another kind.
+    ValueError
+        For spaces, ranges or settings that are impossible.
+
+    Attributes
+    ----------
+    observation_space, action_space : gymnasium.Space
+    approximator, learning
+        As used; sizes that follow from the spaces are known once the warm-up is over.
+    seed : int
+    """
+
+    learns_any_transition: ClassVar[bool] = True
+    """Whether transitions can be learned that do not begin with the last exploring `act`."""
+
+    least_inputs: ClassVar[int] = 1
+    """Inputs that its approximator needs."""
+
+    approximator_type: ClassVar[type[Any]]
+    learning_type: ClassVar[type[Any]]
+    """Of the settings."""
+
+    approximator: Approximator
+    learning: Learning
+    _actions: Actions
+    _tables: list[NDArray[np.int8]] | None = None
+
+    def __init__(
+        self,
+        observation_space: gym.Space[Any],
+        action_space: gym.Space[Any],
+        approximator: Approximator,
+        learning: Learning,
+        *,
+        seed: int = 0,
+        observation_range: Range | None = None,
+        angles: Sequence[int] = (),
+        angle_pairs: AnglePairs = "none",
+        warm_up_steps: int = 1000,
+    ) -> None:
+        self.observation_space = observation_space
+        self.action_space = action_space
+        self.approximator = approximator
+        self.learning = learning
+        self.seed = seed_of(seed)
+        self._warm_up_steps = whole("warm_up_steps", warm_up_steps, 2, 10**7)
+        self._observations = UnitObservations(
+            observation_space,
+            ranges=observation_range,
+            angles=angles,
+            angle_pairs=angle_pairs,
+            least_inputs=self.least_inputs,
+        )
+        self._actions = self._make_actions(action_space)
+        self._progress = 0.0
+        self._parts: list[Any] = []
+        self._warm_up: WarmUp | None = None
+        if self._observations.is_settled:
+            self._parts = self._make_parts()
+        else:
+            self._check_parts()
+            self._warm_up = self._new_warm_up()
+
+    def _new_warm_up(self) -> WarmUp:
+        return WarmUp(
+            self._observations.n_variables,
+            self._actions.n_dimensions,
+            self._warm_up_steps,
+            self.seed,
+        )
+
+    # What the kinds of agents differ in.
+
+    @abc.abstractmethod
+    def _make_actions(self, space: gym.Space[Any]) -> Actions:
+        """Make the conversion of actions; ``approximator`` is known."""
+
+    @abc.abstractmethod
+    def _make_parts(self) -> list[Any]:
+        """Make the compiled agents; the observations are settled. Fills in ``approximator``."""
+
+    def _remember_action(self) -> None:
+        """Take up the action that the restored parts took last, where they must know it."""
+
+    def _check_parts(self) -> None:
+        """Find impossible settings before the warm-up: make the parts for as many variables."""
+        trial = object.__new__(type(self))
+        trial.__dict__.update(self.__dict__)
+        trial._observations = copy.deepcopy(self._observations)
+        trial._observations.settle(np.zeros((1, trial._observations.n_variables)))
+        trial._make_parts()
+
+    @abc.abstractmethod
+    def _act(self, state: NDArray[np.float64], explore: bool) -> list[Any]:
+        """Choose the numbers of an action."""
+
+    @abc.abstractmethod
+    def _learn(
+        self,
+        state: NDArray[np.float64],
+        numbers: list[Any],
+        reward: float,
+        following: NDArray[np.float64],
+        terminated: bool,
+    ) -> None:
+        """Learn a transition."""
+
+    # What users call.
+
+    @property
+    def is_warming_up(self) -> bool:
+        """Whether the agent still acts at random to see the ranges of its observations."""
+        return self._warm_up is not None
+
+    @property
+    def progress(self) -> float:
+        """How much of the learning is done, in [0, 1].
+
+        Settings such as ``final_epsilon`` follow it; ``train`` sets it.
+        """
+        return self._progress
+
+    @progress.setter
+    def progress(self, progress: float) -> None:
+        value = float(progress)
+        if not 0.0 <= value <= 1.0:
+            raise ValueError(f"progress must be in [0, 1], got {progress!r}")
+        self._progress = value
+        self._apply_progress()
+
+    def _apply_progress(self) -> None:
+        for part in self._parts:
+            if hasattr(part, "set_progress"):
+                part.set_progress(self._progress)
+
+    def begin_episode(self) -> None:
+        """Note that an episode begins: `learn` never does.
+
+        Starts the greedy first steps of an episode anew, and learns what still waits.
+        """
+        if self._warm_up is not None:
+            self._warm_up.begin_episode()
+        for part in self._parts:
+            part.begin_episode()
+
+    def act(self, observation: Any, explore: bool = True) -> Any:
+        """Choose the action to take, an element of the action space.
+
+        Parameters
+        ----------
+        observation : element of the observation space
+        explore : bool
+            False: always a best action, and no effect on the agent's later learning.
+
+        Raises
+        ------
+        ValueError
+            If the observation has another shape or holds NaN.
+        """
+        if self._warm_up is not None:
+            self._observations.flat("observation", observation)
+            return self._actions.element(self._warm_up.act(self._actions.random, explore))
+        numbers = self._act(self._observations("observation", observation), explore)
+        return self._actions.take(numbers) if explore else self._actions.element(numbers)
+
+    def flat_observation(self, observation: Any) -> NDArray[np.float64]:
+        """Give the observed variables as a vector, shape (n_variables,), in their own units.
+
+        Raises
+        ------
+        ValueError
+            If the observation has another shape or holds NaN.
+        """
+        return self._observations.flat("observation", observation)
+
+    def learn(self, transition: Transition) -> None:
+        """Learn one transition.
+
+        Any action of the space can be learned, not only that of the last `act` (but by
+        `FuzzyQLearning`); of a ``Box`` the nearest one is. A terminated transition begins no
+        episode. With ``n_steps`` above 1 a transition waits for those that follow; one that does
+        not begin where the one before it ended (another ``observation`` than the last
+        ``next_observation``) begins anew, and `begin_episode` learns what still waits.
+
+        Raises
+        ------
+        ValueError
+            If an observation, the action or the reward is not usable; nothing is learned then.
+        OverflowError
+            If a weight would leave its range; nothing is learned then.
+        """
+        reward, terminated = float(transition.reward), bool(transition.terminated)
+        if self._warm_up is None:
+            self._learn(
+                self._observations("observation", transition.observation),
+                self._actions.numbers(transition.action),
+                reward,
+                self._observations("next_observation", transition.next_observation),
+                terminated,
+            )
+            return
+        observation = self._observations.flat("observation", transition.observation)
+        following = self._observations.flat("next_observation", transition.next_observation)
+        if not np.isfinite(reward):
+            raise ValueError(f"reward must be finite, got {reward}")
+        values = self._actions.vector(transition.action)
+        self._warm_up.learn(observation, values, reward, following, terminated)
+        if self._warm_up.is_over:
+            self._end_warm_up(self._warm_up)
+
+    def _end_warm_up(self, warm_up: WarmUp) -> None:
+        self._observations.settle(warm_up.observations())
+        self._parts = self._make_parts()
+        self._apply_progress()
+        self._warm_up = None
+        if not self.learns_any_transition:
+            for part in self._parts:
+                part.begin_episode()
+            return
+        for begins, (observation, action, reward, following, terminated) in warm_up.transitions():
+            if begins:
+                self.begin_episode()
+            self._learn(
+                self._observations.unit(observation),
+                self._actions.numbers(action),
+                reward,
+                self._observations.unit(following),
+                terminated,
+            )
+
+    def _born(self) -> list[Any]:
+        """Give the compiled agents; RuntimeError while there are none."""
+        if self._warm_up is not None:
+            raise RuntimeError(
+                "the agent is still warming up: it knows no ranges of its observations until it has"
+                f" learned {self._warm_up_steps} transitions, or is given observation_range"
+            )
+        return self._parts
+
+    def _state(self, name: str, observation: Any) -> NDArray[np.float64]:
+        """Convert an observation for the compiled agents."""
+        self._born()
+        return self._observations(name, observation)
+
+    # Loops.
+
+    def train(
+        self,
+        env: gym.Env[Any, Any],
+        *,
+        steps: int | None = None,
+        episodes: int | None = None,
+        seed: int | None = None,
+        callbacks: Iterable[Callback] = (),
+        progress: bool = False,
+        evaluate_every: int | None = None,
+        evaluation_env: gym.Env[Any, Any] | None = None,
+        evaluation_episodes: int = 10,
+    ) -> TrainingResult:
+        """Learn in an environment; see `sdnn.agents.Training`, which can also be resumed.
+
+        With ``progress`` a line on a terminal says how far it is.
+
+        Examples
+        --------
+        >>> import gymnasium as gym
+        >>> from sdnn.agents import SDNNQLearning
+        >>> env = gym.make("CartPole-v1")
+        >>> agent = SDNNQLearning(env.observation_space, env.action_space, seed=1)
+        >>> result = agent.train(env, steps=200)
+        >>> result.n_steps
+        200
+        """
+        own = list(callbacks)
+        if progress:
+            from rich.console import Console
+
+            from sdnn.agents.progress import ProgressLine
+
+            own.append(ProgressLine(Console(stderr=True), "learning"))
+        return Training(
+            self,
+            env,
+            steps=steps,
+            episodes=episodes,
+            seed=self.seed if seed is None else seed,
+            callbacks=own,
+            evaluate_every=evaluate_every,
+            evaluation_env=evaluation_env,
+            evaluation_episodes=evaluation_episodes,
+        ).run()
+
+    # Files.
+
+    def save(self, path: str | Path) -> None:
+        """Write the agent, with all that it needs to go on exactly as it would have.
+
+        One safetensors file, there as a whole or not at all.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+        """
+        write(Path(path), self.description(), self.state())
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read an agent that `save` wrote.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be read.
+        ValueError
+            If it is damaged, from a newer version, or holds another kind of agent.
+        """
+        agent = load_agent(path)
+        if not isinstance(agent, cls):
+            raise ValueError(f"{path} holds a {type(agent).__name__}, not a {cls.__name__}")
+        return agent
+
+    def description(self) -> Description:
+        """Say all that is needed to make an agent like this one, as data that JSON can hold.
+
+        Raises
+        ------
+        TypeError
+            If a space cannot be written down.
+        """
+        actions = self._actions
+        if actions.is_box:
+            shape = list(self.action_space.shape or ())
+            ends = {"low": actions.low.tolist(), "high": actions.high.tolist()}
+            action = {"kind": "box", **ends, "shape": shape}
+        else:
+            action = {"kind": "discrete", "start": actions.start.tolist()}
+        observations = self._observations
+        return {
+            "class": type(self).__name__,
+            "seed": self.seed,
+            "progress": self.progress,
+            "approximator": dataclasses.asdict(self.approximator),  # type: ignore[call-overload]
+            "learning": dataclasses.asdict(self.learning),  # type: ignore[call-overload]
+            "observation_space": space_data(self.observation_space),
+            "action_space": space_data(self.action_space),
+            "n_actions": list(getattr(actions, "n_actions", [])),
+            "action": action,
+            "warm_up_steps": self._warm_up_steps,
+            "asked": observations.asked(),
+            "observation": observations.description() if observations.is_settled else None,
+            "n_tables": len(self._tables or ()),
+        }
+
+    def state(self) -> Arrays:
+        """Give all that the agent remembers, as arrays by name; with `description` all of it."""
+        arrays: Arrays = {}
+        for number, part in enumerate(self._parts):
+            prefix = _CORE if len(self._parts) == 1 else f"{_CORE}{number}."
+            arrays |= {prefix + name: array for name, array in part.state().items()}
+        if self._warm_up is not None:
+            arrays |= {_WARM_UP + name: array for name, array in self._warm_up.state().items()}
+        arrays |= {f"{_TABLE}{i}": table for i, table in enumerate(self._tables or ())}
+        return arrays
+
+    @classmethod
+    def rebuild(cls, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Self:
+        """Make an agent of what `description` and `state` gave.
+
+        Raises
+        ------
+        ValueError
+            If they do not fit; before much memory is asked for.
+        """
+
+        def part(prefix: str) -> Arrays:
+            return {n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)}
+
+        agent = cls.__new__(cls)
+        approximator = dict(description["approximator"])
+        if "circular" in approximator:
+            approximator["circular"] = tuple(approximator["circular"])
+        agent.approximator = cls.approximator_type(**approximator)
+        agent.learning = cls.learning_type(**description["learning"])
+        if description["n_tables"]:
+            agent._tables = [arrays[f"{_TABLE}{i}"] for i in range(description["n_tables"])]
+        agent.observation_space = space_of(description["observation_space"])
+        agent.action_space = space_of(description["action_space"])
+        agent.seed = seed_of(description["seed"])
+        agent._warm_up_steps = whole("warm_up_steps", description["warm_up_steps"], 2, 10**7)
+        asked = description["asked"]
+        low, high = ([np.nan if x is None else x for x in asked[end]] for end in ("low", "high"))
+        agent._observations = UnitObservations(
+            agent.observation_space,
+            ranges=(low, high),
+            angles=asked["angles"],
+            angle_pairs=asked["angle_pairs"],
+            least_inputs=cls.least_inputs,
+        )
+        agent._actions = agent._make_actions(agent.action_space)
+        agent._parts, agent._warm_up, agent._progress = [], None, 0.0
+        if description["observation"] is None:
+            agent._warm_up = agent._new_warm_up()
+            agent._warm_up.restore(part(_WARM_UP), agent._actions.check)
+        else:
+            agent._observations.settled_as(description["observation"])
+            agent._check_state(part(_CORE))
+            agent._parts = agent._make_parts()
+            for number, core in enumerate(agent._parts):
+                core.restore(part(_CORE if len(agent._parts) == 1 else f"{_CORE}{number}."))
+            agent._remember_action()
+        agent.progress = float(description["progress"])
+        return agent
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        """Make the kind known to files."""
+        super().__init_subclass__(**kwargs)
+        register(cls.__name__, cls.rebuild)
+
+    @abc.abstractmethod
+    def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Compare sizes with the settings before memory is asked for; ValueError."""
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return rebuilt, (self.description(), self.state())
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        copied = self.rebuild(self.description(), self.state())
+        memo[id(self)] = copied
+        return copied
+
+
+def check_shape(state: Mapping[str, NDArray[Any]], name: str, shape: tuple[int, ...]) -> None:
+    """Compare the shape of an array with what settings make of it; ValueError."""
+    if name not in state or state[name].shape != shape:
+        came = state[name].shape if name in state else "none"
+        raise ValueError(f"{name} must have shape {shape}, got {came}")
+
+
+def load_agent(path: str | Path) -> Agent[Any, Any]:
+    """Read an agent of any kind that `Agent.save` wrote; see `Agent.load`."""
+    agent: Agent[Any, Any] = from_file(Path(path), *read(Path(path)))
+    return agent

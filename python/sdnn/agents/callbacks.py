@@ -1,0 +1,135 @@
+"""What happens beside learning: rows to files, checkpoints, early stops."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from sdnn.agents.training import Callback, Row, Training
+from sdnn.whole_files import write_whole
+
+__all__ = ["Checkpoints", "EarlyStop", "JSONLines", "TensorBoard"]
+
+
+class JSONLines(Callback):
+    """Writes each row as a line of JSON.
+
+    A training that goes on from a checkpoint first takes back the lines written after it.
+
+    Parameters
+    ----------
+    path
+        The file; a new training begins it anew.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+
+    def on_start(self, training: Training) -> None:
+        """Begin the file, or keep as many lines as the training had rows."""
+        lines: list[bytes] = []
+        if training.n_rows and self.path.exists():
+            lines = self.path.read_bytes().splitlines(keepends=True)[: training.n_rows]
+        write_whole(self.path, lines)
+        self._file = self.path.open("a", encoding="utf-8", newline="\n", buffering=1)
+
+    def on_row(self, training: Training, row: Row) -> None:
+        """Write a line."""
+        self._file.write(json.dumps(row) + "\n")
+
+    def on_end(self, training: Training) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+class Checkpoints(Callback):
+    """Saves the training, agent and all, from where `Training.load` goes on exactly.
+
+    Parameters
+    ----------
+    path
+        The file; each checkpoint takes the place of the one before, as a whole.
+    every
+        Steps between two.
+    """
+
+    def __init__(self, path: str | Path, every: int = 10_000) -> None:
+        if every < 1:
+            raise ValueError(f"every must be at least 1, got {every}")
+        self.path = Path(path)
+        self.every = every
+
+    def on_step(self, training: Training) -> None:
+        """Save where it is due."""
+        if training.n_steps % self.every == 0:
+            training.save(self.path)
+
+    def on_end(self, training: Training) -> None:
+        """Save where the training ends, unless an error left a step half done."""
+        if not training.is_within_step:
+            training.save(self.path)
+
+
+class EarlyStop(Callback):
+    """Stops when evaluations are good enough.
+
+    Parameters
+    ----------
+    mean_return
+        At which mean return of an evaluation.
+    patience
+        How many evaluations in a row have to reach it.
+    """
+
+    def __init__(self, mean_return: float, patience: int = 1) -> None:
+        self.mean_return = mean_return
+        self.patience = patience
+        self._n_reached = 0
+
+    def on_row(self, training: Training, row: Row) -> None:
+        """Look at an evaluation."""
+        if row["kind"] == "evaluation":
+            is_reached = row["mean_return"] >= self.mean_return
+            self._n_reached = self._n_reached + 1 if is_reached else 0
+            if self._n_reached >= self.patience:
+                training.stop()
+
+
+class TensorBoard(Callback):
+    """Writes the numbers of each row for TensorBoard; needs ``tensorboardX`` or ``torch``.
+
+    Parameters
+    ----------
+    folder
+        For the event files.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self._make = _summary_writer()
+        self.folder = Path(folder)
+
+    def on_start(self, training: Training) -> None:
+        """Open the event file."""
+        self._writer = self._make(str(self.folder))
+
+    def on_row(self, training: Training, row: Row) -> None:
+        """Write the row's numbers under its kind."""
+        for name, value in row.items():
+            if isinstance(value, int | float) and name not in ("step",):
+                self._writer.add_scalar(f"{row['kind']}/{name}", value, row["step"])
+
+    def on_end(self, training: Training) -> None:
+        """Close the event file."""
+        self._writer.close()
+
+
+def _summary_writer() -> Callable[[str], Any]:
+    for module in ("tensorboardX", "torch.utils.tensorboard"):
+        try:
+            make: Callable[[str], Any] = __import__(module, fromlist=["x"]).SummaryWriter
+        except ImportError:
+            continue
+        return make
+    raise ImportError("TensorBoard rows need tensorboardX: pip install tensorboardX")

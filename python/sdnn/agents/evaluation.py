@@ -1,0 +1,98 @@
+"""Greedy episodes: how good an agent is now."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.arguments import whole
+
+__all__ = ["Evaluation", "episode_seed", "evaluate"]
+
+EVALUATION = 1
+"""The kind of episodes that `episode_seed` gives seeds to."""
+
+
+class Acts(Protocol):
+    """What is evaluated."""
+
+    def act(self, observation: Any, explore: bool = True) -> Any:
+        """Choose an action."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluation:
+    """The outcome of some greedy episodes.
+
+    Parameters
+    ----------
+    returns
+        Undiscounted sums of rewards, shape (n_episodes,).
+    lengths
+        Steps, shape (n_episodes,).
+    terminated
+        Whether each ended in a terminal state, rather than by a time limit.
+    """
+
+    returns: NDArray[np.float64]
+    lengths: NDArray[np.int64]
+    terminated: NDArray[np.bool_]
+
+    @property
+    def mean_return(self) -> float:
+        """The mean of the returns."""
+        return float(self.returns.mean())
+
+    @property
+    def median_return(self) -> float:
+        """The median of the returns."""
+        return float(np.median(self.returns))
+
+
+def episode_seed(seed: int, kind: int, episode: int) -> int:
+    """Give the seed that an episode's `reset` gets: own ones for learning and evaluation."""
+    word = np.random.SeedSequence(seed, spawn_key=(kind, episode)).generate_state(1, np.uint32)[0]
+    return int(word) % 2**31  # some environments take no larger ones
+
+
+def evaluate(
+    agent: Acts, env: gym.Env[Any, Any], episodes: int = 10, *, seed: int = 0
+) -> Evaluation:
+    """Run greedy episodes, in which nothing is learned and nothing of the agent's future changes.
+
+    Parameters
+    ----------
+    agent
+        What acts.
+    env
+        Each episode resets it with a seed of its own, so that the same call gives the same result.
+    episodes
+        How many.
+    seed
+        Root of the episodes' seeds.
+
+    Raises
+    ------
+    ValueError
+        If ``episodes`` is not at least 1.
+    """
+    n_episodes = whole("episodes", episodes, 1, 10**9)
+    returns, lengths, ends = [], [], []
+    for episode in range(n_episodes):
+        observation, _ = env.reset(seed=episode_seed(seed, EVALUATION, episode))
+        episode_return, length, terminated, truncated = 0.0, 0, False, False
+        while not (terminated or truncated):
+            action = agent.act(observation, explore=False)
+            observation, reward, terminated, truncated, _ = env.step(action)
+            episode_return += float(reward)
+            length += 1
+        returns.append(episode_return)
+        lengths.append(length)
+        ends.append(terminated)
+    return Evaluation(
+        returns=np.array(returns), lengths=np.array(lengths), terminated=np.array(ends, bool)
+    )

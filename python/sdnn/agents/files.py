@@ -1,0 +1,117 @@
+"""An agent's file: one safetensors file of arrays, with a description as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn._core import __version__
+from sdnn.whole_files import write_whole
+
+__all__ = ["Arrays", "Description", "from_file", "read", "rebuilt", "register", "write"]
+
+FORMAT = "sdnn-agent"
+FORMAT_VERSION = 1
+KEY = "sdnn"
+"""Of the description in the file's metadata."""
+
+Arrays = dict[str, NDArray[Any]]
+Description = dict[str, Any]
+
+_KINDS: dict[str, Callable[[Mapping[str, Any], Mapping[str, NDArray[Any]]], Any]] = {}
+
+
+def register(
+    kind: str, make: Callable[[Mapping[str, Any], Mapping[str, NDArray[Any]]], Any]
+) -> None:
+    """Say how agents of a kind are made of a description and arrays."""
+    _KINDS[kind] = make
+
+
+def rebuilt(description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Any:
+    """Make an agent of its description and arrays; ValueError if they do not fit."""
+    return _KINDS[description["class"]](description, arrays)
+
+
+def write(path: Path, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Write an agent's file, as a whole or not at all.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    description
+        Data that JSON can hold; format and version are added.
+    arrays
+        By name.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    from safetensors.numpy import save as to_bytes
+
+    contiguous = {name: np.asarray(array, order="C") for name, array in arrays.items()}
+    told = {"format": f"{FORMAT}-{FORMAT_VERSION}", "version": __version__, **description}
+    write_whole(path, to_bytes(contiguous, metadata={KEY: json.dumps(told, allow_nan=False)}))
+
+
+def read(path: Path) -> tuple[Description, Arrays]:
+    """Read an agent's file: its description and its arrays.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        If it is damaged, no agent's, or of a newer format.
+    """
+    from safetensors import SafetensorError, safe_open
+
+    if path.is_dir():
+        raise IsADirectoryError(f"{path} is a folder, not a file")
+    if not path.exists():
+        raise FileNotFoundError(f"{path} is not there")
+    try:
+        with safe_open(path, framework="numpy") as file:
+            description = _description(path, (file.metadata() or {}).get(KEY, ""))
+            arrays = {name: file.get_tensor(name) for name in list(file.keys())}
+    except SafetensorError as error:
+        raise ValueError(f"{path} is no agent's file, or damaged: {error}") from None
+    return description, arrays
+
+
+def _description(path: Path, text: str) -> Description:
+    try:
+        description = json.loads(text)
+    except (RecursionError, ValueError):
+        description = None
+    name = description.get("format") if isinstance(description, dict) else None
+    family, _, number = str(name).rpartition("-")
+    if description is None or family != FORMAT or not number.isdigit():
+        raise ValueError(f"{path} does not hold an agent of this package")
+    if int(number) > FORMAT_VERSION:
+        raise ValueError(
+            f"{path} was written by a newer version of sdnn"
+            f" ({description.get('version')}, this is {__version__}): update sdnn to read it"
+        )
+    if description.get("class") not in _KINDS:
+        raise ValueError(f"{path} holds an unknown kind of agent, {description.get('class')!r}")
+    checked: Description = description
+    return checked
+
+
+def from_file(
+    path: Path, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]
+) -> Any:
+    """Make the agent of a file that has been read; ValueError that names the file."""
+    try:
+        return rebuilt(description, arrays)
+    except (AttributeError, IndexError, KeyError, OverflowError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} is damaged: {error}") from error

@@ -1,0 +1,64 @@
+"""Interrupts that wait for the end of a step, so that what is saved then is whole."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Sequence
+from types import FrameType, TracebackType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["Interrupts"]
+
+
+class Interrupts:
+    """While it is entered, a first signal only asks to stop; a second one does what it always did.
+
+    Signals that somebody else handles, and threads other than the main one, are left alone.
+
+    Parameters
+    ----------
+    ask_to_stop
+        Called by the first signal.
+    signals
+        Which; by default SIGINT, what Ctrl-C sends.
+
+    Attributes
+    ----------
+    received : int or None
+        The signal that came.
+    """
+
+    def __init__(
+        self, ask_to_stop: Callable[[], None], signals: Sequence[int] = (signal.SIGINT,)
+    ) -> None:
+        self._ask_to_stop = ask_to_stop
+        self._signals = signals
+        self._before: dict[int, Any] = {}
+        self.received: int | None = None
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            for number in self._signals:
+                handler = signal.getsignal(number)
+                if handler in (signal.default_int_handler, signal.SIG_DFL):
+                    self._before[number] = signal.signal(number, self._handle)
+        return self
+
+    def __exit__(
+        self,
+        _kind: type[BaseException] | None,
+        _error: BaseException | None,
+        _traceback: TracebackType | None,
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _handle(self, number: int, _frame: FrameType | None) -> None:
+        self.received = number
+        for each, handler in self._before.items():
+            signal.signal(each, handler)
+        self._ask_to_stop()

@@ -1,0 +1,304 @@
+"""Observations of a Gymnasium space as what networks take: numbers in [0, 1]."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, TypeAlias
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sdnn import _core
+from sdnn.bounds import flat_bounds, with_infinities
+
+__all__ = ["AnglePairs", "Range", "UnitObservations"]
+
+AnglePairs: TypeAlias = Literal["none", "find"] | Sequence[tuple[int, int]]
+"""Which variables are the cosine and the sine of one angle."""
+
+Range: TypeAlias = tuple[ArrayLike, ArrayLike]
+"""Lowest and highest values: a number for all variables, or one for each."""
+
+_HEADROOM = 0.25
+"""How much wider than what was seen a range is made at each end, in parts of it."""
+
+_ON_THE_CIRCLE = 1e-3
+"""How far cos^2 + sin^2 may be from 1, for numbers in single precision and some rounding."""
+
+
+class UnitObservations:
+    """From an observation to the inputs of a network, each in [0, 1].
+
+    Observations are flattened as Gymnasium does it. Each observed variable then is an input, scaled
+    by its range and clipped; two that are the cosine and the sine of an angle are one input, the
+    angle; one declared to be an angle wraps around in its range. Ranges that are not known are
+    taken from observations given to `settle`.
+
+    Parameters
+    ----------
+    space : gymnasium.Space
+        That Gymnasium can flatten to a vector: Box, Discrete, MultiDiscrete, MultiBinary, Dict,
+        Tuple.
+    ranges : (low, high), optional
+        Of the variables; by default the bounds of the space. NaN, and bounds that are infinite:
+        not known.
+    angles : sequence of int
+        Variables that are angles: the ends of their ranges are the same.
+    angle_pairs : "none", "find" or sequence of (int, int)
+        Pairs of variables that are a cosine and a sine. ``"find"``: those that lie on the unit
+        circle in all observations given to `settle`.
+    least_inputs : int
+        Variables are repeated to give at least so many inputs: a network may need two.
+
+    Raises
+    ------
+    TypeError
+        For a space that is no vector when flattened.
+    ValueError
+        For ranges, angles or pairs that do not fit.
+    """
+
+    def __init__(
+        self,
+        space: gym.Space[Any],
+        *,
+        ranges: Range | None = None,
+        angles: Sequence[int] = (),
+        angle_pairs: AnglePairs = "none",
+        least_inputs: int = 1,
+    ) -> None:
+        self._space = space
+        self._shape = space.shape if isinstance(space, gym.spaces.Box) else None
+        low, high = flat_bounds(space)
+        self.n_variables = low.size
+        if self.n_variables == 0:
+            raise ValueError(f"observation_space must have a variable, got {space}")
+        self.low, self.high = _ranges(low, high, ranges)
+        self._least_inputs = least_inputs
+        self._angles = tuple(self._variable("angles", angle) for angle in angles)
+        self._finds_pairs = isinstance(angle_pairs, str) and angle_pairs == "find"
+        self._pairs: tuple[tuple[int, int], ...] = ()
+        if not isinstance(angle_pairs, str):
+            self._pairs = tuple(self._pair(pair) for pair in angle_pairs)
+        elif angle_pairs not in ("none", "find"):
+            raise ValueError(
+                f"angle_pairs must be 'none', 'find' or pairs of variables, got {angle_pairs!r}"
+            )
+        used = [*self._angles, *(variable for pair in self._pairs for variable in pair)]
+        if len(set(used)) != len(used):
+            raise ValueError(
+                f"angles and angle_pairs must name each variable once, got {list(angles)} and"
+                f" {angle_pairs!r}"
+            )
+        self._is_settled = False
+        self._converted: tuple[tuple[bytes, NDArray[np.float64]], ...] = ((b"", np.empty(0)),) * 2
+        if not self._finds_pairs and not self._unknown().any():
+            self._settled()
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether all ranges are known: before, no observation can be converted."""
+        return self._is_settled
+
+    @property
+    def n_inputs(self) -> int:
+        """Inputs of the network, once settled."""
+        return len(self.inputs)
+
+    @property
+    def circular(self) -> tuple[bool, ...]:
+        """Which inputs are angles, once settled."""
+        return tuple("variable" not in one for one in self.inputs)
+
+    def flat(self, name: str, observation: Any) -> NDArray[np.float64]:
+        """Flatten an observation, shape (n_variables,); ValueError if it is none, or has NaN."""
+        values = self._vector(name, observation)
+        if np.isnan(values).any():
+            raise ValueError(f"{name} must not hold NaN, got {values}")
+        return values
+
+    def _vector(self, name: str, observation: Any) -> NDArray[np.float64]:
+        if self._shape is None:
+            try:
+                values = np.asarray(gym.spaces.flatten(self._space, observation), np.float64)
+            except (TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
+                raise ValueError(f"{name} must be of {self._space}, got {observation!r}") from error
+        else:
+            try:
+                values = np.asarray(observation, dtype=np.float64)
+            except (TypeError, ValueError) as error:
+                raise ValueError(f"{name} must be numbers, got {observation!r}") from error
+            if values.shape != self._shape:
+                raise ValueError(f"{name} must have shape {self._shape}, got {values.shape}")
+            values = values.reshape(-1)
+        return values
+
+    def __call__(self, name: str, observation: Any) -> NDArray[np.float64]:
+        """Convert an observation; ValueError with its ``name`` for another shape or NaN."""
+        values = self._vector(name, observation)
+        key = values.tobytes()  # not the array, which others may change
+        for known, state in self._converted:  # a step asks for each one three times
+            if key == known:
+                return state
+        if np.isnan(values).any():
+            raise ValueError(f"{name} must not hold NaN, got {values}")
+        state = self.unit(values)
+        self._converted = (self._converted[1], (key, state))
+        return state
+
+    def unit(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Convert what `flat` gave, shape (n_inputs,)."""
+        scaled = (values - self.low) / (self.high - self.low)
+        scaled = np.minimum(np.maximum(scaled, 0.0), 1.0)
+        if self._plain:
+            return scaled
+        if not np.isfinite(values).all():
+            raise ValueError(f"observation must be finite where it has angles, got {values}")
+        state = np.empty(len(self.inputs))
+        for place, one in enumerate(self.inputs):
+            if "variable" in one:
+                state[place] = scaled[one["variable"]]
+            elif "angle" in one:
+                cosine, sine = one["angle"]
+                angle = _core.atan2(values[sine], values[cosine])
+                state[place] = (angle + np.pi) / (2.0 * np.pi)
+            else:
+                at = one["circular"]
+                turns = (values[at] - self.low[at]) / (self.high[at] - self.low[at])
+                state[place] = turns - np.floor(turns)
+        return state
+
+    def settle(self, seen: NDArray[np.float64]) -> None:
+        """Take what is not known from flattened observations, shape (n, n_variables)."""
+        if self._finds_pairs:
+            self._pairs = self._pairs_of(seen)
+        unknown = self._unknown()
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        low, high = np.maximum(low, -_LARGEST), np.minimum(high, _LARGEST)
+        width = np.where(high > low, high - low, np.maximum(np.abs(high), 1.0))
+        self.low = np.where(unknown, low - _HEADROOM * width, self.low)
+        self.high = np.where(unknown, high + _HEADROOM * width, self.high)
+        self._settled()
+
+    def asked(self) -> dict[str, Any]:
+        """Give what was asked for, as data that JSON can hold: to go on before `settle`."""
+        ends = (self.low, self.high)
+        low, high = ([None if np.isnan(x) else float(x) for x in end] for end in ends)
+        pairs = "find" if self._finds_pairs else [list(pair) for pair in self._pairs]
+        return {"angles": list(self._angles), "angle_pairs": pairs, "low": low, "high": high}
+
+    def description(self) -> dict[str, Any]:
+        """Give what `settled_as` takes, as data that JSON can hold."""
+        return {
+            "low": self.low.tolist(),
+            "high": self.high.tolist(),
+            "inputs": [dict(one) for one in self.inputs],
+        }
+
+    def settled_as(self, description: Mapping[str, Any]) -> None:
+        """Take the ranges and inputs that `description` gave; ValueError if they do not fit."""
+        low = np.asarray(description["low"], np.float64)
+        high = np.asarray(description["high"], np.float64)
+        shape = (self.n_variables,)
+        if low.shape != shape or high.shape != shape or not (low < high).all():
+            raise ValueError(f"observation ranges must be {self.n_variables} of low < high")
+        if not np.isfinite(high - low).all():
+            raise ValueError("observation ranges must be finite")
+        self.low, self.high = low, high
+        self._angles = tuple(
+            self._variable("circular", one["circular"])
+            for one in description["inputs"]
+            if "circular" in one
+        )
+        self._pairs = tuple(
+            self._pair(one["angle"]) for one in description["inputs"] if "angle" in one
+        )
+        self._settled()
+        if [dict(one) for one in self.inputs] != [dict(one) for one in description["inputs"]]:
+            raise ValueError(f"observation inputs must be {self.inputs}")
+
+    def _settled(self) -> None:
+        sines = {sine for _, sine in self._pairs}
+        pairs = dict(self._pairs)
+        inputs: list[dict[str, Any]] = []
+        for variable in range(self.n_variables):
+            if variable in pairs:
+                inputs.append({"angle": [variable, pairs[variable]]})
+            elif variable in self._angles:
+                inputs.append({"circular": variable})
+            elif variable not in sines:
+                inputs.append({"variable": variable})
+        while len(inputs) < self._least_inputs:
+            inputs.append(dict(inputs[-1]))
+        self._converted = ((b"", np.empty(0)),) * 2
+        self.inputs = inputs
+        self._plain = inputs == [{"variable": i} for i in range(self.n_variables)]
+        self._is_settled = True
+
+    def _unknown(self) -> NDArray[np.bool_]:
+        """Which variables need a range and have none; the others get one that is not used."""
+        unknown: NDArray[np.bool_] = np.isnan(self.low) | np.isnan(self.high)
+        for variable in (variable for pair in self._pairs for variable in pair):
+            self.low[variable], self.high[variable] = -1.0, 1.0
+            unknown[variable] = False
+        for variable in self._angles:
+            if unknown[variable]:
+                raise ValueError(
+                    f"observation_range must be given for variable {variable}, which is an angle"
+                    " without bounds: -pi to pi, for example"
+                )
+        return unknown
+
+    def _variable(self, name: str, number: Any) -> int:
+        is_whole = isinstance(number, int | np.integer) and not isinstance(number, bool)
+        if not is_whole or not 0 <= number < self.n_variables:
+            raise ValueError(
+                f"{name} must be variables from 0 to {self.n_variables - 1}, got {number!r}"
+            )
+        return int(number)
+
+    def _pair(self, pair: Any) -> tuple[int, int]:
+        if isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2:
+            raise ValueError(f"angle_pairs must be pairs (cosine, sine) of variables, got {pair!r}")
+        return self._variable("angle_pairs", pair[0]), self._variable("angle_pairs", pair[1])
+
+    def _pairs_of(self, seen: NDArray[np.float64]) -> tuple[tuple[int, int], ...]:
+        """Neighbouring variables that lie on the unit circle and move on it."""
+        pairs = []
+        variable = 0
+        while variable + 1 < self.n_variables:
+            cosine, sine = seen[:, variable], seen[:, variable + 1]
+            on_circle = np.abs(cosine * cosine + sine * sine - 1.0).max() < _ON_THE_CIRCLE
+            moves = np.ptp(cosine) > _ON_THE_CIRCLE and np.ptp(sine) > _ON_THE_CIRCLE
+            is_free = not {variable, variable + 1} & set(self._angles)
+            if on_circle and moves and is_free:
+                pairs.append((variable, variable + 1))
+                variable += 1
+            variable += 1
+        return tuple(pairs)
+
+
+_LARGEST = 1e300
+
+
+def _ranges(
+    low: NDArray[np.float64], high: NDArray[np.float64], ranges: Range | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest values of each variable, those given or the bounds; NaN: not known."""
+    if ranges is not None:
+        if not isinstance(ranges, Sequence) or isinstance(ranges, str) or len(ranges) != 2:
+            raise ValueError(f"observation_range must be (low, high), got {ranges!r}")
+        try:
+            low, high = (
+                with_infinities(np.broadcast_to(np.asarray(end, np.float64).reshape(-1), low.shape))
+                for end in ranges
+            )
+        except (TypeError, ValueError):
+            raise ValueError(
+                f"observation_range must be two numbers or two times {low.size}, got {ranges!r}"
+            ) from None
+    known = np.isfinite(low) & np.isfinite(high)
+    if (low[known] >= high[known]).any():
+        raise ValueError(f"observation ranges must be low < high, got {low} to {high}")
+    return np.where(known, low, np.nan), np.where(known, high, np.nan)

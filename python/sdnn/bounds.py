@@ -1,0 +1,42 @@
+"""The bounds of what is observed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["flat_bounds", "with_infinities"]
+
+
+def with_infinities(ends: NDArray[Any]) -> NDArray[np.float64]:
+    """Read ends of ranges, of which some environments write the largest float for infinity.
+
+    >>> with_infinities(np.array([1.0, -3.4028235e38]))
+    array([  1., -inf])
+    """
+    values = ends.astype(np.float64)
+    is_bounded = np.abs(values) < np.finfo(np.float32).max
+    return np.where(is_bounded | np.isnan(values), values, np.copysign(np.inf, values))
+
+
+def flat_bounds(space: gym.Space[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give the bounds of the vector to which Gymnasium flattens a space; infinite: it has none.
+
+    Raises
+    ------
+    TypeError
+        If it is none that Gymnasium flattens to a vector.
+    """
+    try:
+        flat = gym.spaces.flatten_space(space)
+    except NotImplementedError:
+        flat = None
+    if not isinstance(flat, gym.spaces.Box):
+        raise TypeError(
+            "observation_space must be a space that Gymnasium flattens to a vector,"
+            f" got {type(space).__name__}"
+        )
+    return with_infinities(flat.low), with_infinities(flat.high)

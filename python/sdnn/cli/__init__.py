@@ -1,0 +1,70 @@
+"""The command ``sdnn``, a file per command. They read options and print; the rooms do the work."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from sdnn.cli.bench import bench
+from sdnn.cli.evaluate import evaluate
+from sdnn.cli.plot import plot
+from sdnn.cli.record import record
+from sdnn.cli.reproduce import reproduce
+from sdnn.cli.resume import resume
+from sdnn.cli.sweep import sweep
+from sdnn.cli.train import train
+
+__all__ = ["main"]
+
+
+def _library_version() -> str:
+    import sdnn
+
+    version: str = sdnn.__version__
+    return version
+
+
+def _print_version(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
+    if value:
+        click.echo(f"sdnn {_library_version()}")
+        context.exit()
+
+
+def _print_cmake_dir(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
+    if not value:
+        return
+    import sdnn
+
+    # An editable install has two folders: the sources and the installed files.
+    for folder in sdnn.__path__:
+        found = Path(folder) / "share" / "cmake" / "sdnn"
+        if found.is_dir():
+            click.echo(found)
+            context.exit()
+    raise click.ClickException("this copy of sdnn has no CMake package; install it with pip")
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_version,
+    help="Print the version and exit.",
+)
+@click.option(
+    "--cmakedir",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_cmake_dir,
+    help="Print the folder of the CMake package, for -Dsdnn_ROOT=..., and exit.",
+)
+def main() -> None:
+    """Learn with selective desensitization neural networks, and reproduce the paper about them."""
+
+
+for command in (train, resume, evaluate, plot, record, reproduce, sweep, bench):
+    main.add_command(command)

@@ -1,0 +1,30 @@
+"""The command ``sdnn bench``: how quick the library is here."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from sdnn.cli.output import make_console
+
+
+@click.command()
+@click.option("--quick", is_flag=True, help="Few repetitions: to see that it works.")
+@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON.")
+def bench(quick: bool, as_json: bool) -> None:
+    """Measure how quick the library is here, and what this machine allows.
+
+    Takes about half a minute. SDNN_INSTRUCTION_SET=portable, avx2 or avx512 forces a level.
+    """
+    from sdnn.benchmarks import BenchmarkError, run_benchmarks
+    from sdnn.benchmarks.report import print_results
+
+    try:
+        results = run_benchmarks(quick=quick)
+    except BenchmarkError as error:
+        raise click.ClickException(str(error)) from error
+    if as_json:
+        click.echo(json.dumps(results, indent=2))
+        return
+    print_results(results, make_console())

@@ -1,0 +1,52 @@
+"""The command ``sdnn evaluate``: greedy episodes of a run's agent."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from sdnn.cli.run_options import json_option, run_argument, run_command, seed_option
+
+
+@click.command()
+@run_argument
+@click.option(
+    "--episodes", type=click.IntRange(min=1), default=100, show_default=True, help="How many."
+)
+@seed_option
+@json_option
+def evaluate(folder: Path, episodes: int, seed: int | None, as_json: bool) -> None:
+    """Say how good the agent of RUN is now: greedy episodes in which nothing is learned."""
+    import numpy as np
+
+    from sdnn.runs import Run
+
+    with run_command():
+        found = Run.open(folder).evaluate(episodes, seed)
+    returns = found.returns
+    low, median, high = np.percentile(returns, (25, 50, 75)).tolist()
+    values = {
+        "folder": str(folder),
+        "n_episodes": episodes,
+        "mean_return": found.mean_return,
+        "standard_deviation": float(returns.std(ddof=1)) if episodes > 1 else None,
+        "median_return": median,
+        "quartiles": [low, high],
+        "range": [float(returns.min()), float(returns.max())],
+        "mean_length": float(found.lengths.mean()),
+        "share_terminated": float(found.terminated.mean()),
+    }
+    if as_json:
+        click.echo(json.dumps({**values, "returns": returns.tolist()}, indent=2))
+        return
+    click.echo(f"{folder}: mean return {found.mean_return:.6g} over {episodes} greedy episodes")
+    click.echo(
+        f"median {median:.6g}, quartiles {low:.6g} to {high:.6g}, all {returns.min():.6g} to"
+        f" {returns.max():.6g}"
+    )
+    click.echo(
+        f"{values['mean_length']:.6g} steps on average,"
+        f" {values['share_terminated']:.0%} of the episodes terminated"
+    )

@@ -1,0 +1,104 @@
+"""What the commands print, and how they end."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sdnn.experiments.engine import RunOutcome
+
+Done = TypeVar("Done")
+
+EXIT_FAILURE = 1
+EXIT_INTERRUPTED = 130
+PLAIN_WIDTH = 160
+"""Width of tables that go to a file or pipe."""
+
+
+def report_outcome(context: click.Context, outcome: RunOutcome, out: Path) -> str:
+    """Tell what failed, exit if interrupted, and say how much is stored."""
+    from sdnn.experiments.progress import describe
+
+    n_stored = outcome.n_reused + outcome.n_run
+    stored = f"{n_stored} of {outcome.n_planned} trials are stored in {out}"
+    for failure in outcome.failures:
+        message = f"{type(failure.error).__name__}: {failure.error}"
+        click.echo(f"Error: {describe(failure.key)} failed: {message}", err=True)
+    if outcome.interrupted:
+        exit_interrupted(context, f"interrupted; {stored}; the same command goes on from there")
+    return stored
+
+
+def print_files(outcome: RunOutcome, files: tuple[Path, ...], stored: str) -> None:
+    """Say what was run and where to look."""
+    page = next(str(file) for file in files if file.suffix == ".html")
+    done_now = f"{stored} ({outcome.n_run} run now); " if outcome.n_planned else ""
+    click.echo(f"{done_now}wrote {len(files)} files: see {page}")
+
+
+def print_tables(
+    console: Console,
+    tables: Iterable[tuple[str, Sequence[str], Sequence[Sequence[str]]]],
+    notes: Iterable[str],
+    mark: str = "",
+) -> None:
+    """Print tables of a title, a header and rows, then notes."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    for title, header, rows in tables:
+        table = Table(title=Text(title + mark), title_justify="left", box=box.SIMPLE_HEAD)
+        for column in header:
+            table.add_column(Text(column), overflow="fold")
+        for row in rows:
+            table.add_row(*map(Text, row))
+        console.print(table)
+    for note in notes:
+        console.print(note, style="dim", highlight=False, markup=False)
+
+
+def make_console() -> Console:
+    """Make the console that tables are printed on: as wide as the terminal, if it is one."""
+    from rich.console import Console
+
+    return Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
+
+
+@contextmanager
+def experiment_command(context: click.Context) -> Iterator[None]:
+    """Make a line and an exit code of what can end a run of trials."""
+    from sdnn.experiments.errors import ExperimentError, StudyError
+
+    try:
+        yield
+    except StudyError as error:
+        raise click.UsageError(str(error)) from error
+    except (ExperimentError, OSError) as error:
+        raise click.ClickException(str(error)) from error
+    except KeyboardInterrupt:
+        exit_interrupted(context, "interrupted; what was finished is stored")
+
+
+def with_progress(run: Callable[..., Done], request: Any) -> Done:
+    """Run what was asked for, with a line of progress."""
+    from rich.console import Console
+
+    from sdnn.experiments.progress import ProgressObserver
+
+    with ProgressObserver(Console(stderr=True)) as observer:
+        return run(request, observer=observer)
+
+
+def exit_interrupted(context: click.Context, message: str) -> NoReturn:
+    """Say what is kept, and exit as a command that was interrupted."""
+    click.echo(message, err=True)
+    context.exit(EXIT_INTERRUPTED)

@@ -1,0 +1,40 @@
+"""The command ``sdnn plot``: learning curves of runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from sdnn.cli.run_options import run_command
+
+
+@click.command()
+@click.argument(
+    "folders",
+    metavar="RUN...",
+    nargs=-1,
+    required=True,
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+)
+@click.option(
+    "--out",
+    metavar="FILE",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="A .png, .svg or .pdf file.  [default: curves.png in RUN, or here for several]",
+)
+def plot(folders: tuple[Path, ...], out: Path | None) -> None:
+    """Draw the learning curves of RUN..., and write their numbers beside the figure as CSV.
+
+    One run of its kind: returns of its episodes as points, their running median, and the mean
+    return of each evaluation with the quartiles over its episodes. Runs that differ in their seeds
+    only: the median of their evaluations with the quartiles over the runs. A panel per task.
+    """
+    from sdnn.runs import Run
+    from sdnn.runs.curves import curves_of, write_curves
+
+    chosen = tuple(dict.fromkeys(folders))
+    path = out or (chosen[0] / "curves.png" if len(chosen) == 1 else Path("curves.png"))
+    with run_command():
+        files = write_curves(curves_of([Run.open(folder) for folder in chosen]), path)
+    click.echo("wrote " + " and ".join(map(str, files)))

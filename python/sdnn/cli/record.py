@@ -1,0 +1,31 @@
+"""The command ``sdnn record``: a moving picture of a run's agent."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import click
+
+from sdnn.cli.run_options import run_argument, run_command, seed_option
+
+
+@click.command()
+@run_argument
+@click.argument("out", metavar="OUT", type=click.Path(dir_okay=False, path_type=Path))
+@seed_option
+@click.option(
+    "--steps", type=click.IntRange(min=1), help="At most so many.  [default: the whole episode]"
+)
+def record(folder: Path, out: Path, seed: int | None, steps: int | None) -> None:
+    """Record a greedy episode of RUN's agent as OUT, a .gif or .mp4 file.
+
+    It is the first episode of `sdnn evaluate` with the same seed.
+    """
+    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # pictures need no screen
+    from sdnn.runs import Run
+    from sdnn.runs.recording import record as record_run
+
+    with run_command():
+        recording = record_run(Run.open(folder), out, seed=seed, max_steps=steps)
+    click.echo(f"wrote {out}: {recording.n_frames} frames, return {recording.total_reward:.6g}")

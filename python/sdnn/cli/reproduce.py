@@ -1,0 +1,168 @@
+"""The command ``sdnn reproduce``: the paper's experiments."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from sdnn.cli.executor_options import executor_options
+from sdnn.cli.output import (
+    EXIT_FAILURE,
+    experiment_command,
+    make_console,
+    print_files,
+    print_tables,
+    report_outcome,
+    with_progress,
+)
+from sdnn.experiments.cases import PRESET_AGENTS, WORDS, includes_cost, select_experiments
+
+if TYPE_CHECKING:
+    from sdnn.experiments.executor import Executor
+    from sdnn.experiments.report import Report
+    from sdnn.experiments.reproduce import ReproduceRequest, Reproduction
+
+
+@click.command()
+@click.argument("experiment", type=click.Choice(WORDS), default="all")
+@click.option(
+    "--trials",
+    type=click.IntRange(min=1),
+    help="Trials per case and agent.  [default: 10, as in the paper]",
+)
+@click.option(
+    "--episodes",
+    type=click.IntRange(min=1),
+    help="Learning episodes per trial.  [default: 15000, as in the paper]",
+)
+@executor_options
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Root of all seeds."
+)
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("results"),
+    show_default=True,
+    help="Folder for the result file, figures, tables and report.html.",
+)
+@click.option(
+    "--quick",
+    is_flag=True,
+    help="A look at a fraction: 2 trials x 300 episodes. Not the result.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
+@click.option("--dry-run", is_flag=True, help="Only say what would be run.")
+@click.option(
+    "--agent",
+    "agents",
+    metavar="ID",
+    multiple=True,
+    help="Run this agent in every case instead of the case's own; may be repeated.",
+)
+@click.option(
+    "--preset",
+    "presets",
+    type=click.Choice(tuple(PRESET_AGENTS)),
+    multiple=True,
+    help="Draw SDNN-C under these settings beside the paper's; may be repeated.",
+)
+@click.pass_context
+def reproduce(
+    context: click.Context,
+    experiment: str,
+    trials: int | None,
+    episodes: int | None,
+    jobs: int | None,
+    executor: Executor | None,
+    seed: int,
+    out: Path,
+    quick: bool,
+    as_json: bool,
+    dry_run: bool,
+    agents: tuple[str, ...],
+    presets: tuple[str, ...],
+) -> None:
+    """Run the paper's experiments and write a report with its figures and claims.
+
+    a: redundant inputs. b: noisy inputs, against fuzzy Q-learning. cost: time of a step against the
+    number of inputs. all: everything, which is the default.
+
+    Finished trials are kept in OUT/results.sqlite; the same command goes on where it stopped.
+    """
+    from sdnn.experiments.reproduce import ReproduceRequest
+    from sdnn.experiments.reproduce import reproduce as run
+
+    request = ReproduceRequest(
+        experiments=select_experiments(experiment),
+        cost=includes_cost(experiment),
+        out=out,
+        n_trials=trials,
+        n_episodes=episodes,
+        seed=seed,
+        jobs=jobs,
+        executor=executor,
+        quick=quick,
+        agents=agents,
+        presets=presets,
+    )
+    try:
+        _ = request.plan
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
+    with experiment_command(context):
+        if dry_run:
+            _print_plan(request, as_json)
+        else:
+            _finish(context, with_progress(run, request), out, as_json)
+
+
+def _print_plan(request: ReproduceRequest, as_json: bool) -> None:
+    from sdnn.experiments.reproduce import count_stored
+
+    counts = count_stored(request)
+    n_episodes = request.protocol.n_learning_episodes
+    n_costs, n_costs_stored = counts.costs
+    if as_json:
+        trials = [
+            {"case": case, "agent": agent, "planned": planned, "stored": stored}
+            for (case, agent), (planned, stored) in counts.trials.items()
+        ]
+        costs = {"planned": n_costs, "stored": n_costs_stored}
+        plan = {"n_learning_episodes": n_episodes, "trials": trials, "costs": costs}
+        click.echo(json.dumps(plan, indent=2))
+        return
+    for (case, agent), (planned, stored) in counts.trials.items():
+        click.echo(
+            f"{case} {agent}: {planned} trials x {n_episodes} episodes,"
+            f" {stored} of them stored in {request.out}"
+        )
+    if n_costs:
+        click.echo(
+            f"cost of a step: {n_costs} measurements, {n_costs_stored} of them stored in"
+            f" {request.out}"
+        )
+
+
+def _finish(context: click.Context, done: Reproduction, out: Path, as_json: bool) -> None:
+    stored = report_outcome(context, done.outcome, out)
+    if done.outcome.failures:
+        click.echo(f"Error: no figure drawn; {stored}", err=True)
+        context.exit(EXIT_FAILURE)
+    if as_json:
+        click.echo(json.dumps(done.table, indent=2))
+        return
+    if done.report is not None:
+        _print_report(done.report)
+    print_files(done.outcome, done.files, stored)
+
+
+def _print_report(report: Report) -> None:
+    mark = " (QUICK LOOK, not the result)" if report.quick else ""
+    console = make_console()
+    if note := report.agents_note():
+        console.print(note, highlight=False)
+    print_tables(console, report.tables(), report.notes(), mark)

@@ -1,0 +1,28 @@
+"""The command ``sdnn resume``: a run goes on where it stopped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from sdnn.cli.run_options import json_option, run_argument, run_command, train_run
+
+
+@click.command()
+@run_argument
+@click.option(
+    "--steps", type=click.IntRange(min=1), help="A new goal: steps in all, whatever the target."
+)
+@click.option("--episodes", type=click.IntRange(min=1), help="The same in episodes.")
+@json_option
+def resume(folder: Path, steps: int | None, episodes: int | None, as_json: bool) -> None:
+    """Go on with RUN, a folder of `sdnn train`, from its last checkpoint.
+
+    It becomes what it would have been without the stop, bit for bit. A run that is done stays as it
+    is unless --steps or --episodes says more.
+    """
+    from sdnn.runs import Run
+
+    with run_command(folder):
+        train_run(Run.open(folder), as_json, steps=steps, episodes=episodes)

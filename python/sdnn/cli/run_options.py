@@ -1,0 +1,152 @@
+"""What the commands on run folders have in common: texts to values, and how errors are told."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sdnn.cli.output import EXIT_INTERRUPTED
+
+if TYPE_CHECKING:
+    from sdnn.runs import Run, RunOutcome
+
+EXIT_TERMINATED = 143
+
+run_argument = click.argument(
+    "folder", metavar="RUN", type=click.Path(exists=True, file_okay=False, path_type=Path)
+)
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the outcome as JSON.")
+
+seed_option = click.option(
+    "--seed",
+    type=click.IntRange(min=0, max=2**64 - 1),
+    help="Root of the episodes' seeds.  [default: others than those of the training]",
+)
+
+_OPTIONS = {"environment.noise": "--noise", "environment.redundant": "--redundant"}
+
+
+def option_of(key: str) -> str:
+    """Find the option that sets a key of a run's configuration."""
+    words = key.split(".")
+    if words[0] == "settings":
+        return f"--set {'.'.join(words[1:])}"
+    if key.startswith("environment.kwargs"):
+        return " ".join(["--env-arg", *words[2:]])
+    if key.startswith("environment.ranges"):
+        return "--range"
+    if words[0] == "environment":
+        return _OPTIONS.get(key, "ENV_ID")
+    return "--" + key.replace("_", "-")
+
+
+def value_of(text: str) -> Any:
+    """Read a value as TOML has it, such as 0.5, true or [1, 2]; anything else is a text."""
+    if sys.version_info >= (3, 11):
+        import tomllib
+    else:
+        import tomli as tomllib
+    if "\n" in text:
+        return text
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def named_values(option: str, pairs: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Split texts like ``name=value``; UsageError with the option's name if one is none."""
+    for pair in pairs:
+        name, equals, text = pair.partition("=")
+        if not equals or not name.strip():
+            raise click.UsageError(f"{option} must be NAME=VALUE, got {pair!r}")
+        yield name.strip(), text.strip()
+
+
+@contextmanager
+def run_command(folder: Path | None = None) -> Iterator[None]:
+    """Let environments be modules of the present folder, and tell errors that users can mend.
+
+    They become a line and an exit code; those of a configuration that comes from options, not from
+    a file, name the option. ``folder`` is what an interrupted run goes on from.
+    """
+    from sdnn.runs import ConfigError, RunError, RunTerminatedError
+
+    if not {"", os.getcwd()} & set(sys.path):
+        sys.path.append(os.getcwd())
+    try:
+        yield
+    except ConfigError as error:
+        if error.place:
+            raise click.UsageError(str(error)) from error
+        raise click.UsageError(f"{option_of(error.key)}: {error.problem}") from error
+    except RunTerminatedError as error:
+        _tell_how_to_resume("terminated", folder)
+        raise click.exceptions.Exit(EXIT_TERMINATED) from error
+    except (RunError, OSError) as error:
+        raise click.ClickException(str(error)) from error
+    except KeyboardInterrupt as error:
+        _tell_how_to_resume("interrupted", folder)
+        raise click.exceptions.Exit(EXIT_INTERRUPTED) from error
+
+
+def _tell_how_to_resume(what: str, folder: Path | None) -> None:
+    goes_on = "" if folder is None or not folder.exists() else f"; sdnn resume {folder} goes on"
+    click.echo(what + goes_on, err=True)
+
+
+def train_run(run: Run, as_json: bool, *, steps: int | None, episodes: int | None) -> None:
+    """Train a run, with a line of progress on a terminal, and print what came of it."""
+    callbacks = []
+    if sys.stderr.isatty():
+        from rich.console import Console
+
+        from sdnn.agents.progress import ProgressLine
+
+        callbacks.append(ProgressLine(Console(stderr=True), run.config.environment.id))
+    outcome = run.train(steps=steps, episodes=episodes, callbacks=callbacks)
+    if as_json:
+        click.echo(json.dumps({"folder": str(run.folder), **outcome_values(outcome)}, indent=2))
+        return
+    for line in _outcome_lines(run, outcome):
+        click.echo(line)
+
+
+def outcome_values(outcome: RunOutcome) -> Mapping[str, Any]:
+    """Give an outcome as JSON has it."""
+    report = outcome.learning_report
+    return {
+        "n_steps": outcome.n_steps,
+        "n_episodes": outcome.n_episodes,
+        "reason": outcome.reason,
+        "last_evaluation": outcome.last_evaluation,
+        "learning_report": None if report is None else dict(report),
+    }
+
+
+def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
+    why = " (the target is reached)" if outcome.reason == "target" else ""
+    yield f"{run.folder}: {outcome.n_steps} steps, {outcome.n_episodes} episodes{why}"
+    row = outcome.last_evaluation
+    if row is not None:
+        yield (
+            f"last evaluation, after {row['step']} steps: mean return"
+            f" {row['mean_return']:.6g} over {len(row['returns'])} greedy episodes"
+        )
+    report = outcome.learning_report
+    if report is not None and report["n_corrections"]:
+        yield (
+            f"of {report['n_corrections']} corrections {report['share_changed']:.0%} changed the"
+            f" network, {report['share_rounded_away']:.0%} were rounded away and"
+            f" {report['share_out_of_range']:.0%} out of its range of values"
+        )
+    commands = (f"sdnn {word} {run.folder}" for word in ("plot", "evaluate", "record"))
+    yield "next: " + ", ".join(commands) + " x.gif"

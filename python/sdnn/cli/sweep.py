@@ -1,0 +1,125 @@
+"""The command ``sdnn sweep``: studies."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from sdnn.cli.executor_options import executor_options
+from sdnn.cli.output import (
+    EXIT_FAILURE,
+    experiment_command,
+    make_console,
+    print_files,
+    print_tables,
+    report_outcome,
+    with_progress,
+)
+
+if TYPE_CHECKING:
+    from sdnn.experiments.executor import Executor
+    from sdnn.experiments.sweep.report import StudyReport
+    from sdnn.experiments.sweep.run import Sweep, SweepRequest
+
+
+@click.command()
+@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option(
+    "--trials",
+    type=click.IntRange(min=1),
+    help="Trials per case and variant, instead of the file's.",
+)
+@click.option(
+    "--seed", type=click.IntRange(min=0), help="Root of all seeds, instead of the file's."
+)
+@executor_options
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("results"),
+    show_default=True,
+    help="Folder for the result file, figure, tables and page.",
+)
+@click.option(
+    "--only", metavar="VARIANT", multiple=True, help="Run this variant only; may be repeated."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
+@click.option("--dry-run", is_flag=True, help="Only say what would be run, and how long it takes.")
+@click.pass_context
+def sweep(
+    context: click.Context,
+    file: Path,
+    trials: int | None,
+    seed: int | None,
+    jobs: int | None,
+    executor: Executor | None,
+    out: Path,
+    only: tuple[str, ...],
+    as_json: bool,
+    dry_run: bool,
+) -> None:
+    """Run the study in FILE: variants of any setting, compared trial by trial.
+
+    FILE is TOML; docs/sweep.md describes it. Tables, a figure and a page are written to OUT under
+    the name of the file.
+
+    Finished trials are kept in OUT/results.sqlite, which `reproduce` may share; the same command
+    goes on where it stopped.
+    """
+    from sdnn.experiments.errors import StudyError
+    from sdnn.experiments.sweep.run import SweepRequest
+    from sdnn.experiments.sweep.run import sweep as run
+
+    request = SweepRequest(
+        file=file,
+        out=out,
+        n_trials=trials,
+        seed=seed,
+        jobs=jobs,
+        executor=executor,
+        only=tuple(dict.fromkeys(only)),
+    )
+    try:
+        _ = request.plan
+    except (StudyError, ValueError) as error:
+        raise click.UsageError(str(error)) from error
+    with experiment_command(context):
+        if dry_run:
+            _print_forecast(request, as_json)
+        else:
+            _finish_sweep(context, with_progress(run, request), out, as_json)
+
+
+def _print_forecast(request: SweepRequest, as_json: bool) -> None:
+    from sdnn.experiments.sweep.forecast import forecast, forecast_json, forecast_lines
+
+    found = forecast(request)
+    if as_json:
+        click.echo(json.dumps(forecast_json(found), indent=2))
+        return
+    for line in forecast_lines(found, request.out):
+        click.echo(line)
+
+
+def _finish_sweep(context: click.Context, done: Sweep, out: Path, as_json: bool) -> None:
+    stored = report_outcome(context, done.outcome, out)
+    if done.report is None:
+        click.echo(f"Error: nothing is complete; {stored}", err=True)
+        context.exit(EXIT_FAILURE)
+    if as_json:
+        click.echo(json.dumps(done.table, indent=2))
+    else:
+        _print_study(done.report)
+        print_files(done.outcome, done.files, stored)
+    if done.outcome.failures:
+        context.exit(EXIT_FAILURE)
+
+
+def _print_study(report: StudyReport) -> None:
+    console = make_console()
+    lines = [report.title, report.scope(), *filter(None, [report.missing()])]
+    console.print("\n".join(lines), highlight=False, markup=False)
+    print_tables(console, report.tables(), report.notes())

@@ -1,0 +1,24 @@
+"""Runs: one agent that learns in one environment, in a folder of its own, which can be resumed.
+
+A folder holds ``config.json`` (all that defines the run), ``rows.jsonl`` (its episodes and
+evaluations), ``checkpoint.safetensors`` (where it goes on) and, once it is finished,
+``agent.safetensors``. The commands ``sdnn train``, ``resume``, ``evaluate``, ``plot`` and
+``record`` work on such folders.
+"""
+
+from sdnn.runs.config import AGENTS, RunConfig
+from sdnn.runs.environment import RunEnvironment
+from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
+from sdnn.runs.run import Goal, Run, RunOutcome
+
+__all__ = [
+    "AGENTS",
+    "ConfigError",
+    "Goal",
+    "Run",
+    "RunConfig",
+    "RunEnvironment",
+    "RunError",
+    "RunOutcome",
+    "RunTerminatedError",
+]

@@ -1,0 +1,275 @@
+"""Learning curves: the numbers of runs' rows, and a figure of them.
+
+matplotlib is an extra and is imported when it is needed, without pyplot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.runs.config import RunConfig
+from sdnn.runs.errors import RunError
+from sdnn.runs.run import Run
+from sdnn.whole_files import csv_bytes, write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["SUFFIXES", "Curve", "curves_of", "draw_curves", "write_curves"]
+
+SUFFIXES = (".png", ".svg", ".pdf")
+
+WINDOW = 20
+"""Episodes in the running median of the returns, or all so far where they are fewer."""
+
+HEADER = ("task", "agent", "kind", "n_runs", "run", "step", "value", "low", "high")
+
+COLORS = ("#1f5a96", "#c2542d", "#3c7d4b", "#7a5195", "#8a6d1d", "#4a4a4a")
+
+Kind = Literal["return", "running median", "evaluation"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Curve:
+    """Numbers against steps.
+
+    Parameters
+    ----------
+    task, agent
+        What was learned by what: runs that agree in both differ in their seeds only.
+    kind
+        Of episodes their returns, or the running median of these; or the evaluations: of one run
+        the mean, of several the median of their means.
+    n_runs
+        How many runs it is of.
+    run
+        The folder, if it is of one.
+    steps, values
+        Shape (n,).
+    low, high
+        Lower and upper quartiles, over the episodes of each evaluation of one run, or over runs;
+        None: there are none. Shape (n,).
+    """
+
+    task: str
+    agent: str
+    kind: Kind
+    n_runs: int
+    run: str
+    steps: NDArray[np.int64]
+    values: NDArray[np.float64]
+    low: NDArray[np.float64] | None = None
+    high: NDArray[np.float64] | None = None
+
+
+def curves_of(runs: Sequence[Run]) -> list[Curve]:
+    """Make the curves of runs; those of one task and agent become one.
+
+    Raises
+    ------
+    RunError
+        If there is nothing to draw yet, or rows cannot be read.
+    """
+    groups: dict[tuple[str, str], list[Run]] = {}
+    for run in runs:
+        groups.setdefault((_task(run.config), _agent(run.config)), []).append(run)
+    curves: list[Curve] = []
+    for (task, agent), members in groups.items():
+        if len(members) == 1:
+            curves += _curves_of_one(task, agent, members[0])
+        else:
+            curves += _curve_of_several(task, agent, members)
+    if not curves:
+        folders = ", ".join(str(run.folder) for run in runs)
+        raise RunError(f"{folders}: no episode and no evaluation is whole yet: nothing to draw")
+    return curves
+
+
+def write_curves(curves: Sequence[Curve], path: Path) -> tuple[Path, Path]:
+    """Draw curves into a file, and write their numbers beside it as CSV; gives both files.
+
+    Raises
+    ------
+    RunError
+        If matplotlib is missing, or the name has another end than those of `SUFFIXES`.
+    OSError
+        If a file cannot be written.
+    """
+    if path.suffix not in SUFFIXES:
+        raise RunError(f"{path} must end in one of {', '.join(SUFFIXES)}")
+    content = BytesIO()
+    draw_curves(curves).savefig(content, format=path.suffix[1:], dpi=150)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, content.getvalue())
+    numbers = path.with_suffix(".csv")
+    write_whole(numbers, csv_bytes(HEADER, _csv_rows(curves)))
+    return path, numbers
+
+
+def draw_curves(curves: Sequence[Curve]) -> Figure:
+    """Draw curves: a panel per task, a color per agent.
+
+    Raises
+    ------
+    RunError
+        If matplotlib is not installed.
+    """
+    if find_spec("matplotlib") is None:
+        raise RunError('figures need matplotlib, which is missing: pip install "sdnn[plot]"')
+    from matplotlib.figure import Figure
+
+    tasks = list(dict.fromkeys(curve.task for curve in curves))
+    agents = list(dict.fromkeys(curve.agent for curve in curves))
+    figure = Figure(figsize=(7.5, 3.6 * len(tasks)), layout="constrained")
+    panels = figure.subplots(len(tasks), squeeze=False)[:, 0]
+    for task, axes in zip(tasks, panels, strict=True):
+        for curve in curves:
+            if curve.task == task:
+                _draw(axes, curve, COLORS[agents.index(curve.agent) % len(COLORS)])
+        axes.set_title(task, fontsize=10)
+        axes.set_xlabel("steps")
+        axes.set_ylabel("return")
+        axes.grid(alpha=0.25)
+        axes.legend(fontsize=8, frameon=False)
+    return figure
+
+
+def _draw(axes: Axes, curve: Curve, color: str) -> None:
+    of = f" ({curve.n_runs} runs)" if curve.n_runs > 1 else ""
+    label = f"{curve.agent}: {curve.kind}{of}"
+    if curve.kind == "return":
+        axes.plot(curve.steps, curve.values, ".", ms=2, color=color, alpha=0.25, label=label)
+        return
+    is_main = curve.kind == "evaluation" or curve.n_runs > 1
+    width, dashes, marker = (1.8, "-", "o") if is_main else (1.0, "--", "")
+    axes.plot(
+        curve.steps, curve.values, dashes, lw=width, marker=marker, ms=3, color=color, label=label
+    )
+    if curve.low is not None and curve.high is not None:
+        axes.fill_between(curve.steps, curve.low, curve.high, color=color, alpha=0.2, lw=0)
+
+
+def _curves_of_one(task: str, agent: str, run: Run) -> list[Curve]:
+    rows = run.rows()
+    episodes = [row for row in rows if row["kind"] == "episode"]
+    evaluations = [row for row in rows if row["kind"] == "evaluation"]
+    names: dict[str, Any] = {"task": task, "agent": agent, "n_runs": 1, "run": str(run.folder)}
+    curves = []
+    if episodes:
+        steps, returns = _episodes(episodes)
+        medians = _running_median(returns)
+        curves += [
+            Curve(**names, kind="return", steps=steps, values=returns),
+            Curve(**names, kind="running median", steps=steps, values=medians),
+        ]
+    if evaluations:
+        quartiles = [np.percentile(row["returns"], (25, 75)) for row in evaluations]
+        low, high = np.array(quartiles).T
+        steps, means = _evaluations(evaluations)
+        curves.append(
+            Curve(**names, kind="evaluation", steps=steps, values=means, low=low, high=high)
+        )
+    return curves
+
+
+def _curve_of_several(task: str, agent: str, runs: Sequence[Run]) -> list[Curve]:
+    kind: Kind = "evaluation"
+    series = []
+    for run in runs:
+        rows = [row for row in run.rows() if row["kind"] == "evaluation"]
+        series.append(_evaluations(rows))
+    if not all(len(steps) for steps, _ in series):
+        kind = "running median"
+        series = []
+        for run in runs:
+            steps, returns = _episodes([row for row in run.rows() if row["kind"] == "episode"])
+            series.append((steps, _running_median(returns)))
+    if not all(len(steps) for steps, _ in series):
+        return []
+    steps = _steps_of_all([steps for steps, _ in series], is_grid=kind == "evaluation")
+    if not len(steps):
+        return []
+    values = np.array([np.interp(steps, own, numbers) for own, numbers in series])
+    low, middle, high = np.percentile(values, (25, 50, 75), axis=0)
+    return [
+        Curve(
+            task=task,
+            agent=agent,
+            kind=kind,
+            n_runs=len(runs),
+            run="",
+            steps=steps,
+            values=middle,
+            low=low,
+            high=high,
+        )
+    ]
+
+
+def _steps_of_all(all_steps: Sequence[NDArray[np.int64]], is_grid: bool) -> NDArray[np.int64]:
+    """Find steps at which all have numbers: shared ones, or a hundred within what all reached."""
+    if is_grid:
+        shared = set.intersection(*(set(steps.tolist()) for steps in all_steps))
+        return np.array(sorted(shared), np.int64)
+    first = max(int(steps[0]) for steps in all_steps)
+    last = min(int(steps[-1]) for steps in all_steps)
+    return (
+        np.unique(np.linspace(first, last, 100).astype(np.int64))
+        if first <= last
+        else (np.array([], np.int64))
+    )
+
+
+def _episodes(rows: Sequence[Any]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    steps = np.array([row["step"] for row in rows], np.int64)
+    return steps, np.array([row["return"] for row in rows], np.float64)
+
+
+def _evaluations(rows: Sequence[Any]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    steps = np.array([row["step"] for row in rows], np.int64)
+    return steps, np.array([row["mean_return"] for row in rows], np.float64)
+
+
+def _running_median(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Median of each number and those before it, `WINDOW` in all."""
+    return np.array([np.median(values[max(0, i + 1 - WINDOW) : i + 1]) for i in range(len(values))])
+
+
+def _task(config: RunConfig) -> str:
+    environment = config.environment
+    words = [environment.id]
+    words += [f"{name}={value}" for name, value in environment.kwargs.items()]
+    words += [f"range {key}: {low} to {high}" for key, (low, high) in environment.ranges.items()]
+    if environment.noise:
+        words.append(f"noise {environment.noise}")
+    if environment.redundant:
+        words.append(f"{environment.redundant} redundant")
+    return ", ".join(words)
+
+
+def _agent(config: RunConfig) -> str:
+    words = [config.agent if config.preset is None else f"{config.agent} {config.preset}"]
+    words += [
+        f"{name}={value}" for values in config.settings.values() for name, value in values.items()
+    ]
+    if config.angle_pairs != "none":
+        words.append("angle pairs")
+    return ", ".join(words)
+
+
+def _csv_rows(curves: Sequence[Curve]) -> Iterable[tuple[object, ...]]:
+    for curve in curves:
+        names = (curve.task, curve.agent, curve.kind, curve.n_runs, curve.run)
+        for place, (step, value) in enumerate(zip(curve.steps, curve.values, strict=True)):
+            low = "" if curve.low is None else repr(float(curve.low[place]))
+            high = "" if curve.high is None else repr(float(curve.high[place]))
+            yield (*names, int(step), repr(float(value)), low, high)

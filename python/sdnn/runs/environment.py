@@ -1,0 +1,208 @@
+"""The environment of a run: any of Gymnasium's, with noisy and redundant sensors if wanted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.arguments import real, whole
+from sdnn.bounds import flat_bounds
+from sdnn.environments import NoisySensors, RedundantSensors, UnitSensors
+from sdnn.runs.errors import ConfigError, problem_of
+
+__all__ = ["ALL", "MeanOfNeighbours", "RunEnvironment"]
+
+ALL = "all"
+"""The key of the range of all variables that have no other."""
+
+Ends = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+class MeanOfNeighbours:
+    """A redundant sensor: the mean of two neighbouring variables; the last one's is the first.
+
+    Parameters
+    ----------
+    first, second
+        The variables' numbers.
+    """
+
+    def __init__(self, first: int, second: int) -> None:
+        self.first, self.second = first, second
+
+    def __call__(self, observation: NDArray[Any]) -> float:
+        """Observe them."""
+        return 0.5 * (float(observation[self.first]) + float(observation[self.second]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunEnvironment:
+    """A Gymnasium environment and what the agent observes of it.
+
+    With noise or redundant variables, observations are flattened and scaled to [0, 1]; values
+    outside their ranges saturate. Without, the agent gets them as they are.
+
+    Parameters
+    ----------
+    id
+        What `gymnasium.make` is given: ``"Pendulum-v1"``, or ``"module:namespace/Name-v0"``, for
+        which the module is imported first.
+    kwargs
+        Further arguments of `gymnasium.make`, such as ``max_episode_steps``, and of the
+        environment.
+    ranges
+        (low, high) of observed variables by their numbers, as text, from 0; ``"all"``: of all
+        others. By default the bounds of the observation space.
+    noise
+        Standard deviation of Gaussian noise on every variable, in parts of its range, >= 0. Every
+        episode draws it anew from the seed of its reset.
+    redundant
+        How many means of neighbouring variables are appended, before the noise: of 0 and 1, of 1
+        and 2, ..., of the last and 0, and so on in a circle. >= 0.
+
+    Raises
+    ------
+    ConfigError
+        If a value is out of its range.
+    """
+
+    id: str
+    kwargs: Mapping[str, Any] = field(default_factory=dict)
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    noise: float = 0.0
+    redundant: int = 0
+
+    def __post_init__(self) -> None:
+        if not self.id:
+            raise ConfigError("environment.id", "must be the id of an environment, got ''")
+        try:
+            json.dumps(self.kwargs)
+        except (TypeError, ValueError) as error:
+            raise ConfigError(
+                "environment.kwargs", f"must be data that JSON has: {error}"
+            ) from None
+        try:
+            noise = real("noise", self.noise)
+        except ValueError:
+            noise = np.nan
+        if not 0.0 <= noise < np.inf:
+            raise ConfigError("environment.noise", f"must be at least 0, got {self.noise!r}")
+        try:
+            whole("redundant", self.redundant, 0, 1000)
+        except ValueError as error:
+            raise ConfigError("environment.redundant", problem_of(error)) from None
+        for key, ends in self.ranges.items():
+            if key != ALL and not (key.isascii() and key.isdigit()):
+                raise ConfigError(
+                    f"environment.ranges.{key}", f"must be of 'all' or a number, got {key!r}"
+                )
+            low, high = ends
+            if not (np.isfinite([low, high]).all() and low < high):
+                raise ConfigError(
+                    f"environment.ranges.{key}", f"must be finite, low < high, got {low} and {high}"
+                )
+
+    @property
+    def changes_observations(self) -> bool:
+        """Whether the agent observes something else than what the environment gives."""
+        return self.noise > 0.0 or self.redundant > 0
+
+    def make(
+        self,
+        stream: Literal["sensor_noise", "evaluation_sensor_noise"] = "sensor_noise",
+        render_mode: str | None = None,
+    ) -> gym.Env[Any, Any]:
+        """Make the environment.
+
+        Parameters
+        ----------
+        stream
+            Where its noise comes from.
+        render_mode
+            As Gymnasium has it.
+
+        Raises
+        ------
+        ConfigError
+            If there is no such environment, it cannot be made, or ranges are missing or wrong.
+        """
+        env = self._bare(render_mode)
+        try:
+            low, high = self.ends(env)
+            if not self.changes_observations:
+                return env
+            if not isinstance(env.observation_space, gym.spaces.Box) or low.shape != (
+                env.observation_space.shape
+            ):
+                env = gym.wrappers.FlattenObservation(env)
+            unknown = np.flatnonzero(~(np.isfinite(low) & np.isfinite(high)))
+            if unknown.size:
+                variables = ", ".join(map(str, unknown))
+                raise ConfigError(
+                    "environment.ranges",
+                    f"noise and redundant need the range of every variable; {self.id} gives none of"
+                    f" variables {variables} of {low.size} (from 0): --range {unknown[0]}=LOW:HIGH",
+                )
+            env = UnitSensors(env, low, high)
+            if self.redundant:
+                pairs = [(i % low.size, (i + 1) % low.size) for i in range(self.redundant)]
+                env = RedundantSensors(env, [MeanOfNeighbours(*pair) for pair in pairs])
+            if self.noise:
+                env = NoisySensors(env, self.noise, edge="saturate", stream=stream)
+            return env
+        except BaseException:
+            env.close()
+            raise
+
+    def ends(self, env: gym.Env[Any, Any]) -> Ends:
+        """Give the lowest and highest values of the flattened observation; infinite: not known.
+
+        Raises
+        ------
+        ConfigError
+            If a range is given of a variable that is not there, or observations are no vector.
+        """
+        try:
+            low, high = flat_bounds(env.observation_space)
+        except TypeError:
+            raise ConfigError(
+                "environment.id",
+                f"{self.id} must have observations that Gymnasium flattens to a vector, got"
+                f" {env.observation_space}",
+            ) from None
+        if ALL in self.ranges:
+            low[:], high[:] = self.ranges[ALL]
+        for key, ends in self.ranges.items():
+            if key == ALL:
+                continue
+            if int(key) >= low.size:
+                raise ConfigError(
+                    f"environment.ranges.{key}",
+                    f"{self.id} has the variables 0 to {low.size - 1}, got {key}",
+                )
+            low[int(key)], high[int(key)] = ends
+        return low, high
+
+    def _bare(self, render_mode: str | None) -> gym.Env[Any, Any]:
+        options = {"disable_env_checker": True, **self.kwargs}
+        if render_mode is not None:
+            options["render_mode"] = render_mode
+        try:
+            return gym.make(self.id, **options)
+        except gym.error.DependencyNotInstalled as error:
+            raise ConfigError(
+                "environment.id", f"{self.id} needs more packages: {error}"
+            ) from error
+        except (gym.error.Error, ImportError) as error:
+            raise ConfigError("environment.id", f"no environment {self.id!r}: {error}") from error
+        except Exception as error:  # whatever a user's environment raises
+            key = "environment.kwargs" if self.kwargs else "environment.id"
+            raise ConfigError(
+                key, f"{self.id} cannot be made: {type(error).__name__}: {error}"
+            ) from error

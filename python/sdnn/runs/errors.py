@@ -1,0 +1,42 @@
+"""The errors a user of runs can cause and mend."""
+
+from __future__ import annotations
+
+__all__ = ["ConfigError", "RunError", "RunTerminatedError", "problem_of"]
+
+
+class RunError(Exception):
+    """Base of the errors whose message alone tells a user what to mend."""
+
+
+class ConfigError(RunError):
+    """A run's configuration says something that cannot be run.
+
+    Parameters
+    ----------
+    key
+        Of what is wrong, with dots between tables: ``"environment.noise"``.
+    problem
+        What was expected and what came.
+    place
+        The file, and the line if it is known.
+    """
+
+    def __init__(self, key: str, problem: str, place: str = "") -> None:
+        self.key = key
+        self.problem = problem
+        self.place = place
+        super().__init__(": ".join(part for part in (place, key, problem) if part))
+
+
+class RunTerminatedError(RunError):
+    """SIGTERM came; the run was saved after the present step."""
+
+
+def problem_of(error: ValueError) -> str:
+    """Give the message of a check in `sdnn.arguments` without the argument's name, its first word.
+
+    >>> problem_of(ValueError("steps must be at least 1, got 0"))
+    'must be at least 1, got 0'
+    """
+    return str(error).partition(" ")[2]

@@ -1,0 +1,180 @@
+"""A greedy episode as a moving picture: GIF, or MP4."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+from importlib.util import find_spec
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.agents import Agent
+from sdnn.agents.evaluation import EVALUATION, episode_seed
+from sdnn.runs.errors import RunError
+from sdnn.runs.run import Run
+from sdnn.whole_files import write_whole
+
+__all__ = ["SUFFIXES", "Recording", "record"]
+
+SUFFIXES = (".gif", ".mp4")
+
+_PACKAGES = {".gif": ("PIL", "Pillow"), ".mp4": ("imageio_ffmpeg", "imageio-ffmpeg")}
+
+FRAMES_PER_SECOND = 30
+"""Where the environment does not say."""
+
+_FASTEST_GIF = 50
+"""Frames per second: viewers slow quicker ones down."""
+
+
+class Recording:
+    """A greedy episode, frame by frame.
+
+    Parameters
+    ----------
+    agent
+        What acts.
+    env
+        With the render mode ``"rgb_array"``.
+    seed
+        Of the episode's reset.
+    max_steps
+        Ends the picture before the episode's end.
+
+    Attributes
+    ----------
+    n_frames
+        So far: one more than steps.
+    total_reward
+        So far.
+    """
+
+    def __init__(
+        self, agent: Agent[Any, Any], env: gym.Env[Any, Any], seed: int, max_steps: int | None
+    ) -> None:
+        self._agent, self._env, self._seed, self._max_steps = agent, env, seed, max_steps
+        self.n_frames = 0
+        self.total_reward = 0.0
+
+    def frames(self) -> Iterator[NDArray[np.uint8]]:
+        """Run the episode; give the frames, shape (height, width, 3).
+
+        Raises
+        ------
+        RunError
+            If the environment gives something else than pictures.
+        """
+        observation, _ = self._env.reset(seed=self._seed)
+        yield self._frame()
+        ended = False
+        while not ended and (self._max_steps is None or self.n_frames <= self._max_steps):
+            action = self._agent.act(observation, explore=False)
+            observation, reward, terminated, truncated, _ = self._env.step(action)
+            self.total_reward += float(reward)
+            ended = terminated or truncated
+            yield self._frame()
+
+    def _frame(self) -> NDArray[np.uint8]:
+        try:
+            frame = np.asarray(self._env.render())
+        except gym.error.DependencyNotInstalled as error:
+            raise RunError(f"pictures of this environment need more: {error}") from error
+        if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8:
+            raise RunError(
+                f"render() must give a picture of red, green and blue, got {frame!r:.80}"
+            )
+        self.n_frames += 1
+        return frame
+
+
+def record(
+    run: Run, path: Path, *, seed: int | None = None, max_steps: int | None = None
+) -> Recording:
+    """Record a greedy episode of a run's agent as it is now.
+
+    Parameters
+    ----------
+    run
+        The run.
+    path
+        The file, whose end says what it becomes.
+    seed
+        As of `Run.evaluate`, whose first episode this is.
+    max_steps
+        Steps at most.
+
+    Raises
+    ------
+    RunError
+        If the name has another end, a package is missing, the environment cannot be rendered, or
+        there is no agent yet.
+    OSError
+        If the file cannot be written.
+    """
+    if path.suffix not in SUFFIXES:
+        raise RunError(f"{path} must end in one of {', '.join(SUFFIXES)}")
+    module, package = _PACKAGES[path.suffix]
+    if find_spec(module) is None:
+        raise RunError(f'{path} needs {package}, which is missing: pip install "sdnn[render]"')
+    agent = run.agent()
+    root = run.fresh_seed if seed is None else seed
+    environment = run.config.environment
+    with closing(environment.make("evaluation_sensor_noise", render_mode="rgb_array")) as env:
+        if env.render_mode != "rgb_array":
+            raise RunError(f"{environment.id} cannot be rendered as pictures (rgb_array)")
+        recording = Recording(agent, env, episode_seed(root, EVALUATION, 0), max_steps)
+        rate = float(env.metadata.get("render_fps") or FRAMES_PER_SECOND)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write = _write_gif if path.suffix == ".gif" else _write_mp4
+        write(path, recording.frames(), rate)
+    return recording
+
+
+def _write_gif(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> None:
+    from PIL import Image
+
+    # Few colors each: an hour's frames in full color would fill the memory.
+    pictures = (Image.fromarray(frame).quantize(128) for frame in frames)
+    first = next(pictures)
+    content = BytesIO()
+    first.save(
+        content,
+        format="GIF",
+        save_all=True,
+        append_images=pictures,
+        duration=round(1000 / min(rate, _FASTEST_GIF)),
+        loop=0,
+    )
+    write_whole(path, content.getvalue())
+
+
+def _write_mp4(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> None:
+    import imageio_ffmpeg
+
+    partial = path.with_name(f"{path.stem}.partial{path.suffix}")
+    writer = None
+    try:
+        for frame in frames:
+            # The video's pictures have even sides.
+            even = np.pad(frame, [(0, n % 2) for n in frame.shape[:2]] + [(0, 0)], mode="edge")
+            if writer is None:
+                size = (even.shape[1], even.shape[0])
+                writer = imageio_ffmpeg.write_frames(
+                    str(partial), size, fps=rate, macro_block_size=2, quality=7
+                )
+                writer.send(None)
+            writer.send(np.ascontiguousarray(even))
+        if writer is not None:
+            writer.close()
+            partial.replace(path)
+    except BaseException:
+        if writer is not None:
+            writer.close()
+        raise
+    finally:
+        partial.unlink(missing_ok=True)

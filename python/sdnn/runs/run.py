@@ -1,0 +1,422 @@
+"""A run in its folder: begun, stopped anywhere, and gone on with exactly."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import signal
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+import gymnasium as gym
+
+from sdnn.agents import (
+    Agent,
+    Callback,
+    Checkpoints,
+    EarlyStop,
+    Evaluation,
+    JSONLines,
+    SDNNQLearning,
+    TensorBoard,
+    Training,
+    evaluate,
+    load_agent,
+)
+from sdnn.agents.interrupts import Interrupts
+from sdnn.agents.training import Row
+from sdnn.arguments import whole
+from sdnn.runs.config import RunConfig, read_json
+from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, problem_of
+from sdnn.whole_files import remove_partial_files, write_whole
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["Goal", "Run", "RunOutcome"]
+
+CONFIG = "config.json"
+ROWS = "rows.jsonl"
+CHECKPOINT = "checkpoint.safetensors"
+AGENT = "agent.safetensors"
+TENSORBOARD = "tensorboard"
+LOCK = ".lock"
+
+Reason: TypeAlias = Literal["done", "target", "stopped"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Goal:
+    """A new goal that a run was given when it was resumed.
+
+    Parameters
+    ----------
+    at_step
+        Steps it had learned then.
+    steps, episodes
+        How many it is to learn in all: one of them.
+    """
+
+    at_step: int
+    steps: int | None = None
+    episodes: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOutcome:
+    """What came of training a run.
+
+    Parameters
+    ----------
+    n_steps, n_episodes
+        Learned in all, and whole episodes among them.
+    reason
+        Why it ended: all was done, an evaluation reached the target, or a callback stopped it.
+    last_evaluation
+        Its row; None if there was none.
+    learning_report
+        See `sdnn.agents.SDNNQLearning.learning_report`; None for other agents and while it is
+        warming up.
+    """
+
+    n_steps: int
+    n_episodes: int
+    reason: Reason
+    last_evaluation: Row | None
+    learning_report: Mapping[str, Any] | None
+
+
+class _Target(EarlyStop):
+    """Stops where the target was reached, also if that was just before the run was killed."""
+
+    def __init__(self, mean_return: float, rows: Path) -> None:
+        super().__init__(mean_return)
+        self._rows = rows
+        self.is_reached = False
+
+    def on_start(self, training: Training) -> None:
+        """Look at the evaluation made at the present step."""
+        row = _last_row(_read_rows(self._rows)[: training.n_rows], "evaluation")
+        if row is not None and row["step"] == training.n_steps:
+            self.on_row(training, row)
+
+    def on_row(self, training: Training, row: Row) -> None:
+        """Look at an evaluation."""
+        super().on_row(training, row)
+        if row["kind"] == "evaluation":
+            self.is_reached = row["mean_return"] >= self.mean_return
+
+
+class Run:
+    """A run in its folder.
+
+    `create` and `open` make one.
+
+    Attributes
+    ----------
+    folder : Path
+    config : RunConfig
+        As it was begun.
+    goals : tuple of Goal
+        Goals it was given later, in order.
+    """
+
+    def __init__(self, folder: Path, config: RunConfig, goals: Iterable[Goal] = ()) -> None:
+        self.folder = folder
+        self.config = config
+        self.goals = tuple(goals)
+
+    @classmethod
+    def create(cls, folder: str | Path, config: RunConfig) -> Self:
+        """Begin a run: make its folder with its configuration, once all is known to work.
+
+        Raises
+        ------
+        ConfigError
+            If environment or agent cannot be made; no folder is made then.
+        RunError
+            If something is there already.
+        OSError
+            If the folder cannot be written.
+        """
+        place = Path(folder)
+        if (place / CONFIG).exists():
+            raise RunError(f"{place} holds a run already: sdnn resume {place} goes on with it")
+        if place.exists() and (not place.is_dir() or any(place.iterdir())):
+            raise RunError(f"{place} is there already, and no run: take another folder")
+        cls(place, config).check()
+        place.mkdir(parents=True, exist_ok=True)
+        run = cls(place, config)
+        run._write_config()
+        return run
+
+    @classmethod
+    def open(cls, folder: str | Path) -> Self:
+        """Read a run's configuration.
+
+        Raises
+        ------
+        RunError
+            If the folder holds no run, or its configuration is damaged: file and key are named.
+        """
+        place = Path(folder)
+        path = place / CONFIG
+        if not path.exists():
+            raise RunError(f"{place} holds no run: there is no {path}")
+        goals = read_json(path).pop("goals", [])
+        try:
+            read = [Goal(**goal) for goal in goals]
+        except TypeError as error:
+            raise ConfigError("goals", f"must be a list of goals: {error}", str(path)) from error
+        return cls(place, RunConfig.read(path), read)
+
+    def check(self) -> None:
+        """Make all that is needed once, to see that it works; ConfigError if not."""
+        with closing(self.config.environment.make()) as env:
+            self.config.make_agent(env)
+        if self.config.tensorboard:
+            self._tensorboard()
+
+    def train(
+        self,
+        *,
+        steps: int | None = None,
+        episodes: int | None = None,
+        callbacks: Iterable[Callback] = (),
+    ) -> RunOutcome:
+        """Learn until the goal is reached, from the beginning or where the run stopped.
+
+        Parameters
+        ----------
+        steps, episodes
+            A new goal, counted from the beginning of the run; a target is dropped with it. By
+            default the goal is as it was.
+        callbacks
+            More of them.
+
+        Raises
+        ------
+        KeyboardInterrupt, RunTerminatedError
+            For SIGINT and SIGTERM, once the present step is done and a checkpoint is written.
+        RunError
+            If a file is damaged, another process trains the run, or the environment differs.
+        OSError
+            If a file cannot be read or written.
+        """
+        with ExitStack() as stack:
+            stack.enter_context(self._locked())
+            remove_partial_files(self.folder)
+            environment = self.config.environment
+            env = stack.enter_context(closing(environment.make()))
+            evaluation_env = stack.enter_context(
+                closing(environment.make("evaluation_sensor_noise"))
+            )
+            if steps is not None or episodes is not None:
+                self._set_goal(env, evaluation_env, steps, episodes)
+            target = None
+            if self.config.target_return is not None and not self.goals:
+                target = _Target(self.config.target_return, self.folder / ROWS)
+            # Rows are written before the checkpoint that counts them.
+            own = [JSONLines(self.folder / ROWS), target, self._checkpoints(), *callbacks]
+            if self.config.tensorboard:
+                own.append(self._tensorboard())
+            training = self._training(env, evaluation_env, [one for one in own if one is not None])
+            with Interrupts(training.stop, (signal.SIGTERM,)) as terminations:
+                result = training.run()
+            if terminations.received is not None:
+                raise RunTerminatedError(f"terminated after {training.n_steps} steps")
+            agent = training.agent
+            assert isinstance(agent, Agent)  # what make_agent and load give
+            agent.save(self.folder / AGENT)
+        is_target = target is not None and target.is_reached
+        reason: Reason = "target" if is_target else "done" if result.is_finished else "stopped"
+        return RunOutcome(
+            n_steps=result.n_steps,
+            n_episodes=result.n_episodes,
+            reason=reason,
+            last_evaluation=_last_row(self.rows(), "evaluation"),
+            learning_report=_report(agent),
+        )
+
+    def agent(self) -> Agent[Any, Any]:
+        """Load the agent as it is now: that of the last checkpoint.
+
+        Raises
+        ------
+        RunError
+            If there is none yet, or its file is damaged.
+        """
+        path = next((p for p in map(self.folder.joinpath, (CHECKPOINT, AGENT)) if p.exists()), None)
+        if path is None:
+            raise RunError(
+                f"{self.folder} has no checkpoint yet: sdnn resume {self.folder} begins it"
+            )
+        try:
+            return load_agent(path)
+        except ValueError as error:
+            raise RunError(str(error)) from error
+
+    def evaluate(self, episodes: int = 10, seed: int | None = None) -> Evaluation:
+        """Run greedy episodes with the agent as it is now.
+
+        Parameters
+        ----------
+        episodes
+            How many.
+        seed
+            Root of the episodes' seeds; by default others than those of the run's evaluations.
+
+        Raises
+        ------
+        RunError
+            If there is no checkpoint yet, or its file is damaged.
+        """
+        root = self.fresh_seed if seed is None else seed
+        agent = self.agent()
+        with closing(self.config.environment.make("evaluation_sensor_noise")) as env:
+            return evaluate(agent, env, episodes, seed=root)
+
+    @property
+    def fresh_seed(self) -> int:
+        """A root of episodes that the run itself does not have."""
+        return (self.config.seed + 2**63) % 2**64
+
+    def rows(self) -> list[Row]:
+        """Read the rows: episodes and evaluations, in order.
+
+        Raises
+        ------
+        RunError
+            If a line cannot be read; file and line are named.
+        """
+        return _read_rows(self.folder / ROWS)
+
+    # Parts.
+
+    def _training(
+        self, env: gym.Env[Any, Any], evaluation_env: gym.Env[Any, Any], callbacks: list[Callback]
+    ) -> Training:
+        path = self.folder / CHECKPOINT
+        if not path.exists():
+            goal = self.goals[-1] if self.goals else self.config
+            return Training(
+                self.config.make_agent(env),
+                env,
+                steps=goal.steps,
+                episodes=goal.episodes,
+                seed=self.config.seed,
+                callbacks=callbacks,
+                evaluate_every=self.config.evaluate_every or None,
+                evaluation_env=evaluation_env,
+                evaluation_episodes=self.config.evaluation_episodes,
+            )
+        try:
+            training = Training.load(path, env, callbacks=callbacks, evaluation_env=evaluation_env)
+        except ValueError as error:
+            raise RunError(str(error)) from error
+        if len(_read_rows(self.folder / ROWS)) < training.n_rows:
+            raise RunError(
+                f"{self.folder / ROWS} must have the {training.n_rows} rows that were written"
+                f" before {path.name}: it was changed"
+            )
+        return training
+
+    def _set_goal(
+        self,
+        env: gym.Env[Any, Any],
+        evaluation_env: gym.Env[Any, Any],
+        steps: int | None,
+        episodes: int | None,
+    ) -> None:
+        """Note a new goal: in the checkpoint, which is followed, then in the configuration."""
+        if steps is not None and episodes is not None:
+            raise ConfigError("episodes", "must not be given together with steps")
+        training = self._training(env, evaluation_env, [])
+        name, goal, done = (
+            ("steps", steps, training.n_steps)
+            if steps is not None
+            else ("episodes", episodes, training.n_episodes)
+        )
+        try:
+            if whole(name, goal, 1, 2**53) < done:
+                raise ConfigError(name, f"must be at least the {done} that are done, got {goal}")
+        except ValueError as error:
+            raise ConfigError(name, problem_of(error)) from None
+        training.steps, training.episodes = steps, episodes
+        if (self.folder / CHECKPOINT).exists():
+            training.save(self.folder / CHECKPOINT)
+        self.goals += (Goal(at_step=training.n_steps, steps=steps, episodes=episodes),)
+        self._write_config()
+
+    def _write_config(self) -> None:
+        values = self.config.values()
+        if self.goals:
+            values["goals"] = [
+                {
+                    name: value
+                    for name, value in dataclasses.asdict(goal).items()
+                    if value is not None
+                }
+                for goal in self.goals
+            ]
+        write_whole(self.folder / CONFIG, (json.dumps(values, indent=2) + "\n").encode())
+
+    def _checkpoints(self) -> Checkpoints:
+        return Checkpoints(self.folder / CHECKPOINT, self.config.checkpoint_every)
+
+    def _tensorboard(self) -> TensorBoard:
+        try:
+            return TensorBoard(self.folder / TENSORBOARD)
+        except ImportError as error:
+            raise ConfigError("tensorboard", str(error)) from error
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Keep other processes from training the same run; a killed one's lock is gone with it."""
+        try:
+            import fcntl
+        except ImportError:  # not on this system
+            yield
+            return
+        file = os.open(self.folder / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                raise RunError(f"{self.folder} is being trained by another process") from error
+            yield
+        finally:
+            os.close(file)
+
+
+def _report(agent: object) -> Mapping[str, Any] | None:
+    if not isinstance(agent, SDNNQLearning) or agent.is_warming_up:
+        return None
+    return agent.learning_report()
+
+
+_KEYS = {"kind", "step"}
+
+
+def _read_rows(path: Path) -> list[Row]:
+    if not path.exists():
+        return []
+    rows: list[Row] = []
+    lines = path.read_bytes().split(b"\n")
+    for number, line in enumerate(lines[:-1], 1):  # what follows the last line end is not whole
+        try:
+            row = json.loads(line)
+        except ValueError:
+            row = None
+        if not isinstance(row, dict) or not set(row) >= _KEYS:
+            raise RunError(f"{path}:{number}: must be a row of a training, got {line[:80]!r}")
+        rows.append(row)
+    return rows
+
+
+def _last_row(rows: Iterable[Row], kind: str) -> Row | None:
+    return next((row for row in reversed(list(rows)) if row["kind"] == kind), None)

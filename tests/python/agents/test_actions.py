@@ -1,0 +1,96 @@
+"""Actions of spaces as numbers, and back."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from sdnn.agents.actions import ContinuousActions, IndexedActions
+
+FLOATS = gym.spaces.Box(np.array([-1.0, 0.0], np.float32), np.array([1.0, 0.1], np.float32))
+
+
+def test_every_dimension_of_a_box_is_cut_evenly():
+    actions = IndexedActions(FLOATS, 5)
+    assert actions.n_actions == [5, 5]
+    assert np.allclose(actions.values(1), np.linspace(0, 0.1, 5))
+    assert np.array_equal(actions.element([4, 0]), FLOATS.dtype.type([1.0, 0.0]))
+    assert all(actions.element([i, j]) in FLOATS for i in range(5) for j in range(5))
+
+
+def test_the_nearest_action_is_found():
+    actions = IndexedActions(FLOATS, 5)
+    for i in range(5):
+        for j in range(5):
+            assert actions.numbers(actions.element([i, j])) == [i, j]
+    assert actions.numbers([0.2, 0.06]) == [2, 2]
+
+
+@pytest.mark.parametrize(
+    ("space", "n_actions", "numbers", "element"),
+    [
+        (gym.spaces.Discrete(3, start=5), [3], [2], 7),
+        (gym.spaces.MultiDiscrete([2, 4], start=[0, 10]), [2, 4], [1, 3], [1, 13]),
+        (gym.spaces.MultiDiscrete([[2, 3], [4, 5]]), [2, 3, 4, 5], [1, 2, 3, 4], [[1, 2], [3, 4]]),
+        (gym.spaces.MultiBinary(3), [2, 2, 2], [1, 0, 1], [1, 0, 1]),
+    ],
+)
+def test_whole_numbers_keep_their_meaning(space, n_actions, numbers, element):
+    actions = IndexedActions(space, 99)
+    assert actions.n_actions == n_actions
+    made = actions.element(numbers)
+    assert made in space
+    assert np.array_equal(made, element)
+    assert actions.numbers(made) == numbers
+
+
+def test_the_action_taken_is_remembered_by_its_numbers():
+    actions = ContinuousActions(FLOATS)
+    taken = actions.take([0.25, -0.5])
+    assert np.allclose(taken, [0.25, 0.025])
+    copy = taken.copy()
+    taken[:] = 0.0
+    assert actions.numbers(copy) == [0.25, -0.5]
+    with pytest.raises(ValueError, match="that of the last exploring act"):
+        actions.numbers(taken)
+
+
+def test_random_actions_are_of_the_space_and_reach_all_of_it():
+    generator = np.random.default_rng(1)
+    drawn = IndexedActions(FLOATS, 3)
+    assert {tuple(drawn.random(generator)) for _ in range(200)} == {
+        (i, j) for i in range(3) for j in range(3)
+    }
+    continuous = ContinuousActions(FLOATS)
+    assert all(continuous.element(continuous.random(generator)) in FLOATS for _ in range(50))
+
+
+@pytest.mark.parametrize(
+    "action", [[0.0], [0.0, 5.0], [np.nan, 0.0], "left", None, [[0.0, 0.0, 0.0]], [1j, 0.0]]
+)
+def test_what_is_no_action_is_refused(action):
+    with pytest.raises(ValueError, match="action must be in Box"):
+        IndexedActions(FLOATS, 3).numbers(action)
+
+
+@pytest.mark.parametrize("action", [[0.5, 0], [2, 0], [-1, 0], [True]])
+def test_what_is_no_whole_action_is_refused(action):
+    with pytest.raises(ValueError, match="action must be in MultiDiscrete"):
+        IndexedActions(gym.spaces.MultiDiscrete([2, 4]), 3).numbers(action)
+
+
+@pytest.mark.parametrize(
+    ("space", "error", "message"),
+    [
+        (gym.spaces.Text(3), TypeError, "action_space must be a Box, Discrete, MultiDiscrete"),
+        (gym.spaces.Box(0, np.inf, (1,)), ValueError, "action_space must have finite bounds"),
+        (gym.spaces.Box(0, 1, (0,)), ValueError, "action_space must have a dimension"),
+    ],
+)
+def test_impossible_spaces_are_named(space, error, message):
+    with pytest.raises(error, match=message):
+        IndexedActions(space, 3)
+
+
+def test_continuous_actions_need_a_box():
+    with pytest.raises(TypeError, match="action_space must be a Box, got Discrete"):
+        ContinuousActions(gym.spaces.Discrete(3))

@@ -1,0 +1,99 @@
+import os
+import signal
+import threading
+
+import gymnasium as gym
+import pytest
+
+from sdnn.agents import Callback, Checkpoints, JSONLines, SDNNQLearning, Training
+from sdnn.agents.interrupts import Interrupts
+
+
+@pytest.fixture(autouse=True)
+def usual_handler():
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    signal.signal(signal.SIGINT, before)
+
+
+def test_the_first_signal_asks_and_the_second_interrupts():
+    asked = []
+    with Interrupts(lambda: asked.append(1)) as interrupts:
+        assert interrupts.received is None
+        os.kill(os.getpid(), signal.SIGINT)
+        assert (asked, interrupts.received) == ([1], signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+    assert asked == [1]
+
+
+def test_handlers_of_others_and_other_threads_are_left_alone():
+    came = []
+    mine = lambda number, frame: came.append(number)  # noqa: E731
+    before = signal.signal(signal.SIGTERM, mine)
+    try:
+        with Interrupts(lambda: came.append("asked"), (signal.SIGTERM,)) as interrupts:
+            os.kill(os.getpid(), signal.SIGTERM)
+        assert (came, interrupts.received) == ([signal.SIGTERM], None)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+    def elsewhere():
+        with Interrupts(lambda: None):
+            came.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=elsewhere)
+    thread.start()
+    thread.join()
+    assert came[-1] is signal.default_int_handler
+
+
+class InterruptIn(gym.Wrapper):
+    """An environment in whose n-th step somebody presses Ctrl-C, perhaps twice."""
+
+    def __init__(self, env, step, times):
+        super().__init__(env)
+        self._left, self._times = step, times
+
+    def step(self, action):
+        self._left -= 1
+        if self._left == 0:
+            for _ in range(self._times):
+                os.kill(os.getpid(), signal.SIGINT)
+        return self.env.step(action)
+
+
+class Count(Callback):
+    n = 0
+
+    def on_end(self, training):
+        self.n += 1
+
+
+@pytest.mark.parametrize(("times", "saved_at"), [(1, 47), (2, 30)])
+def test_an_interrupted_training_goes_on_exactly(tmp_path, times, saved_at):
+    def make(env, name):
+        agent = SDNNQLearning(env.observation_space, env.action_space, seed=1)
+        return Training(agent, env, steps=120, seed=2, callbacks=callbacks(name))
+
+    def callbacks(name):
+        rows = JSONLines(tmp_path / f"{name}.jsonl")
+        return [rows, Checkpoints(tmp_path / name, every=30), Count()]
+
+    make(gym.make("CartPole-v1"), "whole").run()
+    training = make(InterruptIn(gym.make("CartPole-v1"), 47, times), "cut")
+    with pytest.raises(KeyboardInterrupt):
+        training.run()
+    assert training.callbacks[2].n == 1
+    assert training.is_within_step == (times == 2)
+    if times == 2:
+        with pytest.raises(RuntimeError, match="left within a step"):
+            training.run()
+    loaded = Training.load(tmp_path / "cut", gym.make("CartPole-v1"), callbacks=callbacks("cut"))
+    assert loaded.n_steps == saved_at
+    loaded.run()
+    assert (tmp_path / "cut").read_bytes() == (tmp_path / "whole").read_bytes()
+    for name in ("cut", "whole"):
+        assert (tmp_path / f"{name}.jsonl").read_text().count("\n") == loaded.n_rows
+    assert (tmp_path / "cut.jsonl").read_text() == (tmp_path / "whole.jsonl").read_text()

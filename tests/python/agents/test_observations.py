@@ -1,0 +1,171 @@
+"""From observations of any space to inputs in [0, 1]."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from sdnn.agents.observations import UnitObservations
+
+BOX = gym.spaces.Box(np.array([-1.0, 0.0]), np.array([3.0, 10.0]), dtype=np.float64)
+UNBOUNDED = gym.spaces.Box(-np.inf, np.inf, (3,), dtype=np.float64)
+
+
+def settled(space, seen, **options):
+    observations = UnitObservations(space, **options)
+    observations.settle(np.asarray(seen, np.float64))
+    return observations
+
+
+def test_bounds_are_the_ranges_and_values_outside_saturate():
+    observations = UnitObservations(BOX)
+    assert observations.is_settled
+    assert observations("observation", [1.0, 2.5]).tolist() == [0.5, 0.25]
+    assert observations("observation", [-7.0, np.inf]).tolist() == [0.0, 1.0]
+
+
+def test_given_ranges_go_before_bounds():
+    observations = UnitObservations(BOX, ranges=(0.0, [2.0, 4.0]))
+    assert observations("observation", [1.0, 1.0]).tolist() == [0.5, 0.25]
+
+
+def test_unknown_ranges_are_those_seen_and_a_quarter_more_at_each_end():
+    observations = settled(UNBOUNDED, [[0.0, -5.0, 7.0], [4.0, 5.0, 7.0]], ranges=None)
+    assert observations.low.tolist() == [-1.0, -7.5, 5.25]  # a constant one: a quarter of itself
+    assert observations.high.tolist() == [5.0, 7.5, 8.75]
+    assert observations("observation", [2.0, 7.5, 7.0]).tolist() == [0.5, 1.0, 0.5]
+
+
+def test_the_largest_float_means_infinity():
+    limit = np.finfo(np.float32).max
+    assert not UnitObservations(gym.spaces.Box(-limit, limit, (2,))).is_settled
+
+
+def test_only_unknown_ranges_are_learned():
+    space = gym.spaces.Box(np.array([-np.inf, 0.0]), np.array([np.inf, 1.0]), dtype=np.float64)
+    observations = settled(space, [[0.0, 0.4], [4.0, 0.6]])
+    assert (observations.low[1], observations.high[1]) == (0.0, 1.0)
+
+
+def test_a_cosine_and_a_sine_become_an_angle():
+    space = gym.spaces.Box(-1.0, 1.0, (3,), dtype=np.float64)
+    observations = UnitObservations(space, angle_pairs=[(0, 1)])
+    assert observations.inputs == [{"angle": [0, 1]}, {"variable": 2}]
+    assert observations.circular == (True, False)
+    for turn in np.linspace(-0.49, 0.49, 25):
+        angle = 2 * np.pi * turn
+        state = observations("observation", [np.cos(angle), np.sin(angle), 0.0])
+        assert state == pytest.approx([turn + 0.5, 0.5], abs=1e-12)
+
+
+def test_pairs_on_the_circle_are_found():
+    angles = np.linspace(0, 5, 40)
+    seen = np.stack([angles, np.cos(angles), np.sin(angles), np.cos(angles)], axis=1)
+    space = gym.spaces.Box(-10.0, 10.0, (4,), dtype=np.float64)
+    assert settled(space, seen, angle_pairs="find").inputs == [
+        {"variable": 0},
+        {"angle": [1, 2]},
+        {"variable": 3},
+    ]
+    standing = np.tile([1.0, 0.0, 1.0, 0.0], (40, 1))
+    assert len(settled(space, standing, angle_pairs="find").inputs) == 4
+
+
+def test_a_declared_angle_wraps():
+    space = gym.spaces.Box(-np.pi, np.pi, (2,), dtype=np.float64)
+    observations = UnitObservations(space, angles=[0])
+    assert observations.circular == (True, False)
+    state = observations("observation", [-np.pi - 0.5 * np.pi, 0.0])
+    assert state == pytest.approx([0.75, 0.5])
+    assert observations("observation", [space.high[0], 0.0])[0] == 0.0
+    with pytest.raises(ValueError, match="must be finite where it has angles"):
+        observations("observation", [0.0, np.inf])
+
+
+def test_one_variable_is_repeated_where_two_are_needed():
+    observations = UnitObservations(gym.spaces.Box(0.0, 4.0, (1,)), least_inputs=2)
+    assert observations("observation", [1.0]).tolist() == [0.25, 0.25]
+
+
+@pytest.mark.parametrize(
+    "space",
+    [
+        gym.spaces.Dict({"speed": gym.spaces.Box(0, 1, (2,)), "gear": gym.spaces.Discrete(3)}),
+        gym.spaces.Tuple([gym.spaces.Box(0, 1, (2,)), gym.spaces.MultiBinary(2)]),
+        gym.spaces.Discrete(4),
+        gym.spaces.MultiDiscrete([2, 3]),
+        gym.spaces.Box(0, 1, (2, 2)),
+    ],
+)
+def test_other_spaces_are_flattened_as_gymnasium_does(space):
+    observations = UnitObservations(space)
+    space.seed(1)
+    for _ in range(20):
+        element = space.sample()
+        flat = gym.spaces.flatten(space, element)
+        assert np.allclose(observations("observation", element), flat)
+
+
+def test_what_was_settled_can_be_written_and_read():
+    angles = np.linspace(0, 5, 40)
+    seen = np.stack([np.cos(angles), np.sin(angles), angles], axis=1)
+    first = settled(UNBOUNDED, seen, angle_pairs="find")
+    second = UnitObservations(UNBOUNDED, angle_pairs="find")
+    second.settled_as(first.description())
+    point = [0.6, 0.8, 2.0]
+    assert first("observation", point).tolist() == second("observation", point).tolist()
+    assert second.description() == first.description()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"low": [0.0]}, "observation ranges must be 3 of low < high"),
+        ({"low": [0.0, 0.0, 9e9]}, "observation ranges must be 3 of low < high"),
+        ({"high": [np.inf, 1e9, 1e9]}, "must be finite"),
+        ({"inputs": [{"variable": 5}]}, "observation inputs must be"),
+        ({"inputs": [{"circular": 9}]}, "circular must be variables from 0 to 2"),
+    ],
+)
+def test_descriptions_that_do_not_fit_are_refused(change, message):
+    description = settled(UNBOUNDED, np.eye(3)).description()
+    with pytest.raises(ValueError, match=message):
+        UnitObservations(UNBOUNDED).settled_as({**description, **change})
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"ranges": (1.0, 0.0)}, "observation ranges must be low < high"),
+        ({"ranges": ([1.0], [2.0, 3.0, 4.0])}, "observation_range must be two numbers or two"),
+        ({"ranges": 3.0}, r"observation_range must be \(low, high\), got 3.0"),
+        ({"ranges": ("a", "b")}, "observation_range must be two numbers"),
+        ({"angles": [2]}, "angles must be variables from 0 to 1, got 2"),
+        ({"angles": ["x"]}, "angles must be variables"),
+        ({"angle_pairs": "all"}, "angle_pairs must be 'none', 'find' or pairs"),
+        ({"angle_pairs": [(0, 1, 2)]}, "angle_pairs must be pairs"),
+        ({"angle_pairs": [(0, 7)]}, "angle_pairs must be variables from 0 to 1"),
+        ({"angle_pairs": [(0, 1)], "angles": [0]}, "must name each variable once"),
+    ],
+)
+def test_impossible_arguments_are_named(options, message):
+    with pytest.raises(ValueError, match=message):
+        UnitObservations(BOX, **options)
+
+
+def test_an_angle_needs_a_range():
+    with pytest.raises(ValueError, match="observation_range must be given for variable 1"):
+        UnitObservations(UNBOUNDED, angles=[1])
+
+
+@pytest.mark.parametrize(
+    ("space", "observation"),
+    [
+        (gym.spaces.Dict({"a": gym.spaces.Box(0, 1, (1,))}), {"b": [0.5]}),
+        (gym.spaces.Dict({"a": gym.spaces.Box(0, 1, (1,))}), 3.0),
+        (gym.spaces.Discrete(3), 7),
+        (gym.spaces.Discrete(3), "one"),
+    ],
+)
+def test_elements_of_other_spaces_are_refused_by_name(space, observation):
+    with pytest.raises(ValueError, match="following must be of"):
+        UnitObservations(space)("following", observation)

@@ -1,0 +1,40 @@
+"""The line of progress of a training."""
+
+from io import StringIO
+
+import gymnasium as gym
+import pytest
+from rich.console import Console
+
+from sdnn.agents import RBFQLearning, Training
+from sdnn.agents.progress import ProgressLine
+
+
+@pytest.mark.parametrize("is_terminal", [True, False])
+@pytest.mark.parametrize("goal", [{"steps": 200}, {"episodes": 5}])
+def test_a_line_on_a_terminal_and_nothing_elsewhere(is_terminal, goal):
+    env = gym.make("Pendulum-v1", max_episode_steps=40)
+    agent = RBFQLearning(env.observation_space, env.action_space)
+    text = StringIO()
+    console = Console(file=text, force_terminal=is_terminal, width=120)
+    callbacks = [ProgressLine(console, "Drifting")]
+    training = Training(
+        agent,
+        env,
+        callbacks=callbacks,
+        evaluate_every=40,
+        evaluation_env=gym.make("Pendulum-v1", max_episode_steps=40),
+        evaluation_episodes=1,
+        **goal,
+    )
+    training.run()
+    assert ("Drifting" in text.getvalue()) == is_terminal
+    if not is_terminal:
+        assert text.getvalue() == ""
+
+
+def test_train_shows_it_where_it_is_asked_for(capsys):
+    env = gym.make("Pendulum-v1", max_episode_steps=40)
+    agent = RBFQLearning(env.observation_space, env.action_space)
+    assert agent.train(env, steps=100, progress=True).n_steps == 100
+    assert capsys.readouterr().out == ""

@@ -1,0 +1,268 @@
+"""Saved agents go on exactly as they would have; damaged files are refused."""
+
+import copy
+import json
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from safetensors.numpy import load_file, save_file
+
+import agent_files
+from sdnn.agents import (
+    FuzzyQLearning,
+    FuzzyQLearningConfig,
+    QLearningConfig,
+    RBFQLearning,
+    SDNNQLearning,
+    Training,
+    Transition,
+    load_agent,
+)
+from sdnn.agents.files import read
+from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
+
+SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
+PLANE = gym.spaces.Box(-1.0, 1.0, (2,), dtype=np.float64)
+UNBOUNDED = gym.spaces.Box(-np.inf, np.inf, (3,), dtype=np.float64)
+TORQUE = gym.spaces.Box(-2.0, 2.0, (1,), dtype=np.float32)
+TWO_TORQUES = gym.spaces.Box(-2.0, 2.0, (2,), dtype=np.float32)
+MIXED = gym.spaces.Dict({"at": PLANE, "lamp": gym.spaces.Discrete(2)})
+GENERAL = QLearningConfig(
+    n_steps=3,
+    epsilon=0.3,
+    final_epsilon=0.0,
+    n_greedy_steps=0,
+    max_repetitions=6,
+    value_range="seen",
+)
+RANDOMLY = SDNNCConfig(
+    n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5, rounding="random"
+)
+TRACES = FuzzyQLearningConfig(trace_decay=0.7, n_greedy_steps=0, epsilon=0.3)
+
+KINDS = {
+    "sdnn": lambda: SDNNQLearning(PLANE, TORQUE, approximator=RANDOMLY, learning=GENERAL, seed=5),
+    "sdnn, vector": lambda: SDNNQLearning(
+        PLANE, TWO_TORQUES, approximator=SMALL, learning=GENERAL, seed=5
+    ),
+    "sdnn, buttons": lambda: SDNNQLearning(
+        MIXED, gym.spaces.Discrete(3, start=2), approximator=SMALL, learning=GENERAL
+    ),
+    "sdnn, switches": lambda: SDNNQLearning(
+        PLANE, gym.spaces.MultiDiscrete([2, 3]), approximator=SMALL, learning=GENERAL
+    ),
+    "sdnn, warm-up": lambda: SDNNQLearning(
+        UNBOUNDED, TORQUE, approximator=SMALL, learning=GENERAL, warm_up_steps=60
+    ),
+    "sdnn, tables": lambda: SDNNQLearning(
+        PLANE, TORQUE, approximator=SMALL, tables=[np.sign(np.eye(20) - 0.5)] * 2
+    ),
+    "rbf": lambda: RBFQLearning(
+        PLANE, TORQUE, approximator=RBFNetworkConfig(n_actions=7), learning=GENERAL
+    ),
+    "rbf, vector": lambda: RBFQLearning(
+        PLANE, TWO_TORQUES, approximator=RBFNetworkConfig(n_actions=7), learning=GENERAL
+    ),
+    "fuzzy": lambda: FuzzyQLearning(PLANE, TORQUE, learning=TRACES, seed=2),
+    "fuzzy, vector": lambda: FuzzyQLearning(
+        PLANE, TWO_TORQUES, approximator=FuzzyRulesConfig(n_sets=4), learning=TRACES
+    ),
+    "fuzzy, warm-up": lambda: FuzzyQLearning(UNBOUNDED, TORQUE, learning=TRACES, warm_up_steps=60),
+}
+N_STEPS = 150
+
+
+def lived(agent, first, last, cut=None):
+    """Steps ``first`` to ``last`` of a life in which everything follows from the step's number.
+
+    At a ``cut`` the agent is replaced after acting and before learning, or after both.
+    """
+    for step in range(first, last):
+        rng = np.random.default_rng(step)
+        observation, following = (
+            {"at": rng.uniform(-1, 1, 2), "lamp": int(rng.integers(2))}
+            if isinstance(agent.observation_space, gym.spaces.Dict)
+            else rng.uniform(-1, 1, agent.observation_space.shape)
+            for _ in range(2)
+        )
+        if step % 17 == 0:
+            agent.begin_episode()
+        agent.progress = step / N_STEPS
+        action = agent.act(observation)
+        if cut is not None and step == cut[0] and cut[1] == "before learning":
+            agent = cut[2](agent)
+        agent.learn(
+            Transition(observation, action, float(rng.normal()), following, step % 17 == 16)
+        )
+        if step % 5 == 0:
+            agent.act(observation, explore=False)
+        if cut is not None and step == cut[0] and cut[1] == "after learning":
+            agent = cut[2](agent)
+    return agent
+
+
+def same_state(first, second):
+    one, other = first.state(), second.state()
+    assert one.keys() == other.keys()
+    for name in one:
+        assert one[name].dtype == other[name].dtype, name
+        assert np.array_equal(one[name], other[name]), name
+    assert first.description() == second.description()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_at_any_cut_a_saved_agent_goes_on_exactly(kind, tmp_path):
+    whole = lived(KINDS[kind](), 0, N_STEPS)
+
+    def from_file(agent):
+        agent.save(tmp_path / "agent.safetensors")
+        return load_agent(tmp_path / "agent.safetensors")
+
+    ways = [from_file, lambda agent: pickle.loads(pickle.dumps(agent)), copy.deepcopy]
+    cuts = np.random.default_rng(7).permutation(N_STEPS - 1)[:100]
+    for number, cut in enumerate(cuts):
+        when = ("before learning", "after learning")[number // 3 % 2]
+        again = lived(KINDS[kind](), 0, N_STEPS, (cut, when, ways[number % 3]))
+        same_state(whole, again)
+
+
+def test_a_copy_shares_nothing():
+    agent = lived(KINDS["sdnn"](), 0, 40)
+    for copied in (copy.deepcopy(agent), copy.copy(agent)):
+        before = copied.state()
+        lived(agent, 40, 90)
+        for name, array in copied.state().items():
+            assert np.array_equal(array, before[name]), name
+
+
+def test_the_class_is_that_of_the_file(tmp_path):
+    KINDS["rbf"]().save(tmp_path / "agent")
+    assert type(load_agent(tmp_path / "agent")) is RBFQLearning
+    assert isinstance(RBFQLearning.load(tmp_path / "agent"), RBFQLearning)
+    with pytest.raises(ValueError, match="holds a RBFQLearning, not a SDNNQLearning"):
+        SDNNQLearning.load(tmp_path / "agent")
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    path = tmp_path_factory.mktemp("saved") / "agent.safetensors"
+    lived(KINDS["sdnn"](), 0, 30).save(path)
+    return path
+
+
+def changed(path, to, change):
+    """A copy of a file whose description or arrays are changed."""
+    description, _ = read(path)
+    arrays = load_file(path)
+    change(description, arrays)
+    save_file(arrays, to, metadata={"sdnn": json.dumps(description)})
+    return to
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda d, a: d.update(format="sdnn-agent-2"), "was written by a newer version of sdnn"),
+        (lambda d, a: d.update(format="sdnn-estimator-1"), "does not hold an agent"),
+        (lambda d, a: d.pop("format"), "does not hold an agent"),
+        (lambda d, a: d.update({"class": "Sarsa"}), "holds an unknown kind of agent, 'Sarsa'"),
+        (lambda d, a: d.pop("learning"), "is damaged: 'learning'"),
+        (lambda d, a: d["learning"].update(discount=7.0), "is damaged: discount must be in"),
+        (lambda d, a: d["learning"].update(speed=7.0), "is damaged: .*speed"),
+        (lambda d, a: d.update(progress=9.0), "is damaged: progress must be in"),
+        (lambda d, a: d.update(seed=-1), "is damaged: seed must be"),
+        (
+            lambda d, a: d["approximator"].update(n_hidden_units=2**20),
+            r"is damaged: action_value.weights must have shape \(1048576, 40\)",
+        ),
+        (lambda d, a: a.pop("agent.step"), "is damaged: state: step must be there"),
+        (
+            lambda d, a: a.update({"agent.other": np.zeros(1)}),
+            "is damaged: state: other must not be there",
+        ),
+        (
+            lambda d, a: a.update({"agent.step": np.zeros((), np.float32)}),
+            "is damaged: state: step must be I32",
+        ),
+        (
+            lambda d, a: a.update({"agent.progress": np.array(np.nan)}),
+            r"is damaged: state: progress must be in \[0, 1\]",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_named(saved, tmp_path, change, message):
+    path = changed(saved, tmp_path / "changed", change)
+    with pytest.raises(ValueError, match=message):
+        load_agent(path)
+
+
+def test_damaged_files_give_an_error_or_an_agent(saved, tmp_path):
+    content = saved.read_bytes()
+    rng = np.random.default_rng(3)
+    damaged = tmp_path / "damaged"
+    for length in rng.integers(0, len(content), 60):
+        damaged.write_bytes(content[:length])
+        with pytest.raises(ValueError, match="damaged"):
+            load_agent(damaged)
+    messages = []
+    header = 8 + int.from_bytes(content[:8], "little")
+    for place in rng.integers(0, header, 300):
+        flipped = bytearray(content)
+        flipped[place] ^= 1 << int(rng.integers(8))
+        damaged.write_bytes(flipped)
+        try:
+            load_agent(damaged)
+        except ValueError as error:
+            messages.append(str(error))
+    assert len(messages) > 100
+    assert all(str(damaged) in message for message in messages)
+
+
+def test_other_files_are_refused(tmp_path):
+    with pytest.raises(FileNotFoundError, match="is not there"):
+        load_agent(tmp_path / "nothing")
+    with pytest.raises(IsADirectoryError, match="is a folder"):
+        load_agent(tmp_path)
+    save_file({"x": np.zeros(3)}, tmp_path / "other")
+    with pytest.raises(ValueError, match="does not hold an agent"):
+        load_agent(tmp_path / "other")
+
+
+def test_a_file_is_whole_or_not_there(saved, tmp_path):
+    agent = load_agent(saved)
+    path = tmp_path / "no folder" / "agent"
+    with pytest.raises(OSError, match="No such file"):
+        agent.save(path)
+    agent.save(tmp_path / "agent")
+    before = (tmp_path / "agent").read_bytes()
+    agent.observation_space = gym.spaces.Graph(PLANE, None)
+    with pytest.raises(TypeError, match="a space of kind Graph cannot be saved"):
+        agent.save(tmp_path / "agent")
+    assert (tmp_path / "agent").read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ["agent"]
+
+
+def test_the_files_that_both_languages_read_are_those_written_now(tmp_path):
+    agent_files.write(tmp_path)
+    kept = sorted(agent_files.FOLDER.iterdir())
+    assert [path.name for path in kept] == sorted(path.name for path in tmp_path.iterdir())
+    for path in kept:
+        again = tmp_path / path.name
+        if path.suffix == ".json":
+            assert json.loads(path.read_text()) == json.loads(again.read_text()), path.name
+        else:
+            same_state(load_agent(path), load_agent(again))
+
+
+def test_a_training_file_holds_an_agent_too(tmp_path):
+    env = gym.make("Pendulum-v1")
+    agent = SDNNQLearning(env.observation_space, env.action_space, approximator=SMALL)
+    training = Training(agent, env, steps=20)
+    training.run()
+    training.save(tmp_path / "training")
+    same_state(load_agent(tmp_path / "training"), agent)
+    agent.save(tmp_path / "agent")
+    with pytest.raises(ValueError, match="holds an agent and no training"):
+        Training.load(tmp_path / "agent", env)

@@ -1,0 +1,265 @@
+"""The loop over an environment: its rows, its ends, and going on exactly."""
+
+import json
+import os
+import signal
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from sdnn.agents import (
+    Callback,
+    Checkpoints,
+    EarlyStop,
+    FuzzyQLearning,
+    JSONLines,
+    RBFQLearning,
+    SDNNQLearning,
+    Training,
+    evaluate,
+)
+from sdnn.approximators import SDNNCConfig
+
+SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
+KINDS = {
+    "sdnn": (SDNNQLearning, {"approximator": SMALL}),
+    "rbf": (RBFQLearning, {}),
+    "fuzzy": (FuzzyQLearning, {}),
+}
+
+
+class Corridor(gym.Env):
+    """Five cells; the right end terminates with 1, every step costs 0.1, eight steps truncate."""
+
+    observation_space = gym.spaces.Box(0.0, 4.0, (1,), dtype=np.float64)
+    action_space = gym.spaces.Discrete(2)
+
+    def __init__(self, is_random=False):
+        self._is_random = is_random
+        self.seeds = []
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.seeds.append(seed)
+        self._at, self._steps = int(self.np_random.integers(2)), 0
+        return self._seen(), {}
+
+    def step(self, action):
+        self._at = max(0, self._at + (1 if action else -1))
+        self._steps += 1
+        ends = self._at == 4
+        return self._seen(), 1.0 if ends else -0.1, ends, self._steps == 8, {}
+
+    def _seen(self):
+        shift = np.random.default_rng().uniform(0, 0.1) if self._is_random else 0.0
+        return np.array([self._at + shift])
+
+
+def corridor_agent(**options):
+    env = Corridor()
+    return SDNNQLearning(
+        env.observation_space, env.action_space, approximator=SMALL, seed=1, **options
+    )
+
+
+class Stop(Callback):
+    """Saves and stops at a step."""
+
+    def __init__(self, at, path):
+        self.at, self.path = at, path
+
+    def on_step(self, training):
+        if training.n_steps == self.at:
+            training.save(self.path)
+            training.stop()
+
+
+class Killed(Checkpoints):
+    """Has no time for a last checkpoint."""
+
+    def on_end(self, training):
+        pass
+
+
+def states_equal(first, second):
+    one, other = first.agent.state(), second.agent.state()
+    assert one.keys() == other.keys()
+    return all(np.array_equal(one[name], other[name]) for name in one)
+
+
+def test_it_learns_the_corridor():
+    agent = corridor_agent()
+    result = agent.train(Corridor(), episodes=300)
+    assert result.is_finished
+    assert (result.n_episodes, len(result.returns)) == (300, 300)
+    found = evaluate(agent, Corridor(), 20, seed=3)
+    assert found.terminated.all()
+    assert set(found.lengths) <= {3, 4}, "from cell 0 or 1 straight to cell 4"
+    assert found.mean_return == found.returns.mean() > 0.6
+
+
+def test_rows_are_those_of_the_episodes():
+    training = Training(corridor_agent(), Corridor(), steps=100)
+    result = training.run()
+    assert result.n_steps == 100
+    lengths = [row["length"] for row in result.rows]
+    assert result.n_episodes == len(lengths)
+    assert 100 - 8 < sum(lengths) <= 100
+    for row in result.rows:
+        reached = 1.0 - 0.1 * (row["length"] - 1)
+        assert row["return"] == pytest.approx(reached if row["terminated"] else -0.8)
+    assert [row["step"] for row in result.rows] == list(np.cumsum(lengths))
+
+
+def test_progress_goes_from_0_to_1():
+    seen = []
+
+    class Note(Callback):
+        def on_step(self, training):
+            seen.append((training.agent.progress, training.agent.core.epsilon))
+
+    corridor_agent().train(Corridor(), steps=10, callbacks=[Note()])
+    assert [progress for progress, _ in seen] == pytest.approx(np.arange(1, 11) / 10)
+    assert seen[-1][1] == pytest.approx(0.01)
+
+
+def test_every_episode_has_a_seed_of_its_own():
+    env, other = Corridor(), Corridor()
+    corridor_agent().train(env, episodes=30, seed=4)
+    corridor_agent().train(other, episodes=30, seed=4)
+    assert env.seeds == other.seeds
+    assert len(set(env.seeds)) == 30
+    third = Corridor()
+    evaluate(corridor_agent(), third, 30, seed=4)
+    assert not set(third.seeds) & set(env.seeds)
+
+
+def test_evaluations_change_nothing_that_is_learned(tmp_path):
+    plain = Training(corridor_agent(), Corridor(), steps=300)
+    tested = Training(
+        corridor_agent(), Corridor(), steps=300, evaluate_every=50, evaluation_env=Corridor()
+    )
+    plain.run()
+    result = tested.run()
+    one, other = plain.agent.state(), tested.agent.state()
+    differ = {name for name in one if not np.array_equal(one[name], other[name])}
+    assert differ <= {"agent.policy.evaluation_ties.words"}
+    assert result.evaluations[:, 0].tolist() == [50, 100, 150, 200, 250, 300]
+    rows = [row for row in result.rows if row["kind"] == "evaluation"]
+    assert all(row["mean_return"] == np.mean(row["returns"]) for row in rows)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_training_stopped_inside_an_episode_goes_on_exactly(kind, tmp_path):
+    make, options = KINDS[kind]
+
+    def begun(callbacks=()):
+        env = gym.make("Pendulum-v1", max_episode_steps=40)
+        agent = make(env.observation_space, env.action_space, seed=3, **options)
+        return Training(agent, env, steps=300, seed=9, callbacks=callbacks)
+
+    whole = begun()
+    rows = whole.run().rows
+    for cut in np.random.default_rng(5).integers(1, 300, 12):
+        first = begun([Stop(cut, tmp_path / "t")])
+        before = first.run()
+        assert not before.is_finished
+        second = Training.load(tmp_path / "t", gym.make("Pendulum-v1", max_episode_steps=40))
+        after = second.run()
+        assert (*before.rows, *after.rows) == rows
+        assert states_equal(whole, second)
+
+
+def test_an_unbounded_environment_is_warmed_up_and_learned(tmp_path):
+    env = gym.make("CartPole-v1")
+
+    def begun(callbacks=()):
+        agent = SDNNQLearning(
+            env.observation_space, env.action_space, approximator=SMALL, warm_up_steps=200
+        )
+        return Training(agent, env, steps=500, callbacks=callbacks)
+
+    whole = begun()
+    assert whole.agent.is_warming_up
+    with pytest.raises(RuntimeError, match="still warming up"):
+        whole.agent.q_values(env.reset()[0])
+    whole.run()
+    assert not whole.agent.is_warming_up
+    assert whole.agent.learning_report()["n_corrections"] > 480
+    for cut in (1, 150, 199, 200, 201, 350):
+        begun([Stop(cut, tmp_path / "t")]).run()
+        again = Training.load(tmp_path / "t", env)
+        again.run()
+        assert states_equal(whole, again)
+
+
+def test_an_environment_that_does_not_repeat_itself_is_refused(tmp_path):
+    env = Corridor(is_random=True)
+    Training(corridor_agent(), env, steps=500, callbacks=[Stop(20, tmp_path / "t")]).run()
+    with pytest.raises(ValueError, match="env must repeat the episode"):
+        Training.load(tmp_path / "t", env)
+
+
+def test_another_goal_goes_further(tmp_path):
+    training = Training(corridor_agent(), Corridor(), steps=50)
+    training.run()
+    training.save(tmp_path / "t")
+    assert Training.load(tmp_path / "t", Corridor()).run().n_steps == 50
+    assert Training.load(tmp_path / "t", Corridor(), steps=80).run().n_steps == 80
+    assert Training.load(tmp_path / "t", Corridor(), episodes=40).run().n_episodes == 40
+
+
+def test_lines_of_a_resumed_training_are_those_of_a_whole_one(tmp_path):
+    path = tmp_path / "rows.jsonl"
+    Training(corridor_agent(), Corridor(), steps=120, callbacks=[JSONLines(path)]).run()
+    whole = path.read_text()
+    assert [json.loads(line)["kind"] for line in whole.splitlines()] == ["episode"] * len(
+        whole.splitlines()
+    )
+    callbacks = [JSONLines(path), Killed(tmp_path / "c", 60), Stop(90, tmp_path / "unused")]
+    Training(corridor_agent(), Corridor(), steps=120, callbacks=callbacks).run()
+    assert len(path.read_text()) < len(whole)
+    Training.load(tmp_path / "c", Corridor(), callbacks=[JSONLines(path)]).run()
+    assert path.read_text() == whole
+
+
+def test_an_early_stop_waits_for_evaluations_in_a_row():
+    stop = EarlyStop(mean_return=0.6, patience=2)
+    result = corridor_agent().train(
+        Corridor(), steps=20_000, callbacks=[stop], evaluate_every=200, evaluation_env=Corridor()
+    )
+    assert not result.is_finished
+    assert (result.evaluations[-2:, 1] >= 0.6).all()
+
+
+def test_an_interrupt_reaches_the_caller_after_the_callbacks(tmp_path):
+    class Interrupt(Callback):
+        def on_step(self, training):
+            if training.n_steps == 30:
+                os.kill(os.getpid(), signal.SIGINT)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    callbacks = [Checkpoints(tmp_path / "c", 1000), Interrupt()]
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            corridor_agent().train(Corridor(), steps=100, callbacks=callbacks)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert Training.load(tmp_path / "c", Corridor()).n_steps == 30
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({}, "one of steps and episodes must be given"),
+        ({"steps": 10, "episodes": 1}, "one of steps and episodes must be given"),
+        ({"steps": 0}, "steps must be a whole number in"),
+        ({"episodes": 1.5}, "episodes must be a whole number in"),
+        ({"steps": 10, "evaluate_every": 5}, "evaluation_env must be given"),
+        ({"steps": 10, "seed": -1}, "seed must be a whole number in"),
+    ],
+)
+def test_impossible_trainings_are_named(options, message):
+    with pytest.raises(ValueError, match=message):
+        corridor_agent().train(Corridor(), **options)

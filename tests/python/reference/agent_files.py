@@ -1,0 +1,128 @@
+"""Writes the files that both languages must read alike: call it to renew tests/data/agents.
+
+For each agent: a file, a life of some steps (observations, actions and so on), and the file that
+the agent leaves after it.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+
+from sdnn.agents import (
+    FuzzyQLearning,
+    FuzzyQLearningConfig,
+    QLearningConfig,
+    RBFQLearning,
+    SDNNQLearning,
+    Transition,
+)
+from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
+
+FOLDER = Path(__file__).parents[2] / "data" / "agents"
+OBSERVATIONS = gym.spaces.Box(
+    np.array([-1.0, -1.0, -8.0, -np.inf]), np.array([1.0, 1.0, 8.0, np.inf]), dtype=np.float64
+)
+TORQUE = gym.spaces.Box(-2.0, 3.0, (1,), dtype=np.float64)
+SMALL = SDNNCConfig(
+    n_pattern_units=12,
+    n_anchor_patterns=4,
+    n_interpolated=6,
+    n_hidden_units=24,
+    n_active_units=8,
+    n_actions=5,
+    rounding="random",
+)
+LEARNING = QLearningConfig(
+    n_steps=3,
+    epsilon=0.3,
+    final_epsilon=0.0,
+    final_learning_rate=0.25,
+    n_greedy_steps=0,
+    max_repetitions=6,
+    value_range="seen",
+)
+N_STEPS = 40
+
+
+def agents():
+    """The agents by name, of all kinds that both languages know."""
+    fuzzy = FuzzyQLearningConfig(trace_decay=0.7, n_greedy_steps=0, epsilon=0.3)
+    made = {
+        "sdnn": SDNNQLearning,
+        "sdnn-vector": SDNNQLearning,
+        "sdnn-discrete": SDNNQLearning,
+        "rbf": RBFQLearning,
+        "fuzzy": FuzzyQLearning,
+    }
+    spaces = {
+        "sdnn-vector": gym.spaces.Box(
+            np.array([0.0, -1.0]), np.array([1.0, 1.0]), dtype=np.float64
+        ),
+        "sdnn-discrete": gym.spaces.Discrete(3, start=4),
+    }
+    settings = {
+        "rbf": {"approximator": RBFNetworkConfig(n_bases=3, n_actions=7), "learning": LEARNING},
+        "fuzzy": {"approximator": FuzzyRulesConfig(n_sets=3, n_actions=4), "learning": fuzzy},
+    }
+    for name, kind in made.items():
+        yield (
+            name,
+            kind(
+                OBSERVATIONS,
+                spaces.get(name, TORQUE),
+                angle_pairs=[(0, 1)],
+                warm_up_steps=50,
+                seed=11,
+                **settings.get(name, {"approximator": SMALL, "learning": LEARNING}),
+            ),
+        )
+
+
+def life(agent, rng, n_steps):
+    """Lets an agent live; gives what it saw and did, step by step."""
+    steps = []
+    turn, speed, other = rng.uniform(-3, 3, 3)
+    begins = True
+    for _ in range(n_steps):
+        seen = [np.cos(turn), np.sin(turn), speed, other]
+        if begins:
+            agent.begin_episode()
+        action = agent.act(seen)
+        greedy = agent.act(seen, explore=False)
+        turn, speed, other = turn + 0.2 * speed, rng.uniform(-8, 8), rng.normal()
+        following = [np.cos(turn), np.sin(turn), speed, other]
+        reward, terminated = float(rng.normal()), bool(rng.random() < 0.1)
+        agent.learn(Transition(seen, action, reward, following, terminated))
+        steps.append(
+            {
+                "begins": begins,
+                "observation": [float(x) for x in seen],
+                "action": np.atleast_1d(action).tolist(),
+                "greedy": np.atleast_1d(greedy).tolist(),
+                "reward": reward,
+                "next_observation": [float(x) for x in following],
+                "terminated": terminated,
+            }
+        )
+        begins = terminated
+    return steps
+
+
+def write(folder):
+    """Write all files to a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, agent in agents():
+        rng = np.random.default_rng(5)
+        life(agent, rng, 120)
+        agent.progress = 0.5
+        agent.save(folder / f"{name}.safetensors")
+        steps = life(agent, rng, N_STEPS)
+        agent.save(folder / f"{name}-after.safetensors")
+        (folder / f"{name}.json").write_text(json.dumps(steps, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    write(Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER)

@@ -1,0 +1,36 @@
+"""An environment of one's own: two unbounded variables, chance of its own, one torque."""
+
+import gymnasium as gym
+import numpy as np
+
+
+class DriftingEnv(gym.Env):
+    """Keep a drifting point near 0; every number follows from the seed and the actions."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012
+    observation_space = gym.spaces.Box(-np.inf, np.inf, (2,), np.float64)
+    action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
+
+    def __init__(self, drift=0.1, render_mode=None):
+        self.drift = drift
+        self.render_mode = render_mode
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.state = self.np_random.normal(0.0, 0.5, 2)
+        return self.state.copy(), {}
+
+    def step(self, action):
+        position, speed = self.state
+        speed += 0.2 * float(action[0]) + self.np_random.normal(0.0, self.drift)
+        position += 0.2 * speed
+        self.state = np.array([position, speed])
+        return self.state.copy(), -abs(position), bool(abs(position) > 3.0), False, {}
+
+    def render(self):
+        picture = np.zeros((33, 65, 3), np.uint8)
+        picture[:, int(np.clip(32 + 10 * self.state[0], 0, 64))] = 255
+        return picture
+
+
+gym.register("tests/Drifting-v0", entry_point=DriftingEnv, max_episode_steps=40)

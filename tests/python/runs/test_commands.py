@@ -1,0 +1,349 @@
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import drifting_env  # noqa: F401
+from sdnn.agents import PRESETS
+from sdnn.cli import main
+from sdnn.cli.run_options import option_of, value_of
+from sdnn.cli.train import AGENTS as AGENT_WORDS
+from sdnn.cli.train import PRESETS as PRESET_WORDS
+from sdnn.runs import AGENTS, Run, RunConfig
+
+SMALL = (
+    "--set", "approximator.n_hidden_units=60", "--set", "approximator.n_active_units=20",
+    "--set", "approximator.n_pattern_units=20", "--set", "agent.warm_up_steps=60",
+)  # fmt: skip
+SHORT = ("--steps", 150, "--evaluate-every", 70, "--evaluation-episodes", 2, *SMALL)
+DRIFTING = "drifting_env:tests/Drifting-v0"
+
+
+@pytest.fixture
+def invoke(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+
+    def _invoke(*arguments):
+        return CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
+
+    return _invoke
+
+
+def test_words_are_those_of_the_rooms():
+    assert set(AGENT_WORDS) == set(AGENTS)
+    assert set(PRESET_WORDS) == set(PRESETS)
+
+
+def test_train_evaluate_plot_record(invoke, tmp_path):
+    done = invoke("train", DRIFTING, *SHORT, "--seed", 3)
+    assert done.exit_code == 0, done.output
+    assert done.stderr == ""  # no progress where there is no terminal
+    folder = Path("runs/drifting_env-tests-Drifting-v0-sdnn-3")
+    lines = done.stdout.splitlines()
+    assert lines[0].startswith(f"{folder}: 150 steps, ")
+    assert lines[1].startswith("last evaluation, after 140 steps: mean return ")
+    assert "corrections" in lines[2]
+    assert f"sdnn plot {folder}" in lines[-1]
+
+    found = json.loads(invoke("evaluate", folder, "--episodes", 3, "--seed", 9, "--json").stdout)
+    returns = Run.open(folder).evaluate(3, 9).returns
+    assert found["returns"] == returns.tolist()
+    assert found["mean_return"] == pytest.approx(returns.mean())
+    assert found["range"] == [returns.min(), returns.max()]
+    text = invoke("evaluate", folder, "--episodes", 3).stdout
+    assert text.startswith(f"{folder}: mean return ")
+    assert (
+        json.loads(invoke("evaluate", folder, "--episodes", 1, "--json").stdout)[
+            "standard_deviation"
+        ]
+        is None
+    )
+
+    figure, numbers = folder / "curves.png", folder / "curves.csv"
+    assert invoke("plot", folder).stdout == f"wrote {figure} and {numbers}\n"
+    drawn = list(csv.DictReader(numbers.read_text().splitlines()))
+    rows = Run.open(folder).rows()
+    assert [float(one["value"]) for one in drawn if one["kind"] == "evaluation"] == [
+        row["mean_return"] for row in rows if row["kind"] == "evaluation"
+    ]
+    assert [float(one["value"]) for one in drawn if one["kind"] == "return"] == [
+        row["return"] for row in rows if row["kind"] == "episode"
+    ]
+    assert figure.stat().st_size > 10_000
+    assert "x.svg" in invoke("plot", folder, "--out", "x.svg").stdout
+
+    recorded = invoke("record", folder, "x.gif", "--steps", 4)
+    assert recorded.stdout.startswith("wrote x.gif: 5 frames, return ")
+    assert (tmp_path / "x.gif").read_bytes().startswith(b"GIF89a")
+
+
+def test_several_runs_are_drawn_where_one_is(invoke, tmp_path):
+    for seed in (1, 2):
+        assert invoke("train", DRIFTING, *SHORT, "--seed", seed).exit_code == 0
+    folders = sorted((tmp_path / "runs").iterdir())
+    assert invoke("plot", *folders, folders[0]).stdout == "wrote curves.png and curves.csv\n"
+    drawn = list(csv.DictReader(Path("curves.csv").read_text().splitlines()))
+    assert {(one["kind"], one["n_runs"], one["run"]) for one in drawn} == {("evaluation", "2", "")}
+
+
+def test_dry_run_shows_the_configuration_and_writes_nothing(invoke, tmp_path):
+    done = invoke(
+        "train", "CartPole-v1", "--agent", "sdnn", "--preset", "robust", "--episodes", 7,
+        "--noise", 0.1, "--redundant", 2, "--range", "-4:4", "--range", "1=-3:3",
+        "--set", "learning.discount=0.5", "--set", "learning.tie_rule=middle",
+        "--set", "approximator.circular=[true, false]", "--env-arg", "max_episode_steps=50",
+        "--evaluate-every", 0, "--checkpoint-every", 5, "--dry-run", "--set",
+        "approximator.circular=[]",
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    values = json.loads(done.stdout)
+    assert values.pop("folder") == "runs/CartPole-v1-sdnn-0"
+    assert values["environment"] == {
+        "id": "CartPole-v1",
+        "kwargs": {"max_episode_steps": 50},
+        "ranges": {"all": [-4.0, 4.0], "1": [-3.0, 3.0]},
+        "noise": 0.1,
+        "redundant": 2,
+    }
+    assert values["settings"] == {
+        "learning": {"discount": 0.5, "tie_rule": "middle"}, "approximator": {"circular": []},
+    }  # fmt: skip
+    assert (values["episodes"], "steps" in values, values["preset"]) == (7, False, "robust")
+    assert (values["evaluate_every"], values["checkpoint_every"]) == (0, 5)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_angles_are_found_in_their_cosines_and_sines(invoke):
+    done = invoke(
+        "train", "Pendulum-v1", "--steps", 70, "--angle-pairs", "find", "--out", "one", *SMALL
+    )
+    assert done.exit_code == 0, done.output
+    assert Run.open("one").agent().approximator.circular == (True, False)
+
+
+def test_options_come_before_a_file(invoke, tmp_path):
+    (tmp_path / "mine.toml").write_text(
+        'environment = "CartPole-v1"\nsteps = 5\nseed = 8\npreset = "robust"\n'
+        "[settings.learning]\ndiscount = 0.5\nepsilon = 0.2\n"
+    )
+    command = ("train", "--config", "mine.toml", "--dry-run")
+    values = json.loads(invoke(*command).stdout)
+    assert (values["environment"]["id"], values["steps"], values["seed"]) == ("CartPole-v1", 5, 8)
+    values = json.loads(
+        invoke(*command, "Acrobot-v1", "--episodes", 6, "--set", "learning.epsilon=0.3").stdout
+    )
+    assert values["environment"]["id"] == "Acrobot-v1"
+    assert (values["episodes"], values.get("steps"), values["preset"]) == (6, None, "robust")
+    assert values["settings"]["learning"] == {"discount": 0.5, "epsilon": 0.3}
+    values = json.loads(invoke(*command, "--agent", "rbf").stdout)
+    assert (values["agent"], values.get("preset")) == ("rbf", None)
+    invoke("train", "--config", "mine.toml", "--out", "one", *SMALL)
+    again = json.loads(invoke("train", "--config", "one/config.json", "--dry-run").stdout)
+    assert again.pop("folder") == "runs/CartPole-v1-sdnn-8"
+    assert RunConfig.from_values(again) == Run.open("one").config
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "ENV_ID must be given"),
+        (["Nothing-v0"], "ENV_ID: no environment 'Nothing-v0'"),
+        (["nowhere:a/B-v0"], "ENV_ID: no environment"),
+        (["CartPole-v1", "--agent", "dqn"], "--agent"),
+        (["CartPole-v1", "--agent", "fuzzy"], "ENV_ID: action_space must be a Box"),
+        (["CartPole-v1", "--preset", "best"], "--preset"),
+        (["CartPole-v1", "--agent", "rbf", "--preset", "paper"], "--preset: is for the agent"),
+        (["CartPole-v1", "--steps", 0], "--steps"),
+        (["CartPole-v1", "--steps", "many"], "--steps"),
+        (["CartPole-v1", "--episodes", 0], "--episodes"),
+        (["CartPole-v1", "--steps", 5, "--episodes", 5], "--steps and --episodes"),
+        (["CartPole-v1", "--seed", -1], "--seed"),
+        (["CartPole-v1", "--seed", 2**64], "--seed"),
+        (["CartPole-v1", "--config", "missing.toml"], "--config"),
+        (["CartPole-v1", "--noise", -1], "--noise"),
+        (["CartPole-v1", "--noise", "nan"], "--noise"),
+        (["CartPole-v1", "--noise", 0.1], "--range: noise and redundant need the range"),
+        (["CartPole-v1", "--redundant", -1], "--redundant"),
+        (["CartPole-v1", "--redundant", 5000, "--range", "0:1"], "--redundant: must be"),
+        (["CartPole-v1", "--range", "5"], "--range must be [VARIABLE=]LOW:HIGH, got '5'"),
+        (["CartPole-v1", "--range", "a:b"], "--range must be"),
+        (["CartPole-v1", "--range", "4:3"], "--range: must be finite, low < high"),
+        (["CartPole-v1", "--range", "9=3:4"], "--range: CartPole-v1 has the variables 0 to 3"),
+        (["CartPole-v1", "--range", "x=3:4"], "--range: must be of 'all' or a number"),
+        (["CartPole-v1", "--set", "learning.discount"], "--set must be NAME=VALUE"),
+        (["CartPole-v1", "--set", "discount=1"], "--set discount: must be SECTION.NAME"),
+        (["CartPole-v1", "--set", "learning.discont=1"], "--set learning.discont: unknown"),
+        (["CartPole-v1", "--set", "a.b=1"], "--set a: unknown section"),
+        (["CartPole-v1", "--set", "learning.discount=x"], "--set learning.discount: must be a"),
+        (["CartPole-v1", "--set", "learning.discount=2"], "--set learning.discount: discount"),
+        (["CartPole-v1", "--set", "agent.angles=[7]"], "--set agent.angles: angles must"),
+        (["CartPole-v1", "--env-arg", "5"], "--env-arg must be NAME=VALUE"),
+        (["CartPole-v1", "--env-arg", "color=5"], "--env-arg: CartPole-v1 cannot be made"),
+        (["CartPole-v1", "--evaluate-every", -1], "--evaluate-every"),
+        (["CartPole-v1", "--evaluation-episodes", 0], "--evaluation-episodes"),
+        (["CartPole-v1", "--checkpoint-every", 0], "--checkpoint-every"),
+        (["CartPole-v1", "--target-return", "high"], "--target-return"),
+        (
+            ["CartPole-v1", "--target-return", 5, "--evaluate-every", 0],
+            "--target-return: needs evaluations",
+        ),
+        (["CartPole-v1", "--angle-pairs", "all"], "--angle-pairs"),
+        (
+            ["CartPole-v1", "--angle-pairs", "find", "--redundant", 1],
+            "--angle-pairs: finds no angles",
+        ),
+        (["CartPole-v1", "--fast"], "--fast"),
+    ],
+)
+def test_wrong_usage_is_exit_code_2_and_names_the_option(invoke, tmp_path, arguments, words):
+    result = invoke("train", *arguments)
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert result.stdout == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_tensorboard_that_is_missing_is_told_before_anything_is_written(
+    invoke, tmp_path, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, "tensorboardX", None)
+    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
+    result = invoke("train", "CartPole-v1", "--tensorboard")
+    assert result.exit_code == 2
+    assert "--tensorboard: TensorBoard rows need tensorboardX" in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_error_in_a_file_names_file_line_and_key(invoke, tmp_path):
+    (tmp_path / "mine.toml").write_text('environment = "CartPole-v1"\nsteps = "x"\n')
+    result = invoke("train", "--config", "mine.toml")
+    assert result.exit_code == 2
+    assert "mine.toml:2: steps: must be a whole number" in result.stderr
+
+
+def test_a_run_is_not_overwritten(invoke):
+    assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
+    before = Path("one/rows.jsonl").read_bytes()
+    result = invoke("train", DRIFTING, *SHORT, "--out", "one")
+    assert result.exit_code == 2
+    assert "--out: one holds a run already: sdnn resume one" in result.stderr
+    assert Path("one/rows.jsonl").read_bytes() == before
+    Path("file").write_text("mine")
+    result = invoke("train", DRIFTING, *SHORT, "--out", "file")
+    assert (result.exit_code, Path("file").read_text()) == (1, "mine")
+
+
+def test_resume_with_a_new_goal(invoke):
+    done = json.loads(invoke("train", DRIFTING, *SHORT, "--out", "one", "--json").stdout)
+    assert (done["n_steps"], done["reason"], done["folder"]) == (150, "done", "one")
+    assert 0.0 <= done["learning_report"]["share_changed"] <= 1.0
+    assert "150 steps" in invoke("resume", "one").stdout
+    assert json.loads(invoke("resume", "one", "--steps", 170, "--json").stdout)["n_steps"] == 170
+    result = invoke("resume", "one", "--steps", 9)
+    assert result.exit_code == 2
+    assert "--steps: must be at least the 170 that are done" in result.stderr
+    result = invoke("resume", "one", "--steps", 900, "--episodes", 900)
+    assert result.exit_code == 2
+    assert "--episodes: must not be given together with steps" in result.stderr
+
+
+@pytest.mark.parametrize("command", [["resume"], ["evaluate"], ["plot"], ["record", "x.gif"]])
+def test_folders_that_are_no_runs(invoke, tmp_path, command):
+    word, *more = command
+    assert invoke(word, "nowhere", *more).exit_code == 2
+    (tmp_path / "empty").mkdir()
+    result = invoke(word, "empty", *more)
+    assert result.exit_code == 1
+    assert "Error: empty holds no run" in result.stderr
+
+
+def test_other_failures_are_exit_code_1(invoke):
+    assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
+    result = invoke("record", "one", "x.avi")
+    assert (result.exit_code, "must end in one of .gif, .mp4" in result.stderr) == (1, True)
+    result = invoke("plot", "one", "--out", "x.doc")
+    assert (result.exit_code, "must end in one of .png" in result.stderr) == (1, True)
+    assert invoke("evaluate", "one", "--episodes", 0).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("0.5", 0.5), ("7", 7), ("true", True), ("[1, 2]", [1, 2]), ("middle", "middle"),
+        ('"7"', "7"), ("", ""), ("a\nb", "a\nb"), ("1 # one", 1),
+    ],
+)  # fmt: skip
+def test_values_are_as_toml_has_them_or_texts(text, value):
+    assert value_of(text) == value
+
+
+@pytest.mark.parametrize(
+    ("key", "option"),
+    [
+        ("settings.learning.discount", "--set learning.discount"),
+        ("environment.kwargs", "--env-arg"),
+        ("environment.ranges.3", "--range"),
+        ("environment.noise", "--noise"),
+        ("environment.id", "ENV_ID"),
+        ("evaluate_every", "--evaluate-every"),
+    ],
+)
+def test_options_of_keys(key, option):
+    assert option_of(key) == option
+
+
+def environment():
+    return os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+
+
+@pytest.mark.parametrize(
+    ("number", "code", "word"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+)
+def test_a_signal_ends_the_step_and_the_run_goes_on_exactly(invoke, tmp_path, number, code, word):
+    long = (
+        DRIFTING, "--steps", 3000, "--evaluate-every", 700, "--evaluation-episodes", 2,
+        "--range", "-4:4", "--noise", 0.01, "--checkpoint-every", 10**9, *SMALL,
+    )  # fmt: skip
+    command = [sys.executable, "-m", "sdnn", "train", *map(str, long), "--out", "cut"]
+    process = subprocess.Popen(
+        command, cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, text=True
+    )
+    rows = tmp_path / "cut" / "rows.jsonl"
+    while process.poll() is None and not (rows.exists() and rows.stat().st_size):
+        time.sleep(0.002)
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == code, errors
+    assert errors == f"{word}; sdnn resume cut goes on\n"
+    assert not (tmp_path / "cut" / "agent.safetensors").exists()
+    cut_at = Run.open("cut").rows()[-1]["step"]
+    assert cut_at < 3000
+    assert invoke("resume", "cut").exit_code == 0
+    assert invoke("train", *long, "--out", "whole").exit_code == 0
+    for name in ("agent.safetensors", "checkpoint.safetensors"):
+        assert (tmp_path / "cut" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+    cut, whole = (
+        [{k: v for k, v in row.items() if k != "seconds"} for row in Run.open(folder).rows()]
+        for folder in ("cut", "whole")
+    )
+    assert cut == whole
+
+
+def test_commands_start_without_heavy_imports():
+    code = (
+        "import sys, sdnn; before = set(sys.modules); import sdnn.cli;"
+        "heavy = ('matplotlib', 'rich', 'PIL', 'safetensors', 'sdnn.agents', 'sdnn.runs');"
+        "print([m for m in heavy if m in set(sys.modules) - before])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment()
+    )
+    assert done.stdout.strip() == "[]"

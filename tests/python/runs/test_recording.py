@@ -1,0 +1,78 @@
+import re
+import subprocess
+
+import gymnasium as gym
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from PIL import Image
+
+import drifting_env
+from sdnn.runs import Run, RunConfig, RunEnvironment, RunError
+from sdnn.runs.recording import record
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    config = RunConfig(
+        environment=RunEnvironment(id="tests/Drifting-v0", ranges={"all": (-4.0, 4.0)}, noise=0.01),
+        agent="rbf",
+        settings={"approximator": {"n_actions": 5}},
+        steps=100,
+        evaluate_every=0,
+    )
+    made = Run.create(tmp_path_factory.mktemp("recording") / "run", config)
+    made.train()
+    return made
+
+
+def test_gif_has_a_frame_per_state(run, tmp_path):
+    recording = record(run, tmp_path / "x.gif", seed=5)
+    evaluation = run.evaluate(1, seed=5)
+    assert recording.n_frames == evaluation.lengths[0] + 1
+    assert recording.total_reward == pytest.approx(evaluation.returns[0], rel=1e-12)
+    with Image.open(tmp_path / "x.gif") as picture:
+        assert picture.size == (65, 33)
+        durations = 0
+        for number in range(picture.n_frames):
+            picture.seek(number)
+            durations += picture.info["duration"]
+        assert durations == 100 * recording.n_frames  # equal neighbours are one, shown longer
+        picture.seek(0)
+        first = np.asarray(picture.convert("RGB"))
+    env = gym.make("tests/Drifting-v0", render_mode="rgb_array")
+    env.reset(seed=recording._seed)
+    assert np.array_equal(first, env.render())
+
+
+def test_steps_can_be_limited(run, tmp_path):
+    assert record(run, tmp_path / "x.gif", max_steps=5).n_frames == 6
+
+
+def test_mp4_has_even_sides_and_all_frames(run, tmp_path):
+    recording = record(run, tmp_path / "x.mp4", seed=5)
+    program = imageio_ffmpeg.get_ffmpeg_exe()
+    command = [program, "-i", tmp_path / "x.mp4", "-f", "null", "-"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert "66x34" in done.stderr
+    assert "10 fps" in done.stderr
+    assert re.findall(r"frame= *(\d+)", done.stderr)[-1] == str(recording.n_frames)
+    assert [path.name for path in tmp_path.iterdir()] == ["x.mp4"]
+
+
+@pytest.mark.parametrize(("suffix", "package"), [("gif", "Pillow"), ("mp4", "imageio-ffmpeg")])
+def test_missing_packages_are_named(run, tmp_path, monkeypatch, suffix, package):
+    monkeypatch.setattr("sdnn.runs.recording.find_spec", lambda name: None)
+    with pytest.raises(RunError, match=rf'{package}, which is missing: pip install "sdnn\[render'):
+        record(run, tmp_path / f"x.{suffix}")
+
+
+def test_what_cannot_be_recorded(run, tmp_path, monkeypatch):
+    with pytest.raises(RunError, match=r"must end in one of \.gif, \.mp4"):
+        record(run, tmp_path / "x.avi")
+    for picture in (None, "text", np.zeros((3, 3))):
+        monkeypatch.setattr(drifting_env.DriftingEnv, "render", lambda self, p=picture: p)
+        for name in ("x.gif", "x.mp4"):
+            with pytest.raises(RunError, match="must give a picture"):
+                record(run, tmp_path / name)
+    assert list(tmp_path.iterdir()) == []

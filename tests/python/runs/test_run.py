@@ -1,0 +1,249 @@
+import dataclasses
+import json
+import os
+import random
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import drifting_env  # noqa: F401
+from sdnn.agents import Callback, Training, load_agent
+from sdnn.runs import ConfigError, Run, RunConfig, RunEnvironment, RunError
+
+SMALL = {
+    "approximator": {"n_hidden_units": 60, "n_active_units": 20, "n_pattern_units": 20},
+    "agent": {"warm_up_steps": 60},
+}
+
+CONFIG = RunConfig(
+    environment=RunEnvironment(
+        id="tests/Drifting-v0", ranges={"all": (-4.0, 4.0)}, noise=0.02, redundant=1
+    ),
+    settings=SMALL,
+    steps=400,
+    seed=3,
+    evaluate_every=90,
+    evaluation_episodes=2,
+    checkpoint_every=70,
+)
+
+WARMING_UP = dataclasses.replace(CONFIG, environment=RunEnvironment(id="tests/Drifting-v0"))
+
+
+def untimed(rows):
+    return [{name: v for name, v in row.items() if name != "seconds"} for row in rows]
+
+
+def contents(run):
+    """All of a run but the time that it took."""
+    files = {name: (run.folder / name).read_bytes() for name in (
+        "checkpoint.safetensors", "agent.safetensors"
+    )}  # fmt: skip
+    return files | {"rows": untimed(run.rows())}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Runs that nothing interrupted, by their configurations."""
+    folder = tmp_path_factory.mktemp("whole")
+    done = []
+
+    def _whole(config):
+        found = next((run for run in done if run.config == config), None)
+        if found is None:
+            found = Run.create(folder / str(len(done)), config)
+            found.train()
+            done.append(found)
+        return found
+
+    return _whole
+
+
+class StopAt(Callback):
+    def __init__(self, step):
+        self._step = step
+
+    def on_step(self, training):
+        if training.n_steps == self._step:
+            training.stop()
+
+
+def test_a_run_is_the_training_that_its_configuration_says(whole, tmp_path):
+    run = whole(CONFIG)
+    env, evaluation_env = (
+        CONFIG.environment.make(stream) for stream in ("sensor_noise", "evaluation_sensor_noise")
+    )
+    training = Training(
+        CONFIG.make_agent(env),
+        env,
+        steps=400,
+        seed=3,
+        evaluate_every=90,
+        evaluation_env=evaluation_env,
+        evaluation_episodes=2,
+    )
+    rows = training.run().rows
+    assert untimed(run.rows()) == untimed(rows)
+    training.agent.save(tmp_path / "agent.safetensors")
+    assert (tmp_path / "agent.safetensors").read_bytes() == contents(run)["agent.safetensors"]
+    assert {path.name for path in run.folder.iterdir()} == {
+        ".lock", "agent.safetensors", "checkpoint.safetensors", "config.json", "rows.jsonl",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("config", [CONFIG, WARMING_UP], ids=["noise", "warm-up"])
+def test_stopped_anywhere_a_run_goes_on_exactly(whole, tmp_path, config):
+    expected = contents(whole(config))
+    steps = sorted(random.Random(5).sample(range(1, 400), 12))
+    run = Run.create(tmp_path / "run", config)
+    for step in steps:  # within an episode, as good as always
+        outcome = Run.open(run.folder).train(callbacks=[StopAt(step)])
+        assert (outcome.n_steps, outcome.reason) == (step, "stopped")
+    assert Run.open(run.folder).train().reason == "done"
+    assert contents(run) == expected
+
+
+class FailAt(Callback):
+    """An error in the midst of a step, when rows are written and learning is done."""
+
+    def __init__(self, step):
+        self._step = step
+
+    def on_step(self, training):
+        if training.n_steps == self._step:
+            raise ZeroDivisionError
+
+
+def test_after_an_error_a_run_goes_on_from_the_last_checkpoint(whole, tmp_path):
+    run = Run.create(tmp_path / "run", CONFIG)
+    with pytest.raises(ZeroDivisionError):
+        run.train(callbacks=[FailAt(155)])
+    env = CONFIG.environment.make()
+    kept = Training.load(run.folder / "checkpoint.safetensors", env, evaluation_env=env)
+    assert kept.n_steps == 140
+    run.train()
+    assert contents(run) == contents(whole(CONFIG))
+
+
+def test_killed_at_any_instant_a_run_goes_on_exactly(whole, tmp_path):
+    config = dataclasses.replace(CONFIG, steps=1500, checkpoint_every=13)
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(config.values()))
+    script = Path(__file__).with_name("kill_run.py")
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    command = [sys.executable, script, tmp_path / "run", path, "12", "8"]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stderr
+    killed, *left = map(int, done.stdout.split())
+    assert killed >= 10
+    assert len(set(left)) >= 4  # some had come further than those before
+    assert contents(Run(tmp_path / "run", config)) == contents(whole(config))
+
+
+def test_a_target_stops_the_run_and_a_new_goal_drops_it(tmp_path):
+    config = dataclasses.replace(CONFIG, target_return=-1e9)
+    run = Run.create(tmp_path / "run", config)
+    outcome = run.train()
+    assert (outcome.n_steps, outcome.reason) == (90, "target")
+    assert outcome.last_evaluation["step"] == 90
+    again = Run.open(run.folder).train()  # as if killed right after the evaluation
+    assert (again.n_steps, again.reason) == (90, "target")
+    outcome = Run.open(run.folder).train(steps=200)
+    assert (outcome.n_steps, outcome.reason) == (200, "done")
+    reopened = Run.open(run.folder)
+    assert [(goal.at_step, goal.steps) for goal in reopened.goals] == [(90, 200)]
+    assert reopened.config == config
+
+
+def test_a_new_goal_is_kept_when_the_run_is_stopped_again(tmp_path):
+    run = Run.create(tmp_path / "run", dataclasses.replace(CONFIG, steps=50))
+    run.train()
+    run.train(steps=120, callbacks=[StopAt(80)])
+    assert Run.open(run.folder).train().n_steps == 120
+    with pytest.raises(ConfigError, match="at least the 120 that are done, got 20"):
+        run.train(steps=20)
+    with pytest.raises(ConfigError, match="episodes: must not be given together"):
+        run.train(steps=200, episodes=20)
+    assert run.train(episodes=20).n_episodes == 20
+
+
+def test_a_goal_before_the_first_checkpoint(tmp_path):
+    run = Run.create(tmp_path / "run", CONFIG)
+    assert run.train(steps=30).n_steps == 30
+
+
+def test_what_is_there_is_not_overwritten(whole, tmp_path):
+    run = whole(CONFIG)
+    before = contents(run)
+    with pytest.raises(RunError, match="sdnn resume"):
+        Run.create(run.folder, CONFIG)
+    assert contents(run) == before
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").write_text("mine")
+    with pytest.raises(RunError, match="is there already"):
+        Run.create(tmp_path / "mine", CONFIG)
+    with pytest.raises(RunError, match="is there already"):
+        Run.create(tmp_path / "mine" / "thesis.txt", CONFIG)
+
+
+def test_nothing_is_written_for_what_cannot_work(tmp_path):
+    wrong = dataclasses.replace(CONFIG, environment=RunEnvironment(id="Nothing-v0"))
+    with pytest.raises(ConfigError):
+        Run.create(tmp_path / "run", wrong)
+    wrong = dataclasses.replace(CONFIG, settings={"learning": {"discount": 2}})
+    with pytest.raises(ConfigError):
+        Run.create(tmp_path / "run", wrong)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_two_processes_do_not_train_one_run(tmp_path):
+    run = Run.create(tmp_path / "run", CONFIG)
+    with run._locked(), pytest.raises(RunError, match="trained by another process"):
+        run.train()
+    assert run.train(steps=20).n_steps == 20
+
+
+def test_agents_and_evaluations(whole):
+    run = whole(CONFIG)
+    np.testing.assert_array_equal(
+        run.agent().q_values([0.5, 0.5, 0.5]),
+        load_agent(run.folder / "agent.safetensors").q_values([0.5, 0.5, 0.5]),
+    )
+    found = run.evaluate(3)
+    assert np.array_equal(run.evaluate(3).returns, found.returns)
+    assert not np.array_equal(run.evaluate(3, seed=1).returns, found.returns)
+    last = [row for row in run.rows() if row["kind"] == "evaluation"][-1]
+    assert last["step"] == 360
+    # The root of the run's own evaluations gives their very episodes.
+    assert len(run.evaluate(2, seed=3).returns) == 2
+
+
+def test_folders_that_hold_no_run_or_a_damaged_one(whole, tmp_path):
+    with pytest.raises(RunError, match="holds no run"):
+        Run.open(tmp_path)
+    run = Run.create(tmp_path / "run", CONFIG)
+    with pytest.raises(RunError, match="no checkpoint yet"):
+        run.agent()
+    run.train(steps=100)
+    rows = run.folder / "rows.jsonl"
+    kept = rows.read_bytes()
+    rows.write_bytes(kept.splitlines(keepends=True)[0])
+    with pytest.raises(RunError, match=r"rows\.jsonl must have the"):
+        run.train(steps=200)
+    rows.write_bytes(b"cake\n" + kept)
+    with pytest.raises(RunError, match=r"rows\.jsonl:1: must be a row"):
+        run.rows()
+    rows.write_bytes(kept + b'{"kind": "epi')  # killed while it wrote
+    assert len(run.rows()) == len(kept.splitlines())
+    (run.folder / "checkpoint.safetensors").write_bytes(b"cake")
+    with pytest.raises(RunError, match=r"checkpoint\.safetensors is no agent's file"):
+        run.agent()
+    with pytest.raises(RunError, match=r"checkpoint\.safetensors is no agent's file"):
+        run.train()
+    config = run.folder / "config.json"
+    config.write_text(config.read_text().replace('"steps": 400', '"steps": "many"', 1))
+    with pytest.raises(ConfigError, match=r"config\.json: steps: must be a whole number"):
+        Run.open(run.folder)

@@ -1,0 +1,92 @@
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import drifting_env  # noqa: F401
+from sdnn.environments import NoisySensors
+from sdnn.runs import ConfigError, RunEnvironment
+
+
+def test_without_noise_the_agent_gets_what_there_is():
+    env = RunEnvironment(id="CartPole-v1", kwargs={"max_episode_steps": 7}).make()
+    assert env.observation_space == gym.make("CartPole-v1").observation_space
+    assert env.spec.max_episode_steps == 7
+
+
+def test_redundant_variables_are_means_of_neighbours_in_a_circle():
+    ranges = {"all": (-2.0, 2.0), "1": (-4.0, 4.0)}
+    env = RunEnvironment(id="tests/Drifting-v0", ranges=ranges, redundant=3).make()
+    observation, _ = env.reset(seed=1)
+    position, speed = env.unwrapped.state
+    first, second = (position + 2) / 4, (speed + 4) / 8
+    mean = 0.5 * (first + second)
+    np.testing.assert_allclose(observation, [first, second, mean, mean, mean], rtol=1e-15)
+    assert env.observation_space == gym.spaces.Box(0.0, 1.0, (5,), np.float64)
+
+
+def test_noise_is_in_parts_of_the_range_and_follows_the_reset():
+    environment = RunEnvironment(
+        id="tests/Drifting-v0", ranges={"all": (-50.0, 50.0)}, noise=0.02, redundant=1
+    )
+    env = environment.make()
+    assert isinstance(env, NoisySensors)
+
+    def errors(env, seed):
+        found = []
+        observation, _ = env.reset(seed=seed)
+        for _ in range(40):
+            position, speed = (env.unwrapped.state + 50) / 100
+            found.append(observation - [position, speed, 0.5 * (position + speed)])
+            observation, *_ = env.step(np.zeros(1, np.float32))
+        return np.array(found)
+
+    first = errors(env, 3)
+    assert first.std() == pytest.approx(0.02, rel=0.2)
+    assert np.array_equal(errors(env, 3), first)  # whatever was drawn before
+    assert not np.array_equal(errors(env, 4), first)
+    assert not np.array_equal(errors(environment.make("evaluation_sensor_noise"), 3), first)
+
+
+def test_observations_of_any_shape_are_flattened():
+    env = RunEnvironment(id="FrozenLake-v1", redundant=1).make()
+    observation, _ = env.reset(seed=0)
+    assert observation.tolist() == [1.0, *[0.0] * 15, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("environment", "key", "words"),
+    [
+        ({"id": "Nothing-v0"}, "environment.id", "no environment 'Nothing-v0'"),
+        ({"id": "nowhere:a/B-v0"}, "environment.id", "no environment 'nowhere:a/B-v0'"),
+        ({"id": "CartPole-v1", "kwargs": {"colour": 1}}, "environment.kwargs", "colour"),
+        ({"id": "CartPole-v1", "noise": 0.1}, "environment.ranges", "none of variables 1, 3 of 4"),
+        ({"id": "CartPole-v1", "redundant": 1}, "environment.ranges", "--range 1=LOW:HIGH"),
+        (
+            {"id": "CartPole-v1", "noise": 0.1, "ranges": {"4": (0, 1)}},
+            "environment.ranges.4",
+            "has the variables 0 to 3, got 4",
+        ),
+    ],
+)
+def test_environments_that_cannot_be_made(environment, key, words):
+    with pytest.raises(ConfigError, match=words) as caught:
+        RunEnvironment(**environment).make()
+    assert caught.value.key == key
+
+
+@pytest.mark.parametrize(
+    ("values", "key"),
+    [
+        ({"id": ""}, "environment.id"),
+        ({"noise": float("nan")}, "environment.noise"),
+        ({"noise": "much"}, "environment.noise"),
+        ({"redundant": -1}, "environment.redundant"),
+        ({"redundant": 1.5}, "environment.redundant"),
+        ({"ranges": {"0": (0, float("inf"))}}, "environment.ranges.0"),
+        ({"kwargs": {"function": print}}, "environment.kwargs"),
+    ],
+)
+def test_values_out_of_range(values, key):
+    with pytest.raises(ConfigError) as caught:
+        RunEnvironment(**{"id": "CartPole-v1", **values})
+    assert caught.value.key == key
