@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any, Protocol
 
 import stable_baselines
+import stream_ac
 from tasks import TASKS
 from tile_coding import TileCodingSarsa
 
@@ -110,6 +111,10 @@ def _learn_stable(algorithm, name, condition, steps, seed, after_step):
     stable_baselines.learn(algorithm, name, make, steps, seed, after_step)
 
 
+def _learn_stream_ac(name, condition, steps, seed, after_step):
+    stream_ac.learn(TASKS[name].make_unscaled(condition), steps, seed, after_step)
+
+
 def _stable(algorithm):
     return Contender(
         title=f"{algorithm}, Stable-Baselines3",
@@ -131,6 +136,13 @@ CONTENDERS = {
     ),
     "tiles": Contender(
         title="Sarsa(lambda), tile coding", learn=_learn_tiles, tasks=tuple(TILINGS)
+    ),
+    "stream-ac": Contender(
+        title="stream AC",
+        learn=_learn_stream_ac,
+        tasks=stream_ac.TASKS,
+        steps=dict.fromkeys(stream_ac.TASKS, 50_000),  # it takes milliseconds for each
+        in_own_units=True,
     ),
     "sac": _stable("SAC"),
     "td3": _stable("TD3"),
