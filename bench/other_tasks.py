@@ -4,7 +4,7 @@
 
 Each trial is a training and a greedy evaluation of 100 episodes; its row goes to
 docs/other-tasks.csv when it is done, and is not run again. At the end the table of
-docs/benchmarks.md is printed from the rows.
+docs/benchmarks.md is printed from the rows of the tasks and agents that were asked for.
 """
 
 from __future__ import annotations
@@ -62,6 +62,13 @@ def sdnn(env, options, seed):
     return SDNNQLearning(env.observation_space, env.action_space, seed=seed, **options)
 
 
+def small(env, options, seed):
+    """SDNN-C for small processors."""
+    return SDNNQLearning(
+        env.observation_space, env.action_space, preset="small", seed=seed, **options
+    )
+
+
 def rbf(env, options, seed):
     """The RBF network with the same learning."""
     sizes = RBFNetworkConfig(n_actions=PRESETS["general"].approximator.n_actions)
@@ -75,7 +82,7 @@ def rbf(env, options, seed):
     )
 
 
-AGENTS = {"sdnn": sdnn, "rbf": rbf}
+AGENTS = {"sdnn": sdnn, "sdnn-small": small, "rbf": rbf}
 
 
 def cpu_seconds() -> float:
@@ -150,13 +157,14 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--folder", type=Path, default=DOCS)
     options = parser.parse_args()
+    tasks, agents = options.tasks.split(","), options.agents.split(",")
     path = options.folder / "other-tasks.csv"
     done = {(r["task"], r["agent"], int(r["seed"])) for r in read_rows(path)}
     missing = [
         (name, kind, seed)
-        for name in options.tasks.split(",")
-        for kind in options.agents.split(",")
         for seed in range(options.seeds)
+        for name in tasks
+        for kind in agents
         if (name, kind, seed) not in done
     ]
     is_new = not path.exists()
@@ -168,7 +176,7 @@ def main() -> None:
             writer.writerow(row)
             file.flush()
             print(*row.values())
-    print(table(read_rows(path)))
+    print(table(r for r in read_rows(path) if r["task"] in tasks and r["agent"] in agents))
 
 
 if __name__ == "__main__":
