@@ -10,6 +10,7 @@ from fractions import Fraction
 from importlib.resources import files
 from pathlib import Path
 from string import Template
+from textwrap import wrap
 from typing import Any
 
 import gymnasium as gym
@@ -316,9 +317,7 @@ class _Writer:
             "weight_bits": f"{32 * n_words / n_weights:.2f}",
             "ram_bytes": f"{ram_bytes:,}",
             "n_words": f"{n_words:,}",
-            "n_multiplications": f"{n_words + sum(n_units) + 2 * n_code_words:,}",
             "usage": _lines(f" * {line}".rstrip() for line in self._usage()),
-            "tie_rule": _TIE_RULES[self.learning.tie_rule],
             "n_observed": len(self.low),
             "n_inputs": len(self.inputs),
             "n_dimensions": len(self.networks),
@@ -479,11 +478,12 @@ class _Writer:
             value = f"{name}_action_fixed{dimension}[{number}]"
             yield f"  int32_t value = {value}; // times {scale}"
         yield ""
-        yield f"With {macro}_USE_FLOAT defined before the include, {name}_act_float and"
-        yield f"{name}_act_double take observations as they are"
-        if self.box is not None:
-            yield f"and {name}_action_float has the actions"
-        yield f"(floating point up to the bins). {name}_act_bins takes the bins themselves:"
+        floats = f"{name}_act_float and {name}_act_double take observations in floating point"
+        actions = "" if self.box is None else f", and {name}_action_float has the actions"
+        yield from wrap(
+            f"With {macro}_USE_FLOAT defined before the include, {floats}{actions}.", 96
+        )
+        yield f"{name}_act_bins takes the bins of all inputs:"
         for place, (one, n_bins) in enumerate(zip(self.inputs, self.n_bins, strict=True)):
             (kind, at), *_ = one.items()
             if kind == "angle":
@@ -493,13 +493,15 @@ class _Writer:
                 ends = f"from {self.low[at]:.6g} to {self.high[at]:.6g} in {n_bins} bins"
                 turn = ", an angle," if kind == "circular" else ""
                 yield f"  input {place}: observation[{at}]{turn} {ends}"
+        yield from wrap(_TIE_RULES[self.learning.tie_rule], 96)
 
 
 _TIE_RULES = {
-    "uniform": "where the agent draws one, this header takes the middle of\n"
-    " * the widest run of neighbours",
-    "middle": "the middle of the widest run of neighbours is taken, as by\n * the agent",
-    "lowest": "the one with the lowest number is taken, as by the agent",
+    "uniform": "Of several best actions, of which the agent draws one, the header takes the middle"
+    " of the widest run of neighbours.",
+    "middle": "Of several best actions it takes the middle of the widest run of neighbours, as the"
+    " agent does.",
+    "lowest": "Of several best actions it takes the lowest, as the agent does.",
 }
 
 _LOWEST = {
@@ -611,5 +613,6 @@ def _turns(low: float, high: float, fraction_bits: int) -> tuple[int, int]:
 def _directions(n_bins: int) -> NDArray[Any]:
     """Give cosine and sine of the angles where bins begin, from bin 1 on: (n_bins - 1, 2)."""
     angles = [math.pi * (2 * b - n_bins) / n_bins for b in range(1, n_bins)]
-    ends = [(math.cos(angle), math.sin(angle)) for angle in angles]
-    return np.round(np.array(ends).reshape(-1, 2) * 2**_DIRECTION_BITS).astype(np.int64)
+    ends = np.array([(math.cos(angle), math.sin(angle)) for angle in angles])
+    rounded: NDArray[Any] = np.round(ends.reshape(-1, 2) * 2**_DIRECTION_BITS).astype(np.int64)
+    return rounded

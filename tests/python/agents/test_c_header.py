@@ -1,9 +1,11 @@
 """The C header of a policy, compiled for several processors, against the agent it is of."""
 
 import functools
+import math
 import shutil
 import subprocess
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -435,6 +437,42 @@ def test_two_headers_share_a_program_and_cpp_takes_them(agents, tmp_path):
         run(compiler, *options, tmp_path / f"both.{ending}", "-o", tmp_path / "both")
         said = [float(word) for word in run(tmp_path / "both").split()]
         assert said == [left, right[0], right[1]]
+
+
+def balance(agent, scale):
+    """What docs/examples/c/main.c does, with the agent itself."""
+    x, v, a, w = 0.01, -0.02, 0.03, 0.0
+    for step in range(500):
+        if abs(x) > 2.4 or abs(a) > 12.0 / 180.0 * 3.141592653589793:
+            return step
+        observation = np.round(np.array([x, v, a, w]) * scale) / scale
+        force = 10.0 if agent.act(observation, explore=False) == 1 else -10.0
+        sine, cosine = math.sin(a), math.cos(a)
+        pull = (force + 0.05 * w * w * sine) / 1.1
+        bend = 9.8 * sine - cosine * pull
+        bend /= 0.5 * (4.0 / 3.0 - 0.1 * cosine * cosine / 1.1)
+        x, v = x + 0.02 * v, v + 0.02 * (pull - 0.05 * bend * cosine / 1.1)
+        a, w = a + 0.02 * w, w + 0.02 * bend
+    return 500
+
+
+def test_the_example_balances_as_the_agent_does(tmp_path):
+    env = gym.make("CartPole-v1")
+    agent = SDNNQLearning(
+        env.observation_space,
+        env.action_space,
+        approximator=replace(PRESETS["small"].approximator, n_pattern_units=40),
+        learning=learning(tie_rule="middle"),
+        seed=1,
+    )
+    agent.train(env, steps=6000)
+    header = export_c_header(agent, tmp_path / "cartpole.h")
+    main = Path(__file__).parents[3] / "docs" / "examples" / "c" / "main.c"
+    options = (*STRICT, "-O2", "-I", tmp_path)
+    run("gcc", *options, main, "-o", tmp_path / "main", "-lm")
+    n_steps = int(run(tmp_path / "main"))
+    assert n_steps == balance(agent, 2.0**header.fraction_bits)
+    assert n_steps > 40  # at random it falls after 20
 
 
 def test_values_of_actions_are_those_of_act():
