@@ -60,12 +60,11 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
             approximator=SDNNCConfig(n_actions=61),
             learning=QLearningConfig(n_steps=5),
         ),
-        # A sixth of the weights: docs/small-processors.md.
+        # A fifth of the weights. Fewer hidden units instead would count in coarser steps:
+        # docs/small-processors.md.
         "small": Preset(
-            title="as recommended for small processors: the general one, a smaller network",
-            approximator=replace(
-                _GENERAL.approximator, n_pattern_units=64, n_hidden_units=600, n_active_units=200
-            ),
+            title="as recommended for small processors: the general one, smaller patterns",
+            approximator=replace(_GENERAL.approximator, n_pattern_units=40),
             learning=_GENERAL.learning,
         ),
     }

@@ -30,13 +30,11 @@ inline Preset general_preset(int n_inputs) {
                        .value_range = ValueRange::seen}};
 }
 
-/// The general one with a smaller network, whose weights fit into the flash of a small processor
-/// (docs/small-processors.md).
+/// The general one with smaller patterns, so that the weights fit into the flash of a small
+/// processor (docs/small-processors.md).
 inline Preset small_preset(int n_inputs) {
   Preset preset = general_preset(n_inputs);
-  preset.approximator.n_pattern_units = 64;
-  preset.approximator.n_hidden_units = 600;
-  preset.approximator.n_active_units = 200;
+  preset.approximator.n_pattern_units = 40;
   return preset;
 }
 
