@@ -1,7 +1,7 @@
 """Agents: ``agent.train(env, steps=...)``, or ``act(observation)`` and ``learn(transition)``."""
 
 from sdnn.agents.agent import Agent, load_agent
-from sdnn.agents.c_header import CHeader, c_header, export_c_header
+from sdnn.agents.c_headers import CHeader, c_header, export_c_header
 from sdnn.agents.callbacks import Checkpoints, EarlyStop, JSONLines, TensorBoard
 from sdnn.agents.evaluation import Evaluation, evaluate
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning, FuzzyQLearningConfig

@@ -1,6 +1,8 @@
 """The C header of a policy, compiled for several processors, against the agent it is of."""
 
+import doctest
 import functools
+import importlib
 import math
 import shutil
 import subprocess
@@ -473,6 +475,12 @@ def test_the_example_balances_as_the_agent_does(tmp_path):
     n_steps = int(run(tmp_path / "main"))
     assert n_steps == balance(agent, 2.0**header.fraction_bits)
     assert n_steps > 40  # at random it falls after 20
+
+
+def test_docstrings():
+    result = doctest.testmod(importlib.import_module("sdnn.agents.c_headers"))
+    assert result.failed == 0
+    assert result.attempted > 0
 
 
 def test_values_of_actions_are_those_of_act():
