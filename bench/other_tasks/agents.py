@@ -129,6 +129,11 @@ CONTENDERS = {
     "sdnn": Contender(
         title="SDNN-C", learn=partial(_learn_ours, SDNNQLearning), tasks=tuple(TASKS)
     ),
+    "sdnn-small": Contender(
+        title="SDNN-C, small",
+        learn=partial(_learn_ours, partial(SDNNQLearning, preset="small")),
+        tasks=("CartPole", "Pendulum", "MountainCarContinuous"),
+    ),
     "rbf": Contender(
         title="RBFN",
         learn=partial(_learn_ours, _rbf),

@@ -164,7 +164,10 @@ def draw(rows: Sequence[Row], path: Path) -> None:
             lower, median, upper = np.percentile(returns, (25, 50, 75), axis=0)
             for panel, field in zip(panels[:, column], ("steps", "cpu_seconds"), strict=True):
                 x = np.median([[float(r[field]) for r in trial] for trial in looks], axis=0)
-                (line,) = panel.plot(x, median, color=f"C{number}", label=contender.title, lw=1.6)
+                (line,) = panel.plot(
+                    x, median, "-" if x.size > 1 else "o", color=f"C{number}",
+                    label=contender.title, lw=1.6,
+                )  # fmt: skip
                 panel.fill_between(x, lower, upper, color=line.get_color(), alpha=0.2, lw=0)
         for panel in panels[:, column]:
             panel.axhline(TASKS[name].solved, color="0.4", lw=0.8, ls=":")

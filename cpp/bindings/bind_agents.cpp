@@ -163,6 +163,9 @@ void bind_agents(py::module_& module) {
   module.def(
       "robust_preset", [parts](int n_inputs) { return parts(agents::robust_preset(n_inputs)); },
       py::arg("n_inputs"), "Settings of approximator and learning, as recommended");
+  module.def(
+      "small_preset", [parts](int n_inputs) { return parts(agents::small_preset(n_inputs)); },
+      py::arg("n_inputs"), "Settings of approximator and learning, for small processors");
 
   module.def("seed_of_dimension", &approximators::seed_of_dimension, py::arg("seed"), py::arg("d"),
              "The seed of the network of a dimension of the action");

@@ -47,6 +47,26 @@ py::array_t<std::int32_t> thresholds(const SDNNC& network) {
   return out;
 }
 
+py::array_t<std::uint32_t> first_units(const SDNNC& network) {
+  const auto& actions = network.action_code();
+  py::array_t<std::uint32_t> out(static_cast<py::ssize_t>(actions.n_actions()));
+  std::uint32_t* unit = out.mutable_data();
+  for (std::size_t action = 0; action < actions.n_actions(); ++action) {
+    *unit++ = static_cast<std::uint32_t>(actions.first_unit(action));
+  }
+  return out;
+}
+
+py::array_t<double> output_values(const SDNNC& network) {
+  const std::size_t n_counts = network.action_code().n_active_units() + 1;
+  py::array_t<double> out(static_cast<py::ssize_t>(n_counts));
+  double* value = out.mutable_data();
+  for (std::size_t u = 0; u < n_counts; ++u) {
+    *value++ = network.output_scale()(static_cast<int>(u));
+  }
+  return out;
+}
+
 /// What all networks that give Q(s, a) for every action have in common.
 template <class Network>
 py::class_<Network> bind_network(py::module_& module, const char* name, const char* doc) {
@@ -166,6 +186,8 @@ void bind_approximators(py::module_& module) {
       .def("permutation", &permutation, py::arg("mu"), py::arg("nu"), "sigma_mu_nu: (m,)")
       .def("weights", &weights, "A copy, in lattice steps: (n, D)")
       .def("thresholds", &thresholds, "A copy, in lattice steps: (n,)")
+      .def("first_units", &first_units, "Where the window of every action begins: (n_actions,)")
+      .def("output_values", &output_values, "g(u) of u = 0 .. n' active units: (n' + 1,)")
       .def_property_readonly(
           "output_range",
           [](const SDNNC& net) {

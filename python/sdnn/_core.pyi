@@ -278,6 +278,14 @@ class SDNNC:
         """
         One correction of Q = Q(state, action) towards (1 - rate) Q + rate target
         """
+    def first_units(self) -> numpy.typing.NDArray[numpy.uint32]:
+        """
+        Where the window of every action begins: (n_actions,)
+        """
+    def output_values(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        g(u) of u = 0 .. n' active units: (n' + 1,)
+        """
     def permutation(self, mu: typing.SupportsInt | typing.SupportsIndex, nu: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.uint32]:
         """
         sigma_mu_nu: (m,)
@@ -1516,6 +1524,10 @@ def set_instruction_set(name: str) -> None:
 def sin_cos(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     (sin x, cos x), item by item
+    """
+def small_preset(n_inputs: typing.SupportsInt | typing.SupportsIndex) -> tuple[SDNNCConfig, QLearningConfig]:
+    """
+    Settings of approximator and learning, for small processors
     """
 @typing.overload
 def time_agent_steps(agent: SDNNQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:

@@ -65,7 +65,7 @@ def test_help_and_version(invoke):
         (["reproduce", "a", "--fast"], "--fast"),
         (
             ["reproduce", "a", "--agent", "dqn"],
-            "one of sdnn-c, fql, rbfn, sdnn-c-robust, sdnn-c-general, got 'dqn'",
+            "one of sdnn-c, fql, rbfn, sdnn-c-robust, sdnn-c-general, sdnn-c-small, got 'dqn'",
         ),
         (["learn"], "learn"),
     ],

@@ -150,7 +150,8 @@ SHIPPED = (
     r"cpp/bindings/([a-z_]+\.[ch]pp|CMakeLists\.txt)",
     r"python/sdnn/([a-z_]+/){0,2}[a-z_]+\.pyi?|python/sdnn/py\.typed",
     r"python/sdnn/experiments/(sweep/)?[a-z]+\.html\.jinja",
-    r"(tests|bench|docs)/.*\.(py|cpp|hpp|txt|md|json|csv|png|svg|toml|ipynb|bin|safetensors)",
+    r"python/sdnn/agents/c_header\.template",
+    r"(tests|bench|docs)/.*\.(py|c|cpp|hpp|txt|md|json|csv|png|svg|toml|ipynb|bin|safetensors)",
 )
 """Every file of a source distribution matches one of these."""
 
@@ -165,6 +166,7 @@ NEEDED = (
     "cpp/bindings/*",
     "python/sdnn/**/*.py",
     "python/sdnn/**/*.jinja",
+    "python/sdnn/**/*.template",
     "python/sdnn/_core.pyi",
     "python/sdnn/py.typed",
 )

@@ -1,6 +1,7 @@
 """Agents: ``agent.train(env, steps=...)``, or ``act(observation)`` and ``learn(transition)``."""
 
 from sdnn.agents.agent import Agent, load_agent
+from sdnn.agents.c_headers import CHeader, c_header, export_c_header
 from sdnn.agents.callbacks import Checkpoints, EarlyStop, JSONLines, TensorBoard
 from sdnn.agents.evaluation import Evaluation, evaluate
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning, FuzzyQLearningConfig
@@ -13,6 +14,7 @@ from sdnn.agents.transition import Transition
 __all__ = [
     "PRESETS",
     "Agent",
+    "CHeader",
     "Callback",
     "Checkpoints",
     "EarlyStop",
@@ -28,6 +30,8 @@ __all__ = [
     "Training",
     "TrainingResult",
     "Transition",
+    "c_header",
     "evaluate",
+    "export_c_header",
     "load_agent",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from sdnn.agents.q_learning_config import QLearningConfig
@@ -31,26 +31,28 @@ class Preset:
     learning: QLearningConfig = field(default_factory=QLearningConfig)
 
 
+# A full step each time, then ever smaller ones, which rounding stills one by one; targets of five
+# steps; exploration that goes somewhere: docs/agents.md.
+_GENERAL = Preset(
+    title="as recommended for any task",
+    approximator=SDNNCConfig(n_actions=5),
+    learning=QLearningConfig(
+        learning_rate=1.0,
+        final_learning_rate=0.1,
+        discount=0.99,
+        epsilon=0.1,
+        final_epsilon=0.01,
+        n_greedy_steps=0,
+        n_steps=5,
+        max_repetitions=100,
+        value_range="seen",
+    ),
+)
+
 PRESETS: Mapping[str, Preset] = MappingProxyType(
     {
         "paper": Preset(title="as in the paper"),
-        # A full step each time, then ever smaller ones, which rounding stills one by one; targets
-        # of five steps; exploration that goes somewhere: docs/agents.md.
-        "general": Preset(
-            title="as recommended for any task",
-            approximator=SDNNCConfig(n_actions=5),
-            learning=QLearningConfig(
-                learning_rate=1.0,
-                final_learning_rate=0.1,
-                discount=0.99,
-                epsilon=0.1,
-                final_epsilon=0.01,
-                n_greedy_steps=0,
-                n_steps=5,
-                max_repetitions=100,
-                value_range="seen",
-            ),
-        ),
+        "general": _GENERAL,
         # Few actions part the best one from its neighbours by more than sensor noise blurs, and a
         # success that reaches the whole path at once is not forgotten: docs/readings.md.
         "robust": Preset(
@@ -58,6 +60,13 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
             approximator=SDNNCConfig(n_actions=61),
             learning=QLearningConfig(n_steps=5),
         ),
+        # A fifth of the weights. Fewer hidden units instead would count in coarser steps:
+        # docs/small-processors.md.
+        "small": Preset(
+            title="as recommended for small processors: the general one, smaller patterns",
+            approximator=replace(_GENERAL.approximator, n_pattern_units=40),
+            learning=_GENERAL.learning,
+        ),
     }
 )
-"""By name: ``"paper"``, ``"general"`` and ``"robust"``."""
+"""By name: ``"paper"``, ``"general"``, ``"robust"`` and ``"small"``."""

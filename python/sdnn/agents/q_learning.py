@@ -163,9 +163,10 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
     tables : sequence of array_like, shape (n_bins, n_pattern_units), optional
         Patterns for each input, of any coding; see `sdnn.approximators.SDNNC`. Not where actions
         have several dimensions.
-    preset : {"general", "robust", "paper"}
-        What is used where no settings are given: those for any task, those that stay steady in the
-        paper's task, or the paper's; see `sdnn.agents.PRESETS`.
+    preset : {"general", "small", "robust", "paper"}
+        What is used where no settings are given: those for any task, the same with a network for
+        small processors, those that stay steady in the paper's task, or the paper's; see
+        `sdnn.agents.PRESETS`.
     observation_range, angles, angle_pairs, warm_up_steps
         See `Agent`.
 

@@ -8,6 +8,7 @@ import click
 
 from sdnn.cli.bench import bench
 from sdnn.cli.evaluate import evaluate
+from sdnn.cli.export import export
 from sdnn.cli.plot import plot
 from sdnn.cli.record import record
 from sdnn.cli.reproduce import reproduce
@@ -62,5 +63,5 @@ def main() -> None:
     """Learn with selective desensitization neural networks, and reproduce the paper about them."""
 
 
-for command in (train, resume, evaluate, plot, record, reproduce, sweep, bench):
+for command in (train, resume, evaluate, plot, record, export, reproduce, sweep, bench):
     main.add_command(command)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sdnn.runs import RunConfig
 
 AGENTS = ("sdnn", "rbf", "fuzzy")
-PRESETS = ("general", "robust", "paper")
+PRESETS = ("general", "small", "robust", "paper")
 
 
 @click.command()

@@ -92,7 +92,12 @@ class Experiment:
         return replace(self, cases=cases)
 
 
-PRESET_AGENTS = {"paper": "sdnn-c", "robust": "sdnn-c-robust", "general": "sdnn-c-general"}
+PRESET_AGENTS = {
+    "paper": "sdnn-c",
+    "robust": "sdnn-c-robust",
+    "general": "sdnn-c-general",
+    "small": "sdnn-c-small",
+}
 """The agents that are SDNN-C under the settings of `sdnn.agents.PRESETS`."""
 
 BOTH = ("sdnn-c", "fql")

@@ -291,7 +291,8 @@ def test_a_preset_is_used_where_nothing_is_given():
     for name, chosen in PRESETS.items():
         core = getattr(_core, f"{name}_preset")(4)
         assert core == (chosen.approximator.to_core(), chosen.learning.to_core())
-    with pytest.raises(ValueError, match="preset must be one of 'paper', 'general', 'robust'"):
+    words = "'paper', 'general', 'robust', 'small'"
+    with pytest.raises(ValueError, match=f"preset must be one of {words}"):
         SDNNQLearning(OBSERVATIONS, TORQUES, preset="best")
 
 

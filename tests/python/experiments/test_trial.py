@@ -37,7 +37,9 @@ def python_trial(config, monkeypatch):
     return trial
 
 
-@pytest.mark.parametrize("agent", ["sdnn-c", "sdnn-c-robust", "sdnn-c-general", "fql", "rbfn"])
+@pytest.mark.parametrize(
+    "agent", ["sdnn-c", "sdnn-c-robust", "sdnn-c-general", "sdnn-c-small", "fql", "rbfn"]
+)
 @pytest.mark.parametrize(("n_sensors", "noise"), [(4, 0.0), (4, 0.02), (5, 0.02), (6, 0.02)])
 def test_it_reproduces_the_compiled_trial_bit_for_bit(agent, n_sensors, noise, monkeypatch):
     config = config_of(agent, n_sensors, noise)
@@ -165,10 +167,12 @@ def test_agents_are_looked_up_by_id():
     assert [(entry.id, entry.title) for entry in AGENTS.values()] == [
         ("sdnn-c", "SDNN-C"), ("fql", "FQL"), ("rbfn", "RBFN"),
         ("sdnn-c-robust", "SDNN-C, robust"), ("sdnn-c-general", "SDNN-C, general"),
+        ("sdnn-c-small", "SDNN-C, small"),
     ]  # fmt: skip
     assert all(agent_entry(name) is entry for name, entry in AGENTS.items())
     with pytest.raises(
-        ValueError, match="one of sdnn-c, fql, rbfn, sdnn-c-robust, sdnn-c-general, got 'dqn'"
+        ValueError,
+        match="one of sdnn-c, fql, rbfn, sdnn-c-robust, sdnn-c-general, sdnn-c-small, got 'dqn'",
     ):
         agent_entry("dqn")
 

@@ -33,7 +33,7 @@ def test_the_python_examples_run(tmp_path, monkeypatch):
 def test_the_commands_and_options_exist():
     shell = "\n".join(blocks("sh"))
     words = set(re.findall(r"sdnn (\w+)", shell))
-    assert words == {"train", "resume", "evaluate", "plot", "record"}
+    assert words == {"train", "resume", "evaluate", "plot", "record", "export"}
     options = {o for c in main.commands.values() for p in c.params for o in p.opts}
     assert set(re.findall(r"--[a-z][a-z-]*", TEXT)) <= options
 

@@ -7,11 +7,13 @@ import sys
 import time
 from pathlib import Path
 
+import gymnasium as gym
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 import drifting_env  # noqa: F401
-from sdnn.agents import PRESETS
+from sdnn.agents import PRESETS, RBFQLearning, SDNNQLearning, c_header
 from sdnn.cli import main
 from sdnn.cli.run_options import option_of, value_of
 from sdnn.cli.train import AGENTS as AGENT_WORDS
@@ -82,6 +84,52 @@ def test_train_evaluate_plot_record(invoke, tmp_path):
     recorded = invoke("record", folder, "x.gif", "--steps", 4)
     assert recorded.stdout.startswith("wrote x.gif: 5 frames, return ")
     assert (tmp_path / "x.gif").read_bytes().startswith(b"GIF89a")
+
+
+def test_export_writes_a_c_header_of_a_run_or_an_agents_file(invoke, tmp_path):
+    assert invoke("train", DRIFTING, *SHORT, "--seed", 3, "--out", "run").exit_code == 0
+    done = invoke("export", "run", "--c-header", "drift.h")
+    assert done.exit_code == 0, done.output
+    assert done.stderr == ""
+    agent = Run.open("run").agent()
+    assert Path("drift.h").read_text() == c_header(agent, "drift").text
+    assert done.stdout.startswith("wrote drift.h: ")
+    options = ("--name", "mine", "--fraction-bits", 12, "--json")
+    told = json.loads(
+        invoke("export", "run/agent.safetensors", "--c-header", "b.h", *options).stdout
+    )
+    header = c_header(agent, "mine", fraction_bits=12)
+    assert Path("b.h").read_text() == header.text
+    assert (told["file"], told["name"], told["fraction_bits"]) == ("b.h", "mine", 12)
+    assert told["flash_bytes"] == header.flash_bytes
+    assert "text" not in told
+
+
+def test_export_says_what_is_wrong(invoke, tmp_path):
+    space = gym.spaces.Box(-1.0, 1.0, (2,))
+    SDNNQLearning(space, space).save("sdnn.safetensors")
+    RBFQLearning(space, gym.spaces.Box(-1.0, 1.0, (1,))).save("rbf.safetensors")
+    SDNNQLearning(gym.spaces.Box(-np.inf, np.inf, (2,)), space).save("unsettled.safetensors")
+    Path("damaged").write_text("no agent")
+    Path("folder").mkdir()
+    before = sorted(tmp_path.iterdir())
+    for arguments, code, words in (
+        (["sdnn.safetensors"], 2, "Missing option '--c-header'"),
+        (["nowhere", "--c-header", "a.h"], 2, "'nowhere' does not exist"),
+        (["sdnn.safetensors", "--c-header", "folder"], 2, "is a directory"),
+        (["sdnn.safetensors", "--c-header", "not-c.h"], 2, "--name must be a C identifier"),
+        (["sdnn.safetensors", "--c-header", "a.h", "--name", "1"], 2, "--name must be a C ident"),
+        (["sdnn.safetensors", "--c-header", "a.h", "--fraction-bits", 31], 2, "--fraction-bits"),
+        (["rbf.safetensors", "--c-header", "a.h"], 1, "must be an SDNNQLearning"),
+        (["unsettled.safetensors", "--c-header", "a.h"], 1, "still warming up"),
+        (["damaged", "--c-header", "a.h"], 1, "damaged is no agent's file"),
+        (["folder", "--c-header", "a.h"], 1, "holds no run"),
+        (["sdnn.safetensors", "--c-header", "no/a.h"], 1, "no/a.h"),
+    ):
+        done = invoke("export", *arguments)
+        assert (done.exit_code, done.stdout) == (code, ""), done.output
+        assert words in done.stderr
+    assert sorted(tmp_path.iterdir()) == before
 
 
 def test_several_runs_are_drawn_where_one_is(invoke, tmp_path):

@@ -30,6 +30,14 @@ inline Preset general_preset(int n_inputs) {
                        .value_range = ValueRange::seen}};
 }
 
+/// The general one with smaller patterns, so that the weights fit into the flash of a small
+/// processor (docs/small-processors.md).
+inline Preset small_preset(int n_inputs) {
+  Preset preset = general_preset(n_inputs);
+  preset.approximator.n_pattern_units = 40;
+  return preset;
+}
+
 /// Steady with noisy sensors in the paper's task: few actions part the best one from its neighbours
 /// by more than noise blurs, and a success that reaches the whole path at once is not forgotten
 /// (docs/collapse.md).

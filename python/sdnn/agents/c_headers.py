@@ -1,0 +1,618 @@
+"""A trained agent's greedy policy as a C header, for processors without an operating system."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from textwrap import wrap
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn._core import __version__
+from sdnn.agents.agent import Agent
+from sdnn.agents.q_learning import SDNNQLearning
+from sdnn.arguments import whole
+from sdnn.whole_files import write_whole
+
+__all__ = ["CHeader", "c_header", "export_c_header"]
+
+_TEMPLATE = "c_header.template"
+
+_LARGEST_NAME = 40
+_DEFAULT_FRACTION_BITS = 16
+_MOST_FRACTION_BITS = 30
+_DIRECTION_BITS = 30
+_MOST_UNITS = 65535
+"""Hidden units whose numbers fit 16 bits."""
+_MOST_WEIGHTS = 2**26
+"""Some hundred megabytes of text; no small processor holds as many."""
+
+_BYTES = {"uint8_t": 1, "uint16_t": 2, "int32_t": 4, "uint32_t": 4}
+_BYTES_OF_UNIT = 8
+_BYTES_OF_NETWORK = 28
+"""A struct of five pointers and two sizes where pointers have 32 bits."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CHeader:
+    """A C header that holds an agent's greedy policy.
+
+    Parameters
+    ----------
+    name
+        What its names begin with; in capitals for macros.
+    text
+        All of it.
+    fraction_bits
+        Readings and actions in fixed point are multiples of 2 to minus this power.
+    flash_bytes
+        Of its constants.
+    weight_bytes
+        Of these, the weights' own.
+    ram_bytes
+        Of arrays on the stack in a decision.
+    n_words
+        Words of 32 bits of weights that a decision reads.
+    """
+
+    name: str
+    text: str
+    fraction_bits: int
+    flash_bytes: int
+    weight_bytes: int
+    ram_bytes: int
+    n_words: int
+
+
+def export_c_header(
+    agent: Agent[Any, Any],
+    path: str | Path,
+    *,
+    name: str | None = None,
+    fraction_bits: int | None = None,
+) -> CHeader:
+    """Write an agent's greedy policy as a C header; see `c_header`.
+
+    Parameters
+    ----------
+    agent, fraction_bits
+        See `c_header`.
+    path
+        Of the file, there as a whole or not at all.
+    name
+        See `c_header`; by default the file's, without its ending.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    TypeError, ValueError, RuntimeError
+        As `c_header`.
+    """
+    place = Path(path)
+    header = c_header(agent, place.stem if name is None else name, fraction_bits=fraction_bits)
+    write_whole(place, header.text.encode())
+    return header
+
+
+def c_header(agent: Agent[Any, Any], name: str, *, fraction_bits: int | None = None) -> CHeader:
+    """Make a C header of an agent's greedy policy.
+
+    The header is C99, and C++. It needs ``<stdint.h>`` and nothing else of a C library, no heap,
+    and no floating point. Its action is that of ``agent.act(observation, explore=False)``; where
+    several actions are best and the agent draws one (``tie_rule="uniform"``), the header takes the
+    middle of the widest run of them. See docs/small-processors.md.
+
+    Parameters
+    ----------
+    agent : SDNNQLearning
+        With known ranges of its observations.
+    name : str
+        What all names in the header begin with.
+    fraction_bits : int, optional
+        Of readings and actions in fixed point, 0 to 30; by default 16, or fewer if an observed
+        range or an action needs it.
+
+    Raises
+    ------
+    TypeError
+        For agents of another kind: they calculate in floating point.
+    ValueError
+        If ``name`` is no C identifier, ``fraction_bits`` leaves too little room, or the network is
+        beyond 65,535 hidden units or 2^26 weights.
+    RuntimeError
+        If the agent is still warming up.
+
+    Examples
+    --------
+    >>> import gymnasium as gym
+    >>> from sdnn.agents import SDNNQLearning, c_header
+    >>> env = gym.make("MountainCar-v0")
+    >>> agent = SDNNQLearning(env.observation_space, env.action_space, preset="small")
+    >>> header = c_header(agent, "car")
+    >>> header.flash_bytes < 2**16
+    True
+    >>> "static inline uint32_t car_act_fixed(const int32_t *observation)" in header.text
+    True
+    """
+    if not isinstance(agent, SDNNQLearning):
+        raise TypeError(
+            "agent must be an SDNNQLearning, whose network is integers only,"
+            f" got {type(agent).__name__}"
+        )
+    return _Writer(agent, _checked_name(name), fraction_bits).header()
+
+
+def _checked_name(name: Any) -> str:
+    fits = isinstance(name, str) and re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name)
+    if not fits or len(name) > _LARGEST_NAME:
+        raise ValueError(
+            "name must be a C identifier of letters, digits and single underscores between them,"
+            f" at most {_LARGEST_NAME} long, got {name!r}"
+        )
+    return str(name)
+
+
+@dataclass
+class _Tables:
+    """Constants in C, and their bytes."""
+
+    n_bytes: int = 0
+    lines: list[str] = field(default_factory=list)
+
+    def add(self, kind: str, name: str, values: NDArray[Any], comment: str = "") -> None:
+        self.n_bytes += _BYTES[kind] * values.size
+        if comment:
+            self.lines.append(f"/* {comment} */")
+        form = "UINT32_C(0x{:08x})" if "weights" in name else "{}"
+        told = values if values.size else np.zeros(1, np.int64)  # C has no empty tables
+        self.lines += _table(f"static const {kind} {name}", told, form)
+
+    def text(self) -> str:
+        return _lines(self.lines)
+
+
+def _table(declaration: str, values: NDArray[Any], form: str) -> list[str]:
+    """Write a table of one or two dimensions in C."""
+    sizes = "".join(f"[{n}]" for n in values.shape)
+    rows = [
+        _wrapped(map(form.format, row)) for row in values.reshape(-1, values.shape[-1]).tolist()
+    ]
+    if values.ndim > 1:
+        for row in rows:
+            row[0] = f"  {{{row[0].lstrip()}"
+            row[-1] = f"{row[-1].rstrip(',')}}},"
+    return [f"{declaration}{sizes} = {{", *(line for row in rows for line in row), "};"]
+
+
+def _wrapped(words: Iterable[str], width: int = 98) -> list[str]:
+    lines, line = [], " "
+    for word in words:
+        if len(line) + len(word) + 2 > width:
+            lines.append(line)
+            line = " "
+        line += f" {word},"
+    return [*lines, line]
+
+
+def _lines(lines: Iterable[str]) -> str:
+    return "".join(f"{line}\n" for line in lines)
+
+
+class _Writer:
+    """Makes the header of one agent."""
+
+    def __init__(self, agent: SDNNQLearning, name: str, fraction_bits: int | None) -> None:
+        self.agent, self.name = agent, name
+        core = agent.core  # RuntimeError while warming up
+        self.networks = (
+            [core.action_value]
+            if agent.n_dimensions == 1
+            else [core.action_value(dimension) for dimension in range(agent.n_dimensions)]
+        )
+        self.is_vector = len(self.networks) > 1
+        self.sizes, self.learning = agent.approximator, agent.learning
+        description = agent.description()
+        self.start: list[int] = description["action"].get("start", [])
+        self.low, self.high = (description["observation"][end] for end in ("low", "high"))
+        self.inputs: list[dict[str, Any]] = description["observation"]["inputs"]
+        self.n_bins = [len(self.networks[0].table(i)) for i in range(len(self.inputs))]
+        n_pairs = len(self.inputs) * (len(self.inputs) - 1)
+        self.n_columns = n_pairs * self.sizes.n_pattern_units
+        self._check_sizes()
+        self.box = self._box()
+        self.fraction_bits = self._checked_fraction_bits(fraction_bits)
+
+    def _check_sizes(self) -> None:
+        n_units = self.sizes.n_hidden_units
+        if n_units > _MOST_UNITS:
+            raise ValueError(
+                f"n_hidden_units must be at most {_MOST_UNITS} in a C header, got {n_units}"
+            )
+        n_weights = len(self.networks) * n_units * self.n_columns
+        if n_weights > _MOST_WEIGHTS:
+            raise ValueError(
+                f"a C header can hold {_MOST_WEIGHTS} weights, got {n_weights}: take fewer inputs,"
+                " n_hidden_units or n_pattern_units"
+            )
+        if any(not -(2**31) <= start < 2**31 for start in self.start):
+            raise ValueError(f"actions must begin within 32 bits, got {self.start}")
+
+    def _box(self) -> NDArray[Any] | None:
+        """Take the actions of a Box as `act` gives them, shape (n_actions, n_dimensions)."""
+        if not isinstance(self.agent.action_space, gym.spaces.Box):
+            return None
+        actions = self.agent._actions
+        n_actions = range(self.networks[0].n_actions)
+        return np.stack([np.ravel(actions.element([i] * len(self.networks))) for i in n_actions])
+
+    def _checked_fraction_bits(self, asked: int | None) -> int:
+        plain = [one["variable"] for one in self.inputs if "variable" in one]
+        numbers = [abs(end[i]) for i in plain for end in (self.low, self.high)]
+        if self.box is not None:
+            numbers += np.abs(self.box.astype(np.float64)).reshape(-1).tolist()
+        largest = max(numbers, default=0.0)
+        most = next(
+            (b for b in range(_MOST_FRACTION_BITS, -1, -1) if math.ceil(largest * 2**b) < 2**31), -1
+        )
+        if most < 0:
+            raise ValueError(
+                "observation ranges and actions must be below 2^31 in a C header,"
+                f" got {largest:g}: scale them"
+            )
+        if asked is None:
+            return min(most, _DEFAULT_FRACTION_BITS)
+        bits = whole("fraction_bits", asked, 0, _MOST_FRACTION_BITS)
+        if bits > most:
+            raise ValueError(
+                f"fraction_bits must be at most {most}, so that {largest:g} fits 32 bits,"
+                f" got {bits}"
+            )
+        return bits
+
+    def header(self) -> CHeader:
+        """Make the header."""
+        tables, fixed_tables = self._common_tables(), _Tables()
+        networks, n_units, n_words = [], [], 0
+        for d, network in enumerate(self.networks):
+            used, first_units = _used_units(network, self.sizes.n_active_units)
+            weights, n_bits, lowest = _planes(network.weights()[used])
+            units = zip(
+                network.thresholds()[used].tolist(), lowest.tolist(), n_bits.tolist(), strict=True
+            )
+            self._add_wiring(tables, d, network)
+            tables.add("uint32_t", f"{self.name}_weights_{d}", weights)
+            tables.add("uint16_t", f"{self.name}_first_units_{d}", first_units)
+            tables.n_bytes += _BYTES_OF_UNIT * used.size + _BYTES_OF_NETWORK
+            networks += [
+                f"static const {self.name}_unit {self.name}_units_{d}[{used.size}] = {{",
+                *_wrapped(f"{{{h}, {low}, {bits}}}" for h, low, bits in units),
+                "};",
+            ]
+            n_units.append(used.size)
+            n_words += weights.size
+        networks += self._table_of_networks(n_units)
+        bins_of_fixed, bins_of_double = self._conversions(fixed_tables)
+
+        n_code_words, n_fire_words = -(-self.n_columns // 32), -(-max(n_units) // 32)
+        most_actions = max(network.n_actions for network in self.networks)
+        ram_bytes = 8 * n_code_words + 4 * n_fire_words + 2 * most_actions + 8 * len(self.inputs)
+        flash_bytes = tables.n_bytes + fixed_tables.n_bytes
+        n_weights = sum(n_units) * self.n_columns
+        values = {
+            "version": __version__,
+            "seed": self.agent.seed,
+            "description": self._description(n_units),
+            "flash_bytes": f"{flash_bytes:,}",
+            "weight_bytes": f"{4 * n_words:,}",
+            "weight_bits": f"{32 * n_words / n_weights:.2f}",
+            "ram_bytes": f"{ram_bytes:,}",
+            "n_words": f"{n_words:,}",
+            "usage": _lines(f" * {line}".rstrip() for line in self._usage()),
+            "n_observed": len(self.low),
+            "n_inputs": len(self.inputs),
+            "n_dimensions": len(self.networks),
+            "fraction_bits": self.fraction_bits,
+            "tables": tables.text(),
+            "permutation_type": self._permutation_type,
+            "networks": _lines(networks),
+            "n_code_words": n_code_words,
+            "n_fire_words": n_fire_words,
+            "most_actions": most_actions,
+            "n_pattern_units": self.sizes.n_pattern_units,
+            "pattern_bytes": -(-self.sizes.n_pattern_units // 8),
+            "n_active_units": self.sizes.n_active_units,
+            "widen": "  best = ${name}_ties[best];\n" if self.learning.tie_tolerance > 0.0 else "",
+            **(_LOWEST if self.learning.tie_rule == "lowest" else _MIDDLE),
+            **(_OF_VECTORS if self.is_vector else _OF_NUMBERS),
+            "fixed_tables": fixed_tables.text(),
+            "bins_of_fixed": _lines(bins_of_fixed),
+            "float_tables": self._float_tables(),
+            "bins_of_double": _lines(bins_of_double),
+        }
+        text = files("sdnn.agents").joinpath(_TEMPLATE).read_text("utf-8")
+        names = {"name": self.name, "NAME": self.name.upper()}
+        return CHeader(
+            name=self.name,
+            # What is filled in has names in it too.
+            text=Template(Template(text).safe_substitute(values)).substitute(names),
+            fraction_bits=self.fraction_bits,
+            flash_bytes=flash_bytes,
+            weight_bytes=4 * n_words,
+            ram_bytes=ram_bytes,
+            n_words=n_words,
+        )
+
+    # The network.
+
+    def _common_tables(self) -> _Tables:
+        tables, name = _Tables(), self.name
+        tables.add("uint32_t", f"{name}_n_bins", np.array(self.n_bins), "Bins of each input.")
+        ranks, ties = self._ranks()
+        about = "Ranks of the values that counts of active units stand for."
+        tables.add("uint16_t", f"{name}_ranks", ranks, about)
+        if self.learning.tie_tolerance > 0.0:
+            about = "Of each rank, the lowest that ties with it."
+            tables.add("uint16_t", f"{name}_ties", ties, about)
+        if self.box is None:
+            about = "The action that has the number 0."
+            tables.add("int32_t", f"{name}_first_action", np.array(self.start), about)
+        else:
+            fixed = np.round(self.box.astype(np.float64) * 2.0**self.fraction_bits)
+            about = f"The actions, times 2^{self.fraction_bits}."
+            fixed_actions = _by_dimension(fixed.astype(np.int64))
+            tables.add("int32_t", f"{name}_action_fixed", fixed_actions, about)
+        return tables
+
+    @property
+    def _permutation_type(self) -> str:
+        return "uint8_t" if self.sizes.n_pattern_units <= 256 else "uint16_t"
+
+    def _add_wiring(self, tables: _Tables, d: int, network: Any) -> None:
+        inputs = range(len(self.inputs))
+        rows = [np.packbits(network.table(i) > 0, axis=1, bitorder="little") for i in inputs]
+        sigma = [network.permutation(mu, nu) for mu in inputs for nu in inputs if nu != mu]
+        tables.add("uint8_t", f"{self.name}_patterns_{d}", np.concatenate(rows).reshape(-1))
+        tables.add(self._permutation_type, f"{self.name}_permutations_{d}", np.concatenate(sigma))
+
+    def _table_of_networks(self, n_units: Sequence[int]) -> Iterator[str]:
+        yield f"static const {self.name}_network {self.name}_networks[{len(n_units)}] = {{"
+        for d, (network, n) in enumerate(zip(self.networks, n_units, strict=True)):
+            tables = ("patterns", "permutations", "weights", "units", "first_units")
+            names = ", ".join(f"{self.name}_{table}_{d}" for table in tables)
+            yield f"  {{{names}, {n}, {network.n_actions}}},"
+        yield "};"
+
+    def _ranks(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Rank the values of all counts; find the lowest rank that ties with each."""
+        values = self.networks[0].output_values()
+        for network in self.networks[1:]:
+            if (network.output_values() != values).any():
+                raise ValueError("networks of one agent must have one range of values")
+        distinct = np.unique(values)
+        ties = np.searchsorted(distinct, distinct - self.learning.tie_tolerance)
+        return np.searchsorted(distinct, values), ties
+
+    # From observations to bins.
+
+    def _conversions(self, tables: _Tables) -> tuple[list[str], list[str]]:
+        """Give the lines that make bins of readings, in fixed and in floating point."""
+        name, known = self.name, dict[Any, str]()
+        fixed, double = [], []
+
+        def table(key: Any, word: str, values: NDArray[Any], comment: str) -> str:
+            if key not in known:
+                known[key] = f"{name}_{word}_{len(known)}"
+                tables.add("int32_t", known[key], values, comment)
+            return known[key]
+
+        for place, (one, n_bins) in enumerate(zip(self.inputs, self.n_bins, strict=True)):
+            (kind, at), *_ = one.items()
+            if kind == "angle":
+                about = "Cosine and sine of the angles where bins begin, from bin 1 on."
+                bounds = table((kind, n_bins), "directions", _directions(n_bins), about)
+                given = f"({bounds}, {n_bins}, observation[{at[0]}], observation[{at[1]}])"
+                fixed.append(f"  bins[{place}] = {name}_bin_of_direction{given};")
+                double.append(f"  bins[{place}] = {name}_bin_of_doubles{given};")
+                continue
+            low, high = self.low[at], self.high[at]
+            unit = f"(observation[{at}] - ({low!r})) / {high - low!r}"
+            if kind == "variable":
+                about = f"The least reading in each bin of observation[{at}], from bin 1 on."
+                values = _fixed_bounds(low, high, n_bins, self.fraction_bits)
+                bounds = table((at, n_bins), "bounds", values, about)
+                given = f"({bounds}, {n_bins}, observation[{at}])"
+                fixed.append(f"  bins[{place}] = {name}_bin_between{given};")
+            else:
+                rate, offset = _turns(low, high, self.fraction_bits)
+                turn = f"UINT64_C({rate}) * (uint64_t)(int64_t)observation[{at}]"
+                turn += f" + UINT64_C({offset})"
+                fixed.append(f"  bins[{place}] = {name}_bin_of_turn({turn}, {n_bins});")
+                unit = f"{name}_part_of_turn({unit})"
+            double.append(f"  bins[{place}] = {name}_bin_of_unit({unit}, {n_bins});")
+        return fixed, double
+
+    def _float_tables(self) -> str:
+        if self.box is None:
+            return ""
+        is_double = self.box.dtype == np.float64
+        kind, form = ("double", "{!r}") if is_double else ("float", "{!r}f")
+        actions = _by_dimension(self.box.astype(np.float64))
+        lines = _table(f"static const {kind} {self.name}_action_float", actions, form)
+        return _lines(["/* The actions. */", *lines, ""])
+
+    # Words for readers.
+
+    def _description(self, n_units: Sequence[int]) -> str:
+        used = " + ".join(map(str, n_units))
+        actions = " x ".join(str(network.n_actions) for network in self.networks)
+        return (
+            f"{len(self.inputs)} inputs, {self.sizes.n_pattern_units} units per pattern, {used}"
+            f" hidden units in use, {actions} actions"
+        )
+
+    def _usage(self) -> Iterator[str]:
+        name, macro = self.name, self.name.upper()
+        dimension, number = ("[d]", "action[d]") if self.is_vector else ("", "action")
+        scale = f"2^{self.fraction_bits}"
+        yield f'  #include "{name}.h"'
+        yield f"  int32_t observation[{macro}_N_OBSERVED]; // in its own units, times {scale}"
+        if self.is_vector:
+            yield f"  uint32_t action[{macro}_N_DIMENSIONS];"
+            yield f"  {name}_act_fixed(observation, action);"
+        else:
+            yield f"  uint32_t action = {name}_act_fixed(observation);"
+        if self.box is None:
+            first = f"{name}_first_action[{'d' if self.is_vector else '0'}]"
+            yield f"  int32_t value = {first} + (int32_t){number}; // as the task has it"
+        else:
+            value = f"{name}_action_fixed{dimension}[{number}]"
+            yield f"  int32_t value = {value}; // times {scale}"
+        yield ""
+        floats = f"{name}_act_float and {name}_act_double take observations in floating point"
+        actions = "" if self.box is None else f", and {name}_action_float has the actions"
+        yield from wrap(
+            f"With {macro}_USE_FLOAT defined before the include, {floats}{actions}.", 96
+        )
+        yield f"{name}_act_bins takes the bins of all inputs:"
+        for place, (one, n_bins) in enumerate(zip(self.inputs, self.n_bins, strict=True)):
+            (kind, at), *_ = one.items()
+            if kind == "angle":
+                yield f"  input {place}: the angle of cosine observation[{at[0]}] and sine"
+                yield f"    observation[{at[1]}], from -pi to pi in {n_bins} bins"
+            else:
+                ends = f"from {self.low[at]:.6g} to {self.high[at]:.6g} in {n_bins} bins"
+                turn = ", an angle," if kind == "circular" else ""
+                yield f"  input {place}: observation[{at}]{turn} {ends}"
+        yield from wrap(_TIE_RULES[self.learning.tie_rule], 96)
+
+
+_TIE_RULES = {
+    "uniform": "Of several best actions, of which the agent draws one, the header takes the middle"
+    " of the widest run of neighbours.",
+    "middle": "Of several best actions it takes the middle of the widest run of neighbours, as the"
+    " agent does.",
+    "lowest": "Of several best actions it takes the lowest, as the agent does.",
+}
+
+_LOWEST = {
+    "counters": "",
+    "choose": """\
+  for (action = 0; ranks[action] < best; ++action) {
+  }
+  return action;
+""",
+}
+
+_MIDDLE = {
+    "counters": ", run = 0, widest = 0, middle = 0",
+    "choose": """\
+  for (action = 0; action < network->n_actions; ++action) {
+    run = ranks[action] >= best ? run + 1 : 0;
+    if (run > widest) {
+      widest = run;
+      middle = action - run / 2;
+    }
+  }
+  return middle;
+""",
+}
+"""How ties are broken."""
+
+_OF_NUMBERS = {
+    "in_each": "",
+    "result": "uint32_t",
+    "parameter": "",
+    "argument": "",
+    "call": "return ",
+    "act_bins": "  return ${name}_best(&${name}_networks[0], bins);\n",
+}
+"""What functions look like that give the number of an action."""
+
+_OF_VECTORS = {
+    "in_each": " in each dimension",
+    "result": "void",
+    "parameter": ", uint32_t *action",
+    "argument": ", action",
+    "call": "",
+    "act_bins": """\
+  uint32_t d;
+  for (d = 0; d < ${NAME}_N_DIMENSIONS; ++d) action[d] = ${name}_best(&${name}_networks[d], bins);
+""",
+}
+"""What they look like where an action has several numbers."""
+
+
+def _by_dimension(actions: NDArray[Any]) -> NDArray[Any]:
+    """Arrange actions as a table in C, (n_actions,) or (n_dimensions, n_actions)."""
+    return actions[:, 0] if actions.shape[1] == 1 else actions.T
+
+
+def _used_units(network: Any, n_active_units: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Find the hidden units that are in a window, and where among them the windows begin."""
+    first = network.first_units().astype(np.intp)
+    used = np.unique(first[:, None] + np.arange(n_active_units))
+    return used, np.searchsorted(used, first)
+
+
+def _planes(weights: NDArray[np.int32]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Pack weights (n, D) as bit planes: words, unit by unit; planes and lowest weight of each.
+
+    A weight less the lowest one of its unit has as many bits as the unit's range needs.
+    """
+    lowest = weights.min(axis=1)
+    above = weights - lowest[:, None]
+    n_bits = np.array([int(most).bit_length() for most in above.max(axis=1)])
+    padded = np.pad(above, ((0, 0), (0, -above.shape[1] % 32)))
+    planes = [
+        np.packbits((padded >> bit & 1).astype(np.uint8), axis=1, bitorder="little").view("<u4")
+        for bit in range(n_bits.max())
+    ]
+    if not planes:
+        return np.zeros(0, np.uint32), n_bits, lowest
+    is_needed = np.arange(len(planes)) < n_bits[:, None]
+    return np.stack(planes, axis=1)[is_needed].reshape(-1), n_bits, lowest
+
+
+def _fixed_bounds(low: float, high: float, n_bins: int, fraction_bits: int) -> NDArray[Any]:
+    """Find the least readings in bins 1, 2, ... n_bins - 1, integers times 2^-fraction_bits.
+
+    Bins are calculated as those of observations are, rounding included, so that the table gives
+    every integer the same bin.
+    """
+    wanted = np.arange(1, n_bins)
+    below = np.full(wanted.shape, -(2**31) - 1)  # not in the bin, or not among the readings
+    least = np.full(wanted.shape, 2**31 - 1)  # in the bin: ranges end before
+    while (least - below > 1).any():
+        middle = (below + least) // 2
+        unit = np.clip((middle / 2.0**fraction_bits - low) / (high - low), 0.0, 1.0)
+        is_in = (unit * n_bins).astype(np.int64) >= wanted
+        least, below = np.where(is_in, middle, least), np.where(is_in, below, middle)
+    return least
+
+
+def _turns(low: float, high: float, fraction_bits: int) -> tuple[int, int]:
+    """Give a reading's unit as a part of a turn, and where reading 0 is in it; times 2^64.
+
+    Rounding must not lead from the beginning of a bin into the one before: 2^31 are added.
+    """
+    width = Fraction(high) - Fraction(low)
+    rate = round(2**64 / (width * 2**fraction_bits)) % 2**64
+    return rate, (round(-Fraction(low) / width * 2**64) + 2**31) % 2**64
+
+
+def _directions(n_bins: int) -> NDArray[Any]:
+    """Give cosine and sine of the angles where bins begin, from bin 1 on: (n_bins - 1, 2)."""
+    angles = [math.pi * (2 * b - n_bins) / n_bins for b in range(1, n_bins)]
+    ends = np.array([(math.cos(angle), math.sin(angle)) for angle in angles])
+    rounded: NDArray[Any] = np.round(ends.reshape(-1, 2) * 2**_DIRECTION_BITS).astype(np.int64)
+    return rounded

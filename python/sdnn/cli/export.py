@@ -1,0 +1,67 @@
+"""The command ``sdnn export``: a trained agent in a form for other programs."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import click
+
+from sdnn.cli.run_options import json_option, run_command
+
+
+@click.command()
+@click.argument("source", metavar="RUN", type=click.Path(exists=True, path_type=Path))
+@click.option(
+    "--c-header",
+    "path",
+    metavar="FILE",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="A C99 header with the greedy policy, in integers: for small processors.",
+)
+@click.option(
+    "--name", metavar="PREFIX", help="What its names begin with.  [default: FILE without ending]"
+)
+@click.option(
+    "--fraction-bits",
+    type=click.IntRange(min=0, max=30),
+    help="Of readings and actions in fixed point.  [default: 16, or fewer where a range needs it]",
+)
+@json_option
+def export(
+    source: Path, path: Path, name: str | None, fraction_bits: int | None, as_json: bool
+) -> None:
+    """Write the agent of RUN, a run's folder or an agent's file, in a form for other programs."""
+    from sdnn.agents import export_c_header, load_agent
+    from sdnn.runs import Run
+
+    with run_command():
+        try:
+            agent = Run.open(source).agent() if source.is_dir() else load_agent(source)
+        except ValueError as error:
+            raise click.ClickException(str(error)) from error
+        try:
+            header = export_c_header(agent, path, name=name, fraction_bits=fraction_bits)
+        except ValueError as error:
+            raise _usage_error(error) from error
+        except (TypeError, RuntimeError) as error:
+            raise click.ClickException(f"{source}: {error}") from error
+    if as_json:
+        values = {k: v for k, v in dataclasses.asdict(header).items() if k != "text"}
+        click.echo(json.dumps({"file": str(path), **values}, indent=2))
+        return
+    click.echo(
+        f"wrote {path}: {header.flash_bytes:,} bytes of constants, {header.ram_bytes:,} bytes of"
+        f" arrays on the stack, {header.n_words:,} words of weights read per decision"
+    )
+
+
+def _usage_error(error: ValueError) -> click.ClickException:
+    """Name the option of an argument, the first word of its error."""
+    word, _, problem = str(error).partition(" ")
+    option = {"name": "--name", "fraction_bits": "--fraction-bits"}.get(word)
+    if option is None:
+        return click.ClickException(str(error))
+    return click.UsageError(f"{option} {problem}")

@@ -1,0 +1,43 @@
+"""What docs/small-processors.md shows works as it stands there."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import gymnasium as gym
+
+from sdnn.agents import SDNNQLearning, c_header
+from sdnn.cli import main
+
+TEXT = (Path(__file__).parents[3] / "docs" / "small-processors.md").read_text()
+
+
+def block(language):
+    (found,) = re.findall(rf"^```{language}\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
+    return found
+
+
+def test_the_examples_work(tmp_path, monkeypatch, skip_unless_ci):
+    if shutil.which("gcc") is None:
+        skip_unless_ci("needs gcc")
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(compile(block("python"), "small-processors.md", "exec"), names)
+    assert Path("cartpole.h").read_text() == names["header"].text
+    Path("main.c").write_text(block("c"))
+    options = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-ffreestanding")
+    subprocess.run(["gcc", *options, "-c", "main.c"], check=True)
+
+
+def test_the_names_and_options_exist():
+    options = {o for c in main.commands.values() for p in c.params for o in p.opts}
+    assert set(re.findall(r"--[a-z][a-z-]*", TEXT)) <= options
+    env = gym.make("CartPole-v1")
+    ranges = ([-4.8, -3.0, -0.4, -3.0], [4.8, 3.0, 0.4, 3.0])
+    agent = SDNNQLearning(env.observation_space, env.action_space, observation_range=ranges)
+    header = c_header(agent, "cartpole").text
+    told = set(re.findall(r"`((?:cartpole|CARTPOLE)_\w+)", TEXT))
+    box_only = {"cartpole_action_fixed", "cartpole_action_float"}
+    assert len(told) > 8
+    assert {name for name in told if not re.search(rf"\b{name}\b", header)} == box_only
