@@ -1,8 +1,9 @@
 """Agents: ``agent.train(env, steps=...)``, or ``act(observation)`` and ``learn(transition)``."""
 
 from sdnn.agents.agent import Agent, load_agent
-from sdnn.agents.callbacks import Checkpoints, EarlyStop, JSONLines, TensorBoard
+from sdnn.agents.callbacks import Checkpoints, EarlyStop, JSONLines, Schedule, TensorBoard
 from sdnn.agents.evaluation import Evaluation, evaluate
+from sdnn.agents.fixed_rate import FixedRate
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning, FuzzyQLearningConfig
 from sdnn.agents.presets import PRESETS, Preset
 from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
@@ -17,6 +18,7 @@ __all__ = [
     "Checkpoints",
     "EarlyStop",
     "Evaluation",
+    "FixedRate",
     "FuzzyQLearning",
     "FuzzyQLearningConfig",
     "JSONLines",
@@ -25,6 +27,7 @@ __all__ = [
     "RBFQLearning",
     "SDNNQLearning",
     "TensorBoard",
+    "Schedule",
     "Training",
     "TrainingResult",
     "Transition",
