@@ -2,8 +2,8 @@
 #pragma once
 
 #include "sdnn/agents/agent.hpp"
-#include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/agents/episodes.hpp"
+#include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/agents/fixed_rate.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/presets.hpp"

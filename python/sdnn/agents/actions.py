@@ -20,8 +20,9 @@ Numbers: TypeAlias = list[Any]
 class Actions(abc.ABC):
     """Actions of a space as the core has them, a number for each dimension, and back.
 
-    The action taken last in each environment is remembered with what it was in the core; only other
-    ones are looked up. What is remembered are its numbers, not the array given away, which others may change.
+    The action taken last in each environment is remembered with what it was in the core; only
+    other ones are looked up. What is remembered are its numbers, not the array given away, which
+    others may change.
 
     Parameters
     ----------

@@ -275,7 +275,9 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             numbers = self._warm_up.act(self._actions.random, explore, environment)
             return self._actions.element(numbers)
         numbers = self._act(self._observations("observation", observation), explore, environment)
-        return self._actions.take(numbers, environment) if explore else self._actions.element(numbers)
+        return (
+            self._actions.take(numbers, environment) if explore else self._actions.element(numbers)
+        )
 
     def flat_observation(self, observation: Any) -> NDArray[np.float64]:
         """Give the observed variables as a vector, shape (n_variables,), in their own units.

@@ -62,7 +62,7 @@ class Checkpoints(Callback):
         self.every = every
 
     def on_start(self, training: Training) -> None:
-        """Raise ValueError where the training cannot be saved, before it has learned for nothing."""
+        """Raise ValueError where the training cannot be saved, before it learns for nothing."""
         training.require_repeatable()
 
     def on_step(self, training: Training) -> None:

@@ -62,8 +62,8 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     the truth values, hence continuous. Each dimension of an action has rules of its own, which
     learn as if the others were part of the environment.
 
-    Only the transition of the last exploring `act` in an environment can be learned: which rule picked what is known
-    of no other. What a warm-up did is therefore not learned.
+    Only the transition of the last exploring `act` in an environment can be learned: which rule
+    picked what is known of no other. What a warm-up did is therefore not learned.
 
     Parameters
     ----------

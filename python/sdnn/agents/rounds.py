@@ -90,7 +90,7 @@ class _Vector(Rounds, abc.ABC):
         from gymnasium.vector.utils import concatenate, create_empty_array
 
         space = self._env.single_action_space
-        batch = create_empty_array(space, self.n_environments)
+        batch: Any = create_empty_array(space, self.n_environments)
         observations, rewards, terminated, truncated, infos = self._env.step(
             concatenate(space, actions, batch)
         )

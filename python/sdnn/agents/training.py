@@ -142,13 +142,13 @@ class Training:
     chooses an action for each of them, in their order, all step together, and then it learns what
     came of it, in their order: a training with one environment has the same bits as one without a
     vector. Each episode is reset with a seed of its own, numbered as they begin. The bits do not
-    depend on how environments are run: `SyncVectorEnv` and `AsyncVectorEnv` give the same, and so do
-    all autoreset modes.
+    depend on how environments are run: ``SyncVectorEnv`` and ``AsyncVectorEnv`` give the same, and
+    so do all autoreset modes.
 
-    A vector environment that cannot be reset one by one with seeds (others than these two, if their
-    autoreset mode is not ``DISABLED`` and their metadata have no ``"reset_mask": True``; any with
-    Gymnasium 1.0) is seeded at the beginning only, and resets itself. Agents learn in it, but such a
-    training cannot be saved.
+    A vector environment that cannot be reset one by one with seeds is seeded at the beginning only,
+    and resets itself. Agents learn in it, but such a training cannot be saved. That is any with
+    Gymnasium 1.0, and any other than these two, unless its autoreset mode is ``DISABLED`` or its
+    metadata say ``"reset_mask": True``.
 
     Parameters
     ----------
@@ -293,8 +293,8 @@ class Training:
         raise ValueError(
             "env must reset each of its environments with a seed of its own where a training is"
             f" saved, got {type(self.env.unwrapped).__name__}: take SyncVectorEnv or AsyncVectorEnv"
-            " of Gymnasium 1.1 or newer, such as gymnasium.make_vec(..., vectorization_mode='sync'),"
-            " with shared memory or the autoreset mode DISABLED"
+            " of Gymnasium 1.1 or newer, as gymnasium.make_vec(..., vectorization_mode='sync')"
+            " makes it, with shared memory or the autoreset mode DISABLED"
         )
 
     def save(self, path: str | Path) -> None:

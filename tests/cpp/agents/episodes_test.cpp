@@ -53,7 +53,7 @@ TEST(Episodes, OfTheFirstEnvironmentHaveTheNamesOfTheOnlyOne) {
   EXPECT_EQ(core::state_of(other), state);
   core::restore(other, core::state_of(Counting{}));
   EXPECT_EQ(other.episodes.size(), 1U);
-  testing::expect_that_damage_is_refused(object);
+  testing::expect_that_damage_is_refused(other);
 }
 
 TEST(Episodes, NameWhatIsImpossible) {

@@ -20,8 +20,7 @@ struct HandClock {
 
   FixedRate rate(double hz) {
     return FixedRate(
-        hz, [this] { return now; },
-        [this](double seconds) { now += seconds + oversleep; });
+        hz, [this] { return now; }, [this](double seconds) { now += seconds + oversleep; });
   }
 };
 

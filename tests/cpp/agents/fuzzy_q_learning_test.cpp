@@ -250,7 +250,8 @@ TEST(FuzzyQLearning, ALifeInSeveralEnvironmentsCanBeCutAnywhere) {
   testing::expect_that_a_life_can_be_cut(traced_agent, 3);
 }
 
-// Where two environments fire different rules, each goes as if it were alone, but for what is drawn.
+// Where two environments fire different rules, each goes as if it were alone, but for what is
+// drawn.
 TEST(FuzzyQLearning, EachEnvironmentHasAnActAndTracesOfItsOwn) {
   const FuzzyQLearningConfig config{.trace_decay = 0.5, .policy = kGreedy};
   const FuzzyRules rules({.n_inputs = 2, .n_sets = 4, .n_actions = 3});

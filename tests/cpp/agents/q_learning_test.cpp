@@ -436,7 +436,8 @@ TEST(QLearning, ALifeInSeveralEnvironmentsCanBeCutAnywhere) {
   testing::expect_that_a_life_can_be_cut(vector_agent, 3);
 }
 
-// As OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown, while another environment goes its way.
+// As OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown, while another environment goes its
+// way.
 TEST(QLearning, EachEnvironmentHasStepsThatWait) {
   LookupTable table(2, 5, 2);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 2}, 1);
@@ -492,7 +493,8 @@ TEST(QLearning, AnyOneOfSeveralEnvironmentsIsLikeTheOnlyOne) {
       const bool is_shared = !state.contains("environment.1." + name);
       EXPECT_EQ(state.at(is_shared ? name : before + name), tensor) << name;
     }
-    EXPECT_NE(state.at(before + "waiting.next_state"), state.at("environment.1.waiting.next_state"));
+    EXPECT_NE(state.at(before + "waiting.next_state"),
+              state.at("environment.1.waiting.next_state"));
   }
 }
 
@@ -554,9 +556,8 @@ TEST(QLearning, AnExponentialScheduleStaysBetweenItsEnds) {
   for (int i = 0; i < 2000; ++i) {
     const double first = 1.0 - random.uniform();
     const double last = i % 3 == 0 ? first : 1e-300 + random.uniform() * random.uniform();
-    const QLearningConfig config{.learning_rate = first,
-                                 .final_learning_rate = last,
-                                 .schedule = Schedule::exponential};
+    const QLearningConfig config{
+        .learning_rate = first, .final_learning_rate = last, .schedule = Schedule::exponential};
     const double progress = random.uniform();
     const double rate = config.learning_rate_at(progress);
     ASSERT_GE(rate, std::min(first, last));
@@ -571,10 +572,10 @@ TEST(QLearning, AnExponentialScheduleStaysBetweenItsEnds) {
 TEST(QLearning, AnExponentialScheduleHasNoEndAtZero) {
   EXPECT_EQ(message({.final_epsilon = 0.0, .schedule = Schedule::exponential}),
             "final_epsilon must be greater than 0 where the schedule is exponential, got 0");
-  EXPECT_EQ(message({.policy = {.epsilon = 0.0},
-                     .final_epsilon = 0.5,
-                     .schedule = Schedule::exponential}),
-            "epsilon must be greater than 0 where the schedule is exponential, got 0");
+  EXPECT_EQ(
+      message(
+          {.policy = {.epsilon = 0.0}, .final_epsilon = 0.5, .schedule = Schedule::exponential}),
+      "epsilon must be greater than 0 where the schedule is exponential, got 0");
   EXPECT_EQ(message({.policy = {.epsilon = 0.0}, .schedule = Schedule::exponential}), "no error");
 }
 
@@ -650,6 +651,8 @@ TEST(QLearning, RefusesAStateThatDoesNotFit) {
          core::state_of(agent).at("waiting.rewards").size() < 2) {
     world.tick(agent);
   }
+  agent.set_learning_rate(std::nullopt);  // what may be missing
+  agent.set_epsilon(std::nullopt);
   testing::expect_that_damage_is_refused(agent);
   const core::State good = core::state_of(agent);
   using testing::with_number;

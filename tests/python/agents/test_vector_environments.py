@@ -47,7 +47,8 @@ class Walk(gym.Env):
         return self._seen(), {}
 
     def step(self, action):
-        assert self._steps < self._limit and abs(self._at) <= 1.0, "the episode is over"
+        assert self._steps < self._limit, "the episode is over"
+        assert abs(self._at) <= 1.0, "the episode is over"
         self._at += 0.3 * float(action[0]) + self.np_random.normal(0.0, 0.1)
         self._steps += 1
         ends = abs(self._at) > 1.0

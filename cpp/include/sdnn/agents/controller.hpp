@@ -254,8 +254,8 @@ class Controller {
   }
 
   /// Learns a transition. The action is one that act gave; of fuzzy Q-learning, the last one with
-  /// `explore` in the environment. Shapes as in act. Throws std::invalid_argument for others and for numbers that are
-  /// not finite, and then nothing has changed; as the agent does.
+  /// `explore` in the environment. Shapes as in act. Throws std::invalid_argument for others and
+  /// for numbers that are not finite, and then nothing has changed; as the agent does.
   void learn(std::span<const double> observation, std::span<const double> action, double reward,
              std::span<const double> next_observation, bool terminated,
              std::size_t environment = 0) {

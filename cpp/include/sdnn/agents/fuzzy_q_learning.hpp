@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/agents/episodes.hpp"
+#include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/core/config_fields.hpp"
@@ -100,8 +100,8 @@ class FuzzyQLearning {
   double last_action(std::size_t environment = 0) const { return episodes_.of(environment).action; }
 
   /// Starts counting the steps of an episode anew and forgets the traces. The caller says when:
-  /// learning a terminated transition ends the traces only. Throws std::invalid_argument if there is
-  /// no such environment.
+  /// learning a terminated transition ends the traces only. Throws std::invalid_argument if there
+  /// is no such environment.
   void begin_episode(std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
     episode.step = 0;
@@ -240,7 +240,8 @@ class FuzzyQLearning {
       return number >= 0 && static_cast<std::uint64_t>(number) < end;
     };
     archive.expect(read.step >= 0, "step", "0 or more");
-    for (const double x : read.state) archive.expect(x >= 0.0 && x <= 1.0, "last_state", "in [0, 1]");
+    for (const double x : read.state)
+      archive.expect(x >= 0.0 && x <= 1.0, "last_state", "in [0, 1]");
     archive.expect(read.action >= -1.0 && read.action <= 1.0, "last_action", "in [-1, 1]");
     Episode episode = new_episode();
     episode.step = read.step;

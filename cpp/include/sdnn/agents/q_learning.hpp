@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/agents/episodes.hpp"
+#include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/agents/return_range.hpp"
 #include "sdnn/agents/waiting_steps.hpp"
 #include "sdnn/approximators/action_value.hpp"
@@ -172,8 +172,8 @@ class QLearning {
   double epsilon() const noexcept { return policy_.config().epsilon; }
 
   /// In how many environments at once the agent learns: each has an episode of its own. Of those
-  /// that are no more, what waits is learned. Throws std::invalid_argument outside [1, 2^20], and as
-  /// learn does.
+  /// that are no more, what waits is learned. Throws std::invalid_argument outside [1, 2^20], and
+  /// as learn does.
   void set_n_environments(std::size_t n) {
     core::require_in_range("n_environments", n, 1, Episodes<Episode>::kMost);
     for (std::size_t i = n; i < n_environments(); ++i) begin_episode(i);
@@ -183,8 +183,8 @@ class QLearning {
 
   /// Starts counting the steps of an episode anew, for the greedy first steps, and learns what
   /// still waits of an episode that did not terminate. The caller says when: learning a terminated
-  /// transition does not. Throws std::invalid_argument if there is no such environment, and as learn
-  /// does.
+  /// transition does not. Throws std::invalid_argument if there is no such environment, and as
+  /// learn does.
   void begin_episode(std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
     episode.step = 0;
@@ -319,8 +319,8 @@ class QLearning {
       archive.expect(!episode.waiting.is_full(), "waiting.rewards", "fewer than n_steps");
       archive.expect(ReturnRange::is_sum(episode.sum), "range.sum", "a finite sum");
       archive.expect(episode.step >= 0, "step", "0 or more");
-      archive.expect(episode.n_kept >= 0 && episode.n_kept < self.config_.max_repetitions,
-                     "n_kept", "in [0, max_repetitions)");
+      archive.expect(episode.n_kept >= 0 && episode.n_kept < self.config_.max_repetitions, "n_kept",
+                     "in [0, max_repetitions)");
     }
   }
 
