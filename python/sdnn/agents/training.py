@@ -227,6 +227,7 @@ class Training:
         """Rows that the callbacks were given, since the training was begun."""
         self._rounds = rounds_in(env)
         self._present: list[_Episode | None] = [None] * self._rounds.n_environments
+        self._first_left = 0  # the environments before it have learned this round's step
         self._stops = False
         self._is_within_step = False
 
@@ -490,10 +491,13 @@ class Training:
     def _next_outcome(self) -> tuple[int, _Episode, Outcome]:
         """Find the first environment whose last step is still to be learned."""
         while True:
-            for i, episode in enumerate(self._present):
+            for i in range(self._first_left, self.n_environments):
+                episode = self._present[i]
                 if episode is not None and episode.outcome is not None:
+                    self._first_left = i
                     return i, episode, episode.outcome
             self._begin_round()
+            self._first_left = 0
 
     def _step(self) -> list[Row]:
         """Learn a step; give the rows that follow from it."""

@@ -19,8 +19,7 @@ struct HandClock {
   double oversleep = 0.0;
 
   FixedRate rate(double hz) {
-    return FixedRate(
-        hz, [this] { return now; }, [this](double seconds) { now += seconds + oversleep; });
+    return {hz, [this] { return now; }, [this](double seconds) { now += seconds + oversleep; }};
   }
 };
 

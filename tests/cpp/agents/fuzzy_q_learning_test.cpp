@@ -261,8 +261,14 @@ TEST(FuzzyQLearning, EachEnvironmentHasAnActAndTracesOfItsOwn) {
   core::Random world(4, core::Stream::weights);
   State state = {0.1, 0.1}, other = {0.9, 0.9};
   for (int i = 0; i < 300; ++i) {
-    if (i % 20 == 0) both.begin_episode(0), low.begin_episode();
-    if (i % 33 == 0) both.begin_episode(1), high.begin_episode();
+    if (i % 20 == 0) {
+      both.begin_episode(0);
+      low.begin_episode();
+    }
+    if (i % 33 == 0) {
+      both.begin_episode(1);
+      high.begin_episode();
+    }
     const State next = {world.uniform() / 3.0, world.uniform() / 3.0};
     const State other_next = {1.0 - world.uniform() / 3.0, 1.0 - world.uniform() / 3.0};
     const double action = both.act(state), other_action = both.act(other, true, 1);
