@@ -1,6 +1,6 @@
 """What several environments at once do to learning, per transition and per second.
 
-    python bench/vector_environments.py [--seeds 10] [--folder DIR]
+    python bench/vector_environments.py [--seeds 10] [--tasks CartPole-v1,...] [--folder DIR]
 
 Each trial is a training with evaluations of 10 greedy episodes; its rows go to
 docs/vector-environments.csv when it is done, and is not run again. At the end a table is printed
@@ -107,12 +107,13 @@ def main() -> None:
     """Run what is missing, then print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--tasks", default=",".join(TASKS))
     parser.add_argument("--folder", type=Path, default=DOCS)
     options = parser.parse_args()
     path = options.folder / "vector-environments.csv"
     done = {(r["task"], r["n_environments"], r["seed"]) for r in read_rows(path)}
     for seed in range(options.seeds):
-        for task in TASKS:
+        for task in options.tasks.split(","):
             for n in SIZES:
                 if (task, str(n), str(seed)) in done:
                     continue
