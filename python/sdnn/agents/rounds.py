@@ -170,7 +170,8 @@ class _OwnResets(_Vector):
 def _autoreset_mode(env: gym.vector.VectorEnv[Any, Any, Any]) -> str:
     """Name the mode as Gymnasium's ``AutoresetMode`` does, which Gymnasium 1.0 has not."""
     modes = getattr(gym.vector, "AutoresetMode", None)
-    mode = env.metadata.get("autoreset_mode")
+    # Not by the metadata first: in Gymnasium 1.1 these may be another vector's.
+    mode = getattr(env.unwrapped, "autoreset_mode", env.metadata.get("autoreset_mode"))
     return "NEXT_STEP" if modes is None or mode is None else str(modes(mode).name)
 
 

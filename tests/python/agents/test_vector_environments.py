@@ -21,6 +21,8 @@ from sdnn.agents import (
 from sdnn.agents.evaluation import episode_seed
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
 
+if not hasattr(gym.vector, "AutoresetMode"):
+    pytest.skip("needs Gymnasium 1.1", allow_module_level=True)
 AutoresetMode = gym.vector.AutoresetMode
 
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
