@@ -37,22 +37,25 @@ namespace {
 template <class Agent>
 void def_agent(py::class_<Agent>& agent) {
   using Action = decltype(std::declval<Agent&>().act({}));
-  agent.def("begin_episode", &Agent::begin_episode)
+  agent.def("set_n_environments", &Agent::set_n_environments, py::arg("n"))
+      .def_property_readonly("n_environments", &Agent::n_environments)
+      .def("begin_episode", &Agent::begin_episode, py::arg("environment") = 0)
       .def(
           "act",
-          [](Agent& self, const ArrayArgument<double>& state, bool explore) {
-            return self.act(bindings::vector(state, "state"), explore);
+          [](Agent& self, const ArrayArgument<double>& state, bool explore,
+             std::size_t environment) {
+            return self.act(bindings::vector(state, "state"), explore, environment);
           },
-          py::arg("state"), py::arg("explore") = true)
+          py::arg("state"), py::arg("explore") = true, py::arg("environment") = 0)
       .def(
           "learn",
           [](Agent& self, const ArrayArgument<double>& state, const Action& action, double reward,
-             const ArrayArgument<double>& next_state, bool terminated) {
+             const ArrayArgument<double>& next_state, bool terminated, std::size_t environment) {
             self.learn(bindings::vector(state, "state"), action, reward,
-                       bindings::vector(next_state, "next_state"), terminated);
+                       bindings::vector(next_state, "next_state"), terminated, environment);
           },
           py::arg("state"), py::arg("action"), py::arg("reward"), py::arg("next_state"),
-          py::arg("terminated"));
+          py::arg("terminated"), py::arg("environment") = 0);
   bindings::def_state(agent);
 }
 
@@ -60,6 +63,8 @@ void def_agent(py::class_<Agent>& agent) {
 template <class Agent>
 void def_q_learning(py::class_<Agent>& agent) {
   agent.def("set_progress", &Agent::set_progress, py::arg("progress"))
+      .def("set_learning_rate", &Agent::set_learning_rate, py::arg("rate"))
+      .def("set_epsilon", &Agent::set_epsilon, py::arg("epsilon"))
       .def_property_readonly("progress", &Agent::progress)
       .def_property_readonly("learning_rate", &Agent::learning_rate)
       .def_property_readonly("epsilon", &Agent::epsilon);
@@ -147,7 +152,12 @@ void bind_agents(py::module_& module) {
   py::enum_<agents::ValueRange>(module, "ValueRange", "Whether the range of values is fixed")
       .value("given", agents::ValueRange::given)
       .value("seen", agents::ValueRange::seen);
-  bindings::bind_config<QLearningConfig>(module, "QLearningConfig", "The parameters of Q-learning");
+  py::enum_<agents::Schedule>(module, "Schedule", "How rates go to their final values")
+      .value("linear", agents::Schedule::linear)
+      .value("exponential", agents::Schedule::exponential);
+  bindings::bind_config<QLearningConfig>(module, "QLearningConfig", "The parameters of Q-learning")
+      .def("learning_rate_at", &QLearningConfig::learning_rate_at, py::arg("progress"))
+      .def("epsilon_at", &QLearningConfig::epsilon_at, py::arg("progress"));
   bindings::bind_config<FuzzyQLearningConfig>(module, "FuzzyQLearningConfig",
                                               "The parameters of fuzzy Q-learning");
 
@@ -202,7 +212,7 @@ void bind_agents(py::module_& module) {
       .def_property_readonly(
           "rules", [](FuzzyQLearning& agent) -> FuzzyRules& { return agent.rules(); },
           py::return_value_policy::reference_internal)
-      .def_property_readonly("last_action", &FuzzyQLearning::last_action)
+      .def("last_action", &FuzzyQLearning::last_action, py::arg("environment") = 0)
       .def(
           "value",
           [](FuzzyQLearning& agent, const ArrayArgument<double>& state) {

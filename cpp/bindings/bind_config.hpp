@@ -35,12 +35,13 @@ void def_fields(pybind11::class_<Config>& type, const Field&... field) {
 
 /// Binds a configuration: keyword arguments with the core's defaults, properties, ==, repr.
 template <class Config>
-void bind_config(pybind11::module_& module, const char* name, const char* doc) {
+pybind11::class_<Config> bind_config(pybind11::module_& module, const char* name, const char* doc) {
   pybind11::class_<Config> type(module, name, doc);
   std::apply([&type](const auto&... field) { def_fields(type, field...); }, Config::fields());
   type.def("__eq__", [](const Config& self, const pybind11::object& other) {
     return pybind11::isinstance<Config>(other) && self == other.cast<const Config&>();
   });
+  return type;
 }
 
 }  // namespace sdnn::bindings

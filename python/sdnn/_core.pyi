@@ -1016,6 +1016,53 @@ class ValueRange:
     @property
     def value(self) -> int:
         ...
+class Schedule:
+    """
+    How rates go to their final values
+    
+    Members:
+    
+      linear
+    
+      exponential
+    """
+    __members__: typing.ClassVar[dict[str, Schedule]]
+    exponential: typing.ClassVar[Schedule]
+    linear: typing.ClassVar[Schedule]
+    @typing.overload
+    def __eq__(self, other: Schedule) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: Schedule) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
 class QLearningConfig:
     """
     The parameters of Q-learning
@@ -1023,9 +1070,13 @@ class QLearningConfig:
     __hash__: typing.ClassVar[None] = None
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, learning_rate: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform, tie_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0, n_steps: typing.SupportsInt | typing.SupportsIndex = 1, max_repetitions: typing.SupportsInt | typing.SupportsIndex = 1, final_learning_rate: typing.SupportsFloat | typing.SupportsIndex | None = None, final_epsilon: typing.SupportsFloat | typing.SupportsIndex | None = None, value_range: ValueRange = ValueRange.given) -> None:
+    def __init__(self, *, learning_rate: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform, tie_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0, n_steps: typing.SupportsInt | typing.SupportsIndex = 1, max_repetitions: typing.SupportsInt | typing.SupportsIndex = 1, final_learning_rate: typing.SupportsFloat | typing.SupportsIndex | None = None, final_epsilon: typing.SupportsFloat | typing.SupportsIndex | None = None, value_range: ValueRange = ValueRange.given, schedule: Schedule = Schedule.linear) -> None:
         ...
     def __repr__(self) -> str:
+        ...
+    def epsilon_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        ...
+    def learning_rate_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
         ...
     @property
     def discount(self) -> float:
@@ -1050,6 +1101,9 @@ class QLearningConfig:
         ...
     @property
     def n_steps(self) -> int:
+        ...
+    @property
+    def schedule(self) -> Schedule:
         ...
     @property
     def tie_rule(self) -> TieRule:
@@ -1104,16 +1158,22 @@ class SDNNQLearning:
         """
         With the patterns of each input: (n_bins, m) of -1, +1
         """
-    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> int:
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> int:
         ...
-    def begin_episode(self) -> None:
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
-    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def restore(self, state: dict) -> None:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes
         """
+    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_learning_rate(self, rate: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     def state(self) -> dict:
@@ -1130,6 +1190,9 @@ class SDNNQLearning:
     def learning_rate(self) -> float:
         ...
     @property
+    def n_environments(self) -> int:
+        ...
+    @property
     def progress(self) -> float:
         ...
 class DecoupledSDNNQLearning:
@@ -1138,18 +1201,24 @@ class DecoupledSDNNQLearning:
     """
     def __init__(self, *, approximator: SDNNCConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
-    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> list[int]:
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[int]:
         ...
     def action_value(self, dimension: typing.SupportsInt | typing.SupportsIndex) -> SDNNC:
         ...
-    def begin_episode(self) -> None:
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
-    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def restore(self, state: dict) -> None:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes
         """
+    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_learning_rate(self, rate: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     def state(self) -> dict:
@@ -1163,6 +1232,9 @@ class DecoupledSDNNQLearning:
     def learning_rate(self) -> float:
         ...
     @property
+    def n_environments(self) -> int:
+        ...
+    @property
     def progress(self) -> float:
         ...
 class RBFQLearning:
@@ -1171,16 +1243,22 @@ class RBFQLearning:
     """
     def __init__(self, *, approximator: RBFNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
-    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> int:
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> int:
         ...
-    def begin_episode(self) -> None:
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
-    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def restore(self, state: dict) -> None:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes
         """
+    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_learning_rate(self, rate: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     def state(self) -> dict:
@@ -1197,6 +1275,9 @@ class RBFQLearning:
     def learning_rate(self) -> float:
         ...
     @property
+    def n_environments(self) -> int:
+        ...
+    @property
     def progress(self) -> float:
         ...
 class DecoupledRBFQLearning:
@@ -1205,18 +1286,24 @@ class DecoupledRBFQLearning:
     """
     def __init__(self, *, approximator: RBFNetworkConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
-    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> list[int]:
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[int]:
         ...
     def action_value(self, dimension: typing.SupportsInt | typing.SupportsIndex) -> RBFNetwork:
         ...
-    def begin_episode(self) -> None:
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
-    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def restore(self, state: dict) -> None:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes
         """
+    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_learning_rate(self, rate: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     def state(self) -> dict:
@@ -1230,6 +1317,9 @@ class DecoupledRBFQLearning:
     def learning_rate(self) -> float:
         ...
     @property
+    def n_environments(self) -> int:
+        ...
+    @property
     def progress(self) -> float:
         ...
 class FuzzyQLearning:
@@ -1238,16 +1328,20 @@ class FuzzyQLearning:
     """
     def __init__(self, *, approximator: FuzzyRulesConfig, learning: FuzzyQLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
-    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> float:
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> float:
         ...
-    def begin_episode(self) -> None:
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
-    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsFloat | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
+    def last_action(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> float:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsFloat | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def restore(self, state: dict) -> None:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes
         """
+    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     def state(self) -> dict:
         """
         What it remembers: arrays by name
@@ -1257,7 +1351,7 @@ class FuzzyQLearning:
         V(state)
         """
     @property
-    def last_action(self) -> float:
+    def n_environments(self) -> int:
         ...
     @property
     def rules(self) -> FuzzyRules:

@@ -2,7 +2,9 @@
 #pragma once
 
 #include "sdnn/agents/agent.hpp"
+#include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/epsilon_greedy.hpp"
+#include "sdnn/agents/fixed_rate.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/presets.hpp"
 #include "sdnn/agents/q_learning.hpp"

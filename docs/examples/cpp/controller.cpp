@@ -7,13 +7,12 @@
 #include "sdnn/agents/controller.hpp"
 
 #include <array>
-#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "sdnn/sdnn.hpp"
@@ -21,8 +20,6 @@
 namespace {
 
 using namespace sdnn;
-using Clock = std::chrono::steady_clock;
-
 constexpr double kSpeed = 9.0;  // rad/s that the controller tells apart
 
 // What the robot's own sensors would say: two angles and two speeds.
@@ -48,7 +45,7 @@ agents::Controller new_controller(double max_torque, std::uint64_t seed) {
 
 struct Outcome {
   int n_decisions = 0;
-  int n_late = 0;
+  std::int64_t n_late = 0;
   bool solved = false;
 };
 
@@ -58,10 +55,10 @@ Outcome run_episode(agents::Controller& controller, environments::Acrobot& acrob
   acrobot.reset();
   controller.begin_episode();
   auto observed = observe(acrobot);
-  const auto period = std::chrono::duration_cast<Clock::duration>(
-      std::chrono::duration<double>(rate > 0.0 ? 1.0 / rate : 0.0));
-  auto deadline = Clock::now();
+  std::optional<agents::FixedRate> ticks;
+  if (rate > 0.0) ticks.emplace(rate);
   for (bool over = false; !over;) {
+    if (ticks) ticks->wait();
     const std::array<double, 1> torque = {controller.act(observed, learning)[0]};
     const auto result = acrobot.step(torque[0], lambda);
     const auto next = observe(acrobot);
@@ -70,11 +67,8 @@ Outcome run_episode(agents::Controller& controller, environments::Acrobot& acrob
     ++outcome.n_decisions;
     outcome.solved = result.terminated;
     over = result.terminated || result.truncated;
-    if (rate <= 0.0) continue;
-    deadline += period;
-    outcome.n_late += Clock::now() > deadline ? 1 : 0;
-    std::this_thread::sleep_until(deadline);
   }
+  if (ticks) outcome.n_late = ticks->n_misses();
   return outcome;
 }
 
@@ -100,7 +94,8 @@ int main(int argc, char** argv) try {
 
   sdnn::agents::Controller controller(path);
   const Outcome test = run_episode(controller, acrobot, lambda(n_episodes), false, rate);
-  std::printf("%d %s %d\n", test.n_decisions, test.solved ? "solved" : "-", test.n_late);
+  std::printf("%d %s %lld\n", test.n_decisions, test.solved ? "solved" : "-",
+              static_cast<long long>(test.n_late));
 } catch (const std::exception& error) {
   std::fprintf(stderr, "controller: %s\n", error.what());
   return 1;

@@ -2,8 +2,9 @@
 
 from sdnn.agents.agent import Agent, load_agent
 from sdnn.agents.c_headers import CHeader, c_header, export_c_header
-from sdnn.agents.callbacks import Checkpoints, EarlyStop, JSONLines, TensorBoard
+from sdnn.agents.callbacks import Checkpoints, EarlyStop, JSONLines, Schedule, TensorBoard
 from sdnn.agents.evaluation import Evaluation, evaluate
+from sdnn.agents.fixed_rate import FixedRate
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning, FuzzyQLearningConfig
 from sdnn.agents.presets import PRESETS, Preset
 from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
@@ -19,6 +20,7 @@ __all__ = [
     "Checkpoints",
     "EarlyStop",
     "Evaluation",
+    "FixedRate",
     "FuzzyQLearning",
     "FuzzyQLearningConfig",
     "JSONLines",
@@ -26,6 +28,7 @@ __all__ = [
     "QLearningConfig",
     "RBFQLearning",
     "SDNNQLearning",
+    "Schedule",
     "TensorBoard",
     "Training",
     "TrainingResult",

@@ -20,8 +20,9 @@ Numbers: TypeAlias = list[Any]
 class Actions(abc.ABC):
     """Actions of a space as the core has them, a number for each dimension, and back.
 
-    The action taken last is remembered with what it was in the core; only other ones are looked
-    up. What is remembered are its numbers, not the array given away, which others may change.
+    The action taken last in each environment is remembered with what it was in the core; only
+    other ones are looked up. What is remembered are its numbers, not the array given away, which
+    others may change.
 
     Parameters
     ----------
@@ -43,7 +44,7 @@ class Actions(abc.ABC):
 
     def __init__(self, space: gym.Space[Any]) -> None:
         self.space = space
-        self._taken: tuple[bytes, Numbers] | None = None
+        self._taken: dict[int, tuple[bytes, Numbers]] = {}
         self.is_box = isinstance(space, gym.spaces.Box)
         if isinstance(space, gym.spaces.Box):
             self.low, self.high = _finite_bounds(space)
@@ -66,18 +67,24 @@ class Actions(abc.ABC):
         if self.n_dimensions == 0:
             raise ValueError(f"action_space must have a dimension, got {space}")
 
-    def take(self, numbers: Numbers) -> Any:
+    def take(self, numbers: Numbers, environment: int = 0) -> Any:
         """Make the element of the space, and remember it."""
         action = self.element(numbers)
-        self._taken = (self.vector(action).tobytes(), numbers)
+        self._taken[environment] = (self.vector(action).tobytes(), numbers)
         return action
 
-    def numbers(self, action: Any) -> Numbers:
+    def numbers(self, action: Any, environment: int = 0) -> Numbers:
         """Find what an element of the space is in the core; ValueError if it is none."""
         values = self.vector(action)
-        if self._taken is not None and values.tobytes() == self._taken[0]:
-            return self._taken[1]
+        taken = self._taken.get(environment)
+        if taken is not None and values.tobytes() == taken[0]:
+            return taken[1]
         return self._find(values)
+
+    def forget(self, n_environments: int) -> None:
+        """Forget what was taken in environments that are no more."""
+        for environment in [i for i in self._taken if i >= n_environments]:
+            del self._taken[environment]
 
     def check(self, numbers: Numbers) -> None:
         """Raise ValueError or TypeError unless these are the numbers of an action."""

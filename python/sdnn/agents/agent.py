@@ -31,6 +31,7 @@ __all__ = ["Agent", "check_shape", "load_agent"]
 _CORE = "agent."
 _WARM_UP = "warm_up."
 _TABLE = "table."
+_RATE = "rate."
 
 Approximator = TypeVar("Approximator")
 Learning = TypeVar("Learning")
@@ -39,8 +40,8 @@ Learning = TypeVar("Learning")
 class Agent(abc.ABC, Generic[Approximator, Learning]):
     """An agent in a Gymnasium environment that learns one transition at a time.
 
-    A loop over an environment is ``train``; a robot that brings its own loop calls
-    `begin_episode`, `act` and `learn`.
+    A loop over an environment, or several at once, is ``train``; a robot that brings its own loop
+    calls `begin_episode`, `act` and `learn`.
 
     An agent whose observations have no known ranges begins with a *warm-up*: it acts at random
     for a while, takes the ranges from what it saw, and then learns what it did, in order. From
@@ -96,6 +97,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     learning: Learning
     _actions: Actions
     _tables: list[NDArray[np.int8]] | None = None
+    _rates: dict[str, float]
+    """That were set during the warm-up: by name."""
 
     def __init__(
         self,
@@ -125,6 +128,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         )
         self._actions = self._make_actions(action_space)
         self._progress = 0.0
+        self._rates = {}
         self._parts: list[Any] = []
         self._warm_up: WarmUp | None = None
         if self._observations.is_settled:
@@ -139,6 +143,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             self._actions.n_dimensions,
             self._warm_up_steps,
             self.seed,
+            learns_any_transition=self.learns_any_transition,
         )
 
     # What the kinds of agents differ in.
@@ -151,8 +156,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     def _make_parts(self) -> list[Any]:
         """Make the compiled agents; the observations are settled. Fills in ``approximator``."""
 
-    def _remember_action(self) -> None:
-        """Take up the action that the restored parts took last, where they must know it."""
+    def _remember_actions(self) -> None:
+        """Take up the actions that the restored parts took last, where they must know them."""
 
     def _check_parts(self) -> None:
         """Find impossible settings before the warm-up: make the parts for as many variables."""
@@ -163,7 +168,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         trial._make_parts()
 
     @abc.abstractmethod
-    def _act(self, state: NDArray[np.float64], explore: bool) -> list[Any]:
+    def _act(self, state: NDArray[np.float64], explore: bool, environment: int) -> list[Any]:
         """Choose the numbers of an action."""
 
     @abc.abstractmethod
@@ -174,6 +179,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         reward: float,
         following: NDArray[np.float64],
         terminated: bool,
+        environment: int,
     ) -> None:
         """Learn a transition."""
 
@@ -205,17 +211,48 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             if hasattr(part, "set_progress"):
                 part.set_progress(self._progress)
 
-    def begin_episode(self) -> None:
+    @property
+    def n_environments(self) -> int:
+        """In how many environments at once the agent learns; may be set, from 1 to 2**20.
+
+        They are numbered from 0. Each has an episode of its own: the transitions that wait, the
+        steps counted, the random action that is kept. All else is shared. Where there are fewer
+        than before, what waits in the others is learned. `train` sets it.
+        """
+        one: Any = self._warm_up or self._parts[0]
+        n: int = one.n_environments
+        return n
+
+    @n_environments.setter
+    def n_environments(self, n: int) -> None:
+        number = whole("n_environments", n, 1, 2**20)
+        if self._warm_up is not None:
+            self._warm_up.n_environments = number
+        for part in self._parts:
+            part.set_n_environments(number)
+        self._actions.forget(number)
+
+    def _check_environment(self, environment: int) -> None:
+        whole("environment", environment, 0, self.n_environments - 1)
+
+    def begin_episode(self, environment: int = 0) -> None:
         """Note that an episode begins: `learn` never does.
 
         Starts the greedy first steps of an episode anew, and learns what still waits.
-        """
-        if self._warm_up is not None:
-            self._warm_up.begin_episode()
-        for part in self._parts:
-            part.begin_episode()
 
-    def act(self, observation: Any, explore: bool = True) -> Any:
+        Raises
+        ------
+        ValueError
+            If there is no such environment.
+        """
+        if environment:
+            self._check_environment(environment)
+        if self._warm_up is not None:
+            self._warm_up.begin_episode(environment)
+        for part in self._parts:
+            part.begin_episode(environment)
+
+    def act(self, observation: Any, explore: bool = True, environment: int = 0) -> Any:
         """Choose the action to take, an element of the action space.
 
         Parameters
@@ -223,17 +260,24 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         observation : element of the observation space
         explore : bool
             False: always a best action, and no effect on the agent's later learning.
+        environment : int
+            In which environment, below `n_environments`.
 
         Raises
         ------
         ValueError
-            If the observation has another shape or holds NaN.
+            If the observation has another shape or holds NaN, or there is no such environment.
         """
+        if environment:
+            self._check_environment(environment)
         if self._warm_up is not None:
             self._observations.flat("observation", observation)
-            return self._actions.element(self._warm_up.act(self._actions.random, explore))
-        numbers = self._act(self._observations("observation", observation), explore)
-        return self._actions.take(numbers) if explore else self._actions.element(numbers)
+            numbers = self._warm_up.act(self._actions.random, explore, environment)
+            return self._actions.element(numbers)
+        numbers = self._act(self._observations("observation", observation), explore, environment)
+        return (
+            self._actions.take(numbers, environment) if explore else self._actions.element(numbers)
+        )
 
     def flat_observation(self, observation: Any) -> NDArray[np.float64]:
         """Give the observed variables as a vector, shape (n_variables,), in their own units.
@@ -245,30 +289,35 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         """
         return self._observations.flat("observation", observation)
 
-    def learn(self, transition: Transition) -> None:
+    def learn(self, transition: Transition, environment: int = 0) -> None:
         """Learn one transition.
 
         Any action of the space can be learned, not only that of the last `act` (but by
         `FuzzyQLearning`); of a ``Box`` the nearest one is. A terminated transition begins no
         episode. With ``n_steps`` above 1 a transition waits for those that follow; one that does
         not begin where the one before it ended (another ``observation`` than the last
-        ``next_observation``) begins anew, and `begin_episode` learns what still waits.
+        ``next_observation``) begins anew, and `begin_episode` learns what still waits. All this is
+        within the environment that the transition comes from.
 
         Raises
         ------
         ValueError
-            If an observation, the action or the reward is not usable; nothing is learned then.
+            If an observation, the action or the reward is not usable, or there is no such
+            environment; nothing is learned then.
         OverflowError
             If a weight would leave its range; nothing is learned then.
         """
+        if environment:
+            self._check_environment(environment)
         reward, terminated = float(transition.reward), bool(transition.terminated)
         if self._warm_up is None:
             self._learn(
                 self._observations("observation", transition.observation),
-                self._actions.numbers(transition.action),
+                self._actions.numbers(transition.action, environment),
                 reward,
                 self._observations("next_observation", transition.next_observation),
                 terminated,
+                environment,
             )
             return
         observation = self._observations.flat("observation", transition.observation)
@@ -276,7 +325,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         if not np.isfinite(reward):
             raise ValueError(f"reward must be finite, got {reward}")
         values = self._actions.vector(transition.action)
-        self._warm_up.learn(observation, values, reward, following, terminated)
+        self._warm_up.learn(observation, values, reward, following, terminated, environment)
         if self._warm_up.is_over:
             self._end_warm_up(self._warm_up)
 
@@ -285,20 +334,25 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         self._parts = self._make_parts()
         self._apply_progress()
         self._warm_up = None
-        if not self.learns_any_transition:
-            for part in self._parts:
-                part.begin_episode()
-            return
-        for begins, (observation, action, reward, following, terminated) in warm_up.transitions():
-            if begins:
-                self.begin_episode()
-            self._learn(
-                self._observations.unit(observation),
-                self._actions.numbers(action),
-                reward,
-                self._observations.unit(following),
-                terminated,
-            )
+        self._rates = {}
+        self.n_environments = warm_up.n_in_all
+        if self.learns_any_transition:
+            for begins, environment, step in warm_up.transitions():
+                observation, action, reward, following, terminated = step
+                if begins:
+                    self.begin_episode(environment)
+                self._learn(
+                    self._observations.unit(observation),
+                    self._actions.numbers(action, environment),
+                    reward,
+                    self._observations.unit(following),
+                    terminated,
+                    environment,
+                )
+        else:
+            for environment in range(self.n_environments):
+                self.begin_episode(environment)
+        self.n_environments = warm_up.n_environments
 
     def _born(self) -> list[Any]:
         """Give the compiled agents; RuntimeError while there are none."""
@@ -318,7 +372,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
     def train(
         self,
-        env: gym.Env[Any, Any],
+        env: gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any],
         *,
         steps: int | None = None,
         episodes: int | None = None,
@@ -329,7 +383,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         evaluation_env: gym.Env[Any, Any] | None = None,
         evaluation_episodes: int = 10,
     ) -> TrainingResult:
-        """Learn in an environment; see `sdnn.agents.Training`, which can also be resumed.
+        """Learn in an environment, or in all of a vector; see `sdnn.agents.Training`.
 
         With ``progress`` a line on a terminal says how far it is.
 
@@ -432,6 +486,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             arrays |= {prefix + name: array for name, array in part.state().items()}
         if self._warm_up is not None:
             arrays |= {_WARM_UP + name: array for name, array in self._warm_up.state().items()}
+            arrays |= {_RATE + name: np.array(value) for name, value in self._rates.items()}
         arrays |= {f"{_TABLE}{i}": table for i, table in enumerate(self._tables or ())}
         return arrays
 
@@ -470,17 +525,20 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             least_inputs=cls.least_inputs,
         )
         agent._actions = agent._make_actions(agent.action_space)
-        agent._parts, agent._warm_up, agent._progress = [], None, 0.0
+        agent._parts, agent._warm_up, agent._progress, agent._rates = [], None, 0.0, {}
         if description["observation"] is None:
             agent._warm_up = agent._new_warm_up()
             agent._warm_up.restore(part(_WARM_UP), agent._actions.check)
+            for name in ("learning_rate", "epsilon"):
+                if _RATE + name in arrays:
+                    setattr(agent, name, float(arrays[_RATE + name]))
         else:
             agent._observations.settled_as(description["observation"])
             agent._check_state(part(_CORE))
             agent._parts = agent._make_parts()
             for number, core in enumerate(agent._parts):
                 core.restore(part(_CORE if len(agent._parts) == 1 else f"{_CORE}{number}."))
-            agent._remember_action()
+            agent._remember_actions()
         agent.progress = float(description["progress"])
         return agent
 

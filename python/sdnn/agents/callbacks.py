@@ -10,7 +10,7 @@ from typing import Any
 from sdnn.agents.training import Callback, Row, Training
 from sdnn.whole_files import write_whole
 
-__all__ = ["Checkpoints", "EarlyStop", "JSONLines", "TensorBoard"]
+__all__ = ["Checkpoints", "EarlyStop", "JSONLines", "Schedule", "TensorBoard"]
 
 
 class JSONLines(Callback):
@@ -61,6 +61,10 @@ class Checkpoints(Callback):
         self.path = Path(path)
         self.every = every
 
+    def on_start(self, training: Training) -> None:
+        """Raise ValueError where the training cannot be saved, before it learns for nothing."""
+        training.require_repeatable()
+
     def on_step(self, training: Training) -> None:
         """Save where it is due."""
         if training.n_steps % self.every == 0:
@@ -97,6 +101,64 @@ class EarlyStop(Callback):
                 training.stop()
 
 
+class Schedule(Callback):
+    """Lets alpha and epsilon follow functions of the progress.
+
+    After every step, and before the first, they are set to what the functions give. That overrides
+    ``final_learning_rate`` and ``final_epsilon``; an agent keeps the last values when it is saved.
+    A training that is loaded must be given its schedule again.
+
+    Parameters
+    ----------
+    learning_rate, epsilon : callable, optional
+        From the progress, 0 at the beginning and 1 at the end, to a value in (0, 1] and [0, 1].
+        (In Stable-Baselines3 such functions are given what remains, from 1 to 0.)
+
+    Raises
+    ------
+    TypeError
+        If something else is given, or the agent has no such rate.
+    ValueError
+        If a function gives another value.
+
+    Examples
+    --------
+    >>> import gymnasium as gym
+    >>> from sdnn.agents import Schedule, SDNNQLearning
+    >>> env = gym.make("MountainCarContinuous-v0")
+    >>> agent = SDNNQLearning(env.observation_space, env.action_space)
+    >>> halves = Schedule(epsilon=lambda progress: 0.2 if progress < 0.5 else 0.0)
+    >>> agent.train(env, steps=100, callbacks=[halves]).n_steps
+    100
+    >>> agent.epsilon
+    0.0
+    """
+
+    def __init__(
+        self,
+        *,
+        learning_rate: Callable[[float], float] | None = None,
+        epsilon: Callable[[float], float] | None = None,
+    ) -> None:
+        given = {"learning_rate": learning_rate, "epsilon": epsilon}
+        for name, function in given.items():
+            if function is not None and not callable(function):
+                raise TypeError(f"{name} must be a function of the progress, got {function!r}")
+        self._functions = {name: f for name, f in given.items() if f is not None}
+
+    def on_start(self, training: Training) -> None:
+        """Set the rates of the first step."""
+        for name in self._functions:
+            if not hasattr(training.agent, name):
+                raise TypeError(f"agent must have a {name}, got {type(training.agent).__name__}")
+        self.on_step(training)
+
+    def on_step(self, training: Training) -> None:
+        """Set the rates of the next step."""
+        for name, function in self._functions.items():
+            setattr(training.agent, name, function(training.agent.progress))
+
+
 class TensorBoard(Callback):
     """Writes the numbers of each row for TensorBoard; needs ``tensorboardX`` or ``torch``.
 
@@ -117,7 +179,7 @@ class TensorBoard(Callback):
     def on_row(self, training: Training, row: Row) -> None:
         """Write the row's numbers under its kind."""
         for name, value in row.items():
-            if isinstance(value, int | float) and name not in ("step",):
+            if isinstance(value, int | float) and name not in ("step", "environment"):
                 self._writer.add_scalar(f"{row['kind']}/{name}", value, row["step"])
 
     def on_end(self, training: Training) -> None:

@@ -62,8 +62,8 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     the truth values, hence continuous. Each dimension of an action has rules of its own, which
     learn as if the others were part of the environment.
 
-    Only the transition of the last exploring `act` can be learned: which rule picked what is known
-    of no other. What a warm-up did is therefore not learned.
+    Only the transition of the last exploring `act` in an environment can be learned: which rule
+    picked what is known of no other. What a warm-up did is therefore not learned.
 
     Parameters
     ----------
@@ -156,11 +156,12 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
             for dimension in range(self._actions.n_dimensions)
         ]
 
-    def _remember_action(self) -> None:
-        self._actions.take([part.last_action for part in self._parts])
+    def _remember_actions(self) -> None:
+        for environment in range(self.n_environments):
+            self._actions.take([part.last_action(environment) for part in self._parts], environment)
 
-    def _act(self, state: NDArray[np.float64], explore: bool) -> list[Any]:
-        return [part.act(state, explore) for part in self._parts]
+    def _act(self, state: NDArray[np.float64], explore: bool, environment: int) -> list[Any]:
+        return [part.act(state, explore, environment) for part in self._parts]
 
     def _learn(
         self,
@@ -169,9 +170,10 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
         reward: float,
         following: NDArray[np.float64],
         terminated: bool,
+        environment: int,
     ) -> None:
         for part, number in zip(self._parts, numbers, strict=True):
-            part.learn(state, number, reward, following, terminated)
+            part.learn(state, number, reward, following, terminated, environment)
 
     def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         sizes = self.approximator

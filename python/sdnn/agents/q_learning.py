@@ -19,7 +19,7 @@ from sdnn.agents.presets import PRESETS
 from sdnn.agents.q_learning_config import QLearningConfig
 from sdnn.approximators.rbf_network import RBFNetworkConfig
 from sdnn.approximators.sdnn_c import SDNNCConfig, pattern_tables
-from sdnn.arguments import choice
+from sdnn.arguments import choice, real
 
 __all__ = ["RBFQLearning", "SDNNQLearning"]
 
@@ -51,14 +51,17 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
         if len(n_actions) == 1 and not self._actions.is_box:
             sizes["n_actions"] = n_actions[0]
         self.approximator = dataclasses.replace(self.approximator, **sizes)
-        return [self._make_core()]
+        core = self._make_core()
+        for name, value in self._rates.items():
+            getattr(core, f"set_{name}")(value)
+        return [core]
 
     @abc.abstractmethod
     def _make_core(self) -> CoreAgent | CoreVectorAgent:
         """Make the compiled agent; the approximator's sizes are known."""
 
-    def _act(self, state: NDArray[np.float64], explore: bool) -> list[Any]:
-        chosen = self._parts[0].act(state, explore)
+    def _act(self, state: NDArray[np.float64], explore: bool, environment: int) -> list[Any]:
+        chosen = self._parts[0].act(state, explore, environment)
         return chosen if self._actions.n_dimensions > 1 else [chosen]
 
     def _learn(
@@ -68,9 +71,55 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
         reward: float,
         following: NDArray[np.float64],
         terminated: bool,
+        environment: int,
     ) -> None:
         action = numbers if self._actions.n_dimensions > 1 else numbers[0]
-        self._parts[0].learn(state, action, reward, following, terminated)
+        self._parts[0].learn(state, action, reward, following, terminated, environment)
+
+    @property
+    def learning_rate(self) -> float:
+        """Alpha as it is now: as it was set, or as `progress` makes it.
+
+        May be set, to a number in (0, 1]: it then stays, whatever the progress, also in a saved
+        agent. None: it follows the progress again.
+
+        Raises
+        ------
+        ValueError
+            If it is set to anything else.
+        """
+        return self._rate("learning_rate")
+
+    @learning_rate.setter
+    def learning_rate(self, rate: float | None) -> None:
+        if rate is not None and not 0.0 < real("learning_rate", rate) <= 1.0:
+            raise ValueError(f"learning_rate must be in (0, 1], or None, got {rate!r}")
+        self._set_rate("learning_rate", rate)
+
+    @property
+    def epsilon(self) -> float:
+        """The probability of a random action as it is now; may be set, like `learning_rate`."""
+        return self._rate("epsilon")
+
+    @epsilon.setter
+    def epsilon(self, epsilon: float | None) -> None:
+        if epsilon is not None and not 0.0 <= real("epsilon", epsilon) <= 1.0:
+            raise ValueError(f"epsilon must be in [0, 1], or None, got {epsilon!r}")
+        self._set_rate("epsilon", epsilon)
+
+    def _rate(self, name: str) -> float:
+        if self._parts:
+            return float(getattr(self._parts[0], name))
+        at_progress: float = getattr(self.learning.to_core(), f"{name}_at")(self.progress)
+        return self._rates.get(name, at_progress)
+
+    def _set_rate(self, name: str, value: float | None) -> None:
+        if self._parts:
+            getattr(self._parts[0], f"set_{name}")(value)
+        elif value is None:
+            self._rates.pop(name, None)
+        else:
+            self._rates[name] = float(value)
 
     @property
     def core(self) -> Any:

@@ -38,8 +38,14 @@ class QLearningConfig:
         Steps that a random action may last, 1 to 10**6. Not in the paper, which has 1: with more,
         it is kept for at least k steps with probability 1 / k.
     final_learning_rate, final_epsilon : float, optional
-        What alpha and epsilon become, in a straight line, as the agent's progress goes from 0 to 1;
-        None: they stay. Not in the paper.
+        What alpha and epsilon become as the agent's progress goes from 0 to 1; None: they stay. Not
+        in the paper.
+    schedule : {"linear", "exponential"}
+        How they go there: in a straight line, or by the same factor in equal parts of the progress,
+        ``first * (final / first) ** progress``. A rate that stays is the common choice where the
+        task itself changes; a line is what most libraries of deep Q-learning take for epsilon; an
+        exponential spends more of the training near a small final value, and has none that is 0.
+        Any other function of the progress: `sdnn.agents.Schedule`.
     value_range : {"given", "seen"}
         Whether Q has the approximator's range, ``q_low`` to ``q_high``, or one that grows with the
         discounted sums of the rewards that come. Not in the paper.
@@ -56,6 +62,7 @@ class QLearningConfig:
     final_learning_rate: float | None = added_later(None)
     final_epsilon: float | None = added_later(None)
     value_range: Literal["given", "seen"] = added_later("given")
+    schedule: Literal["linear", "exponential"] = added_later("linear")
 
     def to_core(self) -> _core.QLearningConfig:
         """Make the core's struct of the same values; see `sdnn.config.to_core`."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from sdnn.agents.evaluation import episode_seed, evaluate
 from sdnn.agents.files import Arrays, Description, from_file, read, write
 from sdnn.agents.interrupts import Interrupts
+from sdnn.agents.rounds import Outcome, rounds_in
 from sdnn.agents.transition import Transition
 from sdnn.arguments import whole
 
@@ -55,14 +56,15 @@ class Learner(Protocol):
 
     action_space: gym.Space[Any]
     progress: float
+    n_environments: int
 
-    def begin_episode(self) -> None:
+    def begin_episode(self, environment: int = 0) -> None:
         """Note that an episode begins."""
 
-    def act(self, observation: Any, explore: bool = True) -> Any:
+    def act(self, observation: Any, explore: bool = True, environment: int = 0) -> Any:
         """Choose an action."""
 
-    def learn(self, transition: Transition) -> None:
+    def learn(self, transition: Transition, environment: int = 0) -> None:
         """Learn a step."""
 
     def flat_observation(self, observation: Any) -> NDArray[np.float64]:
@@ -109,6 +111,24 @@ class TrainingResult:
         return np.array(found, np.float64).reshape(-1, 2)
 
 
+@dataclass
+class _Episode:
+    """The present episode in one environment.
+
+    ``observation`` is what was observed before ``outcome``, if that is still to be learned.
+    """
+
+    number: int
+    observation: Any
+    actions: list[Any] = field(default_factory=list)
+    sum_of_rewards: float = 0.0
+    outcome: Outcome | None = None
+
+    @property
+    def last_observation(self) -> Any:
+        return self.observation if self.outcome is None else self.outcome.observation
+
+
 class Training:
     """An agent that learns in an environment for a number of steps or episodes.
 
@@ -118,14 +138,26 @@ class Training:
     the state it had, whatever environment it is, as long as equal seeds and actions give equal
     episodes.
 
+    A *vector environment* is several environments in which one agent learns. In each round it
+    chooses an action for each of them, in their order, all step together, and then it learns what
+    came of it, in their order: a training with one environment has the same bits as one without a
+    vector. Each episode is reset with a seed of its own, numbered as they begin. The bits do not
+    depend on how environments are run: ``SyncVectorEnv`` and ``AsyncVectorEnv`` give the same, and
+    so do all autoreset modes.
+
+    A vector environment that cannot be reset one by one with seeds is seeded at the beginning only,
+    and resets itself. Agents learn in it, but such a training cannot be saved. That is any with
+    Gymnasium 1.0, and any other than these two, unless its autoreset mode is ``DISABLED`` or its
+    metadata say ``"reset_mask": True``.
+
     Parameters
     ----------
     agent
-        Learns every transition; its `progress` follows the training.
+        Learns every transition; its `progress` and its number of environments follow the training.
     env
-        With the agent's spaces.
+        With the agent's spaces; those of a single environment, where it is a vector of them.
     steps, episodes
-        How long: one of them.
+        How long: one of them. Steps are transitions learned, over all environments.
     seed
         Root of the episodes' seeds.
     callbacks
@@ -151,12 +183,16 @@ class Training:
     >>> training = Training(agent, env, steps=500)
     >>> training.run().n_steps
     500
+    >>> envs = gym.make_vec("Pendulum-v1", num_envs=4, vectorization_mode="sync")
+    >>> agent = SDNNQLearning(envs.single_observation_space, envs.single_action_space, seed=1)
+    >>> agent.train(envs, steps=500).n_steps
+    500
     """
 
     def __init__(
         self,
         agent: Learner,
-        env: gym.Env[Any, Any],
+        env: gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any],
         *,
         steps: int | None = None,
         episodes: int | None = None,
@@ -189,11 +225,16 @@ class Training:
         """Whole episodes."""
         self.n_rows = 0
         """Rows that the callbacks were given, since the training was begun."""
-        self._actions: list[Any] | None = None  # of the present episode; None: none has begun
-        self._observation: Any = None
-        self._return = 0.0
+        self._rounds = rounds_in(env)
+        self._present: list[_Episode | None] = [None] * self._rounds.n_environments
+        self._first_left = 0  # the environments before it have learned this round's step
         self._stops = False
         self._is_within_step = False
+
+    @property
+    def n_environments(self) -> int:
+        """In how many environments at once the agent learns."""
+        return self._rounds.n_environments
 
     @property
     def is_within_step(self) -> bool:
@@ -233,8 +274,8 @@ class Training:
                 stack.callback(callback.on_end, self)
             while not (self.is_finished or self._stops):
                 self._is_within_step = True
-                if self._actions is None:
-                    self._begin_episode()
+                if self.agent.n_environments != self.n_environments:
+                    self.agent.n_environments = self.n_environments
                 rows += self._step()
                 self._is_within_step = False
         if interrupts.received is not None:
@@ -246,6 +287,17 @@ class Training:
             is_finished=self.is_finished,
         )
 
+    def require_repeatable(self) -> None:
+        """Raise ValueError if the episodes of the environment cannot be repeated, nor saved."""
+        if self._rounds.can_repeat:
+            return
+        raise ValueError(
+            "env must reset each of its environments with a seed of its own where a training is"
+            f" saved, got {type(self.env.unwrapped).__name__}: take SyncVectorEnv or AsyncVectorEnv"
+            " of Gymnasium 1.1 or newer, as gymnasium.make_vec(..., vectorization_mode='sync')"
+            " makes it, with shared memory or the autoreset mode DISABLED"
+        )
+
     def save(self, path: str | Path) -> None:
         """Write agent and training in one file, from which `load` goes on.
 
@@ -253,30 +305,48 @@ class Training:
         ------
         OSError
             If the file cannot be written.
+        ValueError
+            If the environment is a vector that cannot be reset one by one.
         """
+        self.require_repeatable()
         arrays = self.agent.state()
-        if self._actions is not None:
-            shape = (-1, *(self.agent.action_space.shape or ()))
-            arrays[_ARRAYS + "actions"] = np.array(self._actions).reshape(shape)
-            arrays[_ARRAYS + "observation"] = np.asarray(self._flat_observation())
-        counts = {
+        shape = (-1, *(self.agent.action_space.shape or ()))
+        for number, episode in enumerate(self._present):
+            if episode is not None:
+                prefix = _prefix(number)
+                arrays[prefix + "actions"] = np.array(episode.actions).reshape(shape)
+                arrays[prefix + "observation"] = np.asarray(
+                    self.agent.flat_observation(episode.last_observation)
+                )
+        first = self._present[0]
+        counts: dict[str, Any] = {
             "steps": self.steps,
             "episodes": self.episodes,
             "seed": self.seed,
             "n_steps": self.n_steps,
             "n_episodes": self.n_episodes,
             "n_rows": self.n_rows,
-            "return": self._return,
+            "return": 0.0 if first is None else first.sum_of_rewards,
             "evaluate_every": self.evaluate_every,
             "evaluation_episodes": self.evaluation_episodes,
         }
+        if self.n_environments > 1:
+            counts["environments"] = [
+                episode
+                and {
+                    "episode": episode.number,
+                    "return": episode.sum_of_rewards,
+                    "waits": episode.outcome is not None,
+                }
+                for episode in self._present
+            ]
         write(Path(path), {**self.agent.description(), "training": counts}, arrays)
 
     @classmethod
     def load(
         cls,
         path: str | Path,
-        env: gym.Env[Any, Any],
+        env: gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any],
         *,
         callbacks: Iterable[Callback] = (),
         evaluation_env: gym.Env[Any, Any] | None = None,
@@ -301,7 +371,8 @@ class Training:
         OSError
             If the file cannot be read.
         ValueError
-            If it is damaged, holds no training, or the environment does not repeat the episode.
+            If it is damaged, holds no training, or the environment does not repeat the episode;
+            if the environment is a vector of another size, or cannot be reset one by one.
         """
         description, arrays = read(Path(path))
         if "training" not in description:
@@ -321,63 +392,143 @@ class Training:
             evaluation_episodes=counts["evaluation_episodes"],
         )
         training.n_steps, training.n_episodes = counts["n_steps"], counts["n_episodes"]
-        training.n_rows, training._return = counts["n_rows"], counts["return"]
-        if _ARRAYS + "actions" in arrays:
-            training._repeat_episode(
-                list(arrays[_ARRAYS + "actions"]), arrays[_ARRAYS + "observation"]
+        training.n_rows = counts["n_rows"]
+        saved = counts.get("environments")
+        if saved is None:
+            has_begun = _prefix(0) + "actions" in arrays
+            only = {"episode": counts["n_episodes"], "return": counts["return"], "waits": False}
+            saved = [only if has_begun else None]
+        if len(saved) != training.n_environments:
+            raise ValueError(
+                f"env must have {len(saved)} environments, as the training had,"
+                f" got {training.n_environments}"
             )
+        training.require_repeatable()
+        for number, told in enumerate(saved):
+            if told is not None:
+                training._present[number] = _Episode(
+                    told["episode"],
+                    None,
+                    list(arrays[_prefix(number) + "actions"]),
+                    told["return"],
+                )
+        waits = [told is not None and told["waits"] for told in saved]
+        training._repeat_episodes(waits)
+        for number, episode in enumerate(training._present):
+            if episode is not None:
+                training._check_repeated(episode, arrays[_prefix(number) + "observation"])
         return training
 
-    def _begin_episode(self) -> None:
-        self._observation, _ = self.env.reset(
-            seed=episode_seed(self.seed, _LEARNING, self.n_episodes)
-        )
-        self._actions, self._return = [], 0.0
-        self.agent.begin_episode()
+    def _repeat_episodes(self, waits: list[bool]) -> None:
+        """Bring every environment to where its episode was saved: all end at the same time.
 
-    def _repeat_episode(self, actions: list[Any], observation: NDArray[np.float64]) -> None:
-        self._observation, _ = self.env.reset(
-            seed=episode_seed(self.seed, _LEARNING, self.n_episodes)
-        )
-        for action in actions:
-            self._observation, *_ = self.env.step(action)
-        if not np.array_equal(self._flat_observation(), observation):
+        Until its own episode begins, an environment does anything.
+        """
+        present = {i: episode for i, episode in enumerate(self._present) if episode is not None}
+        n_rounds = max((len(episode.actions) for episode in present.values()), default=0)
+        longest = next((e for e in present.values() if len(e.actions) == n_rounds), None)
+        seeds = {i: self._seed_of(present[i].number if i in present else 0) for i in self._numbers}
+        ended = set(self._numbers)
+        for t in range(n_rounds):
+            assert longest is not None
+            starts = {i for i, e in present.items() if n_rounds - len(e.actions) == t}
+            seen = self._rounds.reset({i: seeds[i] for i in sorted(starts | ended)})
+            for i in starts:
+                present[i].observation = seen[i]
+            actions = [
+                present[i].actions[t - n_rounds]
+                if i in present and t >= n_rounds - len(present[i].actions)
+                else longest.actions[t]
+                for i in self._numbers
+            ]
+            outcomes = self._rounds.step(actions)
+            ended = {i for i, outcome in enumerate(outcomes) if outcome.ends}
+            for i, episode in present.items():
+                if t < n_rounds - 1 or not waits[i]:
+                    episode.observation = outcomes[i].observation
+                else:
+                    episode.outcome = outcomes[i]
+
+    def _check_repeated(self, episode: _Episode, observation: NDArray[np.float64]) -> None:
+        found = self.agent.flat_observation(episode.last_observation)
+        if not np.array_equal(found, observation):
             raise ValueError(
                 "env must repeat the episode in which the training was saved: the same seed and"
-                f" actions led to {self._flat_observation()}, not to {observation}"
+                f" actions led to {found}, not to {observation}"
             )
-        self._actions = actions
 
-    def _flat_observation(self) -> NDArray[np.float64]:
-        return self.agent.flat_observation(self._observation)
+    @property
+    def _numbers(self) -> range:
+        return range(self.n_environments)
+
+    def _seed_of(self, episode: int) -> int:
+        return episode_seed(self.seed, _LEARNING, episode)
+
+    def _begin_episode(self, environment: int, number: int, observation: Any) -> None:
+        self._present[environment] = _Episode(number, observation)
+        self.agent.begin_episode(environment)
+
+    def _begin_round(self) -> None:
+        """Take a step in every environment, and begin an episode where the last one is over."""
+        over = [i for i, episode in enumerate(self._present) if episode is None]
+        n_begun = self.n_episodes + self.n_environments - len(over)
+        numbers = {i: n_begun + k for k, i in enumerate(over)}
+        first = self._rounds.reset({i: self._seed_of(number) for i, number in numbers.items()})
+        for i, observation in first.items():
+            self._begin_episode(i, numbers[i], observation)
+        actions = [
+            None if episode is None else self.agent.act(episode.observation, environment=i)
+            for i, episode in enumerate(self._present)
+        ]
+        for i, outcome in enumerate(self._rounds.step(actions)):
+            episode = self._present[i]
+            if episode is None:
+                self._begin_episode(i, numbers[i], outcome.observation)
+            else:
+                episode.actions.append(actions[i])
+                episode.outcome = outcome
+
+    def _next_outcome(self) -> tuple[int, _Episode, Outcome]:
+        """Find the first environment whose last step is still to be learned."""
+        while True:
+            for i in range(self._first_left, self.n_environments):
+                episode = self._present[i]
+                if episode is not None and episode.outcome is not None:
+                    self._first_left = i
+                    return i, episode, episode.outcome
+            self._begin_round()
+            self._first_left = 0
 
     def _step(self) -> list[Row]:
-        """Act and learn once; give the rows that follow from it."""
+        """Learn a step; give the rows that follow from it."""
         agent = self.agent
-        assert self._actions is not None
-        action = agent.act(self._observation)
-        following, reward, terminated, truncated, _ = self.env.step(action)
-        agent.learn(Transition(self._observation, action, float(reward), following, terminated))
-        self._actions.append(action)
-        self._observation = following
-        self._return += float(reward)
+        i, episode, outcome = self._next_outcome()
+        following, reward, terminated, _ = outcome
+        agent.learn(
+            Transition(episode.observation, episode.actions[-1], reward, following, terminated),
+            environment=i,
+        )
+        episode.observation, episode.outcome = following, None
+        episode.sum_of_rewards += reward
         self.n_steps += 1
         rows: list[Row] = []
-        if terminated or truncated:
+        if outcome.ends:
+            where = {"environment": i} if self.n_environments > 1 else {}
             rows.append(
                 self._row(
                     "episode",
                     episode=self.n_episodes,
-                    **{"return": self._return},
-                    length=len(self._actions),
-                    terminated=bool(terminated),
+                    **where,
+                    **{"return": episode.sum_of_rewards},
+                    length=len(episode.actions),
+                    terminated=terminated,
                 )
             )
             self.n_episodes += 1
-            self._actions = None
+            self._present[i] = None
         if self.steps is not None:
             agent.progress = self.n_steps / max(self.steps, self.n_steps)
-        elif self._actions is None and self.episodes is not None:
+        elif outcome.ends and self.episodes is not None:
             agent.progress = self.n_episodes / max(self.episodes, self.n_episodes)
         if self.evaluate_every is not None and self.n_steps % self.evaluate_every == 0:
             rows.append(self._evaluation())
@@ -403,3 +554,8 @@ class Training:
     def _row(self, kind: str, **values: Any) -> Row:
         self.n_rows += 1
         return {"kind": kind, "step": self.n_steps, **values}
+
+
+def _prefix(environment: int) -> str:
+    """Of the names of an environment's arrays: the first one's as if there were no others."""
+    return f"{_ARRAYS}{environment}." if environment else _ARRAYS

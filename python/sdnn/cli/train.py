@@ -33,6 +33,12 @@ PRESETS = ("general", "small", "robust", "paper")
     "--seed", type=click.IntRange(min=0, max=2**64 - 1), help="Root of all seeds.  [default: 0]"
 )
 @click.option(
+    "--n-envs",
+    type=click.IntRange(min=1, max=4096),
+    metavar="N",
+    help="Environments to learn in, in turn; steps are counted over all.  [default: 1]",
+)
+@click.option(
     "--out",
     type=click.Path(path_type=Path),
     help="The run's folder.  [default: runs/ENV-AGENT-SEED]",

@@ -72,6 +72,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         "render_modes": ["rgb_array"],
         "render_fps": AcrobotSwingUpEnv.metadata["render_fps"],
         "autoreset_mode": _AUTORESET,
+        "reset_mask": True,  # an option of reset: see sdnn.agents.Training
     }
 
     def __init__(

@@ -59,6 +59,7 @@ _WHOLE = {
     "steps": (1, 2**53),
     "episodes": (1, 2**53),
     "seed": (0, 2**64 - 1),
+    "n_envs": (1, 4096),
     "evaluate_every": (0, 2**53),
     "evaluation_episodes": (1, 10**9),
     "checkpoint_every": (1, 2**53),
@@ -92,6 +93,8 @@ class RunConfig:
         How long it learns: one of them; by default 200,000 steps.
     seed
         Root of all seeds, 0 to 2**64 - 1.
+    n_envs
+        Environments that the agent learns in, in turn; steps are counted over all of them.
     evaluate_every
         Steps between evaluations; 0: none.
     evaluation_episodes
@@ -126,6 +129,7 @@ class RunConfig:
     steps: int | None = None
     episodes: int | None = None
     seed: int = 0
+    n_envs: int = 1
     evaluate_every: int = 10_000
     evaluation_episodes: int = 10
     checkpoint_every: int = 10_000
@@ -192,8 +196,22 @@ class RunConfig:
 
     # What is made of it.
 
+    def make_training_env(self) -> gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any]:
+        """Make what the agent learns in: an environment, or a vector of `n_envs`.
+
+        Raises
+        ------
+        ConfigError
+            As `RunEnvironment.make`; or if Gymnasium is too old for a vector.
+        """
+        if self.n_envs == 1:
+            return self.environment.make()
+        if not hasattr(gym.vector, "AutoresetMode"):
+            raise ConfigError("n_envs", f"needs Gymnasium 1.1 or newer, this is {gym.__version__}")
+        return gym.vector.SyncVectorEnv([self.environment.make] * self.n_envs)
+
     def make_agent(self, env: gym.Env[Any, Any]) -> Agent[Any, Any]:
-        """Make the agent for an environment that `environment` made.
+        """Make the agent for an environment such as `environment` makes.
 
         Raises
         ------

@@ -46,6 +46,8 @@ AGENT = "agent.safetensors"
 TENSORBOARD = "tensorboard"
 LOCK = ".lock"
 
+TrainingEnv: TypeAlias = gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any]
+
 Reason: TypeAlias = Literal["done", "target", "stopped"]
 
 
@@ -211,7 +213,7 @@ class Run:
             stack.enter_context(self._locked())
             remove_partial_files(self.folder)
             environment = self.config.environment
-            env = stack.enter_context(closing(environment.make()))
+            env = stack.enter_context(closing(self.config.make_training_env()))
             evaluation_env = stack.enter_context(
                 closing(environment.make("evaluation_sensor_noise"))
             )
@@ -298,13 +300,13 @@ class Run:
     # Parts.
 
     def _training(
-        self, env: gym.Env[Any, Any], evaluation_env: gym.Env[Any, Any], callbacks: list[Callback]
+        self, env: TrainingEnv, evaluation_env: gym.Env[Any, Any], callbacks: list[Callback]
     ) -> Training:
         path = self.folder / CHECKPOINT
         if not path.exists():
             goal = self.goals[-1] if self.goals else self.config
             return Training(
-                self.config.make_agent(env),
+                self.config.make_agent(evaluation_env),
                 env,
                 steps=goal.steps,
                 episodes=goal.episodes,
@@ -327,7 +329,7 @@ class Run:
 
     def _set_goal(
         self,
-        env: gym.Env[Any, Any],
+        env: TrainingEnv,
         evaluation_env: gym.Env[Any, Any],
         steps: int | None,
         episodes: int | None,

@@ -238,6 +238,36 @@ TEST(Controller, DoesWhatItsAgentDoes) {
             core::state_of(agent));
 }
 
+TEST(Controller, OfSeveralRobotsDoesWhatItsAgentDoes) {
+  const testing::Folder folder;
+  const Numbers observed = {1.0, 0.0, 4.0, 11.0}, state = {0.5, 0.75, 0.25};
+  auto agent = fuzzy();
+  Controller controller(file_of(agent));
+  agent.set_n_environments(3);
+  controller.set_n_environments(3);
+  for (std::size_t t = 0; t < 60; ++t) {
+    const std::size_t robot = t * t % 3;  // 0 and 1
+    if (t % 7 == 0) {
+      agent.begin_episode(robot);
+      controller.begin_episode(robot);
+    }
+    const double picked = agent.act(state, true, robot);
+    const auto taken = controller.act(observed, true, robot);
+    const Numbers action(taken.begin(), taken.end());
+    (void)controller.act(observed, true, 2);  // another one decides meanwhile
+    (void)agent.act(state, true, 2);
+    agent.learn(state, picked, 1.0, state, false, robot);
+    controller.learn(observed, action, 1.0, observed, false, robot);
+  }
+  EXPECT_EQ(core::state_of(std::get<FuzzyQLearning>(controller.agent())), core::state_of(agent));
+  EXPECT_THROW((void)controller.act(observed, true, 3), std::invalid_argument);
+  EXPECT_THROW(controller.begin_episode(3), std::invalid_argument);
+  controller.write(folder / "agent");
+  const Controller other(folder / "agent");
+  EXPECT_EQ(other.n_environments(), 3U);
+  EXPECT_EQ(core::state_of(std::get<FuzzyQLearning>(other.agent())), core::state_of(agent));
+}
+
 TEST(Controller, ABadArgumentChangesNothing) {
   const Numbers good(4, 0.5), shorter(3, 0.5), nan = {0.5, 0.5, testing::kNaN, 0.5};
   const auto check = [&](const auto& agent) {

@@ -246,6 +246,54 @@ TEST(FuzzyQLearning, ALifeCanBeCutAnywhere) {
   testing::expect_that_a_life_can_be_cut(traced_agent);
 }
 
+TEST(FuzzyQLearning, ALifeInSeveralEnvironmentsCanBeCutAnywhere) {
+  testing::expect_that_a_life_can_be_cut(traced_agent, 3);
+}
+
+// Where two environments fire different rules, each goes as if it were alone, but for what is
+// drawn.
+TEST(FuzzyQLearning, EachEnvironmentHasAnActAndTracesOfItsOwn) {
+  const FuzzyQLearningConfig config{.trace_decay = 0.5, .policy = kGreedy};
+  const FuzzyRules rules({.n_inputs = 2, .n_sets = 4, .n_actions = 3});
+  FuzzyQLearning both(rules, config, 1), low(rules, config, 1), high(rules, config, 1);
+  both.set_n_environments(2);
+  EXPECT_EQ(both.n_environments(), 2U);
+  core::Random world(4, core::Stream::weights);
+  State state = {0.1, 0.1}, other = {0.9, 0.9};
+  for (int i = 0; i < 300; ++i) {
+    if (i % 20 == 0) {
+      both.begin_episode(0);
+      low.begin_episode();
+    }
+    if (i % 33 == 0) {
+      both.begin_episode(1);
+      high.begin_episode();
+    }
+    const State next = {world.uniform() / 3.0, world.uniform() / 3.0};
+    const State other_next = {1.0 - world.uniform() / 3.0, 1.0 - world.uniform() / 3.0};
+    const double action = both.act(state), other_action = both.act(other, true, 1);
+    ASSERT_EQ(action, low.act(state));
+    ASSERT_EQ(other_action, high.act(other));
+    ASSERT_EQ(both.last_action(1), high.last_action());
+    const double reward = world.uniform(), other_reward = -world.uniform();
+    both.learn(state, action, reward, next, i % 20 == 19);
+    both.learn(other, other_action, other_reward, other_next, i % 33 == 32, 1);
+    low.learn(state, action, reward, next, i % 20 == 19);
+    high.learn(other, other_action, other_reward, other_next, i % 33 == 32);
+    state = next;
+    other = other_next;
+  }
+  for (const double x : {0.05, 0.2, 0.3}) {
+    EXPECT_EQ(both.value(State{x, x / 2.0}), low.value(State{x, x / 2.0}));
+    EXPECT_EQ(both.value(State{1.0 - x, 0.8}), high.value(State{1.0 - x, 0.8}));
+  }
+  EXPECT_THROW(both.learn(state, both.act(state), 1.0, state, false, 1), std::invalid_argument);
+  EXPECT_THROW((void)both.act(state, true, 2), std::invalid_argument);
+  EXPECT_THROW((void)both.act(state, false, 2), std::invalid_argument);
+  EXPECT_THROW(both.begin_episode(2), std::invalid_argument);
+  EXPECT_THROW(both.set_n_environments(0), std::invalid_argument);
+}
+
 TEST(FuzzyQLearning, ARestoredAgentAllocatesNothing) {
   testing::expect_that_a_restored_agent_allocates_nothing(traced_agent, testing::allocation_count);
 }

@@ -20,20 +20,22 @@ class World {
  public:
   using Action = decltype(std::declval<Agent&>().act({}));
 
-  World(std::size_t n_inputs, std::uint64_t seed)
-      : random_(seed, core::Stream::sensor_noise), state_(n_inputs, 0.5) {}
+  World(std::size_t n_inputs, std::uint64_t seed, std::size_t environment = 0)
+      : environment_(environment),
+        random_(seed, core::Stream::sensor_noise),
+        state_(n_inputs, 0.5) {}
 
   /// The next thing that happens to an agent: an episode begins, it acts, or it learns. Returns
   /// the action that it took, if any.
   std::optional<Action> tick(Agent& agent) {
     if (begins_) {
-      agent.begin_episode();
+      agent.begin_episode(environment_);
       begins_ = false;
       return std::nullopt;
     }
     if (!has_acted_) {
-      if (random_.below(8) == 0) (void)agent.act(state_, false);
-      action_ = agent.act(state_);
+      if (random_.below(8) == 0) (void)agent.act(state_, false, environment_);
+      action_ = agent.act(state_, true, environment_);
       has_acted_ = true;
       return action_;
     }
@@ -44,16 +46,25 @@ class World {
     // Now and then a larger one, so that ranges which follow the rewards grow.
     const double scale = random_.below(32) == 0 ? 32.0 : 4.0;
     const double reward = scale * static_cast<double>(random_.below(5)) - 2.0 * scale;
-    agent.learn(state_, action_, reward, next, terminated);
+    agent.learn(state_, action_, reward, next, terminated, environment_);
     state_ = std::move(next);
     begins_ = terminated || random_.below(16) == 0;
     if constexpr (requires { agent.set_progress(0.0); }) {
       if (random_.below(8) == 0) agent.set_progress(random_.uniform());
+      if (random_.below(16) == 0) agent.set_learning_rate(rate());
+      if (random_.below(16) == 0) agent.set_epsilon(rate());
     }
     return std::nullopt;
   }
 
  private:
+  /// In (0, 1], or that of the progress.
+  std::optional<double> rate() {
+    if (random_.below(2) == 0) return std::nullopt;
+    return 1.0 - random_.uniform();
+  }
+
+  std::size_t environment_;
   core::Random random_;
   std::vector<double> state_;
   Action action_{};
@@ -62,21 +73,24 @@ class World {
 };
 
 /// Expects that a life that was cut and taken up by another agent made by `make` ends as the whole
-/// one, for 120 random cuts, wherever it is cut and under whatever instruction sets.
+/// one, for 120 random cuts, wherever it is cut and under whatever instruction sets. With several
+/// environments these take turns.
 template <class Make>
-void expect_that_a_life_can_be_cut(const Make& make) {
+void expect_that_a_life_can_be_cut(const Make& make, std::size_t n_environments = 1) {
   using Agent = decltype(make());
   constexpr std::uint64_t kTicks = 400;
   Agent whole = make();
-  World<Agent> world(whole.n_inputs(), 7);
+  whole.set_n_environments(n_environments);
+  std::vector<World<Agent>> worlds;
+  for (std::size_t i = 0; i < n_environments; ++i) worlds.emplace_back(whole.n_inputs(), 7 + i, i);
   struct Cut {
     core::State state;
-    World<Agent> world;
+    std::vector<World<Agent>> worlds;
   };
   std::vector<Cut> cuts;
   for (std::uint64_t t = 0; t < kTicks; ++t) {
-    cuts.push_back({core::state_of(whole), world});
-    world.tick(whole);
+    cuts.push_back({core::state_of(whole), worlds});
+    worlds[t % n_environments].tick(whole);
   }
   const core::State end = core::state_of(whole);
   core::Random random(11, core::Stream::weights);
@@ -86,8 +100,8 @@ void expect_that_a_life_can_be_cut(const Make& make) {
       Agent resumed = make();
       core::restore(resumed, cuts[at].state);
       ASSERT_EQ(core::state_of(resumed), cuts[at].state) << at;
-      World<Agent> rest = cuts[at].world;
-      for (std::uint64_t t = at; t < kTicks; ++t) rest.tick(resumed);
+      std::vector<World<Agent>> rest = cuts[at].worlds;
+      for (std::uint64_t t = at; t < kTicks; ++t) rest[t % n_environments].tick(resumed);
       ASSERT_EQ(core::state_of(resumed), end) << at;
     }
   });

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -430,6 +431,191 @@ TEST(QLearning, ALifeCanBeCutAnywhere) {
   testing::expect_that_a_life_can_be_cut(vector_agent);
 }
 
+TEST(QLearning, ALifeInSeveralEnvironmentsCanBeCutAnywhere) {
+  testing::expect_that_a_life_can_be_cut(rbf_agent, 2);
+  testing::expect_that_a_life_can_be_cut(vector_agent, 3);
+}
+
+// As OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown, while another environment goes its
+// way.
+TEST(QLearning, EachEnvironmentHasStepsThatWait) {
+  LookupTable table(2, 5, 2);
+  Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 2}, 1);
+  agent.set_n_environments(2);
+  EXPECT_EQ(agent.n_environments(), 2U);
+  const auto at = [](int i, int environment) {
+    return std::array{(i + 0.5) / 5.0, environment == 0 ? 0.1 : 0.9};
+  };
+  const auto q = [&](int i, int environment) {
+    return agent.action_value().value(at(i, environment), 0);
+  };
+  for (int i = 0; i < 2; ++i) {
+    for (const int e : {0, 1}) {
+      agent.learn(at(i, e), 0, e == 0 ? i + 1.0 : 8.0, at(i + 1, e), false,
+                  static_cast<std::size_t>(e));
+    }
+  }
+  EXPECT_EQ(q(0, 0), 1.0 + 0.5 * 2.0);
+  EXPECT_EQ(q(0, 1), 8.0 + 0.5 * 8.0);
+  EXPECT_EQ(q(1, 0), 0.0);
+  agent.begin_episode(1);  // of the other nothing is learned
+  EXPECT_EQ(q(1, 0), 0.0);
+  EXPECT_EQ(q(1, 1), 8.0);
+  agent.set_n_environments(1);
+  EXPECT_EQ(q(1, 0), 0.0);
+  agent.begin_episode();
+  EXPECT_EQ(q(1, 0), 2.0);
+}
+
+TEST(QLearning, WhatWaitsOfEnvironmentsThatAreNoMoreIsLearned) {
+  Agent agent(LookupTable(1, 5, 2), {.learning_rate = 1.0, .n_steps = 5}, 1);
+  agent.set_n_environments(3);
+  agent.learn(cell(2), 1, 4.0, cell(3), false, 2);
+  EXPECT_EQ(agent.action_value().value(cell(2), 1), 0.0);
+  agent.set_n_environments(2);
+  EXPECT_EQ(agent.action_value().value(cell(2), 1), 4.0);
+}
+
+// All that other environments share with it is drawn and learned here, and in nobody's name.
+TEST(QLearning, AnyOneOfSeveralEnvironmentsIsLikeTheOnlyOne) {
+  auto alone = vector_agent();
+  testing::World<decltype(alone)> world(2, 9);
+  for (int t = 0; t < 300; ++t) world.tick(alone);
+  for (const std::size_t environment : {0U, 2U}) {
+    auto one_of_four = vector_agent();
+    one_of_four.set_n_environments(4);
+    testing::World<decltype(alone)> same_world(2, 9, environment);
+    for (int t = 0; t < 300; ++t) same_world.tick(one_of_four);
+    const core::State state = core::state_of(one_of_four);
+    const std::string before =
+        environment == 0 ? "" : "environment." + std::to_string(environment) + ".";
+    for (const auto& [name, tensor] : core::state_of(alone)) {
+      const bool is_shared = !state.contains("environment.1." + name);
+      EXPECT_EQ(state.at(is_shared ? name : before + name), tensor) << name;
+    }
+    EXPECT_NE(state.at(before + "waiting.next_state"),
+              state.at("environment.1.waiting.next_state"));
+  }
+}
+
+TEST(QLearning, RefusesEnvironmentsThatAreNone) {
+  Agent agent(LookupTable(1, 5, 2), {}, 1);
+  agent.set_n_environments(2);
+  EXPECT_THROW((void)agent.act(cell(0), true, 2), std::invalid_argument);
+  EXPECT_THROW((void)agent.act(cell(0), false, 2), std::invalid_argument);
+  EXPECT_THROW(agent.begin_episode(2), std::invalid_argument);
+  EXPECT_THROW(agent.learn(cell(0), 0, 1.0, cell(1), false, 2), std::invalid_argument);
+  EXPECT_THROW(agent.set_n_environments(0), std::invalid_argument);
+  EXPECT_THROW(agent.set_n_environments((1U << 20U) + 1U), std::invalid_argument);
+  EXPECT_EQ(agent.n_environments(), 2U);
+  EXPECT_EQ(agent.action_value(), LookupTable(1, 5, 2));
+}
+
+TEST(QLearning, RefusesAStateOfEnvironmentsThatDoesNotFit) {
+  auto agent = rbf_agent();
+  agent.set_n_environments(3);
+  testing::expect_that_damage_is_refused(agent);
+  const core::State good = core::state_of(agent);
+  const auto refused = [&](const core::State& bad, const std::string& message) {
+    testing::expect_refused(agent, bad, "state: environment.2." + message);
+  };
+  refused(testing::with_number(good, "environment.2.step", -1), "step must be 0 or more");
+  refused(testing::with_number(good, "environment.2.kept_action", std::int64_t{7}),
+          "kept_action must be an action");
+  refused(testing::with_number(good, "environment.2.range.sum", testing::kNaN),
+          "range.sum must be a finite sum");
+  core::State bad = good;  // a second one is missing
+  std::erase_if(bad, [](const auto& item) { return item.first.starts_with("environment.1."); });
+  testing::expect_refused(agent, bad, "state: environment.2.kept_action must not be there");
+}
+
+TEST(QLearning, RatesFallByEqualFactorsWithAnExponentialSchedule) {
+  const QLearningConfig config{.learning_rate = 1.0,
+                               .policy = {.epsilon = 0.5},
+                               .final_learning_rate = 0.0625,
+                               .final_epsilon = 0.125,
+                               .schedule = Schedule::exponential};
+  Agent agent(LookupTable(1, 5, 2), config, 1);
+  EXPECT_EQ(agent.learning_rate(), 1.0);
+  agent.set_progress(0.5);
+  EXPECT_DOUBLE_EQ(agent.learning_rate(), 0.25);
+  EXPECT_DOUBLE_EQ(agent.epsilon(), 0.25);
+  agent.set_progress(0.75);
+  EXPECT_DOUBLE_EQ(agent.learning_rate(), 0.125);
+  EXPECT_EQ(config.learning_rate_at(0.75), agent.learning_rate());
+  EXPECT_EQ(config.epsilon_at(0.75), agent.epsilon());
+  agent.set_progress(1.0);
+  EXPECT_EQ(agent.learning_rate(), 0.0625);
+  EXPECT_EQ(agent.epsilon(), 0.125);
+  const Agent steady(LookupTable(1, 5, 2), {.schedule = Schedule::exponential}, 1);
+  EXPECT_EQ(steady.config().learning_rate_at(0.7), 0.5);
+}
+
+TEST(QLearning, AnExponentialScheduleStaysBetweenItsEnds) {
+  core::Random random(3, core::Stream::weights);
+  for (int i = 0; i < 2000; ++i) {
+    const double first = 1.0 - random.uniform();
+    const double last = i % 3 == 0 ? first : 1e-300 + random.uniform() * random.uniform();
+    const QLearningConfig config{
+        .learning_rate = first, .final_learning_rate = last, .schedule = Schedule::exponential};
+    const double progress = random.uniform();
+    const double rate = config.learning_rate_at(progress);
+    ASSERT_GE(rate, std::min(first, last));
+    ASSERT_LE(rate, std::max(first, last));
+    ASSERT_NEAR(std::log(rate), (1.0 - progress) * std::log(first) + progress * std::log(last),
+                1e-11);
+    ASSERT_EQ(config.learning_rate_at(0.0), first);
+    ASSERT_EQ(config.learning_rate_at(1.0), last);
+  }
+}
+
+TEST(QLearning, AnExponentialScheduleHasNoEndAtZero) {
+  EXPECT_EQ(message({.final_epsilon = 0.0, .schedule = Schedule::exponential}),
+            "final_epsilon must be greater than 0 where the schedule is exponential, got 0");
+  EXPECT_EQ(
+      message(
+          {.policy = {.epsilon = 0.0}, .final_epsilon = 0.5, .schedule = Schedule::exponential}),
+      "epsilon must be greater than 0 where the schedule is exponential, got 0");
+  EXPECT_EQ(message({.policy = {.epsilon = 0.0}, .schedule = Schedule::exponential}), "no error");
+}
+
+TEST(QLearning, RatesThatAreSetStayWhateverTheProgress) {
+  Agent agent(LookupTable(1, 5, 2),
+              {.learning_rate = 0.5, .final_learning_rate = 0.25, .final_epsilon = 0.0}, 1);
+  agent.set_learning_rate(0.75);
+  EXPECT_EQ(agent.learning_rate(), 0.75);
+  agent.set_progress(1.0);
+  EXPECT_EQ(agent.learning_rate(), 0.75);
+  EXPECT_EQ(agent.epsilon(), 0.0);
+  agent.learn(cell(0), 0, 16.0, cell(1), true);
+  EXPECT_EQ(agent.action_value().value(cell(0), 0), 12.0);
+  agent.set_epsilon(1.0);
+  agent.set_learning_rate(std::nullopt);
+  EXPECT_EQ(agent.learning_rate(), 0.25);
+  EXPECT_EQ(agent.epsilon(), 1.0);
+  for (const double bad : {-0.1, 1.1, testing::kNaN}) {
+    EXPECT_THROW(agent.set_learning_rate(bad), std::invalid_argument);
+    EXPECT_THROW(agent.set_epsilon(bad), std::invalid_argument);
+  }
+  EXPECT_THROW(agent.set_learning_rate(0.0), std::invalid_argument);
+  EXPECT_EQ(agent.epsilon(), 1.0);
+  auto saved = rbf_agent();
+  EXPECT_FALSE(core::state_of(saved).contains("learning_rate"));
+  saved.set_learning_rate(0.75);
+  saved.set_epsilon(0.5);
+  const core::State good = core::state_of(saved);
+  for (const double bad : {0.0, 1.1, testing::kNaN}) {
+    testing::expect_refused(saved, testing::with_number(good, "learning_rate", bad),
+                            "state: learning_rate must be in (0, 1]");
+  }
+  testing::expect_refused(saved, testing::with_number(good, "epsilon", -0.1),
+                          "state: epsilon must be in [0, 1]");
+  auto other = rbf_agent();
+  core::restore(other, good);
+  EXPECT_EQ(other.learning_rate(), 0.75);
+  EXPECT_EQ(other.epsilon(), 0.5);
+}
+
 TEST(QLearning, ARestoredAgentAllocatesNothing) {
   testing::expect_that_a_restored_agent_allocates_nothing(sdnn_agent, testing::allocation_count);
   testing::expect_that_a_restored_agent_allocates_nothing(rbf_agent, testing::allocation_count);
@@ -465,6 +651,8 @@ TEST(QLearning, RefusesAStateThatDoesNotFit) {
          core::state_of(agent).at("waiting.rewards").size() < 2) {
     world.tick(agent);
   }
+  agent.set_learning_rate(std::nullopt);  // what may be missing
+  agent.set_epsilon(std::nullopt);
   testing::expect_that_damage_is_refused(agent);
   const core::State good = core::state_of(agent);
   using testing::with_number;

@@ -19,44 +19,47 @@ void expect_range(const ReturnRange& range, double low, double high) {
 // gamma = 1/2: every number is exact.
 TEST(ReturnRange, GrowsByAQuarterMoreThanItMust) {
   ReturnRange range(0.5);
+  double sum = 0.0;
   EXPECT_FALSE(range.is_known());
-  EXPECT_FALSE(range.note(0.0));
+  EXPECT_FALSE(range.note(0.0, sum));
   EXPECT_FALSE(range.is_known());
-  EXPECT_TRUE(range.note(8.0));  // 8 + 8 / 4
+  EXPECT_TRUE(range.note(8.0, sum));  // 8 + 8 / 4
   EXPECT_TRUE(range.is_known());
   expect_range(range, 0.0, 10.0);
-  EXPECT_FALSE(range.note(2.0));  // 2 + 8 / 2 = 6
-  EXPECT_FALSE(range.note(7.0));  // 7 + 6 / 2 = 10, still inside
-  EXPECT_TRUE(range.note(8.0));   // 8 + 10 / 2 = 13, and 13 / 4
+  EXPECT_FALSE(range.note(2.0, sum));  // 2 + 8 / 2 = 6
+  EXPECT_FALSE(range.note(7.0, sum));  // 7 + 6 / 2 = 10, still inside
+  EXPECT_TRUE(range.note(8.0, sum));   // 8 + 10 / 2 = 13, and 13 / 4
   expect_range(range, 0.0, 16.25);
-  EXPECT_TRUE(range.note(-20.0));  // -20 + 13 / 2 = -13.5, and (16.25 + 13.5) / 4
+  EXPECT_TRUE(range.note(-20.0, sum));  // -20 + 13 / 2 = -13.5, and (16.25 + 13.5) / 4
   expect_range(range, -20.9375, 16.25);
 }
 
 TEST(ReturnRange, OfPunishmentsBeginsWithThem) {
   ReturnRange range(1.0);
-  EXPECT_TRUE(range.note(-4.0));
+  double sum = 0.0;
+  EXPECT_TRUE(range.note(-4.0, sum));
   EXPECT_TRUE(range.is_known());
   expect_range(range, -5.0, 0.0);
 }
 
-TEST(ReturnRange, AnEpisodeBeginsWithASumOfNothing) {
+TEST(ReturnRange, HoldsTheSumsOfSeveralEpisodes) {
   ReturnRange range(1.0);
-  EXPECT_TRUE(range.note(8.0));
-  range.begin_episode();
-  EXPECT_FALSE(range.note(9.0));  // 17 otherwise
+  double sum = 0.0, other = 0.0;
+  EXPECT_TRUE(range.note(8.0, sum));
+  EXPECT_FALSE(range.note(9.0, other));  // 17 if it were the same episode
   expect_range(range, 0.0, 10.0);
 }
 
 TEST(ReturnRange, HoldsEverySumAndGrowsRarely) {
   ReturnRange range(0.9);
   core::Random random(1, core::Stream::weights);
-  double sum = 0.0;
+  double sum = 0.0, expected = 0.0;
   int n_grown = 0;
   for (int i = 0; i < 10000; ++i) {
     const double reward = std::exp(10.0 * random.uniform()) - 100.0;
-    sum = reward + 0.9 * sum;
-    n_grown += range.note(reward);
+    expected = reward + 0.9 * expected;
+    n_grown += range.note(reward, sum);
+    ASSERT_EQ(sum, expected);
     ASSERT_LE(range.low(), sum);
     ASSERT_GE(range.high(), sum);
   }
@@ -65,8 +68,10 @@ TEST(ReturnRange, HoldsEverySumAndGrowsRarely) {
 
 TEST(ReturnRange, StaysFinite) {
   ReturnRange range(1.0);
+  double sum = 0.0;
   for (int i = 0; i < 5000; ++i) {
-    range.note(std::numeric_limits<double>::max() * (i / 7 % 2 == 0 ? 1.0 : -1.0));
+    range.note(std::numeric_limits<double>::max() * (i / 7 % 2 == 0 ? 1.0 : -1.0), sum);
+    ASSERT_TRUE(ReturnRange::is_sum(sum));
   }
   EXPECT_LT(range.high(), 1.7e300);
   EXPECT_GT(range.low(), -1.7e300);
@@ -77,11 +82,13 @@ TEST(ReturnRange, StaysFinite) {
 
 TEST(ReturnRange, RefusesWhatIsNoRange) {
   ReturnRange range(0.5);
-  range.note(8.0);
+  double sum = 0.0;
+  range.note(8.0, sum);
   testing::expect_that_damage_is_refused(range);
   const core::State good = core::state_of(range);
   for (const double bad : {testing::kNaN, testing::kInfinity, -testing::kInfinity}) {
-    for (const char* name : {"sum", "low", "high"}) {
+    EXPECT_FALSE(ReturnRange::is_sum(bad));
+    for (const char* name : {"low", "high"}) {
       testing::expect_refused(range, testing::with_number(good, name, bad),
                               std::string("state: ") + name + " must be ");
     }

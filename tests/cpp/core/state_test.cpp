@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -98,6 +99,42 @@ TEST(State, WhatDoesNotFitIsNamedAndChangesNothing) {
   testing::expect_refused(object, bad, "state: list must be of one dimension");
   bad["list"].shape = {0, 7};
   testing::expect_refused(object, bad, "state: list must be as large as its shape");
+}
+
+/// A number that may be missing, and parts that are numbered from 1.
+struct Sparse {
+  std::optional<double> limit;
+  std::vector<Inner> others;
+
+  template <class Self, class Archive>
+  static void exchange(Self& self, Archive& archive) {
+    archive.number("limit", self.limit);
+    if constexpr (Archive::kReads) self.others.resize(archive.n_numbered("other"));
+    for (std::size_t i = 0; i < self.others.size(); ++i) {
+      archive.within("other." + std::to_string(i + 1),
+                     [&] { Inner::exchange(self.others[i], archive); });
+    }
+  }
+};
+
+TEST(State, HasNothingOfWhatIsMissing) {
+  Sparse none;
+  EXPECT_TRUE(state_of(none).empty());
+  Sparse some{2.5, std::vector<Inner>(11)};
+  some.others[9].value = 7.0;
+  const State state = state_of(some);
+  EXPECT_EQ(state.size(), 12U);
+  EXPECT_EQ(testing::number_of<double>(state, "other.10.value"), 7.0);
+  Sparse other{1.0, std::vector<Inner>(2)};
+  restore(other, state);
+  EXPECT_EQ(other.limit, 2.5);
+  EXPECT_EQ(state_of(other), state);
+  restore(other, state_of(none));
+  EXPECT_EQ(other.limit, std::nullopt);
+  EXPECT_TRUE(other.others.empty());
+  State bad = state;
+  bad.erase("other.4.value");
+  testing::expect_refused(other, bad, "state: other.10.value must not be there");
 }
 
 TEST(StateReader, NamesTheTensorOfWhatCouldNotBeTaken) {

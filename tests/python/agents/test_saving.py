@@ -77,9 +77,11 @@ N_STEPS = 150
 def lived(agent, first, last, cut=None):
     """Steps ``first`` to ``last`` of a life in which everything follows from the step's number.
 
-    At a ``cut`` the agent is replaced after acting and before learning, or after both.
+    At a ``cut`` the agent is replaced after acting and before learning, or after both. Where it
+    has several environments these take turns.
     """
     for step in range(first, last):
+        where = step % agent.n_environments
         rng = np.random.default_rng(step)
         observation, following = (
             {"at": rng.uniform(-1, 1, 2), "lamp": int(rng.integers(2))}
@@ -88,13 +90,13 @@ def lived(agent, first, last, cut=None):
             for _ in range(2)
         )
         if step % 17 == 0:
-            agent.begin_episode()
+            agent.begin_episode(where)
         agent.progress = step / N_STEPS
-        action = agent.act(observation)
+        action = agent.act(observation, environment=where)
         if cut is not None and step == cut[0] and cut[1] == "before learning":
             agent = cut[2](agent)
         agent.learn(
-            Transition(observation, action, float(rng.normal()), following, step % 17 == 16)
+            Transition(observation, action, float(rng.normal()), following, step % 17 == 16), where
         )
         if step % 5 == 0:
             agent.act(observation, explore=False)
@@ -112,19 +114,25 @@ def same_state(first, second):
     assert first.description() == second.description()
 
 
+@pytest.mark.parametrize(("n_environments", "n_cuts"), [(1, 100), (4, 24)])
 @pytest.mark.parametrize("kind", KINDS)
-def test_at_any_cut_a_saved_agent_goes_on_exactly(kind, tmp_path):
-    whole = lived(KINDS[kind](), 0, N_STEPS)
+def test_at_any_cut_a_saved_agent_goes_on_exactly(kind, n_environments, n_cuts, tmp_path):
+    def new_agent():
+        agent = KINDS[kind]()
+        agent.n_environments = n_environments
+        return agent
+
+    whole = lived(new_agent(), 0, N_STEPS)
 
     def from_file(agent):
         agent.save(tmp_path / "agent.safetensors")
         return load_agent(tmp_path / "agent.safetensors")
 
     ways = [from_file, lambda agent: pickle.loads(pickle.dumps(agent)), copy.deepcopy]
-    cuts = np.random.default_rng(7).permutation(N_STEPS - 1)[:100]
+    cuts = np.random.default_rng(7).permutation(N_STEPS - 1)[:n_cuts]
     for number, cut in enumerate(cuts):
         when = ("before learning", "after learning")[number // 3 % 2]
-        again = lived(KINDS[kind](), 0, N_STEPS, (cut, when, ways[number % 3]))
+        again = lived(new_agent(), 0, N_STEPS, (cut, when, ways[number % 3]))
         same_state(whole, again)
 
 

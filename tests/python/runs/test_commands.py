@@ -198,6 +198,19 @@ def test_options_come_before_a_file(invoke, tmp_path):
     assert RunConfig.from_values(again) == Run.open("one").config
 
 
+def test_several_environments_are_learned_in(invoke):
+    done = invoke("train", DRIFTING, *SHORT, "--n-envs", 4, "--out", "four", "--json")
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["n_steps"] == 150
+    run = Run.open("four")
+    assert run.config.n_envs == 4
+    seen = {row["environment"] for row in run.rows() if row["kind"] == "episode"}
+    assert len(seen) > 1
+    assert seen <= {0, 1, 2, 3}
+    assert invoke("resume", "four", "--steps", 170).exit_code == 0
+    assert invoke("plot", "four").exit_code == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -214,6 +227,8 @@ def test_options_come_before_a_file(invoke, tmp_path):
         (["CartPole-v1", "--steps", 5, "--episodes", 5], "--steps and --episodes"),
         (["CartPole-v1", "--seed", -1], "--seed"),
         (["CartPole-v1", "--seed", 2**64], "--seed"),
+        (["CartPole-v1", "--n-envs", 0], "--n-envs"),
+        (["CartPole-v1", "--n-envs", 5000], "--n-envs"),
         (["CartPole-v1", "--config", "missing.toml"], "--config"),
         (["CartPole-v1", "--noise", -1], "--noise"),
         (["CartPole-v1", "--noise", "nan"], "--noise"),

@@ -94,7 +94,12 @@ def test_a_run_is_the_training_that_its_configuration_says(whole, tmp_path):
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("config", [CONFIG, WARMING_UP], ids=["noise", "warm-up"])
+SEVERAL = dataclasses.replace(WARMING_UP, n_envs=3)
+
+
+@pytest.mark.parametrize(
+    "config", [CONFIG, WARMING_UP, SEVERAL], ids=["noise", "warm-up", "several"]
+)
 def test_stopped_anywhere_a_run_goes_on_exactly(whole, tmp_path, config):
     expected = contents(whole(config))
     steps = sorted(random.Random(5).sample(range(1, 400), 12))
@@ -104,6 +109,14 @@ def test_stopped_anywhere_a_run_goes_on_exactly(whole, tmp_path, config):
         assert (outcome.n_steps, outcome.reason) == (step, "stopped")
     assert Run.open(run.folder).train().reason == "done"
     assert contents(run) == expected
+
+
+def test_in_several_environments_rows_say_which(whole):
+    run = whole(SEVERAL)
+    rows = [row for row in run.rows() if row["kind"] == "episode"]
+    assert {row["environment"] for row in rows} == {0, 1, 2}
+    assert 400 - 3 * max(row["length"] for row in rows) < sum(row["length"] for row in rows) <= 400
+    assert load_agent(run.folder / "agent.safetensors").n_environments == 3
 
 
 class FailAt(Callback):

@@ -67,6 +67,9 @@ constexpr std::array<std::string_view, 3> words_of(TieRule) noexcept {
 constexpr std::array<std::string_view, 2> words_of(ValueRange) noexcept {
   return {"given", "seen"};
 }
+constexpr std::array<std::string_view, 2> words_of(Schedule) noexcept {
+  return {"linear", "exponential"};
+}
 constexpr std::array<std::string_view, 2> words_of(approximators::InitialWeights) noexcept {
   return {"ternary", "uniform"};
 }

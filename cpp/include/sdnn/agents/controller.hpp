@@ -215,19 +215,30 @@ class Controller {
   std::size_t n_observed() const noexcept { return parts_.observation.n_observed(); }
   std::size_t n_dimensions() const noexcept { return parts_.action.n_dimensions(); }
 
-  /// The next act is an episode's first.
-  void begin_episode() {
-    std::visit([](auto& agent) { agent.begin_episode(); }, parts_.agent);
+  /// How many robots, or environments, the agent learns from at once: each has an episode of its
+  /// own, and a number from 0. Throws as the agent does.
+  void set_n_environments(std::size_t n) {
+    std::visit([n](auto& agent) { agent.set_n_environments(n); }, parts_.agent);
+  }
+  std::size_t n_environments() const {
+    return std::visit([](const auto& agent) { return agent.n_environments(); }, parts_.agent);
+  }
+
+  /// The next act in the environment is an episode's first.
+  void begin_episode(std::size_t environment = 0) {
+    std::visit([environment](auto& agent) { agent.begin_episode(environment); }, parts_.agent);
   }
 
   /// The action to take, in the units of the task; without `explore` a best one. The span is valid
   /// until the next act. Shapes: observation (n_observed,), the action (n_dimensions,). Throws
-  /// std::invalid_argument naming a number that is not finite; then nothing has changed.
-  std::span<const double> act(std::span<const double> observation, bool explore = true) {
+  /// std::invalid_argument naming a number that is not finite, or if there is no such environment;
+  /// then nothing has changed.
+  std::span<const double> act(std::span<const double> observation, bool explore = true,
+                              std::size_t environment = 0) {
     parts_.observation(observation, state_);
     std::visit(
         [&](auto& agent) {
-          const auto action = agent.act(state_, explore);
+          const auto action = agent.act(state_, explore, environment);
           if constexpr (std::is_same_v<decltype(action), const double>) {
             action_[0] = parts_.action.of_normalized(action);
           } else if constexpr (std::is_same_v<decltype(action), const std::size_t>) {
@@ -243,10 +254,11 @@ class Controller {
   }
 
   /// Learns a transition. The action is one that act gave; of fuzzy Q-learning, the last one with
-  /// `explore`. Shapes as in act. Throws std::invalid_argument for others and for numbers that are
-  /// not finite, and then nothing has changed; as the agent does.
+  /// `explore` in the environment. Shapes as in act. Throws std::invalid_argument for others and
+  /// for numbers that are not finite, and then nothing has changed; as the agent does.
   void learn(std::span<const double> observation, std::span<const double> action, double reward,
-             std::span<const double> next_observation, bool terminated) {
+             std::span<const double> next_observation, bool terminated,
+             std::size_t environment = 0) {
     parts_.observation(observation, state_);
     parts_.observation(next_observation, next_state_);
     if (action.size() != n_dimensions()) {
@@ -256,17 +268,18 @@ class Controller {
         [&](auto& agent) {
           using Agent = std::remove_cvref_t<decltype(agent)>;
           if constexpr (std::is_same_v<Agent, FuzzyQLearning>) {
-            core::require(action[0] == parts_.action.of_normalized(agent.last_action()), "action",
+            const double last = agent.last_action(environment);
+            core::require(action[0] == parts_.action.of_normalized(last), "action",
                           "that of the last exploring act", action[0]);
-            agent.learn(state_, agent.last_action(), reward, next_state_, terminated);
+            agent.learn(state_, last, reward, next_state_, terminated, environment);
           } else if constexpr (Agent::kDecoupled) {
             for (std::size_t d = 0; d < action.size(); ++d) {
               indices_[d] = parts_.action.index_of(action[d], d);
             }
-            agent.learn(state_, indices_, reward, next_state_, terminated);
+            agent.learn(state_, indices_, reward, next_state_, terminated, environment);
           } else {
             agent.learn(state_, parts_.action.index_of(action[0], 0), reward, next_state_,
-                        terminated);
+                        terminated, environment);
           }
         },
         parts_.agent);

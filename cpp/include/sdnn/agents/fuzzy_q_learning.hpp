@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/coding/action_code.hpp"
@@ -53,6 +54,9 @@ struct FuzzyQLearningConfig {
 /// Traces accumulate, a random pick does not cut them, they end with the episode, and one below
 /// kForgottenTrace is forgotten.
 ///
+/// An agent may learn in several environments at once, numbered from 0: what belongs to an episode
+/// (the last exploring act, the traces, the number of steps) is then kept for each.
+///
 /// Source: Jouffe, L. (1998). Fuzzy inference system learning by reinforcement methods. IEEE
 /// Transactions on Systems, Man, and Cybernetics C 28(3), 338-355; spec section 3.
 class FuzzyQLearning {
@@ -63,22 +67,14 @@ class FuzzyQLearning {
   /// Throws std::invalid_argument naming the field that is out of range.
   FuzzyQLearning(approximators::FuzzyRules rules, const FuzzyQLearningConfig& config,
                  std::uint64_t seed)
-      : config_(config),
+      : config_(checked(config)),
         rules_(std::move(rules)),
         policy_(config.policy, seed),
-        state_(rules_.n_inputs()),
-        fired_(rules_.no_rules()),
-        other_fired_(rules_.no_rules()) {
-    core::require(config.learning_coefficient > 0.0 && config.learning_coefficient <= 1.0,
-                  "learning_coefficient", "in (0, 1]", config.learning_coefficient);
-    core::require_in_range("discount", config.discount, 0.0, 1.0);
-    core::require_in_range("trace_decay", config.trace_decay, 0.0, 1.0);
-    core::require(fading() <= kSlowestFading, "trace_decay", "at most 0.99 / discount",
-                  config.trace_decay);
+        other_fired_(rules_.no_rules()),
+        episodes_(new_episode()) {
     for (std::size_t action = 0; action < rules_.n_actions(); ++action) {
       actions_.push_back(coding::action_value(action, rules_.n_actions(), -1.0, 1.0));
     }
-    make_room();
   }
 
   const FuzzyQLearningConfig& config() const noexcept { return config_; }
@@ -86,39 +82,54 @@ class FuzzyQLearning {
   approximators::FuzzyRules& rules() noexcept { return rules_; }
   std::size_t n_inputs() const noexcept { return rules_.n_inputs(); }
 
-  /// The rules that fired in the last exploring act, and the actions they picked.
-  const approximators::FiredRules& fired() const noexcept { return fired_; }
-  std::span<const std::size_t> picked() const noexcept { return picked_; }
+  /// In how many environments at once the agent learns: each has an episode of its own. Throws
+  /// std::invalid_argument outside [1, 2^20].
+  void set_n_environments(std::size_t n) {
+    episodes_.resize(n, [this] { return new_episode(); });
+  }
+  std::size_t n_environments() const noexcept { return episodes_.size(); }
+
+  /// The rules that fired in the last exploring act in an environment, and the actions they picked.
+  const approximators::FiredRules& fired(std::size_t environment = 0) const {
+    return episodes_.of(environment).fired;
+  }
+  std::span<const std::size_t> picked(std::size_t environment = 0) const {
+    return episodes_.of(environment).picked;
+  }
   /// The action that came of it.
-  double last_action() const noexcept { return action_; }
+  double last_action(std::size_t environment = 0) const { return episodes_.of(environment).action; }
 
   /// Starts counting the steps of an episode anew and forgets the traces. The caller says when:
-  /// learning a terminated transition ends the traces only.
-  void begin_episode() noexcept {
-    step_ = 0;
-    traces_.clear();
+  /// learning a terminated transition ends the traces only. Throws std::invalid_argument if there
+  /// is no such environment.
+  void begin_episode(std::size_t environment = 0) {
+    Episode& episode = episodes_.of(environment);
+    episode.step = 0;
+    episode.traces.clear();
   }
 
   /// The action to take in `state`, in [-1, 1]. Without `explore` every rule picks a best action
   /// and nothing is remembered: the learning step goes on with the last exploring act.
   ///
   /// Shape: state (d,) in [0, 1]. Throws std::invalid_argument otherwise, and nothing has changed.
-  double act(std::span<const double> state, bool explore = true) {
-    auto& fired = explore ? fired_ : other_fired_;
+  double act(std::span<const double> state, bool explore = true, std::size_t environment = 0) {
+    Episode& episode = episodes_.of(environment);
+    auto& fired = explore ? episode.fired : other_fired_;
     rules_.fire(state, fired);
     if (explore) {
-      std::copy(state.begin(), state.end(), state_.begin());
-      picked_.clear();
+      std::copy(state.begin(), state.end(), episode.state.begin());
+      episode.picked.clear();
     }
     const double mean = mean_over(fired, [&](std::size_t i) {
-      const std::size_t action = policy_.select(rules_.values(fired.rules[i]), step_, explore);
-      if (explore) picked_.push_back(action);
+      const std::size_t action =
+          policy_.select(rules_.values(fired.rules[i]), episode.step, explore);
+      if (explore) episode.picked.push_back(action);
       return actions_[action];
     });
     const double action = std::clamp(mean, -1.0, 1.0);
     if (explore) {
-      ++step_;
-      action_ = action;
+      ++episode.step;
+      episode.action = action;
     }
     return action;
   }
@@ -134,33 +145,34 @@ class FuzzyQLearning {
     });
   }
 
-  /// Learns the transition that began with the last exploring act.
+  /// Learns the transition that began with the last exploring act in the environment.
   ///
   /// Throws std::invalid_argument if `state` and `action` are not those of that act (which rule
   /// picked what is known of no other), for a bad next state or a reward that is not finite;
   /// std::overflow_error if a value would leave the floats. The table is unchanged then.
   void learn(std::span<const double> state, double action, double reward,
-             std::span<const double> next_state, bool terminated) {
-    core::require(
-        !picked_.empty() && std::equal(state.begin(), state.end(), state_.begin(), state_.end()),
-        "state", "that of the last exploring act", "another");
-    core::require(action == action_, "action", "that of the last exploring act", action);
+             std::span<const double> next_state, bool terminated, std::size_t environment = 0) {
+    Episode& episode = episodes_.of(environment);
+    core::require(!episode.picked.empty() && std::equal(state.begin(), state.end(),
+                                                        episode.state.begin(), episode.state.end()),
+                  "state", "that of the last exploring act", "another");
+    core::require(action == episode.action, "action", "that of the last exploring act", action);
     core::require_finite("reward", reward);
     const double target = terminated ? reward : reward + config_.discount * value(next_state);
-    const double value_of_picks = mean_over(fired_, [this](std::size_t i) -> double {
-      return rules_.value(fired_.rules[i], picked_[i]);
+    const double value_of_picks = mean_over(episode.fired, [&](std::size_t i) -> double {
+      return rules_.value(episode.fired.rules[i], episode.picked[i]);
     });
     const double step = config_.learning_coefficient * (target - value_of_picks);
-    renew_traces();
-    for (const Trace& trace : traces_) {
+    renew_traces(episode);
+    for (const Trace& trace : episode.traces) {
       if (!(std::abs(moved(trace, step)) <= kLargest)) {
         throw std::overflow_error("a value of a fuzzy rule would leave the range of floats");
       }
     }
-    for (const Trace& trace : traces_) {
+    for (const Trace& trace : episode.traces) {
       rules_.set_value(trace.rule, trace.action, static_cast<float>(moved(trace, step)));
     }
-    if (terminated) traces_.clear();
+    if (terminated) episode.traces.clear();
   }
 
   /// Lists what is remembered; see core/state.hpp.
@@ -168,21 +180,10 @@ class FuzzyQLearning {
   static void exchange(Self& self, Archive& archive) {
     archive.part("rules", self.rules_);
     archive.part("policy", self.policy_);
-    archive.number("step", self.step_);
-    archive.fixed("last_state", {self.state_.size()}, self.state_);
-    archive.number("last_action", self.action_);
-    std::vector<std::int64_t> picked(self.picked_.begin(), self.picked_.end());
-    archive.numbers("picked", picked);
-    std::vector<std::int64_t> traced;
-    std::vector<double> eligibilities;
-    for (const Trace& trace : self.traces_) {
-      traced.push_back(static_cast<std::int64_t>(trace.rule));
-      traced.push_back(static_cast<std::int64_t>(trace.action));
-      eligibilities.push_back(trace.eligibility);
-    }
-    archive.numbers("traced", traced);
-    archive.numbers("eligibilities", eligibilities);
-    if constexpr (Archive::kReads) self.take(archive, picked, traced, eligibilities);
+    Episodes<Episode>::exchange(
+        self.episodes_, archive, [&self] { return self.new_episode(); },
+        [&](auto& episode) { exchange_episode(self, episode, archive); });
+    if constexpr (Archive::kReads) self.other_fired_ = self.rules_.no_rules();  // as new_episode's
   }
 
  private:
@@ -192,40 +193,90 @@ class FuzzyQLearning {
     double eligibility;
   };
 
+  /// What belongs to the present episode in one environment.
+  struct Episode {
+    std::vector<double> state;  ///< of the last exploring act, with all below
+    approximators::FiredRules fired;
+    std::vector<std::size_t> picked;
+    double action = 0.0;
+    std::vector<Trace> traces;
+    int step = 0;
+  };
+
+  /// With room for whatever may come: a copy has none.
+  Episode new_episode() const {
+    Episode episode;
+    episode.state.resize(rules_.n_inputs());
+    episode.fired = rules_.no_rules();
+    episode.picked.reserve(rules_.max_fired());
+    episode.traces.reserve(most_traces());
+    return episode;
+  }
+
+  template <class Self, class Listed, class Archive>
+  static void exchange_episode(Self& self, Listed& listed, Archive& archive) {
+    archive.number("step", listed.step);
+    archive.fixed("last_state", {listed.state.size()}, listed.state);
+    archive.number("last_action", listed.action);
+    std::vector<std::int64_t> picked(listed.picked.begin(), listed.picked.end());
+    archive.numbers("picked", picked);
+    std::vector<std::int64_t> traced;
+    std::vector<double> eligibilities;
+    for (const Trace& trace : listed.traces) {
+      traced.push_back(static_cast<std::int64_t>(trace.rule));
+      traced.push_back(static_cast<std::int64_t>(trace.action));
+      eligibilities.push_back(trace.eligibility);
+    }
+    archive.numbers("traced", traced);
+    archive.numbers("eligibilities", eligibilities);
+    if constexpr (Archive::kReads) self.take(archive, listed, picked, traced, eligibilities);
+  }
+
   /// Takes over what was read, after checks.
   template <class Archive>
-  void take(const Archive& archive, const std::vector<std::int64_t>& picked,
+  void take(const Archive& archive, Episode& read, const std::vector<std::int64_t>& picked,
             const std::vector<std::int64_t>& traced, const std::vector<double>& eligibilities) {
     const auto is_below = [](std::int64_t number, std::size_t end) {
       return number >= 0 && static_cast<std::uint64_t>(number) < end;
     };
-    archive.expect(step_ >= 0, "step", "0 or more");
-    for (const double x : state_) archive.expect(x >= 0.0 && x <= 1.0, "last_state", "in [0, 1]");
-    archive.expect(action_ >= -1.0 && action_ <= 1.0, "last_action", "in [-1, 1]");
-    fired_ = rules_.no_rules();  // a copy has no room for what may fire
-    other_fired_ = rules_.no_rules();
-    picked_.clear();
+    archive.expect(read.step >= 0, "step", "0 or more");
+    for (const double x : read.state)
+      archive.expect(x >= 0.0 && x <= 1.0, "last_state", "in [0, 1]");
+    archive.expect(read.action >= -1.0 && read.action <= 1.0, "last_action", "in [-1, 1]");
+    Episode episode = new_episode();
+    episode.step = read.step;
+    episode.state = read.state;
+    episode.action = read.action;
     if (!picked.empty()) {
-      rules_.fire(state_, fired_);
-      archive.expect(picked.size() == fired_.size(), "picked", "one per rule that fired");
+      rules_.fire(episode.state, episode.fired);
+      archive.expect(picked.size() == episode.fired.size(), "picked", "one per rule that fired");
       for (const std::int64_t action : picked) {
         archive.expect(is_below(action, rules_.n_actions()), "picked", "of actions");
-        picked_.push_back(static_cast<std::size_t>(action));
+        episode.picked.push_back(static_cast<std::size_t>(action));
       }
     }
     archive.expect(traced.size() == 2 * eligibilities.size(), "traced", "two per eligibility");
-    make_room();  // a copy has none
     archive.expect(eligibilities.size() <= most_traces(), "eligibilities", "not too many");
-    traces_.clear();
     for (std::size_t i = 0; i < eligibilities.size(); ++i) {
       archive.expect(is_below(traced[2 * i], rules_.n_rules()) &&
                          is_below(traced[2 * i + 1], rules_.n_actions()),
                      "traced", "of rules and actions");
       archive.expect(std::isfinite(eligibilities[i]) && eligibilities[i] >= 0.0, "eligibilities",
                      "finite and 0 or more");
-      traces_.push_back({static_cast<std::size_t>(traced[2 * i]),
-                         static_cast<std::size_t>(traced[2 * i + 1]), eligibilities[i]});
+      episode.traces.push_back({static_cast<std::size_t>(traced[2 * i]),
+                                static_cast<std::size_t>(traced[2 * i + 1]), eligibilities[i]});
     }
+    read = std::move(episode);
+  }
+
+  static FuzzyQLearningConfig checked(const FuzzyQLearningConfig& config) {
+    core::require(config.learning_coefficient > 0.0 && config.learning_coefficient <= 1.0,
+                  "learning_coefficient", "in (0, 1]", config.learning_coefficient);
+    core::require_in_range("discount", config.discount, 0.0, 1.0);
+    core::require_in_range("trace_decay", config.trace_decay, 0.0, 1.0);
+    core::require(config.discount * config.trace_decay <= kSlowestFading, "trace_decay",
+                  "at most 0.99 / discount", config.trace_decay);
+    return config;
   }
 
   static constexpr double kSlowestFading = 0.99;  // bounds the room for traces
@@ -253,30 +304,26 @@ class FuzzyQLearning {
 
   std::size_t most_traces() const noexcept { return (trace_lifetime() + 1) * rules_.max_fired(); }
 
-  void make_room() {
-    picked_.reserve(rules_.max_fired());
-    traces_.reserve(most_traces());
-  }
-
   double moved(const Trace& trace, double step) const noexcept {
     return static_cast<double>(rules_.value(trace.rule, trace.action)) + step * trace.eligibility;
   }
 
   // Fades the old traces and adds those of the picks, which are of different rules.
-  void renew_traces() {
-    for (Trace& trace : traces_) trace.eligibility *= fading();
-    std::erase_if(traces_, [](const Trace& t) { return !(t.eligibility >= kForgottenTrace); });
-    const std::size_t n_old = traces_.size();
-    for (std::size_t i = 0; i < fired_.size(); ++i) {
-      const std::size_t rule = fired_.rules[i], action = picked_[i];
-      const auto old_end = traces_.begin() + static_cast<std::ptrdiff_t>(n_old);
-      const auto old = std::find_if(traces_.begin(), old_end, [&](const Trace& trace) {
+  void renew_traces(Episode& episode) {
+    std::vector<Trace>& traces = episode.traces;
+    for (Trace& trace : traces) trace.eligibility *= fading();
+    std::erase_if(traces, [](const Trace& t) { return !(t.eligibility >= kForgottenTrace); });
+    const std::size_t n_old = traces.size();
+    for (std::size_t i = 0; i < episode.fired.size(); ++i) {
+      const std::size_t rule = episode.fired.rules[i], action = episode.picked[i];
+      const auto old_end = traces.begin() + static_cast<std::ptrdiff_t>(n_old);
+      const auto old = std::find_if(traces.begin(), old_end, [&](const Trace& trace) {
         return trace.rule == rule && trace.action == action;
       });
       if (old != old_end) {
-        old->eligibility += fired_.truth_values[i];
+        old->eligibility += episode.fired.truth_values[i];
       } else {
-        traces_.push_back({rule, action, fired_.truth_values[i]});
+        traces.push_back({rule, action, episode.fired.truth_values[i]});
       }
     }
   }
@@ -284,14 +331,9 @@ class FuzzyQLearning {
   FuzzyQLearningConfig config_;
   approximators::FuzzyRules rules_;
   EpsilonGreedy policy_;
-  std::vector<double> actions_;  // the discrete ones, in [-1, 1]
-  std::vector<double> state_;    // of the last exploring act, with all below
-  approximators::FiredRules fired_;
-  std::vector<std::size_t> picked_;
-  double action_ = 0.0;
+  std::vector<double> actions_;            // the discrete ones, in [-1, 1]
   approximators::FiredRules other_fired_;  // of evaluation and of the next state
-  std::vector<Trace> traces_;
-  int step_ = 0;
+  Episodes<Episode> episodes_;
 };
 
 }  // namespace sdnn::agents

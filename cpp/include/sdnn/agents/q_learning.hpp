@@ -9,11 +9,13 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/agents/return_range.hpp"
 #include "sdnn/agents/waiting_steps.hpp"
@@ -22,6 +24,7 @@
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/elementary.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::agents {
@@ -30,6 +33,12 @@ namespace sdnn::agents {
 enum class ValueRange {
   given,  ///< as the approximator was made
   seen,   ///< that of ReturnRange, where the approximator has a range
+};
+
+/// How alpha and epsilon go from their first to their final values.
+enum class Schedule {
+  linear,       ///< in a straight line
+  exponential,  ///< by the same factor in equal parts of the progress; no end may be 0
 };
 
 /// The agent's parameters; the defaults are the paper's (section 4.2).
@@ -42,6 +51,15 @@ struct QLearningConfig {
   std::optional<double> final_learning_rate = {};  ///< at progress 1, in (0, 1]; none: the same
   std::optional<double> final_epsilon = {};        ///< at progress 1, in [0, 1]; none: the same
   ValueRange value_range = ValueRange::given;
+  Schedule schedule = Schedule::linear;  ///< to the final values
+
+  /// Alpha and epsilon at a progress in [0, 1].
+  double learning_rate_at(double progress) const noexcept {
+    return between(learning_rate, final_learning_rate, progress);
+  }
+  double epsilon_at(double progress) const noexcept {
+    return between(policy.epsilon, final_epsilon, progress);
+  }
 
   static constexpr auto fields() noexcept {
     return std::tuple_cat(
@@ -52,9 +70,18 @@ struct QLearningConfig {
                    core::field("max_repetitions", &QLearningConfig::max_repetitions),
                    core::field("final_learning_rate", &QLearningConfig::final_learning_rate),
                    core::field("final_epsilon", &QLearningConfig::final_epsilon),
-                   core::field("value_range", &QLearningConfig::value_range)));
+                   core::field("value_range", &QLearningConfig::value_range),
+                   core::field("schedule", &QLearningConfig::schedule)));
   }
   bool operator==(const QLearningConfig&) const = default;
+
+ private:
+  double between(double first, const std::optional<double>& last, double progress) const noexcept {
+    if (!last) return first;
+    if (schedule == Schedule::linear) return (1.0 - progress) * first + progress * *last;
+    if (progress == 1.0) return *last;  // without rounding
+    return first * core::exp(progress * core::log(*last / first));
+  }
 };
 
 /// An agent that learns Q(s, a) by Eq. (1) and acts epsilon-greedily.
@@ -77,6 +104,10 @@ struct QLearningConfig {
 /// probability 1 / k, and m at most: what single random steps do not reach, some of these do.
 /// Source: Dabney, W., Ostrovski, G., Barreto, A. (2021). Temporally-extended epsilon-greedy
 /// exploration (with this distribution in the place of the zeta one, which it resembles).
+///
+/// An agent may learn in several environments at once, numbered from 0: what belongs to an episode
+/// (the steps that wait, the kept action, the number of its steps, the sum of its rewards) is then
+/// kept for each, all else is shared. Which of them acts or learns when is the caller's choice.
 template <class Q>
 class QLearning {
  public:
@@ -92,9 +123,7 @@ class QLearning {
         repetitions_(seed, core::Stream::repetitions),
         range_(config.discount),
         learning_rate_(config.learning_rate),
-        kept_(n_dimensions()),
-        waiting_(static_cast<std::size_t>(config.n_steps), action_value_.n_inputs(),
-                 n_dimensions()) {
+        episodes_(new_episode()) {
     for (std::size_t d = 0; d < n_dimensions(); ++d) values_.emplace_back(n_actions(d));
   }
 
@@ -123,25 +152,46 @@ class QLearning {
   void set_progress(double progress) {
     core::require_in_range("progress", progress, 0.0, 1.0);
     progress_ = progress;
-    const auto between = [progress](double first, const std::optional<double>& last) {
-      return last ? (1.0 - progress) * first + progress * *last : first;
-    };
-    learning_rate_ = between(config_.learning_rate, config_.final_learning_rate);
-    policy_.set_epsilon(between(config_.policy.epsilon, config_.final_epsilon));
+    apply_rates();
   }
   double progress() const noexcept { return progress_; }
-  /// As progress has made them.
+  /// Sets alpha or epsilon, whatever the progress, until it is set anew; none: it follows the
+  /// progress again. Throws std::invalid_argument outside (0, 1] and [0, 1].
+  void set_learning_rate(std::optional<double> rate) {
+    if (rate) require_rate("learning_rate", *rate);
+    set_learning_rate_ = rate;
+    apply_rates();
+  }
+  void set_epsilon(std::optional<double> epsilon) {
+    if (epsilon) core::require_in_range("epsilon", *epsilon, 0.0, 1.0);
+    set_epsilon_ = epsilon;
+    apply_rates();
+  }
+  /// As they were set, or as progress has made them.
   double learning_rate() const noexcept { return learning_rate_; }
   double epsilon() const noexcept { return policy_.config().epsilon; }
 
+  /// In how many environments at once the agent learns: each has an episode of its own. Of those
+  /// that are no more, what waits is learned. Throws std::invalid_argument outside [1, 2^20], and
+  /// as learn does.
+  void set_n_environments(std::size_t n) {
+    core::require_in_range("n_environments", n, 1, Episodes<Episode>::kMost);
+    for (std::size_t i = n; i < n_environments(); ++i) begin_episode(i);
+    episodes_.resize(n, [this] { return new_episode(); });
+  }
+  std::size_t n_environments() const noexcept { return episodes_.size(); }
+
   /// Starts counting the steps of an episode anew, for the greedy first steps, and learns what
   /// still waits of an episode that did not terminate. The caller says when: learning a terminated
-  /// transition does not. Throws as learn does.
-  void begin_episode() {
-    step_ = 0;
-    n_kept_ = 0;
-    range_.begin_episode();
-    if (waiting_.size() > 0) learn_all_waiting(state_value(waiting_.next_state()));
+  /// transition does not. Throws std::invalid_argument if there is no such environment, and as
+  /// learn does.
+  void begin_episode(std::size_t environment = 0) {
+    Episode& episode = episodes_.of(environment);
+    episode.step = 0;
+    episode.n_kept = 0;
+    episode.sum = 0.0;
+    WaitingSteps& waiting = episode.waiting;
+    if (waiting.size() > 0) learn_all(waiting, state_value(waiting.next_state()));
   }
 
   /// Lets the approximator write to the memory that it will need, where it knows how.
@@ -152,23 +202,25 @@ class QLearning {
   }
 
   /// The action to take in `state`; without `explore` a best one. Shape: state (l,) in [0, 1].
-  Action act(std::span<const double> state, bool explore = true) {
+  Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0) {
+    Episode& episode = episodes_.of(environment);
     if (!explore) return best_action(state, false);
     core::require_unit_values("state", state, n_inputs());  // before anything is drawn
     // Evaluating is no step of the episode: it must not move the end of the greedy phase.
-    const int step = step_++;
-    if (n_kept_ == 0 && !policy_.explores(step)) return best_action(state, true);
-    if (n_kept_ > 0) {
-      --n_kept_;
-      return as_action(kept_);
+    const int step = episode.step++;
+    if (episode.n_kept == 0 && !policy_.explores(step)) return best_action(state, true);
+    std::vector<std::size_t>& kept = episode.kept;
+    if (episode.n_kept > 0) {
+      --episode.n_kept;
+      return as_action(kept);
     }
-    for (std::size_t d = 0; d < kept_.size(); ++d) kept_[d] = policy_.random_action(n_actions(d));
+    for (std::size_t d = 0; d < kept.size(); ++d) kept[d] = policy_.random_action(n_actions(d));
     if (config_.max_repetitions > 1) {
       const double drawn = 1.0 - repetitions_.uniform();  // in (0, 1]
       const double most = static_cast<double>(config_.max_repetitions);
-      n_kept_ = static_cast<int>(std::min(1.0 / drawn, most)) - 1;
+      episode.n_kept = static_cast<int>(std::min(1.0 / drawn, most)) - 1;
     }
-    return as_action(kept_);
+    return as_action(kept);
   }
 
   /// The action as a number in [-1, 1]: actions cut the range evenly.
@@ -176,30 +228,30 @@ class QLearning {
     return coding::action_value(action, n_actions(d), -1.0, 1.0);
   }
 
-  /// Learns one transition. Throws std::invalid_argument for a reward that is not finite, and as
-  /// the approximator does; then nothing has been learned.
+  /// Learns one transition. Throws std::invalid_argument for a reward that is not finite or an
+  /// environment that is none, and as the approximator does; then nothing has been learned.
   void learn(std::span<const double> state, const Action& action, double reward,
-             std::span<const double> next_state, bool terminated) {
+             std::span<const double> next_state, bool terminated, std::size_t environment = 0) {
     // Refuses at once what could not be learned: a correction may come later.
     core::require_unit_values("state", state, n_inputs());
     require_action(indices(action));
     core::require_finite("reward", reward);
     core::require_unit_values("next_state", next_state, n_inputs());
+    Episode& episode = episodes_.of(environment);
     if constexpr (kHasRange) {
-      if (adapts_range() && range_.note(reward)) {
+      if (adapts_range() && range_.note(reward, episode.sum)) {
         action_value_.set_output_range(range_.low(), range_.high());
       }
     }
     // The next state first: the network then remembers it, corrected, for the next decision.
     const double next_value = terminated ? 0.0 : state_value(next_state);
-    if (!waiting_.is_continued_by(state)) {
-      learn_all_waiting(state_value(waiting_.next_state()));
-    }
-    waiting_.add(state, indices(action), reward, next_state);
+    WaitingSteps& waiting = episode.waiting;
+    if (!waiting.is_continued_by(state)) learn_all(waiting, state_value(waiting.next_state()));
+    waiting.add(state, indices(action), reward, next_state);
     if (terminated) {
-      learn_all_waiting(0.0);
-    } else if (waiting_.is_full()) {
-      learn_oldest(next_value);
+      learn_all(waiting, 0.0);
+    } else if (waiting.is_full()) {
+      learn_oldest(waiting, next_value);
     }
   }
 
@@ -210,17 +262,52 @@ class QLearning {
     archive.part("policy", self.policy_);
     archive.part("repetitions", self.repetitions_);
     archive.part("range", self.range_);
-    archive.part("waiting", self.waiting_);
-    archive.number("step", self.step_);
-    std::vector<std::int64_t> kept(self.kept_.begin(), self.kept_.end());
-    archive.numbers("kept_action", kept);
-    archive.number("n_kept", self.n_kept_);
     archive.number("progress", self.progress_);
+    archive.number("learning_rate", self.set_learning_rate_);
+    archive.number("epsilon", self.set_epsilon_);
+    Episodes<Episode>::exchange(
+        self.episodes_, archive, [&self] { return self.new_episode(); },
+        [&](auto& episode) { exchange_episode(self, episode, archive); });
     if constexpr (Archive::kReads) {
-      archive.expect(kept.size() == self.kept_.size(), "kept_action", "one per dimension");
+      archive.expect(self.progress_ >= 0.0 && self.progress_ <= 1.0, "progress", "in [0, 1]");
+      const double rate = self.set_learning_rate_.value_or(1.0);
+      archive.expect(rate > 0.0 && rate <= 1.0, "learning_rate", "in (0, 1]");
+      const double epsilon = self.set_epsilon_.value_or(0.0);
+      archive.expect(epsilon >= 0.0 && epsilon <= 1.0, "epsilon", "in [0, 1]");
+      self.apply_rates();
+    }
+  }
+
+ private:
+  static constexpr bool kHasRange = requires(Q& q) { q.set_output_range(0.0, 1.0); };
+
+  /// What belongs to the present episode in one environment.
+  struct Episode {
+    WaitingSteps waiting;
+    std::vector<std::size_t> kept;  ///< the random action
+    int n_kept = 0;                 ///< steps that it will still last
+    int step = 0;
+    double sum = 0.0;  ///< of ReturnRange
+  };
+
+  Episode new_episode() const {
+    return {WaitingSteps(static_cast<std::size_t>(config_.n_steps), n_inputs(), n_dimensions()),
+            std::vector<std::size_t>(n_dimensions())};
+  }
+
+  template <class Self, class Listed, class Archive>
+  static void exchange_episode(Self& self, Listed& episode, Archive& archive) {
+    archive.part("waiting", episode.waiting);
+    archive.number("range.sum", episode.sum);
+    archive.number("step", episode.step);
+    std::vector<std::int64_t> kept(episode.kept.begin(), episode.kept.end());
+    archive.numbers("kept_action", kept);
+    archive.number("n_kept", episode.n_kept);
+    if constexpr (Archive::kReads) {
+      archive.expect(kept.size() == episode.kept.size(), "kept_action", "one per dimension");
       for (std::size_t d = 0; d < kept.size(); ++d) {
         archive.expect(self.has_action(d, kept[d]), "kept_action", "an action");
-        self.kept_[d] = static_cast<std::size_t>(kept[d]);
+        episode.kept[d] = static_cast<std::size_t>(kept[d]);
       }
       const auto is_of_actions = [&self](const WaitingSteps::Step& step) {
         for (std::size_t d = 0; d < step.action.size(); ++d) {
@@ -228,30 +315,37 @@ class QLearning {
         }
         return true;
       };
-      archive.expect(self.waiting_.each_is(is_of_actions), "waiting.actions", "of actions");
-      archive.expect(!self.waiting_.is_full(), "waiting.rewards", "fewer than n_steps");
-      archive.expect(self.step_ >= 0, "step", "0 or more");
-      archive.expect(self.n_kept_ >= 0 && self.n_kept_ < self.config_.max_repetitions, "n_kept",
+      archive.expect(episode.waiting.each_is(is_of_actions), "waiting.actions", "of actions");
+      archive.expect(!episode.waiting.is_full(), "waiting.rewards", "fewer than n_steps");
+      archive.expect(ReturnRange::is_sum(episode.sum), "range.sum", "a finite sum");
+      archive.expect(episode.step >= 0, "step", "0 or more");
+      archive.expect(episode.n_kept >= 0 && episode.n_kept < self.config_.max_repetitions, "n_kept",
                      "in [0, max_repetitions)");
-      archive.expect(self.progress_ >= 0.0 && self.progress_ <= 1.0, "progress", "in [0, 1]");
-      self.set_progress(self.progress_);
     }
   }
 
- private:
-  static constexpr bool kHasRange = requires(Q& q) { q.set_output_range(0.0, 1.0); };
+  static void require_rate(std::string_view name, double rate) {
+    core::require(rate > 0.0 && rate <= 1.0, name, "in (0, 1]", rate);
+  }
 
   static QLearningConfig checked(const QLearningConfig& config) {
-    core::require(config.learning_rate > 0.0 && config.learning_rate <= 1.0, "learning_rate",
-                  "in (0, 1]", config.learning_rate);
+    require_rate("learning_rate", config.learning_rate);
     core::require_in_range("discount", config.discount, 0.0, 1.0);
     core::require_in_range("n_steps", config.n_steps, 1, 1000);
     core::require_in_range("max_repetitions", config.max_repetitions, 1, 1000000);
-    const double last_rate = config.final_learning_rate.value_or(1.0);
-    core::require(last_rate > 0.0 && last_rate <= 1.0, "final_learning_rate", "in (0, 1]",
-                  last_rate);
+    require_rate("final_learning_rate", config.final_learning_rate.value_or(1.0));
     core::require_in_range("final_epsilon", config.final_epsilon.value_or(0.0), 0.0, 1.0);
+    if (config.schedule == Schedule::exponential && config.final_epsilon) {
+      const char* const expected = "greater than 0 where the schedule is exponential";
+      core::require(config.policy.epsilon > 0.0, "epsilon", expected, config.policy.epsilon);
+      core::require(*config.final_epsilon > 0.0, "final_epsilon", expected, *config.final_epsilon);
+    }
     return config;
+  }
+
+  void apply_rates() {
+    learning_rate_ = set_learning_rate_.value_or(config_.learning_rate_at(progress_));
+    policy_.set_epsilon(set_epsilon_.value_or(config_.epsilon_at(progress_)));
   }
 
   bool adapts_range() const noexcept { return config_.value_range == ValueRange::seen; }
@@ -314,9 +408,9 @@ class QLearning {
     return sum;
   }
 
-  void learn_oldest(double value) {
-    const double target = waiting_.return_of_oldest(value, config_.discount);
-    const WaitingSteps::Step& oldest = waiting_.take_oldest();
+  void learn_oldest(WaitingSteps& waiting, double value) {
+    const double target = waiting.return_of_oldest(value, config_.discount);
+    const WaitingSteps::Step& oldest = waiting.take_oldest();
     if constexpr (kDecoupled) {
       action_value_.correct(oldest.state, oldest.action, target, learning_rate_);
     } else {
@@ -324,8 +418,8 @@ class QLearning {
     }
   }
 
-  void learn_all_waiting(double value) {
-    while (waiting_.size() > 0) learn_oldest(value);
+  void learn_all(WaitingSteps& waiting, double value) {
+    while (waiting.size() > 0) learn_oldest(waiting, value);
   }
 
   QLearningConfig config_;
@@ -334,12 +428,10 @@ class QLearning {
   core::Random repetitions_;
   ReturnRange range_;
   double progress_ = 0.0;
+  std::optional<double> set_learning_rate_, set_epsilon_;
   double learning_rate_;
   std::vector<std::vector<double>> values_;  ///< of every dimension
-  std::vector<std::size_t> kept_;            ///< the random action
-  int n_kept_ = 0;                           ///< steps that it will still last
-  WaitingSteps waiting_;
-  int step_ = 0;
+  Episodes<Episode> episodes_;
 };
 
 }  // namespace sdnn::agents

@@ -19,29 +19,30 @@ class ReturnRange {
   double low() const noexcept { return low_; }
   double high() const noexcept { return high_; }
 
-  /// The next sum begins with 0.
-  void begin_episode() noexcept { sum_ = 0.0; }
-
-  /// Notes a finite reward; says whether the range has grown.
-  bool note(double reward) noexcept {
-    sum_ = std::clamp(reward + discount_ * sum_, -kLargest, kLargest);
-    if (sum_ >= low_ && sum_ <= high_) return false;
-    if (sum_ > high_) {
-      high_ = sum_ + kHeadroom * (sum_ - low_);
+  /// Adds a finite reward to the sum of its episode, which begins with 0; says whether the range
+  /// has grown.
+  bool note(double reward, double& sum) noexcept {
+    sum = std::clamp(reward + discount_ * sum, -kLargest, kLargest);
+    if (sum >= low_ && sum <= high_) return false;
+    if (sum > high_) {
+      high_ = sum + kHeadroom * (sum - low_);
     } else {
-      low_ = sum_ - kHeadroom * (high_ - sum_);
+      low_ = sum - kHeadroom * (high_ - sum);
     }
     return true;
+  }
+
+  /// Whether a number can be a sum: finite, and no larger than sums become.
+  static bool is_sum(double number) noexcept {  // comparisons with NaN are false
+    return number >= -kLargest && number <= kLargest;
   }
 
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void exchange(Self& self, Archive& archive) {
-    archive.number("sum", self.sum_);
     archive.number("low", self.low_);
     archive.number("high", self.high_);
     if constexpr (Archive::kReads) {  // comparisons with NaN are false
-      archive.expect(self.sum_ >= -kLargest && self.sum_ <= kLargest, "sum", "a finite sum");
       archive.expect(self.low_ >= -kFurthest && self.low_ <= 0.0, "low", "finite and at most 0");
       archive.expect(self.high_ >= 0.0 && self.high_ <= kFurthest, "high", "finite and at least 0");
     }
@@ -53,7 +54,6 @@ class ReturnRange {
   static constexpr double kFurthest = 2.0 * kLargest;  // of the ends, which stay within 5/3 of it
 
   double discount_;
-  double sum_ = 0.0;
   double low_ = 0.0;
   double high_ = 0.0;
 };

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstring>
 #include <map>
+#include <optional>
 #include <set>
 #include <span>
 #include <stdexcept>
@@ -101,6 +102,11 @@ class StateWriter {
       add<T>(name, {}, std::span<const T>(&value, 1));
     }
   }
+  /// One that may be missing: then there is no tensor.
+  template <class T>
+  void number(std::string_view name, const std::optional<T>& value) {
+    if (value) number(name, *value);
+  }
   /// As many as there are. Shape: (n,).
   template <class T>
   void numbers(std::string_view name, const std::vector<T>& values) {
@@ -114,8 +120,13 @@ class StateWriter {
   }
   template <class Part>
   void part(std::string_view name, const Part& part) {
+    within(name, [&] { Part::exchange(part, *this); });
+  }
+  /// What `list` lists, with `name` before.
+  template <class List>
+  void within(std::string_view name, const List& list) {
     const detail::Prefixed prefixed(*this, name);
-    Part::exchange(part, *this);
+    list();
   }
 
   State state;
@@ -151,6 +162,11 @@ class StateReader {
     }
   }
   template <class T>
+  void number(std::string_view name, std::optional<T>& value) {
+    value.reset();
+    if (state_.contains(prefix + std::string(name))) number(name, value.emplace());
+  }
+  template <class T>
   void numbers(std::string_view name, std::vector<T>& values) {
     const Tensor& tensor = find<T>(name);
     expect(tensor.shape.size() == 1, name, "of one dimension");
@@ -164,8 +180,23 @@ class StateReader {
   }
   template <class Part>
   void part(std::string_view name, Part& part) {
+    within(name, [&] { Part::exchange(part, *this); });
+  }
+  /// What `list` lists, with `name` before.
+  template <class List>
+  void within(std::string_view name, const List& list) {
     const detail::Prefixed prefixed(*this, name);
-    Part::exchange(part, *this);
+    list();
+  }
+
+  /// How many parts there are called `name`.1, `name`.2 and so on.
+  std::size_t n_numbered(std::string_view name) const {
+    std::size_t n = 0;
+    for (;; ++n) {
+      const std::string part = prefix + std::string(name) + "." + std::to_string(n + 1) + ".";
+      const auto found = state_.lower_bound(part);
+      if (found == state_.end() || !found->first.starts_with(part)) return n;
+    }
   }
 
   /// Throws unless `holds`, naming the tensor and what it must be.

@@ -1,0 +1,63 @@
+/// What belongs to an agent's present episode, once for each environment that it learns in.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sdnn/core/detail/check.hpp"
+
+namespace sdnn::agents {
+
+/// The episodes that one agent is in at the same time: one per environment, at least one.
+template <class Episode>
+class Episodes {
+ public:
+  /// The most environments of an agent.
+  static constexpr std::size_t kMost = std::size_t{1} << 20;
+
+  explicit Episodes(Episode first) { episodes_.push_back(std::move(first)); }
+
+  std::size_t size() const noexcept { return episodes_.size(); }
+
+  /// That of an environment, from 0. Throws std::invalid_argument if there is none.
+  Episode& of(std::size_t environment) {
+    require_environment(environment);
+    return episodes_[environment];
+  }
+  const Episode& of(std::size_t environment) const {
+    require_environment(environment);
+    return episodes_[environment];
+  }
+
+  /// Of more environments, whose episodes `make()` makes, or of fewer. Throws std::invalid_argument
+  /// unless 1 <= n <= kMost.
+  template <class Make>
+  void resize(std::size_t n, const Make& make) {
+    core::require_in_range("n_environments", n, 1, kMost);
+    while (episodes_.size() > n) episodes_.pop_back();
+    while (episodes_.size() < n) episodes_.push_back(make());
+  }
+
+  /// Lists what `list(episode)` lists of each: the first one's as if there were no others, so that
+  /// states do not tell an agent that can have several environments from one that cannot.
+  template <class Self, class Archive, class Make, class List>
+  static void exchange(Self& self, Archive& archive, const Make& make, const List& list) {
+    if constexpr (Archive::kReads) self.resize(archive.n_numbered("environment") + 1, make);
+    list(self.episodes_.front());
+    for (std::size_t i = 1; i < self.size(); ++i) {
+      archive.within("environment." + std::to_string(i), [&] { list(self.episodes_[i]); });
+    }
+  }
+
+ private:
+  void require_environment(std::size_t environment) const {
+    if (environment < size()) return;  // only a bad one's text costs memory
+    core::require(false, "environment", "less than " + std::to_string(size()), environment);
+  }
+
+  std::vector<Episode> episodes_;
+};
+
+}  // namespace sdnn::agents

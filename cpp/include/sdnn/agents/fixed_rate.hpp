@@ -1,0 +1,109 @@
+/// A loop at a fixed rate: waits for the next tick, and counts the deadlines that were missed.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <thread>
+#include <utility>
+
+#include "sdnn/core/detail/check.hpp"
+
+namespace sdnn::agents {
+
+/// Ticks `hz` times a second:
+///
+///     FixedRate rate(50.0);
+///     while (running) {
+///       rate.wait();
+///       ...  // what is to be done by the next tick
+///     }
+///
+/// Tick k is at start + k / hz, whatever was before: nothing adds up, so the loop does not drift.
+/// What follows a tick has until the next one. If it takes longer, that is a miss: the ticks that
+/// have passed are left out, and the loop goes on with the next one to come. It never catches up in
+/// a burst. A wait that ends too late by a whole period is a miss, too.
+///
+/// The operating system decides when a sleeping thread runs again: times are as good as it is.
+class FixedRate {
+ public:
+  /// Seconds since any fixed moment; waits for so many seconds, or less.
+  using Clock = std::function<double()>;
+  using Sleep = std::function<void(double)>;
+
+  /// Throws std::invalid_argument unless `hz` is in [1e-3, 1e6].
+  explicit FixedRate(double hz)
+      : FixedRate(
+            hz,
+            [] {
+              const auto now = std::chrono::steady_clock::now().time_since_epoch();
+              return std::chrono::duration<double>(now).count();
+            },
+            [](double seconds) {
+              std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+            }) {}
+  /// With another clock, which must never go back.
+  FixedRate(double hz, Clock clock, Sleep sleep)
+      : hz_(hz), clock_(std::move(clock)), sleep_(std::move(sleep)) {
+    core::require_in_range("hz", hz, 1e-3, 1e6);
+  }
+
+  double hz() const noexcept { return hz_; }
+
+  /// Waits for the next tick and returns its number: 0 at once, at the first call, then the number
+  /// of periods since.
+  std::int64_t wait() {
+    if (tick_ < 0) {
+      start_ = clock_();
+      return tick_ = 0;
+    }
+    const std::int64_t before = tick_++;
+    double now = clock_();
+    if (now > time_of(tick_)) skip(now);
+    for (;;) {
+      while (now < time_of(tick_)) {
+        sleep_(time_of(tick_) - now);
+        now = clock_();
+      }
+      if (now <= time_of(tick_ + 1)) break;
+      ++tick_;  // slept through it
+      skip(now);
+    }
+    n_skipped_ += tick_ - before - 1;
+    return tick_;
+  }
+
+  /// How often what followed a tick was not done by the next one.
+  std::int64_t n_misses() const noexcept { return n_misses_; }
+  /// Ticks that were left out because of it.
+  std::int64_t n_skipped() const noexcept { return n_skipped_; }
+  /// By how many seconds the worst miss was too late.
+  double worst_lateness() const noexcept { return worst_lateness_; }
+
+ private:
+  double time_of(std::int64_t tick) const noexcept {
+    return start_ + static_cast<double>(tick) / hz_;
+  }
+
+  /// Notes that tick_ has passed, and finds the next one to come.
+  void skip(double now) {
+    ++n_misses_;
+    worst_lateness_ = std::max(worst_lateness_, now - time_of(tick_));
+    const auto next = static_cast<std::int64_t>(std::ceil((now - start_) * hz_));
+    tick_ = std::max(tick_, next);
+    if (time_of(tick_) < now) ++tick_;  // rounding
+  }
+
+  double hz_;
+  Clock clock_;
+  Sleep sleep_;
+  double start_ = 0.0;
+  std::int64_t tick_ = -1;
+  std::int64_t n_misses_ = 0;
+  std::int64_t n_skipped_ = 0;
+  double worst_lateness_ = 0.0;
+};
+
+}  // namespace sdnn::agents

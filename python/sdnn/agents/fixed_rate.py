@@ -1,0 +1,112 @@
+"""A loop at a fixed rate, for robots."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+from sdnn.arguments import real
+
+__all__ = ["FixedRate"]
+
+
+class FixedRate:
+    """Ticks ``hz`` times a second: what a loop that controls a robot iterates over.
+
+    Tick k is at start + k / hz, whatever was before: nothing adds up, so the loop does not drift.
+    The body of the loop has until the next tick. If it takes longer, that is a miss: the ticks that
+    have passed are left out, and the loop goes on with the next one to come. It never catches up in
+    a burst. A sleep that ends too late by a whole period is a miss, too.
+
+    The operating system decides when a sleeping program runs again, often some 0.1 ms late, and
+    Python's garbage collector may take a few ms: for a loop that must never be late, take the C++
+    class of the same name under a real-time scheduler.
+
+    Parameters
+    ----------
+    hz : float
+        Ticks a second, in [1e-3, 1e6].
+    clock : callable
+        Gives seconds since any fixed moment, and never goes back.
+    sleep : callable
+        Waits for so many seconds, or less.
+
+    Raises
+    ------
+    ValueError
+        If ``hz`` is out of range.
+
+    Attributes
+    ----------
+    hz : float
+    n_misses : int
+        How often the body was not done by the next tick.
+    n_skipped : int
+        Ticks that were left out because of it.
+    worst_lateness : float
+        By how many seconds the worst miss was too late.
+
+    Examples
+    --------
+    >>> from sdnn.agents import FixedRate
+    >>> rate = FixedRate(100.0)
+    >>> for tick in rate:  # 0, 1, 2, ...: the periods since the first
+    ...     if tick >= 3:
+    ...         break
+    >>> rate.hz
+    100.0
+    """
+
+    def __init__(
+        self,
+        hz: float,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], object] = time.sleep,
+    ) -> None:
+        self.hz = real("hz", hz)
+        if not 1e-3 <= self.hz <= 1e6:
+            raise ValueError(f"hz must be in [0.001, 1e+06], got {hz!r}")
+        self._clock, self._sleep = clock, sleep
+        self._start = 0.0
+        self._tick = -1
+        self.n_misses = 0
+        self.n_skipped = 0
+        self.worst_lateness = 0.0
+
+    def __iter__(self) -> FixedRate:
+        return self
+
+    def __next__(self) -> int:
+        """Wait for the next tick; its number, 0 at once and then the periods since."""
+        if self._tick < 0:
+            self._start = self._clock()
+            self._tick = 0
+            return 0
+        before = self._tick
+        self._tick += 1
+        now = self._clock()
+        if now > self._time_of(self._tick):
+            self._skip(now)
+        while True:
+            while now < self._time_of(self._tick):
+                self._sleep(self._time_of(self._tick) - now)
+                now = self._clock()
+            if now <= self._time_of(self._tick + 1):
+                break
+            self._tick += 1  # slept through it
+            self._skip(now)
+        self.n_skipped += self._tick - before - 1
+        return self._tick
+
+    def _time_of(self, tick: int) -> float:
+        return self._start + tick / self.hz
+
+    def _skip(self, now: float) -> None:
+        """Note that the present tick has passed, and find the next one to come."""
+        self.n_misses += 1
+        self.worst_lateness = max(self.worst_lateness, now - self._time_of(self._tick))
+        self._tick = max(self._tick, math.ceil((now - self._start) * self.hz))
+        if self._time_of(self._tick) < now:  # rounding
+            self._tick += 1

@@ -1,0 +1,75 @@
+#include "sdnn/agents/episodes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <stdexcept>
+
+#include "states.hpp"
+
+namespace sdnn::agents {
+namespace {
+
+struct Count {
+  int steps = 0;
+};
+
+/// An object with episodes, which begin with `first` steps.
+struct Counting {
+  int first = 5;
+  Episodes<Count> episodes{Count{first}};
+
+  template <class Self, class Archive>
+  static void exchange(Self& self, Archive& archive) {
+    Episodes<Count>::exchange(
+        self.episodes, archive, [&self] { return Count{self.first}; },
+        [&archive](auto& episode) { archive.number("steps", episode.steps); });
+  }
+};
+
+TEST(Episodes, ComeAndGoAtTheEnd) {
+  Episodes<Count> episodes(Count{1});
+  EXPECT_EQ(episodes.size(), 1U);
+  episodes.resize(3, [] { return Count{7}; });
+  episodes.of(2).steps = 9;
+  EXPECT_EQ(episodes.of(0).steps, 1);
+  EXPECT_EQ(episodes.of(1).steps, 7);
+  episodes.resize(2, [] { return Count{8}; });
+  EXPECT_EQ(episodes.of(1).steps, 7);
+  episodes.resize(3, [] { return Count{8}; });
+  EXPECT_EQ(episodes.of(2).steps, 8);
+}
+
+TEST(Episodes, OfTheFirstEnvironmentHaveTheNamesOfTheOnlyOne) {
+  Counting object;
+  EXPECT_EQ(core::state_of(object).size(), 1U);
+  EXPECT_EQ(testing::number_of<int>(core::state_of(object), "steps"), 5);
+  object.episodes.resize(3, [] { return Count{6}; });
+  const core::State state = core::state_of(object);
+  EXPECT_EQ(state.size(), 3U);
+  EXPECT_EQ(testing::number_of<int>(state, "environment.2.steps"), 6);
+  Counting other;
+  core::restore(other, state);
+  EXPECT_EQ(core::state_of(other), state);
+  core::restore(other, core::state_of(Counting{}));
+  EXPECT_EQ(other.episodes.size(), 1U);
+  testing::expect_that_damage_is_refused(other);
+}
+
+TEST(Episodes, NameWhatIsImpossible) {
+  Episodes<Count> episodes(Count{1});
+  const auto make = [] { return Count{}; };
+  try {
+    (void)episodes.of(1);
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "environment must be less than 1, got 1");
+  }
+  for (const std::size_t bad : {std::size_t{0}, Episodes<Count>::kMost + 1}) {
+    EXPECT_THROW(episodes.resize(bad, make), std::invalid_argument);
+  }
+  EXPECT_EQ(episodes.size(), 1U);
+}
+
+}  // namespace
+}  // namespace sdnn::agents

@@ -1,0 +1,181 @@
+"""Learning rate and epsilon: schedules of the progress, and rates that are set by hand."""
+
+import copy
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from sdnn.agents import (
+    Callback,
+    FuzzyQLearning,
+    QLearningConfig,
+    RBFQLearning,
+    Schedule,
+    SDNNQLearning,
+    Training,
+    Transition,
+    load_agent,
+)
+from sdnn.approximators import RBFNetworkConfig, SDNNCConfig
+
+SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
+FALLING = {"learning_rate": 0.8, "final_learning_rate": 0.05, "epsilon": 0.5, "final_epsilon": 0.02}
+TORQUE = gym.spaces.Box(-2.0, 2.0, (1,), dtype=np.float32)
+PLANE = gym.spaces.Box(-1.0, 1.0, (2,))
+UNBOUNDED = gym.spaces.Box(-np.inf, np.inf, (2,))
+
+
+def new_agent(space=PLANE, **learning):
+    return SDNNQLearning(
+        space, TORQUE, approximator=SMALL, learning=QLearningConfig(**learning), warm_up_steps=30
+    )
+
+
+@pytest.mark.parametrize("space", [PLANE, UNBOUNDED], ids=["born", "warming up"])
+@pytest.mark.parametrize("schedule", ["linear", "exponential"])
+def test_rates_follow_the_progress(schedule, space):
+    agent = new_agent(space, schedule=schedule, **FALLING)
+    progress = np.linspace(0.0, 1.0, 41)
+    found = []
+    for agent.progress in progress:
+        found.append((agent.learning_rate, agent.epsilon))
+    for rates, name in zip(np.transpose(found), ("learning_rate", "epsilon"), strict=True):
+        first, last = FALLING[name], FALLING["final_" + name]
+        expected = (
+            first + (last - first) * progress
+            if schedule == "linear"
+            else first * (last / first) ** progress
+        )
+        np.testing.assert_allclose(rates, expected, rtol=1e-14)
+        assert (rates[0], rates[-1]) == (first, last)
+
+
+def test_without_final_values_rates_stay():
+    for schedule in ("linear", "exponential"):
+        agent = new_agent(schedule=schedule, learning_rate=0.3, epsilon=0.0)
+        agent.progress = 0.7
+        assert (agent.learning_rate, agent.epsilon) == (0.3, 0.0)
+
+
+def test_impossible_schedules_are_named():
+    with pytest.raises(ValueError, match="schedule must be one of 'linear', 'exponential'"):
+        new_agent(schedule="cosine")
+    with pytest.raises(ValueError, match="final_epsilon must be greater than 0 where the schedule"):
+        new_agent(schedule="exponential", final_epsilon=0.0)
+    with pytest.raises(ValueError, match="epsilon must be greater than 0 where the schedule is"):
+        new_agent(schedule="exponential", epsilon=0.0, final_epsilon=0.1)
+
+
+@pytest.mark.parametrize("space", [PLANE, UNBOUNDED], ids=["born", "warming up"])
+def test_rates_that_are_set_stay_and_are_saved(space, tmp_path):
+    agent = new_agent(space, **FALLING)
+    agent.learning_rate, agent.epsilon = 0.25, 0
+    agent.progress = 1.0
+    agent.save(tmp_path / "agent")
+    ways = (load_agent(tmp_path / "agent"), copy.deepcopy(agent), pickle.loads(pickle.dumps(agent)))
+    for one in (agent, *ways):
+        assert (one.learning_rate, one.epsilon) == (0.25, 0.0)
+        seen = np.zeros(2)
+        for _ in range(40):
+            one.learn(Transition(seen, one.act(seen), 1.0, seen + 0.1, False))
+        assert not one.is_warming_up
+        assert (one.learning_rate, one.epsilon) == (0.25, 0.0)
+        assert one.core.learning_rate == 0.25
+        one.learning_rate = one.epsilon = None
+        assert (one.learning_rate, one.epsilon) == (0.05, 0.02)
+
+
+@pytest.mark.parametrize("space", [PLANE, UNBOUNDED], ids=["born", "warming up"])
+def test_impossible_rates_are_named(space):
+    agent = new_agent(space, **FALLING)
+    for bad in (-0.1, 1.1, np.nan, np.inf, "much", [0.1]):
+        with pytest.raises(ValueError, match=r"^learning_rate must be"):
+            agent.learning_rate = bad
+        with pytest.raises(ValueError, match=r"^epsilon must be"):
+            agent.epsilon = bad
+    with pytest.raises(ValueError, match=r"learning_rate must be in \(0, 1\], or None, got 0"):
+        agent.learning_rate = 0
+    assert (agent.learning_rate, agent.epsilon) == (0.8, 0.5)
+
+
+class Stop(Callback):
+    def __init__(self, at, path):
+        self.at, self.path = at, path
+
+    def on_step(self, training):
+        if training.n_steps == self.at:
+            training.save(self.path)
+            training.stop()
+
+
+class Anneal(Callback):
+    """What users write: from the last value to the next."""
+
+    def on_step(self, training):
+        training.agent.epsilon *= 0.97
+        training.agent.learning_rate = max(0.1, 0.99 * training.agent.learning_rate)
+
+
+def waves():
+    return Schedule(
+        learning_rate=lambda progress: 0.6 + 0.4 * np.sin(9 * progress), epsilon=lambda p: 1 - p
+    )
+
+
+@pytest.mark.parametrize("make", [Anneal, waves])
+@pytest.mark.parametrize("env_id", ["Pendulum-v1", "CartPole-v1"])
+def test_a_training_whose_rates_are_set_goes_on_exactly(make, env_id, tmp_path):
+    def begun(*callbacks):
+        env = gym.make(env_id)
+        agent = SDNNQLearning(
+            env.observation_space, env.action_space, approximator=SMALL, warm_up_steps=50
+        )
+        return Training(agent, env, steps=200, callbacks=callbacks)
+
+    whole = begun(make())
+    whole.run()
+    state = whole.agent.state()
+    assert {"agent.learning_rate", "agent.epsilon"} <= state.keys()
+    for cut in (1, 30, 49, 50, 51, 120, 199):
+        begun(make(), Stop(cut, tmp_path / "t")).run()
+        again = Training.load(tmp_path / "t", gym.make(env_id), callbacks=[make()])
+        again.run()
+        found = again.agent.state()
+        assert found.keys() == state.keys()
+        assert all(np.array_equal(found[name], state[name]) for name in state)
+
+
+def test_a_schedule_gives_the_rates_of_every_step():
+    seen = []
+
+    class Note(Callback):
+        def on_start(self, training):
+            self.on_step(training)
+
+        def on_step(self, training):
+            agent = training.agent
+            seen.append((agent.progress, agent.learning_rate, agent.epsilon))
+
+    env = gym.make("Pendulum-v1")
+    agent = RBFQLearning(
+        env.observation_space, env.action_space, approximator=RBFNetworkConfig(n_actions=5)
+    )
+    agent.train(env, steps=20, callbacks=[waves(), Note()])
+    assert len(seen) == 21
+    for progress, rate, epsilon in seen:
+        assert rate == 0.6 + 0.4 * np.sin(9 * progress)
+        assert epsilon == 1 - progress
+
+
+def test_impossible_schedule_callbacks_are_named():
+    with pytest.raises(TypeError, match=r"epsilon must be a function of the progress, got 0\.1"):
+        Schedule(epsilon=0.1)
+    env = gym.make("Pendulum-v1")
+    agent = FuzzyQLearning(env.observation_space, env.action_space)
+    with pytest.raises(TypeError, match="agent must have a epsilon, got FuzzyQLearning"):
+        agent.train(env, steps=5, callbacks=[Schedule(epsilon=lambda progress: 0.1)])
+    agent = SDNNQLearning(env.observation_space, env.action_space, approximator=SMALL)
+    with pytest.raises(ValueError, match="epsilon must be in"):
+        agent.train(env, steps=5, callbacks=[Schedule(epsilon=lambda progress: 2.0)])

@@ -1,0 +1,463 @@
+"""One agent in several environments: who learns what and when, and going on exactly."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
+
+import sdnn  # noqa: F401  (registers its environments)
+from sdnn.agents import (
+    Callback,
+    Checkpoints,
+    FuzzyQLearning,
+    FuzzyQLearningConfig,
+    JSONLines,
+    QLearningConfig,
+    RBFQLearning,
+    SDNNQLearning,
+    Training,
+    Transition,
+)
+from sdnn.agents.evaluation import episode_seed
+from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
+
+if not hasattr(gym.vector, "AutoresetMode"):
+    pytest.skip("needs Gymnasium 1.1", allow_module_level=True)
+AutoresetMode = gym.vector.AutoresetMode
+
+SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
+GENERAL = QLearningConfig(
+    n_steps=3, epsilon=0.3, final_epsilon=0.01, n_greedy_steps=2, max_repetitions=6,
+    value_range="seen",
+)  # fmt: skip
+
+
+class Walk(gym.Env):
+    """A walk on a line with gusts: episodes of 1 to 15 steps, ended by its end or a time limit."""
+
+    action_space = gym.spaces.Box(-1.0, 1.0, (1,), dtype=np.float32)
+
+    def __init__(self, is_bounded=True, drifts=False):
+        bound = 2.0 if is_bounded else np.inf
+        self.observation_space = gym.spaces.Box(-bound, bound, (2,), dtype=np.float64)
+        self._drifts = drifts
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self._at, self._steps = self.np_random.uniform(-0.5, 0.5), 0
+        self._limit = int(self.np_random.integers(3, 16))
+        return self._seen(), {}
+
+    def step(self, action):
+        assert self._steps < self._limit, "the episode is over"
+        assert abs(self._at) <= 1.0, "the episode is over"
+        self._at += 0.3 * float(action[0]) + self.np_random.normal(0.0, 0.1)
+        self._steps += 1
+        ends = abs(self._at) > 1.0
+        return self._seen(), -abs(self._at), ends, self._steps == self._limit and not ends, {}
+
+    def _seen(self):
+        shift = np.random.default_rng().uniform() if self._drifts else 0.0
+        return np.array([self._at, self._steps / 16 + shift])
+
+
+class Unbounded(Walk):
+    def __init__(self):
+        super().__init__(is_bounded=False)
+
+
+def sdnn_agent(env=None, **options):
+    env = env or Walk()
+    given = {"approximator": SMALL, "learning": GENERAL, "seed": 3, **options}
+    return SDNNQLearning(env.observation_space, env.action_space, **given)
+
+
+def rbf_agent():
+    sizes = RBFNetworkConfig(n_actions=7)
+    return RBFQLearning(Walk().observation_space, Walk.action_space, approximator=sizes)
+
+
+def fuzzy_agent(env=None, **options):
+    env = env or Walk()
+    learning = FuzzyQLearningConfig(trace_decay=0.7, n_greedy_steps=0, epsilon=0.3)
+    sizes = FuzzyRulesConfig(n_sets=4)
+    return FuzzyQLearning(
+        env.observation_space, env.action_space, learning=learning, approximator=sizes, **options
+    )
+
+
+KINDS = {
+    "sdnn": (Walk, sdnn_agent),
+    "sdnn, warm-up": (Unbounded, lambda: sdnn_agent(Unbounded(), warm_up_steps=60)),
+    "rbf": (Walk, rbf_agent),
+    "fuzzy": (Walk, fuzzy_agent),
+    "fuzzy, warm-up": (Unbounded, lambda: fuzzy_agent(Unbounded(), warm_up_steps=60)),
+}
+
+
+def sync(n, env=Walk, mode="NEXT_STEP", **options):
+    return SyncVectorEnv([env] * n, autoreset_mode=AutoresetMode[mode], **options)
+
+
+def vectors(n):
+    """Vector environments of all kinds, to be closed."""
+    yield from (sync(n, mode=mode) for mode in ("NEXT_STEP", "SAME_STEP", "DISABLED"))
+    yield sync(n, copy=False)
+    yield AsyncVectorEnv([Walk] * n)
+    yield AsyncVectorEnv([Walk] * n, autoreset_mode=AutoresetMode.SAME_STEP)
+    yield AsyncVectorEnv([Walk] * n, shared_memory=False, autoreset_mode=AutoresetMode.DISABLED)
+
+
+class Stop(Callback):
+    """Saves and stops at a step."""
+
+    def __init__(self, at, path):
+        self.at, self.path = at, path
+
+    def on_step(self, training):
+        if training.n_steps == self.at:
+            training.save(self.path)
+            training.stop()
+
+
+def states_equal(first, second):
+    one, other = first.state(), second.state()
+    assert one.keys() == other.keys()
+    return all(np.array_equal(one[name], other[name]) for name in one)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_vector_of_one_has_the_bits_of_its_environment(kind):
+    env, make = KINDS[kind]
+    plain = Training(make(), env(), steps=200, seed=4)
+    rows = plain.run().rows
+    for vector in (sync(1, env), sync(1, env, "SAME_STEP"), AsyncVectorEnv([env])):
+        training = Training(make(), vector, steps=200, seed=4)
+        assert training.run().rows == rows
+        assert states_equal(training.agent, plain.agent)
+        assert training.agent.description() == plain.agent.description()
+        vector.close()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_environment_is_learned_in_order(kind):
+    """A round by hand: all act, all step, all learn; episodes are numbered as they begin."""
+    env_type, make = KINDS[kind]
+    n = 3
+    by_hand, trained = make(), make()
+    result = trained.train(sync(n, env_type), steps=200, seed=4)
+    by_hand.n_environments = n
+    envs = [env_type() for _ in range(n)]
+    observations, lengths, returns = [None] * n, [0] * n, [0.0] * n
+    rows, n_begun, n_learned = [], 0, 0
+    while n_learned < 200:
+        for i in range(n):
+            if observations[i] is None:
+                observations[i], _ = envs[i].reset(seed=episode_seed(4, 0, n_begun))
+                n_begun, lengths[i], returns[i] = n_begun + 1, 0, 0.0
+                by_hand.begin_episode(i)
+        actions = [by_hand.act(observations[i], environment=i) for i in range(n)]
+        steps = [envs[i].step(actions[i]) for i in range(n)]
+        for i, (following, reward, terminated, truncated, _) in enumerate(steps):
+            if n_learned == 200:
+                break
+            transition = Transition(observations[i], actions[i], reward, following, terminated)
+            by_hand.learn(transition, environment=i)
+            n_learned += 1
+            lengths[i], returns[i] = lengths[i] + 1, returns[i] + reward
+            observations[i] = following
+            if terminated or truncated:
+                rows.append((n_learned, i, lengths[i], returns[i], terminated))
+                observations[i] = None
+            by_hand.progress = n_learned / 200
+    assert states_equal(by_hand, trained)
+    names = ("step", "environment", "length", "return", "terminated")
+    assert [tuple(row[name] for name in names) for row in result.rows] == rows
+    assert [row["episode"] for row in result.rows] == list(range(len(rows)))
+    assert {row["environment"] for row in result.rows} == set(range(n))
+
+
+def test_the_bits_do_not_depend_on_how_environments_are_run():
+    outcomes = []
+    for vector in vectors(3):
+        agent = sdnn_agent()
+        outcomes.append((agent.train(vector, steps=151, seed=2).rows, agent))
+        vector.close()
+    (rows, agent), *others = outcomes
+    assert len(rows) > 15
+    for other_rows, other in others:
+        assert other_rows == rows
+        assert states_equal(other, agent)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_training_stopped_anywhere_goes_on_exactly(kind, tmp_path):
+    env, make = KINDS[kind]
+    path = tmp_path / "training"
+    whole = Training(make(), sync(3, env), steps=150, seed=9)
+    rows = whole.run().rows
+    for cut in np.random.default_rng(5).permutation(np.arange(1, 150))[:40]:
+        # Interruptions may come within a round, and while episodes of any length go on.
+        first = Training(make(), sync(3, env), steps=150, seed=9, callbacks=[Stop(cut, path)])
+        before = first.run()
+        assert not before.is_finished
+        second = Training.load(path, sync(3, env, ("NEXT_STEP", "SAME_STEP", "DISABLED")[cut % 3]))
+        assert second.agent.n_environments == 3
+        after = second.run()
+        assert (*before.rows, *after.rows) == rows
+        assert states_equal(whole.agent, second.agent)
+
+
+def test_a_training_goes_on_exactly_in_processes_and_many_times(tmp_path):
+    whole = Training(sdnn_agent(), sync(4), steps=120, seed=1)
+    rows = whole.run().rows
+    path = tmp_path / "training"
+    training = Training(sdnn_agent(), sync(4), steps=120, seed=1, callbacks=[Stop(7, path)])
+    found = list(training.run().rows)
+    for cut in (8, 30, 31, 33, 77, 1000):
+        vector = AsyncVectorEnv([Walk] * 4)
+        training = Training.load(path, vector, callbacks=[Stop(cut, path)])
+        found += training.run().rows
+        vector.close()
+    assert tuple(found) == rows
+    assert states_equal(whole.agent, training.agent)
+
+
+def test_the_fast_acrobots_have_the_bits_of_single_ones_and_go_on_exactly(tmp_path):
+    def agent():
+        env = gym.make("sdnn/AcrobotSwingUp-v0")
+        return sdnn_agent(env, approximator=SMALL)
+
+    def acrobots(fast=True):
+        mode = None if fast else "sync"
+        name = "sdnn/AcrobotSwingUp-v0"
+        if fast:
+            return gym.make_vec(name, num_envs=3)
+        return gym.make_vec(name, num_envs=3, vectorization_mode=mode)
+
+    whole = Training(agent(), acrobots(), steps=400)
+    whole.run()
+    slow = Training(agent(), acrobots(fast=False), steps=400)
+    slow.run()
+    assert states_equal(whole.agent, slow.agent)
+    for cut in (100, 302, 355):
+        Training(agent(), acrobots(), steps=400, callbacks=[Stop(cut, tmp_path / "t")]).run()
+        again = Training.load(tmp_path / "t", acrobots())
+        again.run()
+        assert states_equal(whole.agent, again.agent)
+
+
+def test_steps_and_callbacks_count_transitions(tmp_path):
+    seen = []
+
+    class Note(Callback):
+        def on_step(self, training):
+            seen.append((training.n_steps, training.agent.progress))
+
+    path = tmp_path / "rows.jsonl"
+    callbacks = [JSONLines(path), Checkpoints(tmp_path / "c", 7), Note()]
+    result = sdnn_agent().train(sync(4), steps=50, callbacks=callbacks)
+    assert result.n_steps == 50
+    assert [step for step, _ in seen] == list(range(1, 51))
+    assert [progress for _, progress in seen] == [step / 50 for step in range(1, 51)]
+    assert len(path.read_text().splitlines()) == result.n_episodes
+    assert sdnn_agent().train(sync(4), episodes=9).n_episodes == 9
+    rows = sdnn_agent().train(sync(2), steps=60, evaluate_every=25, evaluation_env=Walk()).rows
+    assert [row["step"] for row in rows if row["kind"] == "evaluation"] == [25, 50]
+
+
+def test_discrete_and_composed_spaces():
+    class Buttons(Walk):
+        action_space = gym.spaces.Discrete(3, start=1)
+
+        def __init__(self):
+            super().__init__()
+            parts = {"at": self.observation_space, "lamp": gym.spaces.Discrete(2)}
+            self.observation_space = gym.spaces.Dict(parts)
+
+        def step(self, action):
+            return super().step([float(action) - 2.0])
+
+        def _seen(self):
+            return {"at": super()._seen(), "lamp": int(self._at > 0)}
+
+    plain, one = sdnn_agent(Buttons()), sdnn_agent(Buttons())
+    plain.train(Buttons(), steps=100)
+    one.train(sync(1, Buttons), steps=100)
+    assert states_equal(plain, one)
+    for make in (sync, lambda n, env: AsyncVectorEnv([env] * n)):
+        vector = make(3, Buttons)
+        assert sdnn_agent(Buttons()).train(vector, steps=100).n_steps == 100
+        vector.close()
+
+
+def test_an_agent_may_go_from_many_environments_to_few_and_back():
+    agent = sdnn_agent()
+    agent.train(sync(4), steps=50)
+    assert agent.n_environments == 4
+    n = agent.learning_report()["n_corrections"]
+    agent.n_environments = 1
+    assert n < agent.learning_report()["n_corrections"] <= 50, "what waited is learned"
+    agent.train(Walk(), steps=30)
+    assert agent.n_environments == 1
+    agent.train(sync(2), steps=30)
+    assert agent.n_environments == 2
+
+
+def test_a_warm_up_may_have_had_more_environments_than_there_are_now():
+    agent = sdnn_agent(Unbounded(), warm_up_steps=60)
+    agent.train(sync(5, Unbounded), steps=40)
+    agent.n_environments = 2
+    assert agent.is_warming_up
+    agent.train(sync(2, Unbounded), steps=30)
+    assert not agent.is_warming_up
+    assert agent.n_environments == 2
+
+
+def test_a_fuzzy_warm_up_ends_where_all_actions_are_its_own_or_learned():
+    agent = fuzzy_agent(Unbounded(), warm_up_steps=10)
+    agent.n_environments = 3
+    seen = np.zeros(2)
+    for _ in range(3):
+        actions = [agent.act(seen, environment=i) for i in range(3)]
+        for i, action in enumerate(actions):
+            agent.learn(Transition(seen, action, 0.0, seen + i, False), i)
+    actions = [agent.act(seen, environment=i) for i in range(3)]
+    agent.learn(Transition(seen, actions[0], 0.0, seen, False), 0)
+    assert agent.is_warming_up, "10 are learned, but two wait whose picks nobody would know"
+    agent.begin_episode(1)
+    agent.learn(Transition(seen, actions[2], 0.0, seen, False), 2)
+    assert not agent.is_warming_up
+
+
+class Opaque(gym.vector.VectorEnv):
+    """A vector environment that takes one seed, and resets itself."""
+
+    def __init__(self, n, mode):
+        self._envs = sync(n, mode=mode, copy=False)
+        self.num_envs, self.metadata = n, {"autoreset_mode": AutoresetMode[mode]}
+        for name in ("action_space", "observation_space"):
+            setattr(self, name, getattr(self._envs, name))
+            setattr(self, f"single_{name}", getattr(self._envs, f"single_{name}"))
+
+    def reset(self, *, seed=None, options=None):
+        assert options is None
+        return self._envs.reset(seed=int(seed))
+
+    def step(self, actions):
+        return self._envs.step(actions)
+
+
+class Recorder:
+    """A learner that acts by a plan of its own in each environment, and notes what it learns."""
+
+    action_space = Walk.action_space
+    progress = 0.0
+    n_environments = 1
+
+    def __init__(self, n):
+        self.plans = [np.random.default_rng(i) for i in range(n)]
+        self.learned = [[] for _ in range(n)]
+
+    def begin_episode(self, environment=0):
+        self.learned[environment].append("begin")
+
+    def act(self, observation, explore=True, environment=0):
+        return self.plans[environment].uniform(-1, 1, 1).astype(np.float32)
+
+    def learn(self, transition, environment=0):
+        observation, action, reward, following, terminated = transition
+        told = (*observation, *action, reward, *following, terminated)
+        self.learned[environment].append(tuple(float(x) for x in told))
+
+
+def test_an_environment_that_resets_itself_is_learned_without_the_steps_of_resets():
+    n = 3
+    by_mode = {}
+    for mode in ("NEXT_STEP", "SAME_STEP"):
+        learner = by_mode[mode] = Recorder(n)
+        result = Training(learner, Opaque(n, mode), steps=300, seed=6).run()
+        assert result.n_steps == 300
+        assert len(result.rows) == result.n_episodes > 30
+    for i in range(n):
+        expected, plan, env = [], np.random.default_rng(i), Walk()
+        observation, _ = env.reset(seed=episode_seed(6, 0, 0) + i)
+        expected.append("begin")
+        for _ in range(80):
+            action = plan.uniform(-1, 1, 1).astype(np.float32)
+            following, reward, terminated, truncated, _ = env.step(action)
+            told = (*observation, *action, reward, *following, terminated)
+            expected.append(tuple(float(x) for x in told))
+            observation = following
+            if terminated or truncated:
+                observation, _ = env.reset()
+                expected.append("begin")
+        for learner in by_mode.values():
+            assert learner.learned[i][:80] == expected[:80]
+
+
+def test_cart_poles_that_gymnasium_makes_by_itself_are_learned():
+    envs = gym.make_vec("CartPole-v1", num_envs=3)  # no SyncVectorEnv
+    agent = SDNNQLearning(
+        envs.single_observation_space, envs.single_action_space, approximator=SMALL,
+        warm_up_steps=100,
+    )  # fmt: skip
+    result = agent.train(envs, steps=500, seed=1)
+    assert not agent.is_warming_up
+    assert all(row["return"] == row["length"] for row in result.rows), "a reset has reward 0"
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Opaque(2, "NEXT_STEP"),
+        lambda: AsyncVectorEnv([Walk] * 2, shared_memory=False),
+    ],
+)
+def test_what_cannot_be_repeated_is_not_saved(make, tmp_path):
+    vector = make()
+    training = Training(sdnn_agent(), vector, steps=20)
+    training.run()
+    with pytest.raises(ValueError, match="env must reset each of its environments with a seed"):
+        training.save(tmp_path / "t")
+    checkpoints = Checkpoints(tmp_path / "t", 1000)
+    with pytest.raises(ValueError, match="vectorization_mode='sync'"):
+        Training(sdnn_agent(), vector, steps=20, callbacks=[checkpoints]).run()
+    Training(sdnn_agent(), sync(2), steps=20, callbacks=[checkpoints]).run()
+    with pytest.raises(ValueError, match="env must reset each of its environments with a seed"):
+        Training.load(tmp_path / "t", vector)
+    vector.close()
+
+
+def test_another_vector_is_refused(tmp_path):
+    Training(sdnn_agent(), sync(3), steps=50, callbacks=[Stop(20, tmp_path / "t")]).run()
+    for other, n in ((sync(2), 2), (Walk(), 1)):
+        with pytest.raises(ValueError, match=f"env must have 3 environments, .* got {n}"):
+            Training.load(tmp_path / "t", other)
+    with pytest.raises(ValueError, match="env must repeat the episode"):
+        Training.load(tmp_path / "t", sync(3, lambda: Walk(drifts=True)))
+    Training(sdnn_agent(), Walk(), steps=50, callbacks=[Stop(20, tmp_path / "t")]).run()
+    with pytest.raises(ValueError, match="env must have 1 environments, as the training had"):
+        Training.load(tmp_path / "t", sync(3))
+    assert Training.load(tmp_path / "t", sync(1)).run().n_steps == 50
+
+
+@pytest.mark.parametrize("agent", [sdnn_agent(), fuzzy_agent(), sdnn_agent(Unbounded())])
+def test_impossible_environments_are_named(agent):
+    agent.n_environments = 2
+    seen = np.zeros(2)
+    action = agent.act(seen)
+    before = agent.state()
+    for bad in (2, -1, 1.5, "first", 2**70):
+        with pytest.raises(ValueError, match="environment must be a whole number in"):
+            agent.act(seen, environment=bad)
+        with pytest.raises(ValueError, match="environment must be a whole number in"):
+            agent.begin_episode(bad)
+        with pytest.raises(ValueError, match="environment must be a whole number in"):
+            agent.learn(Transition(seen, action, 0.0, seen, False), bad)
+    for bad in (0, -1, 1.5, None, 2**20 + 1):
+        with pytest.raises(ValueError, match="n_environments must be a whole number in"):
+            agent.n_environments = bad
+    assert agent.n_environments == 2
+    after = agent.state()
+    assert all(np.array_equal(before[name], after[name]) for name in before)
