@@ -17,7 +17,7 @@ from sdnn.agents.evaluation import episode_seed, evaluate
 from sdnn.agents.files import Arrays, Description, from_file, read, write
 from sdnn.agents.interrupts import Interrupts
 from sdnn.agents.transition import Transition
-from sdnn.arguments import whole
+from sdnn.arguments import has_methods, path_of, whole
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -166,6 +166,12 @@ class Training:
         evaluation_env: gym.Env[Any, Any] | None = None,
         evaluation_episodes: int = 10,
     ) -> None:
+        has_methods("agent", agent, "an agent", "act", "learn", "begin_episode")
+        has_methods("env", env, "a Gymnasium environment", "reset", "step")
+        if evaluation_env is not None:
+            has_methods(
+                "evaluation_env", evaluation_env, "a Gymnasium environment", "reset", "step"
+            )
         if (steps is None) == (episodes is None):
             raise ValueError(
                 f"one of steps and episodes must be given, got steps={steps}, episodes={episodes}"
@@ -175,7 +181,7 @@ class Training:
         self.steps = None if steps is None else whole("steps", steps, 1, 2**53)
         self.episodes = None if episodes is None else whole("episodes", episodes, 1, 2**53)
         self.seed = whole("seed", seed, 0, 2**64 - 1)
-        self.callbacks = tuple(callbacks)
+        self.callbacks = _listed(callbacks)
         self.evaluate_every = (
             None if evaluate_every is None else whole("evaluate_every", evaluate_every, 1, 2**53)
         )
@@ -270,7 +276,7 @@ class Training:
             "evaluate_every": self.evaluate_every,
             "evaluation_episodes": self.evaluation_episodes,
         }
-        write(Path(path), {**self.agent.description(), "training": counts}, arrays)
+        write(path_of("path", path), {**self.agent.description(), "training": counts}, arrays)
 
     @classmethod
     def load(
@@ -303,10 +309,11 @@ class Training:
         ValueError
             If it is damaged, holds no training, or the environment does not repeat the episode.
         """
-        description, arrays = read(Path(path))
+        place = path_of("path", path)
+        description, arrays = read(place)
         if "training" not in description:
             raise ValueError(f"{path} holds an agent and no training: Agent.load reads it")
-        agent = from_file(Path(path), description, arrays)
+        agent = from_file(place, description, arrays)
         counts = description["training"]
         has_goal = steps is not None or episodes is not None
         training = cls(
@@ -403,3 +410,13 @@ class Training:
     def _row(self, kind: str, **values: Any) -> Row:
         self.n_rows += 1
         return {"kind": kind, "step": self.n_steps, **values}
+
+
+def _listed(callbacks: Iterable[Callback]) -> tuple[Callback, ...]:
+    try:
+        listed = tuple(callbacks)
+    except TypeError:
+        raise TypeError(f"callbacks must be a list of callbacks, got {callbacks!r}") from None
+    for callback in listed:
+        has_methods("callbacks", callback, "callbacks", "on_start", "on_step", "on_row", "on_end")
+    return listed

@@ -17,6 +17,7 @@
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/elementary.hpp"
 
 namespace sdnn::agents {
@@ -60,21 +61,16 @@ class FuzzyQLearning {
   /// Smaller eligibilities count as 0.
   static constexpr double kForgottenTrace = 1e-3;
 
-  /// Throws std::invalid_argument naming the field that is out of range.
+  /// Throws std::invalid_argument naming the field that is out of range; std::length_error if what
+  /// fires at once and its traces need more than max_table_bytes.
   FuzzyQLearning(approximators::FuzzyRules rules, const FuzzyQLearningConfig& config,
                  std::uint64_t seed)
-      : config_(config),
-        rules_(std::move(rules)),
+      : config_(checked(config)),
+        rules_(with_room(std::move(rules))),
         policy_(config.policy, seed),
         state_(rules_.n_inputs()),
         fired_(rules_.no_rules()),
         other_fired_(rules_.no_rules()) {
-    core::require(config.learning_coefficient > 0.0 && config.learning_coefficient <= 1.0,
-                  "learning_coefficient", "in (0, 1]", config.learning_coefficient);
-    core::require_in_range("discount", config.discount, 0.0, 1.0);
-    core::require_in_range("trace_decay", config.trace_decay, 0.0, 1.0);
-    core::require(fading() <= kSlowestFading, "trace_decay", "at most 0.99 / discount",
-                  config.trace_decay);
     for (std::size_t action = 0; action < rules_.n_actions(); ++action) {
       actions_.push_back(coding::action_value(action, rules_.n_actions(), -1.0, 1.0));
     }
@@ -151,11 +147,14 @@ class FuzzyQLearning {
       return rules_.value(fired_.rules[i], picked_[i]);
     });
     const double step = config_.learning_coefficient * (target - value_of_picks);
+    const bool is_large = !(std::abs(step) < kLargeStep);  // others need no room to go back
+    const std::vector<Trace> before = is_large ? traces_ : std::vector<Trace>();
     renew_traces();
     for (const Trace& trace : traces_) {
-      if (!(std::abs(moved(trace, step)) <= kLargest)) {
-        throw std::overflow_error("a value of a fuzzy rule would leave the range of floats");
-      }
+      if (std::abs(moved(trace, step)) <= kLargest) continue;
+      if (is_large) traces_.assign(before.begin(), before.end());
+      throw std::overflow_error(
+          "reward is too large: a value of a fuzzy rule would leave the range of floats");
     }
     for (const Trace& trace : traces_) {
       rules_.set_value(trace.rule, trace.action, static_cast<float>(moved(trace, step)));
@@ -191,6 +190,26 @@ class FuzzyQLearning {
     std::size_t action;
     double eligibility;
   };
+
+  static FuzzyQLearningConfig checked(const FuzzyQLearningConfig& config) {
+    core::require(config.learning_coefficient > 0.0 && config.learning_coefficient <= 1.0,
+                  "learning_coefficient", "in (0, 1]", config.learning_coefficient);
+    core::require_in_range("discount", config.discount, 0.0, 1.0);
+    core::require_in_range("trace_decay", config.trace_decay, 0.0, 1.0);
+    core::require(config.discount * config.trace_decay <= kSlowestFading, "trace_decay",
+                  "at most 0.99 / discount", config.trace_decay);
+    return config;
+  }
+
+  /// Asked before memory is: the number of rules that fire doubles with every input.
+  approximators::FuzzyRules with_room(approximators::FuzzyRules rules) const {
+    const double per_rule = 2.0 * (sizeof(std::size_t) + sizeof(double)) + sizeof(std::size_t) +
+                            static_cast<double>(trace_lifetime() + 1) * sizeof(Trace);
+    core::require_table_bytes("n_inputs or trace_decay", "rules that fire and their traces",
+                              per_rule * static_cast<double>(rules.max_fired()),
+                              rules.config().max_table_bytes);
+    return rules;
+  }
 
   /// Takes over what was read, after checks.
   template <class Archive>
@@ -230,6 +249,7 @@ class FuzzyQLearning {
 
   static constexpr double kSlowestFading = 0.99;  // bounds the room for traces
   static constexpr double kLargest = std::numeric_limits<float>::max();
+  static constexpr double kLargeStep = 1e28;  // smaller ones move no value that is near kLargest
 
   // sum value(i) alpha_i / sum alpha_i over the fired rules i, in their order.
   template <class Value>

@@ -176,14 +176,15 @@ class QLearning {
     return coding::action_value(action, n_actions(d), -1.0, 1.0);
   }
 
-  /// Learns one transition. Throws std::invalid_argument for a reward that is not finite, and as
-  /// the approximator does; then nothing has been learned.
+  /// Learns one transition. Throws std::invalid_argument for a reward that is not finite or beyond
+  /// +- 1e300, and as the approximator does; then nothing has been learned.
   void learn(std::span<const double> state, const Action& action, double reward,
              std::span<const double> next_state, bool terminated) {
     // Refuses at once what could not be learned: a correction may come later.
     core::require_unit_values("state", state, n_inputs());
     require_action(indices(action));
     core::require_finite("reward", reward);
+    core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
     core::require_unit_values("next_state", next_state, n_inputs());
     if constexpr (kHasRange) {
       if (adapts_range() && range_.note(reward)) {
@@ -239,6 +240,7 @@ class QLearning {
   }
 
  private:
+  static constexpr double kLargestReward = 1e300;  // sums of some, and steps to them, stay finite
   static constexpr bool kHasRange = requires(Q& q) { q.set_output_range(0.0, 1.0); };
 
   static QLearningConfig checked(const QLearningConfig& config) {
