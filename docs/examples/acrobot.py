@@ -1,9 +1,10 @@
 # %% [markdown]
 # # The paper's acrobot in twenty lines
 #
-# Two links hang from a fixed joint; a motor between them is the only drive. The agent decides on a torque once a second
-# and has 50 decisions to bring the tip 1.5 m above the joint. At first it may fly past; from episode to episode it has to
-# be slower there, down to almost standing still. `robust` is the preset that we recommend for this task.
+# Two links hang from a fixed joint; a motor between them is the only drive. The agent decides on a
+# torque once a second and has 50 decisions to bring the tip 1.5 m above the joint. At first it may
+# fly past; from episode to episode it has to be slower there, down to almost standing still.
+# `robust` is the preset that we recommend for this task.
 
 # %%
 import gymnasium as gym
@@ -23,12 +24,15 @@ for episode in range(1, 401):
         greedy = evaluate(agent, env, episodes=1)  # nothing is learned in it
         tests.append((episode, greedy.lengths[0], greedy.terminated[0]))
 episodes, decisions, solved = np.array(tests).T
-print(f"solved in {solved.sum():.0f} of {solved.size} tests; in the last 20: {solved[-20:].sum():.0f}")
+print(
+    f"solved in {solved.sum():.0f} of {solved.size} tests; in the last 20: {solved[-20:].sum():.0f}"
+)
 print(f"decisions of the last solved test: {decisions[solved == 1][-1]:.0f}")
 
 # %% [markdown]
-# Each point is a test without random actions. 50 decisions mean that the goal was not reached. A test can fail after others
-# were solved: the goal has become harder in the meantime, and the agent has to find a slower way up.
+# Each point is a test without random actions. 50 decisions mean that the goal was not reached. A
+# test can fail after others were solved: the goal has become harder in the meantime, and the agent
+# has to find a slower way up.
 
 # %%
 plt.figure(figsize=(7, 3))

@@ -1,9 +1,10 @@
 # %% [markdown]
 # # Train in Python, run in C++
 #
-# An agent's file is the same in both languages. Here an agent learns in Python to drive a car out of a valley, and the C++
-# program [cpp/run_agent.cpp](cpp/run_agent.cpp) takes its file and answers observations with actions. It needs no Python: a
-# header-only library, nlohmann/json (`apt install nlohmann-json3-dev`) and a C++20 compiler. A program that also learns is
+# An agent's file is the same in both languages. Here an agent learns in Python to drive a car out
+# of a valley, and the C++ program [cpp/run_agent.cpp](cpp/run_agent.cpp) takes its file and
+# answers observations with actions. It needs no Python: a header-only library, nlohmann/json (`apt
+# install nlohmann-json3-dev`) and a C++20 compiler. A program that also learns is
 # [cpp/controller.cpp](cpp/controller.cpp).
 
 # %%
@@ -43,8 +44,9 @@ program = subprocess.Popen(
 )
 
 # %% [markdown]
-# We give it 1,000 random observations and compare its answers with those of the agent in Python. Where several actions are
-# best, one of them is drawn; the file holds the state of the random numbers, so even that is the same.
+# We give it 1,000 random observations and compare its answers with those of the agent in Python.
+# Where several actions are best, one of them is drawn; the file holds the state of the random
+# numbers, so even that is the same.
 
 # %%
 generator = np.random.default_rng(1)

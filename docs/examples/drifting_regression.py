@@ -1,7 +1,8 @@
 # %% [markdown]
 # # Regression, and a stream that drifts
 #
-# `SDNNRegressor` has scikit-learn's interface. First a sample that stays as it is: two inputs, a smooth function, some noise.
+# `SDNNRegressor` has scikit-learn's interface. First a sample that stays as it is: two inputs, a
+# smooth function, some noise.
 
 # %%
 import matplotlib.pyplot as plt
@@ -27,9 +28,10 @@ best = 1 - 0.1**2 / y.var()
 print(f"R2 in 5-fold cross-validation: {scores.mean():.3f}; noise allows {best:.3f} at most")
 
 # %% [markdown]
-# Now samples come in portions of 50, and the function's waves travel: after 100 portions they have shifted by half a period. One
-# model learns from the first 20 portions and then stays as it is; the other goes on with `partial_fit`, one pass over each portion.
-# Both are tested on each portion before it is learned. Ranges are given, because later samples could leave those of the first.
+# Now samples come in portions of 50, and the function's waves travel: after 100 portions they have
+# shifted by half a period. One model learns from the first 20 portions and then stays as it is;
+# the other goes on with `partial_fit`, one pass over each portion. Both are tested on each portion
+# before it is learned. Ranges are given, because later samples could leave those of the first.
 
 # %%
 coding = RandomInverse(low=0.0, high=1.0)
@@ -46,11 +48,13 @@ for portion in range(120):
         fixed.partial_fit(x, y)
     online.partial_fit(x, y)
 for name, error in errors.items():
-    print(f"{name}: error {np.mean(error[10:19]):.2f} before the drift, {np.mean(error[-20:]):.2f} at its end")
+    before, end = np.mean(error[10:19]), np.mean(error[-20:])
+    print(f"{name}: error {before:.2f} before the drift, {end:.2f} at its end")
 
 # %% [markdown]
-# The noise alone has a standard deviation of 0.1, which no model can get below. The model that goes on learning follows
-# the waves a little behind them; the other one ends with the opposite of the truth.
+# The noise alone has a standard deviation of 0.1, which no model can get below. The model that
+# goes on learning follows the waves a little behind them; the other one ends with the opposite of
+# the truth.
 
 # %%
 plt.figure(figsize=(7, 3))

@@ -1,10 +1,11 @@
 # %% [markdown]
 # # Noisy sensors
 #
-# The acrobot again, but each of its four sensors has noise with a standard deviation of 2 % of its range. Two agents learn:
-# one with the paper's settings, one with those that we recommend, `robust` (61 torques instead of 601, and five rewards in
-# a target before it trusts the network). To see in minutes what takes thousands of episodes otherwise, the goal gets harder
-# ten times as fast as in the paper.
+# The acrobot again, but each of its four sensors has noise with a standard deviation of 2 % of its
+# range. Two agents learn: one with the paper's settings, one with those that we recommend,
+# `robust` (61 torques instead of 601, and five rewards in a target before it trusts the network).
+# To see in minutes what takes thousands of episodes otherwise, the goal gets harder ten times as
+# fast as in the paper.
 
 # %%
 import gymnasium as gym
@@ -32,13 +33,16 @@ for preset in ("paper", "robust"):
                 test = evaluate(agent, env, episodes=1, seed=episode)
                 solved.append(test.terminated[0])
         shares[preset, seed] = np.array(solved).reshape(8, -1).mean(axis=1)
-        print(f"{preset}, seed {seed}: solved {np.mean(solved[40:]):.0%} of the second half's tests")
+        print(
+            f"{preset}, seed {seed}: solved {np.mean(solved[40:]):.0%} of the second half's tests"
+        )
 
 # %% [markdown]
-# Each line is one training; a point is the share of ten tests that reached the goal. With the paper's settings a path that noise
-# and a tighter goal spoil is unlearned, and what is left is too uncertain to find the next one; some trainings come back,
-# some do not. Two seeds prove nothing: the experiment with 150 noisy trials is in [REPRODUCTION.md](../../REPRODUCTION.md),
-# and why it happens in [collapse.md](../collapse.md).
+# Each line is one training; a point is the share of ten tests that reached the goal. With the
+# paper's settings a path that noise and a tighter goal spoil is unlearned, and what is left is too
+# uncertain to find the next one; some trainings come back, some do not. Two seeds prove nothing:
+# the experiment with 150 noisy trials is in [REPRODUCTION.md](../../REPRODUCTION.md), and why it
+# happens in [collapse.md](../collapse.md).
 
 # %%
 plt.figure(figsize=(7, 3))

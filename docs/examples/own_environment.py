@@ -1,8 +1,9 @@
 # %% [markdown]
 # # An environment of your own
 #
-# A boat crosses a river whose current is strongest in the middle. It has a fixed speed and chooses one of nine headings, ten
-# times in a crossing or more. It shall land at a jetty on the other side.
+# A boat crosses a river whose current is strongest in the middle. It has a fixed speed and chooses
+# one of nine headings, ten times in a crossing or more. It shall land at a jetty on the other
+# side.
 
 # %%
 import gymnasium as gym
@@ -41,7 +42,8 @@ class RiverEnv(gym.Env):
 gym.register("examples/River-v0", entry_point=RiverEnv, max_episode_steps=100)
 
 # %% [markdown]
-# That is all an environment needs: spaces with bounds, `reset`, `step`, and a time limit. An agent learns it as it is.
+# That is all an environment needs: spaces with bounds, `reset`, `step`, and a time limit. An agent
+# learns it as it is.
 
 # %%
 env = gym.make("examples/River-v0")
@@ -66,8 +68,8 @@ for name, controller in controllers.items():
     print(f"{name}: return {found.mean_return:.2f}, {found.lengths.mean():.1f} steps")
 
 # %% [markdown]
-# A perfect landing gives 1 less 0.02 for each step. The rule is carried away by the current in the middle and has to fight its
-# way back; the agent has learned to steer against the current before.
+# A perfect landing gives 1 less 0.02 for each step. The rule is carried away by the current in the
+# middle and has to fight its way back; the agent has learned to steer against the current before.
 
 
 # %%

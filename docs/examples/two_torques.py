@@ -1,9 +1,10 @@
 # %% [markdown]
 # # Actions with two dimensions
 #
-# An arm of two links lies on a table. Each joint has a motor, so an action is two numbers. The tip shall come to a point that
-# differs from episode to episode, and stay there. With 5 values for each motor there are 25 joint actions; the agent has a
-# network for each motor instead and takes the mean of their values, so that it looks at 5 + 5.
+# An arm of two links lies on a table. Each joint has a motor, so an action is two numbers. The tip
+# shall come to a point that differs from episode to episode, and stay there. With 5 values for
+# each motor there are 25 joint actions; the agent has a network for each motor instead and takes
+# the mean of their values, so that it looks at 5 + 5.
 
 # %%
 import gymnasium as gym
@@ -27,7 +28,9 @@ class ReachingEnv(gym.Env):
 
     def step(self, action):
         first, second = action
-        speeds = np.array([first - 0.5 * second, second])  # the second motor turns the first link too
+        speeds = np.array(
+            [first - 0.5 * second, second]
+        )  # the second motor turns the first link too
         self.joints = np.clip(self.joints + 0.15 * speeds, -2.0, 2.0)
         distance = np.linalg.norm(tip(self.joints) - tip(self.goal))
         return self._observation(), -float(distance), False, False, {}
@@ -45,20 +48,22 @@ def tip(joints):
 gym.register("examples/Reaching-v0", entry_point=ReachingEnv, max_episode_steps=40)
 
 # %% [markdown]
-# Before any learning the agent acts at random. An episode has 40 steps, and its return is minus the sum of the distances.
+# Before any learning the agent acts at random. An episode has 40 steps, and its return is minus
+# the sum of the distances.
 
 # %%
 env = gym.make("examples/Reaching-v0")
 test = gym.make("examples/Reaching-v0")
 agent = SDNNQLearning(env.observation_space, env.action_space, seed=1)
 print("action space:", env.action_space, "- actions of each motor:", agent.n_actions)
-before = evaluate(agent, test, episodes=50)
+before = -evaluate(agent, test, episodes=50).mean_return / 40
 agent.train(env, steps=15_000)
-after = evaluate(agent, test, episodes=50)
-print(f"mean distance before: {-before.mean_return / 40:.2f} m, after: {-after.mean_return / 40:.2f} m")
+after = -evaluate(agent, test, episodes=50).mean_return / 40
+print(f"mean distance before: {before:.2f} m, after: {after:.2f} m")
 
 # %% [markdown]
-# The way to the goal counts in these means. Where does the tip end? The figure has the paths of the tip in eight episodes.
+# The way to the goal counts in these means. Where does the tip end? The figure has the paths of
+# the tip in eight episodes.
 
 # %%
 plt.figure(figsize=(4.5, 4.5))

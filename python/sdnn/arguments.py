@@ -78,7 +78,8 @@ def flag(name: str, value: Any) -> bool:
     """
     if value is True or value is False:
         return bool(value)
-    if getattr(value, "dtype", None) != bool or getattr(value, "size", 0) != 1:
+    kind = getattr(getattr(value, "dtype", None), "kind", "")
+    if kind != "b" or value.size != 1:
         raise TypeError(f"{name} must be True or False, got {value!r}")
     return bool(value)
 

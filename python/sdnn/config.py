@@ -57,16 +57,17 @@ def to_core(config: Any, core_type: type[CoreConfig]) -> CoreConfig:
 
 def _check_type(core_type: Any, field: dataclasses.Field[Any], value: Any, default: Any) -> None:
     """Raise TypeError unless the core takes the value; it takes True for 1 and None for False."""
-    is_truth = getattr(value, "dtype", type(value)) == bool
+    kind = getattr(getattr(value, "dtype", None), "kind", "")
+    is_truth = kind == "b" or isinstance(value, bool)
     try:
         if is_truth != isinstance(default, bool):
             raise TypeError
         core_type(**{field.name: value})
     except TypeError:
-        kind = str(field.type)
+        hint = str(field.type)
         words = {"bool": "True or False", "int": "a whole number", "float": "a number"}
-        first = kind.partition(" | ")[0]
-        expected = words.get(first, first) + (" or None" if kind.endswith("None") else "")
+        first = hint.partition(" | ")[0]
+        expected = words.get(first, first) + (" or None" if hint.endswith("None") else "")
         if isinstance(value, int) and not is_truth:
             expected += " that the core can hold"
         raise TypeError(f"{field.name} must be {expected}, got {value!r}") from None

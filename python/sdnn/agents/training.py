@@ -17,7 +17,7 @@ from sdnn.agents.evaluation import episode_seed, evaluate
 from sdnn.agents.files import Arrays, Description, from_file, read, write
 from sdnn.agents.interrupts import Interrupts
 from sdnn.agents.transition import Transition
-from sdnn.arguments import has_methods, path_of, whole
+from sdnn.arguments import has_methods, path_of, real, whole
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -314,7 +314,7 @@ class Training:
         if "training" not in description:
             raise ValueError(f"{path} holds an agent and no training: Agent.load reads it")
         agent = from_file(place, description, arrays)
-        counts = description["training"]
+        counts = _checked_counts(place, description["training"])
         has_goal = steps is not None or episodes is not None
         training = cls(
             agent,
@@ -330,6 +330,8 @@ class Training:
         training.n_steps, training.n_episodes = counts["n_steps"], counts["n_episodes"]
         training.n_rows, training._return = counts["n_rows"], counts["return"]
         if _ARRAYS + "actions" in arrays:
+            if _ARRAYS + "observation" not in arrays:
+                raise ValueError(f"{place} is damaged: training.observation must be there")
             training._repeat_episode(
                 list(arrays[_ARRAYS + "actions"]), arrays[_ARRAYS + "observation"]
             )
@@ -410,6 +412,37 @@ class Training:
     def _row(self, kind: str, **values: Any) -> Row:
         self.n_rows += 1
         return {"kind": kind, "step": self.n_steps, **values}
+
+
+_WHOLE = {
+    "steps": (1, 2**53),
+    "episodes": (1, 2**53),
+    "seed": (0, 2**64 - 1),
+    "n_steps": (0, 2**53),
+    "n_episodes": (0, 2**53),
+    "n_rows": (0, 2**53),
+    "evaluate_every": (1, 2**53),
+    "evaluation_episodes": (1, 10**9),
+}
+"""Least and largest of what `Training.save` writes down."""
+
+
+def _checked_counts(path: Path, counts: Any) -> Mapping[str, Any]:
+    """Read what `Training.save` wrote down; ValueError that names the file."""
+    try:
+        if not isinstance(counts, dict):
+            raise TypeError(f"training must be a table, got {counts!r}")
+        for name, (low, high) in _WHOLE.items():
+            if counts[name] is not None or name not in ("steps", "episodes", "evaluate_every"):
+                whole(name, counts[name], low, high)
+        if (counts["steps"] is None) == (counts["episodes"] is None):
+            raise ValueError("one of steps and episodes must be given")
+        real("return", counts["return"])
+    except KeyError as error:
+        raise ValueError(f"{path} is damaged: training has no {error}") from None
+    except (OverflowError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} is damaged: {error}") from error
+    return counts
 
 
 def _listed(callbacks: Iterable[Callback]) -> tuple[Callback, ...]:
