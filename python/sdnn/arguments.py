@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any, TypeVar
 
-__all__ = ["choice", "one_of", "real", "seed_of", "whole"]
+__all__ = ["choice", "flag", "has_methods", "one_of", "path_of", "real", "seed_of", "whole"]
 
 Member = TypeVar("Member")
 
@@ -61,4 +63,49 @@ def real(name: str, value: Any) -> float:
     """
     if not isinstance(value, Real) or isinstance(value, bool):
         raise ValueError(f"{name} must be a number, got {value!r}")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise OverflowError(f"{name} must be a number of less than 1.8e308, got more") from None
+
+
+def flag(name: str, value: Any) -> bool:
+    """Check that an argument is true or false, NumPy's too; TypeError if not.
+
+    >>> flag("explore", "no")
+    Traceback (most recent call last):
+    TypeError: explore must be True or False, got 'no'
+    """
+    if value is True or value is False:
+        return bool(value)
+    kind = getattr(getattr(value, "dtype", None), "kind", "")
+    if kind != "b" or value.size != 1:
+        raise TypeError(f"{name} must be True or False, got {value!r}")
+    return bool(value)
+
+
+def path_of(name: str, value: Any) -> Path:
+    """Check that an argument can name a file; TypeError or ValueError if not.
+
+    >>> path_of("path", None)
+    Traceback (most recent call last):
+    TypeError: path must be the name of a file, got None
+    """
+    if not isinstance(value, str | os.PathLike):
+        raise TypeError(f"{name} must be the name of a file, got {value!r}")
+    text = os.fspath(value)
+    if not isinstance(text, str) or not text or "\0" in text:
+        raise ValueError(f"{name} must be the name of a file, got {value!r}")
+    return Path(text)
+
+
+def has_methods(name: str, value: Any, what: str, *methods: str) -> None:
+    """Check that an argument has some methods; TypeError if not.
+
+    >>> has_methods("env", 5, "a Gymnasium environment", "reset", "step")
+    Traceback (most recent call last):
+    TypeError: env must be a Gymnasium environment, got 5
+    """
+    is_object = not isinstance(value, type)
+    if not (is_object and all(callable(getattr(value, method, None)) for method in methods)):
+        raise TypeError(f"{name} must be {what}, got {value!r}")

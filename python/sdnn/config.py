@@ -43,7 +43,7 @@ def to_core(config: Any, core_type: type[CoreConfig]) -> CoreConfig:
     ValueError
         If a word is none of its enumeration's.
     TypeError
-        If a value has the wrong type.
+        If a value has the wrong type, or is too large for the core's; the message names its field.
     """
     defaults = core_type()
     values = {}
@@ -51,4 +51,23 @@ def to_core(config: Any, core_type: type[CoreConfig]) -> CoreConfig:
         value = getattr(config, field.name)
         members = getattr(type(getattr(defaults, field.name)), "__members__", None)
         values[field.name] = value if members is None else choice(field.name, value, members)
+        _check_type(core_type, field, values[field.name], getattr(defaults, field.name))
     return core_type(**values)
+
+
+def _check_type(core_type: Any, field: dataclasses.Field[Any], value: Any, default: Any) -> None:
+    """Raise TypeError unless the core takes the value; it takes True for 1 and None for False."""
+    kind = getattr(getattr(value, "dtype", None), "kind", "")
+    is_truth = kind == "b" or isinstance(value, bool)
+    try:
+        if is_truth != isinstance(default, bool):
+            raise TypeError
+        core_type(**{field.name: value})
+    except TypeError:
+        hint = str(field.type)
+        words = {"bool": "True or False", "int": "a whole number", "float": "a number"}
+        first = hint.partition(" | ")[0]
+        expected = words.get(first, first) + (" or None" if hint.endswith("None") else "")
+        if isinstance(value, int) and not is_truth:
+            expected += " that the core can hold"
+        raise TypeError(f"{field.name} must be {expected}, got {value!r}") from None

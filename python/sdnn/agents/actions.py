@@ -64,8 +64,11 @@ class Actions(abc.ABC):
             )
         if not self.is_box:
             self.n_dimensions = len(self._sizes)
-        if self.n_dimensions == 0:
-            raise ValueError(f"action_space must have a dimension, got {space}")
+            _check_sizes(self._sizes, self.start)
+        if not 0 < self.n_dimensions <= _MOST_DIMENSIONS:
+            raise ValueError(
+                f"action_space must have 1 to {_MOST_DIMENSIONS} dimensions, got {space}"
+            )
 
     def take(self, numbers: Numbers, environment: int = 0) -> Any:
         """Make the element of the space, and remember it."""
@@ -104,7 +107,10 @@ class Actions(abc.ABC):
 
     def vector(self, action: Any) -> NDArray[np.float64]:
         """Read an element of the space, shape (n_dimensions,); ValueError if it is none."""
-        values = np.asarray(action)
+        try:
+            values = np.asarray(action)
+        except ValueError:  # lists of several lengths
+            values = np.empty(0)
         fits = values.size == self.n_dimensions and values.dtype.kind in "biuf"
         if fits:
             values = values.reshape(-1).astype(np.float64)
@@ -198,11 +204,32 @@ class ContinuousActions(Actions):
         raise ValueError(f"action must be that of the last exploring act, got {values.tolist()}")
 
 
+_MOST_DIMENSIONS = 1024
+_MOST_ACTIONS = 2**20
+_FURTHEST = 1e300
+"""Of bounds: what lies between them, times the number of an action, must stay finite."""
+_LARGEST_WHOLE = 2**53
+"""Up to which doubles are whole numbers."""
+
+
+def _check_sizes(sizes: list[int], start: NDArray[np.int64]) -> None:
+    if max(sizes, default=0) > _MOST_ACTIONS:
+        raise ValueError(
+            f"action_space must have at most {_MOST_ACTIONS} actions in each dimension,"
+            f" got {max(sizes)}"
+        )
+    if (np.abs(start.astype(np.float64)) > _LARGEST_WHOLE - _MOST_ACTIONS).any():
+        raise ValueError(f"action_space must begin within +-(2**53 - 2**20), got {start}")
+
+
 def _finite_bounds(space: gym.spaces.Box) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     low, high = (end.astype(np.float64).reshape(-1) for end in (space.low, space.high))
-    if not (np.isfinite(high - low).all() and (low < high).all()):
+    furthest = _FURTHEST if space.dtype.kind == "f" else float(_LARGEST_WHOLE)
+    is_bounded = (np.maximum(np.abs(low), np.abs(high)) <= furthest).all()
+    if not (is_bounded and (low < high).all()):
         raise ValueError(
-            f"action_space must have finite bounds, low < high, got {low} to {high}; "
+            f"action_space must have finite bounds within {furthest:.3g}, low < high,"
+            f" got {low} to {high}; "
             "pass a Box with the range that matters, and gymnasium's RescaleAction or ClipAction"
         )
     return low, high

@@ -20,12 +20,14 @@ from sdnn.agents.spaces import space_data, space_of
 from sdnn.agents.training import Callback, Training, TrainingResult
 from sdnn.agents.transition import Transition
 from sdnn.agents.warm_up import WarmUp
-from sdnn.arguments import seed_of, whole
+from sdnn.arguments import flag, path_of, real, seed_of, whole
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
 __all__ = ["Agent", "check_shape", "load_agent"]
+
+_LARGEST_REWARD = 1e300
 
 # Beginnings of the names of arrays that are saved.
 _CORE = "agent."
@@ -113,6 +115,14 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         angle_pairs: AnglePairs = "none",
         warm_up_steps: int = 1000,
     ) -> None:
+        settings: tuple[tuple[str, Any, type[Any]], ...] = (
+            ("approximator", approximator, self.approximator_type),
+            ("learning", learning, self.learning_type),
+        )
+        for name, part, kind in settings:
+            if not isinstance(part, kind):
+                raise TypeError(f"{name} must be a {kind.__name__}, got {part!r}")
+            part.to_core()  # the types of its fields
         self.observation_space = observation_space
         self.action_space = action_space
         self.approximator = approximator
@@ -132,7 +142,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         self._parts: list[Any] = []
         self._warm_up: WarmUp | None = None
         if self._observations.is_settled:
-            self._parts = self._make_parts()
+            self._parts = self._checked_parts()
         else:
             self._check_parts()
             self._warm_up = self._new_warm_up()
@@ -165,7 +175,32 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         trial.__dict__.update(self.__dict__)
         trial._observations = copy.deepcopy(self._observations)
         trial._observations.settle(np.zeros((1, trial._observations.n_variables)))
-        trial._make_parts()
+        trial._checked_parts()
+
+    def _core_approximator(self) -> Any:
+        """Give the core's settings of one dimension, of the memory's limit its share."""
+        settings: Any = self.approximator
+        core = settings.to_core()
+        n_dimensions = self._actions.n_dimensions
+        if n_dimensions == 1:
+            return core
+        share = settings.max_table_bytes // n_dimensions
+        return dataclasses.replace(settings, max_table_bytes=share).to_core()
+
+    def _checked_parts(self) -> list[Any]:
+        """Make the compiled agents; an error about sizes says which space they follow from."""
+        try:
+            return self._make_parts()
+        except ValueError as error:
+            reasons = {"n_inputs": "n_inputs follows from observation_space"}
+            if not self._actions.is_box:
+                reasons["n_actions"] = "n_actions follows from action_space"
+            if self._actions.n_dimensions > 1:
+                reasons["max_table_bytes"] = "for each dimension of action_space"
+            found = [reason for word, reason in reasons.items() if word in str(error)]
+            if not found:
+                raise
+            raise ValueError(f"{error} ({', '.join(found)})") from error
 
     @abc.abstractmethod
     def _act(self, state: NDArray[np.float64], explore: bool, environment: int) -> list[Any]:
@@ -200,7 +235,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
     @progress.setter
     def progress(self, progress: float) -> None:
-        value = float(progress)
+        value = real("progress", progress)
         if not 0.0 <= value <= 1.0:
             raise ValueError(f"progress must be in [0, 1], got {progress!r}")
         self._progress = value
@@ -267,7 +302,11 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         ------
         ValueError
             If the observation has another shape or holds NaN, or there is no such environment.
+        TypeError
+            If ``explore`` is not True or False.
         """
+        if explore is not True and explore is not False:
+            explore = flag("explore", explore)
         if environment:
             self._check_environment(environment)
         if self._warm_up is not None:
@@ -301,15 +340,21 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
         Raises
         ------
-        ValueError
-            If an observation, the action or the reward is not usable, or there is no such
-            environment; nothing is learned then.
+        TypeError, ValueError
+            If an observation, the action, the reward (beyond +-1e300, for example) or
+            ``terminated`` is not usable, or there is no such environment; nothing is learned then.
         OverflowError
             If a weight would leave its range; nothing is learned then.
         """
         if environment:
             self._check_environment(environment)
-        reward, terminated = float(transition.reward), bool(transition.terminated)
+        if not isinstance(transition, Transition):
+            raise TypeError(f"transition must be a Transition, got {transition!r}")
+        reward, terminated = transition.reward, transition.terminated
+        if type(reward) is not float:
+            reward = _reward(reward)
+        if terminated is not True and terminated is not False:
+            terminated = flag("terminated", terminated)
         if self._warm_up is None:
             self._learn(
                 self._observations("observation", transition.observation),
@@ -322,8 +367,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             return
         observation = self._observations.flat("observation", transition.observation)
         following = self._observations.flat("next_observation", transition.next_observation)
-        if not np.isfinite(reward):
-            raise ValueError(f"reward must be finite, got {reward}")
+        if not abs(reward) <= _LARGEST_REWARD:
+            raise ValueError(f"reward must be finite and within 1e300, got {reward}")
         values = self._actions.vector(transition.action)
         self._warm_up.learn(observation, values, reward, following, terminated, environment)
         if self._warm_up.is_over:
@@ -397,13 +442,13 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         >>> result.n_steps
         200
         """
-        own = list(callbacks)
-        if progress:
+        own: list[Callback] | Iterable[Callback] = callbacks
+        if flag("progress", progress):
             from rich.console import Console
 
             from sdnn.agents.progress import ProgressLine
 
-            own.append(ProgressLine(Console(stderr=True), "learning"))
+            own = [*callbacks, ProgressLine(Console(stderr=True), "learning")]
         return Training(
             self,
             env,
@@ -428,7 +473,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         OSError
             If the file cannot be written.
         """
-        write(Path(path), self.description(), self.state())
+        write(path_of("path", path), self.description(), self.state())
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -560,6 +605,13 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         return copied
 
 
+def _reward(reward: Any) -> float:
+    """Read a reward that is no float: NumPy's numbers, and arrays of one."""
+    if isinstance(reward, np.ndarray) and reward.size == 1 and reward.dtype.kind in "fiu":
+        return float(reward.item())
+    return real("reward", reward)
+
+
 def check_shape(state: Mapping[str, NDArray[Any]], name: str, shape: tuple[int, ...]) -> None:
     """Compare the shape of an array with what settings make of it; ValueError."""
     if name not in state or state[name].shape != shape:
@@ -569,5 +621,6 @@ def check_shape(state: Mapping[str, NDArray[Any]], name: str, shape: tuple[int, 
 
 def load_agent(path: str | Path) -> Agent[Any, Any]:
     """Read an agent of any kind that `Agent.save` wrote; see `Agent.load`."""
-    agent: Agent[Any, Any] = from_file(Path(path), *read(Path(path)))
+    place = path_of("path", path)
+    agent: Agent[Any, Any] = from_file(place, *read(place))
     return agent

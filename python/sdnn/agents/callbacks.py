@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from sdnn.agents.training import Callback, Row, Training
+from sdnn.arguments import path_of, real, whole
 from sdnn.whole_files import write_whole
 
 __all__ = ["Checkpoints", "EarlyStop", "JSONLines", "Schedule", "TensorBoard"]
@@ -25,7 +27,7 @@ class JSONLines(Callback):
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
+        self.path = path_of("path", path)
 
     def on_start(self, training: Training) -> None:
         """Begin the file, or keep as many lines as the training had rows."""
@@ -56,10 +58,8 @@ class Checkpoints(Callback):
     """
 
     def __init__(self, path: str | Path, every: int = 10_000) -> None:
-        if every < 1:
-            raise ValueError(f"every must be at least 1, got {every}")
-        self.path = Path(path)
-        self.every = every
+        self.path = path_of("path", path)
+        self.every = whole("every", every, 1, 2**53)
 
     def on_start(self, training: Training) -> None:
         """Raise ValueError where the training cannot be saved, before it learns for nothing."""
@@ -88,8 +88,10 @@ class EarlyStop(Callback):
     """
 
     def __init__(self, mean_return: float, patience: int = 1) -> None:
-        self.mean_return = mean_return
-        self.patience = patience
+        self.mean_return = real("mean_return", mean_return)
+        if math.isnan(self.mean_return):
+            raise ValueError("mean_return must be a number, got NaN")
+        self.patience = whole("patience", patience, 1, 2**53)
         self._n_reached = 0
 
     def on_row(self, training: Training, row: Row) -> None:
@@ -169,8 +171,8 @@ class TensorBoard(Callback):
     """
 
     def __init__(self, folder: str | Path) -> None:
+        self.folder = path_of("folder", folder)
         self._make = _summary_writer()
-        self.folder = Path(folder)
 
     def on_start(self, training: Training) -> None:
         """Open the event file."""

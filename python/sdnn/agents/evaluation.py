@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.arguments import whole
+from sdnn.arguments import has_methods, seed_of, whole
 
 __all__ = ["Evaluation", "episode_seed", "evaluate"]
 
@@ -77,9 +77,12 @@ def evaluate(
 
     Raises
     ------
-    ValueError
-        If ``episodes`` is not at least 1.
+    TypeError, ValueError
+        If an argument cannot be used, such as ``episodes`` below 1.
     """
+    has_methods("agent", agent, "an agent", "act")
+    has_methods("env", env, "a Gymnasium environment", "reset", "step")
+    seed = seed_of(seed)
     n_episodes = whole("episodes", episodes, 1, 10**9)
     returns, lengths, ends = [], [], []
     for episode in range(n_episodes):

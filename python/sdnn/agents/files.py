@@ -101,7 +101,7 @@ def _description(path: Path, text: str) -> Description:
             f"{path} was written by a newer version of sdnn"
             f" ({description.get('version')}, this is {__version__}): update sdnn to read it"
         )
-    if description.get("class") not in _KINDS:
+    if str(description.get("class")) not in _KINDS:
         raise ValueError(f"{path} holds an unknown kind of agent, {description.get('class')!r}")
     checked: Description = description
     return checked

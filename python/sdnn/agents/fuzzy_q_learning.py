@@ -15,6 +15,7 @@ from sdnn.agents.actions import Actions, ContinuousActions
 from sdnn.agents.agent import Agent, check_shape
 from sdnn.agents.observations import AnglePairs, Range
 from sdnn.approximators.fuzzy_rules import FuzzyRulesConfig
+from sdnn.arguments import whole
 from sdnn.config import added_later, to_core
 
 __all__ = ["FuzzyQLearning", "FuzzyQLearningConfig"]
@@ -131,8 +132,8 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
         super().__init__(
             observation_space,
             action_space,
-            approximator or FuzzyRulesConfig(),
-            learning or FuzzyQLearningConfig(),
+            FuzzyRulesConfig() if approximator is None else approximator,
+            FuzzyQLearningConfig() if learning is None else learning,
             seed=seed,
             observation_range=observation_range,
             angles=angles,
@@ -147,10 +148,11 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
         self.approximator = dataclasses.replace(
             self.approximator, n_inputs=self._observations.n_inputs
         )
+        approximator, learning = self._core_approximator(), self.learning.to_core()
         return [
             _core.FuzzyQLearning(
-                approximator=self.approximator.to_core(),
-                learning=self.learning.to_core(),
+                approximator=approximator,
+                learning=learning,
                 seed=_core.seed_of_dimension(self.seed, dimension),
             )
             for dimension in range(self._actions.n_dimensions)
@@ -212,5 +214,6 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
 
     def rule_values(self, rule: int) -> NDArray[np.float32]:
         """v(rule, a) of every discrete action, shape (n_actions,); of the first dimension."""
+        rule = whole("rule", rule, 0, self.n_rules - 1)
         values: NDArray[np.float32] = self.core.rules.values(rule)
         return values

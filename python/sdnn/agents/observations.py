@@ -76,11 +76,11 @@ class UnitObservations:
             raise ValueError(f"observation_space must have a variable, got {space}")
         self.low, self.high = _ranges(low, high, ranges)
         self._least_inputs = least_inputs
-        self._angles = tuple(self._variable("angles", angle) for angle in angles)
+        self._angles = tuple(self._variable("angles", one) for one in _listed("angles", angles))
         self._finds_pairs = isinstance(angle_pairs, str) and angle_pairs == "find"
         self._pairs: tuple[tuple[int, int], ...] = ()
         if not isinstance(angle_pairs, str):
-            self._pairs = tuple(self._pair(pair) for pair in angle_pairs)
+            self._pairs = tuple(self._pair(one) for one in _listed("angle_pairs", angle_pairs))
         elif angle_pairs not in ("none", "find"):
             raise ValueError(
                 f"angle_pairs must be 'none', 'find' or pairs of variables, got {angle_pairs!r}"
@@ -88,8 +88,8 @@ class UnitObservations:
         used = [*self._angles, *(variable for pair in self._pairs for variable in pair)]
         if len(set(used)) != len(used):
             raise ValueError(
-                f"angles and angle_pairs must name each variable once, got {list(angles)} and"
-                f" {angle_pairs!r}"
+                f"angles and angle_pairs must name each variable once, got {list(self._angles)}"
+                f" and {list(self._pairs)}"
             )
         self._is_settled = False
         self._converted: tuple[tuple[bytes, NDArray[np.float64]], ...] = ((b"", np.empty(0)),) * 2
@@ -122,13 +122,10 @@ class UnitObservations:
         if self._shape is None:
             try:
                 values = np.asarray(gym.spaces.flatten(self._space, observation), np.float64)
-            except (TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
+            except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
                 raise ValueError(f"{name} must be of {self._space}, got {observation!r}") from error
         else:
-            try:
-                values = np.asarray(observation, dtype=np.float64)
-            except (TypeError, ValueError) as error:
-                raise ValueError(f"{name} must be numbers, got {observation!r}") from error
+            values = _numbers(name, observation)
             if values.shape != self._shape:
                 raise ValueError(f"{name} must have shape {self._shape}, got {values.shape}")
             values = values.reshape(-1)
@@ -282,6 +279,23 @@ class UnitObservations:
 _LARGEST = 1e300
 
 
+def _numbers(name: str, values: Any) -> NDArray[np.float64]:
+    try:
+        array = np.asarray(values)
+    except ValueError as error:  # lists of several lengths
+        raise ValueError(f"{name} must be numbers, got {values!r}") from error
+    if array.dtype.kind not in "fiub":
+        raise ValueError(f"{name} must be numbers, got {values!r}")
+    return array.astype(np.float64, copy=False)
+
+
+def _listed(name: str, values: Any) -> tuple[Any, ...]:
+    try:
+        return tuple(values)
+    except TypeError:
+        raise TypeError(f"{name} must be a list, got {values!r}") from None
+
+
 def _ranges(
     low: NDArray[np.float64], high: NDArray[np.float64], ranges: Range | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -291,14 +305,17 @@ def _ranges(
             raise ValueError(f"observation_range must be (low, high), got {ranges!r}")
         try:
             low, high = (
-                with_infinities(np.broadcast_to(np.asarray(end, np.float64).reshape(-1), low.shape))
+                with_infinities(
+                    np.broadcast_to(_numbers("observation_range", end).reshape(-1), low.shape)
+                )
                 for end in ranges
             )
-        except (TypeError, ValueError):
+        except ValueError:
             raise ValueError(
                 f"observation_range must be two numbers or two times {low.size}, got {ranges!r}"
             ) from None
     known = np.isfinite(low) & np.isfinite(high)
     if (low[known] >= high[known]).any():
-        raise ValueError(f"observation ranges must be low < high, got {low} to {high}")
+        name = "observation_space" if ranges is None else "observation_range"
+        raise ValueError(f"{name} must have low < high, got {low} to {high}")
     return np.where(known, low, np.nan), np.where(known, high, np.nan)

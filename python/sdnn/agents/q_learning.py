@@ -19,7 +19,7 @@ from sdnn.agents.presets import PRESETS
 from sdnn.agents.q_learning_config import QLearningConfig
 from sdnn.approximators.rbf_network import RBFNetworkConfig
 from sdnn.approximators.sdnn_c import SDNNCConfig, pattern_tables
-from sdnn.arguments import choice, real
+from sdnn.arguments import choice, real, whole
 
 __all__ = ["RBFQLearning", "SDNNQLearning"]
 
@@ -173,9 +173,7 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
         return values
 
     def _dimension(self, dimension: int) -> int:
-        if not 0 <= dimension < self.n_dimensions:
-            raise ValueError(f"dimension must be in [0, {self.n_dimensions}), got {dimension}")
-        return dimension
+        return whole("dimension", dimension, 0, self.n_dimensions - 1)
 
     def _network(self, dimension: int) -> Any:
         """Find the approximator of a dimension."""
@@ -273,8 +271,8 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         super().__init__(
             observation_space,
             action_space,
-            approximator or chosen.approximator,
-            learning or chosen.learning,
+            chosen.approximator if approximator is None else approximator,
+            chosen.learning if learning is None else learning,
             seed=seed,
             observation_range=observation_range,
             angles=angles,
@@ -291,7 +289,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
             self.approximator = dataclasses.replace(
                 self.approximator, circular=self._observations.circular
             )
-        config, learning = self.approximator.to_core(), self.learning.to_core()
+        config, learning = self._core_approximator(), self.learning.to_core()
         if self.n_dimensions > 1:
             if self._tables is not None:
                 raise ValueError("tables must be None where actions have several dimensions")
@@ -415,8 +413,8 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
         super().__init__(
             observation_space,
             action_space,
-            approximator or RBFNetworkConfig(),
-            learning or QLearningConfig(),
+            RBFNetworkConfig() if approximator is None else approximator,
+            QLearningConfig() if learning is None else learning,
             seed=seed,
             observation_range=observation_range,
             angles=angles,
@@ -425,7 +423,7 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
         )
 
     def _make_core(self) -> CoreAgent | CoreVectorAgent:
-        config, learning = self.approximator.to_core(), self.learning.to_core()
+        config, learning = self._core_approximator(), self.learning.to_core()
         if self.n_dimensions > 1:
             return _core.DecoupledRBFQLearning(
                 approximator=config,

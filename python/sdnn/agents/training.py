@@ -18,7 +18,7 @@ from sdnn.agents.files import Arrays, Description, from_file, read, write
 from sdnn.agents.interrupts import Interrupts
 from sdnn.agents.rounds import Outcome, rounds_in
 from sdnn.agents.transition import Transition
-from sdnn.arguments import whole
+from sdnn.arguments import flag, has_methods, path_of, real, whole
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -202,6 +202,12 @@ class Training:
         evaluation_env: gym.Env[Any, Any] | None = None,
         evaluation_episodes: int = 10,
     ) -> None:
+        has_methods("agent", agent, "an agent", "act", "learn", "begin_episode")
+        has_methods("env", env, "a Gymnasium environment", "reset", "step")
+        if evaluation_env is not None:
+            has_methods(
+                "evaluation_env", evaluation_env, "a Gymnasium environment", "reset", "step"
+            )
         if (steps is None) == (episodes is None):
             raise ValueError(
                 f"one of steps and episodes must be given, got steps={steps}, episodes={episodes}"
@@ -211,7 +217,7 @@ class Training:
         self.steps = None if steps is None else whole("steps", steps, 1, 2**53)
         self.episodes = None if episodes is None else whole("episodes", episodes, 1, 2**53)
         self.seed = whole("seed", seed, 0, 2**64 - 1)
-        self.callbacks = tuple(callbacks)
+        self.callbacks = _listed(callbacks)
         self.evaluate_every = (
             None if evaluate_every is None else whole("evaluate_every", evaluate_every, 1, 2**53)
         )
@@ -340,7 +346,7 @@ class Training:
                 }
                 for episode in self._present
             ]
-        write(Path(path), {**self.agent.description(), "training": counts}, arrays)
+        write(path_of("path", path), {**self.agent.description(), "training": counts}, arrays)
 
     @classmethod
     def load(
@@ -374,11 +380,12 @@ class Training:
             If it is damaged, holds no training, or the environment does not repeat the episode;
             if the environment is a vector of another size, or cannot be reset one by one.
         """
-        description, arrays = read(Path(path))
+        place = path_of("path", path)
+        description, arrays = read(place)
         if "training" not in description:
             raise ValueError(f"{path} holds an agent and no training: Agent.load reads it")
-        agent = from_file(Path(path), description, arrays)
-        counts = description["training"]
+        agent = from_file(place, description, arrays)
+        counts = _checked_counts(place, description["training"])
         has_goal = steps is not None or episodes is not None
         training = cls(
             agent,
@@ -409,14 +416,15 @@ class Training:
                 training._present[number] = _Episode(
                     told["episode"],
                     None,
-                    list(arrays[_prefix(number) + "actions"]),
+                    list(_saved_array(place, arrays, _prefix(number) + "actions")),
                     told["return"],
                 )
         waits = [told is not None and told["waits"] for told in saved]
         training._repeat_episodes(waits)
         for number, episode in enumerate(training._present):
             if episode is not None:
-                training._check_repeated(episode, arrays[_prefix(number) + "observation"])
+                name = _prefix(number) + "observation"
+                training._check_repeated(episode, _saved_array(place, arrays, name))
         return training
 
     def _repeat_episodes(self, waits: list[bool]) -> None:
@@ -559,3 +567,55 @@ class Training:
 def _prefix(environment: int) -> str:
     """Of the names of an environment's arrays: the first one's as if there were no others."""
     return f"{_ARRAYS}{environment}." if environment else _ARRAYS
+
+
+_WHOLE = {
+    "steps": (1, 2**53),
+    "episodes": (1, 2**53),
+    "seed": (0, 2**64 - 1),
+    "n_steps": (0, 2**53),
+    "n_episodes": (0, 2**53),
+    "n_rows": (0, 2**53),
+    "evaluate_every": (1, 2**53),
+    "evaluation_episodes": (1, 10**9),
+}
+"""Least and largest of what `Training.save` writes down."""
+
+
+def _checked_counts(path: Path, counts: Any) -> Mapping[str, Any]:
+    """Read what `Training.save` wrote down; ValueError that names the file."""
+    try:
+        if not isinstance(counts, dict):
+            raise TypeError(f"training must be a table, got {counts!r}")
+        for name, (low, high) in _WHOLE.items():
+            if counts[name] is not None or name not in ("steps", "episodes", "evaluate_every"):
+                whole(name, counts[name], low, high)
+        if (counts["steps"] is None) == (counts["episodes"] is None):
+            raise ValueError("one of steps and episodes must be given")
+        real("return", counts["return"])
+        for told in counts.get("environments", ()):
+            if told is not None:
+                whole("episode", told["episode"], 0, 2**53)
+                real("return", told["return"])
+                flag("waits", told["waits"])
+    except KeyError as error:
+        raise ValueError(f"{path} is damaged: training has no {error}") from None
+    except (OverflowError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} is damaged: {error}") from error
+    return counts
+
+
+def _saved_array(path: Path, arrays: Arrays, name: str) -> NDArray[Any]:
+    if name not in arrays:
+        raise ValueError(f"{path} is damaged: {name} must be there")
+    return arrays[name]
+
+
+def _listed(callbacks: Iterable[Callback]) -> tuple[Callback, ...]:
+    try:
+        listed = tuple(callbacks)
+    except TypeError:
+        raise TypeError(f"callbacks must be a list of callbacks, got {callbacks!r}") from None
+    for callback in listed:
+        has_methods("callbacks", callback, "callbacks", "on_start", "on_step", "on_row", "on_end")
+    return listed

@@ -25,7 +25,8 @@ class FuzzyRulesConfig:
     n_actions : int
         Discrete actions that every rule has values of, evenly spaced over the action's range.
     max_table_bytes : int
-        A larger table is refused before memory is asked for; 1 GiB by default.
+        A larger table is refused before memory is asked for; 1 GiB by default. For all action
+        dimensions together, where an agent has several.
     """
 
     n_inputs: int = 4

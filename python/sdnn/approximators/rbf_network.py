@@ -28,10 +28,11 @@ class RBFNetworkConfig:
     width : float
         Standard deviation of a Gaussian in units of the spacing of the centres, 0.1 to 100.
     gradient_rate : float
-        Rate of a gradient step, > 0. With Q-learning's ``learning_rate`` 0.5 the default is stable
-        whatever the sizes and the width.
+        Rate of a gradient step, > 0 and at most 1e6. With Q-learning's ``learning_rate`` 0.5 the
+        default is stable whatever the sizes and the width.
     max_table_bytes : int
-        More weights are refused before memory is asked for; 1 GiB by default.
+        More weights are refused before memory is asked for; 1 GiB by default. For all action
+        dimensions together, where an agent has several.
     """
 
     n_inputs: int = 4

@@ -64,6 +64,9 @@ class SDNNCConfig:
         Of the number of units that are to fire: to the nearest; up or down at random in proportion,
         so that no small change is lost on average; or in the direction of the change by at least
         one unit. A reading.
+    max_table_bytes : int
+        A larger network (weights, patterns, remembered potentials) is refused before memory is
+        asked for; 1 GiB by default. For all action dimensions together, where an agent has several.
     """
 
     n_inputs: int = 4
@@ -85,6 +88,7 @@ class SDNNCConfig:
     initial_weights: Literal["ternary", "uniform"] = "ternary"
     initial_weight_limit: float = 0.1
     rounding: Literal["half_up", "random", "away"] = added_later("half_up")
+    max_table_bytes: int = added_later(2**30)
 
     def to_core(self) -> _core.SDNNCConfig:
         """Make the core's struct of the same values; see `sdnn.config.to_core`."""
@@ -94,8 +98,11 @@ class SDNNCConfig:
 def pattern_tables(tables: Sequence[ArrayLike]) -> list[NDArray[np.int8]]:
     """Read the patterns of each input; ValueError for other entries than -1 and +1."""
     read = []
-    for number, table in enumerate(tables):
-        signs = np.asarray(table)
+    try:
+        listed = [np.asarray(table) for table in tables]
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"tables must be matrices of -1 and +1, got {tables!r}") from error
+    for number, signs in enumerate(listed):
         if signs.ndim != 2 or not np.isin(signs, (-1, 1)).all():
             raise ValueError(
                 f"tables[{number}] must be a matrix of -1 and +1, got one of shape {signs.shape}"

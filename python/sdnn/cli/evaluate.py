@@ -13,7 +13,7 @@ from sdnn.cli.run_options import json_option, run_argument, run_command, seed_op
 @click.command()
 @run_argument
 @click.option(
-    "--episodes", type=click.IntRange(min=1), default=100, show_default=True, help="How many."
+    "--episodes", type=click.IntRange(1, 10**9), default=100, show_default=True, help="How many."
 )
 @seed_option
 @json_option

@@ -26,7 +26,7 @@ _OPTIONS = (
     ),
     click.option(
         "--jobs",
-        type=click.IntRange(min=1),
+        type=click.IntRange(1, 10_000),
         help="Trials to run at the same time, with threads.  [default: all cores]",
     ),
     click.option(

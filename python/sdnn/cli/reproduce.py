@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 @click.argument("experiment", type=click.Choice(WORDS), default="all")
 @click.option(
     "--trials",
-    type=click.IntRange(min=1),
+    type=click.IntRange(1, 100_000),
     help="Trials per case and agent.  [default: 10, as in the paper]",
 )
 @click.option(

@@ -248,6 +248,7 @@ class RunConfig:
         given = [(section, name) for section, values in self.settings.items() for name in values]
         for kind, section in ((approximator, "approximator"), (learning, "learning")):
             given += [(section, one.name) for one in dataclasses.fields(kind)]
+        given = [one for one in given if one != ("approximator", "n_inputs")]  # not a setting
         keys = [f"settings.{section}.{name}" for section, name in given if name in words]
         return keys[0] if keys else "environment.id"
 

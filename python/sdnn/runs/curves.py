@@ -105,7 +105,7 @@ def write_curves(curves: Sequence[Curve], path: Path) -> tuple[Path, Path]:
         If a file cannot be written.
     """
     if path.suffix not in SUFFIXES:
-        raise RunError(f"{path} must end in one of {', '.join(SUFFIXES)}")
+        raise RunError(f"out must end in one of {', '.join(SUFFIXES)}, got {path}")
     content = BytesIO()
     draw_curves(curves).savefig(content, format=path.suffix[1:], dpi=150)
     path.parent.mkdir(parents=True, exist_ok=True)

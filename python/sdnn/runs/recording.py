@@ -117,7 +117,7 @@ def record(
         If the file cannot be written.
     """
     if path.suffix not in SUFFIXES:
-        raise RunError(f"{path} must end in one of {', '.join(SUFFIXES)}")
+        raise RunError(f"out must end in one of {', '.join(SUFFIXES)}, got {path}")
     module, package = _PACKAGES[path.suffix]
     if find_spec(module) is None:
         raise RunError(f'{path} needs {package}, which is missing: pip install "sdnn[render]"')

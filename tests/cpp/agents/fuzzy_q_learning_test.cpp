@@ -215,6 +215,12 @@ TEST(FuzzyQLearning, NamesWhatIsImpossible) {
   EXPECT_EQ(of({.policy = {.epsilon = 2.0}}), "epsilon must be in [0, 1], got 2");
 }
 
+TEST(FuzzyQLearning, TooManyTracesAreRefusedBeforeMemoryIsAskedFor) {
+  const FuzzyRules rules({.n_inputs = 16, .n_sets = 2, .n_actions = 2});
+  EXPECT_THROW(FuzzyQLearning(rules, {.discount = 1.0, .trace_decay = 0.99}, 1), std::length_error);
+  EXPECT_EQ(FuzzyQLearning(rules, {}, 1).n_inputs(), 16U);
+}
+
 TEST(FuzzyQLearning, ABadTransitionTeachesNothing) {
   FuzzyQLearning agent(FuzzyRules({.n_inputs = 2}), {}, 1);
   const State state = {0.3, 0.6}, other = {0.3, 0.7}, bad = {0.3, 1.7};
@@ -240,6 +246,19 @@ FuzzyQLearning traced_agent() {
   return {FuzzyRules({.n_inputs = 2, .n_sets = 4, .n_actions = 5}),
           {.trace_decay = 0.8, .policy = {.epsilon = 0.3, .n_greedy_steps = 2}},
           3};
+}
+
+TEST(FuzzyQLearning, ARewardThatIsTooLargeLeavesTheTraces) {
+  FuzzyQLearning one = traced_agent(), other = traced_agent();
+  const State state = {0.3, 0.6}, next = {0.3, 0.7};
+  for (int step = 0; step < 20; ++step) {
+    const double action = one.act(state);
+    EXPECT_EQ(other.act(state), action);
+    EXPECT_THROW(one.learn(state, action, 1e300, next, false), std::overflow_error);
+    one.learn(state, action, 1.0, next, false);
+    other.learn(state, action, 1.0, next, false);
+  }
+  EXPECT_EQ(table(one), table(other));
 }
 
 TEST(FuzzyQLearning, ALifeCanBeCutAnywhere) {

@@ -122,11 +122,14 @@ std::string refusal(const FuzzyRulesConfig& config) {
 }
 
 TEST(FuzzyRules, TooLargeATableIsRefusedBeforeMemoryIsAskedFor) {
-  EXPECT_EQ(refusal<std::length_error>({.n_inputs = 9}),
-            "a table of 9^9 = 387420489 rules needs 32543321076 bytes, but max_table_bytes is "
-            "1073741824");
+  EXPECT_EQ(
+      refusal<std::length_error>({.n_inputs = 9}),
+      "n_sets or n_inputs must be smaller: a table of 9^9 = 387420489 rules needs 32543321076 "
+      "bytes, but max_table_bytes is "
+      "1073741824");
   EXPECT_EQ(refusal<std::length_error>({.n_inputs = 2, .max_table_bytes = 81 * 84 - 1}),
-            "a table of 9^2 = 81 rules needs 6804 bytes, but max_table_bytes is 6803");
+            "n_sets or n_inputs must be smaller: a table of 9^2 = 81 rules needs 6804 bytes, but "
+            "max_table_bytes is 6803");
   EXPECT_EQ(refusal<std::length_error>({.n_inputs = 2, .max_table_bytes = 81 * 84}), "no error");
 }
 

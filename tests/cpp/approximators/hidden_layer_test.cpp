@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <vector>
+
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::approximators {
@@ -183,6 +186,34 @@ TEST(HiddenLayer, OverflowIsDetectedBeforeAnythingChanges) {
 TEST(HiddenLayer, ALargerInputLowersTheWeightLimitSoThatPotentialsFit) {
   const HiddenLayer p(1, std::size_t{1} << 20);
   EXPECT_EQ(p.weight_limit(), 1023);  // 2^20 * 1023 < 2^30
+}
+
+TEST(HiddenLayer, AddingToAColumnIsSettingItsWeights) {
+  HiddenLayer added(130, 3);
+  HiddenLayer set(130, 3);
+  core::Random random(5, core::Stream::weights);
+  std::vector<std::int32_t> changes(130);
+  for (int round = 0; round < 40; ++round) {
+    const std::size_t column = round % 3;
+    const int sign = round % 2 == 0 ? 1 : -1;
+    for (std::int32_t& change : changes) {
+      change = static_cast<std::int32_t>(random.below(round < 20 ? 9 : 90)) - 4;
+    }
+    added.add_to_column(column, changes, sign);
+    for (std::size_t unit = 0; unit < changes.size(); ++unit) {
+      set.set_weight(unit, column, set.weight(unit, column) + sign * changes[unit]);
+    }
+  }
+  const Input x{.plus = {0, 2}, .minus = {1}};
+  std::vector<std::int32_t> one(130);
+  std::vector<std::int32_t> other(130);
+  added.potentials(x, one);
+  set.potentials(x, other);
+  EXPECT_EQ(one, other);
+  EXPECT_EQ(added.n_high_columns(), set.n_high_columns());
+  EXPECT_GT(added.n_high_columns(), 0U);
+  std::fill(changes.begin(), changes.end(), 40000);
+  EXPECT_THROW(added.add_to_column(0, changes, 1), std::invalid_argument);
 }
 
 TEST(HiddenLayer, NamesWhatIsImpossible) {

@@ -190,10 +190,12 @@ std::string message(const RBFNetworkConfig& config) {
 
 TEST(RBFNetwork, TooManyBasesAreRefusedBeforeMemoryIsAskedFor) {
   EXPECT_EQ(message<std::length_error>({.n_inputs = 13}),
-            "a table of 4^14 = 268435456 joint bases needs 2147483648 bytes, but "
+            "n_bases or n_inputs must be smaller: a table of 4^14 = 268435456 joint bases needs "
+            "2147483648 bytes, but "
             "max_table_bytes is 1073741824");
   EXPECT_EQ(message<std::length_error>({.n_inputs = 62, .max_table_bytes = UINT64_MAX}),
-            "a table of 4^63 joint bases needs 2^64 bytes or more, but max_table_bytes is "
+            "n_bases or n_inputs must be smaller: a table of 4^63 joint bases needs 2^64 bytes or "
+            "more, but max_table_bytes is "
             "18446744073709551615");
 }
 
@@ -205,6 +207,11 @@ TEST(RBFNetwork, NamesWhatIsImpossible) {
   EXPECT_EQ(message<Error>({.width = 0.0}), "width must be in [0.1, 100], got 0");
   EXPECT_EQ(message<Error>({.gradient_rate = -1.0}),
             "gradient_rate must be a finite number greater than 0, got -1");
+  EXPECT_EQ(message<Error>({.gradient_rate = 1e7}), "gradient_rate must be at most 1e6, got 1e+07");
+  EXPECT_EQ(
+      message<std::length_error>({.n_inputs = 1, .n_bases = 8000, .n_actions = 1 << 20}),
+      "n_actions or n_bases must be smaller: the bases of all actions need 67108864000 bytes, "
+      "but max_table_bytes is 1073741824");
 }
 
 TEST(RBFNetwork, BadArgumentsChangeNothing) {

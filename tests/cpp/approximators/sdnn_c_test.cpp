@@ -477,6 +477,35 @@ void expect_named(const SDNNCConfig& config, const std::string& name) {
   EXPECT_EQ(message(config).rfind(name + " must be ", 0), 0U) << message(config);
 }
 
+TEST(SDNNC, TooLargeANetworkIsRefusedBeforeMemoryIsAskedFor) {
+  const auto refusal = [](const SDNNCConfig& config) -> std::string {
+    try {
+      Network(config, 1);
+    } catch (const std::length_error& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(refusal({.n_inputs = 16, .n_pattern_units = 4096}),
+            "n_hidden_units, n_pattern_units or n_inputs must be smaller: weights, patterns and "
+            "remembered potentials need 1821434880 bytes, but max_table_bytes is 1073741824");
+  const std::string patterns = refusal({.n_anchor_patterns = 10000, .n_interpolated = 10000});
+  EXPECT_TRUE(patterns.starts_with("n_interpolated, n_anchor_patterns, n_pattern_units"))
+      << patterns;
+  const std::string potentials = refusal(
+      {.n_inputs = 2, .n_pattern_units = 2, .n_hidden_units = 1 << 20, .n_active_units = 1 << 20});
+  EXPECT_TRUE(potentials.starts_with("n_hidden_units or n_active_units must")) << potentials;
+  const SDNNCConfig small{.n_inputs = 2,
+                          .n_pattern_units = 20,
+                          .n_hidden_units = 64,
+                          .n_active_units = 20,
+                          .max_table_bytes = 1 << 20};
+  EXPECT_EQ(refusal(small), "no error");
+  SDNNCConfig smaller = small;
+  smaller.max_table_bytes = 1 << 16;
+  EXPECT_NE(refusal(smaller), "no error");
+}
+
 TEST(SDNNC, NamesTheFieldThatIsImpossible) {
   const double nan = std::nan("");
   EXPECT_EQ(message({.n_hidden_units = 900, .n_active_units = 901}),

@@ -147,8 +147,9 @@ class ActionScale {
     low_ = numbers("low");
     high_ = numbers("high");
     for (std::size_t d = 0; d < low_.size(); ++d) {
-      core::require(low_[d] <= high_[d] && std::isfinite(high_[d] - low_[d]), "action.high",
-                    "at least action.low", high_[d]);
+      core::require_in_range("action.low", low_[d], -kFurthest, kFurthest);
+      core::require_in_range("action.high", high_[d], -kFurthest, kFurthest);
+      core::require(low_[d] <= high_[d], "action.high", "at least action.low", high_[d]);
     }
   }
 
@@ -187,6 +188,8 @@ class ActionScale {
     const double last = static_cast<double>(n_actions_[d] - 1);
     return position > 0.0 ? static_cast<std::size_t>(std::min(position, last)) : 0;
   }
+
+  static constexpr double kFurthest = 1e300;  // of bounds: what lies between them stays finite
 
   bool is_discrete_ = false;
   std::vector<std::size_t> n_actions_;

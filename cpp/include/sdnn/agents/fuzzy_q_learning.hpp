@@ -18,6 +18,7 @@
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/elementary.hpp"
 
 namespace sdnn::agents {
@@ -64,11 +65,12 @@ class FuzzyQLearning {
   /// Smaller eligibilities count as 0.
   static constexpr double kForgottenTrace = 1e-3;
 
-  /// Throws std::invalid_argument naming the field that is out of range.
+  /// Throws std::invalid_argument naming the field that is out of range; std::length_error if what
+  /// fires at once and its traces need more than max_table_bytes.
   FuzzyQLearning(approximators::FuzzyRules rules, const FuzzyQLearningConfig& config,
                  std::uint64_t seed)
       : config_(checked(config)),
-        rules_(std::move(rules)),
+        rules_(with_room(std::move(rules))),
         policy_(config.policy, seed),
         other_fired_(rules_.no_rules()),
         episodes_(new_episode()) {
@@ -163,11 +165,14 @@ class FuzzyQLearning {
       return rules_.value(episode.fired.rules[i], episode.picked[i]);
     });
     const double step = config_.learning_coefficient * (target - value_of_picks);
+    const bool is_large = !(std::abs(step) < kLargeStep);  // others need no room to go back
+    const std::vector<Trace> before = is_large ? episode.traces : std::vector<Trace>();
     renew_traces(episode);
     for (const Trace& trace : episode.traces) {
-      if (!(std::abs(moved(trace, step)) <= kLargest)) {
-        throw std::overflow_error("a value of a fuzzy rule would leave the range of floats");
-      }
+      if (std::abs(moved(trace, step)) <= kLargest) continue;
+      if (is_large) episode.traces.assign(before.begin(), before.end());
+      throw std::overflow_error(
+          "reward is too large: a value of a fuzzy rule would leave the range of floats");
     }
     for (const Trace& trace : episode.traces) {
       rules_.set_value(trace.rule, trace.action, static_cast<float>(moved(trace, step)));
@@ -192,6 +197,16 @@ class FuzzyQLearning {
     std::size_t action;
     double eligibility;
   };
+
+  /// Asked before memory is: the number of rules that fire doubles with every input.
+  approximators::FuzzyRules with_room(approximators::FuzzyRules rules) const {
+    const double per_rule = 2.0 * (sizeof(std::size_t) + sizeof(double)) + sizeof(std::size_t) +
+                            static_cast<double>(trace_lifetime() + 1) * sizeof(Trace);
+    core::require_table_bytes("n_inputs or trace_decay", "rules that fire and their traces",
+                              per_rule * static_cast<double>(rules.max_fired()),
+                              rules.config().max_table_bytes);
+    return rules;
+  }
 
   /// What belongs to the present episode in one environment.
   struct Episode {
@@ -281,6 +296,7 @@ class FuzzyQLearning {
 
   static constexpr double kSlowestFading = 0.99;  // bounds the room for traces
   static constexpr double kLargest = std::numeric_limits<float>::max();
+  static constexpr double kLargeStep = 1e28;  // smaller ones move no value that is near kLargest
 
   // sum value(i) alpha_i / sum alpha_i over the fired rules i, in their order.
   template <class Value>

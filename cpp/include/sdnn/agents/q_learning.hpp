@@ -228,14 +228,16 @@ class QLearning {
     return coding::action_value(action, n_actions(d), -1.0, 1.0);
   }
 
-  /// Learns one transition. Throws std::invalid_argument for a reward that is not finite or an
-  /// environment that is none, and as the approximator does; then nothing has been learned.
+  /// Learns one transition. Throws std::invalid_argument for a reward that is not finite or beyond
+  /// +- 1e300 or an environment that is none, and as the approximator does; then nothing has been
+  /// learned.
   void learn(std::span<const double> state, const Action& action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0) {
     // Refuses at once what could not be learned: a correction may come later.
     core::require_unit_values("state", state, n_inputs());
     require_action(indices(action));
     core::require_finite("reward", reward);
+    core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
     core::require_unit_values("next_state", next_state, n_inputs());
     Episode& episode = episodes_.of(environment);
     if constexpr (kHasRange) {
@@ -279,6 +281,7 @@ class QLearning {
   }
 
  private:
+  static constexpr double kLargestReward = 1e300;  // sums of some, and steps to them, stay finite
   static constexpr bool kHasRange = requires(Q& q) { q.set_output_range(0.0, 1.0); };
 
   /// What belongs to the present episode in one environment.

@@ -58,7 +58,8 @@ class FuzzyRules {
   /// rules, bytes and limit, before any memory is asked for; std::bad_alloc.
   explicit FuzzyRules(const FuzzyRulesConfig& config)
       : config_(checked(config)),
-        n_rules_(core::grid_cells("rules", static_cast<std::size_t>(config.n_sets), n_inputs(),
+        n_rules_(core::grid_cells("n_sets or n_inputs", "rules",
+                                  static_cast<std::size_t>(config.n_sets), n_inputs(),
                                   n_actions() * sizeof(float), config.max_table_bytes)),
         table_(n_rules_ * n_actions()) {}
 

@@ -79,6 +79,21 @@ class HiddenLayer {
     }
     store(unit, column, value);
   }
+  /// Adds sign * changes to the weights of a column. Shape: changes (n,). Throws as set_weight.
+  void add_to_column(std::size_t column, std::span<const std::int32_t> changes, int sign) {
+    assert(changes.size() == n_units_);
+    const std::int32_t limit = std::min(kByteLimit, weight_limit_);
+    for (std::size_t unit = 0; unit < n_units_; ++unit) {
+      std::int8_t& byte = bytes_[byte_index(unit, column)];
+      const std::int32_t value = byte + sign * changes[unit];
+      if (may_have_high_[unit] || std::abs(value) > limit) {
+        set_weight(unit, column, weight(unit, column) + sign * changes[unit]);
+        continue;
+      }
+      byte = static_cast<std::int8_t>(value);
+      if (std::abs(value) > largest_weight_[unit]) note_largest(unit, std::abs(value));
+    }
+  }
   /// Whether |value| is below 2^30.
   static constexpr bool is_threshold(std::int32_t value) noexcept {
     return value >= -kThresholdLimit && value <= kThresholdLimit;

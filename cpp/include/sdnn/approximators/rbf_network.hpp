@@ -27,7 +27,7 @@ struct RBFNetworkConfig {
   int n_bases = 4;             ///< per dimension, of the state and of the action
   int n_actions = 601;         ///< evenly spaced over the action's range
   double width = 0.5;          ///< of a Gaussian, in units of the spacing of the centres
-  double gradient_rate = 3.0;  ///< of the gradient step in correct; stable below 2 / |phi|^2
+  double gradient_rate = 3.0;  ///< of the step in correct, at most 1e6; stable below 2 / |phi|^2
   std::uint64_t max_table_bytes = core::kDefaultMaxTableBytes;  ///< more weights are refused
 
   static constexpr auto fields() noexcept {
@@ -58,8 +58,8 @@ class RBFNetwork {
   /// std::length_error naming bases, bytes and limit before any memory is asked for.
   explicit RBFNetwork(const RBFNetworkConfig& config)
       : config_(checked(config)),
-        n_joint_bases_(core::grid_cells("joint bases", n_bases(), n_inputs() + 1, sizeof(double),
-                                        config.max_table_bytes)),
+        n_joint_bases_(core::grid_cells("n_bases or n_inputs", "joint bases", n_bases(),
+                                        n_inputs() + 1, sizeof(double), config.max_table_bytes)),
         weights_(n_joint_bases_),
         state_bases_(index(n_joint_bases_ / n_bases())),
         action_bases_(index(n_actions()), index(n_bases())),
@@ -128,8 +128,8 @@ class RBFNetwork {
   /// W += gradient_rate (q_hat - Q) phi(state, action).
   ///
   /// Throws std::invalid_argument like value, and for a NaN target or a rate outside (0, 1];
-  /// std::overflow_error if the error is not finite (the network has diverged, or target is
-  /// infinite). Nothing has changed then.
+  /// std::overflow_error if the step exceeds 1e305 (the network has diverged, or target is
+  /// infinite): weights stay finite, and so do values. Nothing has changed then.
   void correct(std::span<const double> state, std::size_t action, double target,
                double rate = 1.0) {
     core::require(!std::isnan(target), "target", "a number", target);
@@ -137,7 +137,10 @@ class RBFNetwork {
     const double q = value(state, action);
     const double q_hat = (1.0 - rate) * q + rate * target;
     const double step = config_.gradient_rate * (q_hat - q);
-    if (!std::isfinite(step)) throw std::overflow_error("the RBF network's weights diverge");
+    if (!(std::abs(step) <= kLargestStep)) {
+      throw std::overflow_error(
+          "the RBF network's weights diverge: reward, gradient_rate or learning_rate is too large");
+    }
     is_mixed_ = false;
     mixed_ = step * action_bases_.row(index(action)).transpose();
     if (mixed_.size() == kUnrolled) {
@@ -149,6 +152,7 @@ class RBFNetwork {
 
  private:
   static constexpr int kUnrolled = 4;  // the paper's n_bases
+  static constexpr double kLargestStep = 1e305;
 
   static RBFNetworkConfig checked(const RBFNetworkConfig& config) {
     core::require_in_range("n_inputs", config.n_inputs, 1, 62);
@@ -156,6 +160,10 @@ class RBFNetwork {
     core::require_in_range("n_actions", config.n_actions, 1, 1 << 20);
     core::require_in_range("width", config.width, 0.1, 100.0);  // narrower ones leave gaps of 0
     core::require_positive("gradient_rate", config.gradient_rate);
+    core::require(config.gradient_rate <= 1e6, "gradient_rate", "at most 1e6",
+                  config.gradient_rate);
+    core::require_table_bytes("n_actions or n_bases", "the bases of all actions",
+                              8.0 * config.n_actions * config.n_bases, config.max_table_bytes);
     return config;
   }
 

@@ -1,6 +1,7 @@
 /// SDNN-C: a network that gives Q(s, a) for every action at once.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
@@ -23,6 +24,7 @@
 #include "sdnn/coding/permutation.hpp"
 #include "sdnn/coding/state_code.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::approximators {
@@ -44,7 +46,8 @@ struct CorrectionCounts {
 class SDNNC {
  public:
   /// Code books by anchor interpolation. Throws std::invalid_argument naming the field that is
-  /// impossible; std::bad_alloc.
+  /// impossible; std::length_error naming bytes, max_table_bytes and what to reduce, before much
+  /// memory is asked for; std::bad_alloc.
   SDNNC(const SDNNCConfig& config, std::uint64_t seed)
       : SDNNC(config, anchor_tables(config, seed), seed) {}
 
@@ -81,10 +84,7 @@ class SDNNC {
 
   /// The weight of a hidden unit for a unit of x_SD, in the paper's order, in lattice steps.
   std::int32_t weight(std::size_t unit, std::size_t j) const {
-    const auto columns = code_->columns_of(j);
-    const std::int32_t first = hidden_layer_.weight(unit, columns.first);
-    return columns.paired ? (first + columns.sign * hidden_layer_.weight(unit, columns.second)) / 2
-                          : first;
+    return weight_at(unit, code_->columns_of(j));
   }
 
   /// Q(state, a) for every action. Shapes: state (l,) in [0, 1], out (n_actions,).
@@ -212,8 +212,11 @@ class SDNNC {
     if constexpr (!Archive::kReads) {
       for (std::size_t unit = 0; unit < n_units; ++unit) {
         thresholds[unit] = self.hidden_layer_.threshold(unit);
-        for (std::size_t j = 0; j < n_columns; ++j) {
-          weights[unit * n_columns + j] = static_cast<std::int16_t>(self.weight(unit, j));
+      }
+      for (std::size_t j = 0; j < n_columns; ++j) {
+        const auto columns = self.code_->columns_of(j);
+        for (std::size_t unit = 0; unit < n_units; ++unit) {
+          weights[unit * n_columns + j] = static_cast<std::int16_t>(self.weight_at(unit, columns));
         }
       }
     }
@@ -252,6 +255,7 @@ class SDNNC {
     core::require_in_range("n_pattern_units", config.n_pattern_units, 2, 1 << 16);
     core::require(config.circular.empty() || config.circular.size() == l, "circular",
                   "empty or one flag per input", config.circular.size());
+    require_room(config, (config.n_anchor_patterns - 1.0) * (config.n_interpolated + 1.0));
     std::vector<coding::PatternTable> tables;
     for (std::size_t mu = 0; mu < l; ++mu) {
       core::Random random(seed, core::Stream::code_books, mu);
@@ -266,6 +270,35 @@ class SDNNC {
     return tables;
   }
 
+  static std::size_t n_patterns(const std::vector<coding::PatternTable>& tables) {
+    std::size_t n = 0;
+    for (const coding::PatternTable& table : tables) n += table.n_bins();
+    return n;
+  }
+
+  /// Throws std::length_error if the network, with so many bins per input, has more bytes than
+  /// config.max_table_bytes. In doubles, which no product overflows; their rounding does not
+  /// matter.
+  static void require_room(const SDNNCConfig& config, double n_bins) {
+    const coding::ActionCode sizes(config.n_hidden_units, config.n_active_units, config.n_actions);
+    const double l = config.n_inputs;
+    const double n_units = static_cast<double>(sizes.n_hidden_units());
+    const double n_columns = l * (l - 1.0) * config.n_pattern_units;
+    const double pattern = 8.0 * std::ceil(config.n_pattern_units / 64.0);
+    const double weights = 2.0 * n_units * n_columns + 4.0 * n_columns;
+    const double patterns = l * l * n_bins * pattern;
+    const double remembered = static_cast<double>(
+        PotentialMemory::n_bytes(sizes.n_hidden_units(), sizes.n_active_units()));
+    const char* largest = "n_hidden_units, n_pattern_units or n_inputs";
+    if (patterns > std::max(weights, remembered)) {
+      largest = "n_interpolated, n_anchor_patterns, n_pattern_units or n_inputs";
+    } else if (remembered > weights) {
+      largest = "n_hidden_units or n_active_units";
+    }
+    core::require_table_bytes(largest, "weights, patterns and remembered potentials",
+                              weights + patterns + remembered, config.max_table_bytes);
+  }
+
   static std::shared_ptr<const coding::StateCode> make_code(
       const SDNNCConfig& config, std::vector<coding::PatternTable> tables, std::uint64_t seed) {
     const std::size_t l = checked_inputs(config);
@@ -275,6 +308,7 @@ class SDNNC {
                     "of n_pattern_units = " + std::to_string(config.n_pattern_units) + " units",
                     table.n_units());
     }
+    require_room(config, static_cast<double>(n_patterns(tables)) / static_cast<double>(l));
     std::vector<coding::Permutation> permutations;
     for (std::size_t group = 0; group < l * (l - 1); ++group) {
       core::Random random(seed, core::Stream::permutations, group);
@@ -319,6 +353,13 @@ class SDNNC {
     memory_.forget();
   }
 
+  std::int32_t weight_at(std::size_t unit,
+                         const coding::StateCode::PairedColumns& columns) const noexcept {
+    const std::int32_t first = hidden_layer_.weight(unit, columns.first);
+    return columns.paired ? (first + columns.sign * hidden_layer_.weight(unit, columns.second)) / 2
+                          : first;
+  }
+
   /// Two weights make a sum that has to fit.
   std::int32_t largest_initial_weight() const noexcept { return hidden_layer_.weight_limit() / 2; }
 
@@ -340,21 +381,22 @@ class SDNNC {
                   "at most " + std::to_string(largest_initial_weight()) + " / lattice",
                   config_.initial_weight_limit);
     core::Random random(seed, core::Stream::weights);
+    std::vector<std::int32_t> drawn(hidden_layer_.n_units());
     for (std::size_t j = 0; j < code_->n_columns(); ++j) {
-      const auto columns = code_->columns_of(j);
       std::uint64_t bits = 0;
-      for (std::size_t i = 0; i < hidden_layer_.n_units(); ++i) {
+      for (std::size_t i = 0; i < drawn.size(); ++i) {
         if (config_.initial_weights == InitialWeights::ternary) {
           if (i % 32 == 0) bits = random.bits();  // two bits a weight
-          add_weight(
-              hidden_layer_, i, columns,
-              static_cast<std::int32_t>(bits & 1) - static_cast<std::int32_t>(bits >> 1 & 1));
+          drawn[i] = static_cast<std::int32_t>(bits & 1) - static_cast<std::int32_t>(bits >> 1 & 1);
           bits >>= 2;
         } else {
-          const double drawn = limit * (2.0 * random.uniform() - 1.0);
-          add_weight(hidden_layer_, i, columns, static_cast<std::int32_t>(std::floor(drawn + 0.5)));
+          const double weight = limit * (2.0 * random.uniform() - 1.0);
+          drawn[i] = static_cast<std::int32_t>(std::floor(weight + 0.5));
         }
       }
+      const auto columns = code_->columns_of(j);
+      hidden_layer_.add_to_column(columns.first, drawn, 1);
+      if (columns.paired) hidden_layer_.add_to_column(columns.second, drawn, columns.sign);
     }
   }
 

@@ -1,11 +1,13 @@
 /// Everything that defines an SDNN-C.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <tuple>
 #include <vector>
 
 #include "sdnn/core/config_fields.hpp"
+#include "sdnn/core/detail/grid_cells.hpp"
 
 namespace sdnn::approximators {
 
@@ -43,6 +45,7 @@ struct SDNNCConfig {
   InitialWeights initial_weights = InitialWeights::ternary;
   double initial_weight_limit = 0.1;      ///< of InitialWeights::uniform, in units of c
   Rounding rounding = Rounding::half_up;  ///< of the number of units that are to fire
+  std::uint64_t max_table_bytes = core::kDefaultMaxTableBytes;  ///< larger networks are refused
 
   static constexpr auto fields() noexcept {
     return std::tuple(
@@ -62,7 +65,8 @@ struct SDNNCConfig {
         core::field("initial_threshold", &SDNNCConfig::initial_threshold),
         core::field("initial_weights", &SDNNCConfig::initial_weights),
         core::field("initial_weight_limit", &SDNNCConfig::initial_weight_limit),
-        core::field("rounding", &SDNNCConfig::rounding));
+        core::field("rounding", &SDNNCConfig::rounding),
+        core::field("max_table_bytes", &SDNNCConfig::max_table_bytes));
   }
   bool operator==(const SDNNCConfig&) const = default;
 };

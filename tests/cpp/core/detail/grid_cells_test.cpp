@@ -7,13 +7,14 @@
 namespace {
 
 using sdnn::core::grid_cells;
+using sdnn::core::require_table_bytes;
 
 constexpr std::uint64_t kAnything = UINT64_MAX;
 
 std::string message(std::size_t n_per_dimension, std::size_t n_dimensions, std::size_t bytes,
                     std::uint64_t limit) {
   try {
-    grid_cells("rules", n_per_dimension, n_dimensions, bytes, limit);
+    grid_cells("n_sets", "rules", n_per_dimension, n_dimensions, bytes, limit);
   } catch (const std::length_error& error) {
     return error.what();
   }
@@ -21,25 +22,45 @@ std::string message(std::size_t n_per_dimension, std::size_t n_dimensions, std::
 }
 
 TEST(GridCells, IsThePower) {
-  EXPECT_EQ(grid_cells("cells", 9, 6, 84, kAnything), 531441U);
-  EXPECT_EQ(grid_cells("cells", 4, 7, 8, kAnything), 16384U);
-  EXPECT_EQ(grid_cells("cells", 5, 0, 1, kAnything), 1U);
-  EXPECT_EQ(grid_cells("cells", 2, 63, 1, kAnything), std::size_t{1} << 63);
+  EXPECT_EQ(grid_cells("n", "cells", 9, 6, 84, kAnything), 531441U);
+  EXPECT_EQ(grid_cells("n", "cells", 4, 7, 8, kAnything), 16384U);
+  EXPECT_EQ(grid_cells("n", "cells", 5, 0, 1, kAnything), 1U);
+  EXPECT_EQ(grid_cells("n", "cells", 2, 63, 1, kAnything), std::size_t{1} << 63);
 }
 
 TEST(GridCells, TheLimitIsTheLargestAllowed) {
   EXPECT_EQ(message(10, 2, 8, 800), "no error");
-  EXPECT_EQ(message(10, 2, 8, 799),
-            "a table of 10^2 = 100 rules needs 800 bytes, but max_table_bytes is 799");
+  EXPECT_EQ(
+      message(10, 2, 8, 799),
+      "n_sets must be smaller: a table of 10^2 = 100 rules needs 800 bytes, but max_table_bytes "
+      "is 799");
 }
 
 TEST(GridCells, WhatCannotBeCountedIsRefusedUnderAnyLimit) {
-  EXPECT_EQ(message(2, 63, 4, kAnything),
-            "a table of 2^63 = 9223372036854775808 rules needs 2^64 bytes or more, but "
-            "max_table_bytes is 18446744073709551615");
+  EXPECT_EQ(
+      message(2, 63, 4, kAnything),
+      "n_sets must be smaller: a table of 2^63 = 9223372036854775808 rules needs 2^64 bytes or "
+      "more, but "
+      "max_table_bytes is 18446744073709551615");
   EXPECT_EQ(message(9, 40, 84, kAnything),
-            "a table of 9^40 rules needs 2^64 bytes or more, but max_table_bytes is "
+            "n_sets must be smaller: a table of 9^40 rules needs 2^64 bytes or more, but "
+            "max_table_bytes is "
             "18446744073709551615");
+}
+
+TEST(RequireTableBytes, SaysWhatToReduce) {
+  require_table_bytes("n_actions", "bases", 800.0, 800);
+  EXPECT_EQ(
+      [] {
+        try {
+          require_table_bytes("n_actions", "bases", 1e18, 800);
+        } catch (const std::length_error& error) {
+          return std::string(error.what());
+        }
+        return std::string("no error");
+      }(),
+      "n_actions must be smaller: bases need 1000000000000000000 bytes, but max_table_bytes is "
+      "800");
 }
 
 }  // namespace

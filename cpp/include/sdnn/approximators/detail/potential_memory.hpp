@@ -72,6 +72,12 @@ class PotentialMemory {
     columns_of_pass_ = 0.5 * l * static_cast<double>(code.n_pattern_units()) * columns_of_modifier;
   }
 
+  /// Bytes that it holds, but for what does not grow with these sizes.
+  static constexpr std::size_t n_bytes(std::size_t n_units, std::size_t max_corrected) noexcept {
+    return kEntries * n_units * sizeof(std::int32_t) +
+           kLogSize * max_corrected * sizeof(std::uint32_t);
+  }
+
   const Counts& counts() const noexcept { return counts_; }
 
   /// Forgets all states: the weights have been replaced.

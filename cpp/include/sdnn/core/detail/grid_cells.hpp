@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <iomanip>
 #include <limits>
 #include <sstream>
 #include <stdexcept>
@@ -13,14 +14,27 @@ namespace sdnn::core {
 /// The default of every max_table_bytes: 1 GiB.
 inline constexpr std::uint64_t kDefaultMaxTableBytes = std::uint64_t{1} << 30;
 
+/// Throws std::length_error "<sizes> must be smaller: <what> need <bytes> bytes, but
+/// max_table_bytes is ..." if they are more. To be asked before memory is; a double, which no
+/// product overflows.
+inline void require_table_bytes(std::string_view sizes, std::string_view what, double bytes,
+                                std::uint64_t max_table_bytes) {
+  if (bytes <= static_cast<double>(max_table_bytes)) return;
+  std::ostringstream message;
+  message << sizes << " must be smaller: " << what << " need " << std::fixed << std::setprecision(0)
+          << bytes << " bytes, but max_table_bytes is " << max_table_bytes;
+  throw std::length_error(message.str());
+}
+
 /// n_per_dimension ^ n_dimensions, when a table with `bytes_per_cell` for each is allowed.
 ///
 /// A grid grows exponentially with its dimensions; asked before memory is requested, so that the
 /// answer is a message and not an exhausted machine. Requires n_per_dimension, bytes_per_cell > 0.
-/// Throws std::length_error naming the number of `cells` ("rules"), the bytes and max_table_bytes.
-inline std::size_t grid_cells(std::string_view cells, std::size_t n_per_dimension,
-                              std::size_t n_dimensions, std::size_t bytes_per_cell,
-                              std::uint64_t max_table_bytes) {
+/// Throws std::length_error naming the `sizes` to reduce ("n_sets or n_inputs"), the number of
+/// `cells` ("rules"), the bytes and max_table_bytes.
+inline std::size_t grid_cells(std::string_view sizes, std::string_view cells,
+                              std::size_t n_per_dimension, std::size_t n_dimensions,
+                              std::size_t bytes_per_cell, std::uint64_t max_table_bytes) {
   constexpr auto kMost = std::numeric_limits<std::size_t>::max();
   std::size_t n = 1;
   bool countable = true;
@@ -32,7 +46,7 @@ inline std::size_t grid_cells(std::string_view cells, std::size_t n_per_dimensio
   if (sized && n * bytes_per_cell <= max_table_bytes) return n;
 
   std::ostringstream message;
-  message << "a table of " << n_per_dimension << '^' << n_dimensions;
+  message << sizes << " must be smaller: a table of " << n_per_dimension << '^' << n_dimensions;
   if (countable) message << " = " << n;
   message << ' ' << cells << " needs ";
   if (sized) {

@@ -1,0 +1,556 @@
+"""A matrix of bad inputs, made from signatures and fields: a new parameter is covered by itself.
+
+A cell gives one bad value to one parameter of one callable. The call must refuse it by a typed
+error that names the parameter, and leave the agent as it was; or take it and work.
+"""
+
+import dataclasses
+import inspect
+import json
+import re
+import tempfile
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+from safetensors.numpy import load_file, save_file
+
+import sdnn.agents as agents
+from sdnn.agents import (
+    FuzzyQLearning,
+    FuzzyQLearningConfig,
+    QLearningConfig,
+    RBFQLearning,
+    SDNNQLearning,
+    Training,
+    Transition,
+    load_agent,
+)
+from sdnn.agents.files import read
+from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
+
+TYPED = (TypeError, ValueError, OverflowError, OSError)
+
+BAD = {
+    "NaN": lambda: np.nan,
+    "inf": lambda: np.inf,
+    "-inf": lambda: -np.inf,
+    "-1": lambda: -1,
+    "0": lambda: 0,
+    "0.5": lambda: 0.5,
+    "2**20": lambda: 2**20,
+    "2**31": lambda: 2**31,
+    "2**63": lambda: 2**63,
+    "-2**63": lambda: -(2**63),
+    "10**400": lambda: 10**400,
+    "1e308": lambda: 1e308,
+    "-1e308": lambda: -1e308,
+    "a text": lambda: "abc",
+    "a number as text": lambda: "1",
+    "an empty text": lambda: "",
+    "a zero byte": lambda: "a\0b",
+    "bytes": lambda: b"1",
+    "None": lambda: None,
+    "True": lambda: True,
+    "complex": lambda: 1 + 2j,
+    "object": object,
+    "empty list": lambda: [],
+    "empty tuple": lambda: (),
+    "empty dict": lambda: {},
+    "ragged list": lambda: [[1.0], [2.0, 3.0]],
+    "list of None": lambda: [None, None],
+    "list of texts": lambda: ["a", "b"],
+    "list of huge": lambda: [10**400, 10**400],
+    "generator": lambda: (number for number in (0.1, 0.2)),
+    "wrong shape": lambda: np.zeros((2, 3, 4)),
+    "wrong dtype": lambda: np.array([1j, 2j]),
+    "array of NaN": lambda: np.full(2, np.nan),
+    "array of inf": lambda: np.full(2, np.inf),
+    "array of 1e308": lambda: np.full(2, 1e308),
+    "array of objects": lambda: np.array([object(), object()]),
+    "a class": lambda: int,
+}
+
+SPACES = {
+    "Text": lambda: gym.spaces.Text(3),
+    "Sequence": lambda: gym.spaces.Sequence(gym.spaces.Discrete(2)),
+    "Graph": lambda: gym.spaces.Graph(gym.spaces.Box(0, 1, (2,)), None),
+    "empty Dict": lambda: gym.spaces.Dict({}),
+    "empty Tuple": lambda: gym.spaces.Tuple(()),
+    "Dict of Text": lambda: gym.spaces.Dict({"a": gym.spaces.Text(3)}),
+    "Box without variables": lambda: gym.spaces.Box(0, 1, (0,)),
+    "Box of one value": lambda: gym.spaces.Box(1, 1, (2,)),
+    "Box without bounds": lambda: gym.spaces.Box(-np.inf, np.inf, (2,)),
+    "Box with one bound": lambda: gym.spaces.Box(0, np.inf, (2,)),
+    "Box to 1e308": lambda: gym.spaces.Box(-1e308, 1e308, (1,), np.float64),
+    "Box of half 1e308": lambda: gym.spaces.Box(-8e307, 8e307, (1,), np.float64),
+    "Box of a tiny range": lambda: gym.spaces.Box(0.0, 5e-324, (1,), np.float64),
+    "Box of float16": lambda: gym.spaces.Box(-6e4, 6e4, (1,), np.float16),
+    "Box of float32": lambda: gym.spaces.Box(-3.4e38, 3.4e38, (1,), np.float32),
+    "Box of int64": lambda: gym.spaces.Box(-(2**63), 2**63 - 1, (1,), np.int64),
+    "Box of uint64": lambda: gym.spaces.Box(0, 2**64 - 1, (1,), np.uint64),
+    "Box of uint8": lambda: gym.spaces.Box(0, 255, (2,), np.uint8),
+    "Box of bool": lambda: gym.spaces.Box(0, 1, (2,), np.bool_),
+    "Box of no dimension": lambda: gym.spaces.Box(0, 1, ()),
+    "Box of 2**20 variables": lambda: gym.spaces.Box(0, 1, (2**20,)),
+    "Box of 64 variables": lambda: gym.spaces.Box(0, 1, (64,)),
+    "Box of 600 variables": lambda: gym.spaces.Box(0, 1, (600,)),
+    "Discrete(1)": lambda: gym.spaces.Discrete(1),
+    "Discrete(2**40)": lambda: gym.spaces.Discrete(2**40),
+    "Discrete from 2**62": lambda: gym.spaces.Discrete(3, start=2**62),
+    "Discrete to 2**63": lambda: gym.spaces.Discrete(3, start=2**63 - 3),
+    "MultiDiscrete of 2**40": lambda: gym.spaces.MultiDiscrete([3, 2**40]),
+    "MultiDiscrete from 2**62": lambda: gym.spaces.MultiDiscrete([3, 2], start=[2**62, 0]),
+    "MultiBinary(2**20)": lambda: gym.spaces.MultiBinary(2**20),
+    "MultiBinary(2, 3)": lambda: gym.spaces.MultiBinary((2, 3)),
+}  # fmt: skip
+
+JSON = {
+    "NaN": np.nan, "-1": -1, "0.5": 0.5, "2**40": 2**40, "2**70": 2**70, "1e308": 1e308,
+    "text": "abc", "null": None, "true": True, "list": [], "lists": [[]], "table": {},
+}  # fmt: skip
+
+PLANE = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
+UNBOUNDED = gym.spaces.Box(-np.inf, np.inf, (2,), np.float64)
+TORQUE = gym.spaces.Box(-2.0, 2.0, (1,), np.float64)
+TORQUES = gym.spaces.Box(-2.0, 2.0, (2,), np.float64)
+
+SETTINGS = {
+    SDNNQLearning: (
+        SDNNCConfig(
+            n_pattern_units=20,
+            n_anchor_patterns=4,
+            n_interpolated=6,
+            n_hidden_units=60,
+            n_active_units=20,
+            n_actions=5,
+        ),
+        QLearningConfig(n_steps=2, value_range="seen", n_greedy_steps=0),
+    ),
+    RBFQLearning: (RBFNetworkConfig(n_actions=5), QLearningConfig(n_greedy_steps=0)),
+    FuzzyQLearning: (
+        FuzzyRulesConfig(n_sets=4, n_actions=5),
+        FuzzyQLearningConfig(trace_decay=0.5, n_greedy_steps=0),
+    ),
+}
+CASES = {
+    "": {},
+    ", vector": {"action_space": TORQUES},
+    ", warm-up": {"observation_space": UNBOUNDED, "warm_up_steps": 30},
+}
+KINDS = [kind.__name__ + case for kind in SETTINGS for case in CASES]
+
+HERE = [0.1, 0.2]
+ENOUGH = 40
+
+
+class EnoughError(Exception):
+    """What was asked for is done, as far as a test wants to see it."""
+
+
+class Slope(gym.Env):
+    """A task that ends the training which asks for too much of it."""
+
+    observation_space = PLANE
+
+    def __init__(self, action_space, lasts=10**9):
+        self.action_space = action_space
+        self._left = lasts
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self._n = 0
+        return np.array(HERE), {}
+
+    def step(self, action):
+        self._left -= 1
+        if self._left < 0:
+            raise EnoughError
+        self._n += 1
+        at = np.clip(np.array(HERE) + 0.1 * np.asarray(action).sum(), -1.0, 1.0)
+        return at, float(-abs(at[0])), False, self._n >= 7, {}
+
+
+def make_agent(kind, **options):
+    name, comma, case = kind.partition(",")
+    cls = getattr(agents, name)
+    approximator, learning = SETTINGS[cls]
+    given = {"observation_space": PLANE, "action_space": TORQUE, "seed": 3}
+    given |= {"approximator": approximator, "learning": learning}
+    agent = cls(**{**given, **CASES[comma + case], **options})
+    return agent
+
+
+def lived(agent, n_steps=7):
+    """The agent after some steps; an exploring act comes last."""
+    generator = np.random.default_rng(1)
+    for _ in range(n_steps):
+        action = agent.act(HERE)
+        following = generator.uniform(-1, 1, 2)
+        agent.learn(Transition(HERE, action, float(generator.normal()), following, False))
+    agent.last = agent.act(HERE)
+    return agent
+
+
+def memory(agent):
+    """All that the agent is."""
+    arrays = {name: (a.dtype.str, a.shape, a.tobytes()) for name, a in agent.state().items()}
+    return repr(agent.description()), arrays
+
+
+def insanity(agent):
+    """What is wrong with an agent that was made or has learned; "" if nothing."""
+    observation = agent.observation_space.sample()
+    n_steps = 35 if agent.is_warming_up else 6
+    for step in range(n_steps):
+        action = agent.act(observation)
+        if fault := action_fault(agent, action):
+            return fault
+        following = agent.observation_space.sample()
+        agent.learn(Transition(observation, action, -0.5 * (step % 3), following, step % 4 == 3))
+        observation = following
+    if fault := action_fault(agent, agent.act(observation, explore=False)):
+        return fault
+    return state_fault(agent)
+
+
+def action_fault(agent, action):
+    values = np.asarray(action, np.float64)
+    is_in = agent.action_space.contains(action) or np.isscalar(action)
+    return "" if np.isfinite(values).all() and is_in else f"chose {action!r}"
+
+
+def state_fault(agent):
+    for name, array in agent.state().items():
+        if name.startswith("warm_up."):  # which remembers what was seen as it was
+            continue
+        if array.dtype.kind == "f" and not np.isfinite(array).all():
+            return f"{name} is not finite"
+    return ""
+
+
+class Lived:
+    """An agent that has lived, for one cell after the other as long as all of them are refused."""
+
+    def __init__(self, kind):
+        self._kind = kind
+        self.forget()
+
+    def forget(self):
+        self._agent = None
+
+    @property
+    def agent(self):
+        if self._agent is None:
+            self._agent = lived(make_agent(self._kind))
+            self._before = memory(self._agent)
+        return self._agent
+
+    @property
+    def is_unchanged(self):
+        return memory(self._agent) == self._before
+
+
+def judged(parameter, call, lived_agent=None):
+    """Run a cell: ``call`` gives what is wrong with an accepted value. Give the fault, or ""."""
+    try:
+        fault = call() or ""
+        if lived_agent is not None:
+            lived_agent.forget()
+        return fault
+    except EnoughError:
+        return ""
+    except TYPED as error:
+        message = str(error)
+        if "incompatible" in message or "not supported" in message:
+            return f"said {type(error).__name__}: {message[:200]}"
+        is_named = re.search(rf"\b{parameter}\b", message) or isinstance(error, OSError)
+        if not is_named:
+            return f"did not name {parameter}: {type(error).__name__}: {message[:200]}"
+        if lived_agent is not None and not lived_agent.is_unchanged:
+            lived_agent.forget()
+            return f"refused, but changed the agent: {message[:100]}"
+        return ""
+    except Exception as error:
+        return f"raised {type(error).__name__}: {str(error)[:200]}"
+
+
+def parameters_of(function):
+    return [name for name in inspect.signature(function).parameters if name not in ("self", "cls")]
+
+
+def values_for(parameter):
+    return BAD | SPACES if parameter.endswith("_space") else BAD
+
+
+# The rows of the matrix.
+
+
+def constructor_cells(name):
+    cls = getattr(agents, name)
+    for parameter in parameters_of(cls.__init__):
+        for word, value in values_for(parameter).items():
+
+            def call(parameter=parameter, value=value):
+                return insanity(make_agent(name, **{parameter: value()}))
+
+            yield f"{name}({parameter}={word})", _cell(parameter, call)
+
+
+def setting_cells(name):
+    """Fields of approximator and learning, of one dimension and of several."""
+    for case in ("", ", vector"):
+        for part, settings in zip(
+            ("approximator", "learning"), SETTINGS[getattr(agents, name)], strict=True
+        ):
+            for field in dataclasses.fields(settings):
+                for word, value in BAD.items():
+
+                    def call(part=part, settings=settings, field=field, value=value, case=case):
+                        changed = dataclasses.replace(settings, **{field.name: value()})
+                        return insanity(make_agent(name + case, **{part: changed}))
+
+                    yield f"{name}{case}: {part}.{field.name}={word}", _cell(field.name, call)
+
+
+def _cell(parameter, call):
+    return lambda: judged(parameter, call)
+
+
+def transition_cells(kind):
+    life = Lived(kind)
+    for parameter in Transition._fields:
+        for word, value in BAD.items():
+
+            def run(parameter=parameter, value=value):
+                agent = life.agent
+                good = Transition(HERE, agent.last, 1.0, [0.3, 0.4], False)
+
+                def call():
+                    agent.learn(good._replace(**{parameter: value()}))
+                    return state_fault(agent) or insanity(agent)
+
+                return judged(parameter, call, life)
+
+            yield f"{kind}.learn: {parameter}={word}", run
+
+
+def method_cells(kind):
+    """Every public method and settable property of an agent."""
+    life = Lived(kind)
+    cls = type(life.agent)
+    for name, method in inspect.getmembers(cls):
+        if name.startswith("_") or name == "rebuild":  # rebuild: see the cells of files
+            continue
+        if kind != KINDS[0] and name in ("train", "save", "load"):  # the same of all kinds
+            continue
+        if isinstance(method, property) and method.fset is not None:
+            parameters = [name]
+        elif inspect.isfunction(method) or inspect.ismethod(method):
+            parameters = parameters_of(method)
+        else:
+            continue
+        for parameter in parameters:
+            for word, value in BAD.items():
+                yield (
+                    f"{kind}.{name}: {parameter}={word}",
+                    _method_cell(life, kind, name, parameters, parameter, value),
+                )
+
+
+def _method_cell(life, kind, name, parameters, parameter, value):
+    def run():
+        agent = life.agent
+        if ", warm-up" in kind and name in ("q_values", "value", "rule_values"):
+            return ""  # which has no values yet
+        given = arguments(agent, parameters) | {parameter: value()}
+
+        def call():
+            if isinstance(getattr(type(agent), name), property):
+                setattr(agent, name, given[parameter])
+                return insanity(agent)
+            return result_fault(agent, getattr(agent, name)(**given), given)
+
+        return judged(parameter, call, life)
+
+    return run
+
+
+def arguments(agent, parameters):
+    """Good arguments of whatever is called; a new required parameter wants one here."""
+    env = Slope(agent.action_space, ENOUGH)
+    path = Path("agent").absolute()
+    if "path" in parameters:
+        agent.save(path)
+    good = {
+        "agent": agent,
+        "env": env,
+        "observation": HERE,
+        "explore": False,
+        "transition": Transition(HERE, agent.last, 1.0, [0.3, 0.4], False),
+        "dimension": 0,
+        "rule": 0,
+        "path": path,
+        "folder": Path("events").absolute(),
+        "steps": 5,
+        "episodes": None,
+        "seed": 3,
+        "callbacks": (),
+        "progress": False,
+        "evaluate_every": None,
+        "evaluation_env": Slope(agent.action_space, ENOUGH),
+        "evaluation_episodes": 1,
+        "every": 3,
+        "mean_return": 5.0,
+        "patience": 1,
+    }
+    return {name: good[name] for name in parameters}
+
+
+def result_fault(agent, result, given):
+    """What is wrong with what a method gave."""
+    if isinstance(result, agents.Agent):
+        return insanity(result)
+    if "observation" in given and "explore" in given:
+        return action_fault(agent, result)
+    if isinstance(result, agents.TrainingResult):
+        return state_fault(agent) or ("" if np.isfinite(result.returns).all() else "returns")
+    is_observation = np.array_equal(result, given.get("observation"))  # as it came, in its units
+    if isinstance(result, float | np.ndarray) and not is_observation:
+        return "" if np.isfinite(result).all() else f"gave {result}"
+    return state_fault(agent)
+
+
+def loop_cells():
+    """Training, its loading, evaluate, load_agent and the callbacks."""
+    kind = "SDNNQLearning"
+    callables = {
+        "evaluate": agents.evaluate,
+        "load_agent": agents.load_agent,
+        "Training": Training,
+        "Training.load": Training.load,
+        "Training.save": Training.save,
+        "Checkpoints": agents.Checkpoints,
+        "EarlyStop": agents.EarlyStop,
+        "JSONLines": agents.JSONLines,
+    }
+    for name, function in callables.items():
+        parameters = parameters_of(function)
+        for parameter in parameters:
+            for word, value in BAD.items():
+                yield (
+                    f"{name}({parameter}={word})",
+                    _loop_cell(kind, name, function, parameters, parameter, value),
+                )
+
+
+def _loop_cell(kind, name, function, parameters, parameter, value):
+    def run():
+        life = Lived(kind)
+        agent = life.agent
+        good = arguments(agent, parameters)
+        training = Training(agent, Slope(agent.action_space), steps=5, seed=3)
+        if name == "evaluate":
+            good["episodes"] = 2
+        if name.startswith("Training."):
+            training.run()
+        if name == "Training.load":
+            training.save(good["path"])
+            good["steps"] = 9
+        given = good | {parameter: value()}
+
+        def call():
+            if name == "Training.save":
+                training.save(**given)
+                return ""
+            made = function(**given)
+            if isinstance(made, Training):
+                return "" if made.run().n_steps > 0 else "learned nothing"
+            if isinstance(made, agents.Evaluation):
+                return "" if np.isfinite(made.returns).all() else "returns"
+            if isinstance(made, agents.Callback):
+                training.callbacks = (made,)
+                training.run()
+            return ""
+
+        return judged(parameter, call, life if name == "evaluate" else None)
+
+    return run
+
+
+def file_cells(kind):
+    """Every value of a file's description and every array, damaged."""
+    agent = lived(make_agent(kind))
+    env = Slope(agent.action_space)
+    training = Training(agent, env, steps=45, seed=3)
+    training.run()
+    training.steps = 90
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "checkpoint"
+        training.save(path)
+        description, _ = read(path)
+        arrays = load_file(path)
+    for place in leaves(description):
+        for word, value in {"nothing": ..., **JSON}.items():
+            changed = replaced(description, place, value)
+            name = ".".join(map(str, place))
+            yield f"{kind}'s file: {name}={word}", _file_cell(changed, arrays, kind)
+    for name, array in arrays.items():
+        damages = {"nothing": None, "texts": np.zeros(3, np.uint8), "longer": np.zeros(7)}
+        damages["-1"] = np.full_like(array, -1 if array.dtype.kind != "u" else 255)
+        if array.dtype.kind == "f":
+            damages |= {"NaN": np.full_like(array, np.nan), "inf": np.full_like(array, np.inf)}
+        for word, damage in damages.items():
+            changed = {n: a for n, a in arrays.items() if n != name}
+            if damage is not None:
+                changed[name] = damage
+            yield f"{kind}'s file: {name} of {word}", _file_cell(description, changed, kind)
+
+
+def leaves(data, place=()):
+    """The places of a file's description: tables, lists and values."""
+    if place:
+        yield place
+    items = data.items() if isinstance(data, dict) else ()
+    if isinstance(data, list) and len(data) <= 4:
+        items = enumerate(data)
+    for key, item in items:
+        yield from leaves(item, (*place, key))
+
+
+def replaced(data, place, value):
+    key, *rest = place
+    changed = dict(data) if isinstance(data, dict) else list(data)
+    if rest:
+        changed[key] = replaced(data[key], rest, value)
+    elif value is ...:
+        del changed[key]
+    else:
+        changed[key] = value
+    return changed
+
+
+def _file_cell(description, arrays, kind):
+    def run():
+        path = Path("damaged").absolute()
+        save_file(arrays, path, metadata={"sdnn": json.dumps(description)})
+        for load in (load_agent, lambda path: _trained(path, kind)):
+            try:
+                fault = insanity(load(path))
+            except EnoughError:
+                continue
+            except OverflowError:
+                continue  # values as large as can be were in the file
+            except ValueError as error:
+                fault = "" if str(path) in str(error) or "env must" in str(error) else str(error)
+            if fault:
+                return fault
+        return ""
+
+    return run
+
+
+def _trained(path, kind):
+    training = Training.load(path, Slope(make_agent(kind).action_space, 2 * ENOUGH))
+    training.run()
+    return training.agent

@@ -1,0 +1,117 @@
+"""A matrix of bad options, made from the commands: a new option is covered by itself.
+
+A cell gives one bad text to one option or argument. The command must end with exit code 2 and name
+it, end with exit code 1 and a message that has the text (a file that is not there), or work.
+"""
+
+import functools
+import os
+import re
+import tempfile
+from pathlib import Path
+
+from click import Argument
+from click.testing import CliRunner
+
+from sdnn.cli import main
+
+TEXTS = {
+    "NaN": "nan", "inf": "inf", "-inf": "-inf", "-1": "-1", "0": "0", "0.5": "0.5",
+    "2**63": str(2**63), "2**70": str(2**70), "400 digits": "9" * 400, "1e308": "1e308",
+    "-1e308": "-1e308", "1e400": "1e400", "empty": "", "blank": " ", "a word": "abc",
+    "None": "None", "true": "true", "list": "[1, 2]", "a line end": "a\nb",
+    "name=value": "x=y", "dots": "..", "no folder": "no/such/place", "a colon": ":",
+    "many letters": "a" * 5000,
+}  # fmt: skip
+
+STUDY = """
+[study]
+title = "Ties"
+trials = 1
+cases = ["s4"]
+
+[base]
+protocol.n_learning_episodes = 10
+
+[axes]
+learning.tie_rule = ["lowest"]
+"""
+
+COMMANDS = {
+    "train": (["CartPole-v1"], ["--dry-run"]),
+    "resume": (["run"], []),
+    "evaluate": (["run"], ["--episodes=1"]),
+    "plot": (["run"], []),
+    "record": (["run", "out.gif"], ["--steps=2"]),
+    "reproduce": (["a"], ["--dry-run", "--out=results"]),
+    "sweep": (["study.toml"], ["--dry-run", "--out=results"]),
+}
+"""Good arguments and options, with which the commands work and end soon."""
+
+_LASTING = tempfile.TemporaryDirectory()
+
+LEFT_OUT = {"bench"}
+"""Measures for a minute whatever its options, which are flags."""
+
+
+@functools.cache
+def run_folder():
+    """A run that is done, in a folder that lasts as long as the process."""
+    folder = _LASTING.name
+    run = os.path.join(folder, "run")
+    settings = ["n_pattern_units=20", "n_hidden_units=60", "n_active_units=20"]
+    options = [word for one in settings for word in ("--set", f"approximator.{one}")]
+    arguments = ["train", "CartPole-v1", "--steps", "60", "--evaluate-every", "60", *options]
+    result = CliRunner().invoke(main, [*arguments, "--evaluation-episodes", "1", "--out", run])
+    assert result.exit_code == 0, result.output
+    return run
+
+
+def command_cells(command):
+    for parameter in main.commands[command].params:
+        texts = {"a value": "5"} if getattr(parameter, "is_flag", False) else TEXTS
+        for word, text in texts.items():
+            name = parameter.opts[-1]
+            yield f"sdnn {command} {name} {word}", _cell(command, parameter, text)
+
+
+def arguments_of(command, parameter, text):
+    """The good arguments and options, with the text in the place of one of them."""
+    arguments, options = (list(words) for words in COMMANDS[command])
+    if isinstance(parameter, Argument):
+        places = [one for one in main.commands[command].params if isinstance(one, Argument)]
+        arguments[places.index(parameter)] = text
+    else:
+        options.append(f"{parameter.opts[-1]}={text}")  # the last one counts
+    return [*options, "--", *arguments]
+
+
+def _cell(command, parameter, text):
+    def run():
+        source = run_folder()
+        os.symlink(source, "run")
+        Path("study.toml").write_text(STUDY)
+        arguments = [command, *arguments_of(command, parameter, text)]
+        result = CliRunner().invoke(main, arguments)
+        return fault_of(result, parameter, text)
+
+    return run
+
+
+def fault_of(result, parameter, text):
+    """What is wrong with how a command ended; "" if nothing."""
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        return f"raised {type(result.exception).__name__}: {str(result.exception)[:200]}"
+    if result.exit_code == 0:
+        return "printed NaN" if "nan" in result.stdout.lower() and text != "nan" else ""
+    told = result.stderr
+    names = {*parameter.opts, *(one.strip("-") for one in parameter.opts)}
+    shown = parameter.metavar or parameter.name.upper()
+    names |= {shown, shown.lower()}
+    names |= {f"[{'|'.join(getattr(parameter.type, 'choices', ()))}]"} - {"[]"}
+    is_named = any(re.search(rf"(?<![\w-]){re.escape(name)}(?!\w)", told) for name in names)
+    if not is_named and not (text.strip() and text[:50] in told):
+        return f"exit code {result.exit_code} did not name {names}: {told[-200:]}"
+    if result.exit_code not in (1, 2):
+        return f"exit code {result.exit_code}: {told[-200:]}"
+    return ""

@@ -1,0 +1,75 @@
+"""Runs the cells of a matrix in a process of its own: a crash or a hang is a failed cell."""
+
+import multiprocessing
+import os
+import resource
+import tempfile
+import time
+import warnings
+
+CELL_SECONDS = 10.0
+START_SECONDS = 120.0
+HEADROOM = 2**31
+"""Bytes of address space that cells may ask for, beyond what the process begins with."""
+
+
+def failures(make_cells, *arguments):
+    """Run the cells of ``make_cells(*arguments)``; give their number and what failed.
+
+    A cell is a pair of a name and a function without arguments, which gives what is wrong, or "".
+    Each is in an empty folder of its own.
+    It has `CELL_SECONDS` and `HEADROOM` bytes; a process that ends is followed by another one.
+    """
+    context = multiprocessing.get_context("spawn")
+    failed, first, n_cells = [], 0, None
+    while n_cells is None or first < n_cells:
+        here, there = context.Pipe(duplex=False)
+        worker = context.Process(target=_work, args=(there, first, make_cells, arguments))
+        worker.start()
+        there.close()
+        name, fault = "the start", None
+        try:
+            n_cells = _received(here, START_SECONDS)
+            for number in range(first, n_cells):
+                first, name = number + 1, _received(here, CELL_SECONDS)
+                if fault := _received(here, CELL_SECONDS):
+                    failed.append(f"{name}: {fault}")
+        except TimeoutError:
+            failed.append(f"{name}: took more than {CELL_SECONDS} s")
+        except EOFError:
+            worker.join()
+            failed.append(f"{name}: ended the process with exit code {worker.exitcode}")
+        worker.kill()
+        worker.join()
+        if n_cells is None:
+            break
+    return n_cells, failed
+
+
+def _received(pipe, seconds):
+    if not pipe.poll(seconds):
+        raise TimeoutError
+    return pipe.recv()
+
+
+def _work(pipe, first, make_cells, arguments):
+    home = os.getcwd()
+    cells = list(make_cells(*arguments))
+    with open("/proc/self/statm") as file:
+        used = int(file.read().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + HEADROOM,) * 2)
+    pipe.send(len(cells))
+    for name, run in cells[first:]:
+        pipe.send(name)
+        began = time.monotonic()
+        with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+            os.chdir(folder)
+            warnings.simplefilter("error")
+            warnings.filterwarnings("ignore", category=UserWarning)  # of Gymnasium, about spaces
+            try:
+                fault = run()
+            except Exception as error:  # what the cell did not expect
+                fault = f"{type(error).__name__}: {error}"
+            os.chdir(home)
+        seconds = time.monotonic() - began
+        pipe.send(fault or (f"took {seconds:.1f} s" if seconds > CELL_SECONDS else ""))

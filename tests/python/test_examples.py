@@ -1,0 +1,120 @@
+"""The examples run as they are, and say what is true; their notebooks are the same."""
+
+import os
+import re
+import runpy
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).parents[2] / "docs" / "examples"
+MAKER = FOLDER / "make_notebooks.py"
+SCRIPTS = sorted(path for path in FOLDER.glob("*.py") if path != MAKER)
+
+
+def run(script, folder):
+    """What a script prints."""
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", script],
+        cwd=folder,
+        env=os.environ | {"MPLBACKEND": "Agg"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[-4000:]
+    return done.stdout
+
+
+def numbers(pattern, printed):
+    """The numbers in the place of a pattern's groups."""
+    found = re.search(pattern, printed)
+    assert found, printed
+    return [float(number) for number in found.groups()]
+
+
+def test_the_acrobot_is_solved(tmp_path):
+    solved, of = numbers(r"in the last (20): (\d+)", run(FOLDER / "acrobot.py", tmp_path))[::-1]
+    assert solved >= 0.8 * of
+
+
+def test_the_agent_beats_the_rule_in_the_own_environment(tmp_path):
+    printed = run(FOLDER / "own_environment.py", tmp_path)
+    (agent,) = numbers(r"agent: return ([-.\d]+)", printed)
+    (rule,) = numbers(r"jetty: return ([-.\d]+)", printed)
+    assert agent > rule
+
+
+def test_robust_keeps_what_the_papers_settings_lose_in_noise(tmp_path):
+    printed = run(FOLDER / "noisy_sensors.py", tmp_path)
+    shares = re.findall(r"(paper|robust), seed \d: solved (\d+)%", printed)
+    of = {preset: [int(s) for name, s in shares if name == preset] for preset in dict(shares)}
+    assert min(of["robust"]) > max(of["paper"])
+
+
+def test_the_arm_learns_to_reach(tmp_path):
+    printed = run(FOLDER / "two_torques.py", tmp_path)
+    before, after = numbers(r"before: ([.\d]+) m, after: ([.\d]+) m", printed)
+    assert after < before / 3
+    assert numbers(r"at the end: ([.\d]+) m", printed)[0] < 0.3
+
+
+def test_the_model_that_goes_on_learning_follows_the_drift(tmp_path):
+    printed = run(FOLDER / "drifting_regression.py", tmp_path)
+    r2, most = numbers(r"cross-validation: ([.\d]+); noise allows ([.\d]+)", printed)
+    assert 0.9 < r2 < most
+    before, fixed = numbers(r"stays as it is: error ([.\d]+) before the drift, ([.\d]+)", printed)
+    online = numbers(r"goes on learning: error [.\d]+ before the drift, ([.\d]+)", printed)[0]
+    assert fixed > 4 * before
+    assert online < 1.5 * before
+
+
+def test_cpp_gives_the_same_actions(tmp_path, cmake, skip_unless_ci):
+    if shutil.which("cmake") is None and not Path(sys.executable).with_name("cmake").exists():
+        skip_unless_ci("needs cmake")
+    include = [Path("/usr/include"), Path("/usr/local/include")]
+    if not any((folder / "nlohmann" / "json.hpp").exists() for folder in include):
+        skip_unless_ci("needs nlohmann/json: apt install nlohmann-json3-dev")
+    printed = run(FOLDER / "cpp_controller.py", tmp_path)
+    assert numbers(r"in Python: (\d+)", printed)[0] > 85
+    assert "1000 of 1000 actions are the same" in printed
+
+
+def test_every_example_is_tested_and_listed():
+    tested = re.findall(r'FOLDER / "(\w+\.py)"', Path(__file__).read_text())
+    listed = re.findall(r"^\| \[(\w+\.py)\]", (FOLDER / "README.md").read_text(), re.MULTILINE)
+    assert sorted(tested) == sorted(listed) == [script.name for script in SCRIPTS]
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
+def test_notebooks_are_their_scripts(script):
+    pytest.importorskip("jupytext")
+    notebook = runpy.run_path(str(MAKER))["notebook_of"](script)
+    pieces = re.split(r"^# %%(.*)\n", script.read_text(), flags=re.MULTILINE)
+    assert pieces[0] == ""
+    cells = []
+    for kind, text in zip(pieces[1::2], pieces[2::2], strict=True):
+        if kind == " [markdown]":
+            text = re.sub(r"^# ?", "", text, flags=re.MULTILINE)
+        cells.append(("markdown" if kind else "code", text.strip()))
+    assert [(cell.cell_type, cell.source) for cell in notebook.cells] == cells
+    assert cells[0][0] == "markdown"
+    assert cells[0][1].startswith("# ")
+
+
+def test_the_command_makes_and_runs_notebooks(tmp_path):
+    pytest.importorskip("nbclient")
+    nbformat = pytest.importorskip("nbformat")
+    maker = runpy.run_path(str(MAKER))
+    script = tmp_path / "small.py"
+    script.write_text("# %% [markdown]\n# # Small\n\n# %%\nprint(6 * 7)\n")
+    notebook = maker["notebook_of"](script)
+    maker["execute"](notebook)
+    assert notebook.cells[1].outputs[0].text == "42\n"
+    command = [sys.executable, MAKER, tmp_path / "made", "--only", "acrobot"]
+    subprocess.run(command, check=True, capture_output=True)
+    made = nbformat.read(tmp_path / "made" / "acrobot.ipynb", as_version=4)
+    assert made.cells[0].source.startswith("# The paper's acrobot")
