@@ -330,8 +330,9 @@ class Training:
         training.n_steps, training.n_episodes = counts["n_steps"], counts["n_episodes"]
         training.n_rows, training._return = counts["n_rows"], counts["return"]
         if _ARRAYS + "actions" in arrays:
-            if _ARRAYS + "observation" not in arrays:
-                raise ValueError(f"{place} is damaged: training.observation must be there")
+            actions = arrays[_ARRAYS + "actions"]
+            if _ARRAYS + "observation" not in arrays or not np.isfinite(actions).all():
+                raise ValueError(f"{place} is damaged: training has no actions and observation")
             training._repeat_episode(
                 list(arrays[_ARRAYS + "actions"]), arrays[_ARRAYS + "observation"]
             )
