@@ -30,9 +30,8 @@ print(
 print(f"decisions of the last solved test: {decisions[solved == 1][-1]:.0f}")
 
 # %% [markdown]
-# Each point is a test without random actions. 50 decisions mean that the goal was not reached. A
-# test can fail after others were solved: the goal has become harder in the meantime, and the agent
-# has to find a slower way up.
+# Each point is a test without random actions. 50 decisions would mean that it failed.
+# Tests get longer when the goal has become harder and the agent has to find a slower way up.
 
 # %%
 plt.figure(figsize=(7, 3))

@@ -175,7 +175,14 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
         environment: int,
     ) -> None:
         for part, number in zip(self._parts, numbers, strict=True):
-            part.learn(state, number, reward, following, terminated, environment)
+            try:
+                part.learn(state, number, reward, following, terminated, environment)
+            except ValueError as error:
+                if "exploring act" not in str(error):
+                    raise
+                raise ValueError(
+                    f"observation and action must be those of the last exploring act: {error}"
+                ) from error
 
     def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         sizes = self.approximator

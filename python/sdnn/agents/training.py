@@ -606,8 +606,8 @@ def _checked_counts(path: Path, counts: Any) -> Mapping[str, Any]:
 
 
 def _saved_array(path: Path, arrays: Arrays, name: str) -> NDArray[Any]:
-    if name not in arrays:
-        raise ValueError(f"{path} is damaged: {name} must be there")
+    if name not in arrays or not np.isfinite(arrays[name]).all():
+        raise ValueError(f"{path} is damaged: {name} must be there, of finite numbers")
     return arrays[name]
 
 

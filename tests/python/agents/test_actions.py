@@ -83,7 +83,7 @@ def test_what_is_no_whole_action_is_refused(action):
     [
         (gym.spaces.Text(3), TypeError, "action_space must be a Box, Discrete, MultiDiscrete"),
         (gym.spaces.Box(0, np.inf, (1,)), ValueError, "action_space must have finite bounds"),
-        (gym.spaces.Box(0, 1, (0,)), ValueError, "action_space must have a dimension"),
+        (gym.spaces.Box(0, 1, (0,)), ValueError, "action_space must have 1 to 1024 dimensions"),
     ],
 )
 def test_impossible_spaces_are_named(space, error, message):

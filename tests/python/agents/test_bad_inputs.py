@@ -3,7 +3,7 @@
 import pytest
 
 import bad_inputs
-from watched_cells import failures
+from watched_cells import failures, faulty_cells
 
 AGENTS = [kind.__name__ for kind in bad_inputs.SETTINGS]
 ROWS = [
@@ -33,22 +33,12 @@ def test_bad_values_are_refused_by_name_or_work(row):
     assert n_cells >= LEAST[make_cells.__name__]
 
 
-def nothing_cells():
-    yield "right", lambda: ""
-    yield "wrong", lambda: "was wrong"
-    yield "raising", lambda: 1 / 0
-    yield "hanging", lambda: [None for _ in iter(int, 1)]
-    yield "crashing", lambda: __import__("os").abort()
-    yield "eating", lambda: bytearray(2**32) and ""
-    yield "last", lambda: "was last"
-
-
 def test_crashes_and_hangs_are_failed_cells(monkeypatch):
-    monkeypatch.setattr("watched_cells.CELL_SECONDS", 1.0)
-    n_cells, failed = failures(nothing_cells)
+    monkeypatch.setattr("watched_cells.HANG_SECONDS", 5.0)
+    n_cells, failed = failures(faulty_cells)
     assert n_cells == 7
     assert failed[:2] == ["wrong: was wrong", "raising: ZeroDivisionError: division by zero"]
-    assert failed[2] == "hanging: took more than 1.0 s"
+    assert failed[2] == "hanging: hangs for more than 5.0 s"
     assert failed[3].startswith("crashing: ended the process with exit code -6")
     assert failed[4].startswith("eating: MemoryError")
     assert failed[5:] == ["last: was last"]

@@ -135,7 +135,7 @@ def test_descriptions_that_do_not_fit_are_refused(change, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"ranges": (1.0, 0.0)}, "observation ranges must be low < high"),
+        ({"ranges": (1.0, 0.0)}, "observation_range must have low < high"),
         ({"ranges": ([1.0], [2.0, 3.0, 4.0])}, "observation_range must be two numbers or two"),
         ({"ranges": 3.0}, r"observation_range must be \(low, high\), got 3.0"),
         ({"ranges": ("a", "b")}, "observation_range must be two numbers"),
