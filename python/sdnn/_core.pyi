@@ -1638,3 +1638,4 @@ def time_decisions(trial: AcrobotTrial, n_episodes: typing.SupportsInt | typing.
 CLASS_SCHEMES: tuple = ('one_vs_rest', 'one_vs_one')
 TRAINING_FORMS: tuple = ('auto', 'dual', 'block', 'plain')
 __version__: str
+compiler: str = 'GCC 12.2.0'

@@ -43,7 +43,13 @@ def invoke(monkeypatch, tmp_path, fake):
 
 def test_help_and_version(invoke):
     assert "reproduce" in invoke("--help").stdout
-    assert invoke("--version").stdout == f"sdnn {sdnn.__version__}\n"
+    version, compiler, *others = invoke("--version").stdout.splitlines()
+    assert version == f"sdnn {sdnn.__version__}"
+    assert re.fullmatch(r"compiler (GCC|.*[Cc]lang|MSVC) .*\d.*", compiler)
+    assert [line.split()[0] for line in others] == [
+        "python", "platform", "processor", "instruction", "packages",
+    ]  # fmt: skip
+    assert f"in use: {sdnn.instruction_set()}" in others[3]
 
 
 @pytest.mark.parametrize(

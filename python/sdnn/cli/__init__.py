@@ -18,16 +18,12 @@ from sdnn.cli.train import train
 __all__ = ["main"]
 
 
-def _library_version() -> str:
-    import sdnn
-
-    version: str = sdnn.__version__
-    return version
-
-
 def _print_version(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
     if value:
-        click.echo(f"sdnn {_library_version()}")
+        from sdnn.machine import build
+
+        for name, found in build().items():
+            click.echo(f"{name} {found}")
         context.exit()
 
 
@@ -52,7 +48,7 @@ def _print_cmake_dir(context: click.Context, _parameter: click.Parameter, value:
     is_eager=True,
     expose_value=False,
     callback=_print_version,
-    help="Print the version and exit.",
+    help="Print the version, how it was built and where it runs, and exit.",
 )
 @click.option(
     "--cmakedir",

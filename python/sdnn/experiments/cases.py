@@ -119,6 +119,7 @@ EXPERIMENTS = (
         start_panels=True,
     ),
 )
+"""The paper's experiments, A and B."""
 
 COST = "cost"
 """The word on the command line for the measurement of costs, which has no trials."""

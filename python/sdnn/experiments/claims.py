@@ -225,6 +225,7 @@ CLAIMS = (
         ),
     ),
 )
+"""The paper's nine claims, by their numbers in the spec's list."""
 
 
 def describe(quantity: Quantity) -> str:

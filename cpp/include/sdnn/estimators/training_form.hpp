@@ -51,7 +51,7 @@ inline TrainingForm training_form_named(std::string_view name) {
 /// Bytes that training may take beside the layer, unless the caller says otherwise.
 inline constexpr std::size_t kMemoryLimit = std::size_t{1} << 30;
 
-/// Calls function.operator()<Product>() with the integer that holds all inner products of codes: 16
+/// Calls the template `function` with the integer type that holds all inner products of codes: 16
 /// bits where these do, else 32.
 template <class Function>
 decltype(auto) with_product_type(const coding::SelectiveDesensitization& code,

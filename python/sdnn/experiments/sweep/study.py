@@ -511,7 +511,7 @@ class _Reader:
         own = (case.settings, variant.settings, variant.case_settings.get(case.id, {}))
         layers = (self._base, *own)
         elsewhere = any(name[0] == "environment" for layer in layers for name in layer)
-        chosen = Setting(PRESET_AGENTS["robust" if elsewhere else "paper"], ())
+        chosen = Setting(PRESET_AGENTS["general" if elsewhere else "paper"], ())
         for layer in layers:
             chosen = layer.get(("agent",), chosen)
         if not isinstance(chosen.value, str) or chosen.value not in AGENTS:

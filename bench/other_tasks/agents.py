@@ -1,0 +1,150 @@
+"""Our agents and the rivals, each as a function that learns a task.
+
+A contender's ``learn(name, condition, steps, seed, after_step)`` learns the task of this name for a
+number of steps and calls ``after_step(n_steps, policy, memory)`` after each, or after each step of
+all its environments: ``policy`` gives an observation's greedy action, ``memory()`` the bytes kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Protocol
+
+import stable_baselines
+import stream_ac
+from tasks import TASKS
+from tile_coding import TileCodingSarsa
+
+from sdnn.agents import Callback, RBFQLearning, SDNNQLearning
+from sdnn.agents.presets import PRESETS
+from sdnn.approximators import RBFNetworkConfig
+from sdnn.bounds import flat_bounds
+
+AfterStep = Callable[[int, Callable[[Any], Any], Callable[[], int]], None]
+
+
+class Learn(Protocol):
+    """See the module."""
+
+    def __call__(
+        self, name: str, condition: str, steps: int, seed: int, after_step: AfterStep
+    ) -> None:
+        """Learn."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contender:
+    """A method of learning.
+
+    Parameters
+    ----------
+    title
+        For a reader.
+    learn
+        See the module.
+    tasks
+        It is run on.
+    steps
+        By task, where it was published with a shorter or longer training than the task's.
+    in_own_units
+        Whether it gets observations in their own units: not scaled to [0, 1].
+    """
+
+    title: str
+    learn: Learn
+    tasks: tuple[str, ...]
+    steps: Mapping[str, int] = field(default_factory=dict)
+    in_own_units: bool = False
+
+
+class _Report(Callback):
+    def __init__(self, after_step: AfterStep) -> None:
+        self._after_step = after_step
+
+    def on_step(self, training) -> None:
+        agent = training.agent
+
+        def memory():
+            return sum(array.nbytes for array in agent.state().values())
+
+        self._after_step(training.n_steps, partial(agent.act, explore=False), memory)
+
+
+def _learn_ours(make, name, condition, steps, seed, after_step):
+    env = TASKS[name].make(condition)
+    # What is said of angles is said of observations as they are.
+    options = TASKS[name].options if condition == "clean" else {}
+    agent = make(env.observation_space, env.action_space, seed=seed, **options)
+    agent.train(env, steps=steps, callbacks=[_Report(after_step)])
+
+
+def _rbf(*spaces, **options):
+    general = PRESETS["general"]
+    sizes = RBFNetworkConfig(n_actions=general.approximator.n_actions)
+    return RBFQLearning(*spaces, approximator=sizes, learning=general.learning, **options)
+
+
+TILINGS = {
+    "CartPole": {"n_bins": 6, "n_tilings": 16},
+    "Pendulum": {"n_bins": 8, "n_tilings": 16},
+    "MountainCar": {"n_bins": 8, "n_tilings": 8, "discount": 1.0, "epsilon": 0.0},
+    "MountainCarContinuous": {"n_bins": 8, "n_tilings": 8},
+    "Acrobot": {"n_bins": 4, "n_tilings": 16, "discount": 1.0, "epsilon": 0.0},
+}
+"""Finer grids for fewer variables; tasks of -1 a step need no chance, as in the book."""
+
+
+def _learn_tiles(name, condition, steps, seed, after_step):
+    task = TASKS[name]
+    env = task.make(condition)
+    low, high = task.ends() if condition == "clean" else flat_bounds(env.observation_space)
+    agent = TileCodingSarsa(env.action_space, (low, high), seed=seed, **TILINGS[name])
+    agent.learn(
+        env, steps, seed, lambda n: after_step(n, agent.greedy, lambda: agent.weights.nbytes)
+    )
+
+
+def _learn_stable(algorithm, name, condition, steps, seed, after_step):
+    make = partial(TASKS[name].make_unscaled, condition)
+    stable_baselines.learn(algorithm, name, make, steps, seed, after_step)
+
+
+def _learn_stream_ac(name, condition, steps, seed, after_step):
+    stream_ac.learn(TASKS[name].make_unscaled(condition), steps, seed, after_step)
+
+
+def _stable(algorithm):
+    return Contender(
+        title=f"{algorithm}, Stable-Baselines3",
+        learn=partial(_learn_stable, algorithm),
+        tasks=tuple(stable_baselines.SETTINGS[algorithm]),
+        steps=stable_baselines.steps_of(algorithm),
+        in_own_units=True,
+    )
+
+
+CONTENDERS = {
+    "sdnn": Contender(
+        title="SDNN-C", learn=partial(_learn_ours, SDNNQLearning), tasks=tuple(TASKS)
+    ),
+    "rbf": Contender(
+        title="RBFN",
+        learn=partial(_learn_ours, _rbf),
+        tasks=("CartPole", "Pendulum", "MountainCar", "MountainCarContinuous"),
+    ),
+    "tiles": Contender(
+        title="Sarsa(lambda), tile coding", learn=_learn_tiles, tasks=tuple(TILINGS)
+    ),
+    "stream-ac": Contender(
+        title="stream AC",
+        learn=_learn_stream_ac,
+        tasks=stream_ac.TASKS,
+        steps=dict.fromkeys(stream_ac.TASKS, 50_000),  # it takes milliseconds for each
+        in_own_units=True,
+    ),
+    "sac": _stable("SAC"),
+    "td3": _stable("TD3"),
+    "ppo": _stable("PPO"),
+}

@@ -1,0 +1,57 @@
+"""The site beside the files: pages of the repository's root, and links as they are on GitHub.
+
+Documents link to each other by their places in the repository. The site holds `docs/` at its root;
+links are rewritten to that, and files outside that are linked to are copied.
+"""
+
+import posixpath
+import re
+from pathlib import Path
+
+from mkdocs.structure.files import File
+
+ROOT = Path(__file__).parents[2]
+PAGES = {"README.md": "index.md"} | {
+    name: name for name in ("REPRODUCTION.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")
+}
+"""Of the root, and where they are on the site."""
+
+_LINK = re.compile(r"(?<=\]\()(?!https?:|mailto:|#)([^)#\s]*)(#[^)\s]*)?(?=\))")
+
+
+def on_files(files, config):
+    """Add the root's pages, and what they and others link to outside `docs`."""
+    for name, place in PAGES.items():
+        files.append(File.generated(config, place, content=(ROOT / name).read_text("utf-8")))
+    for page in list(files.documentation_pages()):
+        for link in _LINK.finditer(page.content_string):
+            target = _target(page.src_uri, link[1])
+            if target and target not in PAGES and not target.startswith("docs/"):
+                source = ROOT / target
+                if source.is_file() and files.get_file_from_path(target) is None:
+                    files.append(File.generated(config, target, abs_src_path=str(source)))
+    return files
+
+
+def on_page_markdown(markdown, page, config, files):
+    """Rewrite links from places in the repository to places on the site."""
+
+    def rewritten(link):
+        target = _target(page.file.src_uri, link[1])
+        if target is None:
+            return link[0]
+        if (ROOT / target).is_dir():
+            target = posixpath.join(target, "README.md")
+        place = PAGES.get(target, target.removeprefix("docs/"))
+        return posixpath.relpath(place, posixpath.dirname(page.file.src_uri)) + (link[2] or "")
+
+    return _LINK.sub(rewritten, markdown)
+
+
+def _target(page, link):
+    """Give what a page of the site links to, as a path in the repository."""
+    if not link:
+        return None
+    sources = {place: name for name, place in PAGES.items()}
+    source = sources.get(page, f"docs/{page}")
+    return posixpath.normpath(posixpath.join(posixpath.dirname(source), link))

@@ -1,0 +1,72 @@
+"""The documentation as a site: builds without a warning, every link leads somewhere."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import sdnn
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory, skip_unless_ci):
+    pytest.importorskip("mkdocs") if not os.environ.get("CI") else None
+    folder = tmp_path_factory.mktemp("site") / "site"
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)],
+        cwd=ROOT,
+        env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def pages(site):
+    return {p.relative_to(site).as_posix(): p.read_text("utf-8") for p in site.rglob("*.html")}
+
+
+def test_every_document_is_a_page(site):
+    found = set(pages(site))
+    for document in (ROOT / "docs").glob("*.md"):
+        assert f"{document.stem}/index.html" in found
+    assert "index.html" in found
+
+
+def test_every_link_within_the_site_leads_somewhere(site):
+    for name, text in pages(site).items():
+        if name == "404.html":
+            continue
+        for target in re.findall(r'(?:href|src)="([^"#?]+)', text):
+            if re.match(r"[a-z]+:|//", target):
+                continue
+            path = (site / name).parent / target
+            assert path.exists(), f"{name} links to {target}"
+
+
+def test_the_reference_has_every_public_name(site):
+    rooms = {name for name in sdnn.__all__ if hasattr(getattr(sdnn, name), "__all__")}
+    for room in rooms:
+        page = "sdnn" if room in ("kernel", "benchmarks") else room
+        text = (site / "reference" / page / "index.html").read_text("utf-8")
+        for name in getattr(sdnn, room).__all__:
+            assert f'id="sdnn.{room}.{name}"' in text, f"{room}.{name} has no entry"
+
+
+def test_the_cpp_reference_is_made_without_a_warning(tmp_path, skip_unless_ci):
+    if shutil.which("doxygen") is None:
+        skip_unless_ci("needs doxygen")
+    text = (ROOT / "docs/site/Doxyfile").read_text() + f'\nOUTPUT_DIRECTORY = "{tmp_path}"\n'
+    done = subprocess.run(
+        ["doxygen", "-"], input=text, cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-4000:]
+    assert (tmp_path / "html" / "classsdnn_1_1approximators_1_1SDNNC.html").exists()
