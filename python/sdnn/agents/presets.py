@@ -60,8 +60,7 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
             approximator=SDNNCConfig(n_actions=61),
             learning=QLearningConfig(n_steps=5),
         ),
-        # A fifth of the weights. Fewer hidden units instead would count in coarser steps:
-        # docs/small-processors.md.
+        # A fifth of the weights, and as many steps between the values: docs/small-processors.md.
         "small": Preset(
             title="as recommended for small processors: the general one, smaller patterns",
             approximator=replace(_GENERAL.approximator, n_pattern_units=40),
