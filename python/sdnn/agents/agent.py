@@ -248,7 +248,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
     @property
     def n_environments(self) -> int:
-        """In how many environments at once the agent learns; may be set, from 1 to 2**20.
+        """In how many environments at once the agent learns; may be set, from 1 to 2**14.
 
         They are numbered from 0. Each has an episode of its own: the transitions that wait, the
         steps counted, the random action that is kept. All else is shared. Where there are fewer
@@ -260,7 +260,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
     @n_environments.setter
     def n_environments(self, n: int) -> None:
-        number = whole("n_environments", n, 1, 2**20)
+        number = whole("n_environments", n, 1, 2**14)
         if self._warm_up is not None:
             self._warm_up.n_environments = number
         for part in self._parts:
@@ -280,7 +280,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         ValueError
             If there is no such environment.
         """
-        if environment:
+        if type(environment) is not int or environment != 0:  # most agents have one
             self._check_environment(environment)
         if self._warm_up is not None:
             self._warm_up.begin_episode(environment)
@@ -307,7 +307,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         """
         if explore is not True and explore is not False:
             explore = flag("explore", explore)
-        if environment:
+        if type(environment) is not int or environment != 0:  # most agents have one
             self._check_environment(environment)
         if self._warm_up is not None:
             self._observations.flat("observation", observation)
@@ -346,7 +346,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         OverflowError
             If a weight would leave its range; nothing is learned then.
         """
-        if environment:
+        if type(environment) is not int or environment != 0:  # most agents have one
             self._check_environment(environment)
         if not isinstance(transition, Transition):
             raise TypeError(f"transition must be a Transition, got {transition!r}")

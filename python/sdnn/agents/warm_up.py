@@ -197,7 +197,7 @@ class WarmUp:
         if not self._acted <= set(range(n_environments)):
             raise ValueError(f"acted must be of {n_environments} environments")
         self._environments = [int(i) for i in state.get("environments", [0] * n)]
-        if any(not 0 <= i < 2**20 for i in self._environments):
+        if any(not 0 <= i < 2**14 for i in self._environments):
             raise ValueError("environments must be numbers of environments")
         self._steps = [
             (observation, action, float(reward), following, bool(terminated))

@@ -45,7 +45,7 @@ def export(
         try:
             header = export_c_header(agent, path, name=name, fraction_bits=fraction_bits)
         except ValueError as error:
-            raise _usage_error(error) from error
+            raise _usage_error(error, is_named=name is not None) from error
         except (TypeError, RuntimeError) as error:
             raise click.ClickException(f"{source}: {error}") from error
     if as_json:
@@ -58,9 +58,11 @@ def export(
     )
 
 
-def _usage_error(error: ValueError) -> click.ClickException:
+def _usage_error(error: ValueError, is_named: bool) -> click.ClickException:
     """Name the option of an argument, the first word of its error."""
     word, _, problem = str(error).partition(" ")
+    if word == "name" and not is_named:
+        return click.UsageError(f"--c-header gives no name; use --name, which {problem}")
     option = {"name": "--name", "fraction_bits": "--fraction-bits"}.get(word)
     if option is None:
         return click.ClickException(str(error))

@@ -41,6 +41,7 @@ COMMANDS = {
     "train": (["CartPole-v1"], ["--dry-run"]),
     "resume": (["run"], []),
     "evaluate": (["run"], ["--episodes=1"]),
+    "export": (["run"], ["--c-header=agent.h"]),
     "plot": (["run"], []),
     "record": (["run", "out.gif"], ["--steps=2"]),
     "reproduce": (["a"], ["--dry-run", "--out=results"]),
@@ -61,7 +62,7 @@ def run_folder():
     run = os.path.join(folder, "run")
     settings = ["n_pattern_units=20", "n_hidden_units=60", "n_active_units=20"]
     options = [word for one in settings for word in ("--set", f"approximator.{one}")]
-    arguments = ["train", "CartPole-v1", "--steps", "60", "--evaluate-every", "60", *options]
+    arguments = ["train", "MountainCar-v0", "--steps", "60", "--evaluate-every", "60", *options]
     result = CliRunner().invoke(main, [*arguments, "--evaluation-episodes", "1", "--out", run])
     assert result.exit_code == 0, result.output
     return run

@@ -15,7 +15,7 @@ template <class Episode>
 class Episodes {
  public:
   /// The most environments of an agent.
-  static constexpr std::size_t kMost = std::size_t{1} << 20;
+  static constexpr std::size_t kMost = std::size_t{1} << 14;
 
   explicit Episodes(Episode first) { episodes_.push_back(std::move(first)); }
 
@@ -47,7 +47,8 @@ class Episodes {
     if constexpr (Archive::kReads) self.resize(archive.n_numbered("environment") + 1, make);
     list(self.episodes_.front());
     for (std::size_t i = 1; i < self.size(); ++i) {
-      archive.within("environment." + std::to_string(i), [&] { list(self.episodes_[i]); });
+      archive.within(std::string("environment.").append(std::to_string(i)),
+                     [&] { list(self.episodes_[i]); });
     }
   }
 

@@ -85,7 +85,7 @@ class FuzzyQLearning {
   std::size_t n_inputs() const noexcept { return rules_.n_inputs(); }
 
   /// In how many environments at once the agent learns: each has an episode of its own. Throws
-  /// std::invalid_argument outside [1, 2^20].
+  /// std::invalid_argument outside [1, 2^14].
   void set_n_environments(std::size_t n) {
     episodes_.resize(n, [this] { return new_episode(); });
   }

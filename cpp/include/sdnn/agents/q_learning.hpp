@@ -172,7 +172,7 @@ class QLearning {
   double epsilon() const noexcept { return policy_.config().epsilon; }
 
   /// In how many environments at once the agent learns: each has an episode of its own. Of those
-  /// that are no more, what waits is learned. Throws std::invalid_argument outside [1, 2^20], and
+  /// that are no more, what waits is learned. Throws std::invalid_argument outside [1, 2^14], and
   /// as learn does.
   void set_n_environments(std::size_t n) {
     core::require_in_range("n_environments", n, 1, Episodes<Episode>::kMost);
