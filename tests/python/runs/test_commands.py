@@ -117,7 +117,7 @@ def test_export_says_what_is_wrong(invoke, tmp_path):
         (["sdnn.safetensors"], 2, "Missing option '--c-header'"),
         (["nowhere", "--c-header", "a.h"], 2, "'nowhere' does not exist"),
         (["sdnn.safetensors", "--c-header", "folder"], 2, "is a directory"),
-        (["sdnn.safetensors", "--c-header", "not-c.h"], 2, "--name must be a C identifier"),
+        (["sdnn.safetensors", "--c-header", "not-c.h"], 2, "--name, which must be a C identifier"),
         (["sdnn.safetensors", "--c-header", "a.h", "--name", "1"], 2, "--name must be a C ident"),
         (["sdnn.safetensors", "--c-header", "a.h", "--fraction-bits", 31], 2, "--fraction-bits"),
         (["rbf.safetensors", "--c-header", "a.h"], 1, "must be an SDNNQLearning"),
