@@ -194,7 +194,7 @@ TEST(HiddenLayer, AddingToAColumnIsSettingItsWeights) {
   core::Random random(5, core::Stream::weights);
   std::vector<std::int32_t> changes(130);
   for (int round = 0; round < 40; ++round) {
-    const std::size_t column = round % 3;
+    const auto column = static_cast<std::size_t>(round % 3);
     const int sign = round % 2 == 0 ? 1 : -1;
     for (std::int32_t& change : changes) {
       change = static_cast<std::int32_t>(random.below(round < 20 ? 9 : 90)) - 4;

@@ -34,7 +34,7 @@ TEST(SDNNCConfig, EveryFieldMakesADifference) {
         (check(field), ...);
       },
       SDNNCConfig::fields());
-  EXPECT_EQ(n_fields, 13U);  // five defaults are zero, empty or the first of their kind already
+  EXPECT_EQ(n_fields, 14U);  // five defaults are zero, empty or the first of their kind already
 }
 
 }  // namespace

@@ -320,6 +320,7 @@ def test_every_field_reaches_the_core():
         initial_weights="uniform",
         initial_weight_limit=0.75,
         rounding="random",
+        max_table_bytes=2**29,
     )
     core = other.to_core()
     for field in dataclasses.fields(SDNNCConfig):

@@ -200,7 +200,7 @@ environment.id = "Pendulum-v1"
 [variants.b]
 learning.discount = 0.5
 [variants.c]
-learning.discount = 0.9
+learning.discount = 0.99
 """
 
 
