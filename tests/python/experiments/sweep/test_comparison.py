@@ -200,7 +200,7 @@ environment.id = "Pendulum-v1"
 [variants.b]
 learning.discount = 0.5
 [variants.c]
-learning.discount = 0.99
+learning.tie_rule = "uniform"
 """
 
 
@@ -229,7 +229,7 @@ def test_tables_have_a_row_for_each_variant_in_each_case(mixed):
     tables = {title: (header, rows) for title, header, rows in mixed.tables()}
     header, rows = tables["Case I: 4 inputs, no noise"]
     assert header[:5] == ("variant", "agent", "trials", "end solved", "episodes to learn")
-    # The discount of c is that of a: the same trials.
+    # The tie rule of c is that of a: the same trials.
     assert [row[0] for row in rows] == ["a", "b", "c"]
     assert rows[0][:5] == ("a", "SDNN-C", "2", "2 of 2", "10 [10, 10]")
     header, rows = tables["A pendulum: less a, trial by trial"]
