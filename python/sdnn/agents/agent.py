@@ -268,6 +268,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         self._actions.forget(number)
 
     def _check_environment(self, environment: int) -> None:
+        if type(environment) is int and environment == 0:  # most agents have no other
+            return
         whole("environment", environment, 0, self.n_environments - 1)
 
     def begin_episode(self, environment: int = 0) -> None:
@@ -280,8 +282,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         ValueError
             If there is no such environment.
         """
-        if type(environment) is not int or environment != 0:  # most agents have one
-            self._check_environment(environment)
+        self._check_environment(environment)
         if self._warm_up is not None:
             self._warm_up.begin_episode(environment)
         for part in self._parts:
@@ -307,8 +308,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         """
         if explore is not True and explore is not False:
             explore = flag("explore", explore)
-        if type(environment) is not int or environment != 0:  # most agents have one
-            self._check_environment(environment)
+        self._check_environment(environment)
         if self._warm_up is not None:
             self._observations.flat("observation", observation)
             numbers = self._warm_up.act(self._actions.random, explore, environment)
@@ -346,8 +346,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         OverflowError
             If a weight would leave its range; nothing is learned then.
         """
-        if type(environment) is not int or environment != 0:  # most agents have one
-            self._check_environment(environment)
+        self._check_environment(environment)
         if not isinstance(transition, Transition):
             raise TypeError(f"transition must be a Transition, got {transition!r}")
         reward, terminated = transition.reward, transition.terminated

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from sdnn._core import __version__
 from sdnn.agents.agent import Agent
 from sdnn.agents.q_learning import SDNNQLearning
-from sdnn.arguments import whole
+from sdnn.arguments import path_of, whole
 from sdnn.whole_files import write_whole
 
 __all__ = ["CHeader", "c_header", "export_c_header"]
@@ -98,7 +98,7 @@ def export_c_header(
     TypeError, ValueError, RuntimeError
         As `c_header`.
     """
-    place = Path(path)
+    place = path_of("path", path)
     header = c_header(agent, place.stem if name is None else name, fraction_bits=fraction_bits)
     write_whole(place, header.text.encode())
     return header
