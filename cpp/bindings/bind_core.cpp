@@ -1,6 +1,8 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
 
+#include <string_view>
 #include <vector>
 
 #include "arrays.hpp"
@@ -21,6 +23,16 @@ void bind_instruction_set(py::module_& module) {
   module.def(
       "best_instruction_set", [] { return core::name_of(core::best_instruction_set()); },
       "The best instruction set that this machine offers");
+  module.def(
+      "available_instruction_sets",
+      [] {
+        std::vector<std::string_view> names;
+        for (const auto level : core::kInstructionSets) {
+          if (core::offers(level)) names.push_back(core::name_of(level));
+        }
+        return names;
+      },
+      "The instruction sets that this machine offers, in rising order");
   module.def("set_instruction_set", &core::set_instruction_set, py::arg("name"),
              "Forces an instruction set, for the whole process");
 }

@@ -1560,6 +1560,10 @@ def anchor_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, n_anchor
     ...
 def atan2(y: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
+def available_instruction_sets() -> list[str]:
+    """
+    The instruction sets that this machine offers, in rising order
+    """
 def basic_observation(state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
     s1..s4 of a state

@@ -1,9 +1,9 @@
 """Which vector instructions the core uses.
 
 The core picks the best level that the processor offers when it is first used. The environment
-variable ``SDNN_INSTRUCTION_SET`` (``portable``, ``avx2`` or ``avx512``) or `set_instruction_set`
-choose another one, for the whole process. Results have the same bits on all levels; only the time
-differs.
+variable ``SDNN_INSTRUCTION_SET`` (``portable``, ``neon``, ``avx2`` or ``avx512``) or
+`set_instruction_set` choose another one, for the whole process. Results have the same bits on all
+levels; only the time differs.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ __all__ = [
     "set_instruction_set",
 ]
 
-INSTRUCTION_SETS = ("portable", "avx2", "avx512")
-"""All levels, in rising order."""
+INSTRUCTION_SETS = ("portable", "neon", "avx2", "avx512")
+"""All levels, those of one processor in rising order."""
 
 
 def instruction_set() -> str:
@@ -46,7 +46,7 @@ def available_instruction_sets() -> tuple[str, ...]:
     >>> available_instruction_sets()[0]
     'portable'
     """
-    return INSTRUCTION_SETS[: INSTRUCTION_SETS.index(best_instruction_set()) + 1]
+    return tuple(_core.available_instruction_sets())
 
 
 def set_instruction_set(name: str) -> None:

@@ -11,9 +11,8 @@ namespace sdnn::testing {
 template <class Check>
 void on_every_instruction_set(const Check& check) {
   const std::string before(core::name_of(core::instruction_set()));
-  for (const auto level :
-       {core::InstructionSet::portable, core::InstructionSet::avx2, core::InstructionSet::avx512}) {
-    if (level > core::best_instruction_set()) continue;
+  for (const auto level : core::kInstructionSets) {
+    if (!core::offers(level)) continue;
     core::set_instruction_set(core::name_of(level));
     check(core::name_of(level));
   }

@@ -22,7 +22,13 @@ def build_folder(request, tmp_path):
 
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize(
-    ("preset", "compiler"), [("gcc", "g++"), ("clang", "clang++"), ("sanitize", "clang++")]
+    ("preset", "compiler"),
+    [
+        ("gcc", "g++"),
+        ("clang", "clang++"),
+        ("sanitize", "clang++"),
+        pytest.param("aarch64", "aarch64-linux-gnu-g++", marks=pytest.mark.slow),  # emulated
+    ],
 )
 def test_the_cpp_suite_passes(preset, compiler, cmake, configure, build_folder, skip_unless_ci):
     if shutil.which(compiler) is None:

@@ -15,7 +15,7 @@ from sdnn.cli.output import make_console
 def bench(quick: bool, as_json: bool) -> None:
     """Measure how quick the library is here, and what this machine allows.
 
-    Takes about half a minute. SDNN_INSTRUCTION_SET=portable, avx2 or avx512 forces a level.
+    Takes about half a minute. SDNN_INSTRUCTION_SET=portable, neon, avx2 or avx512 forces a level.
     """
     from sdnn.benchmarks import BenchmarkError, run_benchmarks
     from sdnn.benchmarks.report import print_results

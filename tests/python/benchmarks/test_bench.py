@@ -113,7 +113,7 @@ def test_a_failing_process_is_one_clear_line(monkeypatch):
     done = CliRunner().invoke(main, ["bench", "--quick"])
     assert done.exit_code == 1
     assert done.stderr.count("\n") == 1
-    assert "instruction set must be portable, avx2 or avx512, got sse9" in done.stderr
+    assert "instruction set must be portable, neon, avx2 or avx512, got sse9" in done.stderr
     with pytest.raises(BenchmarkError, match="sse9"):
         run.run_benchmarks(quick=True)
 

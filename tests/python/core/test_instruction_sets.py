@@ -79,7 +79,9 @@ def test_levels_can_be_chosen():
 @pytest.mark.parametrize("name", ["", "sse9", "AVX2", "avx2 "])
 def test_bad_names(name):
     before = instruction_set()
-    with pytest.raises(ValueError, match="instruction set must be portable, avx2 or avx512, got"):
+    with pytest.raises(
+        ValueError, match="instruction set must be portable, neon, avx2 or avx512, got"
+    ):
         set_instruction_set(name)
     assert instruction_set() == before
     with pytest.raises(TypeError):
@@ -94,7 +96,7 @@ def test_levels_beyond_the_processor():
 
 @pytest.mark.parametrize(
     ("value", "said"),
-    [("portable", "portable"), ("sse9", "instruction set must be portable, avx2 or avx512")],
+    [("portable", "portable"), ("sse9", "instruction set must be portable, neon, avx2 or avx512")],
 )
 def test_the_environment_variable_chooses(value, said):
     environment = os.environ | {
@@ -131,4 +133,6 @@ def test_an_unusable_level_in_the_environment_is_an_error_not_an_abort(call):
         check=False,
     )
     assert done.returncode == 1
-    assert "ValueError: instruction set must be portable, avx2 or avx512, got foo" in done.stderr
+    assert (
+        "ValueError: instruction set must be portable, neon, avx2 or avx512, got foo" in done.stderr
+    )

@@ -16,6 +16,9 @@
 #if SDNN_X86_KERNELS
 #include <immintrin.h>
 #endif
+#if SDNN_NEON_KERNELS
+#include <arm_neon.h>
+#endif
 
 namespace sdnn::benchmarks {
 
@@ -100,6 +103,50 @@ inline void multiply_avx512(const float* weights, std::size_t n_rows, std::size_
 }
 
 #endif  // SDNN_X86_KERNELS
+
+#if SDNN_NEON_KERNELS
+
+/// sum + a * b, by one instruction.
+inline float32x4_t fused(float32x4_t sum, float32x4_t a, float32x4_t b) noexcept {
+#if defined(__ARM_FEATURE_FMA)
+  return vfmaq_f32(sum, a, b);
+#else
+  return vmlaq_f32(sum, a, b);
+#endif
+}
+
+/// Eight rows at a time, as multiply_fma.
+inline void multiply_neon(const float* weights, std::size_t n_rows, std::size_t n_columns,
+                          const float* input, float* out) noexcept {
+  constexpr std::size_t kRows = 8;
+  constexpr std::size_t kLanes = 4;
+  const std::size_t whole_rows = n_rows - n_rows % kRows;
+  for (std::size_t i = 0; i < whole_rows; i += kRows) {
+    const float* const rows = weights + i * n_columns;
+    float32x4_t sums[kRows] = {};
+    std::size_t j = 0;
+    for (; j + kLanes <= n_columns; j += kLanes) {
+      const float32x4_t x = vld1q_f32(input + j);
+      for (std::size_t r = 0; r < kRows; ++r) {
+        sums[r] = fused(sums[r], vld1q_f32(rows + r * n_columns + j), x);
+      }
+    }
+    for (std::size_t r = 0; r < kRows; ++r) {
+      std::array<float, kLanes> lanes;
+      vst1q_f32(lanes.data(), sums[r]);
+      float sum = 0.0F;
+      for (std::size_t rest = j; rest < n_columns; ++rest) {
+        sum += rows[r * n_columns + rest] * input[rest];
+      }
+      for (const float lane : lanes) sum += lane;
+      out[i + r] = sum;
+    }
+  }
+  multiply_portable(weights + whole_rows * n_columns, n_rows - whole_rows, n_columns, input,
+                    out + whole_rows);
+}
+
+#endif  // SDNN_NEON_KERNELS
 
 }  // namespace detail
 

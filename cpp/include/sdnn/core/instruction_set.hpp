@@ -1,6 +1,7 @@
 /// Which vector instructions the kernels use: chosen once, at run time.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdlib>
 #include <stdexcept>
@@ -13,11 +14,19 @@
 #define SDNN_X86_KERNELS 0
 #endif
 
+// Every AArch64 processor has NEON; of 32-bit ones those that it was compiled for (-mfpu=neon).
+#if defined(__ARM_NEON) && (defined(__GNUC__) || defined(__clang__))
+#define SDNN_NEON_KERNELS 1
+#else
+#define SDNN_NEON_KERNELS 0
+#endif
+
 namespace sdnn::core {
 
-/// Levels in rising order. Results have the same bits on all of them.
+/// Levels, those of a processor in rising order. Results have the same bits on all of them.
 enum class InstructionSet {
   portable,  ///< whatever the compiler makes of plain loops
+  neon,      ///< Arm's Advanced SIMD
   avx2,
   avx512,  ///< AVX-512 F and BW
 };
@@ -29,41 +38,58 @@ inline std::string_view name_of(InstructionSet level) noexcept {
       return "avx512";
     case InstructionSet::avx2:
       return "avx2";
+    case InstructionSet::neon:
+      return "neon";
     default:
       return "portable";
   }
 }
 
-/// The highest level this processor and operating system offer.
-inline InstructionSet best_instruction_set() noexcept {
+inline constexpr std::array kInstructionSets = {InstructionSet::portable, InstructionSet::neon,
+                                                InstructionSet::avx2, InstructionSet::avx512};
+
+/// Do this processor, its operating system and this build offer the level?
+inline bool offers(InstructionSet level) noexcept {
+  switch (level) {
+    case InstructionSet::portable:
+      return true;
+    case InstructionSet::neon:
+      return SDNN_NEON_KERNELS != 0;
 #if SDNN_X86_KERNELS
-  if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("bmi") ||
-      !__builtin_cpu_supports("popcnt")) {
-    return InstructionSet::portable;
-  }
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw")) {
-    return InstructionSet::avx512;
-  }
-  return InstructionSet::avx2;
-#else
-  return InstructionSet::portable;
+    case InstructionSet::avx2:
+      return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") &&
+             __builtin_cpu_supports("popcnt");
+    case InstructionSet::avx512:
+      return offers(InstructionSet::avx2) && __builtin_cpu_supports("avx512f") &&
+             __builtin_cpu_supports("avx512bw");
 #endif
+    default:
+      return false;
+  }
 }
 
-/// The level called `name`. Throws std::invalid_argument if there is no such level, or this
-/// processor does not offer it.
+/// The highest level on offer.
+inline InstructionSet best_instruction_set() noexcept {
+  InstructionSet best = InstructionSet::portable;
+  for (const InstructionSet level : kInstructionSets) {
+    if (offers(level)) best = level;
+  }
+  return best;
+}
+
+/// The level called `name`. Throws std::invalid_argument if there is no such level, or none on
+/// offer.
 inline InstructionSet instruction_set_named(std::string_view name) {
-  for (const auto level :
-       {InstructionSet::portable, InstructionSet::avx2, InstructionSet::avx512}) {
+  for (const InstructionSet level : kInstructionSets) {
     if (name != name_of(level)) continue;
-    if (level > best_instruction_set()) {
+    if (!offers(level)) {
       throw std::invalid_argument("instruction set must be one that this processor offers (up to " +
                                   std::string(name_of(best_instruction_set())) + "), got " +
                                   std::string(name));
     }
     return level;
   }
-  throw std::invalid_argument("instruction set must be portable, avx2 or avx512, got " +
+  throw std::invalid_argument("instruction set must be portable, neon, avx2 or avx512, got " +
                               std::string(name));
 }
 

@@ -18,10 +18,12 @@ SDNN_INLINE int sum_body(const int* items, int n) noexcept {
 
 // Each version by hand, so that a test sees which one runs.
 inline std::string_view version_portable() { return "portable"; }
+inline std::string_view version_neon() { return "neon"; }
 inline std::string_view version_avx2() { return "avx2"; }
 inline std::string_view version_avx512() { return "avx512"; }
 
 SDNN_INLINE std::string_view mixed_body() { return "made"; }
+inline std::string_view mixed_neon() { return "by hand"; }
 inline std::string_view mixed_avx2() { return "by hand"; }
 
 }  // namespace detail
@@ -46,8 +48,9 @@ TEST(Kernel, RunsTheVersionOfTheInstructionSetInUse) {
 }
 
 TEST(Kernel, TakesAVersionThatIsWrittenByHand) {
-  sdnn::testing::on_every_instruction_set(
-      [](auto level) { EXPECT_EQ(mixed(), level == "avx2" ? "by hand" : "made") << level; });
+  sdnn::testing::on_every_instruction_set([](auto level) {
+    EXPECT_EQ(mixed(), level == "avx2" || level == "neon" ? "by hand" : "made") << level;
+  });
 }
 
 }  // namespace

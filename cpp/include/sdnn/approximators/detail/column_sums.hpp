@@ -14,6 +14,9 @@
 #if SDNN_X86_KERNELS
 #include <immintrin.h>
 #endif
+#if SDNN_NEON_KERNELS
+#include <arm_neon.h>
+#endif
 
 namespace sdnn::approximators {
 
@@ -117,12 +120,7 @@ inline void add_columns_portable(const std::int8_t* block, const ColumnPlaces& p
   }
 }
 
-#if SDNN_X86_KERNELS
-
-// Both vector kernels take two groups of columns at a time: the columns of a group are added in 8
-// bits, the bytes of the two groups are interleaved, and one multiply-add by ones widens and adds
-// them pair by pair. Interleaving leaves the 16-bit sums in an order of their own, undone at the
-// end.
+#if SDNN_X86_KERNELS || SDNN_NEON_KERNELS
 
 /// Asks for the columns that will be added kPrefetchAhead places later.
 [[gnu::always_inline]] inline void prefetch_ahead(const std::int8_t* block,
@@ -131,6 +129,63 @@ inline void add_columns_portable(const std::int8_t* block, const ColumnPlaces& p
     __builtin_prefetch(column_at(block, places[ColumnPlaces::kPrefetchAhead + k]));
   }
 }
+
+#endif
+
+#if SDNN_NEON_KERNELS
+
+/// The columns of a group are added in 8 bits; adding their sum to those of 16 bits widens it.
+template <std::size_t Group>
+void add_groups_neon(const std::int8_t* block, const ColumnPlaces& places, int factor,
+                     std::int32_t* sums) {
+  const std::uint32_t* const end = places.data() + places.size();
+  for (const std::uint32_t* begin = places.data(); begin != end;) {
+    const std::uint32_t* const part_end = end_of_part<Group>(begin, end);
+    int16x8_t wide[kBlockUnits / 8] = {};
+    for (; begin != part_end; begin += ColumnPlaces::kAtOnce) {
+      prefetch_ahead(block, begin);
+      for (std::size_t k = 0; k < ColumnPlaces::kAtOnce; k += Group) {
+        for (std::size_t quarter = 0; quarter < kBlockUnits / 16; ++quarter) {
+          const auto bytes = [&](std::size_t column) __attribute__((always_inline)) {
+            return vld1q_s8(column_at(block, begin[k + column]) + 16 * quarter);
+          };
+          int8x16_t sum = bytes(0);
+          for (std::size_t column = 1; column < Group; ++column) sum = vaddq_s8(sum, bytes(column));
+          wide[2 * quarter] = vaddw_s8(wide[2 * quarter], vget_low_s8(sum));
+          wide[2 * quarter + 1] = vaddw_s8(wide[2 * quarter + 1], vget_high_s8(sum));
+        }
+      }
+    }
+    for (std::size_t eighth = 0; eighth < kBlockUnits / 8; ++eighth) {
+      std::int32_t* const at = sums + 8 * eighth;
+      const int32x4_t low = vmovl_s16(vget_low_s16(wide[eighth]));
+      const int32x4_t high = vmovl_s16(vget_high_s16(wide[eighth]));
+      vst1q_s32(at, vmlaq_n_s32(vld1q_s32(at), low, factor));
+      vst1q_s32(at + 4, vmlaq_n_s32(vld1q_s32(at + 4), high, factor));
+    }
+  }
+}
+
+inline void add_columns_neon(const std::int8_t* block, const ColumnPlaces& places, int group,
+                             int factor, std::int32_t* sums) {
+  switch (group) {
+    case 4:
+      return add_groups_neon<4>(block, places, factor, sums);
+    case 2:
+      return add_groups_neon<2>(block, places, factor, sums);
+    default:
+      return add_groups_neon<1>(block, places, factor, sums);
+  }
+}
+
+#endif  // SDNN_NEON_KERNELS
+
+#if SDNN_X86_KERNELS
+
+// Both vector kernels take two groups of columns at a time: the columns of a group are added in 8
+// bits, the bytes of the two groups are interleaved, and one multiply-add by ones widens and adds
+// them pair by pair. Interleaving leaves the 16-bit sums in an order of their own, undone at the
+// end.
 
 [[SDNN_TARGET_AVX2, gnu::always_inline]] inline __m256i group_sum_avx2(const std::int8_t* block,
                                                                        const std::uint32_t* places,

@@ -15,6 +15,9 @@
 #if SDNN_X86_KERNELS
 #include <immintrin.h>
 #endif
+#if SDNN_NEON_KERNELS
+#include <arm_neon.h>
+#endif
 
 namespace sdnn::coding {
 
@@ -97,6 +100,41 @@ inline std::int32_t inner_product_portable(const TernaryCode& one, const Ternary
 }
 
 #endif  // SDNN_X86_KERNELS
+
+#if SDNN_NEON_KERNELS
+
+/// 128 bits at a time: NEON counts the bits of every byte.
+inline std::int32_t inner_product_neon(const TernaryCode& one, const TernaryCode& other,
+                                       std::size_t n_words) noexcept {
+  constexpr std::size_t kMost = 2 * 4095;  // words whose counts, 16 at most, fit into 16 bits
+  const auto load = [](const std::uint64_t* from) __attribute__((always_inline)) {
+    return vreinterpretq_u8_u64(vld1q_u64(from));
+  };
+  std::uint64_t n_both = 0;
+  std::uint64_t n_unlike = 0;
+  const auto total = [](uint16x8_t counts) __attribute__((always_inline)) {
+    const uint64x2_t halves = vpaddlq_u32(vpaddlq_u16(counts));
+    return vgetq_lane_u64(halves, 0) + vgetq_lane_u64(halves, 1);
+  };
+  std::size_t w = 0;
+  while (w + 2 <= n_words) {
+    uint16x8_t both = vdupq_n_u16(0);
+    uint16x8_t unlike = both;
+    for (const std::size_t end = std::min(n_words, w + kMost); w + 2 <= end; w += 2) {
+      const uint8x16_t shared = vandq_u8(load(one.active + w), load(other.active + w));
+      const uint8x16_t differing = veorq_u8(load(one.positive + w), load(other.positive + w));
+      both = vpadalq_u8(both, vcntq_u8(shared));
+      unlike = vpadalq_u8(unlike, vcntq_u8(vandq_u8(shared, differing)));
+    }
+    n_both += total(both);
+    n_unlike += total(unlike);
+  }
+  return static_cast<std::int32_t>(static_cast<std::int64_t>(n_both) -
+                                   2 * static_cast<std::int64_t>(n_unlike)) +
+         inner_product_of_words(one, other, w, n_words);
+}
+
+#endif  // SDNN_NEON_KERNELS
 
 }  // namespace detail
 

@@ -1,12 +1,13 @@
 /// Kernels: functions that are compiled for every instruction set and choose when they are called.
 ///
 /// The one way to an instruction set. A kernel `name` in a room's namespace has a version for each
-/// level in the nested namespace `detail`: name_portable, name_avx2, name_avx512. It is exact: sums
-/// of integers, or floating-point operations in a fixed order, so that all versions give the same
-/// bits. SDNN_KERNEL makes all versions from one body; a version that is worth writing by hand is
-/// written, the others are made by SDNN_KERNEL_PORTABLE, SDNN_KERNEL_AVX2 and SDNN_KERNEL_AVX512,
-/// and SDNN_DISPATCH makes the function that chooses. Another level, such as one for NEON, is an
-/// enumerator of core::InstructionSet, a macro like these and a line in SDNN_DISPATCH.
+/// level in the nested namespace `detail`: name_portable, name_neon, name_avx2, name_avx512. It is
+/// exact: sums of integers, or floating-point operations in a fixed order, so that all versions
+/// give the same bits. SDNN_KERNEL makes all versions from one body; a version that is worth
+/// writing by hand is written, the others are made by SDNN_KERNEL_PORTABLE, SDNN_KERNEL_NEON,
+/// SDNN_KERNEL_AVX2 and SDNN_KERNEL_AVX512, and SDNN_DISPATCH makes the function that chooses.
+/// Another level is an enumerator of core::InstructionSet, a macro like these and a line in
+/// SDNN_DISPATCH.
 #pragma once
 
 #include "sdnn/core/detail/lanes.hpp"
@@ -20,6 +21,20 @@
   namespace detail {                                                         \
   inline Result name##_portable parameters { return name##_body arguments; } \
   }
+
+// What is compiled for NEON at all may use it everywhere: the portable version has it already.
+#if SDNN_NEON_KERNELS
+
+#define SDNN_KERNEL_NEON(Result, name, parameters, arguments)                \
+  namespace detail {                                                         \
+  inline Result name##_neon parameters { return name##_portable arguments; } \
+  }
+
+#else
+
+#define SDNN_KERNEL_NEON(Result, name, parameters, arguments)
+
+#endif
 
 #if SDNN_X86_KERNELS
 
@@ -36,6 +51,24 @@
   [[SDNN_TARGET_AVX512]] inline Result name##_avx512 parameters { return name##_body arguments; } \
   }
 
+#else
+
+#define SDNN_KERNEL_AVX2(Result, name, parameters, arguments)
+#define SDNN_KERNEL_AVX512(Result, name, parameters, arguments)
+
+#endif
+
+#if SDNN_NEON_KERNELS
+
+#define SDNN_DISPATCH(Result, name, parameters, arguments)       \
+  inline Result name parameters {                                \
+    return core::instruction_set() == core::InstructionSet::neon \
+               ? detail::name##_neon arguments                   \
+               : detail::name##_portable arguments;              \
+  }
+
+#elif SDNN_X86_KERNELS
+
 #define SDNN_DISPATCH(Result, name, parameters, arguments) \
   inline Result name parameters {                          \
     switch (core::instruction_set()) {                     \
@@ -50,9 +83,6 @@
 
 #else
 
-#define SDNN_KERNEL_AVX2(Result, name, parameters, arguments)
-#define SDNN_KERNEL_AVX512(Result, name, parameters, arguments)
-
 #define SDNN_DISPATCH(Result, name, parameters, arguments) \
   inline Result name parameters { return detail::name##_portable arguments; }
 
@@ -60,6 +90,7 @@
 
 #define SDNN_KERNEL(Result, name, parameters, arguments)    \
   SDNN_KERNEL_PORTABLE(Result, name, parameters, arguments) \
+  SDNN_KERNEL_NEON(Result, name, parameters, arguments)     \
   SDNN_KERNEL_AVX2(Result, name, parameters, arguments)     \
   SDNN_KERNEL_AVX512(Result, name, parameters, arguments)   \
   SDNN_DISPATCH(Result, name, parameters, arguments)

@@ -69,6 +69,13 @@ inline void move_acrobots_portable(const AcrobotDynamics& dynamics, const Acrobo
 #endif
 }
 
+#if SDNN_NEON_KERNELS
+inline void move_acrobots_neon(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays,
+                               std::size_t n) {
+  move_acrobots_portable(dynamics, arrays, n);  // NEON's two doubles already
+}
+#endif
+
 #if SDNN_X86_KERNELS
 [[SDNN_TARGET_AVX2]] inline void move_acrobots_avx2(const AcrobotDynamics& dynamics,
                                                     const AcrobotArrays& arrays, std::size_t n) {
