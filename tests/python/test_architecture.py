@@ -54,8 +54,8 @@ SHARED_BINDINGS = {"core", "coding", "module"}
 """Bound rooms without a Python room of their own, and what belongs to no room, such as the version:
 any room may use them."""
 
-MACROS = {"kernel.hpp"}
-"""Headers of macros, which have no namespace."""
+MACROS = {"floating_point.hpp", "kernel.hpp"}
+"""Headers of macros and of what the preprocessor asks, which have no namespace."""
 
 ON_REQUEST = {"benchmarks"}
 """Rooms that the umbrella leaves out: a controller has no use for them."""
@@ -357,6 +357,33 @@ def test_headers_live_in_the_namespace_of_their_room():
         if path.parent != INCLUDE and path.name not in MACROS:
             assert f"namespace sdnn::{room_of_header(path)} {{" in path.read_text(), path
         assert "#pragma once" in path.read_text(), path
+
+
+def test_headers_with_floating_point_refuse_options_that_change_results():
+    includes = {
+        path: {
+            INCLUDE.parent / name
+            for name in re.findall(r'#include "(sdnn/[^"]+)"', path.read_text(encoding="utf-8"))
+        }
+        for path in INCLUDE.rglob("*.hpp")
+    }
+
+    def reached(path, seen):
+        for included in includes.get(path, ()):
+            if included not in seen:
+                seen.add(included)
+                reached(included, seen)
+        return seen
+
+    guard = INCLUDE / "core" / "detail" / "floating_point.hpp"
+    assert guard in includes
+    unguarded = [
+        path
+        for path in includes
+        if re.search(r"\b(double|float)\b", path.read_text(encoding="utf-8"))
+        if path != guard and guard not in reached(path, set())
+    ]
+    assert unguarded == []
 
 
 def test_no_drawer_for_things_without_a_place():

@@ -30,6 +30,7 @@
 #include "sdnn/core/bit_layer.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/elementary.hpp"
+#include "sdnn/core/errors.hpp"
 #include "sdnn/core/instruction_set.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/core/state.hpp"

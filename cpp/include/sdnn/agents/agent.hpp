@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <span>
 
+#include "sdnn/core/detail/floating_point.hpp"
+
 namespace sdnn::agents {
 
 /// An agent with states in [0, 1]^l and one action dimension.

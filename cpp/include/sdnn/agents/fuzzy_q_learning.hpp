@@ -20,6 +20,7 @@
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/elementary.hpp"
+#include "sdnn/core/errors.hpp"
 
 namespace sdnn::agents {
 
@@ -171,8 +172,8 @@ class FuzzyQLearning {
     for (const Trace& trace : episode.traces) {
       if (std::abs(moved(trace, step)) <= kLargest) continue;
       if (is_large) episode.traces.assign(before.begin(), before.end());
-      throw std::overflow_error(
-          "reward is too large: a value of a fuzzy rule would leave the range of floats");
+      core::fail(std::overflow_error(
+          "reward is too large: a value of a fuzzy rule would leave the range of floats"));
     }
     for (const Trace& trace : episode.traces) {
       rules_.set_value(trace.rule, trace.action, static_cast<float>(moved(trace, step)));

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "sdnn/core/detail/floating_point.hpp"
+
 namespace sdnn::agents {
 
 /// A range that holds the discounted sums of rewards seen so far.

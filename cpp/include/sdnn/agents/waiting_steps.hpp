@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/core/detail/floating_point.hpp"
+
 namespace sdnn::agents {
 
 /// Up to n steps (state, action, reward) of an episode, the oldest first. Allocates nothing after

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <span>
 
+#include "sdnn/core/detail/floating_point.hpp"
+
 namespace sdnn::approximators {
 
 /// A learnable table of action values over continuous states in [0, 1]^l.

@@ -18,6 +18,7 @@
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/errors.hpp"
 
 namespace sdnn::approximators {
 
@@ -320,9 +321,9 @@ class HiddenLayer {
     if (largest_weight_[unit] > room) largest_weight_[unit] = largest_weight(unit);
     if ((largest_weight_[unit] > room && !fits(unit, parts)) ||
         std::abs(thresholds_[unit] - step) > kThresholdLimit) {
-      throw std::overflow_error(
+      core::fail(std::overflow_error(
           "a weight or threshold of hidden unit " + std::to_string(unit) +
-          " would exceed its range (|weight| <= " + std::to_string(weight_limit_) + " steps)");
+          " would exceed its range (|weight| <= " + std::to_string(weight_limit_) + " steps)"));
     }
   }
 

@@ -18,6 +18,7 @@
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/elementary.hpp"
+#include "sdnn/core/errors.hpp"
 
 namespace sdnn::approximators {
 
@@ -138,8 +139,9 @@ class RBFNetwork {
     const double q_hat = (1.0 - rate) * q + rate * target;
     const double step = config_.gradient_rate * (q_hat - q);
     if (!(std::abs(step) <= kLargestStep)) {
-      throw std::overflow_error(
-          "the RBF network's weights diverge: reward, gradient_rate or learning_rate is too large");
+      core::fail(
+          std::overflow_error("the RBF network's weights diverge: reward, gradient_rate or "
+                              "learning_rate is too large"));
     }
     is_mixed_ = false;
     mixed_ = step * action_bases_.row(index(action)).transpose();

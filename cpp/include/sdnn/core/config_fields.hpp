@@ -5,6 +5,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "sdnn/core/detail/floating_point.hpp"
+
 namespace sdnn::core {
 
 /// A member of a configuration and its name.

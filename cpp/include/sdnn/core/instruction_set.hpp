@@ -8,6 +8,8 @@
 #include <string>
 #include <string_view>
 
+#include "sdnn/core/errors.hpp"
+
 #if (defined(__x86_64__) || defined(_M_X64)) && (defined(__GNUC__) || defined(__clang__))
 #define SDNN_X86_KERNELS 1
 #else
@@ -83,14 +85,14 @@ inline InstructionSet instruction_set_named(std::string_view name) {
   for (const InstructionSet level : kInstructionSets) {
     if (name != name_of(level)) continue;
     if (!offers(level)) {
-      throw std::invalid_argument("instruction set must be one that this processor offers (up to " +
-                                  std::string(name_of(best_instruction_set())) + "), got " +
-                                  std::string(name));
+      fail(std::invalid_argument("instruction set must be one that this processor offers (up to " +
+                                 std::string(name_of(best_instruction_set())) + "), got " +
+                                 std::string(name)));
     }
     return level;
   }
-  throw std::invalid_argument("instruction set must be portable, neon, avx2 or avx512, got " +
-                              std::string(name));
+  fail(std::invalid_argument("instruction set must be portable, neon, avx2 or avx512, got " +
+                             std::string(name)));
 }
 
 namespace detail {

@@ -17,6 +17,9 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/core/detail/floating_point.hpp"
+#include "sdnn/core/errors.hpp"
+
 namespace sdnn::core {
 
 /// The types of numbers that a tensor may hold, named as in the safetensors format.
@@ -202,25 +205,30 @@ class StateReader {
   /// Throws unless `holds`, naming the tensor and what it must be.
   void expect(bool holds, std::string_view name, std::string_view what) const {
     if (holds) return;
-    throw std::invalid_argument("state: " + prefix + std::string(name) + " must be " +
-                                std::string(what));
+    fail(std::invalid_argument("state: " + prefix + std::string(name) + " must be " +
+                               std::string(what)));
   }
 
   /// Does what takes a tensor over; where that throws std::invalid_argument, names the tensor.
   template <class Take>
   void taking(std::string_view name, const Take& take) const {
+#if SDNN_EXCEPTIONS
     try {
       take();
     } catch (const std::invalid_argument& error) {
       expect(false, name, std::string("such that ") + error.what());
     }
+#else
+    static_cast<void>(name);
+    take();
+#endif
   }
 
   /// Throws if the state has a tensor that nobody asked for.
   void finish() const {
     for (const auto& [name, tensor] : state_) {
       if (read_.contains(&tensor)) continue;
-      throw std::invalid_argument("state: " + name + " must not be there");
+      fail(std::invalid_argument("state: " + name + " must not be there"));
     }
   }
 

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/errors.hpp"
 #include "sdnn/environments/acrobot_config.hpp"
 #include "sdnn/environments/acrobot_state.hpp"
 #include "sdnn/environments/detail/acrobot_dynamics.hpp"
@@ -55,13 +56,13 @@ class Acrobot {
   StepResult step(double torque, double goal_tolerance) {
     core::require_in_range("torque", torque, -config().max_torque, config().max_torque);
     core::require(goal_tolerance >= 0.0, "goal_tolerance", "at least 0", goal_tolerance);
-    if (over_) throw std::logic_error("the episode is over: call reset before step");
+    if (over_) core::fail(std::logic_error("the episode is over: call reset before step"));
     const bool goal = integrate(torque, goal_tolerance);
     state_[0] = wrap_angle(state_[0]);
     state_[1] = wrap_angle(state_[1]);
     if (!state_.allFinite()) {
       over_ = true;
-      throw std::overflow_error("the acrobot's speed is too high for this integration_step");
+      core::fail(std::overflow_error("the acrobot's speed is too high for this integration_step"));
     }
     ++decisions_;
     const StepResult result = result_of(config(), state_, goal, decisions_);

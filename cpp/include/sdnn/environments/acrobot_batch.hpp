@@ -13,6 +13,7 @@
 
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/errors.hpp"
 #include "sdnn/environments/acrobot.hpp"
 #include "sdnn/environments/acrobot_config.hpp"
 #include "sdnn/environments/acrobot_sensors.hpp"
@@ -115,8 +116,8 @@ class AcrobotBatch {
       results.truncated[i] = result.truncated;
     }
     if (n_overflows > 0) {
-      throw std::overflow_error("the speed of acrobot " + std::to_string(first_overflow) +
-                                " is too high for this integration_step");
+      core::fail(std::overflow_error("the speed of acrobot " + std::to_string(first_overflow) +
+                                     " is too high for this integration_step"));
     }
   }
 
@@ -160,8 +161,8 @@ class AcrobotBatch {
 
   void require_index(std::size_t i) const {
     if (i >= size_) {
-      throw std::out_of_range("index must be below " + std::to_string(size_) + ", got " +
-                              std::to_string(i));
+      core::fail(std::out_of_range("index must be below " + std::to_string(size_) + ", got " +
+                                   std::to_string(i)));
     }
   }
 
@@ -207,8 +208,8 @@ class AcrobotBatch {
       core::require_in_range("torques" + item, torques[i], -max_torque, max_torque);
       core::require(goal_tolerances[i] >= 0.0, "goal_tolerances" + item, "at least 0",
                     goal_tolerances[i]);
-      throw std::logic_error("the episode of acrobot " + std::to_string(i) +
-                             " is over: call reset before step");
+      core::fail(std::logic_error("the episode of acrobot " + std::to_string(i) +
+                                  " is over: call reset before step"));
     }
   }
 

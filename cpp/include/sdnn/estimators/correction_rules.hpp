@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/errors.hpp"
 #include "sdnn/estimators/detail/unit_ranking.hpp"
 
 namespace sdnn::estimators {
@@ -134,7 +135,8 @@ inline ClassScheme class_scheme_named(std::string_view name) {
   for (const auto scheme : kClassSchemes) {
     if (name == name_of(scheme)) return scheme;
   }
-  throw std::invalid_argument("scheme must be one_vs_rest or one_vs_one, got " + std::string(name));
+  core::fail(
+      std::invalid_argument("scheme must be one_vs_rest or one_vs_one, got " + std::string(name)));
 }
 
 /// The units that a scheme needs. Throws std::invalid_argument if there are fewer than 2 classes or

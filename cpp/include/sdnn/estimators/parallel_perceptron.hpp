@@ -17,6 +17,7 @@
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/errors.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/estimators/detail/query_order.hpp"
 #include "sdnn/estimators/detail/unit_ranking.hpp"
@@ -118,9 +119,9 @@ class ParallelPerceptron {
     for (std::size_t i = 0; i < n_units(); ++i) {
       const std::int64_t norm = norms[i] + std::abs(std::int64_t{thresholds_[i]});
       if (norm > std::numeric_limits<std::int32_t>::max()) {
-        throw std::overflow_error("the weights of unit " + std::to_string(i) +
-                                  " must have absolute values of a sum below 2^31, got " +
-                                  std::to_string(norm));
+        core::fail(std::overflow_error("the weights of unit " + std::to_string(i) +
+                                       " must have absolute values of a sum below 2^31, got " +
+                                       std::to_string(norm)));
       }
       largest = std::max(largest, norm);
     }

@@ -13,6 +13,7 @@
 #include <variant>
 
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/errors.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/detail/block_training.hpp"
 #include "sdnn/estimators/detail/dual_training.hpp"
@@ -96,9 +97,9 @@ class Trainer {
     const std::int64_t left = std::numeric_limits<std::int32_t>::max() - layer_->check_norms();
     headroom_ = static_cast<std::size_t>(left) / (layer_->code().max_active() + 1);
     if (headroom_ == 0) {
-      throw std::overflow_error(
-          "the weights have grown so large that a further correction could "
-          "overflow a potential of 32 bits");
+      core::fail(
+          std::overflow_error("the weights have grown so large that a further correction could "
+                              "overflow a potential of 32 bits"));
     }
   }
 

@@ -11,6 +11,7 @@
 
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/errors.hpp"
 #include "sdnn/estimators/detail/block_training.hpp"
 #include "sdnn/estimators/detail/dual_training.hpp"
 
@@ -45,7 +46,8 @@ inline TrainingForm training_form_named(std::string_view name) {
   for (const auto form : kTrainingForms) {
     if (name == name_of(form)) return form;
   }
-  throw std::invalid_argument("form must be auto, dual, block or plain, got " + std::string(name));
+  core::fail(
+      std::invalid_argument("form must be auto, dual, block or plain, got " + std::string(name)));
 }
 
 /// Bytes that training may take beside the layer, unless the caller says otherwise.
@@ -91,9 +93,9 @@ inline TrainingForm choose_form(TrainingForm form, std::size_t n_units,
   const auto memory = [&](TrainingForm f) { return form_memory(f, n_units, code, n_samples); };
   if (form != TrainingForm::automatic) {
     if (memory(form) > memory_limit) {
-      throw std::length_error("memory_limit must be at least " + std::to_string(memory(form)) +
-                              " bytes for the form " + std::string(name_of(form)) + ", got " +
-                              std::to_string(memory_limit));
+      core::fail(std::length_error("memory_limit must be at least " + std::to_string(memory(form)) +
+                                   " bytes for the form " + std::string(name_of(form)) + ", got " +
+                                   std::to_string(memory_limit)));
     }
     return form;
   }

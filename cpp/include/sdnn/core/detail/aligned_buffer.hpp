@@ -9,6 +9,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "sdnn/core/errors.hpp"
+
 namespace sdnn::core {
 
 /// The alignment of every AlignedBuffer, in bytes: one cache line.
@@ -33,7 +35,7 @@ class AlignedBuffer {
     if (size == 0) return;
     // calloc leaves large blocks untouched; one more cache line makes room to align inside it.
     block_ = std::calloc(size * sizeof(Item) + kCacheLine, 1);
-    if (block_ == nullptr) throw std::bad_alloc();
+    if (block_ == nullptr) fail(std::bad_alloc());
     const auto misfit = reinterpret_cast<std::size_t>(block_) % kCacheLine;
     data_ = reinterpret_cast<Item*>(static_cast<std::byte*>(block_) + (kCacheLine - misfit));
   }

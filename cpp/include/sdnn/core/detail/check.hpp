@@ -10,6 +10,9 @@
 #include <string_view>
 #include <type_traits>
 
+#include "sdnn/core/detail/floating_point.hpp"
+#include "sdnn/core/errors.hpp"
+
 namespace sdnn::core {
 
 /// Throws std::invalid_argument "<name> must be <expected>, got <value>" unless `valid`.
@@ -18,7 +21,7 @@ void require(bool valid, std::string_view name, std::string_view expected, const
   if (valid) return;
   std::ostringstream message;
   message << name << " must be " << expected << ", got " << value;
-  throw std::invalid_argument(message.str());
+  fail(std::invalid_argument(message.str()));
 }
 
 /// Throws std::invalid_argument unless low <= value <= high; NaN is outside every range.

@@ -9,6 +9,9 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "sdnn/core/detail/floating_point.hpp"
+#include "sdnn/core/errors.hpp"
+
 namespace sdnn::core {
 
 /// The default of every max_table_bytes: 1 GiB.
@@ -23,7 +26,7 @@ inline void require_table_bytes(std::string_view sizes, std::string_view what, d
   std::ostringstream message;
   message << sizes << " must be smaller: " << what << " need " << std::fixed << std::setprecision(0)
           << bytes << " bytes, but max_table_bytes is " << max_table_bytes;
-  throw std::length_error(message.str());
+  fail(std::length_error(message.str()));
 }
 
 /// n_per_dimension ^ n_dimensions, when a table with `bytes_per_cell` for each is allowed.
@@ -55,7 +58,7 @@ inline std::size_t grid_cells(std::string_view sizes, std::string_view cells,
     message << "2^64 bytes or more";
   }
   message << ", but max_table_bytes is " << max_table_bytes;
-  throw std::length_error(message.str());
+  fail(std::length_error(message.str()));
 }
 
 }  // namespace sdnn::core

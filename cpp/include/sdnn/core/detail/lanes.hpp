@@ -11,6 +11,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "sdnn/core/detail/floating_point.hpp"
+
 #if defined(__clang__) || \
     (defined(__GNUC__) && __GNUC__ >= 12)  // the first with shuffles as clang's
 #define SDNN_LANES 1

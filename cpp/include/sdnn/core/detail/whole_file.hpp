@@ -18,6 +18,8 @@
 #else
 #define SDNN_HAS_POSIX_FILES 0
 #include <fstream>
+
+#include "sdnn/core/errors.hpp"
 #endif
 
 namespace sdnn::core {
@@ -98,8 +100,8 @@ class WholeFile {
 
  private:
   [[noreturn]] void fail(const char* what) const {
-    throw std::runtime_error(path_.string() + ": " + what + ": " +
-                             std::generic_category().message(errno));
+    fail(std::runtime_error(path_.string() + ": " + what + ": " +
+                            std::generic_category().message(errno)));
   }
 
   bool close() noexcept {

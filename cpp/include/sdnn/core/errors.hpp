@@ -1,0 +1,44 @@
+/// How errors reach the caller: as exceptions, or where there are none, through a function of his.
+#pragma once
+
+#include <utility>
+
+#if defined(__cpp_exceptions) || defined(_CPPUNWIND)
+#define SDNN_EXCEPTIONS 1
+#else
+#define SDNN_EXCEPTIONS 0
+#include <cstdio>
+#include <cstdlib>
+#endif
+
+namespace sdnn::core {
+
+#if !SDNN_EXCEPTIONS
+
+/// Gets the message of an error, and does not return: it restarts the processor, say.
+using ErrorHandler = void (*)(const char* message);
+
+/// The handler in use. At first: it writes the message to standard error. Should a handler return,
+/// the program is aborted.
+inline ErrorHandler& error_handler() noexcept {
+  static ErrorHandler handler = [](const char* message) {
+    std::fprintf(stderr, "sdnn: %s\n", message);
+  };
+  return handler;
+}
+
+#endif
+
+/// Throws `error`. Compiled without exceptions (-fno-exceptions), hands its message to
+/// error_handler() and aborts.
+template <class Error>
+[[noreturn]] void fail(Error error) {
+#if SDNN_EXCEPTIONS
+  throw std::move(error);
+#else
+  error_handler()(error.what());
+  std::abort();
+#endif
+}
+
+}  // namespace sdnn::core
