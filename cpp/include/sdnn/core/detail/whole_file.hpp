@@ -11,6 +11,8 @@
 #include <string>
 #include <system_error>
 
+#include "sdnn/core/errors.hpp"
+
 #if defined(__unix__) || defined(__APPLE__)
 #define SDNN_HAS_POSIX_FILES 1
 #include <fcntl.h>
@@ -18,8 +20,6 @@
 #else
 #define SDNN_HAS_POSIX_FILES 0
 #include <fstream>
-
-#include "sdnn/core/errors.hpp"
 #endif
 
 namespace sdnn::core {
@@ -100,7 +100,7 @@ class WholeFile {
 
  private:
   [[noreturn]] void fail(const char* what) const {
-    fail(std::runtime_error(path_.string() + ": " + what + ": " +
+    core::fail(std::runtime_error(path_.string() + ": " + what + ": " +
                             std::generic_category().message(errno)));
   }
 

@@ -1,0 +1,28 @@
+// Any bytes as a saved agent: where it loads it acts, learns and can be saved.
+#include <cmath>
+
+#include "input.hpp"
+#include "sdnn/agents/controller.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace sdnn;
+  fuzz::accepted([&] {
+    const fuzz::MemoryFile file({data, size});
+    agents::Controller controller(file.path());
+    const std::vector<double> observation(controller.n_observed(), 0.25);
+    controller.begin_episode();
+    for (int step = 0; step < 3; ++step) {
+      const auto chosen = controller.act(observation);
+      const std::vector<double> action(chosen.begin(), chosen.end());
+      for (const double component : action) {
+        fuzz::expect(!std::isnan(component), "an action is no number");
+      }
+      controller.learn(observation, action, 1.0, observation, step == 2);
+    }
+    const std::string copy = "/dev/shm/sdnn_fuzz_" + std::to_string(::getpid());
+    controller.write(copy);
+    const agents::Controller again(copy);
+    ::unlink(copy.c_str());
+  });
+  return 0;
+}

@@ -1,0 +1,115 @@
+// Any configuration of an agent, then any states, actions, rewards and parameters: values stay in
+// their range, and a refused call changes nothing that a copy of the agent would do otherwise.
+#include <cmath>
+#include <cstddef>
+#include <optional>
+
+#include "input.hpp"
+#include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/q_learning.hpp"
+#include "sdnn/approximators/rbf_network.hpp"
+#include "sdnn/approximators/sdnn_c.hpp"
+#include "sdnn/core/state.hpp"
+
+namespace {
+
+using namespace sdnn;
+
+constexpr std::uint64_t kMostBytes = 1 << 20;
+
+template <class Agent>
+void use(Agent& agent, FuzzedDataProvider& input) {
+  const std::size_t n_inputs = agent.n_inputs();
+  agent.begin_episode();
+  while (input.remaining_bytes() > 0) {
+    const auto state = fuzz::any_doubles(input, n_inputs, 0.0, 1.0);
+    switch (input.ConsumeIntegralInRange(0, 3)) {
+      case 0:
+        fuzz::accepted([&] { agent.act(state, input.ConsumeBool()); });
+        break;
+      case 1:
+        agent.begin_episode();
+        break;
+      case 2: {  // saved and restored
+        const core::State saved = core::state_of(agent);
+        core::restore(agent, saved);
+        fuzz::expect(core::state_of(agent) == saved, "a restored state differs");
+        break;
+      }
+      default: {
+        const auto next = fuzz::any_doubles(input, n_inputs, 0.0, 1.0);
+        const double reward = fuzz::any_double(input, -10.0, 10.0);
+        const bool terminated = input.ConsumeBool();
+        fuzz::accepted([&] {
+          const auto action = agent.act(state, true);
+          agent.learn(state, action, reward, next, terminated);
+        });
+      }
+    }
+  }
+}
+
+void sdnn_c(FuzzedDataProvider& input) {
+  approximators::SDNNCConfig config{.n_inputs = input.ConsumeIntegralInRange(2, 4),
+                                    .n_pattern_units = 20,
+                                    .n_interpolated = 4,
+                                    .n_hidden_units = 60,
+                                    .n_active_units = 30};
+  fuzz::change(config, input);
+  config.max_table_bytes = kMostBytes;
+  agents::QLearningConfig learning;
+  fuzz::change(learning, input);
+  agents::QLearning agent(approximators::SDNNC(config, 1), learning, 1);
+  use(agent, input);
+  std::vector<double> values(agent.action_value().n_actions());
+  agent.action_value().values(std::vector<double>(agent.n_inputs(), 0.5), values);
+  const auto& scale = agent.action_value().output_scale();
+  for (const double value : values) {
+    fuzz::expect(value >= scale.q_low() && value <= scale.q_high(), "a value out of range");
+  }
+}
+
+void rbf(FuzzedDataProvider& input) {
+  approximators::RBFNetworkConfig config{.n_inputs = 2, .n_bases = 3, .n_actions = 5};
+  fuzz::change(config, input);
+  config.max_table_bytes = kMostBytes;
+  agents::QLearningConfig learning;
+  fuzz::change(learning, input);
+  approximators::RBFNetwork network(config);
+  if (input.ConsumeBool()) {
+    const auto weights = fuzz::any_doubles(input, network.n_joint_bases(), -1.0, 1.0);
+    fuzz::accepted([&] { network.set_weights(weights); });
+  }
+  agents::QLearning agent(std::move(network), learning, 1);
+  use(agent, input);
+  for (const double weight : agent.action_value().weights()) {
+    fuzz::expect(std::isfinite(weight), "a weight is not finite");
+  }
+}
+
+void fuzzy(FuzzedDataProvider& input) {
+  approximators::FuzzyRulesConfig rules{.n_inputs = 2, .n_sets = 3, .n_actions = 4};
+  fuzz::change(rules, input);
+  rules.max_table_bytes = kMostBytes;
+  agents::FuzzyQLearningConfig learning;
+  fuzz::change(learning, input);
+  agents::FuzzyQLearning agent(approximators::FuzzyRules(rules), learning, 1);
+  use(agent, input);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  FuzzedDataProvider input(data, size);
+  sdnn::fuzz::accepted([&] {
+    switch (input.ConsumeIntegralInRange(0, 2)) {
+      case 0:
+        return sdnn_c(input);
+      case 1:
+        return rbf(input);
+      default:
+        return fuzzy(input);
+    }
+  });
+  return 0;
+}
