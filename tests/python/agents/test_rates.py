@@ -19,6 +19,7 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.approximators import RBFNetworkConfig, SDNNCConfig
+from stopped_training import Stop
 
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
 FALLING = {"learning_rate": 0.8, "final_learning_rate": 0.05, "epsilon": 0.5, "final_epsilon": 0.02}
@@ -98,16 +99,6 @@ def test_impossible_rates_are_named(space):
     with pytest.raises(ValueError, match=r"learning_rate must be in \(0, 1\], or None, got 0"):
         agent.learning_rate = 0
     assert (agent.learning_rate, agent.epsilon) == (0.8, 0.5)
-
-
-class Stop(Callback):
-    def __init__(self, at, path):
-        self.at, self.path = at, path
-
-    def on_step(self, training):
-        if training.n_steps == self.at:
-            training.save(self.path)
-            training.stop()
 
 
 class Anneal(Callback):

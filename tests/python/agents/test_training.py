@@ -20,6 +20,7 @@ from sdnn.agents import (
     evaluate,
 )
 from sdnn.approximators import SDNNCConfig
+from stopped_training import Stop, states_equal
 
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
 KINDS = {
@@ -63,29 +64,11 @@ def corridor_agent(**options):
     )
 
 
-class Stop(Callback):
-    """Saves and stops at a step."""
-
-    def __init__(self, at, path):
-        self.at, self.path = at, path
-
-    def on_step(self, training):
-        if training.n_steps == self.at:
-            training.save(self.path)
-            training.stop()
-
-
 class Killed(Checkpoints):
     """Has no time for a last checkpoint."""
 
     def on_end(self, training):
         pass
-
-
-def states_equal(first, second):
-    one, other = first.agent.state(), second.agent.state()
-    assert one.keys() == other.keys()
-    return all(np.array_equal(one[name], other[name]) for name in one)
 
 
 def test_it_learns_the_corridor():
@@ -168,7 +151,7 @@ def test_a_training_stopped_inside_an_episode_goes_on_exactly(kind, tmp_path):
         second = Training.load(tmp_path / "t", gym.make("Pendulum-v1", max_episode_steps=40))
         after = second.run()
         assert (*before.rows, *after.rows) == rows
-        assert states_equal(whole, second)
+        assert states_equal(whole.agent, second.agent)
 
 
 def test_an_unbounded_environment_is_warmed_up_and_learned(tmp_path):
@@ -191,7 +174,7 @@ def test_an_unbounded_environment_is_warmed_up_and_learned(tmp_path):
         begun([Stop(cut, tmp_path / "t")]).run()
         again = Training.load(tmp_path / "t", env)
         again.run()
-        assert states_equal(whole, again)
+        assert states_equal(whole.agent, again.agent)
 
 
 def test_an_environment_that_does_not_repeat_itself_is_refused(tmp_path):

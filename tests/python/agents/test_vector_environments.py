@@ -20,6 +20,7 @@ from sdnn.agents import (
 )
 from sdnn.agents.evaluation import episode_seed
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
+from stopped_training import Stop, states_equal
 
 if not hasattr(gym.vector, "AutoresetMode"):
     pytest.skip("needs Gymnasium 1.1", allow_module_level=True)
@@ -106,24 +107,6 @@ def vectors(n):
     yield AsyncVectorEnv([Walk] * n)
     yield AsyncVectorEnv([Walk] * n, autoreset_mode=AutoresetMode.SAME_STEP)
     yield AsyncVectorEnv([Walk] * n, shared_memory=False, autoreset_mode=AutoresetMode.DISABLED)
-
-
-class Stop(Callback):
-    """Saves and stops at a step."""
-
-    def __init__(self, at, path):
-        self.at, self.path = at, path
-
-    def on_step(self, training):
-        if training.n_steps == self.at:
-            training.save(self.path)
-            training.stop()
-
-
-def states_equal(first, second):
-    one, other = first.state(), second.state()
-    assert one.keys() == other.keys()
-    return all(np.array_equal(one[name], other[name]) for name in one)
 
 
 @pytest.mark.parametrize("kind", KINDS)
