@@ -9,6 +9,7 @@
 #include <memory>
 #include <span>
 #include <stdexcept>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <utility>
@@ -17,12 +18,17 @@
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/grid_cells.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/estimators/detail/query_order.hpp"
 #include "sdnn/estimators/detail/unit_ranking.hpp"
 #include "sdnn/estimators/detail/weight_tiles.hpp"
 
 namespace sdnn::estimators {
+
+/// The most bytes that the weights of a layer may have: 4 GiB.
+inline constexpr std::uint64_t kMaxWeightBytes = std::uint64_t{1} << 32;
 
 /// `n_units` units over the columns of a code: potential = weights . x_SD - threshold, firing if >
 /// 0.
@@ -38,7 +44,8 @@ class ParallelPerceptron {
   /// Weights and thresholds are drawn uniformly from the integers in [-initial_range,
   /// initial_range], unit by unit, the threshold first.
   ///
-  /// Throws std::invalid_argument unless n_units is in [1, 2^20] and initial_range in [0, 10^6].
+  /// Throws std::invalid_argument unless n_units is in [1, 2^20] and initial_range in [0, 10^6],
+  /// std::length_error if the weights have more than kMaxWeightBytes. Long work: may be stopped.
   ParallelPerceptron(std::shared_ptr<const Code> code, std::size_t n_units, std::uint64_t seed,
                      int initial_range = 5)
       : ParallelPerceptron(std::move(code), n_units) {
@@ -48,6 +55,7 @@ class ParallelPerceptron {
     const auto draw = [&] { return static_cast<std::int32_t>(random.below(span)) - initial_range; };
     const std::vector<std::size_t> slots = slots_of_columns();
     for (std::size_t i = 0; i < n_units; ++i) {
+      core::interruption_point();
       thresholds_[i] = draw();
       for (const std::size_t slot : slots) weights_.at(i, slot) = draw();
     }
@@ -71,6 +79,7 @@ class ParallelPerceptron {
     const std::int32_t* weight = weights.data();
     const std::vector<std::size_t> slots = slots_of_columns();
     for (std::size_t i = 0; i < n_units; ++i) {
+      core::interruption_point();
       for (const std::size_t slot : slots) weights_.at(i, slot) = *weight++;
     }
     std::copy(thresholds.begin(), thresholds.end(), thresholds_.begin());
@@ -182,6 +191,9 @@ class ParallelPerceptron {
   ParallelPerceptron(std::shared_ptr<const Code> code, std::size_t n_units)
       : code_(std::move(code)) {
     core::require_in_range("n_units", n_units, 1, std::size_t{1} << 20);
+    core::require_bytes("n_units, or the columns of the code,", "the weights of all units",
+                        4.0 * static_cast<double>(n_units) * static_cast<double>(code_->n_slots()),
+                        kMaxWeightBytes);
     weights_ = WeightTiles<std::int32_t>(n_units, code_->n_slots());
     thresholds_.resize(n_units);
   }
@@ -202,17 +214,23 @@ class ParallelPerceptron {
     for (std::size_t part = 1; part < n_parts; ++part) {
       const std::size_t begin = part * order.size() / n_parts;
       const std::size_t end = (part + 1) * order.size() / n_parts;
-      threads.emplace_back([&, begin, end] {
-        answer_some(tiles, n_per_sum, bins, order.subspan(begin, end - begin), consume);
+      threads.emplace_back([&, begin, end](const std::stop_token& stop) {
+        answer_some(tiles, n_per_sum, bins, order.subspan(begin, end - begin), consume,
+                    [&stop] { return !stop.stop_requested(); });
       });
     }
-    answer_some(tiles, n_per_sum, bins, order.first(order.size() / n_parts), consume);
+    answer_some(tiles, n_per_sum, bins, order.first(order.size() / n_parts), consume,
+                [n = 0U]() mutable {
+                  if (n++ % 16 == 0) core::interruption_point();  // a throw stops the others too
+                  return true;
+                });
   }
 
-  template <class Weight, class Consume>
+  /// Goes on as long as is_wanted(), which is asked before every query.
+  template <class Weight, class Consume, class IsWanted>
   void answer_some(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
                    std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
-                   const Consume& consume) const {
+                   const Consume& consume, IsWanted is_wanted) const {
     const std::size_t n_words = code_->n_words();
     std::vector<std::uint64_t> words(4 * n_words);
     std::uint64_t* now = words.data();  // active, then positive
@@ -224,6 +242,7 @@ class ParallelPerceptron {
     start_from_zero();
     coding::ColumnLists slots(n_words);
     for (const std::uint32_t query : order) {
+      if (!is_wanted()) return;
       code_->encode(bins.subspan(query * code_->n_inputs(), code_->n_inputs()), now, now + n_words);
       const coding::TernaryCode code{now, now + n_words};
       slots.read_changes({before, before + n_words}, code);

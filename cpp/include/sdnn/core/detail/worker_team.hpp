@@ -16,8 +16,13 @@ namespace sdnn::core {
 class WorkerTeam {
  public:
   explicit WorkerTeam(std::size_t n_threads) {
-    for (std::size_t part = 1; part < n_threads; ++part) {
-      threads_.emplace_back([this, part] { serve(part); });
+    try {
+      for (std::size_t part = 1; part < n_threads; ++part) {
+        threads_.emplace_back([this, part] { serve(part); });
+      }
+    } catch (...) {  // no more threads to be had: those that wait already must end
+      start();
+      throw;
     }
   }
   WorkerTeam(const WorkerTeam&) = delete;
