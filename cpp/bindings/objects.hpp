@@ -169,6 +169,7 @@ template <sdnn::bindings::LibraryClass T>
 class type_caster<std::shared_ptr<T>> : public copyable_holder_caster<T, std::shared_ptr<T>> {
  public:
   bool load(handle source, bool convert) {
+    if (source.is_none()) return false;  // no function takes a null pointer
     return this->template load_impl<type_caster>(source, convert);
   }
 

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["AcrobotSwingUpVectorEnv"]
 
+MAX_ENVS = 2**20
+
 # Gymnasium 1.0 knows this mode only and has no name for it.
 _AUTORESET = getattr(getattr(gym.vector, "AutoresetMode", None), "NEXT_STEP", "NextStep")
 
@@ -40,7 +42,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
     Parameters
     ----------
     num_envs : int
-        N >= 1.
+        N, from 1 to 2**20.
     config : AcrobotConfig, optional
         The same for all.
     goal_tolerance : float or array_like, shape (num_envs,)
@@ -86,8 +88,8 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
     ) -> None:
         super().__init__()
         self.num_envs = operator.index(num_envs)
-        if self.num_envs < 1:
-            raise ValueError(f"num_envs must be at least 1, got {num_envs}")
+        if not 1 <= self.num_envs <= MAX_ENVS:  # before spaces of that size are made
+            raise ValueError(f"num_envs must be in [1, {MAX_ENVS}], got {num_envs}")
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise ValueError(
                 f"render_mode must be None or one of {self.metadata['render_modes']}, "

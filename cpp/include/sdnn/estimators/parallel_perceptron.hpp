@@ -9,7 +9,6 @@
 #include <memory>
 #include <span>
 #include <stdexcept>
-#include <stop_token>
 #include <string>
 #include <thread>
 #include <utility>
@@ -214,23 +213,17 @@ class ParallelPerceptron {
     for (std::size_t part = 1; part < n_parts; ++part) {
       const std::size_t begin = part * order.size() / n_parts;
       const std::size_t end = (part + 1) * order.size() / n_parts;
-      threads.emplace_back([&, begin, end](const std::stop_token& stop) {
-        answer_some(tiles, n_per_sum, bins, order.subspan(begin, end - begin), consume,
-                    [&stop] { return !stop.stop_requested(); });
+      threads.emplace_back([&, begin, end] {
+        answer_some(tiles, n_per_sum, bins, order.subspan(begin, end - begin), consume);
       });
     }
-    answer_some(tiles, n_per_sum, bins, order.first(order.size() / n_parts), consume,
-                [n = 0U]() mutable {
-                  if (n++ % 16 == 0) core::interruption_point();  // a throw stops the others too
-                  return true;
-                });
+    answer_some(tiles, n_per_sum, bins, order.first(order.size() / n_parts), consume);
   }
 
-  /// Goes on as long as is_wanted(), which is asked before every query.
-  template <class Weight, class Consume, class IsWanted>
+  template <class Weight, class Consume>
   void answer_some(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
                    std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
-                   const Consume& consume, IsWanted is_wanted) const {
+                   const Consume& consume) const {
     const std::size_t n_words = code_->n_words();
     std::vector<std::uint64_t> words(4 * n_words);
     std::uint64_t* now = words.data();  // active, then positive
@@ -242,7 +235,6 @@ class ParallelPerceptron {
     start_from_zero();
     coding::ColumnLists slots(n_words);
     for (const std::uint32_t query : order) {
-      if (!is_wanted()) return;
       code_->encode(bins.subspan(query * code_->n_inputs(), code_->n_inputs()), now, now + n_words);
       const coding::TernaryCode code{now, now + n_words};
       slots.read_changes({before, before + n_words}, code);
