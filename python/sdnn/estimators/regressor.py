@@ -275,9 +275,11 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     def _range_of(self, targets: NDArray[np.float64]) -> NDArray[np.float64]:
         if self.output_range is not None:
             try:
-                given = np.array(self.output_range, dtype=np.float64)
-            except (TypeError, ValueError):  # words, or rows of different lengths
+                given = np.asarray(self.output_range)
+            except ValueError:  # rows of different lengths
                 given = np.empty(0)
+            is_real = given.dtype.kind in "iuf"  # numbers beyond all floats are objects
+            given = given.astype(np.float64) if is_real else np.empty(0)
             given = np.tile(given, (self.n_outputs_, 1)) if given.ndim == 1 else given
             if (
                 given.shape != (self.n_outputs_, 2)

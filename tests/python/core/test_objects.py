@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import core_cells
+import public_cells
 import sdnn._core as core
 from watched_cells import failures
 
@@ -20,8 +21,17 @@ BINDINGS = Path(__file__).parents[3] / "cpp" / "bindings"
 IN_USE = "in use by a call in another thread"
 
 
-@pytest.mark.parametrize("make_cells", [core_cells.never_made_cells, core_cells.argument_cells])
-def test_bad_use_of_the_core_is_refused(make_cells):
+@pytest.mark.parametrize(
+    "make_cells",
+    [
+        core_cells.never_made_cells,
+        core_cells.argument_cells,
+        public_cells.never_initialised_cells,
+        public_cells.estimator_cells,
+        public_cells.environment_cells,
+    ],
+)
+def test_bad_use_is_refused(make_cells):
     n_cells, failed = failures(make_cells)
     assert n_cells > 1000
     assert not failed, "\n".join(failed[:20])

@@ -202,7 +202,9 @@ def test_bad_actions_name_the_argument_and_move_nothing():
 
 
 def test_bad_arguments():
-    with pytest.raises(ValueError, match=r"num_envs must be in \[1, 1048576\], got 0"):
+    with pytest.raises(
+        ValueError, match=r"num_envs must be a whole number in \[1, 1048576\], got 0"
+    ):
         AcrobotSwingUpVectorEnv(0)
     with pytest.raises(TypeError):
         AcrobotSwingUpVectorEnv(2.5)

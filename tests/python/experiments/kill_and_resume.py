@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import collections
+import gzip
 import json
 import os
 import random
@@ -53,7 +54,9 @@ def content(folder: Path) -> dict[str, object]:
     kept: dict[str, object] = {"files": sorted(path.name for path in folder.iterdir())}
     for path in folder.glob("results*.csv"):
         kept["rows"] = path.read_bytes()
-    for path in folder.glob("table*.json"):
+    for path in folder.glob("*results.csv.gz"):  # of a sweep
+        kept["rows"] = gzip.decompress(path.read_bytes())
+    for path in folder.glob("*table*.json"):
         table = json.loads(path.read_text())
         kept["digest"] = table["digest"]
         kept["costs"] = [(cost["series"], cost["n_inputs"]) for cost in table.get("costs", [])]
