@@ -14,6 +14,8 @@
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/grid_cells.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 
 namespace sdnn::bindings {
 
@@ -25,6 +27,12 @@ using ArrayArgument = pybind11::array_t<T, pybind11::array::c_style | pybind11::
 template <class T>
 std::span<const T> flat(const ArrayArgument<T>& array) {
   return {array.data(), static_cast<std::size_t>(array.size())};
+}
+
+/// A copy, for work without the GIL: meanwhile other threads may change the array.
+template <class T>
+std::vector<T> copied(std::span<const T> items) {
+  return {items.begin(), items.end()};
 }
 
 /// The items of a one-dimensional array. Throws std::invalid_argument naming the argument.
@@ -47,11 +55,19 @@ std::span<const T> matrix(const ArrayArgument<T>& array, const char* name,
   return bindings::flat(array);
 }
 
+/// Throws std::length_error unless patterns fit in an array of 1 GiB. To be asked before they are
+/// made.
+inline void require_room_for_signs(double n_bins, double n_units) {
+  core::require_bytes("n_units or n_bins", "the patterns, a byte for each unit,", n_bins * n_units,
+                      core::kDefaultMaxTableBytes);
+}
+
 /// The patterns of a table, +1 and -1. Shapes: (n_bins, n_units).
 inline pybind11::array_t<std::int8_t> signs_of(const coding::PatternTable& table) {
   pybind11::array_t<std::int8_t> signs({table.n_bins(), table.n_units()});
   std::int8_t* sign = signs.mutable_data();
   for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {
+    core::interruption_point();
     for (std::size_t k = 0; k < table.n_units(); ++k) {
       *sign++ = static_cast<std::int8_t>(table.sign(bin, k));
     }

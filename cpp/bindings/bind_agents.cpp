@@ -1,3 +1,4 @@
+#include <pybind11/native_enum.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
@@ -133,10 +134,12 @@ void bind_decoupled_q_learning(py::module_& module, const char* name, const char
 }  // namespace
 
 void bind_agents(py::module_& module) {
-  py::enum_<agents::TieRule>(module, "TieRule", "Which of several best actions is taken")
+  py::native_enum<agents::TieRule>(module, "TieRule", "enum.Enum",
+                                   "Which of several best actions is taken")
       .value("uniform", agents::TieRule::uniform)
       .value("lowest", agents::TieRule::lowest)
-      .value("middle", agents::TieRule::middle);
+      .value("middle", agents::TieRule::middle)
+      .finalize();
   bindings::bind_config<agents::EpsilonGreedyConfig>(module, "EpsilonGreedyConfig",
                                                      "The policy's parameters");
   py::class_<agents::EpsilonGreedy>(module, "EpsilonGreedy", "The policy, over rows of values")
@@ -149,12 +152,16 @@ void bind_agents(py::module_& module) {
             return policy.select(bindings::vector(values, "values"), step, explore);
           },
           py::arg("values"), py::arg("step"), py::arg("explore") = true);
-  py::enum_<agents::ValueRange>(module, "ValueRange", "Whether the range of values is fixed")
+  py::native_enum<agents::ValueRange>(module, "ValueRange", "enum.Enum",
+                                      "Whether the range of values is fixed")
       .value("given", agents::ValueRange::given)
-      .value("seen", agents::ValueRange::seen);
-  py::enum_<agents::Schedule>(module, "Schedule", "How rates go to their final values")
+      .value("seen", agents::ValueRange::seen)
+      .finalize();
+  py::native_enum<agents::Schedule>(module, "Schedule", "enum.Enum",
+                                    "How rates go to their final values")
       .value("linear", agents::Schedule::linear)
-      .value("exponential", agents::Schedule::exponential);
+      .value("exponential", agents::Schedule::exponential)
+      .finalize();
   bindings::bind_config<QLearningConfig>(module, "QLearningConfig", "The parameters of Q-learning")
       .def("learning_rate_at", &QLearningConfig::learning_rate_at, py::arg("progress"))
       .def("epsilon_at", &QLearningConfig::epsilon_at, py::arg("progress"));

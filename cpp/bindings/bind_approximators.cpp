@@ -1,3 +1,4 @@
+#include <pybind11/native_enum.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
@@ -142,13 +143,17 @@ void bind_rbf_network(py::module_& module) {
 }  // namespace
 
 void bind_approximators(py::module_& module) {
-  py::enum_<approximators::InitialWeights>(module, "InitialWeights", "How the weights start")
+  py::native_enum<approximators::InitialWeights>(module, "InitialWeights", "enum.Enum",
+                                                 "How the weights start")
       .value("ternary", approximators::InitialWeights::ternary)
-      .value("uniform", approximators::InitialWeights::uniform);
-  py::enum_<approximators::Rounding>(module, "Rounding", "How numbers of units are rounded")
+      .value("uniform", approximators::InitialWeights::uniform)
+      .finalize();
+  py::native_enum<approximators::Rounding>(module, "Rounding", "enum.Enum",
+                                           "How numbers of units are rounded")
       .value("half_up", approximators::Rounding::half_up)
       .value("random", approximators::Rounding::random)
-      .value("away", approximators::Rounding::away);
+      .value("away", approximators::Rounding::away)
+      .finalize();
   bindings::bind_config<SDNNCConfig>(module, "SDNNCConfig", "Everything that defines an SDNN-C");
 
   bind_network<SDNNC>(module, "SDNNC", "A network that gives Q(s, a) for every action at once")

@@ -1,6 +1,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <span>
@@ -20,6 +21,7 @@
 namespace py = pybind11;
 using namespace sdnn;
 using bindings::ArrayArgument;
+using bindings::copied;
 using bindings::matrix;
 
 namespace {
@@ -43,11 +45,12 @@ py::array_t<std::int8_t> transform(const Code& code, const Bins& bins) {
 
 py::array_t<std::int32_t> gram(const Code& code, const Bins& bins,
                                const std::optional<Bins>& other_bins) {
-  const auto values = matrix(bins, "bins", code.n_inputs());
-  const auto others = other_bins ? matrix(*other_bins, "other_bins", code.n_inputs()) : values;
+  const auto values = copied(matrix(bins, "bins", code.n_inputs()));
+  const auto others =
+      other_bins ? copied(matrix(*other_bins, "other_bins", code.n_inputs())) : values;
   py::array_t<std::int32_t> out({values.size() / code.n_inputs(), others.size() / code.n_inputs()});
   const std::span products(out.mutable_data(), static_cast<std::size_t>(out.size()));
-  const py::gil_scoped_release release;
+  const bindings::WithoutGIL unlocked(code);
   coding::write_products(code, values, others, products);
   return out;
 }
@@ -60,6 +63,8 @@ void bind_coding(py::module_& module) {
       [](std::size_t action, std::size_t n_actions, double low, double high) {
         core::require(action < n_actions, "action", "less than " + std::to_string(n_actions),
                       action);
+        core::require(low <= high && std::isfinite(high - low), "high",
+                      "at least low, and a finite distance from it", high);
         return coding::action_value(action, n_actions, low, high);
       },
       py::arg("action"), py::arg("n_actions"), py::arg("low"), py::arg("high"),
@@ -67,6 +72,7 @@ void bind_coding(py::module_& module) {
   module.def(
       "random_inverse_patterns",
       [](int n_units, int n_bins, int n_flipped, std::uint64_t seed) {
+        bindings::require_room_for_signs(n_bins, n_units);
         core::Random random(seed, core::Stream::code_books);
         return bindings::signs_of(
             coding::random_inverse_patterns({n_units, n_bins, n_flipped}, random));
@@ -76,6 +82,8 @@ void bind_coding(py::module_& module) {
       "anchor_patterns",
       [](int n_units, int n_anchor_patterns, int n_interpolated, bool circular,
          std::uint64_t seed) {
+        bindings::require_room_for_signs((n_anchor_patterns - 1.0) * (n_interpolated + 1.0),
+                                         n_units);
         core::Random random(seed, core::Stream::code_books);
         return bindings::signs_of(coding::anchor_patterns({.n_units = n_units,
                                                            .n_anchor_patterns = n_anchor_patterns,
@@ -89,6 +97,7 @@ void bind_coding(py::module_& module) {
       "correlation_matrix_patterns",
       [](int n_units, const bindings::ArrayArgument<double>& correlations, std::uint64_t seed) {
         const auto values = bindings::matrix(correlations, "correlations");
+        bindings::require_room_for_signs(static_cast<double>(correlations.shape(0)), n_units);
         core::Random random(seed, core::Stream::code_books);
         return bindings::signs_of(coding::correlation_matrix_patterns(
             n_units, values, static_cast<std::size_t>(correlations.shape(0)), random));

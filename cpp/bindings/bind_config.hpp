@@ -7,6 +7,7 @@
 #include <string>
 #include <tuple>
 
+#include "objects.hpp"
 #include "sdnn/core/config_fields.hpp"
 
 namespace sdnn::bindings {

@@ -1,12 +1,15 @@
+#include <pybind11/native_enum.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <chrono>
 #include <string_view>
 #include <vector>
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/elementary.hpp"
 #include "sdnn/core/instruction_set.hpp"
 #include "sdnn/core/random.hpp"
@@ -15,6 +18,29 @@ namespace py = pybind11;
 using namespace sdnn;
 
 namespace {
+
+/// The thread in which Python handles signals.
+unsigned long main_thread = 0;
+
+/// Lets signal handlers run, as Python does between its instructions, and ends the work if one
+/// raises: KeyboardInterrupt of Ctrl-C.
+void check_signals() {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::chrono::milliseconds kInterval{50};
+  thread_local Clock::time_point due{};
+  if (PyThread_get_thread_ident() != main_thread) return;
+  const Clock::time_point now = Clock::now();
+  if (now < due) return;
+  due = now + kInterval;
+  const py::gil_scoped_acquire locked;
+  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+}
+
+void bind_interruption() {
+  const auto thread = py::module_::import("threading").attr("main_thread")();
+  main_thread = thread.attr("ident").cast<unsigned long>();
+  core::interruption_check() = &check_signals;
+}
 
 void bind_instruction_set(py::module_& module) {
   module.def(
@@ -38,7 +64,7 @@ void bind_instruction_set(py::module_& module) {
 }
 
 void bind_random(py::module_& module) {
-  py::enum_<core::Stream>(module, "Stream", "What a random number is for")
+  py::native_enum<core::Stream>(module, "Stream", "enum.Enum", "What a random number is for")
       .value("code_books", core::Stream::code_books)
       .value("permutations", core::Stream::permutations)
       .value("weights", core::Stream::weights)
@@ -46,7 +72,8 @@ void bind_random(py::module_& module) {
       .value("exploration", core::Stream::exploration)
       .value("sensor_noise", core::Stream::sensor_noise)
       .value("evaluation_ties", core::Stream::evaluation_ties)
-      .value("evaluation_sensor_noise", core::Stream::evaluation_sensor_noise);
+      .value("evaluation_sensor_noise", core::Stream::evaluation_sensor_noise)
+      .finalize();
 }
 
 void bind_elementary(py::module_& module) {
@@ -76,6 +103,7 @@ void bind_elementary(py::module_& module) {
 }  // namespace
 
 void bind_core(py::module_& module) {
+  bind_interruption();
   bind_instruction_set(module);
   bind_random(module);
   bind_elementary(module);

@@ -1,3 +1,4 @@
+#include <pybind11/native_enum.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
@@ -21,6 +22,7 @@ namespace py = pybind11;
 using namespace sdnn;
 using namespace sdnn::environments;
 using bindings::ArrayArgument;
+using bindings::copied;
 
 namespace {
 
@@ -49,10 +51,12 @@ std::span<double> items(py::array_t<double>& array) {
 }
 
 void bind_goal_schedule(py::module_& module) {
-  py::enum_<GoalScheduleKind>(module, "GoalScheduleKind", "The formula of lambda(k)")
+  py::native_enum<GoalScheduleKind>(module, "GoalScheduleKind", "enum.Enum",
+                                    "The formula of lambda(k)")
       .value("inverse_linear", GoalScheduleKind::inverse_linear)
       .value("inverse_sqrt", GoalScheduleKind::inverse_sqrt)
-      .value("constant", GoalScheduleKind::constant);
+      .value("constant", GoalScheduleKind::constant)
+      .finalize();
   bindings::bind_config<GoalScheduleConfig>(module, "GoalScheduleConfig", "How lambda(k) falls");
   py::class_<GoalSchedule>(module, "GoalSchedule", "lambda as a function of the learning episode")
       .def(py::init<const GoalScheduleConfig&>(), py::arg("config"))
@@ -60,9 +64,10 @@ void bind_goal_schedule(py::module_& module) {
 }
 
 void bind_acrobot(py::module_& module) {
-  py::enum_<GoalTest>(module, "GoalTest", "When the goal is looked for")
+  py::native_enum<GoalTest>(module, "GoalTest", "enum.Enum", "When the goal is looked for")
       .value("every_step", GoalTest::every_step)
-      .value("decision_instant", GoalTest::decision_instant);
+      .value("decision_instant", GoalTest::decision_instant)
+      .finalize();
   bindings::bind_config<AcrobotConfig>(module, "AcrobotConfig",
                                        "The numbers of the acrobot's task");
 
@@ -120,12 +125,12 @@ void bind_acrobot_batch(py::module_& module) {
             const auto size = static_cast<py::ssize_t>(batch.size());
             py::array_t<double> rewards(size);
             py::array_t<bool> terminated(size), truncated(size);
-            const auto torque = bindings::vector(torques, "torques");
-            const auto tolerance = bindings::vector(goal_tolerances, "goal_tolerances");
-            const auto mask = flags(moving, "moving");
+            const auto torque = copied(bindings::vector(torques, "torques"));
+            const auto tolerance = copied(bindings::vector(goal_tolerances, "goal_tolerances"));
+            const auto mask = copied(flags(moving, "moving"));
             const AcrobotBatchResults results{items(rewards), flags(terminated), flags(truncated)};
             {
-              const py::gil_scoped_release unlocked;
+              const bindings::WithoutGIL unlocked(batch);
               batch.step(torque, tolerance, mask, results);
             }
             return std::make_tuple(rewards, terminated, truncated);
@@ -144,9 +149,11 @@ void bind_acrobot_batch(py::module_& module) {
 }
 
 void bind_sensors(py::module_& module) {
-  py::enum_<SensorEdge>(module, "SensorEdge", "What noise does at the ends of a sensor's range")
+  py::native_enum<SensorEdge>(module, "SensorEdge", "enum.Enum",
+                              "What noise does at the ends of a sensor's range")
       .value("wrap", SensorEdge::wrap)
-      .value("saturate", SensorEdge::saturate);
+      .value("saturate", SensorEdge::saturate)
+      .finalize();
   module.def(
       "basic_observation",
       [](const ArrayArgument<double>& state) {
@@ -170,9 +177,10 @@ void bind_sensors(py::module_& module) {
             return array(noisy);
           },
           py::arg("values"), "A noisy copy");
-  py::enum_<NoiseEntry>(module, "NoiseEntry", "Where noise enters")
+  py::native_enum<NoiseEntry>(module, "NoiseEntry", "enum.Enum", "Where noise enters")
       .value("every_sensor", NoiseEntry::every_sensor)
-      .value("basic_sensors", NoiseEntry::basic_sensors);
+      .value("basic_sensors", NoiseEntry::basic_sensors)
+      .finalize();
   bindings::bind_config<SensorConfig>(module, "SensorConfig",
                                       "Which sensors there are and how noisy");
   py::class_<AcrobotSensors>(module, "AcrobotSensors", "s1..s4, s5 and s6 with their noise")

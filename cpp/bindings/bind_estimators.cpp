@@ -15,6 +15,7 @@
 namespace py = pybind11;
 using namespace sdnn;
 using bindings::ArrayArgument;
+using bindings::copied;
 using bindings::matrix;
 using bindings::signs_of;
 
@@ -49,20 +50,20 @@ py::array_t<std::int32_t> thresholds_of(const ParallelPerceptron& layer) {
 }
 
 Matrix potentials_of(const ParallelPerceptron& layer, const Bins& bins, int n_threads) {
-  const auto values = matrix(bins, "bins", layer.code().n_inputs());
+  const auto values = copied(matrix(bins, "bins", layer.code().n_inputs()));
   Matrix out({static_cast<std::size_t>(bins.shape(0)), layer.n_units()});
   const std::span items(out.mutable_data(), static_cast<std::size_t>(out.size()));
-  const py::gil_scoped_release release;
+  const bindings::WithoutGIL unlocked(layer);
   layer.potentials(values, n_threads, items);
   return out;
 }
 
 Matrix counts_of(const ParallelPerceptron& layer, const Bins& bins, std::size_t n_groups,
                  int n_threads) {
-  const auto values = matrix(bins, "bins", layer.code().n_inputs());
+  const auto values = copied(matrix(bins, "bins", layer.code().n_inputs()));
   Matrix out({static_cast<std::size_t>(bins.shape(0)), n_groups});
   const std::span items(out.mutable_data(), static_cast<std::size_t>(out.size()));
-  const py::gil_scoped_release release;
+  const bindings::WithoutGIL unlocked(layer);
   layer.counts(values, n_groups, n_threads, items);
   return out;
 }
@@ -73,7 +74,15 @@ py::tuple libsdnn_tables(int n_units, const std::vector<std::pair<int, int>>& in
   estimators::LibsdnnRandom random(seed, estimators::standard_library_named(library));
   std::vector<coding::RandomInverseConfig> configs;
   for (const auto& [n_bins, n_flipped] : inputs) configs.push_back({n_units, n_bins, n_flipped});
-  const auto tables = estimators::libsdnn_tables(configs, bindings::pairs_of(pairs), random);
+  const auto input_pairs = bindings::pairs_of(pairs);
+  double n_bins_of_all = 0.0;
+  for (const auto& pair : input_pairs) {
+    for (const std::size_t input : {pair.modified, pair.modifier}) {
+      n_bins_of_all += input < configs.size() ? configs[input].n_bins : 0;
+    }
+  }
+  bindings::require_room_for_signs(n_bins_of_all, n_units);
+  const auto tables = estimators::libsdnn_tables(configs, input_pairs, random);
   py::list modified;
   py::list modifiers;
   for (const auto& table : tables.modified) modified.append(signs_of(table));
@@ -103,11 +112,10 @@ template <class Trainer, class Rule>
 std::shared_ptr<Trainer> make_trainer(std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
                                       Rule rule, const std::string& form, std::size_t memory_limit,
                                       int n_threads) {
-  const auto values = matrix(bins, "bins", layer->code().n_inputs());
+  const auto values = copied(matrix(bins, "bins", layer->code().n_inputs()));
   const auto chosen = estimators::training_form_named(form);
-  const py::gil_scoped_release release;
-  return std::make_shared<Trainer>(std::move(layer), values, std::move(rule), chosen, memory_limit,
-                                   n_threads);
+  const bindings::WithoutGIL unlocked(*layer);
+  return std::make_shared<Trainer>(layer, values, std::move(rule), chosen, memory_limit, n_threads);
 }
 
 template <class Trainer>
@@ -119,16 +127,21 @@ void bind_trainer_methods(py::class_<Trainer, std::shared_ptr<Trainer>>& trainer
       .def(
           "present",
           [](Trainer& self, const ArrayArgument<std::int32_t>& order) {
-            const auto items = bindings::vector(order, "order");
-            const py::gil_scoped_release release;
+            const auto items = copied(bindings::vector(order, "order"));
+            const bindings::WithoutGIL unlocked(self, self.layer());
             const auto count = self.present(items);
             return std::pair(count.n_samples, count.n_units);
           },
           py::arg("order"),
           "Presents samples in that order; returns how many corrected something, and how many "
           "units were corrected")
-      .def("synchronize", &Trainer::synchronize, py::call_guard<py::gil_scoped_release>(),
-           "Brings the layer's weights to those of plain training in the same order");
+      .def(
+          "synchronize",
+          [](Trainer& self) {
+            const bindings::WithoutGIL unlocked(self, self.layer());
+            self.synchronize();
+          },
+          "Brings the layer's weights to those of plain training in the same order");
 }
 
 }  // namespace

@@ -40,7 +40,7 @@ void def_time_agent_steps(py::module_& module) {
       "time_agent_steps",
       [](Agent& agent, int n_repetitions, std::uint64_t seed) {
         return bindings::times_of(
-            [&] { return experiments::time_agent_steps(agent, n_repetitions, seed); });
+            agent, [&] { return experiments::time_agent_steps(agent, n_repetitions, seed); });
       },
       py::arg("agent"), py::arg("n_repetitions"), py::arg("seed"),
       "The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)");
@@ -104,9 +104,12 @@ py::class_<AcrobotTrial<Agent>> def_trial(py::module_& module, const char* name,
           py::return_value_policy::reference_internal,
           "The agent at work: asking for values changes nothing that follows")
       .def(
-          "advance", [](Trial& self, int n_episodes) { self.advance(n_episodes); },
-          py::arg("n_episodes"), py::call_guard<py::gil_scoped_release>(),
-          "Runs up to n more learning episodes")
+          "advance",
+          [](Trial& self, int n_episodes) {
+            const bindings::WithoutGIL unlocked(self);
+            self.advance(n_episodes);
+          },
+          py::arg("n_episodes"), "Runs up to n more learning episodes")
       .def("test_rows", &test_rows<Trial>, "Columns of the test episodes so far");
   return trial;
 }

@@ -3,6 +3,8 @@
 
 #include <pybind11/pybind11.h>
 
+#include "objects.hpp"  // how every argument is taken: before any function is bound
+
 void bind_core(pybind11::module_& module);
 void bind_coding(pybind11::module_& module);
 void bind_approximators(pybind11::module_& module);

@@ -22,6 +22,7 @@ PYBIND11_MODULE(_core, module) {
   module.doc() = "The compiled core of sdnn; use it through the package's rooms.";
   module.attr("__version__") = SDNN_VERSION;
   module.attr("compiler") = compiler();
+  sdnn::bindings::refuse_bare_objects();
   bind_core(module);
   bind_coding(module);
   bind_approximators(module);

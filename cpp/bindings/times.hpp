@@ -6,16 +6,17 @@
 
 #include <cstdint>
 
+#include "objects.hpp"
 #include "sdnn/experiments/detail/stopwatch.hpp"
 
 namespace sdnn::bindings {
 
-/// The times that `measure` returns, int64 nanoseconds (n,); it runs without the GIL.
-template <class Measure>
-pybind11::array_t<std::int64_t> times_of(Measure&& measure) {
+/// The times that `measure` of an object returns, int64 nanoseconds (n,); it runs without the GIL.
+template <class Object, class Measure>
+pybind11::array_t<std::int64_t> times_of(Object& object, const Measure& measure) {
   experiments::Times times;
   {
-    const pybind11::gil_scoped_release release;
+    const WithoutGIL unlocked(object);
     times = measure();
   }
   return pybind11::array_t<std::int64_t>(static_cast<pybind11::ssize_t>(times.size()),

@@ -3,74 +3,22 @@ The compiled core of sdnn; use it through the package's rooms.
 """
 from __future__ import annotations
 import collections.abc
+import enum
 import numpy
 import numpy.typing
 import typing
-class Stream:
+class Stream(enum.Enum):
     """
     What a random number is for
-    
-    Members:
-    
-      code_books
-    
-      permutations
-    
-      weights
-    
-      ties
-    
-      exploration
-    
-      sensor_noise
-    
-      evaluation_ties
-    
-      evaluation_sensor_noise
     """
-    __members__: typing.ClassVar[dict[str, Stream]]
-    code_books: typing.ClassVar[Stream]
-    evaluation_sensor_noise: typing.ClassVar[Stream]
-    evaluation_ties: typing.ClassVar[Stream]
-    exploration: typing.ClassVar[Stream]
-    permutations: typing.ClassVar[Stream]
-    sensor_noise: typing.ClassVar[Stream]
-    ties: typing.ClassVar[Stream]
-    weights: typing.ClassVar[Stream]
-    @typing.overload
-    def __eq__(self, other: Stream) -> bool:
-        ...
-    @typing.overload
-    def __eq__(self, other: typing.Any) -> bool:
-        ...
-    def __getstate__(self) -> int:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __index__(self) -> int:
-        ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __int__(self) -> int:
-        ...
-    @typing.overload
-    def __ne__(self, other: Stream) -> bool:
-        ...
-    @typing.overload
-    def __ne__(self, other: typing.Any) -> bool:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __str__(self) -> str:
-        ...
-    @property
-    def name(self) -> str:
-        ...
-    @property
-    def value(self) -> int:
-        ...
+    code_books = 1
+    evaluation_sensor_noise = 8
+    evaluation_ties = 7
+    exploration = 5
+    permutations = 2
+    sensor_noise = 6
+    ties = 4
+    weights = 3
 class SelectiveDesensitization:
     """
     The desensitized code of a sample, from its bins
@@ -97,103 +45,19 @@ class SelectiveDesensitization:
     @property
     def n_units(self) -> int:
         ...
-class InitialWeights:
+class InitialWeights(enum.Enum):
     """
     How the weights start
-    
-    Members:
-    
-      ternary
-    
-      uniform
     """
-    __members__: typing.ClassVar[dict[str, InitialWeights]]
-    ternary: typing.ClassVar[InitialWeights]
-    uniform: typing.ClassVar[InitialWeights]
-    @typing.overload
-    def __eq__(self, other: InitialWeights) -> bool:
-        ...
-    @typing.overload
-    def __eq__(self, other: typing.Any) -> bool:
-        ...
-    def __getstate__(self) -> int:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __index__(self) -> int:
-        ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __int__(self) -> int:
-        ...
-    @typing.overload
-    def __ne__(self, other: InitialWeights) -> bool:
-        ...
-    @typing.overload
-    def __ne__(self, other: typing.Any) -> bool:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __str__(self) -> str:
-        ...
-    @property
-    def name(self) -> str:
-        ...
-    @property
-    def value(self) -> int:
-        ...
-class Rounding:
+    ternary = 0
+    uniform = 1
+class Rounding(enum.Enum):
     """
     How numbers of units are rounded
-    
-    Members:
-    
-      half_up
-    
-      random
-    
-      away
     """
-    __members__: typing.ClassVar[dict[str, Rounding]]
-    away: typing.ClassVar[Rounding]
-    half_up: typing.ClassVar[Rounding]
-    random: typing.ClassVar[Rounding]
-    @typing.overload
-    def __eq__(self, other: Rounding) -> bool:
-        ...
-    @typing.overload
-    def __eq__(self, other: typing.Any) -> bool:
-        ...
-    def __getstate__(self) -> int:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __index__(self) -> int:
-        ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __int__(self) -> int:
-        ...
-    @typing.overload
-    def __ne__(self, other: Rounding) -> bool:
-        ...
-    @typing.overload
-    def __ne__(self, other: typing.Any) -> bool:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __str__(self) -> str:
-        ...
-    @property
-    def name(self) -> str:
-        ...
-    @property
-    def value(self) -> int:
-        ...
+    away = 2
+    half_up = 0
+    random = 1
 class SDNNCConfig:
     """
     Everything that defines an SDNN-C
@@ -440,56 +304,13 @@ class RBFNetwork:
     @property
     def n_joint_bases(self) -> int:
         ...
-class GoalScheduleKind:
+class GoalScheduleKind(enum.Enum):
     """
     The formula of lambda(k)
-    
-    Members:
-    
-      inverse_linear
-    
-      inverse_sqrt
-    
-      constant
     """
-    __members__: typing.ClassVar[dict[str, GoalScheduleKind]]
-    constant: typing.ClassVar[GoalScheduleKind]
-    inverse_linear: typing.ClassVar[GoalScheduleKind]
-    inverse_sqrt: typing.ClassVar[GoalScheduleKind]
-    @typing.overload
-    def __eq__(self, other: GoalScheduleKind) -> bool:
-        ...
-    @typing.overload
-    def __eq__(self, other: typing.Any) -> bool:
-        ...
-    def __getstate__(self) -> int:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __index__(self) -> int:
-        ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __int__(self) -> int:
-        ...
-    @typing.overload
-    def __ne__(self, other: GoalScheduleKind) -> bool:
-        ...
-    @typing.overload
-    def __ne__(self, other: typing.Any) -> bool:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __str__(self) -> str:
-        ...
-    @property
-    def name(self) -> str:
-        ...
-    @property
-    def value(self) -> int:
-        ...
+    constant = 2
+    inverse_linear = 0
+    inverse_sqrt = 1
 class GoalScheduleConfig:
     """
     How lambda(k) falls
@@ -524,53 +345,12 @@ class GoalSchedule:
         ...
     def __init__(self, config: GoalScheduleConfig) -> None:
         ...
-class GoalTest:
+class GoalTest(enum.Enum):
     """
     When the goal is looked for
-    
-    Members:
-    
-      every_step
-    
-      decision_instant
     """
-    __members__: typing.ClassVar[dict[str, GoalTest]]
-    decision_instant: typing.ClassVar[GoalTest]
-    every_step: typing.ClassVar[GoalTest]
-    @typing.overload
-    def __eq__(self, other: GoalTest) -> bool:
-        ...
-    @typing.overload
-    def __eq__(self, other: typing.Any) -> bool:
-        ...
-    def __getstate__(self) -> int:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __index__(self) -> int:
-        ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __int__(self) -> int:
-        ...
-    @typing.overload
-    def __ne__(self, other: GoalTest) -> bool:
-        ...
-    @typing.overload
-    def __ne__(self, other: typing.Any) -> bool:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __str__(self) -> str:
-        ...
-    @property
-    def name(self) -> str:
-        ...
-    @property
-    def value(self) -> int:
-        ...
+    decision_instant = 1
+    every_step = 0
 class AcrobotConfig:
     """
     The numbers of the acrobot's task
@@ -688,53 +468,12 @@ class AcrobotBatch:
         """
     def tip_heights(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
-class SensorEdge:
+class SensorEdge(enum.Enum):
     """
     What noise does at the ends of a sensor's range
-    
-    Members:
-    
-      wrap
-    
-      saturate
     """
-    __members__: typing.ClassVar[dict[str, SensorEdge]]
-    saturate: typing.ClassVar[SensorEdge]
-    wrap: typing.ClassVar[SensorEdge]
-    @typing.overload
-    def __eq__(self, other: SensorEdge) -> bool:
-        ...
-    @typing.overload
-    def __eq__(self, other: typing.Any) -> bool:
-        ...
-    def __getstate__(self) -> int:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __index__(self) -> int:
-        ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __int__(self) -> int:
-        ...
-    @typing.overload
-    def __ne__(self, other: SensorEdge) -> bool:
-        ...
-    @typing.overload
-    def __ne__(self, other: typing.Any) -> bool:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __str__(self) -> str:
-        ...
-    @property
-    def name(self) -> str:
-        ...
-    @property
-    def value(self) -> int:
-        ...
+    saturate = 1
+    wrap = 0
 class SensorNoise:
     """
     Gaussian noise on every channel
@@ -745,53 +484,12 @@ class SensorNoise:
         """
         A noisy copy
         """
-class NoiseEntry:
+class NoiseEntry(enum.Enum):
     """
     Where noise enters
-    
-    Members:
-    
-      every_sensor
-    
-      basic_sensors
     """
-    __members__: typing.ClassVar[dict[str, NoiseEntry]]
-    basic_sensors: typing.ClassVar[NoiseEntry]
-    every_sensor: typing.ClassVar[NoiseEntry]
-    @typing.overload
-    def __eq__(self, other: NoiseEntry) -> bool:
-        ...
-    @typing.overload
-    def __eq__(self, other: typing.Any) -> bool:
-        ...
-    def __getstate__(self) -> int:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __index__(self) -> int:
-        ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __int__(self) -> int:
-        ...
-    @typing.overload
-    def __ne__(self, other: NoiseEntry) -> bool:
-        ...
-    @typing.overload
-    def __ne__(self, other: typing.Any) -> bool:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __str__(self) -> str:
-        ...
-    @property
-    def name(self) -> str:
-        ...
-    @property
-    def value(self) -> int:
-        ...
+    basic_sensors = 1
+    every_sensor = 0
 class SensorConfig:
     """
     Which sensors there are and how noisy
@@ -891,56 +589,13 @@ class PerceptronTrainer:
         """
         Bytes beside the layer
         """
-class TieRule:
+class TieRule(enum.Enum):
     """
     Which of several best actions is taken
-    
-    Members:
-    
-      uniform
-    
-      lowest
-    
-      middle
     """
-    __members__: typing.ClassVar[dict[str, TieRule]]
-    lowest: typing.ClassVar[TieRule]
-    middle: typing.ClassVar[TieRule]
-    uniform: typing.ClassVar[TieRule]
-    @typing.overload
-    def __eq__(self, other: TieRule) -> bool:
-        ...
-    @typing.overload
-    def __eq__(self, other: typing.Any) -> bool:
-        ...
-    def __getstate__(self) -> int:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __index__(self) -> int:
-        ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __int__(self) -> int:
-        ...
-    @typing.overload
-    def __ne__(self, other: TieRule) -> bool:
-        ...
-    @typing.overload
-    def __ne__(self, other: typing.Any) -> bool:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __str__(self) -> str:
-        ...
-    @property
-    def name(self) -> str:
-        ...
-    @property
-    def value(self) -> int:
-        ...
+    lowest = 1
+    middle = 2
+    uniform = 0
 class EpsilonGreedyConfig:
     """
     The policy's parameters
@@ -972,100 +627,18 @@ class EpsilonGreedy:
         ...
     def select(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step: typing.SupportsInt | typing.SupportsIndex, explore: bool = True) -> int:
         ...
-class ValueRange:
+class ValueRange(enum.Enum):
     """
     Whether the range of values is fixed
-    
-    Members:
-    
-      given
-    
-      seen
     """
-    __members__: typing.ClassVar[dict[str, ValueRange]]
-    given: typing.ClassVar[ValueRange]
-    seen: typing.ClassVar[ValueRange]
-    @typing.overload
-    def __eq__(self, other: ValueRange) -> bool:
-        ...
-    @typing.overload
-    def __eq__(self, other: typing.Any) -> bool:
-        ...
-    def __getstate__(self) -> int:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __index__(self) -> int:
-        ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __int__(self) -> int:
-        ...
-    @typing.overload
-    def __ne__(self, other: ValueRange) -> bool:
-        ...
-    @typing.overload
-    def __ne__(self, other: typing.Any) -> bool:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __str__(self) -> str:
-        ...
-    @property
-    def name(self) -> str:
-        ...
-    @property
-    def value(self) -> int:
-        ...
-class Schedule:
+    given = 0
+    seen = 1
+class Schedule(enum.Enum):
     """
     How rates go to their final values
-    
-    Members:
-    
-      linear
-    
-      exponential
     """
-    __members__: typing.ClassVar[dict[str, Schedule]]
-    exponential: typing.ClassVar[Schedule]
-    linear: typing.ClassVar[Schedule]
-    @typing.overload
-    def __eq__(self, other: Schedule) -> bool:
-        ...
-    @typing.overload
-    def __eq__(self, other: typing.Any) -> bool:
-        ...
-    def __getstate__(self) -> int:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __index__(self) -> int:
-        ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __int__(self) -> int:
-        ...
-    @typing.overload
-    def __ne__(self, other: Schedule) -> bool:
-        ...
-    @typing.overload
-    def __ne__(self, other: typing.Any) -> bool:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __str__(self) -> str:
-        ...
-    @property
-    def name(self) -> str:
-        ...
-    @property
-    def value(self) -> int:
-        ...
+    exponential = 1
+    linear = 0
 class QLearningConfig:
     """
     The parameters of Q-learning

@@ -33,7 +33,7 @@ def coding_named(coding: str | Coding) -> Coding:
     """
     if isinstance(coding, Coding):
         return coding
-    if coding == CorrelationMatrix.name:
+    if isinstance(coding, str) and coding == CorrelationMatrix.name:
         raise ValueError("'correlation-matrix' needs a matrix: use CorrelationMatrix(matrix=...)")
     if not isinstance(coding, str) or coding not in CODINGS:
         names = ", ".join(repr(name) for name in CODINGS if name != CorrelationMatrix.name)

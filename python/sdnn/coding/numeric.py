@@ -25,6 +25,8 @@ __all__ = ["Anchor", "Circular", "RandomInverse"]
 MAX_BINS = 65535
 FINE = 1000
 """Bins from which on more of them make no visible difference."""
+LONGEST = 1000.0
+"""The largest length_scale: all values would look alike beyond."""
 
 
 def numbers(column: NDArray[Any]) -> NDArray[np.float64]:
@@ -78,8 +80,8 @@ class RandomInverse(Coding):
         one_of("spacing", self.spacing, ("even", "quantile"))
         if self.spacing == "quantile" and not (self.low is None and self.high is None):
             raise ValueError("low and high cannot be given with spacing='quantile'")
-        if not 0 < real("length_scale", self.length_scale) < math.inf:
-            raise ValueError(f"length_scale must be positive, got {self.length_scale!r}")
+        if not 0 < real("length_scale", self.length_scale) <= LONGEST:
+            raise ValueError(f"length_scale must be in (0, {LONGEST}], got {self.length_scale!r}")
         values = numbers(column)
         low, high = learned_range(values, self.low, self.high)
         n_bins, n_flipped = self._bins_and_flips(n_units)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import real
+from sdnn.arguments import choice, one_of, real
 from sdnn.environments.config import AcrobotConfig
 
 if TYPE_CHECKING:
@@ -169,17 +169,14 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         render_mode: str | None = None,
         dtype: Literal["float32", "float64"] = "float32",
     ) -> None:
-        if dtype not in _DTYPES:
-            raise ValueError(f"dtype must be one of {', '.join(map(repr, _DTYPES))}, got {dtype!r}")
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(
-                f"render_mode must be None or one of {self.metadata['render_modes']}, "
-                f"got {render_mode!r}"
-            )
-        self.config = config or AcrobotConfig()
+        self._dtype = choice("dtype", dtype, _DTYPES)
+        if render_mode is not None:
+            one_of("render_mode", render_mode, tuple(self.metadata["render_modes"]))
+        if config is not None and not isinstance(config, AcrobotConfig):
+            raise TypeError(f"config must be an AcrobotConfig, got {config!r}")
+        self.config = AcrobotConfig() if config is None else config
         self.goal_tolerance = goal_tolerance
         self.render_mode = render_mode
-        self._dtype = _DTYPES[dtype]
         self._acrobot = _core.Acrobot(self.config.to_core())
         self._was_reset = False
         self._tolerance = self._goal_tolerance

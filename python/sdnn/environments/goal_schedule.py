@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sdnn import _core
+from sdnn.arguments import whole
 from sdnn.environments.config import GoalScheduleConfig
 
 __all__ = ["GoalSchedule"]
@@ -38,7 +39,7 @@ class GoalSchedule:
 
     def __call__(self, episode: int) -> float:
         """Goal tolerance of the 1-based learning episode; ValueError below 1."""
-        return float(self._core(episode))
+        return float(self._core(whole("episode", episode, 1, 2**31 - 1)))
 
     def __reduce__(self) -> tuple[type[GoalSchedule], tuple[GoalScheduleConfig]]:
         return GoalSchedule, (self.config,)  # environments are copied with their schedule

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,6 +11,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
+from sdnn.arguments import one_of, whole
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.config import AcrobotConfig
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from sdnn.environments.acrobot_picture import AcrobotPicture
 
 __all__ = ["AcrobotSwingUpVectorEnv"]
+
+MAX_ENVS = 2**20
 
 # Gymnasium 1.0 knows this mode only and has no name for it.
 _AUTORESET = getattr(getattr(gym.vector, "AutoresetMode", None), "NEXT_STEP", "NextStep")
@@ -40,7 +42,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
     Parameters
     ----------
     num_envs : int
-        N >= 1.
+        N, from 1 to 2**20.
     config : AcrobotConfig, optional
         The same for all.
     goal_tolerance : float or array_like, shape (num_envs,)
@@ -85,14 +87,9 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         dtype: Literal["float32", "float64"] = "float32",
     ) -> None:
         super().__init__()
-        self.num_envs = operator.index(num_envs)
-        if self.num_envs < 1:
-            raise ValueError(f"num_envs must be at least 1, got {num_envs}")
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(
-                f"render_mode must be None or one of {self.metadata['render_modes']}, "
-                f"got {render_mode!r}"
-            )
+        self.num_envs = whole("num_envs", num_envs, 1, MAX_ENVS)
+        if render_mode is not None:
+            one_of("render_mode", render_mode, tuple(self.metadata["render_modes"]))
         single = AcrobotSwingUpEnv(config=config, dtype=dtype)
         self.config = single.config
         self.goal_tolerance = goal_tolerance
@@ -253,7 +250,13 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
             raise ValueError(f"seed must have num_envs={self.num_envs} items, got {len(seed)}")
 
     def _tolerances_of(self, values: ArrayLike) -> NDArray[np.float64]:
-        tolerances = np.array(values, dtype=np.float64)
+        try:
+            given = np.asarray(values)
+        except ValueError:  # rows of different lengths
+            given = np.empty(0, object)
+        if given.dtype.kind not in "iuf":
+            raise TypeError(f"goal_tolerance must be numbers, got {values!r}")
+        tolerances = given.astype(np.float64)
         if tolerances.shape not in ((), (self.num_envs,)):
             raise ValueError(
                 f"goal_tolerance must be a number or of shape ({self.num_envs},), "

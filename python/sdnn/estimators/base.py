@@ -14,7 +14,7 @@ from sklearn.utils import assert_all_finite, check_random_state
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from sdnn import _core
-from sdnn.arguments import one_of, real, whole
+from sdnn.arguments import flag, one_of, real, whole
 from sdnn.coding import Coding, RandomInverse, coding_named
 from sdnn.estimators import files
 from sdnn.estimators.columns import coding_entries, codings_of_columns, input_pairs
@@ -56,6 +56,14 @@ class BaseSDNN(BaseEstimator):
         whole("n_iter_no_change", self.n_iter_no_change, 1, LARGEST)
         whole("memory_limit", self.memory_limit, 0, LARGEST)
         one_of("training", self.training, _core.TRAINING_FORMS)
+        flag("shuffle", self.shuffle)
+        flag("early_stopping", self.early_stopping)
+        if not isinstance(self.verbose, bool | np.bool_):
+            whole("verbose", self.verbose, 0, LARGEST)
+        if self.n_jobs is not None:
+            whole("n_jobs", self.n_jobs, -4096, 4096)
+        if isinstance(self.coding, list | tuple) and not self.coding:
+            raise ValueError(f"coding must name a coding for some columns, got {self.coding!r}")
         if not 0 < real("validation_fraction", self.validation_fraction) < 1:
             raise ValueError(
                 f"validation_fraction must be between 0 and 1, got {self.validation_fraction!r}"

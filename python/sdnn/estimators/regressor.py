@@ -18,6 +18,9 @@ __all__ = ["SDNNRegressor"]
 MARGIN = 0.2
 """Fraction of the targets' range that a learned output range adds on either side."""
 
+FURTHEST = 1e300
+"""The largest end of an output range: what lies between two ends stays finite."""
+
 Self = TypeVar("Self", bound="SDNNRegressor")
 
 
@@ -272,22 +275,27 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     def _range_of(self, targets: NDArray[np.float64]) -> NDArray[np.float64]:
         if self.output_range is not None:
             try:
-                given = np.array(self.output_range, dtype=np.float64)
-            except (TypeError, ValueError):  # words, or rows of different lengths
+                given = np.asarray(self.output_range)
+            except ValueError:  # rows of different lengths
                 given = np.empty(0)
+            is_real = given.dtype.kind in "iuf"  # numbers beyond all floats are objects
+            given = given.astype(np.float64) if is_real else np.empty(0)
             given = np.tile(given, (self.n_outputs_, 1)) if given.ndim == 1 else given
             if (
                 given.shape != (self.n_outputs_, 2)
                 or not np.all(np.isfinite(given))
                 or not np.all(given[:, 0] < given[:, 1])
+                or np.any(np.abs(given) > FURTHEST)
             ):
                 raise ValueError(
                     "output_range must be (low, high) or one row (low, high) per output, "
-                    f"finite, low < high, got {self.output_range!r}"
+                    f"within {FURTHEST}, low < high, got {self.output_range!r}"
                 )
             return given
         self._need_two(targets, "the output_range that is not given")
         low, high = targets.min(axis=0), targets.max(axis=0)
+        if np.any(np.maximum(-low, high) > FURTHEST):
+            raise ValueError(f"y must be within {FURTHEST}, got [{low.min()}, {high.max()}]")
         margin = np.where(high > low, MARGIN * (high - low), np.maximum(1.0, np.abs(low)))
         return np.stack([low - margin, high + margin], axis=1)
 

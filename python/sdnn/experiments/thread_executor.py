@@ -88,6 +88,10 @@ def _run_one(
         )
     except Exception as error:
         messages.put(Failed(planned, error))
+    except BaseException as error:  # SystemExit and the like end a thread without a word
+        failure = RuntimeError(f"the trial raised {error!r}")
+        failure.__cause__ = error
+        messages.put(Failed(planned, failure))
     else:
         messages.put(_Abandoned() if record is None else Finished(planned, record))
 

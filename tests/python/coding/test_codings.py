@@ -140,8 +140,9 @@ def test_names():
 @pytest.mark.parametrize(
     ("coding", "error"),
     [
-        (RandomInverse(length_scale=0.0), "length_scale must be positive"),
-        (RandomInverse(length_scale=np.inf), "length_scale must be positive"),
+        (RandomInverse(length_scale=0.0), r"length_scale must be in \(0, 1000.0\]"),
+        (RandomInverse(length_scale=1e9), r"length_scale must be in \(0, 1000.0\]"),
+        (RandomInverse(length_scale=np.inf), r"length_scale must be in \(0, 1000.0\]"),
         (RandomInverse(n_bins=1), "n_bins must be a whole number"),
         (RandomInverse(n_bins=2.5), "n_bins must be a whole number"),
         (RandomInverse(n_flipped=33), r"n_flipped must be a whole number in \[1, 32\], got 33"),

@@ -120,7 +120,7 @@ class Campaign:
         spec = importlib.util.spec_from_file_location("kill_and_resume", path)
         self.single = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(self.single)
-        self.single.run(parent / "whole", arguments)
+        self.single.run(parent / "whole", ["reproduce", *arguments])
         self.expected = self.single.content(parent / "whole")
 
     def run(self, wanted: dict[str, int]) -> None:

@@ -98,6 +98,18 @@ def test_failing_trial_does_not_stop_the_others(tmp_path, fake, run):
     assert run(tmp_path, plan)[0].n_run == 1
 
 
+@pytest.mark.parametrize("kind", [SystemExit, KeyboardInterrupt, GeneratorExit])
+def test_what_ends_a_thread_without_a_word_is_a_failure(tmp_path, fake, run, kind):
+    class Leaving(fake.FakeTrial):
+        def __init__(self, **_parts):
+            raise kind("left")
+
+    outcome, _ = run(tmp_path, None, Leaving)
+    assert outcome.n_run == 0
+    assert not outcome.interrupted
+    assert {str(f.error) for f in outcome.failures} == {f"the trial raised {kind('left')!r}"}
+
+
 def test_interruption_keeps_what_is_finished(tmp_path, fake, run):
     """Ctrl-C comes while the second trial runs: it is given up, the first stays stored."""
     made = []

@@ -23,6 +23,14 @@ def generate() -> str:
     # The tool invents an __all__ that the module does not have, and writes down its version.
     if not hasattr(sdnn._core, "__all__"):
         text = re.sub(r"^__all__.*?\]\n", "", text, flags=re.MULTILINE | re.DOTALL)
+    # It writes members of enumerations as Python's type checkers no longer take them.
+    text = re.sub(
+        r"^    (\w+): typing\.ClassVar\[(\w+)\]$",
+        lambda line: f"    {line[1]} = {getattr(sdnn._core, line[2])[line[1]].value}",
+        text,
+        flags=re.MULTILINE,
+    )
+    text = text.replace("    @classmethod\n    def __new__(cls, value):\n        ...\n", "")
     return re.sub(r"^__version__: str = .*$", "__version__: str", text, flags=re.MULTILINE)
 
 

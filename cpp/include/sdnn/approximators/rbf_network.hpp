@@ -86,6 +86,11 @@ class RBFNetwork {
   void set_weights(std::span<const double> weights) {
     core::require(weights.size() == n_joint_bases_, "weights",
                   std::to_string(n_joint_bases_) + " values", weights.size());
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      if (std::abs(weights[i]) <= kLargestWeight) continue;
+      core::require_in_range("weights[" + std::to_string(i) + "]", weights[i], -kLargestWeight,
+                             kLargestWeight);
+    }
     std::copy(weights.begin(), weights.end(), weights_.data());
     is_mixed_ = false;
   }
@@ -155,6 +160,7 @@ class RBFNetwork {
  private:
   static constexpr int kUnrolled = 4;  // the paper's n_bases
   static constexpr double kLargestStep = 1e305;
+  static constexpr double kLargestWeight = 1e300;  // of given ones: sums of them stay finite
 
   static RBFNetworkConfig checked(const RBFNetworkConfig& config) {
     core::require_in_range("n_inputs", config.n_inputs, 1, 62);

@@ -25,6 +25,7 @@
 #include "sdnn/coding/state_code.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::approximators {
@@ -341,6 +342,7 @@ class SDNNC {
     HiddenLayer replaced(hidden_layer_.n_units(), hidden_layer_.n_columns(),
                          hidden_layer_.n_double_columns());
     for (std::size_t j = 0; j < n_columns; ++j) {
+      core::interruption_point();
       const auto columns = code_->columns_of(j);
       for (std::size_t unit = 0; unit < hidden_layer_.n_units(); ++unit) {
         add_weight(replaced, unit, columns, weights[unit * n_columns + j]);
@@ -383,6 +385,7 @@ class SDNNC {
     core::Random random(seed, core::Stream::weights);
     std::vector<std::int32_t> drawn(hidden_layer_.n_units());
     for (std::size_t j = 0; j < code_->n_columns(); ++j) {
+      core::interruption_point();
       std::uint64_t bits = 0;
       for (std::size_t i = 0; i < drawn.size(); ++i) {
         if (config_.initial_weights == InitialWeights::ternary) {

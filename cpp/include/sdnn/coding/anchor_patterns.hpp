@@ -7,6 +7,7 @@
 
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::coding {
@@ -48,6 +49,7 @@ inline PatternTable anchor_patterns(const AnchorConfig& config, core::Random& ra
     anchors[i].for_each_set([&](std::size_t k) { table.set(first, k); });
     std::size_t n_flipped = 0;
     for (std::size_t j = 1; j < n_portions; ++j) {
+      core::interruption_point();
       table.copy(first + j - 1, first + j);
       for (; n_flipped < j * differing.size() / n_portions; ++n_flipped) {
         table.flip(first + j, differing[n_flipped]);

@@ -12,11 +12,14 @@
 
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::coding {
 
 namespace detail {
+
+inline constexpr std::size_t kProposalsPerPoint = 4096;
 
 /// Patterns as bytes and their inner products, moved towards wanted ones by swaps of two units.
 class CorrelationSearch {
@@ -49,6 +52,7 @@ class CorrelationSearch {
       random.shuffle(pattern);
     }
     for (std::size_t j = 0; j < i; ++j) {
+      core::interruption_point();
       std::int64_t product = 0;
       for (std::size_t k = 0; k < n_units_; ++k) product += std::int64_t{pattern[k]} * signs(j)[k];
       products_[i * n_bins_ + j] = products_[j * n_bins_ + i] = product;
@@ -122,6 +126,7 @@ inline PatternTable correlation_matrix_patterns(int n_units, std::span<const dou
   core::require(correlations.size() == n_bins * n_bins, "correlations", "a square matrix",
                 correlations.size());
   for (std::size_t i = 0; i < n_bins; ++i) {
+    core::interruption_point();
     for (std::size_t j = 0; j < n_bins; ++j) {
       const std::string name = "correlations[" + std::to_string(i) + ", " + std::to_string(j) + "]";
       const double value = correlations[i * n_bins + j];
@@ -136,7 +141,10 @@ inline PatternTable correlation_matrix_patterns(int n_units, std::span<const dou
   const std::size_t n_proposals = units * std::min<std::size_t>(20, affordable);
   for (std::size_t i = 0; i < n_bins; ++i) {
     search.begin(i, random);
-    for (std::size_t p = 0; p < n_proposals; ++p) search.propose(i, i, random);
+    for (std::size_t p = 0; p < n_proposals; ++p) {
+      if (p % detail::kProposalsPerPoint == 0) core::interruption_point();
+      search.propose(i, i, random);
+    }
   }
   for (std::size_t p = 0; p < n_proposals * n_bins; ++p) {
     search.propose(random.below(n_bins), n_bins, random);

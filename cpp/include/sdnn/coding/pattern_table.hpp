@@ -12,6 +12,7 @@
 
 #include "sdnn/core/bit_layer.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::coding {
@@ -49,6 +50,7 @@ class PatternTable {
                   std::to_string(n_bins * n_units) + " values", signs.size());
     const std::int8_t* sign = signs.data();
     for (std::size_t bin = 0; bin < n_bins; ++bin) {
+      core::interruption_point();
       for (std::size_t unit = 0; unit < n_units; ++unit, ++sign) {
         if (*sign != 1 && *sign != -1) {
           core::require(false, "patterns", "+1 or -1 everywhere", static_cast<int>(*sign));

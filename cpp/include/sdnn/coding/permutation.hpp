@@ -10,6 +10,7 @@
 
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::coding {
@@ -53,6 +54,7 @@ inline PatternTable permuted(const PatternTable& table, const Permutation& permu
   require_permutation(permutation, table.n_units());
   PatternTable result(table.n_bins(), table.n_units());
   for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {
+    core::interruption_point();
     const core::BitLayer pattern = table[bin];
     for (std::size_t k = 0; k < permutation.size(); ++k) {
       if (pattern[permutation[k]]) result.set(bin, k);

@@ -8,6 +8,7 @@
 
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::coding {
@@ -41,6 +42,7 @@ inline PatternTable random_inverse_patterns(const RandomInverseConfig& config,
     (table.sign(0, k) > 0 ? positive : negative).push_back(k);
   }
   for (std::size_t bin = 1; bin < table.n_bins(); ++bin) {
+    core::interruption_point();
     table.copy(bin - 1, bin);
     for (auto* const units : {&positive, &negative}) {
       for (std::size_t i = 0; i < n_flipped; ++i) {  // the first n_flipped of a partial shuffle

@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/elementary.hpp"
 
 namespace sdnn::core {
@@ -85,10 +86,13 @@ class Random {
     return normal_quantile((static_cast<double>(bits() >> 12) + 0.5) * 0x1.0p-52);
   }
 
-  /// Puts `items` in a uniformly random order (Fisher-Yates, from the back).
+  /// Puts `items` in a uniformly random order (Fisher-Yates, from the back). Long work: may be
+  /// stopped.
   template <class Item>
-  void shuffle(std::span<Item> items) noexcept {
+  void shuffle(std::span<Item> items) {
+    constexpr std::size_t kItemsPerPoint = std::size_t{1} << 16;
     for (std::size_t i = items.size(); i > 1; --i) {
+      if (i % kItemsPerPoint == 0) interruption_point();
       std::swap(items[i - 1], items[static_cast<std::size_t>(below(i))]);
     }
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -13,6 +14,7 @@
 
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/errors.hpp"
 #include "sdnn/environments/acrobot.hpp"
 #include "sdnn/environments/acrobot_config.hpp"
@@ -80,7 +82,8 @@ class AcrobotBatch {
   /// (reward 0, no end), whatever their torque and tolerance.
   ///
   /// Shapes: all (size(),). Throws std::invalid_argument or std::logic_error, like Acrobot::step,
-  /// before anything moves; std::overflow_error after all have moved.
+  /// before anything moves; std::overflow_error after all have moved. Long work: may be stopped,
+  /// and then the episodes of those that were to move are over.
   void step(std::span<const double> torques, std::span<const double> goal_tolerances,
             std::span<const std::uint8_t> moving, const AcrobotBatchResults& results) {
     check_step(torques, goal_tolerances, moving, results);
@@ -89,12 +92,7 @@ class AcrobotBatch {
       goal_tolerance_[i] = moving[i] ? goal_tolerances[i] : 0.0;
       mask_[i] = moving[i] ? ~std::uint64_t{0} : 0;
     }
-    move_acrobots(dynamics_,
-                  {{state_[0].data(), state_[1].data(), state_[2].data(), state_[3].data()},
-                   torque_.data(),
-                   goal_tolerance_.data(),
-                   mask_.data()},
-                  padded_size_);
+    move_all(moving);
     std::size_t n_overflows = 0, first_overflow = 0;
     for (std::size_t i = size_; i-- > 0;) {
       StepResult result{0.0, false, false};
@@ -169,6 +167,26 @@ class AcrobotBatch {
   void require_size(const char* name, std::size_t size, std::size_t width = 1) const {
     const std::size_t expected = width * size_;
     core::require(size == expected, name, "of " + std::to_string(expected) + " items", size);
+  }
+
+  /// Moves in parts of which each is a short time's work. Stopped between them, all that move have
+  /// ended their episodes.
+  void move_all(std::span<const std::uint8_t> moving) {
+    constexpr double kStepsPerPoint = 1 << 20;
+    const double steps = std::nearbyint(config().decision_interval / config().integration_step);
+    const std::size_t part =
+        core::round_up(static_cast<std::size_t>(kStepsPerPoint / steps) + 1, kAcrobotLanes);
+    for (std::size_t i = 0; i < size_; ++i) over_[i] = over_[i] || moving[i];  // unless all move
+    for (std::size_t first = 0; first < padded_size_; first += part) {
+      core::interruption_point();
+      move_acrobots(dynamics_,
+                    {{state_[0].data() + first, state_[1].data() + first, state_[2].data() + first,
+                      state_[3].data() + first},
+                     torque_.data() + first,
+                     goal_tolerance_.data() + first,
+                     mask_.data() + first},
+                    std::min(part, padded_size_ - first));
+    }
   }
 
   AcrobotState state_of(std::size_t i) const noexcept {

@@ -15,6 +15,9 @@
 #include "sdnn/coding/random_inverse.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/grid_cells.hpp"
+#include "sdnn/core/detail/interruption.hpp"
+#include "sdnn/estimators/parallel_perceptron.hpp"
 
 namespace sdnn::estimators {
 
@@ -151,10 +154,14 @@ inline LibsdnnWeights libsdnn_weights(std::size_t n_units, std::size_t n_columns
                                       LibsdnnRandom& random) {
   core::require_in_range("low", low, -1000000, 1000000);
   core::require_in_range("high", high, low, 1000000);
+  core::require_bytes("n_units or n_columns", "the weights",
+                      4.0 * static_cast<double>(n_units) * static_cast<double>(n_columns),
+                      kMaxWeightBytes);
   LibsdnnWeights drawn;
   drawn.weights.reserve(n_units * n_columns);
   drawn.thresholds.reserve(n_units);
   for (std::size_t i = 0; i < n_units; ++i) {
+    core::interruption_point();
     drawn.thresholds.push_back(random.uniform(low, high));
     for (std::size_t j = 0; j < n_columns; ++j) drawn.weights.push_back(random.uniform(low, high));
   }

@@ -17,6 +17,8 @@
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/grid_cells.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/errors.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/estimators/detail/query_order.hpp"
@@ -24,6 +26,9 @@
 #include "sdnn/estimators/detail/weight_tiles.hpp"
 
 namespace sdnn::estimators {
+
+/// The most bytes that the weights of a layer may have: 4 GiB.
+inline constexpr std::uint64_t kMaxWeightBytes = std::uint64_t{1} << 32;
 
 /// `n_units` units over the columns of a code: potential = weights . x_SD - threshold, firing if >
 /// 0.
@@ -39,7 +44,8 @@ class ParallelPerceptron {
   /// Weights and thresholds are drawn uniformly from the integers in [-initial_range,
   /// initial_range], unit by unit, the threshold first.
   ///
-  /// Throws std::invalid_argument unless n_units is in [1, 2^20] and initial_range in [0, 10^6].
+  /// Throws std::invalid_argument unless n_units is in [1, 2^20] and initial_range in [0, 10^6],
+  /// std::length_error if the weights have more than kMaxWeightBytes. Long work: may be stopped.
   ParallelPerceptron(std::shared_ptr<const Code> code, std::size_t n_units, std::uint64_t seed,
                      int initial_range = 5)
       : ParallelPerceptron(std::move(code), n_units) {
@@ -49,6 +55,7 @@ class ParallelPerceptron {
     const auto draw = [&] { return static_cast<std::int32_t>(random.below(span)) - initial_range; };
     const std::vector<std::size_t> slots = slots_of_columns();
     for (std::size_t i = 0; i < n_units; ++i) {
+      core::interruption_point();
       thresholds_[i] = draw();
       for (const std::size_t slot : slots) weights_.at(i, slot) = draw();
     }
@@ -72,6 +79,7 @@ class ParallelPerceptron {
     const std::int32_t* weight = weights.data();
     const std::vector<std::size_t> slots = slots_of_columns();
     for (std::size_t i = 0; i < n_units; ++i) {
+      core::interruption_point();
       for (const std::size_t slot : slots) weights_.at(i, slot) = *weight++;
     }
     std::copy(thresholds.begin(), thresholds.end(), thresholds_.begin());
@@ -183,6 +191,9 @@ class ParallelPerceptron {
   ParallelPerceptron(std::shared_ptr<const Code> code, std::size_t n_units)
       : code_(std::move(code)) {
     core::require_in_range("n_units", n_units, 1, std::size_t{1} << 20);
+    core::require_bytes("n_units, or the columns of the code,", "the weights of all units",
+                        4.0 * static_cast<double>(n_units) * static_cast<double>(code_->n_slots()),
+                        kMaxWeightBytes);
     weights_ = WeightTiles<std::int32_t>(n_units, code_->n_slots());
     thresholds_.resize(n_units);
   }

@@ -53,6 +53,8 @@ class Trainer {
     make_training(bins, n_threads, keeps_plans);
   }
 
+  /// What is trained.
+  ParallelPerceptron& layer() noexcept { return *layer_; }
   TrainingForm form() const noexcept { return form_; }
   /// The most bytes that the form takes beside the layer.
   std::size_t memory() const noexcept { return memory_; }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -13,6 +14,8 @@
 #include "sdnn/agents/agent.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/grid_cells.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/environments/acrobot.hpp"
 #include "sdnn/environments/acrobot_sensors.hpp"
@@ -60,6 +63,7 @@ class AcrobotTrial {
                std::uint64_t seed)
       : agent_(std::move(agent)),
         max_torque_(acrobot.max_torque),
+        steps_per_decision_(acrobot.decision_interval / acrobot.integration_step),
         acrobot_(acrobot),
         goal_(goal),
         sensors_(sensors, seed, core::Stream::sensor_noise),
@@ -74,6 +78,10 @@ class AcrobotTrial {
                   agent_.n_inputs());
     // No decision is to wait for memory it is the first to use: that of the agent, room for rows.
     if constexpr (requires { agent_.warm_caches(); }) agent_.warm_caches();
+    core::require_bytes("n_learning_episodes / test_interval", "the rows of the test episodes",
+                        sizeof(TestRow) * static_cast<double>(protocol.n_learning_episodes) /
+                            protocol.test_interval,
+                        core::kDefaultMaxTableBytes);
     rows_.resize(static_cast<std::size_t>(protocol.n_learning_episodes / protocol.test_interval));
     rows_.clear();
   }
@@ -89,6 +97,10 @@ class AcrobotTrial {
   Agent& agent() noexcept { return agent_; }
 
   /// Runs up to `n_episodes` more learning episodes, with the test episodes that fall due.
+  ///
+  /// Long work: may be stopped between episodes and then go on, and within a long one. Whatever is
+  /// thrown within an episode ends the trial: it cannot be taken up there, and advance throws
+  /// std::logic_error from then on.
   void advance(int n_episodes) {
     advance(n_episodes, [] {});
   }
@@ -97,8 +109,12 @@ class AcrobotTrial {
   template <class AfterDecision>
   void advance(int n_episodes, AfterDecision&& after_decision) {
     core::require_in_range("n_episodes", n_episodes, 0, 1 << 30);
+    if (in_episode_) {
+      core::fail(std::logic_error("the trial was ended within an episode: make a new one"));
+    }
     const int last = episode_ + std::min(n_episodes, protocol_.n_learning_episodes - episode_);
     while (episode_ < last) {
+      core::interruption_point();
       if constexpr (requires { agent_.set_progress(0.0); }) {
         agent_.set_progress(static_cast<double>(episode_) /
                             static_cast<double>(protocol_.n_learning_episodes));
@@ -123,6 +139,8 @@ class AcrobotTrial {
                       AfterDecision& after_decision) {
     const double lambda = goal_(episode_);
     TestRow row{.episode = episode_, .steps = 0, .episode_return = 0.0, .solved = false};
+    double n_steps = 0.0;
+    in_episode_ = true;
     acrobot_.reset();
     agent_.begin_episode();
     sensors.observe(acrobot_.state(), observed_);
@@ -140,13 +158,22 @@ class AcrobotTrial {
       row.solved = result.terminated;
       truncated = result.truncated;
       after_decision();
+      n_steps += steps_per_decision_;
+      if (n_steps > kStepsPerPoint) {  // a usual episode is over before
+        core::interruption_point();
+        n_steps = 0.0;
+      }
     }
+    in_episode_ = false;
     n_decisions_ += row.steps;
     return row;
   }
 
+  static constexpr double kStepsPerPoint = 1 << 20;  ///< integration steps
+
   Agent agent_;
   double max_torque_;
+  double steps_per_decision_;
   environments::Acrobot acrobot_;
   environments::GoalSchedule goal_;
   environments::AcrobotSensors sensors_;
@@ -157,6 +184,7 @@ class AcrobotTrial {
   std::vector<TestRow> rows_;
   std::int64_t n_decisions_ = 0;
   int episode_ = 0;
+  bool in_episode_ = false;  // also after something was thrown there
 };
 
 }  // namespace sdnn::experiments

@@ -10,6 +10,7 @@
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 
 namespace sdnn::coding {
 
@@ -82,6 +83,7 @@ inline void write_products(const SelectiveDesensitization& code, std::span<const
   assert(products.size() == one.size() * other.size());
   std::int32_t* product = products.data();
   for (std::size_t t = 0; t < one.size(); ++t) {
+    core::interruption_point();
     for (std::size_t s = 0; s < other.size(); ++s) {
       *product++ = inner_product(one[t], other[s], one.n_words());
     }

@@ -29,6 +29,16 @@ inline void require_table_bytes(std::string_view sizes, std::string_view what, d
   fail(std::length_error(message.str()));
 }
 
+/// The same where no setting allows more: "... bytes, but at most <most> are allowed".
+inline void require_bytes(std::string_view sizes, std::string_view what, double bytes,
+                          std::uint64_t most) {
+  if (bytes <= static_cast<double>(most)) return;
+  std::ostringstream message;
+  message << sizes << " must be smaller: " << what << " need " << std::fixed << std::setprecision(0)
+          << bytes << " bytes, but at most " << most << " are allowed";
+  fail(std::length_error(message.str()));
+}
+
 /// n_per_dimension ^ n_dimensions, when a table with `bytes_per_cell` for each is allowed.
 ///
 /// A grid grows exponentially with its dimensions; asked before memory is requested, so that the

@@ -16,9 +16,17 @@ namespace sdnn::core {
 class WorkerTeam {
  public:
   explicit WorkerTeam(std::size_t n_threads) {
+    struct EndsWaiting {  // should no more threads be had, those that wait already must end
+      WorkerTeam& team;
+      bool has_all = false;
+      ~EndsWaiting() {
+        if (!has_all) team.start();
+      }
+    } waiting{*this};
     for (std::size_t part = 1; part < n_threads; ++part) {
       threads_.emplace_back([this, part] { serve(part); });
     }
+    waiting.has_all = true;
   }
   WorkerTeam(const WorkerTeam&) = delete;
   WorkerTeam& operator=(const WorkerTeam&) = delete;

@@ -1,0 +1,184 @@
+/// How a call gets hold of the objects of Python: made ones only, and none that a call in another
+/// thread works on.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace sdnn::bindings {
+
+/// Whether `T` is a class of this library. Known by its name: a list of classes could lack one.
+template <class T>
+consteval bool is_of_library() {
+#if defined(_MSC_VER)
+  const std::string_view signature = __FUNCSIG__;
+  return signature.find("is_of_library<class sdnn::") != std::string_view::npos ||
+         signature.find("is_of_library<struct sdnn::") != std::string_view::npos;
+#else
+  return std::string_view(__PRETTY_FUNCTION__).find("T = sdnn::") != std::string_view::npos;
+#endif
+}
+
+template <class T>
+concept LibraryClass = std::is_class_v<T> && is_of_library<T>();
+
+/// Memory that a call reads or changes without the GIL. The GIL guards the list of them.
+struct Use {
+  const void* owner;
+  const std::byte* begin;
+  const std::byte* end;
+  bool changes;
+
+  static std::vector<Use>& all() {
+    static std::vector<Use> uses;
+    return uses;
+  }
+
+  bool overlaps(const Use& other) const noexcept {
+    return std::less<>()(begin, other.end) && std::less<>()(other.begin, end);
+  }
+};
+
+/// Throws std::runtime_error if another call changes the memory, or uses it and this one is to
+/// change it.
+inline void require_unused(const Use& wanted, const char* name) {
+  for (const Use& use : Use::all()) {
+    if ((use.changes || wanted.changes) && use.overlaps(wanted)) {
+      throw std::runtime_error(std::string("this ") + name +
+                               " is in use by a call in another thread: wait for its end");
+    }
+  }
+}
+
+/// Lets other threads run Python while objects are worked on.
+///
+/// Objects given as const are read, the others are changed, with all that they hold in themselves.
+/// As long as it lives, every use of an object that is being changed is refused with a
+/// RuntimeError, and every change of one that is being read. What a call reads of arrays must be a
+/// copy: arrays have no owner that could refuse.
+class WithoutGIL {
+ public:
+  /// Throws std::runtime_error if another thread's call is in the way.
+  template <class... Object>
+  explicit WithoutGIL(Object&... objects) : uses_(this, objects...) {}
+  WithoutGIL(const WithoutGIL&) = delete;
+  WithoutGIL& operator=(const WithoutGIL&) = delete;
+
+ private:
+  struct Uses {
+    template <class... Object>
+    explicit Uses(const void* owner, Object&... objects) : owner_(owner) {
+      const auto use_of = [owner]<class T>(T& object) {
+        const auto* const begin = reinterpret_cast<const std::byte*>(&object);
+        return Use{owner, begin, begin + sizeof(T), !std::is_const_v<T>};
+      };
+      (require_unused(use_of(objects), "object"), ...);
+      Use::all().reserve(Use::all().size() + sizeof...(objects));
+      (Use::all().push_back(use_of(objects)), ...);
+    }
+    Uses(const Uses&) = delete;
+    Uses& operator=(const Uses&) = delete;
+    ~Uses() {
+      std::erase_if(Use::all(), [this](const Use& use) { return use.owner == owner_; });
+    }
+
+    const void* owner_;
+  };
+
+  /// pybind11's gil_scoped_release, but for the end of the interpreter: before 3.14 Python then
+  /// ends the threads that ask for the GIL by unwinding their stacks, which frames of C++ answer
+  /// with std::terminate. Such a thread waits here for the end of the process.
+  class Release {
+   public:
+    Release() : state_(PyEval_SaveThread()) {}
+    Release(const Release&) = delete;
+    Release& operator=(const Release&) = delete;
+    ~Release() {
+      try {
+        PyEval_RestoreThread(state_);
+      } catch (...) {
+        for (;;) std::this_thread::sleep_for(std::chrono::hours(1));
+      }
+    }
+
+   private:
+    PyThreadState* state_;
+  };
+
+  Uses uses_;
+  Release release_;  // last: the GIL is back before the list changes
+};
+
+/// Makes pybind11's base of all classes refuse to be called. Nobody does, but pickle's protocols 0
+/// and 1 and object.__reduce__; pybind11 would throw through Python's frames.
+inline void refuse_bare_objects() {
+  auto* const base =
+      reinterpret_cast<PyTypeObject*>(pybind11::detail::get_internals().instance_base);
+  base->tp_new = [](PyTypeObject* type, PyObject*, PyObject*) -> PyObject* {
+    if (!pybind11::detail::all_type_info(type).empty()) {
+      return pybind11::detail::make_new_instance(type);
+    }
+    PyErr_Format(PyExc_TypeError, "cannot make or pickle a %.200s", type->tp_name);
+    return nullptr;
+  };
+}
+
+/// Throws TypeError if the object behind `held` was never made, std::runtime_error if another
+/// thread's call changes it. pybind11 would hand out fresh memory for the first, and knows nothing
+/// of the second.
+inline void require_usable(const pybind11::detail::value_and_holder& held) {
+  const auto name = [&held] {
+    const pybind11::handle type(reinterpret_cast<PyObject*>(Py_TYPE(held.inst)));
+    return pybind11::cast<std::string>(type.attr("__name__"));
+  };
+  const auto* const object = static_cast<const std::byte*>(held.value_ptr());
+  if (object == nullptr) throw pybind11::type_error(name() + ".__init__() was not called");
+  if (!Use::all().empty()) require_unused({nullptr, object, object + 1, false}, name().c_str());
+}
+
+}  // namespace sdnn::bindings
+
+namespace pybind11::detail {
+
+/// Arguments of the library's classes, `self` among them.
+template <sdnn::bindings::LibraryClass T>
+class type_caster<T> : public type_caster_base<T> {
+ public:
+  bool load(handle source, bool convert) {
+    return this->template load_impl<type_caster>(source, convert);
+  }
+  void load_value(value_and_holder&& held) {
+    sdnn::bindings::require_usable(held);
+    type_caster_base<T>::load_value(std::move(held));
+  }
+};
+
+template <sdnn::bindings::LibraryClass T>
+class type_caster<std::shared_ptr<T>> : public copyable_holder_caster<T, std::shared_ptr<T>> {
+ public:
+  bool load(handle source, bool convert) {
+    if (source.is_none()) return false;  // no function takes a null pointer
+    return this->template load_impl<type_caster>(source, convert);
+  }
+
+ private:
+  friend class type_caster_generic;
+  void load_value(value_and_holder&& held) {
+    sdnn::bindings::require_usable(held);
+    copyable_holder_caster<T, std::shared_ptr<T>>::load_value(std::move(held));
+  }
+};
+
+}  // namespace pybind11::detail

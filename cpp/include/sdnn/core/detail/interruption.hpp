@@ -1,0 +1,20 @@
+/// Long work that can be stopped from outside.
+#pragma once
+
+#include <atomic>
+
+namespace sdnn::core {
+
+/// What long work calls now and then, at least ten times a second; it throws to stop the work.
+/// None unless somebody sets it, as the Python package does for Ctrl-C. Called from any thread.
+inline std::atomic<void (*)()>& interruption_check() noexcept {
+  static std::atomic<void (*)()> check = nullptr;
+  return check;
+}
+
+/// A place where work may end early, with whatever the check throws.
+inline void interruption_point() {
+  if (const auto check = interruption_check().load(std::memory_order_relaxed)) check();
+}
+
+}  // namespace sdnn::core

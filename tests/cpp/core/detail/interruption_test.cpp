@@ -1,0 +1,83 @@
+#include "sdnn/core/detail/interruption.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <numeric>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include "sdnn/coding/anchor_patterns.hpp"
+#include "sdnn/core/random.hpp"
+#include "sdnn/environments/acrobot_batch.hpp"
+
+namespace sdnn::core {
+namespace {
+
+struct StopError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+int n_points_left = 0;
+
+/// Stops work at its `n`-th interruption point from now, counted from 0.
+class StopAt {
+ public:
+  explicit StopAt(int n) {
+    n_points_left = n;
+    interruption_check() = [] {
+      if (n_points_left-- == 0) throw StopError("stopped");
+    };
+  }
+  StopAt(const StopAt&) = delete;
+  StopAt& operator=(const StopAt&) = delete;
+  ~StopAt() { interruption_check() = nullptr; }
+};
+
+TEST(Interruption, DoesNothingUnlessSomebodyAsks) {
+  EXPECT_NO_THROW(interruption_point());
+  const StopAt stop(1);
+  EXPECT_NO_THROW(interruption_point());
+  EXPECT_THROW(interruption_point(), StopError);
+}
+
+TEST(Interruption, EndsTheMakingOfPatterns) {
+  Random random(1, Stream::code_books);
+  const coding::AnchorConfig config{.n_units = 20, .n_anchor_patterns = 3, .n_interpolated = 4};
+  const StopAt stop(4);
+  EXPECT_THROW(coding::anchor_patterns(config, random), StopError);
+}
+
+TEST(Interruption, ShufflesToTheSameOrderIfItGoesOn) {
+  std::vector<std::uint32_t> one(200'000), other(200'000);
+  std::iota(one.begin(), one.end(), 0U);
+  std::iota(other.begin(), other.end(), 0U);
+  Random(1, Stream::weights).shuffle(std::span(one));
+  const StopAt stop(1000);
+  Random(1, Stream::weights).shuffle(std::span(other));
+  EXPECT_LT(n_points_left, 1000);
+  EXPECT_EQ(one, other);
+}
+
+TEST(Interruption, OfAStepEndsTheEpisodesOfABatch) {
+  environments::AcrobotBatch batch({}, 3);
+  const std::vector<double> torques(3, 1.0), tolerances(3, 1.0);
+  std::vector<std::uint8_t> moving{1, 0, 1}, terminated(3), truncated(3);
+  std::vector<double> rewards(3);
+  const environments::AcrobotBatchResults results{rewards, terminated, truncated};
+  {
+    const StopAt stop(0);
+    EXPECT_THROW(batch.step(torques, tolerances, moving, results), StopError);
+  }
+  EXPECT_THROW(batch.step(torques, tolerances, moving, results), std::logic_error);
+  moving = {0, 1, 0};  // which the stopped step did not move
+  EXPECT_NO_THROW(batch.step(torques, tolerances, moving, results));
+  batch.reset();
+  moving = {1, 1, 1};
+  EXPECT_NO_THROW(batch.step(torques, tolerances, moving, results));
+  EXPECT_EQ(batch.state(0), batch.state(2));
+}
+
+}  // namespace
+}  // namespace sdnn::core

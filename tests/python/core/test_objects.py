@@ -1,0 +1,242 @@
+"""Objects of the core: never made, used by several threads, changed arrays, Ctrl-C."""
+
+import pickle
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import core_cells
+import public_cells
+import sdnn._core as core
+from watched_cells import failures
+
+BINDINGS = Path(__file__).parents[3] / "cpp" / "bindings"
+IN_USE = "in use by a call in another thread"
+
+
+@pytest.mark.parametrize(
+    "make_cells",
+    [
+        core_cells.never_made_cells,
+        core_cells.argument_cells,
+        public_cells.never_initialised_cells,
+        public_cells.estimator_cells,
+        public_cells.environment_cells,
+    ],
+)
+def test_bad_use_is_refused(make_cells):
+    n_cells, failed = failures(make_cells)
+    assert n_cells > 1000
+    assert not failed, "\n".join(failed[:20])
+
+
+def test_good_arguments_are_known_of_everything_that_takes_some():
+    configs = {cls.__name__ for cls in core_cells.CLASSES if cls.__name__.endswith("Config")}
+    classes = {cls.__name__ for cls in core_cells.CLASSES}
+    assert classes - configs <= set(core_cells.GOOD)
+    for name in core_cells.GOOD:
+        core_cells.made(name)
+
+
+def test_a_made_object_cannot_be_pickled_by_any_protocol():
+    for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
+        with pytest.raises(TypeError, match="pickle"):
+            pickle.dumps(core.Acrobot(core.AcrobotConfig()), protocol)
+
+
+def test_only_one_class_releases_the_lock():
+    for path in BINDINGS.glob("*.[ch]pp"):
+        found = re.findall(r"gil_scoped_release|PyEval_SaveThread", path.read_text())
+        assert path.name == "objects.hpp" or not found, path
+
+
+def in_thread(work):
+    """Run work in another thread, once it has begun."""
+    outcome = []
+
+    def run():
+        try:
+            outcome.append(work())
+        except BaseException as error:
+            outcome.append(error)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    time.sleep(0.02)
+    return thread, outcome
+
+
+def big_trial():
+    settings = core_cells.GOOD["AcrobotTrial"]()
+    settings["protocol"] = core.ProtocolConfig(n_learning_episodes=100_000)
+    return core.AcrobotTrial(**settings)
+
+
+def test_a_trial_that_advances_refuses_all_else():
+    trial = big_trial()
+    agent, network = trial.agent, trial.agent.action_value
+    n_decisions = trial.n_decisions
+    thread, outcome = in_thread(lambda: trial.advance(800))
+    uses = [
+        lambda: trial.advance(1),
+        trial.test_rows,
+        lambda: trial.finished,
+        lambda: agent.act([0.1] * 4),
+        lambda: network.values([0.1] * 4),
+        lambda: core.NetworkParts(network, 1),
+    ]
+    for use in uses:
+        with pytest.raises(RuntimeError, match=IN_USE):
+            use()
+    assert thread.is_alive()
+    thread.join()
+    assert outcome == [None]
+    assert trial.episode == 800
+    assert trial.n_decisions > n_decisions
+    alone = big_trial()
+    alone.advance(800)
+    for name, column in alone.test_rows().items():
+        np.testing.assert_array_equal(trial.test_rows()[name], column)
+
+
+def trainer_of(layer, form="auto", n_samples=20_000):
+    generator = np.random.default_rng(1)
+    bins = generator.integers(0, 12, (n_samples, 2)).astype(np.int32)
+    targets = generator.uniform(0, layer.n_units, (n_samples, 1))
+    return core.PDeltaTrainer(layer, bins, targets, form=form, memory_limit=2**34)
+
+
+@pytest.mark.parametrize("form", ["plain", "block"])
+def test_a_layer_that_is_trained_refuses_all_else(form):
+    layer = core.ParallelPerceptron(core_cells.code(), 200, seed=1)
+    trainer, other = trainer_of(layer, form), trainer_of(layer, form)
+    order = np.tile(np.arange(20_000, dtype=np.int32), 20)
+    thread, outcome = in_thread(lambda: trainer.present(order))
+    uses = [
+        lambda: trainer.present(order[:1]),
+        lambda: other.present(order[:1]),
+        trainer.synchronize,
+        other.synchronize,
+        lambda: layer.weights,
+        lambda: layer.potentials(core_cells.BINS),
+        lambda: core.PDeltaTrainer(layer, core_cells.BINS, [[1.0]] * 3),
+    ]
+    for use in uses:
+        with pytest.raises(RuntimeError, match=IN_USE):
+            use()
+    order[:] = -(2**31)  # it works on a copy
+    assert thread.is_alive()
+    thread.join()
+    (count,) = outcome
+    assert count[0] > 0
+
+
+def test_a_layer_may_be_read_by_many_threads_but_not_trained_meanwhile():
+    layer = core.ParallelPerceptron(core_cells.code(), 200, seed=1)
+    trainer = trainer_of(layer, "plain", 5)
+    bins = np.tile(np.array(core_cells.BINS, np.int32), (300_000, 1))
+    expected = layer.potentials(core_cells.BINS)
+    reads = [in_thread(lambda: layer.potentials(bins)) for _ in range(2)]
+    with pytest.raises(RuntimeError, match=IN_USE):
+        trainer.present([0])
+    np.testing.assert_array_equal(layer.potentials(core_cells.BINS), expected)
+    assert layer.weights.shape == (200, 40)
+    bins[:] = 2**31 - 1  # they read a copy
+    for thread, outcome in reads:
+        assert thread.is_alive()
+        thread.join()
+        np.testing.assert_array_equal(outcome[0][-3:], expected)
+    trainer.present([0])
+
+
+def test_a_batch_that_moves_refuses_all_else():
+    n = 2**16
+    batch = core.AcrobotBatch(core.AcrobotConfig(), n)
+    moving = np.ones(n, np.bool_)
+    thread, outcome = in_thread(lambda: batch.step(np.ones(n), np.ones(n), moving))
+    with pytest.raises(RuntimeError, match=IN_USE):
+        batch.reset(moving)
+    with pytest.raises(RuntimeError, match=IN_USE):
+        batch.states()
+    thread.join()
+    assert len(outcome[0]) == 3
+
+
+LONG_WORK = {
+    "a network": "c.SDNNC(c.SDNNCConfig(n_inputs=16, n_hidden_units=10**4), 1)",
+    "patterns": "c.anchor_patterns(2**22, 9, 25, False, 1)",
+    "correlations": "c.correlation_matrix_patterns(2**20, np.eye(64), 1)",
+    "a step of many": "b = c.AcrobotBatch(c.AcrobotConfig(), 2**22); n = 2**22;"
+    " b.step(np.zeros(n), np.ones(n), np.ones(n, bool))",
+    "a trial of small steps": "core_cells.small_steps().advance(2)",
+    "products": "b = np.zeros((30_000, 2), np.int32); core_cells.code().gram(b)",
+}
+
+
+@pytest.mark.parametrize("work", LONG_WORK)
+def test_long_work_ends_on_ctrl_c_within_a_second(work):
+    program = f"""
+import sys, time
+sys.path.insert(0, {str(Path(core_cells.__file__).parent)!r})
+import numpy as np, sdnn._core as c, core_cells
+def small_steps():
+    settings = core_cells.GOOD["AcrobotTrial"]()
+    settings["acrobot"] = c.AcrobotConfig(integration_step=1e-6)
+    return c.AcrobotTrial(**settings)
+core_cells.small_steps = small_steps
+print("ready", flush=True)
+try:
+    {LONG_WORK[work]}
+except KeyboardInterrupt:
+    print("stopped", flush=True)
+else:
+    print("ended", flush=True)
+"""
+    command = [sys.executable, "-c", program]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "ready\n"
+        time.sleep(0.5)
+        begin = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        assert process.stdout.readline() == "stopped\n"
+        seconds = time.monotonic() - begin
+    assert process.returncode == 0
+    assert seconds < 3.0  # the machine may be busy
+
+
+def test_a_trial_goes_on_after_ctrl_c_between_episodes():
+    trial = big_trial()
+    timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        trial.advance(100_000)
+    timer.join()
+    done = trial.episode
+    trial.advance(50)
+    alone = big_trial()
+    alone.advance(done + 50)
+    np.testing.assert_array_equal(trial.test_rows()["steps"], alone.test_rows()["steps"])
+
+
+def test_the_process_ends_while_a_thread_works_in_the_core():
+    program = """
+import threading, time, os, sdnn._core as c, numpy as np
+def work():
+    b = c.AcrobotBatch(c.AcrobotConfig(), 2**10)
+    n = 2**10
+    while True:
+        b.reset(np.ones(n, bool))
+        b.step(np.zeros(n), np.ones(n), np.ones(n, bool))
+threading.Thread(target=work, daemon=True).start()
+time.sleep(0.2)
+"""
+    for _ in range(3):
+        done = subprocess.run([sys.executable, "-c", program], capture_output=True, timeout=60)
+        assert (done.returncode, done.stderr) == (0, b"")

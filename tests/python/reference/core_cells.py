@@ -1,0 +1,271 @@
+"""Cells about the classes and functions of the compiled core, found in the module itself.
+
+An object that was never made must be refused wherever it is used; a bad value in the place of any
+argument must be refused by a typed error, or taken.
+"""
+
+import contextlib
+import copy
+import inspect
+import operator
+import pickle
+
+import numpy as np
+
+import sdnn._core as core
+from bad_inputs import BAD, TYPED
+
+CLASSES = [value for value in vars(core).values() if type(value).__name__ == "pybind11_type"]
+"""All classes but enumerations, which are Python's own."""
+
+NOT_MADE = "__init__() was not called"
+
+
+def patterns(n_bins=12, n_units=20):
+    return core.random_inverse_patterns(n_units, n_bins, 2, 1)
+
+
+def code():
+    return core.SelectiveDesensitization([patterns()] * 2, [patterns()] * 2, [[0, 1], [1, 0]])
+
+
+def network_config(**sizes):
+    small = {"n_inputs": 2, "n_pattern_units": 20, "n_hidden_units": 60, "n_active_units": 20}
+    return core.SDNNCConfig(**{**small, **sizes})
+
+
+def learning(kind=core.QLearningConfig):
+    return kind(n_greedy_steps=0)
+
+
+def trial_settings():
+    return {
+        "learning": core.QLearningConfig(),
+        "acrobot": core.AcrobotConfig(),
+        "goal": core.GoalScheduleConfig(),
+        "sensors": core.SensorConfig(),
+        "protocol": core.ProtocolConfig(n_learning_episodes=20),
+        "seed": 1,
+    }
+
+
+BINS = [[0, 1], [2, 3], [4, 5]]
+
+GOOD = {
+    "SelectiveDesensitization": lambda: {
+        "modified": [patterns()] * 2, "modifiers": [patterns()] * 2, "pairs": [[0, 1], [1, 0]]
+    },
+    "SDNNC": lambda: {"config": network_config(), "seed": 1},
+    "FuzzyRules": lambda: {"config": core.FuzzyRulesConfig()},
+    "RBFNetwork": lambda: {"config": core.RBFNetworkConfig()},
+    "GoalSchedule": lambda: {"config": core.GoalScheduleConfig()},
+    "Acrobot": lambda: {"config": core.AcrobotConfig()},
+    "AcrobotBatch": lambda: {"config": core.AcrobotConfig(), "n_acrobots": 3},
+    "SensorNoise": lambda: {
+        "sigma": 0.1, "edges": [core.SensorEdge.wrap], "seed": 1, "stream": core.Stream.sensor_noise
+    },
+    "AcrobotSensors": lambda: {
+        "config": core.SensorConfig(), "seed": 1, "stream": core.Stream.sensor_noise
+    },
+    "ParallelPerceptron": lambda: {"code": code(), "n_units": 6, "seed": 1, "initial_range": 5},
+    "PDeltaTrainer": lambda: {
+        "layer": core.ParallelPerceptron(code(), 6), "bins": BINS, "targets": [[1.0], [2.0], [3.0]],
+        "form": "auto", "memory_limit": 2**20, "n_threads": 1,
+    },
+    "PerceptronTrainer": lambda: {
+        "layer": core.ParallelPerceptron(code(), 3), "bins": BINS, "labels": [0, 1, 2],
+        "n_classes": 3, "scheme": "one_vs_rest", "form": "auto", "memory_limit": 2**20,
+        "n_threads": 1,
+    },
+    "EpsilonGreedy": lambda: {"config": core.EpsilonGreedyConfig(), "seed": 1},
+    "SDNNQLearning": lambda: {"approximator": network_config(), "learning": learning(), "seed": 1},
+    "DecoupledSDNNQLearning": lambda: {
+        "approximator": network_config(), "n_actions": [3, 4], "learning": learning(), "seed": 1
+    },
+    "RBFQLearning": lambda: {
+        "approximator": core.RBFNetworkConfig(), "learning": learning(), "seed": 1
+    },
+    "DecoupledRBFQLearning": lambda: {
+        "approximator": core.RBFNetworkConfig(), "n_actions": [3, 4], "learning": learning(),
+        "seed": 1,
+    },
+    "FuzzyQLearning": lambda: {
+        "approximator": core.FuzzyRulesConfig(), "learning": learning(core.FuzzyQLearningConfig),
+        "seed": 1,
+    },
+    "AcrobotTrial": lambda: {"approximator": network_config(n_inputs=4), **trial_settings()},
+    "FuzzyAcrobotTrial": lambda: {
+        "approximator": core.FuzzyRulesConfig(), **trial_settings(),
+        "learning": core.FuzzyQLearningConfig(),
+    },
+    "RBFAcrobotTrial": lambda: {"approximator": core.RBFNetworkConfig(), **trial_settings()},
+    "PlainRBFQLearning": lambda: {
+        "approximator": core.RBFNetworkConfig(), "learning": learning(), "seed": 1
+    },
+    "BufferRead": lambda: {"n_bytes": 4096},
+    "DenseProduct": lambda: {"n_rows": 3, "n_columns": 4, "seed": 1},
+    "NetworkParts": lambda: {"network": core.SDNNC(network_config(), 1), "seed": 1},
+    "AcrobotDecisions": lambda: {"config": core.AcrobotConfig(), "seed": 1},
+    "action_value": lambda: {"action": 1, "n_actions": 3, "low": -1.0, "high": 1.0},
+    "random_inverse_patterns": lambda: {"n_units": 20, "n_bins": 5, "n_flipped": 2, "seed": 1},
+    "anchor_patterns": lambda: {
+        "n_units": 20, "n_anchor_patterns": 3, "n_interpolated": 4, "circular": False, "seed": 1
+    },
+    "correlation_matrix_patterns": lambda: {"n_units": 20, "correlations": np.eye(3), "seed": 1},
+    "libsdnn_tables": lambda: {
+        "n_units": 20, "inputs": [(5, 2), (6, 2)], "pairs": [[0, 1]], "seed": [1],
+        "library": "libstdc++",
+    },
+    "libsdnn_weights": lambda: {
+        "n_units": 3, "n_columns": 4, "low": -5, "high": 5, "seed": [1], "library": "libstdc++"
+    },
+    "n_units_for": lambda: {"scheme": "one_vs_one", "n_classes": 4},
+    "seed_of_dimension": lambda: {"seed": 1, "d": 2},
+}  # fmt: skip
+"""Good arguments of everything that takes some; what is missing here fails the test."""
+
+METHODS = {
+    ("SelectiveDesensitization", "transform"): {"bins": BINS},
+    ("SelectiveDesensitization", "gram"): {"bins": BINS, "other_bins": None},
+    ("ParallelPerceptron", "potentials"): {"bins": BINS, "n_threads": 1},
+    ("ParallelPerceptron", "counts"): {"bins": BINS, "n_groups": 1, "n_threads": 1},
+    ("PDeltaTrainer", "present"): {"order": [0, 2, 1]},
+    ("PerceptronTrainer", "present"): {"order": [0, 2, 1]},
+    ("SDNNC", "values"): {"state": [0.1, 0.2]},
+    ("SDNNC", "value"): {"state": [0.1, 0.2], "action": 3},
+    ("SDNNC", "correct"): {"state": [0.1, 0.2], "action": 3, "target": 1.0, "rate": 1.0},
+    ("SDNNC", "table"): {"input": 0},
+    ("SDNNC", "permutation"): {"mu": 0, "nu": 1},
+    ("FuzzyRules", "values"): {"rule": 0},
+    ("RBFNetwork", "set_weights"): {"weights": None},
+    ("Acrobot", "set_state"): {"state": [0.0, 0.0, 0.0, 0.0]},
+    ("Acrobot", "step"): {"torque": 1.0, "goal_tolerance": 1.0},
+    ("AcrobotBatch", "reset"): {"mask": [True, False, True]},
+    ("AcrobotBatch", "set_state"): {"index": 1, "state": [0.0, 0.0, 0.0, 0.0]},
+    ("AcrobotBatch", "step"): {
+        "torques": [1.0, 2.0, 3.0], "goal_tolerances": [1.0] * 3, "moving": [True] * 3
+    },
+    ("AcrobotBatch", "decisions"): {"index": 1},
+    ("EpsilonGreedy", "select"): {"values": [1.0, 2.0], "step": 3, "explore": True},
+    ("SDNNQLearning", "set_n_environments"): {"n": 2},
+    ("SDNNQLearning", "begin_episode"): {"environment": 0},
+    ("SDNNQLearning", "act"): {"state": [0.1, 0.2], "explore": True, "environment": 0},
+    ("SDNNQLearning", "set_progress"): {"progress": 0.5},
+    ("AcrobotTrial", "advance"): {"n_episodes": 1},
+    ("NetworkParts", "time_values"): {"n_repetitions": 2},
+    ("NetworkParts", "time_corrections"): {"n_repetitions": 2, "n_corrected": 3},
+    ("NetworkParts", "time_selections"): {
+        "n_repetitions": 2, "n_selections": 3, "n_selected": 2
+    },
+}  # fmt: skip
+
+
+def made(name):
+    return getattr(core, name)(**GOOD[name]())
+
+
+def never_made_cells():
+    for cls in CLASSES:
+        for name, member in inspect.getmembers(cls):
+            if isinstance(member, property):
+                yield f"{cls.__name__}.{name}", _refusal_cell(cls, operator.attrgetter(name))
+            elif not name.startswith("_") and callable(member):
+                yield f"{cls.__name__}.{name}()", _refusal_cell(cls, _calls(name))
+        for other in GOOD:
+            for parameter in GOOD[other]():
+                yield (
+                    f"{other}({parameter}={cls.__name__}.__new__)",
+                    _argument_cell(other, parameter, lambda cls=cls: cls.__new__(cls)),
+                )
+        yield f"{cls.__name__} in general", _general_cell(cls)
+        yield f"a subclass of {cls.__name__}", _subclass_cell(cls)
+
+
+def _calls(name):
+    """Call a method with as many arguments as it wants, of which none is looked at."""
+
+    def call(one):
+        for count in range(7):
+            try:
+                return getattr(one, name)(*[0] * count)
+            except TypeError as error:
+                if NOT_MADE in str(error):
+                    raise
+        return None  # takes arguments of other types only, and has refused these
+
+    return call
+
+
+def _refusal_cell(cls, use):
+    def run():
+        try:
+            given = use(cls.__new__(cls))
+        except TypeError as error:
+            return "" if NOT_MADE in str(error) else f"said {error}"
+        return "" if given is None else f"gave {given!r}"
+
+    return run
+
+
+def _general_cell(cls):
+    def run():
+        one = cls.__new__(cls)
+        uses = [repr, str, hash, bool, len, copy.copy, copy.deepcopy, lambda one: one == one]
+        uses += [lambda one, p=p: pickle.dumps(one, p) for p in range(6)]
+        for use in uses:
+            with contextlib.suppress(TypeError):
+                use(one)
+        return ""
+
+    return run
+
+
+def _subclass_cell(cls):
+    class Forgetful(cls):
+        def __init__(self):
+            pass
+
+    def run():
+        try:
+            Forgetful()
+        except TypeError as error:
+            return "" if "__init__" in str(error) else str(error)
+        return "was made"
+
+    return run
+
+
+def argument_cells():
+    for name in GOOD:
+        for parameter in GOOD[name]():
+            for word, value in BAD.items():
+                yield f"{name}({parameter}={word})", _argument_cell(name, parameter, value)
+    for (name, method), good in METHODS.items():
+        for parameter in good:
+            for word, value in BAD.items():
+                yield (
+                    f"{name}.{method}({parameter}={word})",
+                    _method_cell(name, method, good, parameter, value),
+                )
+
+
+def _argument_cell(name, parameter, value):
+    return lambda: _judged(lambda: getattr(core, name)(**{**GOOD[name](), parameter: value()}))
+
+
+def _method_cell(name, method, good, parameter, value):
+    return lambda: _judged(lambda: getattr(made(name), method)(**{**good, parameter: value()}))
+
+
+def _judged(call):
+    """A refusal need not name the argument: the core's callers have named it before."""
+    try:
+        result = call()
+    except (*TYPED, IndexError, MemoryError):
+        return ""
+    numbers = (
+        [item for item in np.atleast_1d(result) if isinstance(item, float)]
+        if (isinstance(result, float | np.ndarray))
+        else []
+    )
+    return "" if np.isfinite(numbers).all() else f"gave {result!r}"

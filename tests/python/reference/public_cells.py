@@ -1,0 +1,191 @@
+"""Cells about public classes: never initialised; bad values for estimators and environments."""
+
+import contextlib
+import importlib
+import inspect
+import pickle
+import re
+
+import numpy as np
+
+from bad_inputs import BAD, judged, parameters_of
+from sdnn.environments import (
+    AcrobotConfig,
+    AcrobotSwingUpEnv,
+    AcrobotSwingUpVectorEnv,
+    GoalSchedule,
+    SensorConfig,
+)
+from sdnn.estimators import SDNNClassifier, SDNNRegressor
+
+ROOMS = ("agents", "approximators", "coding", "environments", "estimators", "experiments", "runs")
+
+SAMPLES = np.random.default_rng(1).uniform(0, 1, (12, 2))
+TARGETS = {SDNNRegressor: SAMPLES.sum(axis=1), SDNNClassifier: np.arange(12) % 3}
+SMALL = {"n_pattern_units": 20, "max_iter": 2, "random_state": 0}
+
+
+LONG_WORK = {
+    (parameter, word)
+    for parameter in ("max_iter", "n_pattern_units", "n_output_units")
+    for word in ("2**20", "2**31", "2**63")
+}
+"""Possible, and takes its time."""
+
+IN_OTHER_WORDS = {("random_state", "list of huge")}
+"""Refused by NumPy, which repeats all of the value before it says why."""
+
+
+def public_classes():
+    for room in ROOMS:
+        module = importlib.import_module(f"sdnn.{room}")
+        for name in module.__all__:
+            value = getattr(module, name)
+            if inspect.isclass(value) and value.__new__ is object.__new__:
+                yield value
+
+
+def never_initialised_cells():
+    """Whatever is done with an object that was made by ``__new__`` alone raises an Exception."""
+    for cls in public_classes():
+        for name in [*vars(cls), "__repr__", "__reduce__", "__eq__"]:
+            yield f"{cls.__qualname__}.__new__().{name}", _use_cell(cls, name)
+        yield f"pickle of {cls.__qualname__}", _use_cell(cls, None)
+
+
+def _use_cell(cls, name):
+    def run():
+        with contextlib.suppress(Exception):
+            one = cls.__new__(cls)
+            if name is None:
+                return pickle.loads(pickle.dumps(one)) and ""
+            member = getattr(one, name)
+            if callable(member) and name not in ("__init__", "__class__", "run"):
+                member(*[0] * _n_required(member))
+        return ""
+
+    return run
+
+
+def _n_required(function):
+    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    parameters = inspect.signature(function).parameters.values()
+    return sum(p.kind in kinds and p.default is p.empty for p in parameters)
+
+
+def estimator_cells():
+    for cls in (SDNNRegressor, SDNNClassifier):
+        for parameter in parameters_of(cls.__init__):
+            for word, value in BAD.items():
+                if (parameter, word) in LONG_WORK | IN_OTHER_WORDS:
+                    continue
+                yield f"{cls.__name__}({parameter}={word})", _estimator_cell(cls, parameter, value)
+        for parameter in ("X", "y"):
+            for word, value in BAD.items():
+                yield f"{cls.__name__}.fit({parameter}={word})", _data_cell(cls, parameter, value)
+        for word, value in BAD.items():
+            yield f"{cls.__name__}.predict(X={word})", _predict_cell(cls, value)
+
+
+def _estimator_cell(cls, parameter, value):
+    def call():
+        model = cls(**{**SMALL, parameter: value()}).fit(SAMPLES, TARGETS[cls])
+        return _prediction_fault(model)
+
+    return lambda: _named_loosely(parameter, call)
+
+
+def _data_cell(cls, parameter, value):
+    def call():
+        given = {"X": SAMPLES, "y": TARGETS[cls], parameter: value()}
+        return _prediction_fault(cls(**SMALL).fit(**given))
+
+    return lambda: _without_name(call)
+
+
+def _predict_cell(cls, value):
+    model = cls(**SMALL).fit(SAMPLES, TARGETS[cls])
+    return lambda: _without_name(lambda: model.predict(value()) is None)
+
+
+def _without_name(call):
+    """As scikit-learn refuses data: typed, in its own words."""
+    fault = judged("", call)
+    is_typed = fault.startswith(("did not name", "said ValueError: Complex"))
+    return "" if is_typed else fault
+
+
+def _named_loosely(parameter, call):
+    """Some are named by what is in them, "a feature", or by NumPy, "Seed"."""
+    fault = judged(parameter, call)
+    words = {"coding": "coding|columns|feature", "pairs": "pair|feature", "random_state": "[Ss]eed"}
+    is_named = re.search(words.get(parameter, parameter), fault.partition(":")[2])
+    return "" if fault.startswith("did not name") and is_named else fault
+
+
+def _prediction_fault(model):
+    predicted = model.predict(np.zeros((2, model.n_features_in_)))
+    return "" if np.isfinite(np.asarray(predicted, np.float64)).all() else f"predicts {predicted}"
+
+
+def environment_cells():
+    makers = {
+        "AcrobotSwingUpEnv": AcrobotSwingUpEnv,
+        "AcrobotSwingUpVectorEnv": AcrobotSwingUpVectorEnv,
+    }
+    for name, maker in makers.items():
+        for parameter in parameters_of(maker.__init__):
+            for word, value in BAD.items():
+                yield f"{name}({parameter}={word})", _env_cell(maker, parameter, value)
+    for config in (AcrobotConfig, SensorConfig):
+        for parameter in parameters_of(config.__init__):
+            for word, value in BAD.items():
+                yield (
+                    f"{config.__name__}({parameter}={word})",
+                    _config_cell(config, parameter, value),
+                )
+    for parameter in parameters_of(GoalSchedule.__call__):
+        for word, value in BAD.items():
+            yield f"GoalSchedule()({parameter}={word})", _schedule_cell(parameter, value)
+
+
+def _env_cell(maker, parameter, value):
+    def call():
+        env = maker(**{parameter: value()})
+        first, _ = env.reset(seed=1)
+        n = getattr(env, "num_envs", None)
+        actions = np.zeros(1) if n is None else np.zeros((n, 1))
+        observation, reward, *_ = env.step(actions)
+        numbers = [np.asarray(item, np.float64) for item in (first, observation, reward)]
+        return "" if all(np.isfinite(item).all() for item in numbers) else "is not finite"
+
+    return lambda: judged(parameter, call)
+
+
+def _config_cell(config, parameter, value):
+    def call():
+        made = config(**{parameter: value()})
+        if isinstance(made, AcrobotConfig):
+            env = AcrobotSwingUpEnv(config=made)
+            env.reset(seed=1)
+            for _ in range(3):
+                observation, reward, terminated, truncated, _ = env.step(np.ones(1))
+                if not np.isfinite([*observation, reward]).all():
+                    return f"gave {observation}, {reward}"
+                if terminated or truncated:
+                    break
+        else:
+            made.to_core()
+        return ""
+
+    def run():
+        fault = judged(parameter, call)
+        return "" if "integration_step" in fault else fault  # forces too strong for it
+
+    return run
+
+
+def _schedule_cell(parameter, value):
+    return lambda: judged(
+        parameter, lambda: "" if np.isfinite(GoalSchedule()(**{parameter: value()})) else "gave NaN"
+    )
