@@ -7,8 +7,10 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "interrupts.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/estimators/libsdnn.hpp"
+#include "sdnn/estimators/online_layer.hpp"
 #include "sdnn/estimators/parallel_perceptron.hpp"
 #include "sdnn/estimators/trainer.hpp"
 
@@ -53,7 +55,7 @@ Matrix potentials_of(const ParallelPerceptron& layer, const Bins& bins, int n_th
   Matrix out({static_cast<std::size_t>(bins.shape(0)), layer.n_units()});
   const std::span items(out.mutable_data(), static_cast<std::size_t>(out.size()));
   const py::gil_scoped_release release;
-  layer.potentials(values, n_threads, items);
+  layer.potentials(values, n_threads, items, bindings::interrupt_check());
   return out;
 }
 
@@ -63,7 +65,7 @@ Matrix counts_of(const ParallelPerceptron& layer, const Bins& bins, std::size_t 
   Matrix out({static_cast<std::size_t>(bins.shape(0)), n_groups});
   const std::span items(out.mutable_data(), static_cast<std::size_t>(out.size()));
   const py::gil_scoped_release release;
-  layer.counts(values, n_groups, n_threads, items);
+  layer.counts(values, n_groups, n_threads, items, bindings::interrupt_check());
   return out;
 }
 
@@ -107,7 +109,57 @@ std::shared_ptr<Trainer> make_trainer(std::shared_ptr<ParallelPerceptron> layer,
   const auto chosen = estimators::training_form_named(form);
   const py::gil_scoped_release release;
   return std::make_shared<Trainer>(std::move(layer), values, std::move(rule), chosen, memory_limit,
-                                   n_threads);
+                                   n_threads, bindings::interrupt_check());
+}
+
+Matrix online_potentials_of(const estimators::OnlineLayer& layer, const Bins& bins) {
+  const auto values = matrix(bins, "bins", layer.layer().code().n_inputs());
+  Matrix out({static_cast<std::size_t>(bins.shape(0)), layer.layer().n_units()});
+  layer.potentials(values, {out.mutable_data(), static_cast<std::size_t>(out.size())});
+  return out;
+}
+
+template <class Rule>
+std::pair<std::size_t, std::size_t> present_online(estimators::OnlineLayer& layer, const Bins& bins,
+                                                   Rule rule) {
+  const auto values = matrix(bins, "bins", layer.layer().code().n_inputs());
+  const py::gil_scoped_release release;
+  const auto count = layer.present(values, rule, bindings::interrupt_check_at_once());
+  return {count.n_samples, count.n_units};
+}
+
+void bind_online_layer(py::module_& module) {
+  using estimators::OnlineLayer;
+  py::class_<OnlineLayer>(
+      module, "OnlineLayer",
+      "Weights in bytes, for samples that come one at a time; the layer lags behind")
+      .def(py::init<std::shared_ptr<ParallelPerceptron>>(), py::arg("layer"))
+      .def(
+          "learn_counts",
+          [](OnlineLayer& self, const Bins& bins, const ArrayArgument<double>& targets) {
+            return present_online(
+                self, bins,
+                estimators::PDeltaRule(self.layer().n_units(), matrix(targets, "targets"),
+                                       static_cast<std::size_t>(targets.shape(1))));
+          },
+          py::arg("bins"), py::arg("targets"),
+          "The p-delta rule; how many samples and units were corrected. What raises changes "
+          "nothing.")
+      .def(
+          "learn_labels",
+          [](OnlineLayer& self, const Bins& bins, const ArrayArgument<std::int32_t>& labels,
+             std::size_t n_classes, const std::string& scheme) {
+            return present_online(
+                self, bins,
+                estimators::PerceptronRule(self.layer().n_units(),
+                                           bindings::vector(labels, "labels"), n_classes,
+                                           estimators::class_scheme_named(scheme)));
+          },
+          py::arg("bins"), py::arg("labels"), py::arg("n_classes"), py::arg("scheme"),
+          "Error correction; how many samples and units were corrected. What raises changes "
+          "nothing.")
+      .def("potentials", &online_potentials_of, py::arg("bins"))
+      .def("synchronize", &OnlineLayer::synchronize, "Brings the layer up to date");
 }
 
 template <class Trainer>
@@ -121,7 +173,7 @@ void bind_trainer_methods(py::class_<Trainer, std::shared_ptr<Trainer>>& trainer
           [](Trainer& self, const ArrayArgument<std::int32_t>& order) {
             const auto items = bindings::vector(order, "order");
             const py::gil_scoped_release release;
-            const auto count = self.present(items);
+            const auto count = self.present(items, bindings::interrupt_check());
             return std::pair(count.n_samples, count.n_units);
           },
           py::arg("order"),
@@ -145,7 +197,12 @@ void bind_estimators(py::module_& module) {
       .def_property_readonly("thresholds", &thresholds_of)
       .def("potentials", &potentials_of, py::arg("bins"), py::arg("n_threads") = 1)
       .def("counts", &counts_of, py::arg("bins"), py::arg("n_groups") = 1, py::arg("n_threads") = 1,
-           "How many units of each group fire");
+           "How many units of each group fire")
+      .def(
+          "copy",
+          [](const ParallelPerceptron& self) { return std::make_shared<ParallelPerceptron>(self); },
+          "A layer of its own with the same weights");
+  bind_online_layer(module);
 
   module.attr("TRAINING_FORMS") = names_of(estimators::kTrainingForms);
   module.attr("CLASS_SCHEMES") = names_of(estimators::kClassSchemes);

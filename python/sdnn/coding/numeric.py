@@ -118,6 +118,14 @@ class RandomInverse(Coding):
         where = positions(numbers(column), known(self.low), known(self.high), self.knots)
         return bins_of_positions(where, self.size)
 
+    def ends(self) -> tuple[float, float]:
+        """Return the range; see `Coding.ends`."""
+        return known(self.low), known(self.high)
+
+    def even_range(self) -> tuple[float, float] | None:
+        """Return the range unless bins are quantiles; see `Coding.even_range`."""
+        return self.ends() if self.knots is None else None
+
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
         """Draw the patterns; see `Coding.patterns`."""
         return _core.random_inverse_patterns(n_units, self.size, known(self.n_flipped), seed)
@@ -190,6 +198,14 @@ class Anchor(Coding):
         """Return the bin of each value; see `Coding.bins`."""
         where = positions(numbers(column), known(self.low), known(self.high), None)
         return bins_of_positions(where, self.size)
+
+    def ends(self) -> tuple[float, float]:
+        """Return the range; see `Coding.ends`."""
+        return known(self.low), known(self.high)
+
+    def even_range(self) -> tuple[float, float]:
+        """Return the range; see `Coding.even_range`."""
+        return self.ends()
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
         """Draw the patterns; see `Coding.patterns`."""

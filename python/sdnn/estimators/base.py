@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import abc
+import contextlib
+import warnings
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from joblib import effective_n_jobs
@@ -19,14 +22,18 @@ from sdnn.coding import Coding, RandomInverse, coding_named
 from sdnn.estimators import files
 from sdnn.estimators.columns import coding_entries, codings_of_columns, input_pairs
 from sdnn.estimators.input_code import draw_input_code, pattern_units_for
-from sdnn.estimators.network import Network
+from sdnn.estimators.network import FEW_SAMPLES, Network
 from sdnn.estimators.training import Trainer, run_epochs
 
-__all__ = ["BaseSDNN"]
+__all__ = ["BaseSDNN", "OutOfRangeWarning"]
 
 Self = TypeVar("Self", bound="BaseSDNN")
 LARGEST = 2**62
 WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
+
+
+class OutOfRangeWarning(UserWarning):
+    """Values to learn lie beyond a range that was given or learned; warned of once a model."""
 
 
 class BaseSDNN(BaseEstimator):
@@ -36,6 +43,7 @@ class BaseSDNN(BaseEstimator):
     n_pattern_units: int | None
     pairs: Any
     tables: str
+    out_of_range: str
     max_iter: int
     shuffle: bool
     early_stopping: bool
@@ -49,6 +57,9 @@ class BaseSDNN(BaseEstimator):
 
     network_: Network
     n_features_in_: int
+    n_inputs_out_of_range_: int
+
+    OUT_OF_RANGE: ClassVar[tuple[str, ...]] = ("clip", "error")
 
     def _check_parameters(self) -> None:
         """ValueError for an impossible parameter; codings and pairs are checked with the data."""
@@ -56,6 +67,7 @@ class BaseSDNN(BaseEstimator):
         whole("n_iter_no_change", self.n_iter_no_change, 1, LARGEST)
         whole("memory_limit", self.memory_limit, 0, LARGEST)
         one_of("training", self.training, _core.TRAINING_FORMS)
+        one_of("out_of_range", self.out_of_range, self.OUT_OF_RANGE)
         if not 0 < real("validation_fraction", self.validation_fraction) < 1:
             raise ValueError(
                 f"validation_fraction must be between 0 and 1, got {self.validation_fraction!r}"
@@ -111,6 +123,8 @@ class BaseSDNN(BaseEstimator):
         code_seed, weight_seed = (int(seed) for seed in random.randint(2**31 - 1, size=2))
         code = draw_input_code(fitted, pairs, n_pattern_units, self.tables, code_seed)
         self.network_ = Network(code, n_units, seed=weight_seed)
+        self.n_inputs_out_of_range_ = 0
+        self._note_inputs(table)
         return random
 
     def _need_two(self, samples: NDArray[Any], what: str) -> None:
@@ -149,11 +163,92 @@ class BaseSDNN(BaseEstimator):
         order = random.permutation(n_samples)
         return np.sort(order[:n_held]), np.sort(order[n_held:])
 
-    def _pass_once(self, trainer: Trainer, n_samples: int) -> None:
-        """Present every sample in its order."""
-        trainer.present(np.arange(n_samples, dtype=np.int32))
+    def _scratch(self: Self) -> Self:
+        """Return an estimator to be trained instead of this one, which takes its attributes over.
+
+        So whatever fails leaves this one as it was. They share what they have until then: nothing
+        of it may be changed in place.
+        """
+        work = object.__new__(type(self))
+        vars(work).update(vars(self))
+        return work
+
+    @abc.abstractmethod
+    def _trainer(
+        self, network: Network, bins: NDArray[np.int32], targets: NDArray[Any]
+    ) -> Trainer:
+        """Return a trainer of the network; targets as `_present_online` has them."""
+
+    @abc.abstractmethod
+    def _present_online(
+        self, online: _core.OnlineLayer, bins: NDArray[np.int32], targets: NDArray[Any]
+    ) -> None:
+        """Present samples once, or raise and change nothing."""
+
+    def _learn_once(self, bins: NDArray[np.int32], targets: NDArray[Any]) -> None:
+        """Present every sample in its order, as the last thing that is done; all or nothing."""
+        few = len(bins) <= FEW_SAMPLES and self.training == "auto"
+        online = self.network_.online(self.memory_limit) if few else None
+        if online is not None:
+            # The other forms of training have room for larger weights.
+            with contextlib.suppress(OverflowError):
+                return self._present_online(online, bins, targets)
+        network = self.network_.copy()
+        trainer = self._trainer(network, bins, targets)
+        trainer.present(np.arange(len(bins), dtype=np.int32))
         trainer.synchronize()
-        self.n_iter_ += 1
+        self.network_ = network
+
+    def _note_inputs(self, table: NDArray[Any]) -> None:
+        """Count values to learn that lie beyond their input's range."""
+        n_outside, first = self.network_.input_code.outside(table)
+        if n_outside == 0:
+            return
+        if self.out_of_range == "error":
+            raise ValueError(f"X has {first}, but out_of_range is 'error'")
+        if self.n_inputs_out_of_range_ == 0:
+            self._warn(f"X has {first}: values beyond a range count as its ends")
+        self.n_inputs_out_of_range_ += n_outside
+
+    @staticmethod
+    def _warn(message: str) -> None:
+        warnings.warn(message, OutOfRangeWarning, stacklevel=5)
+
+    def _row(self, x: Any) -> NDArray[Any]:
+        """Return one sample, shape (n_features,), checked; see `learn_one`."""
+        if isinstance(x, Mapping):
+            names = getattr(self, "feature_names_in_", None)
+            if names is None:
+                raise ValueError("x must be a 1-D array: the features were learned without names")
+            if len(x) != len(names) or any(name not in x for name in names):
+                raise ValueError(f"x must have the features {names.tolist()}, got {list(x)}")
+            values: Any = [x[name] for name in names]
+        else:
+            values = x
+        if all(coding.is_numeric for coding in self.codings_):
+            try:
+                row = np.asarray(values, dtype=np.float64)
+            except (TypeError, ValueError):
+                raise ValueError(f"x must be numbers, got {x!r}") from None
+            if not np.isfinite(row).all():
+                raise ValueError(f"x must be finite numbers, got {x!r}")
+        else:
+            row = np.array(values, dtype=object)
+        if row.shape != (self.n_features_in_,):
+            raise ValueError(f"x must have {self.n_features_in_} features, got {x!r}")
+        return row if row.dtype == np.float64 else self._finite(row[None], self.codings_)[0]
+
+    def _table_of_one(self, x: Any) -> NDArray[Any]:
+        """Return the first sample of all as a table; a mapping gives names to the features."""
+        names = list(x) if isinstance(x, Mapping) else None
+        values = list(x.values()) if isinstance(x, Mapping) else x
+        row = np.array(values, dtype=object)
+        if row.ndim != 1 or (names is not None and not all(isinstance(n, str) for n in names)):
+            raise ValueError(f"x must be a 1-D array, or a mapping with words as keys, got {x!r}")
+        table: NDArray[Any] = self._validated(row[None], reset=True)
+        if names is not None:
+            self.feature_names_in_ = np.array(names, dtype=object)
+        return table
 
     def _run(
         self,

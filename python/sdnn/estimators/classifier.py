@@ -12,6 +12,7 @@ from sklearn.utils.multiclass import check_classification_targets, unique_labels
 from sdnn import _core
 from sdnn.arguments import one_of
 from sdnn.estimators.base import BaseSDNN
+from sdnn.estimators.network import Network
 from sdnn.estimators.training import Trainer
 
 __all__ = ["SDNNClassifier"]
@@ -50,6 +51,9 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         also what a single feature gets.
     tables : {"shared", "separate"}, default="shared"
         One table of patterns per input, permuted anew for each pair, or two tables per pair.
+    out_of_range : {"clip", "error"}, default="clip"
+        Inputs to learn beyond their range count as its ends, and an `OutOfRangeWarning` says so
+        once; or they are errors.
     scheme : {"one_vs_rest", "one_vs_one"}, default="one_vs_rest"
         One unit per class, the largest potential wins; or one per pair of classes, which vote.
     max_iter : int, default=100
@@ -84,6 +88,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         The pairs in use.
     weights_ : ndarray of int32, shape (n_units, n_columns)
     thresholds_ : ndarray of int32, shape (n_units,)
+    n_inputs_out_of_range_ : int
+        Values learned since the last `fit` that lay beyond their range.
     n_iter_ : int
         Epochs of the last `fit` and calls of `partial_fit` since.
     n_corrected_ : ndarray of int64, shape (n_epochs,)
@@ -113,6 +119,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         n_pattern_units: int | None = None,
         pairs: Any = "all",
         tables: str = "shared",
+        out_of_range: str = "clip",
         scheme: str = "one_vs_rest",
         max_iter: int = 100,
         shuffle: bool = True,
@@ -129,6 +136,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         self.n_pattern_units = n_pattern_units
         self.pairs = pairs
         self.tables = tables
+        self.out_of_range = out_of_range
         self.scheme = scheme
         self.max_iter = max_iter
         self.shuffle = shuffle
@@ -164,11 +172,18 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         MemoryError
             If there is no room for the weights.
         """
+        work = self._scratch()
+        work._fit(X, y)
+        self.__dict__ = vars(work)
+        return self
+
+    def _fit(self, X: ArrayLike, y: ArrayLike) -> None:
         table, y = self._checked(X, y, reset=True, ensure_min_samples=2)
         random = self._begin(X, table, unique_labels(y))
         labels = numbers_of(y, self.classes_)
         held, kept = self._split(random, len(table))
-        trainer = self._trainer(table[kept], labels[kept])
+        bins = self.network_.input_code.bins(table)
+        trainer = self._trainer(self.network_, bins[kept], labels[kept])
         held_table, held_labels = table[held], labels[held]
 
         def score() -> float:
@@ -176,7 +191,6 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             return float(np.mean(winners == held_labels))
 
         self._run(trainer, len(kept), random, score)
-        return self
 
     def partial_fit(
         self: Self, X: ArrayLike, y: ArrayLike, classes: ArrayLike | None = None
@@ -207,19 +221,90 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         first = not hasattr(self, "network_")
         if first and classes is None:
             raise ValueError("classes must be given in the first call of partial_fit")
-        table, y = self._checked(X, y, reset=first)
+        work = self._scratch()
+        table, y = work._checked(X, y, reset=first)
         listed = self.classes_ if classes is None else unique_labels(classes)
         labels = numbers_of(y, listed)
         if first:
-            self._begin(X, table, listed)
-            self.n_iter_ = 0
+            work._begin(X, table, listed)
+            work.n_iter_ = 0
         elif not np.array_equal(listed, self.classes_):
             raise ValueError(
                 f"classes={listed!r} are not those of the first call, {self.classes_!r}"
             )
-        trainer = self._trainer(table, labels)
-        self._pass_once(trainer, len(table))
+        else:
+            work._finite(table, work.codings_)
+            work._note_inputs(table)
+        work.n_iter_ += 1
+        work._learn_once(work.network_.input_code.bins(table), labels)
+        self.__dict__ = vars(work)
         return self
+
+    def learn_one(self: Self, x: Any, y: Any, classes: ArrayLike | None = None) -> Self:
+        """Learn one sample: `partial_fit` of one row, to the same bits, without its overhead.
+
+        Parameters
+        ----------
+        x : array_like of shape (n_features,), or mapping from feature names to values
+            The names of a mapping that comes first of all are those of the features.
+        y : label
+        classes : array_like, shape (n_classes,), optional
+            All labels that can occur; needed in the first call.
+
+        Returns
+        -------
+        SDNNClassifier
+            Itself.
+
+        Raises
+        ------
+        ValueError, OverflowError, MemoryError
+            As of `partial_fit`; nothing is changed then.
+        """
+        work = self._scratch()
+        if hasattr(self, "network_"):
+            if classes is not None and not np.array_equal(unique_labels(classes), self.classes_):
+                raise ValueError(
+                    f"classes={classes!r} are not those of the first call, {self.classes_!r}"
+                )
+            labels = work._number_of_one(y)
+            row = self._row(x)
+            work._note_inputs(row[None])
+            bins = work.network_.input_code.bins_of_row(row)
+        else:
+            if classes is None:
+                raise ValueError("classes must be given in the first call of learn_one")
+            table = work._table_of_one(x)
+            work._begin(x, table, unique_labels(classes))
+            labels = work._number_of_one(y)
+            work.n_iter_ = 0
+            bins = work.network_.input_code.bins(table)
+        work.n_iter_ += 1
+        work._learn_once(bins, labels)
+        self.__dict__ = vars(work)
+        return self
+
+    def _number_of_one(self, y: Any) -> NDArray[np.int32]:
+        """Return the index of a label among the classes, shape (1,)."""
+        return numbers_of(np.array([y]), self.classes_)
+
+    def predict_one(self, x: Any) -> Any:
+        """Predict the label of one sample: `predict` of one row, without its overhead.
+
+        Parameters
+        ----------
+        x : array_like of shape (n_features,), or mapping from feature names to values
+
+        Raises
+        ------
+        NotFittedError, ValueError
+            As of `predict`.
+        """
+        network = self._fitted_network
+        network.online(self.memory_limit)
+        bins = network.input_code.bins_of_row(self._row(x))
+        decision = self._decision_of(network.potentials_of_bins(bins, n_threads=1))
+        return self.classes_[self._winners(decision)[0]]
 
     def decision_function(self, X: ArrayLike) -> NDArray[np.float64]:
         """Return how much speaks for each class.
@@ -281,19 +366,28 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         self._scheme = self.scheme
         return self._start(X, table, _core.n_units_for(self.scheme, n_classes))
 
-    def _trainer(self, table: NDArray[Any], labels: NDArray[np.int32]) -> Trainer:
-        self._finite(table, self.codings_)
+    def _trainer(
+        self, network: Network, bins: NDArray[np.int32], targets: NDArray[np.int32]
+    ) -> Trainer:
         return _core.PerceptronTrainer(
-            self.network_.layer,
-            self.network_.input_code.bins(table),
-            labels,
+            network.layer,
+            bins,
+            targets,
             len(self.classes_),
             self._scheme,
             **self._trainer_options(),
         )
 
+    def _present_online(
+        self, online: _core.OnlineLayer, bins: NDArray[np.int32], targets: NDArray[np.int32]
+    ) -> None:
+        online.learn_labels(bins, targets, len(self.classes_), self._scheme)
+
     def _decide(self, table: NDArray[Any]) -> NDArray[np.float64]:
-        potentials = self.network_.potentials(table, self._n_threads()).astype(np.float64)
+        return self._decision_of(self.network_.potentials(table, self._n_threads()))
+
+    def _decision_of(self, integers: NDArray[np.int32]) -> NDArray[np.float64]:
+        potentials = integers.astype(np.float64)
         n_classes = len(self.classes_)
         if self._scheme == "one_vs_rest":
             return potentials[:, 1] - potentials[:, 0] if n_classes == 2 else potentials
@@ -301,10 +395,10 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         leaning = potentials - 0.5
         if n_classes == 2:
             return -leaning[:, 0]
-        votes = np.zeros((len(table), n_classes))
-        sums = np.zeros((len(table), n_classes))
+        votes = np.zeros((len(potentials), n_classes))
+        sums = np.zeros((len(potentials), n_classes))
         for unit, (i, j) in enumerate(zip(*np.triu_indices(n_classes, 1), strict=True)):
-            votes[np.arange(len(table)), np.where(leaning[:, unit] > 0, i, j)] += 1
+            votes[np.arange(len(votes)), np.where(leaning[:, unit] > 0, i, j)] += 1
             sums[:, i] += leaning[:, unit]
             sums[:, j] -= leaning[:, unit]
         decision: NDArray[np.float64] = votes + sums / (3 * (np.abs(sums) + 1))

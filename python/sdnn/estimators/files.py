@@ -20,7 +20,15 @@ from sdnn.whole_files import write_whole
 __all__ = ["Saved", "load", "save"]
 
 FORMAT = "sdnn-estimator-1"
-PLAIN = ("n_features_in_", "n_iter_", "n_outputs_", "training_form_", "training_memory_")
+PLAIN = (
+    "n_features_in_",
+    "n_inputs_out_of_range_",
+    "n_iter_",
+    "n_outputs_",
+    "n_outputs_out_of_range_",
+    "training_form_",
+    "training_memory_",
+)
 PRIVATE = ("_flat", "_counts_of_range", "_scheme")
 ARRAYS = ("output_range_", "n_corrected_", "validation_scores_")
 NAMES = ("classes_", "feature_names_in_")
@@ -155,7 +163,11 @@ def read_estimator(
 ) -> Estimator:
     """Make the estimator with its parameters and all it has learned."""
     estimator = kind(**{name: restored(value) for name, value in metadata["parameters"].items()})
-    for name, value in metadata["plain"].items():
+    # Earlier versions did not count.
+    counts = {"n_inputs_out_of_range_": 0}
+    if "n_outputs_" in metadata["plain"]:
+        counts["n_outputs_out_of_range_"] = 0
+    for name, value in {**counts, **metadata["plain"]}.items():
         if name in (*PLAIN, *PRIVATE):
             setattr(estimator, name, value)
     for name, value in metadata["names"].items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -87,6 +88,59 @@ class InputCode:
             except ValueError as error:
                 raise ValueError(f"{error} in column {index}") from None
         return bins
+
+    @functools.cached_property
+    def _even(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]] | None:
+        """Ranges and numbers of bins of the inputs in pairs, where all have bins of equal width."""
+        ranges = [self.codings[index].even_range() for index in self.used]
+        if any(ends is None or not ends[0] < ends[1] for ends in ranges):
+            return None
+        low, high = np.array(ranges, dtype=np.float64).T
+        return low, high, np.array([self.codings[i].size for i in self.used], dtype=np.int32)
+
+    def bins_of_row(self, row: NDArray[Any]) -> NDArray[np.int32]:
+        """Return the bins of one sample, (n_inputs,) to (1, n inputs in pairs); as of `bins`.
+
+        Where all inputs have bins of equal width, they are found together: inputs one by one
+        would cost more than the network.
+        """
+        if self._even is None or row.dtype != np.float64:
+            return self.bins(row[None])
+        low, high, sizes = self._even
+        inside = np.minimum(np.maximum(row[self._used], low), high)
+        where = (inside / 2 - low / 2) / (high / 2 - low / 2)  # as in `sdnn.coding.ranges`
+        return np.minimum((where * sizes).astype(np.int32), sizes - 1)[None]
+
+    @functools.cached_property
+    def _used(self) -> NDArray[np.intp] | slice:
+        every = self.used == list(range(len(self.codings)))
+        return slice(None) if every else np.array(self.used)
+
+    @functools.cached_property
+    def _ends(self) -> tuple[list[int], NDArray[np.float64], NDArray[np.float64]]:
+        """Which inputs have a range, and their ranges."""
+        ends = {index: self.codings[index].ends() for index in self.used}
+        ranges = {index: pair for index, pair in ends.items() if pair is not None}
+        low, high = np.array(list(ranges.values()), dtype=np.float64).reshape(-1, 2).T
+        return list(ranges), low, high
+
+    def outside(self, table: NDArray[Any]) -> tuple[int, str]:
+        """Return how many values lie beyond their input's range, and what the first of them is.
+
+        Shapes: table (n_samples, n_inputs).
+        """
+        indices, low, high = self._ends
+        values = table if len(indices) == table.shape[1] else table[:, indices]
+        values = np.asarray(values, dtype=np.float64)
+        beyond = (values < low) | (values > high)
+        n_beyond = int(np.count_nonzero(beyond))
+        if n_beyond == 0:
+            return 0, ""
+        row, place = np.argwhere(beyond)[0]
+        return n_beyond, (
+            f"{values[row, place]} in column {indices[place]}, whose range is "
+            f"[{low[place]}, {high[place]}]"
+        )
 
 
 def draw_input_code(

@@ -11,6 +11,7 @@ from sklearn.base import RegressorMixin
 from sdnn import _core
 from sdnn.arguments import whole
 from sdnn.estimators.base import BaseSDNN
+from sdnn.estimators.network import Network
 from sdnn.estimators.training import Trainer
 
 __all__ = ["SDNNRegressor"]
@@ -48,6 +49,10 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     output_range : (float, float) or array_like of shape (n_outputs, 2), optional
         Smallest and largest output. None takes the range of the first sample's targets and a
         fifth of it more on either side.
+    out_of_range : {"clip", "widen", "error"}, default="clip"
+        Targets to learn beyond the output range count as its ends, widen it (which stretches
+        what was learned until it is learned anew), or are errors. Inputs beyond their range
+        count as its ends, unless they are errors. An `OutOfRangeWarning` says so once.
     max_iter : int, default=30
         Largest number of epochs of `fit`, which ends earlier once nothing is corrected. Targets
         with much noise want fewer, say 5; exact ones more, say 300.
@@ -80,6 +85,8 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     weights_ : ndarray of int32, shape (n_outputs * n_output_units, n_columns)
     thresholds_ : ndarray of int32, shape (n_outputs * n_output_units,)
     output_range_ : ndarray, shape (n_outputs, 2)
+    n_inputs_out_of_range_, n_outputs_out_of_range_ : int
+        Values learned since the last `fit` that lay beyond their range.
     n_outputs_ : int
     n_iter_ : int
         Epochs of the last `fit` and calls of `partial_fit` since.
@@ -106,6 +113,8 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     (3,)
     """
 
+    OUT_OF_RANGE = ("clip", "widen", "error")
+
     def __init__(
         self,
         coding: Any = "random-inverse",
@@ -115,6 +124,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         tables: str = "shared",
         n_output_units: int = 280,
         output_range: Any = None,
+        out_of_range: str = "clip",
         max_iter: int = 30,
         shuffle: bool = True,
         early_stopping: bool = False,
@@ -132,6 +142,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         self.tables = tables
         self.n_output_units = n_output_units
         self.output_range = output_range
+        self.out_of_range = out_of_range
         self.max_iter = max_iter
         self.shuffle = shuffle
         self.early_stopping = early_stopping
@@ -172,11 +183,22 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         MemoryError
             If there is no room for the weights.
         """
+        work = self._scratch()
+        work._fit(X, y)
+        self.__dict__ = vars(work)
+        return self
+
+    def _fit(self, X: ArrayLike, y: ArrayLike) -> None:
         table, targets = self._checked(X, y, reset=True)
         random = self._begin(X, table, targets)
+        if self.out_of_range == "widen":
+            self._widen(targets.min(axis=0))
+            self._widen(targets.max(axis=0))
+        counts_to_learn = self._counts_to_learn(targets)
+        bins = self.network_.input_code.bins(table)
         held, kept = self._split(random, len(table))
-        trainer = self._trainer(table[kept], targets[kept])
-        held_bins = self.network_.input_code.bins(table[held])
+        trainer = self._trainer(self.network_, bins[kept], counts_to_learn[kept])
+        held_bins = bins[held]
         held_counts = self._in_counts(targets[held])
 
         def score() -> float:
@@ -186,7 +208,6 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             return -float(np.mean((held_counts - counts) ** 2))
 
         self._run(trainer, len(kept), random, score)
-        return self
 
     def partial_fit(self: Self, X: ArrayLike, y: ArrayLike) -> Self:
         """Go once through the samples, in their order.
@@ -210,18 +231,96 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         ValueError, OverflowError, MemoryError
             As of `fit`; ValueError too for another number of outputs.
         """
+        work = self._scratch()
         first = not hasattr(self, "network_")
-        table, targets = self._checked(X, y, reset=first)
+        table, targets = work._checked(X, y, reset=first)
         if first:
-            self._begin(X, table, targets)
-            self.n_iter_ = 0
-        elif targets.shape[1] != self.n_outputs_:
-            raise ValueError(
-                f"y must have as many outputs as before, {self.n_outputs_}, got {targets.shape[1]}"
-            )
-        trainer = self._trainer(table, targets)
-        self._pass_once(trainer, len(table))
+            work._begin(X, table, targets)
+            work.n_iter_ = 0
+        else:
+            work._check_outputs(targets.shape[1])
+            work._finite(table, work.codings_)
+            work._note_inputs(table)
+        counts = work._counts_to_learn(targets)
+        work.n_iter_ += 1
+        work._learn_once(work.network_.input_code.bins(table), counts)
+        self.__dict__ = vars(work)
         return self
+
+    def learn_one(self: Self, x: Any, y: Any) -> Self:
+        """Learn one sample: `partial_fit` of one row, to the same bits, without its overhead.
+
+        Parameters
+        ----------
+        x : array_like of shape (n_features,), or mapping from feature names to values
+            The names of a mapping that comes first of all are those of the features.
+        y : float or array_like of shape (n_outputs,)
+
+        Returns
+        -------
+        SDNNRegressor
+            Itself.
+
+        Raises
+        ------
+        ValueError, OverflowError, MemoryError
+            As of `partial_fit`; nothing is changed then.
+
+        Examples
+        --------
+        >>> from sdnn.coding import RandomInverse
+        >>> unit = RandomInverse(low=0.0, high=1.0)
+        >>> model = SDNNRegressor(unit, output_range=(0, 1), n_pattern_units=64, random_state=0)
+        >>> for _ in range(20):
+        ...     model = model.learn_one({"a": 0.2, "b": 0.9}, 0.75)
+        >>> model.predict_one({"a": 0.2, "b": 0.9})
+        0.75
+        """
+        try:
+            targets = np.array(y, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ValueError(f"y must be a number or one per output, got {y!r}") from None
+        if targets.ndim > 1 or not np.isfinite(targets).all():
+            raise ValueError(f"y must be a finite number or one per output, got {y!r}")
+        work = self._scratch()
+        if not hasattr(self, "network_"):
+            table = work._table_of_one(x)
+            work._flat = targets.ndim == 0
+            work._begin(x, table, targets.reshape(1, -1))
+            work.n_iter_ = 0
+            bins = work.network_.input_code.bins(table)
+        else:
+            row = self._row(x)
+            work._check_outputs(targets.size)
+            work._note_inputs(row[None])
+            bins = work.network_.input_code.bins_of_row(row)
+        counts = work._counts_to_learn(targets.reshape(1, -1))
+        work.n_iter_ += 1
+        work._learn_once(bins, counts)
+        self.__dict__ = vars(work)
+        return self
+
+    def predict_one(self, x: Any) -> Any:
+        """Predict the outputs of one sample: `predict` of one row, without its overhead.
+
+        Parameters
+        ----------
+        x : array_like of shape (n_features,), or mapping from feature names to values
+
+        Returns
+        -------
+        float, or ndarray of shape (n_outputs,) where targets had several
+
+        Raises
+        ------
+        NotFittedError, ValueError
+            As of `predict`.
+        """
+        network = self._fitted_network
+        network.online(self.memory_limit)
+        bins = network.input_code.bins_of_row(self._row(x))
+        values = self._of_counts(network.counts_of_bins(bins, self.n_outputs_, n_threads=1))[0]
+        return float(values[0]) if self._flat else values
 
     def predict(self, X: ArrayLike) -> NDArray[np.float64]:
         """Predict the outputs of samples.
@@ -244,8 +343,14 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         """
         table = self._table(X)
         counts = self.network_.counts(table, self.n_outputs_, self._n_threads())
-        values = self._step() * counts + self.output_range_[:, 0]
+        values = self._of_counts(counts)
         return values[:, 0] if self._flat else values
+
+    def _check_outputs(self, n_outputs: int) -> None:
+        if n_outputs != self.n_outputs_:
+            raise ValueError(
+                f"y must have as many outputs as before, {self.n_outputs_}, got {n_outputs}"
+            )
 
     def _checked(self, X: Any, y: Any, reset: bool) -> tuple[NDArray[Any], NDArray[np.float64]]:
         if y is None:
@@ -265,6 +370,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     ) -> np.random.RandomState:
         self.n_outputs_ = targets.shape[1]
         self.output_range_ = self._range_of(targets)
+        self.n_outputs_out_of_range_ = 0
         n_units = whole("n_output_units", self.n_output_units, 1, 2**20)
         self._counts_of_range = n_units
         return self._start(X, table, self.n_outputs_ * n_units)
@@ -301,11 +407,56 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         counts: NDArray[np.float64] = (targets - self.output_range_[:, 0]) / self._step()
         return counts
 
-    def _trainer(self, table: NDArray[Any], targets: NDArray[np.float64]) -> Trainer:
-        self._finite(table, self.codings_)
-        return _core.PDeltaTrainer(
-            self.network_.layer,
-            self.network_.input_code.bins(table),
-            self._in_counts(targets),
-            **self._trainer_options(),
-        )
+    def _of_counts(self, counts: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Outputs that firing counts stand for, shape (n_samples, n_outputs)."""
+        values: NDArray[np.float64] = self._step() * counts + self.output_range_[:, 0]
+        return values
+
+    def _counts_to_learn(self, targets: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Targets in counts; those beyond the range are counted, refused, or widen it."""
+        low, high = self.output_range_.T
+        outside = (targets < low) | (targets > high)
+        if not outside.any():
+            return self._in_counts(targets)
+        row, output = np.argwhere(outside)[0]
+        ends = f"{targets[row, output]}, beyond output_range_ [{low[output]}, {high[output]}]"
+        if self.out_of_range == "error":
+            raise ValueError(f"y has {ends}, but out_of_range is 'error'")
+        if self.n_outputs_out_of_range_ == 0:
+            then = "count as its ends" if self.out_of_range == "clip" else "widen it"
+            self._warn(f"y has {ends}: values beyond the range {then}")
+        if self.out_of_range == "clip":
+            self.n_outputs_out_of_range_ += int(np.count_nonzero(outside))
+            return self._in_counts(targets)
+        counts = np.empty_like(targets)
+        begin = 0
+        for row in np.flatnonzero(outside.any(axis=1)):
+            counts[begin:row] = self._in_counts(targets[begin:row])
+            begin = row
+            self.n_outputs_out_of_range_ += self._widen(targets[row])
+        counts[begin:] = self._in_counts(targets[begin:])
+        return counts
+
+    def _widen(self, targets: NDArray[np.float64]) -> int:
+        """Widen the ranges of outputs whose target lies beyond; returns how many did.
+
+        Predictions so far are stretched with the range, as counts keep their meaning within it.
+        """
+        low, high = self.output_range_.T
+        new_low = np.where(targets < low, targets - MARGIN * (high - targets), low)
+        new_high = np.where(targets > high, targets + MARGIN * (targets - low), high)
+        if not np.all(np.isfinite(new_high - new_low)):
+            raise ValueError(f"y has {targets}: no range can be so wide")
+        n_widened = int(np.count_nonzero((new_low < low) | (new_high > high)))
+        self.output_range_ = np.stack([new_low, new_high], axis=1)
+        return n_widened
+
+    def _trainer(
+        self, network: Network, bins: NDArray[np.int32], targets: NDArray[np.float64]
+    ) -> Trainer:
+        return _core.PDeltaTrainer(network.layer, bins, targets, **self._trainer_options())
+
+    def _present_online(
+        self, online: _core.OnlineLayer, bins: NDArray[np.int32], targets: NDArray[np.float64]
+    ) -> None:
+        online.learn_counts(bins, targets)

@@ -77,7 +77,7 @@ def test_regression(problem, n_outputs, n_output_units):
     layer = transcribed(model)
     bins = model.network_.input_code.bins(X)
     slow = estimator_transcription.PDeltaTrainer(layer, bins, counts)
-    fast = model._trainer(X, y.astype(float))
+    fast = model._trainer(model.network_, bins, counts)
     for order in orders:
         assert tuple(fast.present(np.array(order, dtype=np.int32))) == slow.present(order)
     fast.synchronize()
@@ -96,7 +96,7 @@ def test_classification(problem, scheme):
     slow = estimator_transcription.PerceptronTrainer(
         layer, model.network_.input_code.bins(X), labels, len(model.classes_), scheme
     )
-    fast = model._trainer(X, labels)
+    fast = model._trainer(model.network_, model.network_.input_code.bins(X), labels)
     for order in orders:
         assert tuple(fast.present(np.array(order, dtype=np.int32))) == slow.present(order)
     fast.synchronize()

@@ -10,6 +10,7 @@ from sklearn.datasets import load_iris
 
 from sdnn import SDNNClassifier, SDNNRegressor, _core
 from sdnn.coding import Circular, RandomInverse
+from sdnn.estimators import OutOfRangeWarning
 
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(0, 1, (150, 2))
@@ -161,8 +162,10 @@ def test_outputs_are_steps_within_the_range():
     model = SDNNRegressor(**REGRESSOR, max_iter=20).fit(X, Y)
     counts = (model.predict(X) + 1.5) / (3 / 60)
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-9)
-    far = SDNNRegressor(**REGRESSOR, max_iter=20).fit(X, Y + 100).predict(X)
-    assert far.max() == pytest.approx(1.5)
+    with pytest.warns(OutOfRangeWarning, match="values beyond the range count as its ends"):
+        far = SDNNRegressor(**REGRESSOR, max_iter=20).fit(X, Y + 100)
+    assert far.predict(X).max() == pytest.approx(1.5)
+    assert far.n_outputs_out_of_range_ == len(X)
 
 
 @pytest.mark.parametrize("kind", [SDNNRegressor, SDNNClassifier])

@@ -17,6 +17,7 @@
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/interrupt_check.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/estimators/detail/query_order.hpp"
 #include "sdnn/estimators/detail/unit_ranking.hpp"
@@ -133,10 +134,10 @@ class ParallelPerceptron {
   /// Neighbouring queries share most of their code, so the potentials of one become those of the
   /// next by the columns in which they differ. Shapes: bins (n_queries, n_inputs), potentials
   /// (n_padded_units,), of which the first n_units mean something. Throws std::invalid_argument for
-  /// bins out of range or n_threads < 1.
+  /// bins out of range or n_threads < 1, and what `check` throws.
   template <class Consume>
-  void for_each_query(std::span<const std::int32_t> bins, int n_threads,
-                      const Consume& consume) const {
+  void for_each_query(std::span<const std::int32_t> bins, int n_threads, const Consume& consume,
+                      const core::InterruptCheck& check = {}) const {
     core::require_in_range("n_threads", n_threads, 1, 4096);
     code_->check_bins(bins);
     const std::size_t n_queries = bins.size() / code_->n_inputs();
@@ -148,34 +149,36 @@ class ParallelPerceptron {
       const WeightTiles<std::int16_t> narrow(weights_);
       const auto n_per_sum = static_cast<std::size_t>(std::numeric_limits<std::int16_t>::max() /
                                                       std::max<std::int64_t>(largest, 1));
-      answer_all(narrow, n_per_sum, bins, order, n_threads, consume);
+      answer_all(narrow, n_per_sum, bins, order, n_threads, consume, check);
     } else {
-      answer_all(weights_, std::size_t{1} << 30, bins, order, n_threads, consume);
+      answer_all(weights_, std::size_t{1} << 30, bins, order, n_threads, consume, check);
     }
   }
 
   /// Potentials in the order of the queries. Shapes: bins (n_queries, n_inputs), out
   /// (n_queries, n_units). Throws like for_each_query.
-  void potentials(std::span<const std::int32_t> bins, int n_threads,
-                  std::span<std::int32_t> out) const {
-    for_each_query(bins, n_threads, [&](std::size_t query, const std::int32_t* values) {
+  void potentials(std::span<const std::int32_t> bins, int n_threads, std::span<std::int32_t> out,
+                  const core::InterruptCheck& check = {}) const {
+    const auto copy = [&](std::size_t query, const std::int32_t* values) {
       std::copy_n(values, n_units(), out.data() + query * n_units());
-    });
+    };
+    for_each_query(bins, n_threads, copy, check);
   }
 
   /// How many units fire in each of `n_groups` groups of equal size. Shapes: bins
   /// (n_queries, n_inputs), out (n_queries, n_groups). Throws std::invalid_argument unless n_groups
   /// divides n_units, and like for_each_query.
   void counts(std::span<const std::int32_t> bins, std::size_t n_groups, int n_threads,
-              std::span<std::int32_t> out) const {
+              std::span<std::int32_t> out, const core::InterruptCheck& check = {}) const {
     core::require(n_groups > 0 && n_units() % n_groups == 0, "n_groups",
                   "a divisor of n_units = " + std::to_string(n_units()), n_groups);
     const std::size_t size = n_units() / n_groups;
-    for_each_query(bins, n_threads, [&](std::size_t query, const std::int32_t* values) {
+    const auto count = [&](std::size_t query, const std::int32_t* values) {
       for (std::size_t g = 0; g < n_groups; ++g) {
         out[query * n_groups + g] = count_firing(values + g * size, size);
       }
-    });
+    };
+    for_each_query(bins, n_threads, count, check);
   }
 
  private:
@@ -195,7 +198,21 @@ class ParallelPerceptron {
   template <class Weight, class Consume>
   void answer_all(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
                   std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
-                  int n_threads, const Consume& consume) const {
+                  int n_threads, const Consume& consume, const core::InterruptCheck& check) const {
+    const std::size_t n_added = code_->n_slots() * n_padded_units();
+    const std::size_t most = std::clamp<std::size_t>(kAddedAtOnce / n_added, 64, 4096) *
+                             static_cast<std::size_t>(n_threads);
+    for (; !order.empty(); order = order.subspan(std::min(most, order.size()))) {
+      check();
+      answer_part(tiles, n_per_sum, bins, order.first(std::min(most, order.size())), n_threads,
+                  consume);
+    }
+  }
+
+  template <class Weight, class Consume>
+  void answer_part(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
+                   std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
+                   int n_threads, const Consume& consume) const {
     const std::size_t n_parts =
         std::min(static_cast<std::size_t>(n_threads), (order.size() + 255) / 256);
     std::vector<std::jthread> threads;  // joined at the end of the scope
@@ -238,6 +255,9 @@ class ParallelPerceptron {
       std::swap(now, before);
     }
   }
+
+  /// Weights that a thread adds between two checks: a tenth of a second of them.
+  static constexpr std::size_t kAddedAtOnce = std::size_t{1} << 32;
 
   std::shared_ptr<const Code> code_;
   WeightTiles<std::int32_t> weights_;

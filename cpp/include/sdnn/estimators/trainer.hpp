@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <span>
@@ -13,6 +14,7 @@
 #include <variant>
 
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/interrupt_check.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/detail/block_training.hpp"
 #include "sdnn/estimators/detail/dual_training.hpp"
@@ -25,17 +27,17 @@ namespace sdnn::estimators {
 /// Presents training samples to a layer. All forms leave the same bits in it.
 ///
 /// Between synchronize() calls the layer's weights may lag behind; nobody else may change them as
-/// long as a trainer is in use. After an exception from present() the layer is as of the last
-/// synchronization inside it, which is a state of plain training too.
+/// long as a trainer is in use. After an exception from present() the layer is good for nothing: who
+/// wants to go on trains a copy.
 template <class Rule>
 class Trainer {
  public:
   /// Shapes: bins (n_samples, n_inputs). Throws std::invalid_argument for bins out of range or if
   /// the rule knows another number of samples, std::length_error if `form` (other than automatic)
-  /// needs more than `memory_limit` bytes.
+  /// needs more than `memory_limit` bytes, and what `check` throws.
   Trainer(std::shared_ptr<ParallelPerceptron> layer, std::span<const std::int32_t> bins, Rule rule,
           TrainingForm form = TrainingForm::automatic, std::size_t memory_limit = kMemoryLimit,
-          int n_threads = 1)
+          int n_threads = 1, const core::InterruptCheck& check = {})
       : layer_(std::move(layer)), rule_(std::move(rule)) {
     core::require_in_range("n_threads", n_threads, 1, 4096);
     layer_->code().check_bins(bins);
@@ -49,7 +51,7 @@ class Trainer {
     const bool keeps_plans = form_ == TrainingForm::block && memory(true) <= memory_limit;
     memory_ = memory(keeps_plans);
     renew_headroom();
-    make_training(bins, n_threads, keeps_plans);
+    make_training(bins, n_threads, keeps_plans, check);
   }
 
   TrainingForm form() const noexcept { return form_; }
@@ -58,8 +60,10 @@ class Trainer {
   std::size_t n_samples() const noexcept { return n_samples_; }
 
   /// Presents samples in the given order. Throws std::invalid_argument for an index out of range,
-  /// before anything is changed, and std::overflow_error before a potential could overflow.
-  TrainingCount present(std::span<const std::int32_t> order) {
+  /// before anything is changed, std::overflow_error before a potential could overflow, and what
+  /// `check` throws, between samples or blocks of them.
+  TrainingCount present(std::span<const std::int32_t> order,
+                        const core::InterruptCheck& check = {}) {
     for (std::size_t i = 0; i < order.size(); ++i) {
       if (order[i] >= 0 && static_cast<std::size_t>(order[i]) < n_samples_) continue;
       core::require(false, "order[" + std::to_string(i) + "]",
@@ -72,8 +76,8 @@ class Trainer {
         renew_headroom();
       }
       const auto some = order.first(std::min(order.size(), headroom_));
-      total +=
-          std::visit([&](auto& training) { return training.present(some, rule_); }, *training_);
+      total += std::visit([&](auto& training) { return training.present(some, rule_, check); },
+                          *training_);
       headroom_ -= some.size();
       order = order.subspan(some.size());
     }
@@ -102,14 +106,15 @@ class Trainer {
     }
   }
 
-  void make_training(std::span<const std::int32_t> bins, int n_threads, bool keeps_plans) {
+  void make_training(std::span<const std::int32_t> bins, int n_threads, bool keeps_plans,
+                     const core::InterruptCheck& check) {
     const auto make = [&]<class Form>(std::in_place_type_t<Form> form, auto... more) {
       training_ = std::make_unique<Training>(form, layer_, bins, n_threads, more...);
     };
     with_product_type(layer_->code(), [&]<class Product> {
       switch (form_) {
         case TrainingForm::dual:
-          return make(std::in_place_type<DualTraining<Product>>);
+          return make(std::in_place_type<DualTraining<Product>>, std::cref(check));
         case TrainingForm::block:
           return make(std::in_place_type<BlockTraining<Product>>, keeps_plans);
         default:

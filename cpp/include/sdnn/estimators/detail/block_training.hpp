@@ -14,6 +14,7 @@
 
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/detail/interrupt_check.hpp"
 #include "sdnn/core/detail/worker_team.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/detail/code_walk.hpp"
@@ -58,13 +59,15 @@ class BlockTraining {
   }
 
   template <class Rule>
-  TrainingCount present(std::span<const std::int32_t> order, Rule& rule) {
+  TrainingCount present(std::span<const std::int32_t> order, Rule& rule,
+                        const core::InterruptCheck& check = {}) {
     if (keeps_plans_ && is_epoch_in_data_order(order)) {
-      if (had_an_epoch_) return present_epoch(order, rule);
+      if (had_an_epoch_) return present_epoch(order, rule, check);
       had_an_epoch_ = true;  // it may be the only one
     }
     TrainingCount count;
     while (!order.empty()) {
+      check();
       const auto some = order.first(std::min(order.size(), kSmallBlock));
       Plan plan;
       count += present_block(some, &plan, rule);
@@ -129,10 +132,12 @@ class BlockTraining {
 
   /// An epoch in large blocks, whose plans are kept for the next one.
   template <class Rule>
-  TrainingCount present_epoch(std::span<const std::int32_t> order, Rule& rule) {
+  TrainingCount present_epoch(std::span<const std::int32_t> order, Rule& rule,
+                              const core::InterruptCheck& check) {
     TrainingCount count;
     plans_.resize((order.size() + kLargeBlock - 1) / kLargeBlock);
     for (Plan& plan : plans_) {
+      check();
       const auto some = order.first(std::min(order.size(), kLargeBlock));
       count += present_block(some, &plan, rule);
       order = order.subspan(some.size());

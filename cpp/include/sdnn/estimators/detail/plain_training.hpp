@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/core/detail/interrupt_check.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/detail/presentation_window.hpp"
 #include "sdnn/estimators/parallel_perceptron.hpp"
@@ -28,12 +29,14 @@ class PlainTraining {
 
   /// Presents samples in the given order.
   template <class Rule>
-  TrainingCount present(std::span<const std::int32_t> order, Rule& rule) {
+  TrainingCount present(std::span<const std::int32_t> order, Rule& rule,
+                        const core::InterruptCheck& check = {}) {
     TrainingCount count;
     const ParallelPerceptron::Code& code = layer_->code();
     std::uint64_t* const active = words_.data();
     std::uint64_t* const positive = active + code.n_words();
     for (const std::int32_t index : order) {
+      check();
       const auto sample = static_cast<std::size_t>(index);
       code.encode(std::span(bins_).subspan(sample * code.n_inputs(), code.n_inputs()), active,
                   positive);
