@@ -174,9 +174,7 @@ class BaseSDNN(BaseEstimator):
         return work
 
     @abc.abstractmethod
-    def _trainer(
-        self, network: Network, bins: NDArray[np.int32], targets: NDArray[Any]
-    ) -> Trainer:
+    def _trainer(self, network: Network, bins: NDArray[np.int32], targets: NDArray[Any]) -> Trainer:
         """Return a trainer of the network; targets as `_present_online` has them."""
 
     @abc.abstractmethod
@@ -220,12 +218,15 @@ class BaseSDNN(BaseEstimator):
             names = getattr(self, "feature_names_in_", None)
             if names is None:
                 raise ValueError("x must be a 1-D array: the features were learned without names")
-            if len(x) != len(names) or any(name not in x for name in names):
+            try:
+                values: Any = [x[name] for name in names] if len(x) == len(names) else None
+            except KeyError:
+                values = None
+            if values is None:
                 raise ValueError(f"x must have the features {names.tolist()}, got {list(x)}")
-            values: Any = [x[name] for name in names]
         else:
             values = x
-        if all(coding.is_numeric for coding in self.codings_):
+        if self._fitted_network.input_code.is_numeric:
             try:
                 row = np.asarray(values, dtype=np.float64)
             except (TypeError, ValueError):

@@ -58,6 +58,7 @@ class InputCode:
         self.core_pairs = np.array(
             [(number_of[mu], number_of[nu]) for mu, nu in self.pairs], dtype=np.int32
         )
+        self.is_numeric = all(coding.is_numeric for coding in self.codings)
         self.core = _core.SelectiveDesensitization(modified, modifiers, self.core_pairs)
 
     def __getstate__(self) -> dict[str, Any]:

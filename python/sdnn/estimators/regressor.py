@@ -414,10 +414,13 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
 
     def _counts_to_learn(self, targets: NDArray[np.float64]) -> NDArray[np.float64]:
         """Targets in counts; those beyond the range are counted, refused, or widen it."""
+        counts = self._in_counts(targets)
+        if counts.min() >= 0 and counts.max() <= self._counts_of_range:
+            return counts
         low, high = self.output_range_.T
         outside = (targets < low) | (targets > high)
-        if not outside.any():
-            return self._in_counts(targets)
+        if not outside.any():  # a count that was rounded
+            return counts
         row, output = np.argwhere(outside)[0]
         ends = f"{targets[row, output]}, beyond output_range_ [{low[output]}, {high[output]}]"
         if self.out_of_range == "error":
@@ -427,8 +430,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             self._warn(f"y has {ends}: values beyond the range {then}")
         if self.out_of_range == "clip":
             self.n_outputs_out_of_range_ += int(np.count_nonzero(outside))
-            return self._in_counts(targets)
-        counts = np.empty_like(targets)
+            return counts
         begin = 0
         for row in np.flatnonzero(outside.any(axis=1)):
             counts[begin:row] = self._in_counts(targets[begin:row])
