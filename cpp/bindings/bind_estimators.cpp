@@ -104,12 +104,12 @@ py::tuple names_of(const Values& values) {
 template <class Trainer, class Rule>
 std::shared_ptr<Trainer> make_trainer(std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
                                       Rule rule, const std::string& form, std::size_t memory_limit,
-                                      int n_threads) {
+                                      int n_threads, std::size_t n_epochs) {
   const auto values = matrix(bins, "bins", layer->code().n_inputs());
   const auto chosen = estimators::training_form_named(form);
   const py::gil_scoped_release release;
   return std::make_shared<Trainer>(std::move(layer), values, std::move(rule), chosen, memory_limit,
-                                   n_threads, bindings::interrupt_check());
+                                   n_threads, n_epochs, bindings::interrupt_check());
 }
 
 Matrix online_potentials_of(const estimators::OnlineLayer& layer, const Bins& bins) {
@@ -218,14 +218,15 @@ void bind_estimators(py::module_& module) {
       module, "PDeltaTrainer", "Trains groups of units to fire in given numbers");
   p_delta.def(py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
                           const ArrayArgument<double>& targets, const std::string& form,
-                          std::size_t memory_limit, int n_threads) {
+                          std::size_t memory_limit, int n_threads, std::size_t n_epochs) {
                 estimators::PDeltaRule rule(layer->n_units(), matrix(targets, "targets"),
                                             static_cast<std::size_t>(targets.shape(1)));
                 return make_trainer<PDeltaTrainer>(std::move(layer), bins, std::move(rule), form,
-                                                   memory_limit, n_threads);
+                                                   memory_limit, n_threads, n_epochs);
               }),
               py::arg("layer"), py::arg("bins"), py::arg("targets"), py::arg("form") = "auto",
-              py::arg("memory_limit") = estimators::kMemoryLimit, py::arg("n_threads") = 1);
+              py::arg("memory_limit") = estimators::kMemoryLimit, py::arg("n_threads") = 1,
+              py::arg("n_epochs") = estimators::kExpectedEpochs);
   bind_trainer_methods(p_delta);
 
   using estimators::PerceptronTrainer;
@@ -234,16 +235,17 @@ void bind_estimators(py::module_& module) {
   perceptron.def(py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
                              const ArrayArgument<std::int32_t>& labels, std::size_t n_classes,
                              const std::string& scheme, const std::string& form,
-                             std::size_t memory_limit, int n_threads) {
+                             std::size_t memory_limit, int n_threads, std::size_t n_epochs) {
                    estimators::PerceptronRule rule(layer->n_units(),
                                                    bindings::vector(labels, "labels"), n_classes,
                                                    estimators::class_scheme_named(scheme));
                    return make_trainer<PerceptronTrainer>(std::move(layer), bins, std::move(rule),
-                                                          form, memory_limit, n_threads);
+                                                          form, memory_limit, n_threads, n_epochs);
                  }),
                  py::arg("layer"), py::arg("bins"), py::arg("labels"), py::arg("n_classes"),
                  py::arg("scheme"), py::arg("form") = "auto",
-                 py::arg("memory_limit") = estimators::kMemoryLimit, py::arg("n_threads") = 1);
+                 py::arg("memory_limit") = estimators::kMemoryLimit, py::arg("n_threads") = 1,
+              py::arg("n_epochs") = estimators::kExpectedEpochs);
   bind_trainer_methods(perceptron);
 
   module.def("libsdnn_tables", &libsdnn_tables, py::arg("n_units"), py::arg("inputs"),

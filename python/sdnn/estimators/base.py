@@ -144,8 +144,9 @@ class BaseSDNN(BaseEstimator):
     def _n_threads(self) -> int:
         return int(effective_n_jobs(self.n_jobs))
 
-    def _trainer_options(self) -> dict[str, Any]:
+    def _trainer_options(self, n_epochs: int) -> dict[str, Any]:
         return {
+            "n_epochs": n_epochs,
             "form": self.training,
             "memory_limit": self.memory_limit,
             "n_threads": self._n_threads(),
@@ -174,7 +175,9 @@ class BaseSDNN(BaseEstimator):
         return work
 
     @abc.abstractmethod
-    def _trainer(self, network: Network, bins: NDArray[np.int32], targets: NDArray[Any]) -> Trainer:
+    def _trainer(
+        self, network: Network, bins: NDArray[np.int32], targets: NDArray[Any], n_epochs: int
+    ) -> Trainer:
         """Return a trainer of the network; targets as `_present_online` has them."""
 
     @abc.abstractmethod
@@ -192,7 +195,7 @@ class BaseSDNN(BaseEstimator):
             with contextlib.suppress(OverflowError):
                 return self._present_online(online, bins, targets)
         network = self.network_.copy()
-        trainer = self._trainer(network, bins, targets)
+        trainer = self._trainer(network, bins, targets, n_epochs=1)
         trainer.present(np.arange(len(bins), dtype=np.int32))
         trainer.synchronize()
         self.network_ = network
@@ -257,6 +260,7 @@ class BaseSDNN(BaseEstimator):
         n_samples: int,
         random: np.random.RandomState,
         score: Callable[[], float],
+        weights: NDArray[np.float64] | None = None,
     ) -> None:
         """Train, and set the attributes that tell how it went."""
         history = run_epochs(
@@ -267,6 +271,7 @@ class BaseSDNN(BaseEstimator):
             random=random if self.shuffle else None,
             score=score if self.early_stopping else None,
             n_iter_no_change=self.n_iter_no_change,
+            weights=weights,
             verbose=self.verbose,
         )
         self.n_iter_ = len(history.n_corrected)

@@ -197,7 +197,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         counts_to_learn = self._counts_to_learn(targets)
         bins = self.network_.input_code.bins(table)
         held, kept = self._split(random, len(table))
-        trainer = self._trainer(self.network_, bins[kept], counts_to_learn[kept])
+        trainer = self._trainer(self.network_, bins[kept], counts_to_learn[kept], self.max_iter)
         held_bins = bins[held]
         held_counts = self._in_counts(targets[held])
 
@@ -408,7 +408,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         return counts
 
     def _of_counts(self, counts: NDArray[np.int32]) -> NDArray[np.float64]:
-        """Outputs that firing counts stand for, shape (n_samples, n_outputs)."""
+        """Return the outputs of firing counts, shape (n_samples, n_outputs)."""
         values: NDArray[np.float64] = self._step() * counts + self.output_range_[:, 0]
         return values
 
@@ -454,9 +454,14 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         return n_widened
 
     def _trainer(
-        self, network: Network, bins: NDArray[np.int32], targets: NDArray[np.float64]
+        self,
+        network: Network,
+        bins: NDArray[np.int32],
+        targets: NDArray[np.float64],
+        n_epochs: int,
     ) -> Trainer:
-        return _core.PDeltaTrainer(network.layer, bins, targets, **self._trainer_options())
+        options = self._trainer_options(n_epochs)
+        return _core.PDeltaTrainer(network.layer, bins, targets, **options)
 
     def _present_online(
         self, online: _core.OnlineLayer, bins: NDArray[np.int32], targets: NDArray[np.float64]

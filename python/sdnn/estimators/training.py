@@ -66,6 +66,26 @@ def progress_bar(verbose: int, n_epochs: int) -> Iterator[Callable[[int], None]]
         yield _advance
 
 
+def presented(n_samples: int, weights: NDArray[np.float64] | None, epoch: int) -> NDArray[np.int32]:
+    """Return the samples of an epoch, a sample of weight 2 twice and one of 1/2 in every other.
+
+    >>> [presented(3, np.array([2.0, 0.5, 0.0]), epoch).tolist() for epoch in range(3)]
+    [[0, 0, 1], [0, 0], [0, 0, 1]]
+    """
+    in_order = np.arange(n_samples, dtype=np.int32)
+    if weights is None:
+        return in_order
+    phases = in_order * 0.6180339887498949 % 1  # so that not all of them come together
+    times = np.floor(weights * (epoch + 1) + phases) - np.floor(weights * epoch + phases)
+    return np.repeat(in_order, times.astype(np.int64))
+
+
+def epochs_to_present_all(weights: NDArray[np.float64]) -> int:
+    """Return how many epochs it takes until each sample of a weight above 0 has come."""
+    least = float(np.min(weights, where=weights > 0, initial=1.0))
+    return int(min(np.ceil(1 / least), 2**62))
+
+
 def run_epochs(
     network: Network,
     trainer: Trainer,
@@ -75,6 +95,7 @@ def run_epochs(
     random: np.random.RandomState | None = None,
     score: Callable[[], float] | None = None,
     n_iter_no_change: int = 10,
+    weights: NDArray[np.float64] | None = None,
     verbose: int = 0,
 ) -> History:
     """Train until nothing is corrected, nothing improves, or ``max_iter`` epochs are over.
@@ -95,16 +116,20 @@ def run_epochs(
         Validation score of the network as it is; larger is better.
     n_iter_no_change : int
         Epochs without a better score after which training stops.
+    weights : ndarray, shape (n_samples,), optional
+        How often each sample is presented per epoch, on average; once by default.
     verbose : int
         Whether to show a progress bar.
     """
     history = History()
-    in_order = np.arange(n_samples, dtype=np.int32)
+    quiet, n_quiet = 0, 1 if weights is None else epochs_to_present_all(weights)
     best: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None
     best_score, best_epoch = -np.inf, 0
     with progress_bar(verbose, max_iter) as advance:
         for epoch in range(max_iter):
-            order = in_order if random is None else random.permutation(in_order)
+            order = presented(n_samples, weights, epoch)
+            if random is not None:
+                order = random.permutation(order)
             n_corrected, _ = trainer.present(order)
             history.n_corrected.append(n_corrected)
             advance(n_corrected)
@@ -116,7 +141,8 @@ def run_epochs(
                     best = network.weights, network.thresholds
                 elif epoch - best_epoch >= n_iter_no_change:
                     break
-            if n_corrected == 0:
+            quiet = quiet + 1 if n_corrected == 0 else 0
+            if quiet == n_quiet:
                 break
     trainer.synchronize()
     if best is not None:

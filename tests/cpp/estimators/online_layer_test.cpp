@@ -176,7 +176,7 @@ TEST(InterruptCheck, EndsEveryFormAndPrediction) {
     EXPECT_THROW(trainer.present(problem.orders[0], stop_at(0)), std::runtime_error);
   }
   EXPECT_THROW(estimators::PDeltaTrainer(layer, problem.bins, rule_for(problem), TrainingForm::dual,
-                                         std::size_t{1} << 30, 1, stop_at(0)),
+                                         std::size_t{1} << 30, 1, 30, stop_at(0)),
                std::runtime_error);
   std::vector<std::int32_t> counts(problem.bins.size() / problem.code->n_inputs());
   EXPECT_THROW(layer->counts(problem.bins, 1, 1, counts, stop_at(0)), std::runtime_error);

@@ -1,5 +1,6 @@
 """Whatever fails or is interrupted leaves an estimator exactly as it was."""
 
+import functools
 import os
 import pickle
 import signal
@@ -84,7 +85,7 @@ def test_a_failure_anywhere_leaves_the_old_model(kind, work, training):
     places = np.random.RandomState(1).randint(1, counting.n_calls - 1, size=100)
     n_failed = 0
     for n in places:
-        if FailAtCall(n).stops(lambda: WORKS[work](model, y)):
+        if FailAtCall(n).stops(functools.partial(WORKS[work], model, y)):
             n_failed += 1
             assert state_of(model) == before, n
         else:  # some libraries go on after an error of a callback

@@ -182,11 +182,14 @@ def test_early_stopping_keeps_the_best_weights(kind):
         kind(early_stopping=True, validation_fraction=0.9).fit(X[:2], [0, 1])
 
 
-@pytest.mark.parametrize("scheme", ["one_vs_rest", "one_vs_one"])
+@pytest.mark.parametrize(
+    ("scheme", "n_units_each"), [("one_vs_rest", 1), ("one_vs_rest", 20), ("one_vs_one", 1)]
+)
 @pytest.mark.parametrize("n_classes", [2, 4])
-def test_the_largest_decision_wins(scheme, n_classes):
+def test_the_largest_decision_wins(scheme, n_units_each, n_classes):
     labels = np.digitize(Y, np.quantile(Y, np.arange(1, n_classes) / n_classes))
-    model = SDNNClassifier(**GIVEN, scheme=scheme, max_iter=1).fit(X, labels)
+    options = {**GIVEN, "scheme": scheme, "n_units_per_class": n_units_each, "max_iter": 1}
+    model = SDNNClassifier(**options).fit(X, labels)
     decision = model.decision_function(X)
     if n_classes == 2:
         assert decision.shape == (150,)
@@ -195,7 +198,7 @@ def test_the_largest_decision_wins(scheme, n_classes):
         assert decision.shape == (150, n_classes)
         np.testing.assert_array_equal(model.predict(X), decision.argmax(axis=1))
     n_units = n_classes if scheme == "one_vs_rest" else n_classes * (n_classes - 1) // 2
-    assert len(model.thresholds_) == n_units
+    assert len(model.thresholds_) == n_units * n_units_each
 
 
 def test_one_versus_one_counts_votes():
@@ -210,6 +213,73 @@ def test_one_versus_one_counts_votes():
     np.testing.assert_array_equal(np.round(model.decision_function(X)), votes)
 
 
+@pytest.mark.parametrize("random_state", [0, 1, 2])
+def test_several_units_learn_the_parity_of_three_inputs(random_state):
+    points = np.random.RandomState(0).uniform(size=(2000, 3))
+    parity = (points > 0.5).sum(axis=1) % 2
+    options = {"random_state": random_state, "n_pattern_units": 1000}
+    several = SDNNClassifier(**options).fit(points[:1000], parity[:1000])
+    assert several.score(points[1000:], parity[1000:]) >= 0.95
+    single = SDNNClassifier(**options, n_units_per_class=1, max_iter=20)
+    assert single.fit(points[:1000], parity[:1000]).score(points[1000:], parity[1000:]) < 0.6
+
+
+def test_scores_are_shares_of_firing_units():
+    model = SDNNClassifier(**GIVEN, n_units_per_class=12).fit(X, LABELS)
+    firing = model.network_.potentials(X, 1) > 0
+    shares = firing.reshape(len(X), 3, 12).mean(axis=2)
+    np.testing.assert_array_equal(model.decision_function(X), shares)
+    raised = np.exp(6 * shares)
+    np.testing.assert_allclose(
+        model.predict_proba(X), raised / raised.sum(axis=1, keepdims=True), rtol=1e-12
+    )
+    np.testing.assert_array_equal(model.predict(X), model.predict_proba(X).argmax(axis=1))
+
+
+def test_the_number_of_units_is_shared_out():
+    assert len(SDNNClassifier(**GIVEN).fit(X, LABELS).thresholds_) == 3 * 60
+    many = np.arange(len(X)) % 75
+    assert len(SDNNClassifier(**GIVEN, max_iter=1).fit(X, many).thresholds_) == 75 * 16
+    one = SDNNClassifier(**GIVEN, scheme="one_vs_one", max_iter=1).fit(X, LABELS)
+    assert len(one.thresholds_) == 3
+    assert not hasattr(one, "predict_proba")
+    assert not hasattr(SDNNClassifier(n_units_per_class=1), "predict_proba")
+    with pytest.raises(ValueError, match="1 or None with scheme='one_vs_one', got 5"):
+        SDNNClassifier(scheme="one_vs_one", n_units_per_class=5).fit(X, LABELS)
+    with pytest.raises(ValueError, match="n_units_per_class must be a whole number"):
+        SDNNClassifier(n_units_per_class=0).fit(X, LABELS)
+
+
+def test_weights_of_classes_are_numbers_of_presentations():
+    rare = (Y > 0.6).astype(int)
+    assert 0 < rare.sum() < 20
+    options = {**GIVEN, "shuffle": False, "max_iter": 4}
+    weighted = SDNNClassifier(**options, class_weight={0: 1, 1: 3}).fit(X, rare)
+    by_hand = SDNNClassifier(**options)
+    by_hand.partial_fit(np.repeat(X, 1 + 2 * rare, axis=0), np.repeat(rare, 1 + 2 * rare), [0, 1])
+    for _ in range(weighted.n_iter_ - 1):
+        by_hand.partial_fit(np.repeat(X, 1 + 2 * rare, axis=0), np.repeat(rare, 1 + 2 * rare))
+    same(weighted, by_hand)
+    noisy = np.where(RANDOM.uniform(size=len(Y)) < 0.2, 1, 0)
+    options = {**GIVEN, "max_iter": 8}
+    plain = SDNNClassifier(**options).fit(X, noisy)
+    balanced = SDNNClassifier(**options, class_weight="balanced").fit(X, noisy)
+    assert balanced.predict(X).mean() > plain.predict(X).mean()
+    for bad in ({0: -1, 1: 1}, {0: np.nan}, "even"):
+        with pytest.raises(ValueError, match="class_weight"):
+            SDNNClassifier(class_weight=bad).fit(X, rare)
+    with pytest.raises(ValueError, match="class_weight works in fit only"):
+        SDNNClassifier(class_weight="balanced").partial_fit(X, rare, classes=[0, 1])
+
+
+def test_training_ends_when_all_weighted_samples_are_learned():
+    easy = (X[:, 0] > 0.5).astype(int)
+    model = SDNNClassifier(**GIVEN, n_units_per_class=1, class_weight={0: 0.25, 1: 1}).fit(X, easy)
+    assert model.n_iter_ < 100
+    assert model.n_corrected_[-4:].tolist() == [0, 0, 0, 0]
+    assert model.score(X, easy) == 1
+
+
 def test_words_and_unit_counts_are_those_of_the_core():
     assert _core.TRAINING_FORMS == ("auto", "dual", "block", "plain")
     assert _core.CLASS_SCHEMES == ("one_vs_rest", "one_vs_one")
@@ -222,7 +292,8 @@ def test_words_and_unit_counts_are_those_of_the_core():
 
 
 def test_a_trainer_refuses_units_that_its_classes_do_not_need():
-    network = SDNNClassifier(**GIVEN, max_iter=1).fit(X, np.arange(len(X)) % 3).network_
+    model = SDNNClassifier(**GIVEN, n_units_per_class=1, max_iter=1)
+    network = model.fit(X, np.arange(len(X)) % 3).network_
     bins = network.input_code.bins(X)
     with pytest.raises(ValueError, match="n_units must be 6 for 4 classes, got 3"):
         _core.PerceptronTrainer(network.layer, bins, np.zeros(len(X)), 4, "one_vs_one")

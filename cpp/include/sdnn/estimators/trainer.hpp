@@ -37,14 +37,16 @@ class Trainer {
   /// needs more than `memory_limit` bytes, and what `check` throws.
   Trainer(std::shared_ptr<ParallelPerceptron> layer, std::span<const std::int32_t> bins, Rule rule,
           TrainingForm form = TrainingForm::automatic, std::size_t memory_limit = kMemoryLimit,
-          int n_threads = 1, const core::InterruptCheck& check = {})
+          int n_threads = 1, std::size_t n_epochs = kExpectedEpochs,
+          const core::InterruptCheck& check = {})
       : layer_(std::move(layer)), rule_(std::move(rule)) {
     core::require_in_range("n_threads", n_threads, 1, 4096);
     layer_->code().check_bins(bins);
     n_samples_ = bins.size() / layer_->code().n_inputs();
     core::require(rule_.n_samples() == n_samples_, "targets or labels",
                   std::to_string(n_samples_) + " samples as bins has", rule_.n_samples());
-    form_ = choose_form(form, layer_->n_units(), layer_->code(), n_samples_, memory_limit);
+    form_ = choose_form(form, layer_->n_units(), layer_->code(), n_samples_, memory_limit,
+                        n_epochs);
     const auto memory = [&](bool keeps_plans) {
       return form_memory(form_, layer_->n_units(), layer_->code(), n_samples_, keeps_plans);
     };
