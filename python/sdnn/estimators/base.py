@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import abc
-import contextlib
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -20,15 +19,25 @@ from sdnn import _core
 from sdnn.arguments import one_of, real, whole
 from sdnn.coding import Coding, RandomInverse, coding_named
 from sdnn.estimators import files
-from sdnn.estimators.columns import coding_entries, codings_of_columns, input_pairs
-from sdnn.estimators.input_code import draw_input_code, pattern_units_for
+from sdnn.estimators.columns import (
+    coding_entries,
+    codings_of_columns,
+    input_pairs,
+    share_of_pairs,
+)
+from sdnn.estimators.input_code import (
+    PAIR_BUDGET,
+    code_bytes,
+    draw_input_code,
+    pattern_units_for,
+)
 from sdnn.estimators.network import FEW_SAMPLES, Network
 from sdnn.estimators.training import Trainer, run_epochs
 
 __all__ = ["BaseSDNN", "OutOfRangeWarning"]
 
 Self = TypeVar("Self", bound="BaseSDNN")
-LARGEST = 2**62
+MOST_EPOCHS = 10**9
 WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
 
 
@@ -63,9 +72,9 @@ class BaseSDNN(BaseEstimator):
 
     def _check_parameters(self) -> None:
         """ValueError for an impossible parameter; codings and pairs are checked with the data."""
-        whole("max_iter", self.max_iter, 1, LARGEST)
-        whole("n_iter_no_change", self.n_iter_no_change, 1, LARGEST)
-        whole("memory_limit", self.memory_limit, 0, LARGEST)
+        whole("max_iter", self.max_iter, 1, MOST_EPOCHS)
+        whole("n_iter_no_change", self.n_iter_no_change, 1, MOST_EPOCHS)
+        whole("memory_limit", self.memory_limit, 0, 2**62)
         one_of("training", self.training, _core.TRAINING_FORMS)
         one_of("out_of_range", self.out_of_range, self.OUT_OF_RANGE)
         if not 0 < real("validation_fraction", self.validation_fraction) < 1:
@@ -114,18 +123,41 @@ class BaseSDNN(BaseEstimator):
         if any(coding.learns for coding in codings):
             self._need_two(table, "ranges and categories that are not given")
         self._finite(table, codings)
-        pairs = input_pairs(self.pairs, listed, n_inputs)
+        random: np.random.RandomState = check_random_state(self.random_state)
+        code_seed, weight_seed = (int(seed) for seed in random.randint(2**31 - 1, size=2))
+        if isinstance(self.pairs, str) and self.pairs == "budget" and n_inputs > 1:
+            pairs = share_of_pairs(n_inputs, PAIR_BUDGET, code_seed)
+        else:
+            everything = isinstance(self.pairs, str) and self.pairs == "budget"
+            pairs = input_pairs("all" if everything else self.pairs, listed, n_inputs)
         n_pattern_units = self.n_pattern_units or pattern_units_for(len(pairs))
         fitted = [
             coding.fit(table[:, index], n_pattern_units) for index, coding in enumerate(codings)
         ]
-        random: np.random.RandomState = check_random_state(self.random_state)
-        code_seed, weight_seed = (int(seed) for seed in random.randint(2**31 - 1, size=2))
+        self._require_memory(n_units, len(pairs), n_pattern_units, fitted, pairs)
         code = draw_input_code(fitted, pairs, n_pattern_units, self.tables, code_seed)
         self.network_ = Network(code, n_units, seed=weight_seed)
         self.n_inputs_out_of_range_ = 0
         self._note_inputs(table)
         return random
+
+    def _require_memory(
+        self,
+        n_units: int,
+        n_pairs: int,
+        n_pattern_units: int,
+        codings: list[Coding],
+        pairs: list[tuple[int, int]],
+    ) -> None:
+        """ValueError if weights and patterns take more than the limit, before they are there."""
+        n_bytes = 4 * n_units * n_pairs * n_pattern_units
+        n_bytes += code_bytes(codings, pairs, n_pattern_units)
+        if n_bytes > self.memory_limit:
+            raise ValueError(
+                f"n_pattern_units={n_pattern_units} of {n_pairs} pairs, read by {n_units} units, "
+                f"need {n_bytes} bytes for weights and patterns, more than "
+                f"memory_limit={self.memory_limit}"
+            )
 
     def _need_two(self, samples: NDArray[Any], what: str) -> None:
         """ValueError, in scikit-learn's words, if one sample has to teach what it cannot."""
@@ -187,13 +219,19 @@ class BaseSDNN(BaseEstimator):
         """Present samples once, or raise and change nothing."""
 
     def _learn_once(self, bins: NDArray[np.int32], targets: NDArray[Any]) -> None:
-        """Present every sample in its order, as the last thing that is done; all or nothing."""
+        """Present every sample in its order; all or nothing.
+
+        Single samples are learned in place: nothing that may fail may follow.
+        """
         few = len(bins) <= FEW_SAMPLES and self.training == "auto"
         online = self.network_.online(self.memory_limit) if few else None
         if online is not None:
-            # The other forms of training have room for larger weights.
-            with contextlib.suppress(OverflowError):
-                return self._present_online(online, bins, targets)
+            try:
+                self._present_online(online, bins, targets)
+            except OverflowError:
+                pass  # the other forms of training have room for larger weights
+            else:
+                return
         network = self.network_.copy()
         trainer = self._trainer(network, bins, targets, n_epochs=1)
         trainer.present(np.arange(len(bins), dtype=np.int32))

@@ -57,9 +57,10 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         ColumnTransformer (inputs left out have "random-inverse").
     n_pattern_units : int, optional
         Units per pattern, even. None shares about 16,000 columns out among the pairs.
-    pairs : "all" or list of (modified, modifier), default="all"
+    pairs : "budget", "all" or list of (modified, modifier), default="budget"
         Pairs of features, by number or name. A modifier of None leaves a pattern plain, which is
-        also what a single feature gets.
+        also what a single feature gets. "budget" means all pairs up to 22 features, and beyond an
+        even share of them drawn at random: 500 pairs, or one per feature.
     tables : {"shared", "separate"}, default="shared"
         One table of patterns per input, permuted anew for each pair, or two tables per pair.
     out_of_range : {"clip", "error"}, default="clip"
@@ -89,7 +90,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     training : {"auto", "dual", "block", "plain"}, default="auto"
         Form of training; the result is the same to the last bit, time and memory differ.
     memory_limit : int, default=2**30
-        Bytes that training may use beside the weights.
+        Bytes that weights and patterns may use, and that training may use beside them.
     random_state : int, RandomState or None, default=None
         Decides patterns, first weights, orders and the validation share.
     n_jobs : int, optional
@@ -136,7 +137,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         coding: Any = "random-inverse",
         *,
         n_pattern_units: int | None = None,
-        pairs: Any = "all",
+        pairs: Any = "budget",
         tables: str = "shared",
         out_of_range: str = "clip",
         scheme: str = "one_vs_rest",
@@ -274,8 +275,9 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             work._finite(table, work.codings_)
             work._note_inputs(table)
         work.n_iter_ += 1
+        learned = vars(work)
         work._learn_once(work.network_.input_code.bins(table), labels)
-        self.__dict__ = vars(work)
+        self.__dict__ = learned
         return self
 
     def learn_one(self: Self, x: Any, y: Any, classes: ArrayLike | None = None) -> Self:
@@ -318,8 +320,9 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             work.n_iter_ = 0
             bins = work.network_.input_code.bins(table)
         work.n_iter_ += 1
+        learned = vars(work)
         work._learn_once(bins, labels)
-        self.__dict__ = vars(work)
+        self.__dict__ = learned
         return self
 
     def _number_of_one(self, y: Any) -> NDArray[np.int32]:
@@ -347,8 +350,9 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     def decision_function(self, X: ArrayLike) -> NDArray[np.float64]:
         """Return how much speaks for each class.
 
-        The share of its units that fire, or the potential of a single one. One-versus-one: votes, and less than half a vote
-        more by the potentials, which decides between classes of equal votes.
+        The share of its units that fire, or the potential of a single one. One-versus-one: votes,
+        and less than half a vote more by the potentials, which decides between classes of equal
+        votes.
 
         Parameters
         ----------

@@ -13,19 +13,39 @@ from sdnn import _core
 from sdnn.arguments import one_of
 from sdnn.coding import Coding
 
-__all__ = ["COLUMN_BUDGET", "InputCode", "draw_input_code", "pattern_units_for"]
+__all__ = [
+    "COLUMN_BUDGET",
+    "PAIR_BUDGET",
+    "InputCode",
+    "code_bytes",
+    "draw_input_code",
+    "pattern_units_for",
+]
 
 COLUMN_BUDGET = 16000
 """Columns of the code that are shared out among the pairs where the user names no size."""
 
 
+PAIR_BUDGET = 500
+"""Pairs that are formed where the user names none: 32 units each are the budget of columns."""
+
+
+def code_bytes(codings: Sequence[Coding], pairs: Sequence[tuple[int, int]], n_units: int) -> int:
+    """Return the bytes that drawing and keeping the patterns of fitted codings takes, about."""
+    of_pairs = sum(codings[mu].size + codings[nu].size for mu, nu in pairs)
+    return int(of_pairs * n_units * 9 / 8)  # a byte a unit, and a bit in the core
+
+
 def pattern_units_for(n_pairs: int) -> int:
     """Units per pattern so that the whole code is about `COLUMN_BUDGET` wide.
 
-    >>> pattern_units_for(2), pattern_units_for(90), pattern_units_for(4032)
-    (2000, 178, 32)
+    At least 32 up to `PAIR_BUDGET` pairs, and 8 beyond.
+
+    >>> [pattern_units_for(n) for n in (2, 90, 500, 870, 4032)]
+    [2000, 178, 32, 18, 8]
     """
-    return min(2000, max(32, 2 * round(COLUMN_BUDGET / n_pairs / 2)))
+    least = 32 if n_pairs <= PAIR_BUDGET else 8
+    return min(2000, max(least, 2 * round(COLUMN_BUDGET / n_pairs / 2)))
 
 
 class InputCode:

@@ -39,9 +39,10 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         ColumnTransformer (inputs left out have "random-inverse").
     n_pattern_units : int, optional
         Units per pattern, even. None shares about 16,000 columns out among the pairs.
-    pairs : "all" or list of (modified, modifier), default="all"
+    pairs : "budget", "all" or list of (modified, modifier), default="budget"
         Pairs of features, by number or name. A modifier of None leaves a pattern plain, which is
-        also what a single feature gets.
+        also what a single feature gets. "budget" means all pairs up to 22 features, and beyond an
+        even share of them drawn at random: 500 pairs, or one per feature.
     tables : {"shared", "separate"}, default="shared"
         One table of patterns per input, permuted anew for each pair, or two tables per pair.
     n_output_units : int, default=280
@@ -68,7 +69,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     training : {"auto", "dual", "block", "plain"}, default="auto"
         Form of training; the result is the same to the last bit, time and memory differ.
     memory_limit : int, default=2**30
-        Bytes that training may use beside the weights.
+        Bytes that weights and patterns may use, and that training may use beside them.
     random_state : int, RandomState or None, default=None
         Decides patterns, first weights, orders and the validation share.
     n_jobs : int, optional
@@ -120,7 +121,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         coding: Any = "random-inverse",
         *,
         n_pattern_units: int | None = None,
-        pairs: Any = "all",
+        pairs: Any = "budget",
         tables: str = "shared",
         n_output_units: int = 280,
         output_range: Any = None,
@@ -243,8 +244,9 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             work._note_inputs(table)
         counts = work._counts_to_learn(targets)
         work.n_iter_ += 1
+        learned = vars(work)
         work._learn_once(work.network_.input_code.bins(table), counts)
-        self.__dict__ = vars(work)
+        self.__dict__ = learned
         return self
 
     def learn_one(self: Self, x: Any, y: Any) -> Self:
@@ -296,8 +298,9 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             bins = work.network_.input_code.bins_of_row(row)
         counts = work._counts_to_learn(targets.reshape(1, -1))
         work.n_iter_ += 1
+        learned = vars(work)
         work._learn_once(bins, counts)
-        self.__dict__ = vars(work)
+        self.__dict__ = learned
         return self
 
     def predict_one(self, x: Any) -> Any:

@@ -124,7 +124,7 @@ def test_every_changed_byte_is_found(tmp_path):
         changed = bytearray(whole)
         changed[place] ^= 1 << place % 8
         path.write_bytes(changed)
-        with pytest.raises(ValueError, match="damaged|does not hold|not a safetensors|newer"):
+        with pytest.raises(ValueError, match=r"damaged|does not hold|not a safetensors|newer"):
             SDNNRegressor.load(path)
 
 
