@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from sdnn.estimators.base import OutOfRangeWarning
     from sdnn.estimators.classifier import SDNNClassifier
+    from sdnn.estimators.kernel_ridge import SDNNKernelRidge
     from sdnn.estimators.libsdnn import read_model_file, read_parameter_file
     from sdnn.estimators.regressor import SDNNRegressor
 
 _HOME_OF = {
     "OutOfRangeWarning": "base",
     "SDNNClassifier": "classifier",
+    "SDNNKernelRidge": "kernel_ridge",
     "SDNNRegressor": "regressor",
     "read_model_file": "libsdnn",
     "read_parameter_file": "libsdnn",
@@ -25,6 +27,7 @@ _HOME_OF = {
 __all__ = [
     "OutOfRangeWarning",
     "SDNNClassifier",
+    "SDNNKernelRidge",
     "SDNNRegressor",
     "read_model_file",
     "read_parameter_file",

@@ -11,20 +11,15 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 from joblib import effective_n_jobs
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator
-from sklearn.utils import assert_all_finite, check_random_state
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils import check_random_state
+from sklearn.utils.validation import check_is_fitted
 
 from sdnn import _core
 from sdnn.arguments import one_of, real, whole
-from sdnn.coding import Coding, RandomInverse, coding_named
+from sdnn.coding import Coding
 from sdnn.estimators import files
-from sdnn.estimators.columns import (
-    coding_entries,
-    codings_of_columns,
-    input_pairs,
-    share_of_pairs,
-)
+from sdnn.estimators.coded_inputs import CodedInputs
+from sdnn.estimators.columns import input_pairs, share_of_pairs
 from sdnn.estimators.input_code import (
     PAIR_BUDGET,
     code_bytes,
@@ -38,17 +33,15 @@ __all__ = ["BaseSDNN", "OutOfRangeWarning"]
 
 Self = TypeVar("Self", bound="BaseSDNN")
 MOST_EPOCHS = 10**9
-WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
 
 
 class OutOfRangeWarning(UserWarning):
     """Values to learn lie beyond a range that was given or learned; warned of once a model."""
 
 
-class BaseSDNN(BaseEstimator):
-    """Validation, the code of the inputs, the loop over epochs, files."""
+class BaseSDNN(CodedInputs):
+    """The code of the inputs, the loop over epochs, files."""
 
-    coding: Any
     n_pattern_units: int | None
     pairs: Any
     tables: str
@@ -86,43 +79,12 @@ class BaseSDNN(BaseEstimator):
             if self.n_pattern_units % 2:
                 raise ValueError(f"n_pattern_units must be even, got {self.n_pattern_units}")
 
-    def _validated(self, X: Any, y: Any = "no_validation", **options: Any) -> Any:
-        """Check data by scikit-learn's rules; words are let through where a coding takes them."""
-        if isinstance(self.coding, list | tuple):
-            numeric = all(coding.is_numeric for coding, _ in coding_entries(self.coding))
-        else:
-            numeric = coding_named(self.coding).is_numeric
-        checks: dict[str, Any] = (
-            {"dtype": np.float64} if numeric else {"dtype": None, "ensure_all_finite": False}
-        )
-        try:
-            return validate_data(self, X, y, **checks, **options)
-        except ValueError as error:
-            if "could not convert string" in str(error) and np.asarray(X).dtype.kind in "OSU":
-                raise ValueError(f"{error}; {WORDS_HINT}") from None
-            raise
-
-    def _finite(self, table: NDArray[Any], codings: Any) -> NDArray[Any]:
-        """Check the numbers of a table that also holds words."""
-        for index, coding in enumerate(codings):
-            if table.dtype != np.float64 and coding.is_numeric:
-                try:
-                    numbers = np.asarray(table[:, index], dtype=np.float64)
-                except ValueError as error:
-                    raise ValueError(f"{error} in column {index}; {WORDS_HINT}") from None
-                assert_all_finite(numbers, input_name="X")
-        return table
-
     def _start(self, X: Any, table: NDArray[Any], n_units: int) -> np.random.RandomState:
         """Fit the codings, draw tables and first weights; returns the generator of orders."""
         self._check_parameters()
-        names = getattr(self, "feature_names_in_", None)
-        listed = None if names is None else names.tolist()
+        listed = self._listed_names()
         n_inputs = table.shape[1]
-        codings = codings_of_columns(self.coding, RandomInverse(), listed, n_inputs, X)
-        if any(coding.learns for coding in codings):
-            self._need_two(table, "ranges and categories that are not given")
-        self._finite(table, codings)
+        codings = self._codings(X, table)
         random: np.random.RandomState = check_random_state(self.random_state)
         code_seed, weight_seed = (int(seed) for seed in random.randint(2**31 - 1, size=2))
         if isinstance(self.pairs, str) and self.pairs == "budget" and n_inputs > 1:
@@ -157,14 +119,6 @@ class BaseSDNN(BaseEstimator):
                 f"n_pattern_units={n_pattern_units} of {n_pairs} pairs, read by {n_units} units, "
                 f"need {n_bytes} bytes for weights and patterns, more than "
                 f"memory_limit={self.memory_limit}"
-            )
-
-    def _need_two(self, samples: NDArray[Any], what: str) -> None:
-        """ValueError, in scikit-learn's words, if one sample has to teach what it cannot."""
-        if len(samples) < 2:
-            raise ValueError(
-                f"Found array with {len(samples)} sample(s) while a minimum of 2 is required by "
-                f"{type(self).__name__} to learn {what}"
             )
 
     def _table(self, X: Any) -> NDArray[Any]:
@@ -203,7 +157,7 @@ class BaseSDNN(BaseEstimator):
         of it may be changed in place.
         """
         work = object.__new__(type(self))
-        vars(work).update(vars(self))
+        work.__dict__.update(self.__dict__)
         return work
 
     @abc.abstractmethod

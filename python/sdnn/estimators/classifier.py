@@ -198,7 +198,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         """
         work = self._scratch()
         work._fit(X, y)
-        self.__dict__ = vars(work)
+        self.__dict__ = work.__dict__
         return self
 
     def _fit(self, X: ArrayLike, y: ArrayLike) -> None:
@@ -275,9 +275,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             work._finite(table, work.codings_)
             work._note_inputs(table)
         work.n_iter_ += 1
-        learned = vars(work)
         work._learn_once(work.network_.input_code.bins(table), labels)
-        self.__dict__ = learned
+        self.__dict__ = work.__dict__
         return self
 
     def learn_one(self: Self, x: Any, y: Any, classes: ArrayLike | None = None) -> Self:
@@ -320,9 +319,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             work.n_iter_ = 0
             bins = work.network_.input_code.bins(table)
         work.n_iter_ += 1
-        learned = vars(work)
         work._learn_once(bins, labels)
-        self.__dict__ = learned
+        self.__dict__ = work.__dict__
         return self
 
     def _number_of_one(self, y: Any) -> NDArray[np.int32]:
@@ -397,7 +395,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     def _has_several_units(self) -> bool:
         return self.scheme == "one_vs_rest" and self.n_units_per_class != 1
 
-    @available_if(_has_several_units)
+    @available_if(_has_several_units)  # type: ignore[untyped-decorator]
     def predict_proba(self, X: ArrayLike) -> NDArray[np.float64]:
         """Return estimated probabilities of the classes, a softmax of their scores.
 

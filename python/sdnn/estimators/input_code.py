@@ -130,7 +130,8 @@ class InputCode:
         low, high, sizes = self._even
         inside = np.minimum(np.maximum(row[self._used], low), high)
         where = (inside / 2 - low / 2) / (high / 2 - low / 2)  # as in `sdnn.coding.ranges`
-        return np.minimum((where * sizes).astype(np.int32), sizes - 1)[None]
+        bins: NDArray[np.int32] = np.minimum((where * sizes).astype(np.int32), sizes - 1)
+        return bins[None]
 
     @functools.cached_property
     def _used(self) -> NDArray[np.intp] | slice:

@@ -133,5 +133,6 @@ class Network:
         """How many units fire, (n_samples, n inputs in pairs) to (n_samples, n_groups)."""
         if self._online is not None and len(bins) <= FEW_SAMPLES:
             firing = (self._online.potentials(bins) > 0).reshape(len(bins), n_groups, -1)
-            return firing.sum(axis=2, dtype=np.int32)
+            counts: NDArray[np.int32] = firing.sum(axis=2, dtype=np.int32)
+            return counts
         return self.layer.counts(bins, n_groups=n_groups, n_threads=n_threads)

@@ -186,7 +186,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         """
         work = self._scratch()
         work._fit(X, y)
-        self.__dict__ = vars(work)
+        self.__dict__ = work.__dict__
         return self
 
     def _fit(self, X: ArrayLike, y: ArrayLike) -> None:
@@ -244,9 +244,8 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             work._note_inputs(table)
         counts = work._counts_to_learn(targets)
         work.n_iter_ += 1
-        learned = vars(work)
         work._learn_once(work.network_.input_code.bins(table), counts)
-        self.__dict__ = learned
+        self.__dict__ = work.__dict__
         return self
 
     def learn_one(self: Self, x: Any, y: Any) -> Self:
@@ -298,9 +297,8 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             bins = work.network_.input_code.bins_of_row(row)
         counts = work._counts_to_learn(targets.reshape(1, -1))
         work.n_iter_ += 1
-        learned = vars(work)
         work._learn_once(bins, counts)
-        self.__dict__ = learned
+        self.__dict__ = work.__dict__
         return self
 
     def predict_one(self, x: Any) -> Any:
@@ -424,7 +422,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         outside = (targets < low) | (targets > high)
         if not outside.any():  # a count that was rounded
             return counts
-        row, output = np.argwhere(outside)[0]
+        row, output = np.argwhere(outside)[0].tolist()
         ends = f"{targets[row, output]}, beyond output_range_ [{low[output]}, {high[output]}]"
         if self.out_of_range == "error":
             raise ValueError(f"y has {ends}, but out_of_range is 'error'")
@@ -435,7 +433,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             self.n_outputs_out_of_range_ += int(np.count_nonzero(outside))
             return counts
         begin = 0
-        for row in np.flatnonzero(outside.any(axis=1)):
+        for row in np.flatnonzero(outside.any(axis=1)).tolist():
             counts[begin:row] = self._in_counts(targets[begin:row])
             begin = row
             self.n_outputs_out_of_range_ += self._widen(targets[row])

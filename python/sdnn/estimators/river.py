@@ -54,7 +54,7 @@ class Waiting:
         self.fitted.partial_fit(frame, np.array(self.targets), **options)
 
 
-class RiverRegressor(Waiting, base.Regressor):  # type: ignore[misc]
+class RiverRegressor(Waiting, base.Regressor):
     """An `SDNNRegressor` for river's streams.
 
     Parameters
@@ -80,7 +80,7 @@ class RiverRegressor(Waiting, base.Regressor):  # type: ignore[misc]
         return float(self.fitted.predict_one(x))
 
 
-class RiverClassifier(Waiting, base.Classifier):  # type: ignore[misc]
+class RiverClassifier(Waiting, base.Classifier):
     """An `SDNNClassifier` for river's streams.
 
     Parameters
