@@ -27,7 +27,7 @@ from sdnn.estimators.input_code import (
     pattern_units_for,
 )
 from sdnn.estimators.network import FEW_SAMPLES, Network
-from sdnn.estimators.training import Trainer, run_epochs
+from sdnn.estimators.training import History, Trainer, run_epochs
 
 __all__ = ["BaseSDNN", "OutOfRangeWarning"]
 
@@ -99,6 +99,7 @@ class BaseSDNN(CodedInputs):
         self._require_memory(n_units, len(pairs), n_pattern_units, fitted, pairs)
         code = draw_input_code(fitted, pairs, n_pattern_units, self.tables, code_seed)
         self.network_ = Network(code, n_units, seed=weight_seed)
+        self._weight_seed = weight_seed
         self.n_inputs_out_of_range_ = 0
         self._note_inputs(table)
         return random
@@ -253,7 +254,8 @@ class BaseSDNN(CodedInputs):
         random: np.random.RandomState,
         score: Callable[[], float],
         weights: NDArray[np.float64] | None = None,
-    ) -> None:
+        n_averaged_epochs: int = 1,
+    ) -> History:
         """Train, and set the attributes that tell how it went."""
         history = run_epochs(
             self.network_,
@@ -264,6 +266,7 @@ class BaseSDNN(CodedInputs):
             score=score if self.early_stopping else None,
             n_iter_no_change=self.n_iter_no_change,
             weights=weights,
+            n_averaged_epochs=n_averaged_epochs,
             verbose=self.verbose,
         )
         self.n_iter_ = len(history.n_corrected)
@@ -271,6 +274,7 @@ class BaseSDNN(CodedInputs):
         self.validation_scores_ = np.array(history.scores)
         self.training_form_ = trainer.form
         self.training_memory_ = trainer.memory
+        return history
 
     @property
     def _fitted_network(self) -> Network:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+import dataclasses
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from sdnn.estimators.columns import coding_entries, codings_of_columns
 
 __all__ = ["CodedInputs"]
 
+Self = TypeVar("Self", bound="CodedInputs")
 WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
 
 
@@ -22,6 +24,28 @@ class CodedInputs(BaseEstimator):
     """Validation of samples for estimators with a parameter ``coding``."""
 
     coding: Any
+
+    def set_params(self: Self, **params: Any) -> Self:
+        """Set parameters; ``coding__length_scale`` and the like replace a field of the coding.
+
+        Raises
+        ------
+        ValueError
+            For an unknown parameter or field, or a field where columns have codings of their own.
+        """
+        fields = {name[8:]: params.pop(name) for name in list(params) if name[:8] == "coding__"}
+        super().set_params(**params)
+        if fields:
+            if isinstance(self.coding, list | tuple):
+                raise ValueError(
+                    f"coding__{next(iter(fields))} needs one coding for all inputs, got a list"
+                )
+            coding = coding_named(self.coding)
+            try:
+                self.coding = dataclasses.replace(coding, **fields)  # type: ignore[type-var]
+            except TypeError:
+                raise ValueError(f"{coding!r} must have the fields {sorted(fields)}") from None
+        return self
 
     def _validated(self, X: Any, y: Any = "no_validation", **options: Any) -> Any:
         """Check data by scikit-learn's rules; words are let through where a coding takes them."""

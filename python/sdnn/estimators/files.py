@@ -34,7 +34,7 @@ PLAIN = (
     "training_form_",
     "training_memory_",
 )
-PRIVATE = ("_flat", "_counts_of_range", "_scheme", "_n_units_each")
+PRIVATE = ("_flat", "_counts_of_range", "_scheme", "_n_units_each", "_weight_seed")
 ARRAYS = ("output_range_", "n_corrected_", "validation_scores_")
 NAMES = ("classes_", "feature_names_in_")
 
@@ -109,6 +109,10 @@ def save(estimator: Saved, path: str | Path) -> None:
         "weights": narrowed(network.weights),
         "thresholds": narrowed(network.thresholds),
     }
+    earlier = vars(estimator).get("_earlier", ())
+    for number, one in enumerate(earlier):
+        tensors[f"weights.{number}"] = narrowed(one.weights)
+        tensors[f"thresholds.{number}"] = narrowed(one.thresholds)
     for number, table in enumerate(unique.values()):
         tensors[f"table.{number}"] = np.packbits(table > 0, axis=1)
     for name in ARRAYS:
@@ -127,6 +131,7 @@ def save(estimator: Saved, path: str | Path) -> None:
         "codings": [to_dict(coding) for coding in code.codings],
         "pairs": code.pairs,
         "n_units": network.n_units,
+        "n_earlier": len(earlier),
         "n_pattern_units": code.n_units,
         "modified": [number_of[id(table)] for table in code.modified],
         "modifiers": [number_of[id(table)] for table in code.modifiers],
@@ -203,6 +208,16 @@ def read_estimator(
         if name in tensors:
             setattr(estimator, name, tensors[name])
     estimator.network_ = read_network(metadata, tensors)
+    if "n_outputs_" in vars(estimator):
+        vars(estimator)["_earlier"] = tuple(
+            Network(
+                estimator.network_.input_code,
+                metadata["n_units"],
+                weights=tensors[f"weights.{number}"].astype(np.int32),
+                thresholds=tensors[f"thresholds.{number}"].astype(np.int32),
+            )
+            for number in range(metadata.get("n_earlier", 0))
+        )
     if "classes_" in vars(estimator):
         # Files of earlier versions: one unit per class or pair of classes.
         vars(estimator).setdefault("_n_units_each", 1)

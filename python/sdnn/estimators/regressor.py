@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import RegressorMixin
 
 from sdnn import _core
-from sdnn.arguments import whole
+from sdnn.arguments import flag, whole
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.network import Network
-from sdnn.estimators.training import Trainer
+from sdnn.estimators.training import Trainer, run_epochs
 
 __all__ = ["SDNNRegressor"]
 
@@ -59,9 +59,16 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         with much noise want fewer, say 5; exact ones more, say 300.
     shuffle : bool, default=True
         Whether each epoch has a new random order; otherwise it is the order of the sample.
+    n_averaged_epochs : int, default=1
+        Predict the mean of the answers after this many last epochs of `fit`; each is a network in
+        memory. On noisy targets 10 are much better than one. `partial_fit` goes on from the last
+        alone.
     early_stopping : bool, default=False
         Whether to hold a fraction of the sample out, stop when its error no longer falls, and keep
         the best weights.
+    refit : bool, default=False
+        Whether to train anew on the whole sample after early stopping, for the best number of
+        epochs.
     validation_fraction : float, default=0.1
         The fraction that early stopping holds out.
     n_iter_no_change : int, default=10
@@ -128,7 +135,9 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         out_of_range: str = "clip",
         max_iter: int = 30,
         shuffle: bool = True,
+        n_averaged_epochs: int = 1,
         early_stopping: bool = False,
+        refit: bool = False,
         validation_fraction: float = 0.1,
         n_iter_no_change: int = 10,
         training: str = "auto",
@@ -146,7 +155,9 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         self.out_of_range = out_of_range
         self.max_iter = max_iter
         self.shuffle = shuffle
+        self.n_averaged_epochs = n_averaged_epochs
         self.early_stopping = early_stopping
+        self.refit = refit
         self.validation_fraction = validation_fraction
         self.n_iter_no_change = n_iter_no_change
         self.training = training
@@ -190,6 +201,8 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         return self
 
     def _fit(self, X: ArrayLike, y: ArrayLike) -> None:
+        flag("refit", self.refit)
+        whole("n_averaged_epochs", self.n_averaged_epochs, 1, 1000)
         table, targets = self._checked(X, y, reset=True)
         random = self._begin(X, table, targets)
         if self.out_of_range == "widen":
@@ -208,7 +221,35 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             )
             return -float(np.mean((held_counts - counts) ** 2))
 
-        self._run(trainer, len(kept), random, score)
+        n_averaged = self.n_averaged_epochs
+        history = self._run(
+            trainer, len(kept), random, score, n_averaged_epochs=1 if self.refit else n_averaged
+        )
+        self._earlier = history.earlier
+        if self.refit and self.early_stopping:
+            self._refit(bins, counts_to_learn, random, history.n_epochs)
+
+    def _refit(
+        self,
+        bins: NDArray[np.int32],
+        counts: NDArray[np.float64],
+        random: np.random.RandomState,
+        n_epochs: int,
+    ) -> None:
+        """Train anew on the whole sample, for as many epochs as were best on a part of it."""
+        network = self.network_
+        self.network_ = Network(network.input_code, network.n_units, seed=self._weight_seed)
+        trainer = self._trainer(self.network_, bins, counts, n_epochs)
+        history = run_epochs(
+            self.network_,
+            trainer,
+            len(bins),
+            max_iter=n_epochs,
+            random=random if self.shuffle else None,
+            n_averaged_epochs=self.n_averaged_epochs,
+            verbose=self.verbose,
+        )
+        self._earlier = history.earlier
 
     def partial_fit(self: Self, X: ArrayLike, y: ArrayLike) -> Self:
         """Go once through the samples, in their order.
@@ -244,6 +285,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             work._note_inputs(table)
         counts = work._counts_to_learn(targets)
         work.n_iter_ += 1
+        work._earlier = ()
         work._learn_once(work.network_.input_code.bins(table), counts)
         self.__dict__ = work.__dict__
         return self
@@ -297,6 +339,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             bins = work.network_.input_code.bins_of_row(row)
         counts = work._counts_to_learn(targets.reshape(1, -1))
         work.n_iter_ += 1
+        work._earlier = ()
         work._learn_once(bins, counts)
         self.__dict__ = work.__dict__
         return self
@@ -320,20 +363,30 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         network = self._fitted_network
         network.online(self.memory_limit)
         bins = network.input_code.bins_of_row(self._row(x))
-        values = self._of_counts(network.counts_of_bins(bins, self.n_outputs_, n_threads=1))[0]
+        counts = [
+            each.counts_of_bins(bins, self.n_outputs_, n_threads=1)
+            for each in (*self._earlier, network)
+        ]
+        values = self._of_counts(np.mean(counts, axis=0) if self._earlier else counts[0])[0]
         return float(values[0]) if self._flat else values
 
-    def predict(self, X: ArrayLike) -> NDArray[np.float64]:
+    def predict(self, X: ArrayLike, return_std: bool = False) -> Any:
         """Predict the outputs of samples.
 
         Parameters
         ----------
         X : array_like, shape (n_samples, n_features)
+        return_std : bool, default=False
+            Whether to return the standard deviation of the averaged epochs' answers too: how
+            unsettled a prediction is, which is not the noise of the targets. Zero where nothing
+            is averaged.
 
         Returns
         -------
         ndarray, shape (n_samples,) or (n_samples, n_outputs)
             As the targets' shape was in training.
+        ndarray, the same shape
+            With ``return_std``.
 
         Raises
         ------
@@ -343,9 +396,16 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             For samples that cannot be used: another number of features, NaN, unknown categories.
         """
         table = self._table(X)
-        counts = self.network_.counts(table, self.n_outputs_, self._n_threads())
-        values = self._of_counts(counts)
-        return values[:, 0] if self._flat else values
+        bins = self.network_.input_code.bins(table)
+        counts = [
+            network.counts_of_bins(bins, self.n_outputs_, self._n_threads())
+            for network in (*self._earlier, self.network_)
+        ]
+        values = self._of_counts(np.mean(counts, axis=0) if self._earlier else counts[0])
+        if not return_std:
+            return values[:, 0] if self._flat else values
+        spread = self._step() * np.std(counts, axis=0)
+        return (values[:, 0], spread[:, 0]) if self._flat else (values, spread)
 
     def _check_outputs(self, n_outputs: int) -> None:
         if n_outputs != self.n_outputs_:
@@ -372,6 +432,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         self.n_outputs_ = targets.shape[1]
         self.output_range_ = self._range_of(targets)
         self.n_outputs_out_of_range_ = 0
+        self._earlier: tuple[Network, ...] = ()
         n_units = whole("n_output_units", self.n_output_units, 1, 2**20)
         self._counts_of_range = n_units
         return self._start(X, table, self.n_outputs_ * n_units)
@@ -408,7 +469,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         counts: NDArray[np.float64] = (targets - self.output_range_[:, 0]) / self._step()
         return counts
 
-    def _of_counts(self, counts: NDArray[np.int32]) -> NDArray[np.float64]:
+    def _of_counts(self, counts: NDArray[Any]) -> NDArray[np.float64]:
         """Return the outputs of firing counts, shape (n_samples, n_outputs)."""
         values: NDArray[np.float64] = self._step() * counts + self.output_range_[:, 0]
         return values

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Protocol
@@ -43,10 +44,16 @@ class History:
         Samples that were corrected.
     scores : list of float
         Validation scores; empty without early stopping.
+    n_epochs : int
+        Epochs that made the weights: with early stopping, up to the best.
+    earlier : tuple of Network
+        The network after each of the epochs before the last of these.
     """
 
     n_corrected: list[int] = dataclasses.field(default_factory=list)
     scores: list[float] = dataclasses.field(default_factory=list)
+    n_epochs: int = 0
+    earlier: tuple[Network, ...] = ()
 
 
 @contextmanager
@@ -96,6 +103,7 @@ def run_epochs(
     score: Callable[[], float] | None = None,
     n_iter_no_change: int = 10,
     weights: NDArray[np.float64] | None = None,
+    n_averaged_epochs: int = 1,
     verbose: int = 0,
 ) -> History:
     """Train until nothing is corrected, nothing improves, or ``max_iter`` epochs are over.
@@ -118,12 +126,16 @@ def run_epochs(
         Epochs without a better score after which training stops.
     weights : ndarray, shape (n_samples,), optional
         How often each sample is presented per epoch, on average; once by default.
+    n_averaged_epochs : int
+        How many epochs' networks are kept, the last among them.
     verbose : int
         Whether to show a progress bar.
     """
     history = History()
     quiet, n_quiet = 0, 1 if weights is None else epochs_to_present_all(weights)
     best: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None
+    best_earlier: tuple[Network, ...] = ()
+    kept: deque[Network] = deque(maxlen=n_averaged_epochs - 1)
     best_score, best_epoch = -np.inf, 0
     with progress_bar(verbose, max_iter) as advance:
         for epoch in range(max_iter):
@@ -133,18 +145,24 @@ def run_epochs(
             n_corrected, _ = trainer.present(order)
             history.n_corrected.append(n_corrected)
             advance(n_corrected)
-            if score is not None:
+            if score is not None or n_averaged_epochs > 1:
                 trainer.synchronize()
+            if score is not None:
                 history.scores.append(score())
                 if best is None or history.scores[-1] > best_score:
                     best_score, best_epoch = history.scores[-1], epoch
                     best = network.weights, network.thresholds
+                    best_earlier = tuple(kept)
                 elif epoch - best_epoch >= n_iter_no_change:
                     break
             quiet = quiet + 1 if n_corrected == 0 else 0
             if quiet == n_quiet:
                 break
+            if n_averaged_epochs > 1 and epoch + 1 < max_iter:
+                kept.append(network.copy())
     trainer.synchronize()
+    history.n_epochs, history.earlier = len(history.n_corrected), tuple(kept)
     if best is not None:
         network.restore(*best)
+        history.n_epochs, history.earlier = best_epoch + 1, best_earlier
     return history

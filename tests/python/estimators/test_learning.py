@@ -297,3 +297,57 @@ def test_a_trainer_refuses_units_that_its_classes_do_not_need():
     bins = network.input_code.bins(X)
     with pytest.raises(ValueError, match="n_units must be 6 for 4 classes, got 3"):
         _core.PerceptronTrainer(network.layer, bins, np.zeros(len(X)), 4, "one_vs_one")
+
+
+def test_answers_of_the_last_epochs_are_averaged(tmp_path):
+    noisy = Y + np.random.RandomState(1).normal(0, 0.5, len(Y))
+    options = {**REGRESSOR, "shuffle": False, "output_range": (-3, 3)}
+    model = SDNNRegressor(**options, max_iter=6, n_averaged_epochs=4).fit(X, noisy)
+    answers = [SDNNRegressor(**options, max_iter=n).fit(X, noisy).predict(X) for n in (3, 4, 5, 6)]
+    means, spread = model.predict(X, return_std=True)
+    np.testing.assert_allclose(means, np.mean(answers, axis=0), atol=1e-12)
+    np.testing.assert_allclose(spread, np.std(answers, axis=0), atol=1e-12)
+    assert spread.max() > 0
+    assert model.predict_one(X[3]) == means[3]
+    path = tmp_path / "model.safetensors"
+    model.save(path)
+    np.testing.assert_array_equal(SDNNRegressor.load(path).predict(X), means)
+    model.learn_one(X[0], Y[0])
+    assert model.predict(X, return_std=True)[1].max() == 0
+    plain = SDNNRegressor(**options, max_iter=6).fit(X, noisy)
+    same(plain.learn_one(X[0], Y[0]), model)
+
+
+def test_averaging_helps_on_noisy_targets():
+    random = np.random.RandomState(3)
+    points = random.uniform(size=(300, 2))
+    noisy = np.sin(5 * points[:, 0]) * points[:, 1] + random.normal(0, 0.5, 300)
+    fresh = random.uniform(size=(500, 2))
+    true = np.sin(5 * fresh[:, 0]) * fresh[:, 1]
+    options = {"coding": UNIT, "n_pattern_units": 256, "random_state": 0}
+    one = SDNNRegressor(**options).fit(points, noisy).score(fresh, true)
+    ten = SDNNRegressor(**options, n_averaged_epochs=10).fit(points, noisy).score(fresh, true)
+    assert ten > one + 0.03
+
+
+def test_early_stopping_keeps_the_averages_of_its_best_epochs():
+    noisy = Y + np.random.RandomState(1).normal(0, 0.3, len(Y))
+    options = {"coding": UNIT, "n_pattern_units": 128, "random_state": 1, "shuffle": False}
+    options |= {"early_stopping": True, "n_iter_no_change": 4, "n_averaged_epochs": 3}
+    model = SDNNRegressor(**options, max_iter=60).fit(X, noisy)
+    best = int(np.argmax(model.validation_scores_))
+    again = SDNNRegressor(**options, max_iter=best + 1).fit(X, noisy)
+    np.testing.assert_array_equal(model.predict(X), again.predict(X))
+
+
+def test_refitting_trains_on_everything_for_the_best_number_of_epochs():
+    noisy = Y + np.random.RandomState(1).normal(0, 0.3, len(Y))
+    options = {**GIVEN, "output_range": (-2, 2), "shuffle": False}
+    model = SDNNRegressor(**options, early_stopping=True, refit=True, max_iter=60).fit(X, noisy)
+    best = int(np.argmax(model.validation_scores_))
+    whole = SDNNRegressor(**options, max_iter=best + 1).fit(X, noisy)
+    np.testing.assert_array_equal(model.weights_, whole.weights_)
+    with pytest.raises(TypeError, match="refit must be True or False"):
+        SDNNRegressor(refit="yes").fit(X, Y)
+    with pytest.raises(ValueError, match="n_averaged_epochs must be a whole number"):
+        SDNNRegressor(n_averaged_epochs=0).fit(X, Y)

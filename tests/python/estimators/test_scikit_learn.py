@@ -253,6 +253,16 @@ def test_it_works_where_scikit_learn_puts_it(estimator):
     assert cross_val_score(pipeline, X, targets, cv=3).shape == (3,)
     grid = {"coding": [RandomInverse(length_scale=0.5), "anchor"]}
     assert GridSearchCV(estimator, grid, cv=3).fit(X, targets).best_params_["coding"] is not None
+    grid = {"coding__length_scale": [0.1, 0.7]}
+    found = GridSearchCV(estimator, grid, cv=3).fit(X, targets)
+    assert found.best_estimator_.coding.length_scale in grid["coding__length_scale"]
+    assert {fitted.length_scale for fitted in found.best_estimator_.codings_} == {
+        found.best_params_["coding__length_scale"]
+    }
+    with pytest.raises(ValueError, match=r"must have the fields \['length'\]"):
+        estimator.set_params(coding__length=0.1)
+    with pytest.raises(ValueError, match="needs one coding for all inputs"):
+        estimator.set_params(coding=[("anchor", [0])]).set_params(coding__length_scale=0.1)
 
 
 def test_progress_is_shown_when_asked_for(estimator, capsys):
