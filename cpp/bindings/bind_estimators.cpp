@@ -149,11 +149,10 @@ void bind_online_layer(py::module_& module) {
           "learn_labels",
           [](OnlineLayer& self, const Bins& bins, const ArrayArgument<std::int32_t>& labels,
              std::size_t n_classes, const std::string& scheme) {
-            return present_online(
-                self, bins,
-                estimators::PerceptronRule(self.layer().n_units(),
-                                           bindings::vector(labels, "labels"), n_classes,
-                                           estimators::class_scheme_named(scheme)));
+            return present_online(self, bins,
+                                  estimators::PerceptronRule(
+                                      self.layer().n_units(), bindings::vector(labels, "labels"),
+                                      n_classes, estimators::class_scheme_named(scheme)));
           },
           py::arg("bins"), py::arg("labels"), py::arg("n_classes"), py::arg("scheme"),
           "Error correction; how many samples and units were corrected. What raises changes "
@@ -232,20 +231,19 @@ void bind_estimators(py::module_& module) {
   using estimators::PerceptronTrainer;
   py::class_<PerceptronTrainer, std::shared_ptr<PerceptronTrainer>> perceptron(
       module, "PerceptronTrainer", "Trains units to tell classes apart");
-  perceptron.def(py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
-                             const ArrayArgument<std::int32_t>& labels, std::size_t n_classes,
-                             const std::string& scheme, const std::string& form,
-                             std::size_t memory_limit, int n_threads, std::size_t n_epochs) {
-                   estimators::PerceptronRule rule(layer->n_units(),
-                                                   bindings::vector(labels, "labels"), n_classes,
-                                                   estimators::class_scheme_named(scheme));
-                   return make_trainer<PerceptronTrainer>(std::move(layer), bins, std::move(rule),
-                                                          form, memory_limit, n_threads, n_epochs);
-                 }),
-                 py::arg("layer"), py::arg("bins"), py::arg("labels"), py::arg("n_classes"),
-                 py::arg("scheme"), py::arg("form") = "auto",
-                 py::arg("memory_limit") = estimators::kMemoryLimit, py::arg("n_threads") = 1,
-              py::arg("n_epochs") = estimators::kExpectedEpochs);
+  perceptron.def(
+      py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
+                  const ArrayArgument<std::int32_t>& labels, std::size_t n_classes,
+                  const std::string& scheme, const std::string& form, std::size_t memory_limit,
+                  int n_threads, std::size_t n_epochs) {
+        estimators::PerceptronRule rule(layer->n_units(), bindings::vector(labels, "labels"),
+                                        n_classes, estimators::class_scheme_named(scheme));
+        return make_trainer<PerceptronTrainer>(std::move(layer), bins, std::move(rule), form,
+                                               memory_limit, n_threads, n_epochs);
+      }),
+      py::arg("layer"), py::arg("bins"), py::arg("labels"), py::arg("n_classes"), py::arg("scheme"),
+      py::arg("form") = "auto", py::arg("memory_limit") = estimators::kMemoryLimit,
+      py::arg("n_threads") = 1, py::arg("n_epochs") = estimators::kExpectedEpochs);
   bind_trainer_methods(perceptron);
 
   module.def("libsdnn_tables", &libsdnn_tables, py::arg("n_units"), py::arg("inputs"),

@@ -11,6 +11,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 from joblib import effective_n_jobs
 from numpy.typing import ArrayLike, NDArray
+from sklearn.base import clone
 from sklearn.utils import check_random_state
 from sklearn.utils.validation import check_is_fitted
 
@@ -27,6 +28,7 @@ from sdnn.estimators.input_code import (
     pattern_units_for,
 )
 from sdnn.estimators.network import FEW_SAMPLES, Network
+from sdnn.estimators.pair_selection import select_pairs
 from sdnn.estimators.training import History, Trainer, run_epochs
 
 __all__ = ["BaseSDNN", "OutOfRangeWarning"]
@@ -61,6 +63,9 @@ class BaseSDNN(CodedInputs):
     n_features_in_: int
     n_inputs_out_of_range_: int
 
+    # Pairs that `fit` has selected, for the time of fitting.
+    _selected: list[tuple[int, int]] | None = None
+
     OUT_OF_RANGE: ClassVar[tuple[str, ...]] = ("clip", "error")
 
     def _check_parameters(self) -> None:
@@ -87,11 +92,13 @@ class BaseSDNN(CodedInputs):
         codings = self._codings(X, table)
         random: np.random.RandomState = check_random_state(self.random_state)
         code_seed, weight_seed = (int(seed) for seed in random.randint(2**31 - 1, size=2))
-        if isinstance(self.pairs, str) and self.pairs == "budget" and n_inputs > 1:
+        shared = isinstance(self.pairs, str) and self.pairs in ("budget", "auto")
+        if self._selected is not None:
+            pairs = self._selected
+        elif shared and n_inputs > 1:
             pairs = share_of_pairs(n_inputs, PAIR_BUDGET, code_seed)
         else:
-            everything = isinstance(self.pairs, str) and self.pairs == "budget"
-            pairs = input_pairs("all" if everything else self.pairs, listed, n_inputs)
+            pairs = input_pairs("all" if shared else self.pairs, listed, n_inputs)
         n_pattern_units = self.n_pattern_units or pattern_units_for(len(pairs))
         fitted = [
             coding.fit(table[:, index], n_pattern_units) for index, coding in enumerate(codings)
@@ -103,6 +110,16 @@ class BaseSDNN(CodedInputs):
         self.n_inputs_out_of_range_ = 0
         self._note_inputs(table)
         return random
+
+    def _select_pairs(self, X: Any, table: NDArray[Any], y: Any) -> None:
+        """Let cross-validation select the pairs, if it is to."""
+        if not (isinstance(self.pairs, str) and self.pairs == "auto") or table.shape[1] < 2:
+            return
+        self._check_parameters()
+        seed = int(check_random_state(self.random_state).randint(2**31 - 1))
+        every = share_of_pairs(table.shape[1], PAIR_BUDGET, seed)
+        model = clone(self).set_params(random_state=seed, early_stopping=False, verbose=0)
+        self._selected = select_pairs(model, X, y, every, seed)
 
     def _require_memory(
         self,
@@ -295,6 +312,22 @@ class BaseSDNN(CodedInputs):
     def weights_(self) -> NDArray[np.int32]:
         """The integer weights, shape (n_units, n_pairs * n_pattern_units)."""
         return self._fitted_network.weights
+
+    @property
+    def pair_importances_(self) -> NDArray[np.float64]:
+        """How much training has changed the weights of each of ``pairs_``: squares, of a sum of 1.
+
+        Shape (n_pairs,). Zeros if nothing was learned.
+        """
+        network = self._fitted_network
+        code = network.input_code
+        seed = vars(self).get("_weight_seed")
+        if seed is None:
+            raise AttributeError("the file that was loaded does not say what the weights began as")
+        begun = _core.ParallelPerceptron(code.core, network.n_units, seed=seed).weights
+        change = (network.weights - begun).reshape(network.n_units, len(code.pairs), code.n_units)
+        squares: NDArray[np.float64] = np.square(change, dtype=np.float64).sum(axis=(0, 2))
+        return squares / max(squares.sum(), 1.0)
 
     @property
     def thresholds_(self) -> NDArray[np.int32]:

@@ -57,10 +57,12 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         ColumnTransformer (inputs left out have "random-inverse").
     n_pattern_units : int, optional
         Units per pattern, even. None shares about 16,000 columns out among the pairs.
-    pairs : "budget", "all" or list of (modified, modifier), default="budget"
+    pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"
         Pairs of features, by number or name. A modifier of None leaves a pattern plain, which is
         also what a single feature gets. "budget" means all pairs up to 22 features, and beyond an
-        even share of them drawn at random: 500 pairs, or one per feature.
+        even share of them drawn at random: 500 pairs, or one per feature. "auto" lets `fit` leave
+        out those that do not matter, as far as cross-validation is clearly better without them;
+        it takes some forty times as long.
     tables : {"shared", "separate"}, default="shared"
         One table of patterns per input, permuted anew for each pair, or two tables per pair.
     out_of_range : {"clip", "error"}, default="clip"
@@ -106,6 +108,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         The fitted coding of each input.
     pairs_ : tuple of (int, int)
         The pairs in use.
+    pair_importances_ : ndarray, shape (n_pairs,)
+        How much training has changed the weights of each pair; they sum to 1.
     weights_ : ndarray of int32, shape (n_units, n_columns)
     thresholds_ : ndarray of int32, shape (n_units,)
     n_inputs_out_of_range_ : int
@@ -203,7 +207,9 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
 
     def _fit(self, X: ArrayLike, y: ArrayLike) -> None:
         table, y = self._checked(X, y, reset=True, ensure_min_samples=2)
+        self._select_pairs(X, table, y)
         random = self._begin(X, table, unique_labels(y))
+        self._selected = None
         labels = numbers_of(y, self.classes_)
         held, kept = self._split(random, len(table))
         bins = self.network_.input_code.bins(table)

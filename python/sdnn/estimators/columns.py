@@ -170,7 +170,8 @@ def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int) -> list[
         return everything or [(0, 0)]
     if isinstance(pairs, str) or not isinstance(pairs, Iterable):
         raise ValueError(
-            f"pairs must be 'budget', 'all' or a list of (modified, modifier), got {pairs!r}"
+            "pairs must be 'budget', 'all', 'auto' or a list of (modified, modifier), "
+            f"got {pairs!r}"
         )
     found = []
     for pair in pairs:

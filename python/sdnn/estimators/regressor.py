@@ -39,10 +39,12 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         ColumnTransformer (inputs left out have "random-inverse").
     n_pattern_units : int, optional
         Units per pattern, even. None shares about 16,000 columns out among the pairs.
-    pairs : "budget", "all" or list of (modified, modifier), default="budget"
+    pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"
         Pairs of features, by number or name. A modifier of None leaves a pattern plain, which is
         also what a single feature gets. "budget" means all pairs up to 22 features, and beyond an
-        even share of them drawn at random: 500 pairs, or one per feature.
+        even share of them drawn at random: 500 pairs, or one per feature. "auto" lets `fit` leave
+        out those that do not matter, as far as cross-validation is clearly better without them;
+        it takes some forty times as long.
     tables : {"shared", "separate"}, default="shared"
         One table of patterns per input, permuted anew for each pair, or two tables per pair.
     n_output_units : int, default=280
@@ -90,6 +92,8 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         The fitted coding of each input.
     pairs_ : tuple of (int, int)
         The pairs in use.
+    pair_importances_ : ndarray, shape (n_pairs,)
+        How much training has changed the weights of each pair; they sum to 1.
     weights_ : ndarray of int32, shape (n_outputs * n_output_units, n_columns)
     thresholds_ : ndarray of int32, shape (n_outputs * n_output_units,)
     output_range_ : ndarray, shape (n_outputs, 2)
@@ -204,7 +208,9 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         flag("refit", self.refit)
         whole("n_averaged_epochs", self.n_averaged_epochs, 1, 1000)
         table, targets = self._checked(X, y, reset=True)
+        self._select_pairs(X, table, y)
         random = self._begin(X, table, targets)
+        self._selected = None
         if self.out_of_range == "widen":
             self._widen(targets.min(axis=0))
             self._widen(targets.max(axis=0))

@@ -132,8 +132,8 @@ TEST(OnlineLayer, ChangesNothingWhenAWeightWouldLeaveItsRange) {
   const std::size_t n_columns = problem.code->n_columns();
   const std::vector<std::int32_t> weights(problem.n_units * n_columns, 16383);
   const std::vector<std::int32_t> thresholds(problem.n_units, 0);
-  const auto layer = std::make_shared<estimators::ParallelPerceptron>(
-      problem.code, problem.n_units, weights, thresholds);
+  const auto layer = std::make_shared<estimators::ParallelPerceptron>(problem.code, problem.n_units,
+                                                                      weights, thresholds);
   OnlineLayer online(layer);
   const auto before = testing::bits_of(*layer);
   bool threw = false;

@@ -72,11 +72,10 @@ TEST(TrainingForm, SuitsTheEpochs) {
     }
   }
   const coding::SelectiveDesensitization code(tables, tables, pairs);
-  for (const Measured& at : {Measured{50, .029, .0002, .091, .0065},
-                             Measured{200, .066, .0007, .097, .022},
-                             Measured{1000, .301, .0047, .091, .104},
-                             Measured{3000, 1.50, .022, .095, .295},
-                             Measured{10000, 15.1, .24, .103, 1.02}}) {
+  for (const Measured& at :
+       {Measured{50, .029, .0002, .091, .0065}, Measured{200, .066, .0007, .097, .022},
+        Measured{1000, .301, .0047, .091, .104}, Measured{3000, 1.50, .022, .095, .295},
+        Measured{10000, 15.1, .24, .103, 1.02}}) {
     for (const std::size_t n_epochs : {1, 3, 10, 30, 100}) {
       const auto epochs = static_cast<double>(n_epochs);
       const double dual = at.dual_once + epochs * at.dual_epoch;

@@ -99,7 +99,8 @@ class OnlineLayer {
   void synchronize() {
     if (!changed_) return;
     WeightTiles<std::int32_t>& tiles = layer_->tiles();
-    for (std::size_t i = 0; i < tiles.n_units(); ++i) layer_->thresholds()[i] = hidden_.threshold(i);
+    for (std::size_t i = 0; i < tiles.n_units(); ++i)
+      layer_->thresholds()[i] = hidden_.threshold(i);
     for (std::size_t slot = 0; slot < tiles.n_slots(); ++slot) {
       for (std::size_t i = 0; i < tiles.n_units(); ++i) tiles.at(i, slot) = hidden_.weight(i, slot);
     }

@@ -27,8 +27,8 @@ namespace sdnn::estimators {
 /// Presents training samples to a layer. All forms leave the same bits in it.
 ///
 /// Between synchronize() calls the layer's weights may lag behind; nobody else may change them as
-/// long as a trainer is in use. After an exception from present() the layer is good for nothing: who
-/// wants to go on trains a copy.
+/// long as a trainer is in use. After an exception from present() the layer is good for nothing:
+/// who wants to go on trains a copy.
 template <class Rule>
 class Trainer {
  public:
@@ -45,8 +45,8 @@ class Trainer {
     n_samples_ = bins.size() / layer_->code().n_inputs();
     core::require(rule_.n_samples() == n_samples_, "targets or labels",
                   std::to_string(n_samples_) + " samples as bins has", rule_.n_samples());
-    form_ = choose_form(form, layer_->n_units(), layer_->code(), n_samples_, memory_limit,
-                        n_epochs);
+    form_ =
+        choose_form(form, layer_->n_units(), layer_->code(), n_samples_, memory_limit, n_epochs);
     const auto memory = [&](bool keeps_plans) {
       return form_memory(form_, layer_->n_units(), layer_->code(), n_samples_, keeps_plans);
     };

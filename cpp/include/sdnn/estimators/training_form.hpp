@@ -91,8 +91,7 @@ inline constexpr std::size_t kExpectedEpochs = 30;
 /// Throws std::length_error if `form` is not automatic and needs more than `memory_limit` bytes.
 inline TrainingForm choose_form(TrainingForm form, std::size_t n_units,
                                 const coding::SelectiveDesensitization& code, std::size_t n_samples,
-                                std::size_t memory_limit,
-                                std::size_t n_epochs = kExpectedEpochs) {
+                                std::size_t memory_limit, std::size_t n_epochs = kExpectedEpochs) {
   const auto memory = [&](TrainingForm f) { return form_memory(f, n_units, code, n_samples); };
   if (form != TrainingForm::automatic) {
     if (memory(form) > memory_limit) {
