@@ -327,7 +327,8 @@ class BaseSDNN(CodedInputs):
         begun = _core.ParallelPerceptron(code.core, network.n_units, seed=seed).weights
         change = (network.weights - begun).reshape(network.n_units, len(code.pairs), code.n_units)
         squares: NDArray[np.float64] = np.square(change, dtype=np.float64).sum(axis=(0, 2))
-        return squares / max(squares.sum(), 1.0)
+        shares: NDArray[np.float64] = squares / max(squares.sum(), 1.0)
+        return shares
 
     @property
     def thresholds_(self) -> NDArray[np.int32]:

@@ -209,7 +209,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         table, y = self._checked(X, y, reset=True, ensure_min_samples=2)
         self._select_pairs(X, table, y)
         random = self._begin(X, table, unique_labels(y))
-        self._selected = None
+        self.__dict__.pop("_selected", None)
         labels = numbers_of(y, self.classes_)
         held, kept = self._split(random, len(table))
         bins = self.network_.input_code.bins(table)

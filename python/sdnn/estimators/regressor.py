@@ -127,6 +127,8 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
 
     OUT_OF_RANGE = ("clip", "widen", "error")
 
+    _earlier: tuple[Network, ...]
+
     def __init__(
         self,
         coding: Any = "random-inverse",
@@ -210,7 +212,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         table, targets = self._checked(X, y, reset=True)
         self._select_pairs(X, table, y)
         random = self._begin(X, table, targets)
-        self._selected = None
+        self.__dict__.pop("_selected", None)
         if self.out_of_range == "widen":
             self._widen(targets.min(axis=0))
             self._widen(targets.max(axis=0))
@@ -438,7 +440,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         self.n_outputs_ = targets.shape[1]
         self.output_range_ = self._range_of(targets)
         self.n_outputs_out_of_range_ = 0
-        self._earlier: tuple[Network, ...] = ()
+        self._earlier = ()
         n_units = whole("n_output_units", self.n_output_units, 1, 2**20)
         self._counts_of_range = n_units
         return self._start(X, table, self.n_outputs_ * n_units)
