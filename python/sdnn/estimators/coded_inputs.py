@@ -56,6 +56,8 @@ class CodedInputs(BaseEstimator):
         checks: dict[str, Any] = (
             {"dtype": np.float64} if numeric else {"dtype": None, "ensure_all_finite": False}
         )
+        if not numeric and hasattr(X, "columns") and hasattr(X, "astype"):
+            X = X.astype(object)  # pandas has no common type of categories and its own numbers
         try:
             return validate_data(self, X, y, **checks, **options)
         except ValueError as error:
@@ -69,7 +71,7 @@ class CodedInputs(BaseEstimator):
             if table.dtype != np.float64 and coding.is_numeric:
                 try:
                     numbers = np.asarray(table[:, index], dtype=np.float64)
-                except ValueError as error:
+                except (TypeError, ValueError) as error:  # pandas.NA is of no type
                     raise ValueError(f"{error} in column {index}; {WORDS_HINT}") from None
                 assert_all_finite(numbers, input_name="X")
         return table
