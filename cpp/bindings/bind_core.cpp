@@ -24,13 +24,13 @@ unsigned long main_thread = 0;
 
 /// Lets signal handlers run, as Python does between its instructions, and ends the work if one
 /// raises: KeyboardInterrupt of Ctrl-C.
-void check_signals() {
+void check_signals(bool at_once) {
   using Clock = std::chrono::steady_clock;
   constexpr std::chrono::milliseconds kInterval{50};
   thread_local Clock::time_point due{};
   if (PyThread_get_thread_ident() != main_thread) return;
   const Clock::time_point now = Clock::now();
-  if (now < due) return;
+  if (now < due && !at_once) return;
   due = now + kInterval;
   const py::gil_scoped_acquire locked;
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();

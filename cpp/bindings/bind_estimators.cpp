@@ -9,6 +9,7 @@
 #include "bindings.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/estimators/libsdnn.hpp"
+#include "sdnn/estimators/online_layer.hpp"
 #include "sdnn/estimators/parallel_perceptron.hpp"
 #include "sdnn/estimators/trainer.hpp"
 
@@ -111,11 +112,67 @@ py::tuple names_of(const Values& values) {
 template <class Trainer, class Rule>
 std::shared_ptr<Trainer> make_trainer(std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
                                       Rule rule, const std::string& form, std::size_t memory_limit,
-                                      int n_threads) {
+                                      int n_threads, std::size_t n_epochs) {
   const auto values = copied(matrix(bins, "bins", layer->code().n_inputs()));
   const auto chosen = estimators::training_form_named(form);
   const bindings::WithoutGIL unlocked(*layer);
-  return std::make_shared<Trainer>(layer, values, std::move(rule), chosen, memory_limit, n_threads);
+  return std::make_shared<Trainer>(layer, values, std::move(rule), chosen, memory_limit, n_threads,
+                                   n_epochs);
+}
+
+Matrix online_potentials_of(const estimators::OnlineLayer& layer, const Bins& bins) {
+  const auto values = matrix(bins, "bins", layer.layer().code().n_inputs());
+  Matrix out({static_cast<std::size_t>(bins.shape(0)), layer.layer().n_units()});
+  layer.potentials(values, {out.mutable_data(), static_cast<std::size_t>(out.size())});
+  return out;
+}
+
+template <class Rule>
+std::pair<std::size_t, std::size_t> present_online(estimators::OnlineLayer& layer, const Bins& bins,
+                                                   Rule rule) {
+  const auto values = copied(matrix(bins, "bins", layer.layer().code().n_inputs()));
+  const bindings::WithoutGIL unlocked(layer);
+  const auto count = layer.present(values, rule);
+  return {count.n_samples, count.n_units};
+}
+
+void bind_online_layer(py::module_& module) {
+  using estimators::OnlineLayer;
+  py::class_<OnlineLayer>(
+      module, "OnlineLayer",
+      "Weights in bytes, for samples that come one at a time; the layer lags behind")
+      .def(py::init<std::shared_ptr<ParallelPerceptron>>(), py::arg("layer"))
+      .def(
+          "learn_counts",
+          [](OnlineLayer& self, const Bins& bins, const ArrayArgument<double>& targets) {
+            return present_online(
+                self, bins,
+                estimators::PDeltaRule(self.layer().n_units(), matrix(targets, "targets"),
+                                       static_cast<std::size_t>(targets.shape(1))));
+          },
+          py::arg("bins"), py::arg("targets"),
+          "The p-delta rule; how many samples and units were corrected. What raises changes "
+          "nothing.")
+      .def(
+          "learn_labels",
+          [](OnlineLayer& self, const Bins& bins, const ArrayArgument<std::int32_t>& labels,
+             std::size_t n_classes, const std::string& scheme) {
+            return present_online(self, bins,
+                                  estimators::PerceptronRule(
+                                      self.layer().n_units(), bindings::vector(labels, "labels"),
+                                      n_classes, estimators::class_scheme_named(scheme)));
+          },
+          py::arg("bins"), py::arg("labels"), py::arg("n_classes"), py::arg("scheme"),
+          "Error correction; how many samples and units were corrected. What raises changes "
+          "nothing.")
+      .def("potentials", &online_potentials_of, py::arg("bins"))
+      .def(
+          "synchronize",
+          [](OnlineLayer& self) {
+            const bindings::WithoutGIL unlocked(self, self.layer());
+            self.synchronize();
+          },
+          "Brings the layer up to date");
 }
 
 template <class Trainer>
@@ -158,7 +215,12 @@ void bind_estimators(py::module_& module) {
       .def_property_readonly("thresholds", &thresholds_of)
       .def("potentials", &potentials_of, py::arg("bins"), py::arg("n_threads") = 1)
       .def("counts", &counts_of, py::arg("bins"), py::arg("n_groups") = 1, py::arg("n_threads") = 1,
-           "How many units of each group fire");
+           "How many units of each group fire")
+      .def(
+          "copy",
+          [](const ParallelPerceptron& self) { return std::make_shared<ParallelPerceptron>(self); },
+          "A layer of its own with the same weights");
+  bind_online_layer(module);
 
   module.attr("TRAINING_FORMS") = names_of(estimators::kTrainingForms);
   module.attr("CLASS_SCHEMES") = names_of(estimators::kClassSchemes);
@@ -174,32 +236,33 @@ void bind_estimators(py::module_& module) {
       module, "PDeltaTrainer", "Trains groups of units to fire in given numbers");
   p_delta.def(py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
                           const ArrayArgument<double>& targets, const std::string& form,
-                          std::size_t memory_limit, int n_threads) {
+                          std::size_t memory_limit, int n_threads, std::size_t n_epochs) {
                 estimators::PDeltaRule rule(layer->n_units(), matrix(targets, "targets"),
                                             static_cast<std::size_t>(targets.shape(1)));
                 return make_trainer<PDeltaTrainer>(std::move(layer), bins, std::move(rule), form,
-                                                   memory_limit, n_threads);
+                                                   memory_limit, n_threads, n_epochs);
               }),
               py::arg("layer"), py::arg("bins"), py::arg("targets"), py::arg("form") = "auto",
-              py::arg("memory_limit") = estimators::kMemoryLimit, py::arg("n_threads") = 1);
+              py::arg("memory_limit") = estimators::kMemoryLimit, py::arg("n_threads") = 1,
+              py::arg("n_epochs") = estimators::kExpectedEpochs);
   bind_trainer_methods(p_delta);
 
   using estimators::PerceptronTrainer;
   py::class_<PerceptronTrainer, std::shared_ptr<PerceptronTrainer>> perceptron(
       module, "PerceptronTrainer", "Trains units to tell classes apart");
-  perceptron.def(py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
-                             const ArrayArgument<std::int32_t>& labels, std::size_t n_classes,
-                             const std::string& scheme, const std::string& form,
-                             std::size_t memory_limit, int n_threads) {
-                   estimators::PerceptronRule rule(layer->n_units(),
-                                                   bindings::vector(labels, "labels"), n_classes,
-                                                   estimators::class_scheme_named(scheme));
-                   return make_trainer<PerceptronTrainer>(std::move(layer), bins, std::move(rule),
-                                                          form, memory_limit, n_threads);
-                 }),
-                 py::arg("layer"), py::arg("bins"), py::arg("labels"), py::arg("n_classes"),
-                 py::arg("scheme"), py::arg("form") = "auto",
-                 py::arg("memory_limit") = estimators::kMemoryLimit, py::arg("n_threads") = 1);
+  perceptron.def(
+      py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
+                  const ArrayArgument<std::int32_t>& labels, std::size_t n_classes,
+                  const std::string& scheme, const std::string& form, std::size_t memory_limit,
+                  int n_threads, std::size_t n_epochs) {
+        estimators::PerceptronRule rule(layer->n_units(), bindings::vector(labels, "labels"),
+                                        n_classes, estimators::class_scheme_named(scheme));
+        return make_trainer<PerceptronTrainer>(std::move(layer), bins, std::move(rule), form,
+                                               memory_limit, n_threads, n_epochs);
+      }),
+      py::arg("layer"), py::arg("bins"), py::arg("labels"), py::arg("n_classes"), py::arg("scheme"),
+      py::arg("form") = "auto", py::arg("memory_limit") = estimators::kMemoryLimit,
+      py::arg("n_threads") = 1, py::arg("n_epochs") = estimators::kExpectedEpochs);
   bind_trainer_methods(perceptron);
 
   module.def("libsdnn_tables", &libsdnn_tables, py::arg("n_units"), py::arg("inputs"),

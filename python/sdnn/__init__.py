@@ -36,10 +36,11 @@ if TYPE_CHECKING:
         kernel,
         runs,
     )
-    from sdnn.estimators import SDNNClassifier, SDNNRegressor
+    from sdnn.estimators import SDNNClassifier, SDNNKernelRidge, SDNNRegressor
 
 __all__ = [
     "SDNNClassifier",
+    "SDNNKernelRidge",
     "SDNNRegressor",
     "__version__",
     "agents",
@@ -57,7 +58,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name in ("SDNNClassifier", "SDNNRegressor"):
+    if name in ("SDNNClassifier", "SDNNKernelRidge", "SDNNRegressor"):
         return getattr(importlib.import_module("sdnn.estimators"), name)
     if name in __all__:
         return importlib.import_module(f"sdnn.{name}")

@@ -530,6 +530,10 @@ class ParallelPerceptron:
     """
     def __init__(self, code: SelectiveDesensitization, n_units: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex = 0, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, thresholds: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, initial_range: typing.SupportsInt | typing.SupportsIndex = 5) -> None:
         ...
+    def copy(self) -> ParallelPerceptron:
+        """
+        A layer of its own with the same weights
+        """
     def counts(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_groups: typing.SupportsInt | typing.SupportsIndex = 1, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.int32]:
         """
         How many units of each group fire
@@ -545,11 +549,31 @@ class ParallelPerceptron:
     @property
     def weights(self) -> numpy.typing.NDArray[numpy.int32]:
         ...
+class OnlineLayer:
+    """
+    Weights in bytes, for samples that come one at a time; the layer lags behind
+    """
+    def __init__(self, layer: ParallelPerceptron) -> None:
+        ...
+    def learn_counts(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[int, int]:
+        """
+        The p-delta rule; how many samples and units were corrected. What raises changes nothing.
+        """
+    def learn_labels(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_classes: typing.SupportsInt | typing.SupportsIndex, scheme: str) -> tuple[int, int]:
+        """
+        Error correction; how many samples and units were corrected. What raises changes nothing.
+        """
+    def potentials(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> numpy.typing.NDArray[numpy.int32]:
+        ...
+    def synchronize(self) -> None:
+        """
+        Brings the layer up to date
+        """
 class PDeltaTrainer:
     """
     Trains groups of units to fire in given numbers
     """
-    def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
+    def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, n_epochs: typing.SupportsInt | typing.SupportsIndex = 30) -> None:
         ...
     def present(self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> tuple[int, int]:
         """
@@ -571,7 +595,7 @@ class PerceptronTrainer:
     """
     Trains units to tell classes apart
     """
-    def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_classes: typing.SupportsInt | typing.SupportsIndex, scheme: str, form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
+    def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_classes: typing.SupportsInt | typing.SupportsIndex, scheme: str, form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, n_epochs: typing.SupportsInt | typing.SupportsIndex = 30) -> None:
         ...
     def present(self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> tuple[int, int]:
         """

@@ -112,6 +112,7 @@ class AnalyticKernel:
         every = [(mu, nu) for mu in inputs for nu in inputs if mu != nu] or [(0, 0)]
         self.codings = tuple(fitted(one, n_units) for one in coding)
         self.pairs = tuple(every if pairs is None else pairs)
+        self._every = pairs is None
         self._correlations = tuple(one.correlations(n_units) for one in self.codings)
 
     def __call__(self, X: ArrayLike, Y: ArrayLike | None = None) -> NDArray[np.float64]:
@@ -146,6 +147,13 @@ class AnalyticKernel:
             )
         ]
         total = np.zeros((len(one), len(other)))
+        if self._every and len(rho) > 2:  # the sum over nu != mu by the sums over all
+            squares = np.zeros_like(total)
+            for of_input in rho:
+                total += of_input
+                squares += of_input**2
+            n_inputs = len(rho)
+            return ((n_inputs - 1) * total + total**2 - squares) / (2 * n_inputs * (n_inputs - 1))
         for mu, nu in self.pairs:
             total += 2 * rho[mu] if mu == nu else (1 + rho[nu]) / 2 * rho[mu]
         return total / sum(2 if mu == nu else 1 for mu, nu in self.pairs)

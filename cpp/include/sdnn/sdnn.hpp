@@ -42,6 +42,7 @@
 #include "sdnn/environments/acrobot_state.hpp"
 #include "sdnn/environments/goal_schedule.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
+#include "sdnn/estimators/online_layer.hpp"
 #include "sdnn/estimators/parallel_perceptron.hpp"
 #include "sdnn/estimators/trainer.hpp"
 #include "sdnn/estimators/training_form.hpp"

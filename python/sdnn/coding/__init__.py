@@ -16,13 +16,14 @@ array([ 0,  0, 50, 99], dtype=int32)
 
 from sdnn.coding.base import Coding
 from sdnn.coding.names import CODINGS, coding_named, from_dict, to_dict
-from sdnn.coding.numeric import Anchor, Circular, RandomInverse
+from sdnn.coding.numeric import Anchor, Circular, CoarseCodeWarning, RandomInverse
 from sdnn.coding.symbols import CorrelationMatrix, Symbolic
 
 __all__ = [
     "CODINGS",
     "Anchor",
     "Circular",
+    "CoarseCodeWarning",
     "Coding",
     "CorrelationMatrix",
     "RandomInverse",

@@ -58,6 +58,17 @@ class Coding(abc.ABC):
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
         """Return the bin of each value of a column, shape (n_samples,), for a fitted coding."""
 
+    def ends(self) -> tuple[float, float] | None:
+        """Return the smallest and largest number within a fitted coding's range.
+
+        Values beyond it count as its ends. None: every value is within, or there is no order.
+        """
+        return None
+
+    def even_range(self) -> tuple[float, float] | None:
+        """Return the range of a fitted coding whose bins are equal parts of it, else None."""
+        return None
+
     @abc.abstractmethod
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
         """Draw the patterns of a fitted coding, +1 and -1, shape (n_bins, n_units)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import warnings
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -20,13 +21,18 @@ from sdnn.coding.ranges import (
     quantile_knots,
 )
 
-__all__ = ["Anchor", "Circular", "RandomInverse"]
+__all__ = ["Anchor", "Circular", "CoarseCodeWarning", "RandomInverse"]
 
 MAX_BINS = 65535
 FINE = 1000
 """Bins from which on more of them make no visible difference."""
 LONGEST = 1000.0
 """The largest length_scale: all values would look alike beyond."""
+FEW_BINS = 8
+
+
+class CoarseCodeWarning(UserWarning):
+    """A length scale leaves few bins, because neighbouring patterns differ in a unit at least."""
 
 
 def numbers(column: NDArray[Any]) -> NDArray[np.float64]:
@@ -100,10 +106,23 @@ class RandomInverse(Coding):
             flipped = min(most, max(1, round(n_units * (1 - kept) / 4)))
         else:
             flipped = max(1, math.ceil(n_units / (4 * self.length_scale * FINE)))
+            if flipped > most:
+                raise ValueError(
+                    f"length_scale must be at least {1 / (2 * FINE)}, got {self.length_scale!r}"
+                )
         if self.n_bins is not None:
             return whole("n_bins", self.n_bins, 2, MAX_BINS), flipped
         per_length = n_units / (4 * flipped)
-        return min(MAX_BINS, max(2, round(per_length / self.length_scale))), flipped
+        n_bins = min(MAX_BINS, max(2, round(per_length / self.length_scale)))
+        if n_bins < FEW_BINS and self.n_flipped is None:
+            warnings.warn(
+                f"length_scale={self.length_scale} with patterns of {n_units} units leaves "
+                f"{n_bins} bins of the range; more n_pattern_units or a shorter length_scale "
+                "tell more values apart",
+                CoarseCodeWarning,
+                stacklevel=2,
+            )
+        return n_bins, flipped
 
     @property
     def learns(self) -> bool:
@@ -119,6 +138,14 @@ class RandomInverse(Coding):
         """Return the bin of each value; see `Coding.bins`."""
         where = positions(numbers(column), known(self.low), known(self.high), self.knots)
         return bins_of_positions(where, self.size)
+
+    def ends(self) -> tuple[float, float]:
+        """Return the range; see `Coding.ends`."""
+        return known(self.low), known(self.high)
+
+    def even_range(self) -> tuple[float, float] | None:
+        """Return the range unless bins are quantiles; see `Coding.even_range`."""
+        return self.ends() if self.knots is None else None
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
         """Draw the patterns; see `Coding.patterns`."""
@@ -192,6 +219,14 @@ class Anchor(Coding):
         """Return the bin of each value; see `Coding.bins`."""
         where = positions(numbers(column), known(self.low), known(self.high), None)
         return bins_of_positions(where, self.size)
+
+    def ends(self) -> tuple[float, float]:
+        """Return the range; see `Coding.ends`."""
+        return known(self.low), known(self.high)
+
+    def even_range(self) -> tuple[float, float]:
+        """Return the range; see `Coding.even_range`."""
+        return self.ends()
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
         """Draw the patterns; see `Coding.patterns`."""

@@ -24,6 +24,14 @@ def listed(categories: Any) -> tuple[Category, ...] | None:
     return None if categories is None else tuple(categories)
 
 
+def is_missing(value: Any) -> bool:
+    """Return whether a value is None, NaN or pandas.NA, which is not even unlike itself."""
+    try:
+        return value is None or bool(value != value)
+    except TypeError:
+        return True
+
+
 def learned_categories(column: NDArray[Any]) -> tuple[Category, ...]:
     """Return the different values of a column, in order, as plain Python values.
 
@@ -33,7 +41,7 @@ def learned_categories(column: NDArray[Any]) -> tuple[Category, ...]:
         If values cannot be ordered (words and numbers), or one is missing.
     """
     values = column.tolist()
-    if any(value is None or value != value for value in values):
+    if any(map(is_missing, values)):
         raise ValueError("Input contains NaN: a missing value is not a category")
     try:
         return tuple(sorted(set(values)))

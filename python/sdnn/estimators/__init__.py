@@ -9,18 +9,29 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sdnn.estimators.base import OutOfRangeWarning
     from sdnn.estimators.classifier import SDNNClassifier
+    from sdnn.estimators.kernel_ridge import SDNNKernelRidge
     from sdnn.estimators.libsdnn import read_model_file, read_parameter_file
     from sdnn.estimators.regressor import SDNNRegressor
 
 _HOME_OF = {
+    "OutOfRangeWarning": "base",
     "SDNNClassifier": "classifier",
+    "SDNNKernelRidge": "kernel_ridge",
     "SDNNRegressor": "regressor",
     "read_model_file": "libsdnn",
     "read_parameter_file": "libsdnn",
 }
 
-__all__ = ["SDNNClassifier", "SDNNRegressor", "read_model_file", "read_parameter_file"]
+__all__ = [
+    "OutOfRangeWarning",
+    "SDNNClassifier",
+    "SDNNKernelRidge",
+    "SDNNRegressor",
+    "read_model_file",
+    "read_parameter_file",
+]
 
 
 def __getattr__(name: str) -> Any:

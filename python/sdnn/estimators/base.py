@@ -2,40 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import abc
+import warnings
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from joblib import effective_n_jobs
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator
-from sklearn.utils import assert_all_finite, check_random_state
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.base import clone
+from sklearn.utils import check_random_state
+from sklearn.utils.validation import check_is_fitted
 
 from sdnn import _core
 from sdnn.arguments import flag, one_of, real, whole
-from sdnn.coding import Coding, RandomInverse, coding_named
+from sdnn.coding import Coding
 from sdnn.estimators import files
-from sdnn.estimators.columns import coding_entries, codings_of_columns, input_pairs
-from sdnn.estimators.input_code import draw_input_code, pattern_units_for
-from sdnn.estimators.network import Network
-from sdnn.estimators.training import Trainer, run_epochs
+from sdnn.estimators.coded_inputs import CodedInputs
+from sdnn.estimators.columns import input_pairs, share_of_pairs
+from sdnn.estimators.input_code import (
+    PAIR_BUDGET,
+    code_bytes,
+    draw_input_code,
+    pattern_units_for,
+)
+from sdnn.estimators.network import FEW_SAMPLES, Network
+from sdnn.estimators.pair_selection import select_pairs
+from sdnn.estimators.training import History, Trainer, run_epochs
 
-__all__ = ["BaseSDNN"]
+__all__ = ["BaseSDNN", "OutOfRangeWarning"]
 
 Self = TypeVar("Self", bound="BaseSDNN")
-LARGEST = 2**62
-WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
+MOST_EPOCHS = 10**9
 
 
-class BaseSDNN(BaseEstimator):
-    """Validation, the code of the inputs, the loop over epochs, files."""
+class OutOfRangeWarning(UserWarning):
+    """Values to learn lie beyond a range that was given or learned; warned of once a model."""
 
-    coding: Any
+
+class BaseSDNN(CodedInputs):
+    """The code of the inputs, the loop over epochs, files."""
+
     n_pattern_units: int | None
     pairs: Any
     tables: str
+    out_of_range: str
     max_iter: int
     shuffle: bool
     early_stopping: bool
@@ -49,21 +61,28 @@ class BaseSDNN(BaseEstimator):
 
     network_: Network
     n_features_in_: int
+    n_inputs_out_of_range_: int
+
+    # Pairs that `fit` has selected, for the time of fitting.
+    _selected: list[tuple[int, int]] | None = None
+
+    OUT_OF_RANGE: ClassVar[tuple[str, ...]] = ("clip", "error")
 
     def _check_parameters(self) -> None:
         """ValueError for an impossible parameter; codings and pairs are checked with the data."""
-        whole("max_iter", self.max_iter, 1, LARGEST)
-        whole("n_iter_no_change", self.n_iter_no_change, 1, LARGEST)
-        whole("memory_limit", self.memory_limit, 0, LARGEST)
+        whole("max_iter", self.max_iter, 1, MOST_EPOCHS)
+        whole("n_iter_no_change", self.n_iter_no_change, 1, MOST_EPOCHS)
+        whole("memory_limit", self.memory_limit, 0, 2**62)
         one_of("training", self.training, _core.TRAINING_FORMS)
         flag("shuffle", self.shuffle)
         flag("early_stopping", self.early_stopping)
         if not isinstance(self.verbose, bool | np.bool_):
-            whole("verbose", self.verbose, 0, LARGEST)
+            whole("verbose", self.verbose, 0, 2**62)
         if self.n_jobs is not None:
             whole("n_jobs", self.n_jobs, -4096, 4096)
         if isinstance(self.coding, list | tuple) and not self.coding:
             raise ValueError(f"coding must name a coding for some columns, got {self.coding!r}")
+        one_of("out_of_range", self.out_of_range, self.OUT_OF_RANGE)
         if not 0 < real("validation_fraction", self.validation_fraction) < 1:
             raise ValueError(
                 f"validation_fraction must be between 0 and 1, got {self.validation_fraction!r}"
@@ -73,60 +92,59 @@ class BaseSDNN(BaseEstimator):
             if self.n_pattern_units % 2:
                 raise ValueError(f"n_pattern_units must be even, got {self.n_pattern_units}")
 
-    def _validated(self, X: Any, y: Any = "no_validation", **options: Any) -> Any:
-        """Check data by scikit-learn's rules; words are let through where a coding takes them."""
-        if isinstance(self.coding, list | tuple):
-            numeric = all(coding.is_numeric for coding, _ in coding_entries(self.coding))
-        else:
-            numeric = coding_named(self.coding).is_numeric
-        checks: dict[str, Any] = (
-            {"dtype": np.float64} if numeric else {"dtype": None, "ensure_all_finite": False}
-        )
-        try:
-            return validate_data(self, X, y, **checks, **options)
-        except ValueError as error:
-            if "could not convert string" in str(error) and np.asarray(X).dtype.kind in "OSU":
-                raise ValueError(f"{error}; {WORDS_HINT}") from None
-            raise
-
-    def _finite(self, table: NDArray[Any], codings: Any) -> NDArray[Any]:
-        """Check the numbers of a table that also holds words."""
-        for index, coding in enumerate(codings):
-            if table.dtype != np.float64 and coding.is_numeric:
-                try:
-                    numbers = np.asarray(table[:, index], dtype=np.float64)
-                except ValueError as error:
-                    raise ValueError(f"{error} in column {index}; {WORDS_HINT}") from None
-                assert_all_finite(numbers, input_name="X")
-        return table
-
     def _start(self, X: Any, table: NDArray[Any], n_units: int) -> np.random.RandomState:
         """Fit the codings, draw tables and first weights; returns the generator of orders."""
         self._check_parameters()
-        names = getattr(self, "feature_names_in_", None)
-        listed = None if names is None else names.tolist()
+        listed = self._listed_names()
         n_inputs = table.shape[1]
-        codings = codings_of_columns(self.coding, RandomInverse(), listed, n_inputs, X)
-        if any(coding.learns for coding in codings):
-            self._need_two(table, "ranges and categories that are not given")
-        self._finite(table, codings)
-        pairs = input_pairs(self.pairs, listed, n_inputs)
+        codings = self._codings(X, table)
+        random: np.random.RandomState = check_random_state(self.random_state)
+        code_seed, weight_seed = (int(seed) for seed in random.randint(2**31 - 1, size=2))
+        shared = isinstance(self.pairs, str) and self.pairs in ("budget", "auto")
+        if self._selected is not None:
+            pairs = self._selected
+        elif shared and n_inputs > 1:
+            pairs = share_of_pairs(n_inputs, PAIR_BUDGET, code_seed)
+        else:
+            pairs = input_pairs("all" if shared else self.pairs, listed, n_inputs)
         n_pattern_units = self.n_pattern_units or pattern_units_for(len(pairs))
         fitted = [
             coding.fit(table[:, index], n_pattern_units) for index, coding in enumerate(codings)
         ]
-        random: np.random.RandomState = check_random_state(self.random_state)
-        code_seed, weight_seed = (int(seed) for seed in random.randint(2**31 - 1, size=2))
+        self._require_memory(n_units, len(pairs), n_pattern_units, fitted, pairs)
         code = draw_input_code(fitted, pairs, n_pattern_units, self.tables, code_seed)
         self.network_ = Network(code, n_units, seed=weight_seed)
+        self._weight_seed = weight_seed
+        self.n_inputs_out_of_range_ = 0
+        self._note_inputs(table)
         return random
 
-    def _need_two(self, samples: NDArray[Any], what: str) -> None:
-        """ValueError, in scikit-learn's words, if one sample has to teach what it cannot."""
-        if len(samples) < 2:
+    def _select_pairs(self, X: Any, table: NDArray[Any], y: Any) -> None:
+        """Let cross-validation select the pairs, if it is to."""
+        if not (isinstance(self.pairs, str) and self.pairs == "auto") or table.shape[1] < 2:
+            return
+        self._check_parameters()
+        seed = int(check_random_state(self.random_state).randint(2**31 - 1))
+        every = share_of_pairs(table.shape[1], PAIR_BUDGET, seed)
+        model = clone(self).set_params(random_state=seed, early_stopping=False, verbose=0)
+        self._selected = select_pairs(model, X, y, every, seed)
+
+    def _require_memory(
+        self,
+        n_units: int,
+        n_pairs: int,
+        n_pattern_units: int,
+        codings: list[Coding],
+        pairs: list[tuple[int, int]],
+    ) -> None:
+        """ValueError if weights and patterns take more than the limit, before they are there."""
+        n_bytes = 4 * n_units * n_pairs * n_pattern_units
+        n_bytes += code_bytes(codings, pairs, n_pattern_units)
+        if n_bytes > self.memory_limit:
             raise ValueError(
-                f"Found array with {len(samples)} sample(s) while a minimum of 2 is required by "
-                f"{type(self).__name__} to learn {what}"
+                f"n_pattern_units={n_pattern_units} of {n_pairs} pairs, read by {n_units} units, "
+                f"need {n_bytes} bytes for weights and patterns, more than "
+                f"memory_limit={self.memory_limit}"
             )
 
     def _table(self, X: Any) -> NDArray[Any]:
@@ -138,8 +156,9 @@ class BaseSDNN(BaseEstimator):
     def _n_threads(self) -> int:
         return int(effective_n_jobs(self.n_jobs))
 
-    def _trainer_options(self) -> dict[str, Any]:
+    def _trainer_options(self, n_epochs: int) -> dict[str, Any]:
         return {
+            "n_epochs": n_epochs,
             "form": self.training,
             "memory_limit": self.memory_limit,
             "n_threads": self._n_threads(),
@@ -157,11 +176,101 @@ class BaseSDNN(BaseEstimator):
         order = random.permutation(n_samples)
         return np.sort(order[:n_held]), np.sort(order[n_held:])
 
-    def _pass_once(self, trainer: Trainer, n_samples: int) -> None:
-        """Present every sample in its order."""
-        trainer.present(np.arange(n_samples, dtype=np.int32))
+    def _scratch(self: Self) -> Self:
+        """Return an estimator to be trained instead of this one, which takes its attributes over.
+
+        So whatever fails leaves this one as it was. They share what they have until then: nothing
+        of it may be changed in place.
+        """
+        work = object.__new__(type(self))
+        work.__dict__.update(self.__dict__)
+        return work
+
+    @abc.abstractmethod
+    def _trainer(
+        self, network: Network, bins: NDArray[np.int32], targets: NDArray[Any], n_epochs: int
+    ) -> Trainer:
+        """Return a trainer of the network; targets as `_present_online` has them."""
+
+    @abc.abstractmethod
+    def _present_online(
+        self, online: _core.OnlineLayer, bins: NDArray[np.int32], targets: NDArray[Any]
+    ) -> None:
+        """Present samples once, or raise and change nothing."""
+
+    def _learn_once(self, bins: NDArray[np.int32], targets: NDArray[Any]) -> None:
+        """Present every sample in its order; all or nothing.
+
+        Single samples are learned in place: nothing that may fail may follow.
+        """
+        few = len(bins) <= FEW_SAMPLES and self.training == "auto"
+        online = self.network_.online(self.memory_limit) if few else None
+        if online is not None:
+            try:
+                self._present_online(online, bins, targets)
+            except OverflowError:
+                pass  # the other forms of training have room for larger weights
+            else:
+                return
+        network = self.network_.copy()
+        trainer = self._trainer(network, bins, targets, n_epochs=1)
+        trainer.present(np.arange(len(bins), dtype=np.int32))
         trainer.synchronize()
-        self.n_iter_ += 1
+        self.network_ = network
+
+    def _note_inputs(self, table: NDArray[Any]) -> None:
+        """Count values to learn that lie beyond their input's range."""
+        n_outside, first = self.network_.input_code.outside(table)
+        if n_outside == 0:
+            return
+        if self.out_of_range == "error":
+            raise ValueError(f"X has {first}, but out_of_range is 'error'")
+        if self.n_inputs_out_of_range_ == 0:
+            self._warn(f"X has {first}: values beyond a range count as its ends")
+        self.n_inputs_out_of_range_ += n_outside
+
+    @staticmethod
+    def _warn(message: str) -> None:
+        warnings.warn(message, OutOfRangeWarning, stacklevel=5)
+
+    def _row(self, x: Any) -> NDArray[Any]:
+        """Return one sample, shape (n_features,), checked; see `learn_one`."""
+        if isinstance(x, Mapping):
+            names = getattr(self, "feature_names_in_", None)
+            if names is None:
+                raise ValueError("x must be a 1-D array: the features were learned without names")
+            try:
+                values: Any = [x[name] for name in names] if len(x) == len(names) else None
+            except KeyError:
+                values = None
+            if values is None:
+                raise ValueError(f"x must have the features {names.tolist()}, got {list(x)}")
+        else:
+            values = x
+        if self._fitted_network.input_code.is_numeric:
+            try:
+                row = np.asarray(values, dtype=np.float64)
+            except (TypeError, ValueError):
+                raise ValueError(f"x must be numbers, got {x!r}") from None
+            if not np.isfinite(row).all():
+                raise ValueError(f"x must be finite numbers, got {x!r}")
+        else:
+            row = np.array(values, dtype=object)
+        if row.shape != (self.n_features_in_,):
+            raise ValueError(f"x must have {self.n_features_in_} features, got {x!r}")
+        return row if row.dtype == np.float64 else self._finite(row[None], self.codings_)[0]
+
+    def _table_of_one(self, x: Any) -> NDArray[Any]:
+        """Return the first sample of all as a table; a mapping gives names to the features."""
+        names = list(x) if isinstance(x, Mapping) else None
+        values = list(x.values()) if isinstance(x, Mapping) else x
+        row = np.array(values, dtype=object)
+        if row.ndim != 1 or (names is not None and not all(isinstance(n, str) for n in names)):
+            raise ValueError(f"x must be a 1-D array, or a mapping with words as keys, got {x!r}")
+        table: NDArray[Any] = self._validated(row[None], reset=True)
+        if names is not None:
+            self.feature_names_in_ = np.array(names, dtype=object)
+        return table
 
     def _run(
         self,
@@ -169,7 +278,9 @@ class BaseSDNN(BaseEstimator):
         n_samples: int,
         random: np.random.RandomState,
         score: Callable[[], float],
-    ) -> None:
+        weights: NDArray[np.float64] | None = None,
+        n_averaged_epochs: int = 1,
+    ) -> History:
         """Train, and set the attributes that tell how it went."""
         history = run_epochs(
             self.network_,
@@ -179,6 +290,8 @@ class BaseSDNN(BaseEstimator):
             random=random if self.shuffle else None,
             score=score if self.early_stopping else None,
             n_iter_no_change=self.n_iter_no_change,
+            weights=weights,
+            n_averaged_epochs=n_averaged_epochs,
             verbose=self.verbose,
         )
         self.n_iter_ = len(history.n_corrected)
@@ -186,6 +299,7 @@ class BaseSDNN(BaseEstimator):
         self.validation_scores_ = np.array(history.scores)
         self.training_form_ = trainer.form
         self.training_memory_ = trainer.memory
+        return history
 
     @property
     def _fitted_network(self) -> Network:
@@ -206,6 +320,23 @@ class BaseSDNN(BaseEstimator):
     def weights_(self) -> NDArray[np.int32]:
         """The integer weights, shape (n_units, n_pairs * n_pattern_units)."""
         return self._fitted_network.weights
+
+    @property
+    def pair_importances_(self) -> NDArray[np.float64]:
+        """How much training has changed the weights of each of ``pairs_``: squares, of a sum of 1.
+
+        Shape (n_pairs,). Zeros if nothing was learned.
+        """
+        network = self._fitted_network
+        code = network.input_code
+        seed = vars(self).get("_weight_seed")
+        if seed is None:
+            raise AttributeError("the file that was loaded does not say what the weights began as")
+        begun = _core.ParallelPerceptron(code.core, network.n_units, seed=seed).weights
+        change = (network.weights - begun).reshape(network.n_units, len(code.pairs), code.n_units)
+        squares: NDArray[np.float64] = np.square(change, dtype=np.float64).sum(axis=(0, 2))
+        shares: NDArray[np.float64] = squares / max(squares.sum(), 1.0)
+        return shares
 
     @property
     def thresholds_(self) -> NDArray[np.int32]:

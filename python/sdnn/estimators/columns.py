@@ -6,10 +6,18 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sdnn.coding import Coding, coding_named
 
-__all__ = ["Columns", "coding_entries", "codings_of_columns", "column_indices", "input_pairs"]
+__all__ = [
+    "Columns",
+    "coding_entries",
+    "codings_of_columns",
+    "column_indices",
+    "input_pairs",
+    "share_of_pairs",
+]
 
 Columns = int | str | slice | Sequence[int] | Sequence[str] | Sequence[bool] | Callable[[Any], Any]
 
@@ -121,6 +129,24 @@ def codings_of_columns(
     return [found.get(index, default) for index in range(n_inputs)]
 
 
+def share_of_pairs(n_inputs: int, n_most: int, seed: int) -> list[tuple[int, int]]:
+    """Return up to ``n_most`` ordered pairs: all, or an even share of them drawn at random.
+
+    In a share every input is modified as often as any other, and modifies as often. There is at
+    least one pair per input.
+
+    >>> share_of_pairs(3, 6, seed=0)
+    [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)]
+    >>> len(share_of_pairs(100, 500, seed=0))
+    500
+    """
+    away: NDArray[np.int64] = np.arange(1, n_inputs)
+    if n_inputs * len(away) > n_most:
+        random = np.random.RandomState(seed)
+        away = random.permutation(away)[: max(1, n_most // n_inputs)]
+    return sorted((mu, int(mu + step) % n_inputs) for mu in range(n_inputs) for step in away)
+
+
 def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int) -> list[tuple[int, int]]:
     """Return the ordered pairs (modified, modifier) of features; (mu, mu) is mu's plain pattern.
 
@@ -143,7 +169,10 @@ def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int) -> list[
         everything = [(mu, nu) for mu in range(n_inputs) for nu in range(n_inputs) if mu != nu]
         return everything or [(0, 0)]
     if isinstance(pairs, str) or not isinstance(pairs, Iterable):
-        raise ValueError(f"pairs must be 'all' or a list of (modified, modifier), got {pairs!r}")
+        raise ValueError(
+            "pairs must be 'budget', 'all', 'auto' or a list of (modified, modifier), "
+            f"got {pairs!r}"
+        )
     found = []
     for pair in pairs:
         if not isinstance(pair, list | tuple | np.ndarray) or len(pair) != 2:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import re
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save as to_bytes
 
+from sdnn import _core
 from sdnn.coding import Coding, from_dict, to_dict
 from sdnn.estimators.input_code import InputCode
 from sdnn.estimators.network import Network
@@ -19,9 +22,19 @@ from sdnn.whole_files import write_whole
 
 __all__ = ["Saved", "load", "save"]
 
-FORMAT = "sdnn-estimator-1"
-PLAIN = ("n_features_in_", "n_iter_", "n_outputs_", "training_form_", "training_memory_")
-PRIVATE = ("_flat", "_counts_of_range", "_scheme")
+FORMAT = "sdnn-estimator-2"
+"""Files of format 1 had no checksum; they are read too."""
+FORMAT_NUMBER = re.compile(r"sdnn-estimator-(\d{1,9})")
+PLAIN = (
+    "n_features_in_",
+    "n_inputs_out_of_range_",
+    "n_iter_",
+    "n_outputs_",
+    "n_outputs_out_of_range_",
+    "training_form_",
+    "training_memory_",
+)
+PRIVATE = ("_flat", "_counts_of_range", "_scheme", "_n_units_each", "_weight_seed")
 ARRAYS = ("output_range_", "n_corrected_", "validation_scores_")
 NAMES = ("classes_", "feature_names_in_")
 
@@ -96,6 +109,10 @@ def save(estimator: Saved, path: str | Path) -> None:
         "weights": narrowed(network.weights),
         "thresholds": narrowed(network.thresholds),
     }
+    earlier = vars(estimator).get("_earlier", ())
+    for number, one in enumerate(earlier):
+        tensors[f"weights.{number}"] = narrowed(one.weights)
+        tensors[f"thresholds.{number}"] = narrowed(one.thresholds)
     for number, table in enumerate(unique.values()):
         tensors[f"table.{number}"] = np.packbits(table > 0, axis=1)
     for name in ARRAYS:
@@ -114,11 +131,24 @@ def save(estimator: Saved, path: str | Path) -> None:
         "codings": [to_dict(coding) for coding in code.codings],
         "pairs": code.pairs,
         "n_units": network.n_units,
+        "n_earlier": len(earlier),
         "n_pattern_units": code.n_units,
         "modified": [number_of[id(table)] for table in code.modified],
         "modifiers": [number_of[id(table)] for table in code.modifiers],
     }
-    write_whole(Path(path), to_bytes(tensors, metadata={"sdnn": json.dumps(metadata)}))
+    text = json.dumps(metadata)
+    stored = {"sdnn": text, "checksum": checksum(text, tensors)}
+    write_whole(Path(path), to_bytes(tensors, metadata=stored))
+
+
+def checksum(text: str, tensors: dict[str, NDArray[Any]]) -> str:
+    """Return the SHA-256 of the description and all tensors, in the order of their names."""
+    digest = hashlib.sha256(text.encode())
+    for name in sorted(tensors):
+        tensor = np.ascontiguousarray(tensors[name])
+        digest.update(f"{name} {tensor.dtype.str} {tensor.shape}".encode())
+        digest.update(tensor.data)
+    return digest.hexdigest()
 
 
 def load(path: str | Path, kind: type[Estimator]) -> Estimator:
@@ -127,12 +157,21 @@ def load(path: str | Path, kind: type[Estimator]) -> Estimator:
         raise IsADirectoryError(f"{path} is a folder, not a file")
     try:
         with safe_open(path, framework="numpy") as file:
-            metadata = described((file.metadata() or {}).get("sdnn", "{}"))
+            stored = file.metadata() or {}
+            metadata = described(stored.get("sdnn", "{}"))
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
     except SafetensorError as error:
         raise ValueError(f"{path} is not a safetensors file: {error}") from None
-    if metadata.get("format") != FORMAT:
+    found = FORMAT_NUMBER.fullmatch(str(metadata.get("format")))
+    if found is None:
         raise ValueError(f"{path} does not hold an estimator of this package ({FORMAT})")
+    if int(found[1]) > 2:
+        raise ValueError(
+            f"{path} was written by a newer version, {metadata.get('version')}, than this one, "
+            f"{version('sdnn')}"
+        )
+    if int(found[1]) == 2 and stored.get("checksum") != checksum(stored["sdnn"], tensors):
+        raise ValueError(f"{path} is damaged: its checksum is another")
     if metadata.get("class") != kind.__name__:
         raise ValueError(f"{path} holds an {metadata.get('class')}, not an {kind.__name__}")
     try:
@@ -155,7 +194,11 @@ def read_estimator(
 ) -> Estimator:
     """Make the estimator with its parameters and all it has learned."""
     estimator = kind(**{name: restored(value) for name, value in metadata["parameters"].items()})
-    for name, value in metadata["plain"].items():
+    # Earlier versions did not count.
+    counts = {"n_inputs_out_of_range_": 0}
+    if "n_outputs_" in metadata["plain"]:
+        counts["n_outputs_out_of_range_"] = 0
+    for name, value in {**counts, **metadata["plain"]}.items():
         if name in (*PLAIN, *PRIVATE):
             setattr(estimator, name, value)
     for name, value in metadata["names"].items():
@@ -165,7 +208,45 @@ def read_estimator(
         if name in tensors:
             setattr(estimator, name, tensors[name])
     estimator.network_ = read_network(metadata, tensors)
+    if "n_outputs_" in vars(estimator):
+        vars(estimator)["_earlier"] = tuple(
+            Network(
+                estimator.network_.input_code,
+                metadata["n_units"],
+                weights=tensors[f"weights.{number}"].astype(np.int32),
+                thresholds=tensors[f"thresholds.{number}"].astype(np.int32),
+            )
+            for number in range(metadata.get("n_earlier", 0))
+        )
+    if "classes_" in vars(estimator):
+        # Files of earlier versions: one unit per class or pair of classes.
+        vars(estimator).setdefault("_n_units_each", 1)
+        if "n_units_per_class" not in metadata["parameters"]:
+            vars(estimator)["n_units_per_class"] = 1
+    require_consistent(estimator)
     return estimator
+
+
+def require_consistent(estimator: Saved) -> None:
+    """ValueError if the parts of a loaded estimator do not fit together."""
+    held = vars(estimator)
+    network = estimator.network_
+    code = network.input_code
+    if "classes_" in held:
+        n_units = _core.n_units_for(held["_scheme"], len(held["classes_"])) * held["_n_units_each"]
+        fits = network.n_units == n_units
+    else:
+        n_outputs = held["n_outputs_"]
+        fits = held["output_range_"].shape == (n_outputs, 2) and network.n_units == (
+            n_outputs * held["_counts_of_range"]
+        )
+        fits = fits and isinstance(held["_flat"], bool)
+    fits = fits and len(code.codings) == held["n_features_in_"]
+    for (mu, nu), modified, modifier in zip(code.pairs, code.modified, code.modifiers, strict=True):
+        fits = fits and len(modified) == code.codings[mu].size
+        fits = fits and len(modifier) == code.codings[nu].size
+    if not fits:
+        raise ValueError("its parts do not fit together")
 
 
 def read_network(metadata: dict[str, Any], tensors: dict[str, NDArray[Any]]) -> Network:

@@ -16,6 +16,9 @@ from sdnn.estimators.libsdnn_language import entries_of, items_of, number_of, wh
 
 Library = Literal["msvc", "libstdc++"]
 
+MOST_DRAWN = 2**27
+"""Flips, and words of 64 units, of the code tables that are drawn: some seconds of them."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class LibsdnnInput:
@@ -83,6 +86,13 @@ class LibsdnnParameters:
         """Return the code with LIBSDNN's own tables; needs a seed in the file."""
         if self.pattern_seed is None:
             raise ValueError("random_seed of PC must be a list of numbers, got hardware_entropy")
+        for one in {self.inputs[index] for pair in self.pairs for index in pair}:
+            n_drawn = 2 * len(self.pairs) * one.n_bins * max(one.n_flipped, self.n_units // 64)
+            if n_drawn > MOST_DRAWN:
+                raise ValueError(
+                    f"q of RANDOM_INVERSE is too large: {one.n_bins} patterns of {self.n_units} "
+                    f"units, {one.n_flipped} flipped, in {2 * len(self.pairs)} tables"
+                )
         sizes = [(one.n_bins, one.n_flipped) for one in self.inputs]
         pairs = np.array(self.pairs, dtype=np.int32)
         modified, modifiers = _core.libsdnn_tables(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,10 @@ from numpy.typing import NDArray
 from sdnn import _core
 from sdnn.estimators.input_code import InputCode
 
-__all__ = ["Network"]
+__all__ = ["FEW_SAMPLES", "Network"]
+
+FEW_SAMPLES = 32
+"""Samples up to which weights in bytes are the quicker way to learn and answer them."""
 
 
 class Network:
@@ -38,8 +42,9 @@ class Network:
     ) -> None:
         self.input_code = input_code
         self.n_units = n_units
+        self._online: _core.OnlineLayer | None = None
         try:
-            self.layer = _core.ParallelPerceptron(
+            self._layer = _core.ParallelPerceptron(
                 input_code.core, n_units, seed=seed, weights=weights, thresholds=thresholds
             )
         except MemoryError:
@@ -63,6 +68,35 @@ class Network:
         self.__init__(**state)  # type: ignore[misc]
 
     @property
+    def layer(self) -> _core.ParallelPerceptron:
+        """The core's layer as it is now; who trains it trains a `copy`, or a fresh network."""
+        if self._online is not None:
+            self._online.synchronize()
+        return self._layer
+
+    def copy(self) -> Network:
+        """Return a network with the same code and weights of its own."""
+        other = object.__new__(Network)
+        other.input_code = self.input_code
+        other.n_units = self.n_units
+        other._online = None
+        other._layer = self.layer.copy()
+        return other
+
+    def online(self, memory_limit: int) -> _core.OnlineLayer | None:
+        """Return the layer for samples one at a time; None if its weights do not fit into bytes.
+
+        It is kept until the network is pickled or its weights are replaced. None too if its two
+        bytes per weight are more than ``memory_limit``.
+        """
+        if self._online is None and 2 * self.n_units * self.input_code.core.n_columns <= (
+            memory_limit
+        ):
+            with contextlib.suppress(ValueError, MemoryError):
+                self._online = _core.OnlineLayer(self._layer)
+        return self._online
+
+    @property
     def weights(self) -> NDArray[np.int32]:
         """Copy the weights, shape (n_units, n_columns)."""
         return self.layer.weights
@@ -74,15 +108,31 @@ class Network:
 
     def restore(self, weights: NDArray[np.int32], thresholds: NDArray[np.int32]) -> None:
         """Go back to earlier weights and thresholds."""
-        self.layer = _core.ParallelPerceptron(
+        self._online = None
+        self._layer = _core.ParallelPerceptron(
             self.input_code.core, self.n_units, weights=weights, thresholds=thresholds
         )
 
     def potentials(self, table: NDArray[Any], n_threads: int) -> NDArray[np.int32]:
         """Potentials, (n_samples, n_inputs) to (n_samples, n_units)."""
-        return self.layer.potentials(self.input_code.bins(table), n_threads=n_threads)
+        return self.potentials_of_bins(self.input_code.bins(table), n_threads)
+
+    def potentials_of_bins(self, bins: NDArray[np.int32], n_threads: int) -> NDArray[np.int32]:
+        """Potentials, (n_samples, n inputs in pairs) to (n_samples, n_units)."""
+        if self._online is not None and len(bins) <= FEW_SAMPLES:
+            return self._online.potentials(bins)
+        return self.layer.potentials(bins, n_threads=n_threads)
 
     def counts(self, table: NDArray[Any], n_groups: int, n_threads: int) -> NDArray[np.int32]:
         """How many units fire, (n_samples, n_inputs) to (n_samples, n_groups)."""
-        bins = self.input_code.bins(table)
+        return self.counts_of_bins(self.input_code.bins(table), n_groups, n_threads)
+
+    def counts_of_bins(
+        self, bins: NDArray[np.int32], n_groups: int, n_threads: int
+    ) -> NDArray[np.int32]:
+        """How many units fire, (n_samples, n inputs in pairs) to (n_samples, n_groups)."""
+        if self._online is not None and len(bins) <= FEW_SAMPLES:
+            firing = (self._online.potentials(bins) > 0).reshape(len(bins), n_groups, -1)
+            counts: NDArray[np.int32] = firing.sum(axis=2, dtype=np.int32)
+            return counts
         return self.layer.counts(bins, n_groups=n_groups, n_threads=n_threads)

@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import RegressorMixin
 
 from sdnn import _core
-from sdnn.arguments import whole
+from sdnn.arguments import flag, whole
 from sdnn.estimators.base import BaseSDNN
-from sdnn.estimators.training import Trainer
+from sdnn.estimators.network import Network
+from sdnn.estimators.training import Trainer, run_epochs
 
 __all__ = ["SDNNRegressor"]
 
@@ -41,9 +42,12 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         ColumnTransformer (inputs left out have "random-inverse").
     n_pattern_units : int, optional
         Units per pattern, even. None shares about 16,000 columns out among the pairs.
-    pairs : "all" or list of (modified, modifier), default="all"
+    pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"
         Pairs of features, by number or name. A modifier of None leaves a pattern plain, which is
-        also what a single feature gets.
+        also what a single feature gets. "budget" means all pairs up to 22 features, and beyond an
+        even share of them drawn at random: 500 pairs, or one per feature. "auto" lets `fit` leave
+        out those that do not matter, as far as cross-validation is clearly better without them;
+        it takes some forty times as long.
     tables : {"shared", "separate"}, default="shared"
         One table of patterns per input, permuted anew for each pair, or two tables per pair.
     n_output_units : int, default=280
@@ -51,14 +55,25 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     output_range : (float, float) or array_like of shape (n_outputs, 2), optional
         Smallest and largest output. None takes the range of the first sample's targets and a
         fifth of it more on either side.
+    out_of_range : {"clip", "widen", "error"}, default="clip"
+        Targets to learn beyond the output range count as its ends, widen it (which stretches
+        what was learned until it is learned anew), or are errors. Inputs beyond their range
+        count as its ends, unless they are errors. An `OutOfRangeWarning` says so once.
     max_iter : int, default=30
         Largest number of epochs of `fit`, which ends earlier once nothing is corrected. Targets
         with much noise want fewer, say 5; exact ones more, say 300.
     shuffle : bool, default=True
         Whether each epoch has a new random order; otherwise it is the order of the sample.
+    n_averaged_epochs : int, default=1
+        Predict the mean of the answers after this many last epochs of `fit`; each is a network in
+        memory. On noisy targets 10 are much better than one. `partial_fit` goes on from the last
+        alone.
     early_stopping : bool, default=False
         Whether to hold a fraction of the sample out, stop when its error no longer falls, and keep
         the best weights.
+    refit : bool, default=False
+        Whether to train anew on the whole sample after early stopping, for the best number of
+        epochs.
     validation_fraction : float, default=0.1
         The fraction that early stopping holds out.
     n_iter_no_change : int, default=10
@@ -66,7 +81,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     training : {"auto", "dual", "block", "plain"}, default="auto"
         Form of training; the result is the same to the last bit, time and memory differ.
     memory_limit : int, default=2**30
-        Bytes that training may use beside the weights.
+        Bytes that weights and patterns may use, and that training may use beside them.
     random_state : int, RandomState or None, default=None
         Decides patterns, first weights, orders and the validation share.
     n_jobs : int, optional
@@ -80,9 +95,13 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         The fitted coding of each input.
     pairs_ : tuple of (int, int)
         The pairs in use.
+    pair_importances_ : ndarray, shape (n_pairs,)
+        How much training has changed the weights of each pair; they sum to 1.
     weights_ : ndarray of int32, shape (n_outputs * n_output_units, n_columns)
     thresholds_ : ndarray of int32, shape (n_outputs * n_output_units,)
     output_range_ : ndarray, shape (n_outputs, 2)
+    n_inputs_out_of_range_, n_outputs_out_of_range_ : int
+        Values learned since the last `fit` that lay beyond their range.
     n_outputs_ : int
     n_iter_ : int
         Epochs of the last `fit` and calls of `partial_fit` since.
@@ -109,18 +128,25 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     (3,)
     """
 
+    OUT_OF_RANGE = ("clip", "widen", "error")
+
+    _earlier: tuple[Network, ...]
+
     def __init__(
         self,
         coding: Any = "random-inverse",
         *,
         n_pattern_units: int | None = None,
-        pairs: Any = "all",
+        pairs: Any = "budget",
         tables: str = "shared",
         n_output_units: int = 280,
         output_range: Any = None,
+        out_of_range: str = "clip",
         max_iter: int = 30,
         shuffle: bool = True,
+        n_averaged_epochs: int = 1,
         early_stopping: bool = False,
+        refit: bool = False,
         validation_fraction: float = 0.1,
         n_iter_no_change: int = 10,
         training: str = "auto",
@@ -135,9 +161,12 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         self.tables = tables
         self.n_output_units = n_output_units
         self.output_range = output_range
+        self.out_of_range = out_of_range
         self.max_iter = max_iter
         self.shuffle = shuffle
+        self.n_averaged_epochs = n_averaged_epochs
         self.early_stopping = early_stopping
+        self.refit = refit
         self.validation_fraction = validation_fraction
         self.n_iter_no_change = n_iter_no_change
         self.training = training
@@ -175,11 +204,26 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         MemoryError
             If there is no room for the weights.
         """
+        work = self._scratch()
+        work._fit(X, y)
+        self.__dict__ = work.__dict__
+        return self
+
+    def _fit(self, X: ArrayLike, y: ArrayLike) -> None:
+        flag("refit", self.refit)
+        whole("n_averaged_epochs", self.n_averaged_epochs, 1, 1000)
         table, targets = self._checked(X, y, reset=True)
+        self._select_pairs(X, table, y)
         random = self._begin(X, table, targets)
+        self.__dict__.pop("_selected", None)
+        if self.out_of_range == "widen":
+            self._widen(targets.min(axis=0))
+            self._widen(targets.max(axis=0))
+        counts_to_learn = self._counts_to_learn(targets)
+        bins = self.network_.input_code.bins(table)
         held, kept = self._split(random, len(table))
-        trainer = self._trainer(table[kept], targets[kept])
-        held_bins = self.network_.input_code.bins(table[held])
+        trainer = self._trainer(self.network_, bins[kept], counts_to_learn[kept], self.max_iter)
+        held_bins = bins[held]
         held_counts = self._in_counts(targets[held])
 
         def score() -> float:
@@ -188,8 +232,35 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             )
             return -float(np.mean((held_counts - counts) ** 2))
 
-        self._run(trainer, len(kept), random, score)
-        return self
+        n_averaged = self.n_averaged_epochs
+        history = self._run(
+            trainer, len(kept), random, score, n_averaged_epochs=1 if self.refit else n_averaged
+        )
+        self._earlier = history.earlier
+        if self.refit and self.early_stopping:
+            self._refit(bins, counts_to_learn, random, history.n_epochs)
+
+    def _refit(
+        self,
+        bins: NDArray[np.int32],
+        counts: NDArray[np.float64],
+        random: np.random.RandomState,
+        n_epochs: int,
+    ) -> None:
+        """Train anew on the whole sample, for as many epochs as were best on a part of it."""
+        network = self.network_
+        self.network_ = Network(network.input_code, network.n_units, seed=self._weight_seed)
+        trainer = self._trainer(self.network_, bins, counts, n_epochs)
+        history = run_epochs(
+            self.network_,
+            trainer,
+            len(bins),
+            max_iter=n_epochs,
+            random=random if self.shuffle else None,
+            n_averaged_epochs=self.n_averaged_epochs,
+            verbose=self.verbose,
+        )
+        self._earlier = history.earlier
 
     def partial_fit(self: Self, X: ArrayLike, y: ArrayLike) -> Self:
         """Go once through the samples, in their order.
@@ -213,30 +284,120 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         ValueError, OverflowError, MemoryError
             As of `fit`; ValueError too for another number of outputs.
         """
+        work = self._scratch()
         first = not hasattr(self, "network_")
-        table, targets = self._checked(X, y, reset=first)
+        table, targets = work._checked(X, y, reset=first)
         if first:
-            self._begin(X, table, targets)
-            self.n_iter_ = 0
-        elif targets.shape[1] != self.n_outputs_:
-            raise ValueError(
-                f"y must have as many outputs as before, {self.n_outputs_}, got {targets.shape[1]}"
-            )
-        trainer = self._trainer(table, targets)
-        self._pass_once(trainer, len(table))
+            work._begin(X, table, targets)
+            work.n_iter_ = 0
+        else:
+            work._check_outputs(targets.shape[1])
+            work._finite(table, work.codings_)
+            work._note_inputs(table)
+        counts = work._counts_to_learn(targets)
+        work.n_iter_ += 1
+        work._earlier = ()
+        work._learn_once(work.network_.input_code.bins(table), counts)
+        self.__dict__ = work.__dict__
         return self
 
-    def predict(self, X: ArrayLike) -> NDArray[np.float64]:
+    def learn_one(self: Self, x: Any, y: Any) -> Self:
+        """Learn one sample: `partial_fit` of one row, to the same bits, without its overhead.
+
+        Parameters
+        ----------
+        x : array_like of shape (n_features,), or mapping from feature names to values
+            The names of a mapping that comes first of all are those of the features.
+        y : float or array_like of shape (n_outputs,)
+
+        Returns
+        -------
+        SDNNRegressor
+            Itself.
+
+        Raises
+        ------
+        ValueError, OverflowError, MemoryError
+            As of `partial_fit`; nothing is changed then.
+
+        Examples
+        --------
+        >>> from sdnn.coding import RandomInverse
+        >>> unit = RandomInverse(low=0.0, high=1.0)
+        >>> model = SDNNRegressor(unit, output_range=(0, 1), n_pattern_units=64, random_state=0)
+        >>> for _ in range(20):
+        ...     model = model.learn_one({"a": 0.2, "b": 0.9}, 0.75)
+        >>> model.predict_one({"a": 0.2, "b": 0.9})
+        0.75
+        """
+        try:
+            targets = np.array(y, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ValueError(f"y must be a number or one per output, got {y!r}") from None
+        if targets.ndim > 1 or not np.isfinite(targets).all():
+            raise ValueError(f"y must be a finite number or one per output, got {y!r}")
+        work = self._scratch()
+        if not hasattr(self, "network_"):
+            table = work._table_of_one(x)
+            work._flat = targets.ndim == 0
+            work._begin(x, table, targets.reshape(1, -1))
+            work.n_iter_ = 0
+            bins = work.network_.input_code.bins(table)
+        else:
+            row = self._row(x)
+            work._check_outputs(targets.size)
+            work._note_inputs(row[None])
+            bins = work.network_.input_code.bins_of_row(row)
+        counts = work._counts_to_learn(targets.reshape(1, -1))
+        work.n_iter_ += 1
+        work._earlier = ()
+        work._learn_once(bins, counts)
+        self.__dict__ = work.__dict__
+        return self
+
+    def predict_one(self, x: Any) -> Any:
+        """Predict the outputs of one sample: `predict` of one row, without its overhead.
+
+        Parameters
+        ----------
+        x : array_like of shape (n_features,), or mapping from feature names to values
+
+        Returns
+        -------
+        float, or ndarray of shape (n_outputs,) where targets had several
+
+        Raises
+        ------
+        NotFittedError, ValueError
+            As of `predict`.
+        """
+        network = self._fitted_network
+        network.online(self.memory_limit)
+        bins = network.input_code.bins_of_row(self._row(x))
+        counts = [
+            each.counts_of_bins(bins, self.n_outputs_, n_threads=1)
+            for each in (*self._earlier, network)
+        ]
+        values = self._of_counts(np.mean(counts, axis=0) if self._earlier else counts[0])[0]
+        return float(values[0]) if self._flat else values
+
+    def predict(self, X: ArrayLike, return_std: bool = False) -> Any:
         """Predict the outputs of samples.
 
         Parameters
         ----------
         X : array_like, shape (n_samples, n_features)
+        return_std : bool, default=False
+            Whether to return the standard deviation of the averaged epochs' answers too: how
+            unsettled a prediction is, which is not the noise of the targets. Zero where nothing
+            is averaged.
 
         Returns
         -------
         ndarray, shape (n_samples,) or (n_samples, n_outputs)
             As the targets' shape was in training.
+        ndarray, the same shape
+            With ``return_std``.
 
         Raises
         ------
@@ -246,9 +407,22 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             For samples that cannot be used: another number of features, NaN, unknown categories.
         """
         table = self._table(X)
-        counts = self.network_.counts(table, self.n_outputs_, self._n_threads())
-        values = self._step() * counts + self.output_range_[:, 0]
-        return values[:, 0] if self._flat else values
+        bins = self.network_.input_code.bins(table)
+        counts = [
+            network.counts_of_bins(bins, self.n_outputs_, self._n_threads())
+            for network in (*self._earlier, self.network_)
+        ]
+        values = self._of_counts(np.mean(counts, axis=0) if self._earlier else counts[0])
+        if not return_std:
+            return values[:, 0] if self._flat else values
+        spread = self._step() * np.std(counts, axis=0)
+        return (values[:, 0], spread[:, 0]) if self._flat else (values, spread)
+
+    def _check_outputs(self, n_outputs: int) -> None:
+        if n_outputs != self.n_outputs_:
+            raise ValueError(
+                f"y must have as many outputs as before, {self.n_outputs_}, got {n_outputs}"
+            )
 
     def _checked(self, X: Any, y: Any, reset: bool) -> tuple[NDArray[Any], NDArray[np.float64]]:
         if y is None:
@@ -268,6 +442,8 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     ) -> np.random.RandomState:
         self.n_outputs_ = targets.shape[1]
         self.output_range_ = self._range_of(targets)
+        self.n_outputs_out_of_range_ = 0
+        self._earlier = ()
         n_units = whole("n_output_units", self.n_output_units, 1, 2**20)
         self._counts_of_range = n_units
         return self._start(X, table, self.n_outputs_ * n_units)
@@ -309,11 +485,63 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         counts: NDArray[np.float64] = (targets - self.output_range_[:, 0]) / self._step()
         return counts
 
-    def _trainer(self, table: NDArray[Any], targets: NDArray[np.float64]) -> Trainer:
-        self._finite(table, self.codings_)
-        return _core.PDeltaTrainer(
-            self.network_.layer,
-            self.network_.input_code.bins(table),
-            self._in_counts(targets),
-            **self._trainer_options(),
-        )
+    def _of_counts(self, counts: NDArray[Any]) -> NDArray[np.float64]:
+        """Return the outputs of firing counts, shape (n_samples, n_outputs)."""
+        values: NDArray[np.float64] = self._step() * counts + self.output_range_[:, 0]
+        return values
+
+    def _counts_to_learn(self, targets: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Targets in counts; those beyond the range are counted, refused, or widen it."""
+        counts = self._in_counts(targets)
+        if counts.min() >= 0 and counts.max() <= self._counts_of_range:
+            return counts
+        low, high = self.output_range_.T
+        outside = (targets < low) | (targets > high)
+        if not outside.any():  # a count that was rounded
+            return counts
+        row, output = np.argwhere(outside)[0].tolist()
+        ends = f"{targets[row, output]}, beyond output_range_ [{low[output]}, {high[output]}]"
+        if self.out_of_range == "error":
+            raise ValueError(f"y has {ends}, but out_of_range is 'error'")
+        if self.n_outputs_out_of_range_ == 0:
+            then = "count as its ends" if self.out_of_range == "clip" else "widen it"
+            self._warn(f"y has {ends}: values beyond the range {then}")
+        if self.out_of_range == "clip":
+            self.n_outputs_out_of_range_ += int(np.count_nonzero(outside))
+            return counts
+        begin = 0
+        for row in np.flatnonzero(outside.any(axis=1)).tolist():
+            counts[begin:row] = self._in_counts(targets[begin:row])
+            begin = row
+            self.n_outputs_out_of_range_ += self._widen(targets[row])
+        counts[begin:] = self._in_counts(targets[begin:])
+        return counts
+
+    def _widen(self, targets: NDArray[np.float64]) -> int:
+        """Widen the ranges of outputs whose target lies beyond; returns how many did.
+
+        Predictions so far are stretched with the range, as counts keep their meaning within it.
+        """
+        low, high = self.output_range_.T
+        new_low = np.where(targets < low, targets - MARGIN * (high - targets), low)
+        new_high = np.where(targets > high, targets + MARGIN * (targets - low), high)
+        if not np.all(np.isfinite(new_high - new_low)):
+            raise ValueError(f"y has {targets}: no range can be so wide")
+        n_widened = int(np.count_nonzero((new_low < low) | (new_high > high)))
+        self.output_range_ = np.stack([new_low, new_high], axis=1)
+        return n_widened
+
+    def _trainer(
+        self,
+        network: Network,
+        bins: NDArray[np.int32],
+        targets: NDArray[np.float64],
+        n_epochs: int,
+    ) -> Trainer:
+        options = self._trainer_options(n_epochs)
+        return _core.PDeltaTrainer(network.layer, bins, targets, **options)
+
+    def _present_online(
+        self, online: _core.OnlineLayer, bins: NDArray[np.int32], targets: NDArray[np.float64]
+    ) -> None:
+        online.learn_counts(bins, targets)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Protocol
@@ -43,10 +44,16 @@ class History:
         Samples that were corrected.
     scores : list of float
         Validation scores; empty without early stopping.
+    n_epochs : int
+        Epochs that made the weights: with early stopping, up to the best.
+    earlier : tuple of Network
+        The network after each of the epochs before the last of these.
     """
 
     n_corrected: list[int] = dataclasses.field(default_factory=list)
     scores: list[float] = dataclasses.field(default_factory=list)
+    n_epochs: int = 0
+    earlier: tuple[Network, ...] = ()
 
 
 @contextmanager
@@ -66,6 +73,26 @@ def progress_bar(verbose: int, n_epochs: int) -> Iterator[Callable[[int], None]]
         yield _advance
 
 
+def presented(n_samples: int, weights: NDArray[np.float64] | None, epoch: int) -> NDArray[np.int32]:
+    """Return the samples of an epoch, a sample of weight 2 twice and one of 1/2 in every other.
+
+    >>> [presented(3, np.array([2.0, 0.5, 0.0]), epoch).tolist() for epoch in range(3)]
+    [[0, 0, 1], [0, 0], [0, 0, 1]]
+    """
+    in_order = np.arange(n_samples, dtype=np.int32)
+    if weights is None:
+        return in_order
+    phases = in_order * 0.6180339887498949 % 1  # so that not all of them come together
+    times = np.floor(weights * (epoch + 1) + phases) - np.floor(weights * epoch + phases)
+    return np.repeat(in_order, times.astype(np.int64))
+
+
+def epochs_to_present_all(weights: NDArray[np.float64]) -> int:
+    """Return how many epochs it takes until each sample of a weight above 0 has come."""
+    least = float(np.min(weights, where=weights > 0, initial=1.0))
+    return int(min(np.ceil(1 / least), 2**62))
+
+
 def run_epochs(
     network: Network,
     trainer: Trainer,
@@ -75,6 +102,8 @@ def run_epochs(
     random: np.random.RandomState | None = None,
     score: Callable[[], float] | None = None,
     n_iter_no_change: int = 10,
+    weights: NDArray[np.float64] | None = None,
+    n_averaged_epochs: int = 1,
     verbose: int = 0,
 ) -> History:
     """Train until nothing is corrected, nothing improves, or ``max_iter`` epochs are over.
@@ -95,30 +124,45 @@ def run_epochs(
         Validation score of the network as it is; larger is better.
     n_iter_no_change : int
         Epochs without a better score after which training stops.
+    weights : ndarray, shape (n_samples,), optional
+        How often each sample is presented per epoch, on average; once by default.
+    n_averaged_epochs : int
+        How many epochs' networks are kept, the last among them.
     verbose : int
         Whether to show a progress bar.
     """
     history = History()
-    in_order = np.arange(n_samples, dtype=np.int32)
+    quiet, n_quiet = 0, 1 if weights is None else epochs_to_present_all(weights)
     best: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None
+    best_earlier: tuple[Network, ...] = ()
+    kept: deque[Network] = deque(maxlen=n_averaged_epochs - 1)
     best_score, best_epoch = -np.inf, 0
     with progress_bar(verbose, max_iter) as advance:
         for epoch in range(max_iter):
-            order = in_order if random is None else random.permutation(in_order)
+            order = presented(n_samples, weights, epoch)
+            if random is not None:
+                order = random.permutation(order)
             n_corrected, _ = trainer.present(order)
             history.n_corrected.append(n_corrected)
             advance(n_corrected)
-            if score is not None:
+            if score is not None or n_averaged_epochs > 1:
                 trainer.synchronize()
+            if score is not None:
                 history.scores.append(score())
                 if best is None or history.scores[-1] > best_score:
                     best_score, best_epoch = history.scores[-1], epoch
                     best = network.weights, network.thresholds
+                    best_earlier = tuple(kept)
                 elif epoch - best_epoch >= n_iter_no_change:
                     break
-            if n_corrected == 0:
+            quiet = quiet + 1 if n_corrected == 0 else 0
+            if quiet == n_quiet:
                 break
+            if n_averaged_epochs > 1 and epoch + 1 < max_iter:
+                kept.append(network.copy())
     trainer.synchronize()
+    history.n_epochs, history.earlier = len(history.n_corrected), tuple(kept)
     if best is not None:
         network.restore(*best)
+        history.n_epochs, history.earlier = best_epoch + 1, best_earlier
     return history

@@ -104,6 +104,7 @@ def test_a_period_away_is_the_same_angle(angle, turns):
     assert min((a - b) % 360, (b - a) % 360) <= 1
 
 
+@pytest.mark.filterwarnings("ignore::sdnn.coding.CoarseCodeWarning")
 @settings(max_examples=100, deadline=None)
 @given(st.integers(1, 4000), st.floats(0.01, 3))
 def test_the_length_scale_is_where_the_correlation_is_one_over_e(half, length_scale):

@@ -77,7 +77,7 @@ def test_regression(problem, n_outputs, n_output_units):
     layer = transcribed(model)
     bins = model.network_.input_code.bins(X)
     slow = estimator_transcription.PDeltaTrainer(layer, bins, counts)
-    fast = model._trainer(X, y.astype(float))
+    fast = model._trainer(model.network_, bins, counts, 3)
     for order in orders:
         assert tuple(fast.present(np.array(order, dtype=np.int32))) == slow.present(order)
     fast.synchronize()
@@ -91,12 +91,12 @@ def test_regression(problem, n_outputs, n_output_units):
 @given(problems(), st.sampled_from(["one_vs_rest", "one_vs_one"]))
 def test_classification(problem, scheme):
     X, y, options, orders = problem
-    model, labels = untrained(SDNNClassifier(scheme=scheme, **options), X, y)
+    model, labels = untrained(SDNNClassifier(scheme=scheme, n_units_per_class=1, **options), X, y)
     layer = transcribed(model)
     slow = estimator_transcription.PerceptronTrainer(
         layer, model.network_.input_code.bins(X), labels, len(model.classes_), scheme
     )
-    fast = model._trainer(X, labels)
+    fast = model._trainer(model.network_, model.network_.input_code.bins(X), labels, 3)
     for order in orders:
         assert tuple(fast.present(np.array(order, dtype=np.int32))) == slow.present(order)
     fast.synchronize()
@@ -111,6 +111,8 @@ def test_fit_presents_the_orders_it_says(regression):
     y = X[:, 0] if regression else np.digitize(X[:, 0], [0.3, 0.6])
     kind = SDNNRegressor if regression else SDNNClassifier
     options = {"n_pattern_units": 40, "random_state": 11, "max_iter": 7}
+    if not regression:
+        options["n_units_per_class"] = 1
     model = kind(**options).fit(X, y)
 
     begun, targets = untrained(kind(**options), X, y)

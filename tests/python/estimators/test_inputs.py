@@ -151,3 +151,33 @@ def test_a_symbolic_input_alone_is_a_lookup_table():
     model = SDNNClassifier("symbolic", n_pattern_units=100, random_state=0).fit(words, [0, 1, 1, 0])
     assert model.predict(words).tolist() == [0, 1, 1, 0]
     assert Symbolic().fit(words[:, 0], 100).size == 4
+
+
+def test_pandas_categories_stand_beside_its_own_numbers():
+    random = np.random.RandomState(4)
+    frame = pd.DataFrame(
+        {
+            "kind": pd.Categorical(random.choice(["u", "v"], 40)),
+            "open": random.uniform(size=40) > 0.5,
+            "count": pd.array(random.randint(0, 5, 40), dtype="Int64"),
+            "wind": pd.array(random.uniform(size=40), dtype="Float64"),
+        }
+    )
+    y = random.uniform(size=40)
+    options = {"coding": [("symbolic", ["kind"])], "n_pattern_units": 32, "random_state": 0}
+    model = SDNNRegressor(**options).fit(frame, y)
+    plain = pd.DataFrame(
+        {
+            name: frame[name].astype(str if name == "kind" else float).astype(object)
+            for name in frame
+        }
+    )
+    np.testing.assert_array_equal(model.predict(frame), model.predict(plain))
+    np.testing.assert_array_equal(model.weights_, SDNNRegressor(**options).fit(plain, y).weights_)
+    row = frame.iloc[0].to_dict()
+    assert model.predict_one(row) == model.predict(frame)[0]
+    for name in ("count", "kind"):
+        missing = frame.copy()
+        missing.loc[3, name] = None
+        with pytest.raises(ValueError, match=r"NaN|NA"):
+            SDNNRegressor(**options).fit(missing, y)

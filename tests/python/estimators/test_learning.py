@@ -10,6 +10,7 @@ from sklearn.datasets import load_iris
 
 from sdnn import SDNNClassifier, SDNNRegressor, _core
 from sdnn.coding import Circular, RandomInverse
+from sdnn.estimators import OutOfRangeWarning
 
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(0, 1, (150, 2))
@@ -161,8 +162,10 @@ def test_outputs_are_steps_within_the_range():
     model = SDNNRegressor(**REGRESSOR, max_iter=20).fit(X, Y)
     counts = (model.predict(X) + 1.5) / (3 / 60)
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-9)
-    far = SDNNRegressor(**REGRESSOR, max_iter=20).fit(X, Y + 100).predict(X)
-    assert far.max() == pytest.approx(1.5)
+    with pytest.warns(OutOfRangeWarning, match="values beyond the range count as its ends"):
+        far = SDNNRegressor(**REGRESSOR, max_iter=20).fit(X, Y + 100)
+    assert far.predict(X).max() == pytest.approx(1.5)
+    assert far.n_outputs_out_of_range_ == len(X)
 
 
 @pytest.mark.parametrize("kind", [SDNNRegressor, SDNNClassifier])
@@ -179,11 +182,14 @@ def test_early_stopping_keeps_the_best_weights(kind):
         kind(early_stopping=True, validation_fraction=0.9).fit(X[:2], [0, 1])
 
 
-@pytest.mark.parametrize("scheme", ["one_vs_rest", "one_vs_one"])
+@pytest.mark.parametrize(
+    ("scheme", "n_units_each"), [("one_vs_rest", 1), ("one_vs_rest", 20), ("one_vs_one", 1)]
+)
 @pytest.mark.parametrize("n_classes", [2, 4])
-def test_the_largest_decision_wins(scheme, n_classes):
+def test_the_largest_decision_wins(scheme, n_units_each, n_classes):
     labels = np.digitize(Y, np.quantile(Y, np.arange(1, n_classes) / n_classes))
-    model = SDNNClassifier(**GIVEN, scheme=scheme, max_iter=1).fit(X, labels)
+    options = {**GIVEN, "scheme": scheme, "n_units_per_class": n_units_each, "max_iter": 1}
+    model = SDNNClassifier(**options).fit(X, labels)
     decision = model.decision_function(X)
     if n_classes == 2:
         assert decision.shape == (150,)
@@ -192,7 +198,7 @@ def test_the_largest_decision_wins(scheme, n_classes):
         assert decision.shape == (150, n_classes)
         np.testing.assert_array_equal(model.predict(X), decision.argmax(axis=1))
     n_units = n_classes if scheme == "one_vs_rest" else n_classes * (n_classes - 1) // 2
-    assert len(model.thresholds_) == n_units
+    assert len(model.thresholds_) == n_units * n_units_each
 
 
 def test_one_versus_one_counts_votes():
@@ -207,6 +213,73 @@ def test_one_versus_one_counts_votes():
     np.testing.assert_array_equal(np.round(model.decision_function(X)), votes)
 
 
+@pytest.mark.parametrize("random_state", [0, 1, 2])
+def test_several_units_learn_the_parity_of_three_inputs(random_state):
+    points = np.random.RandomState(0).uniform(size=(2000, 3))
+    parity = (points > 0.5).sum(axis=1) % 2
+    options = {"random_state": random_state, "n_pattern_units": 1000}
+    several = SDNNClassifier(**options).fit(points[:1000], parity[:1000])
+    assert several.score(points[1000:], parity[1000:]) >= 0.95
+    single = SDNNClassifier(**options, n_units_per_class=1, max_iter=20)
+    assert single.fit(points[:1000], parity[:1000]).score(points[1000:], parity[1000:]) < 0.6
+
+
+def test_scores_are_shares_of_firing_units():
+    model = SDNNClassifier(**GIVEN, n_units_per_class=12).fit(X, LABELS)
+    firing = model.network_.potentials(X, 1) > 0
+    shares = firing.reshape(len(X), 3, 12).mean(axis=2)
+    np.testing.assert_array_equal(model.decision_function(X), shares)
+    raised = np.exp(6 * shares)
+    np.testing.assert_allclose(
+        model.predict_proba(X), raised / raised.sum(axis=1, keepdims=True), rtol=1e-12
+    )
+    np.testing.assert_array_equal(model.predict(X), model.predict_proba(X).argmax(axis=1))
+
+
+def test_the_number_of_units_is_shared_out():
+    assert len(SDNNClassifier(**GIVEN).fit(X, LABELS).thresholds_) == 3 * 60
+    many = np.arange(len(X)) % 75
+    assert len(SDNNClassifier(**GIVEN, max_iter=1).fit(X, many).thresholds_) == 75 * 16
+    one = SDNNClassifier(**GIVEN, scheme="one_vs_one", max_iter=1).fit(X, LABELS)
+    assert len(one.thresholds_) == 3
+    assert not hasattr(one, "predict_proba")
+    assert not hasattr(SDNNClassifier(n_units_per_class=1), "predict_proba")
+    with pytest.raises(ValueError, match="1 or None with scheme='one_vs_one', got 5"):
+        SDNNClassifier(scheme="one_vs_one", n_units_per_class=5).fit(X, LABELS)
+    with pytest.raises(ValueError, match="n_units_per_class must be a whole number"):
+        SDNNClassifier(n_units_per_class=0).fit(X, LABELS)
+
+
+def test_weights_of_classes_are_numbers_of_presentations():
+    rare = (Y > 0.6).astype(int)
+    assert 0 < rare.sum() < 20
+    options = {**GIVEN, "shuffle": False, "max_iter": 4}
+    weighted = SDNNClassifier(**options, class_weight={0: 1, 1: 3}).fit(X, rare)
+    by_hand = SDNNClassifier(**options)
+    by_hand.partial_fit(np.repeat(X, 1 + 2 * rare, axis=0), np.repeat(rare, 1 + 2 * rare), [0, 1])
+    for _ in range(weighted.n_iter_ - 1):
+        by_hand.partial_fit(np.repeat(X, 1 + 2 * rare, axis=0), np.repeat(rare, 1 + 2 * rare))
+    same(weighted, by_hand)
+    noisy = np.where(RANDOM.uniform(size=len(Y)) < 0.2, 1, 0)
+    options = {**GIVEN, "max_iter": 8}
+    plain = SDNNClassifier(**options).fit(X, noisy)
+    balanced = SDNNClassifier(**options, class_weight="balanced").fit(X, noisy)
+    assert balanced.predict(X).mean() > plain.predict(X).mean()
+    for bad in ({0: -1, 1: 1}, {0: np.nan}, "even"):
+        with pytest.raises(ValueError, match="class_weight"):
+            SDNNClassifier(class_weight=bad).fit(X, rare)
+    with pytest.raises(ValueError, match="class_weight works in fit only"):
+        SDNNClassifier(class_weight="balanced").partial_fit(X, rare, classes=[0, 1])
+
+
+def test_training_ends_when_all_weighted_samples_are_learned():
+    easy = (X[:, 0] > 0.5).astype(int)
+    model = SDNNClassifier(**GIVEN, n_units_per_class=1, class_weight={0: 0.25, 1: 1}).fit(X, easy)
+    assert model.n_iter_ < 100
+    assert model.n_corrected_[-4:].tolist() == [0, 0, 0, 0]
+    assert model.score(X, easy) == 1
+
+
 def test_words_and_unit_counts_are_those_of_the_core():
     assert _core.TRAINING_FORMS == ("auto", "dual", "block", "plain")
     assert _core.CLASS_SCHEMES == ("one_vs_rest", "one_vs_one")
@@ -219,7 +292,62 @@ def test_words_and_unit_counts_are_those_of_the_core():
 
 
 def test_a_trainer_refuses_units_that_its_classes_do_not_need():
-    network = SDNNClassifier(**GIVEN, max_iter=1).fit(X, np.arange(len(X)) % 3).network_
+    model = SDNNClassifier(**GIVEN, n_units_per_class=1, max_iter=1)
+    network = model.fit(X, np.arange(len(X)) % 3).network_
     bins = network.input_code.bins(X)
     with pytest.raises(ValueError, match="n_units must be 6 for 4 classes, got 3"):
         _core.PerceptronTrainer(network.layer, bins, np.zeros(len(X)), 4, "one_vs_one")
+
+
+def test_answers_of_the_last_epochs_are_averaged(tmp_path):
+    noisy = Y + np.random.RandomState(1).normal(0, 0.5, len(Y))
+    options = {**REGRESSOR, "shuffle": False, "output_range": (-3, 3)}
+    model = SDNNRegressor(**options, max_iter=6, n_averaged_epochs=4).fit(X, noisy)
+    answers = [SDNNRegressor(**options, max_iter=n).fit(X, noisy).predict(X) for n in (3, 4, 5, 6)]
+    means, spread = model.predict(X, return_std=True)
+    np.testing.assert_allclose(means, np.mean(answers, axis=0), atol=1e-12)
+    np.testing.assert_allclose(spread, np.std(answers, axis=0), atol=1e-12)
+    assert spread.max() > 0
+    assert model.predict_one(X[3]) == means[3]
+    path = tmp_path / "model.safetensors"
+    model.save(path)
+    np.testing.assert_array_equal(SDNNRegressor.load(path).predict(X), means)
+    model.learn_one(X[0], Y[0])
+    assert model.predict(X, return_std=True)[1].max() == 0
+    plain = SDNNRegressor(**options, max_iter=6).fit(X, noisy)
+    same(plain.learn_one(X[0], Y[0]), model)
+
+
+def test_averaging_helps_on_noisy_targets():
+    random = np.random.RandomState(3)
+    points = random.uniform(size=(300, 2))
+    noisy = np.sin(5 * points[:, 0]) * points[:, 1] + random.normal(0, 0.5, 300)
+    fresh = random.uniform(size=(500, 2))
+    true = np.sin(5 * fresh[:, 0]) * fresh[:, 1]
+    options = {"coding": UNIT, "n_pattern_units": 256, "random_state": 0}
+    one = SDNNRegressor(**options).fit(points, noisy).score(fresh, true)
+    ten = SDNNRegressor(**options, n_averaged_epochs=10).fit(points, noisy).score(fresh, true)
+    assert ten > one + 0.03
+
+
+def test_early_stopping_keeps_the_averages_of_its_best_epochs():
+    noisy = Y + np.random.RandomState(1).normal(0, 0.3, len(Y))
+    options = {"coding": UNIT, "n_pattern_units": 128, "random_state": 1, "shuffle": False}
+    options |= {"early_stopping": True, "n_iter_no_change": 4, "n_averaged_epochs": 3}
+    model = SDNNRegressor(**options, max_iter=60).fit(X, noisy)
+    best = int(np.argmax(model.validation_scores_))
+    again = SDNNRegressor(**options, max_iter=best + 1).fit(X, noisy)
+    np.testing.assert_array_equal(model.predict(X), again.predict(X))
+
+
+def test_refitting_trains_on_everything_for_the_best_number_of_epochs():
+    noisy = Y + np.random.RandomState(1).normal(0, 0.3, len(Y))
+    options = {**GIVEN, "output_range": (-2, 2), "shuffle": False}
+    model = SDNNRegressor(**options, early_stopping=True, refit=True, max_iter=60).fit(X, noisy)
+    best = int(np.argmax(model.validation_scores_))
+    whole = SDNNRegressor(**options, max_iter=best + 1).fit(X, noisy)
+    np.testing.assert_array_equal(model.weights_, whole.weights_)
+    with pytest.raises(TypeError, match="refit must be True or False"):
+        SDNNRegressor(refit="yes").fit(X, Y)
+    with pytest.raises(ValueError, match="n_averaged_epochs must be a whole number"):
+        SDNNRegressor(n_averaged_epochs=0).fit(X, Y)

@@ -198,3 +198,10 @@ def test_broken_model_files_are_refused(tmp_path):
         path.write_bytes(changed)
         with contextlib.suppress(ValueError, OverflowError):
             libsdnn.read_model_file(path)
+
+
+def test_tables_of_any_size_are_not_drawn(parameter_file):
+    """2^24 patterns an input would take half a minute and 16 GB."""
+    file = parameter_file(("1001,5", "16777216,5"))
+    with pytest.raises(ValueError, match="q of RANDOM_INVERSE is too large: 16777216 patterns"):
+        libsdnn.read_parameter_file(file).make_layer()

@@ -17,7 +17,7 @@ from sklearn.utils.estimator_checks import check_estimator
 
 import sdnn
 from sdnn import SDNNClassifier, SDNNRegressor, _core
-from sdnn.coding import Anchor, Circular, RandomInverse
+from sdnn.coding import Anchor, Circular, CoarseCodeWarning, RandomInverse
 
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(-2, 3, (120, 3))
@@ -151,12 +151,12 @@ def test_targets_are_checked():
         ({"n_pattern_units": 1}, "n_pattern_units must be a whole number"),
         ({"training": "fast"}, "training must be one of 'auto'"),
         ({"tables": "both"}, "tables must be one of 'shared', 'separate'"),
-        ({"pairs": "some"}, "pairs must be 'all'"),
+        ({"pairs": "some"}, "pairs must be 'budget', 'all', 'auto'"),
         ({"pairs": []}, "pairs must not be empty"),
         ({"pairs": [(0, 0)]}, "cannot modify itself"),
         ({"pairs": [(0, 3)]}, "there is no number 3"),
         ({"pairs": [("a", "b")]}, "no feature names"),
-        ({"pairs": None}, "pairs must be 'all' or a list of"),
+        ({"pairs": None}, "pairs must be 'budget', 'all', 'auto' or a list of"),
         ({"pairs": [0, 1]}, r"a pair is \(modified, modifier\), got 0"),
         ({"coding": "unheard"}, "coding must be one of"),
         ({"coding": "correlation-matrix"}, "needs a matrix"),
@@ -171,6 +171,13 @@ def test_targets_are_checked():
         ({"coding": [("anchor", [0, 1]), ("circular", 1)]}, "more than one coding"),
         ({"validation_fraction": 1.0}, "between 0 and 1"),
         ({"n_iter_no_change": 0}, "n_iter_no_change"),
+        ({"max_iter": 0}, r"max_iter must be a whole number in \[1, 1000000000\], got 0"),
+        ({"coding": RandomInverse(length_scale=1e-9)}, "length_scale must be at least 0.0005"),
+        (
+            {"n_pattern_units": 2**24},
+            "n_pattern_units=16777216 of 6 pairs, read by .* units, need .* bytes for weights and "
+            "patterns, more than memory_limit=1073741824",
+        ),
         ({"memory_limit": -1}, "memory_limit"),
         ({"coding": RandomInverse(low=1.0, high=1.0)}, "low < high"),
         ({"coding": Anchor(n_anchor_patterns=1)}, "n_anchor_patterns"),
@@ -246,6 +253,16 @@ def test_it_works_where_scikit_learn_puts_it(estimator):
     assert cross_val_score(pipeline, X, targets, cv=3).shape == (3,)
     grid = {"coding": [RandomInverse(length_scale=0.5), "anchor"]}
     assert GridSearchCV(estimator, grid, cv=3).fit(X, targets).best_params_["coding"] is not None
+    grid = {"coding__length_scale": [0.1, 0.7]}
+    found = GridSearchCV(estimator, grid, cv=3).fit(X, targets)
+    assert found.best_estimator_.coding.length_scale in grid["coding__length_scale"]
+    assert {fitted.length_scale for fitted in found.best_estimator_.codings_} == {
+        found.best_params_["coding__length_scale"]
+    }
+    with pytest.raises(ValueError, match=r"must have the fields \['length'\]"):
+        estimator.set_params(coding__length=0.1)
+    with pytest.raises(ValueError, match="needs one coding for all inputs"):
+        estimator.set_params(coding=[("anchor", [0])]).set_params(coding__length_scale=0.1)
 
 
 def test_progress_is_shown_when_asked_for(estimator, capsys):
@@ -261,3 +278,24 @@ def test_the_rooms_name_what_they_hold():
         assert getattr(sdnn.estimators, name) is not None
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         _ = sdnn.estimators.nothing
+
+
+def test_wide_tables_keep_to_the_budget_of_columns(estimator):
+    table = RANDOM.uniform(size=(20, 100))
+    options = {"n_pattern_units": None, "max_iter": 1}
+    estimator.set_params(**options).fit(table, targets_of(estimator)[:20])
+    assert estimator.weights_.shape[1] == 16_000
+    counts = np.array(estimator.pairs_).T
+    np.testing.assert_array_equal(np.bincount(counts[0]), 5)
+    np.testing.assert_array_equal(np.bincount(counts[1]), 5)
+    assert len(set(estimator.pairs_)) == 500
+    again = clone(estimator).fit(table, targets_of(estimator)[:20])
+    assert again.pairs_ == estimator.pairs_
+    narrow = clone(estimator).fit(table[:, :22], targets_of(estimator)[:20])
+    assert len(narrow.pairs_) == 22 * 21
+
+
+def test_few_bins_are_warned_of(estimator):
+    estimator.set_params(coding=RandomInverse(length_scale=3.0), n_pattern_units=32)
+    with pytest.warns(CoarseCodeWarning, match=r"length_scale=3\.0 with .* 32 units leaves 3 bins"):
+        estimator.fit(X, targets_of(estimator))

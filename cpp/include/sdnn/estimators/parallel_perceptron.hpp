@@ -167,9 +167,10 @@ class ParallelPerceptron {
   /// (n_queries, n_units). Throws like for_each_query.
   void potentials(std::span<const std::int32_t> bins, int n_threads,
                   std::span<std::int32_t> out) const {
-    for_each_query(bins, n_threads, [&](std::size_t query, const std::int32_t* values) {
+    const auto copy = [&](std::size_t query, const std::int32_t* values) {
       std::copy_n(values, n_units(), out.data() + query * n_units());
-    });
+    };
+    for_each_query(bins, n_threads, copy);
   }
 
   /// How many units fire in each of `n_groups` groups of equal size. Shapes: bins
@@ -180,11 +181,12 @@ class ParallelPerceptron {
     core::require(n_groups > 0 && n_units() % n_groups == 0, "n_groups",
                   "a divisor of n_units = " + std::to_string(n_units()), n_groups);
     const std::size_t size = n_units() / n_groups;
-    for_each_query(bins, n_threads, [&](std::size_t query, const std::int32_t* values) {
+    const auto count = [&](std::size_t query, const std::int32_t* values) {
       for (std::size_t g = 0; g < n_groups; ++g) {
         out[query * n_groups + g] = count_firing(values + g * size, size);
       }
-    });
+    };
+    for_each_query(bins, n_threads, count);
   }
 
  private:
@@ -208,6 +210,20 @@ class ParallelPerceptron {
   void answer_all(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
                   std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
                   int n_threads, const Consume& consume) const {
+    const std::size_t n_added = code_->n_slots() * n_padded_units();
+    const std::size_t most = std::clamp<std::size_t>(kAddedAtOnce / n_added, 64, 4096) *
+                             static_cast<std::size_t>(n_threads);
+    for (; !order.empty(); order = order.subspan(std::min(most, order.size()))) {
+      core::interruption_point();
+      answer_part(tiles, n_per_sum, bins, order.first(std::min(most, order.size())), n_threads,
+                  consume);
+    }
+  }
+
+  template <class Weight, class Consume>
+  void answer_part(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
+                   std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
+                   int n_threads, const Consume& consume) const {
     const std::size_t n_parts =
         std::min(static_cast<std::size_t>(n_threads), (order.size() + 255) / 256);
     std::vector<std::jthread> threads;  // joined at the end of the scope
@@ -250,6 +266,9 @@ class ParallelPerceptron {
       std::swap(now, before);
     }
   }
+
+  /// Weights that a thread adds between two checks: a tenth of a second of them.
+  static constexpr std::size_t kAddedAtOnce = std::size_t{1} << 32;
 
   std::shared_ptr<const Code> code_;
   WeightTiles<std::int32_t> weights_;

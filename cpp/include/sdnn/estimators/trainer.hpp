@@ -13,6 +13,7 @@
 #include <variant>
 
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/errors.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/detail/block_training.hpp"
@@ -26,8 +27,8 @@ namespace sdnn::estimators {
 /// Presents training samples to a layer. All forms leave the same bits in it.
 ///
 /// Between synchronize() calls the layer's weights may lag behind; nobody else may change them as
-/// long as a trainer is in use. After an exception from present() the layer is as of the last
-/// synchronization inside it, which is a state of plain training too.
+/// long as a trainer is in use. After an exception from present() the layer is good for nothing:
+/// who wants to go on trains a copy.
 template <class Rule>
 class Trainer {
  public:
@@ -36,14 +37,15 @@ class Trainer {
   /// needs more than `memory_limit` bytes.
   Trainer(std::shared_ptr<ParallelPerceptron> layer, std::span<const std::int32_t> bins, Rule rule,
           TrainingForm form = TrainingForm::automatic, std::size_t memory_limit = kMemoryLimit,
-          int n_threads = 1)
+          int n_threads = 1, std::size_t n_epochs = kExpectedEpochs)
       : layer_(std::move(layer)), rule_(std::move(rule)) {
     core::require_in_range("n_threads", n_threads, 1, 4096);
     layer_->code().check_bins(bins);
     n_samples_ = bins.size() / layer_->code().n_inputs();
     core::require(rule_.n_samples() == n_samples_, "targets or labels",
                   std::to_string(n_samples_) + " samples as bins has", rule_.n_samples());
-    form_ = choose_form(form, layer_->n_units(), layer_->code(), n_samples_, memory_limit);
+    form_ =
+        choose_form(form, layer_->n_units(), layer_->code(), n_samples_, memory_limit, n_epochs);
     const auto memory = [&](bool keeps_plans) {
       return form_memory(form_, layer_->n_units(), layer_->code(), n_samples_, keeps_plans);
     };
@@ -61,7 +63,8 @@ class Trainer {
   std::size_t n_samples() const noexcept { return n_samples_; }
 
   /// Presents samples in the given order. Throws std::invalid_argument for an index out of range,
-  /// before anything is changed, and std::overflow_error before a potential could overflow.
+  /// before anything is changed, std::overflow_error before a potential could overflow. May be
+  /// stopped between samples or blocks of them (core::interruption_point).
   TrainingCount present(std::span<const std::int32_t> order) {
     for (std::size_t i = 0; i < order.size(); ++i) {
       if (order[i] >= 0 && static_cast<std::size_t>(order[i]) < n_samples_) continue;

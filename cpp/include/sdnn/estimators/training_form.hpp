@@ -1,6 +1,7 @@
 /// The forms of training: what each needs, and which one suits a problem.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -81,15 +82,18 @@ inline std::size_t form_memory(TrainingForm form, std::size_t n_units,
   });
 }
 
+/// Epochs that are expected where nobody says how many.
+inline constexpr std::size_t kExpectedEpochs = 30;
+
 /// The form to use. An estimate of the time per presentation decides between dual and block: the
 /// one moves a row of n_samples for every corrected unit, three times as slowly beyond the caches,
-/// and has computed n_samples^2 / 2 inner products before, spread over some 30 epochs; the other
-/// reads all weights.
+/// and has computed n_samples^2 / 2 inner products and the first potentials before, spread over
+/// `n_epochs`; the other reads all weights.
 ///
 /// Throws std::length_error if `form` is not automatic and needs more than `memory_limit` bytes.
 inline TrainingForm choose_form(TrainingForm form, std::size_t n_units,
                                 const coding::SelectiveDesensitization& code, std::size_t n_samples,
-                                std::size_t memory_limit) {
+                                std::size_t memory_limit, std::size_t n_epochs = kExpectedEpochs) {
   const auto memory = [&](TrainingForm f) { return form_memory(f, n_units, code, n_samples); };
   if (form != TrainingForm::automatic) {
     if (memory(form) > memory_limit) {
@@ -101,9 +105,10 @@ inline TrainingForm choose_form(TrainingForm form, std::size_t n_units,
   }
   const std::size_t padded_units = core::round_up(n_units, kTileStep);
   const std::size_t row_factor = memory(TrainingForm::dual) > (std::size_t{32} << 20) ? 3 : 1;
-  const std::size_t dual_cost =
-      row_factor * n_samples / 2 + n_units + n_samples * code.n_words() / 140;
   const std::size_t block_cost = code.n_slots() / 8 * (padded_units / 16) + code.n_slots();
+  const std::size_t before = n_samples * code.n_words() * 2 / 7 + block_cost / 2;
+  const std::size_t dual_cost = row_factor * n_samples / 2 + n_units +
+                                before / std::clamp<std::size_t>(n_epochs, 1, kExpectedEpochs);
   if (dual_cost <= block_cost && memory(TrainingForm::dual) <= memory_limit) {
     return TrainingForm::dual;
   }

@@ -16,6 +16,7 @@
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/detail/interruption.hpp"
+#include "sdnn/core/errors.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/environments/acrobot.hpp"
 #include "sdnn/environments/acrobot_sensors.hpp"

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "interruptions.hpp"
 #include "sdnn/coding/anchor_patterns.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/environments/acrobot_batch.hpp"
@@ -15,31 +16,26 @@
 namespace sdnn::core {
 namespace {
 
-struct StopError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-int n_points_left = 0;
-
-/// Stops work at its `n`-th interruption point from now, counted from 0.
-class StopAt {
- public:
-  explicit StopAt(int n) {
-    n_points_left = n;
-    interruption_check() = [] {
-      if (n_points_left-- == 0) throw StopError("stopped");
-    };
-  }
-  StopAt(const StopAt&) = delete;
-  StopAt& operator=(const StopAt&) = delete;
-  ~StopAt() { interruption_check() = nullptr; }
-};
+using testing::n_points_left;
+using testing::StopAt;
+using testing::StopError;
 
 TEST(Interruption, DoesNothingUnlessSomebodyAsks) {
   EXPECT_NO_THROW(interruption_point());
   const StopAt stop(1);
   EXPECT_NO_THROW(interruption_point());
   EXPECT_THROW(interruption_point(), StopError);
+}
+
+TEST(Interruption, SaysWhetherToLookAtOnce) {
+  static int n_at_once;
+  n_at_once = 0;
+  interruption_check() = [](bool at_once) { n_at_once += at_once ? 1 : 0; };
+  interruption_point();
+  EXPECT_EQ(n_at_once, 0);
+  interruption_point(true);
+  EXPECT_EQ(n_at_once, 1);
+  interruption_check() = nullptr;
 }
 
 TEST(Interruption, EndsTheMakingOfPatterns) {

@@ -7,14 +7,17 @@ namespace sdnn::core {
 
 /// What long work calls now and then, at least ten times a second; it throws to stop the work.
 /// None unless somebody sets it, as the Python package does for Ctrl-C. Called from any thread.
-inline std::atomic<void (*)()>& interruption_check() noexcept {
-  static std::atomic<void (*)()> check = nullptr;
+/// With `at_once` it must look even if it just did: what follows cannot be undone.
+using InterruptionCheck = void (*)(bool at_once);
+
+inline std::atomic<InterruptionCheck>& interruption_check() noexcept {
+  static std::atomic<InterruptionCheck> check = nullptr;
   return check;
 }
 
 /// A place where work may end early, with whatever the check throws.
-inline void interruption_point() {
-  if (const auto check = interruption_check().load(std::memory_order_relaxed)) check();
+inline void interruption_point(bool at_once = false) {
+  if (const auto check = interruption_check().load(std::memory_order_relaxed)) check(at_once);
 }
 
 }  // namespace sdnn::core

@@ -14,6 +14,7 @@
 
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/detail/worker_team.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/detail/code_walk.hpp"
@@ -65,6 +66,7 @@ class BlockTraining {
     }
     TrainingCount count;
     while (!order.empty()) {
+      core::interruption_point();
       const auto some = order.first(std::min(order.size(), kSmallBlock));
       Plan plan;
       count += present_block(some, &plan, rule);
@@ -133,6 +135,7 @@ class BlockTraining {
     TrainingCount count;
     plans_.resize((order.size() + kLargeBlock - 1) / kLargeBlock);
     for (Plan& plan : plans_) {
+      core::interruption_point();
       const auto some = order.first(std::min(order.size(), kLargeBlock));
       count += present_block(some, &plan, rule);
       order = order.subspan(some.size());

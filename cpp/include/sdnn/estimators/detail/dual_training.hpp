@@ -16,6 +16,7 @@
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/detail/worker_team.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/detail/presentation_window.hpp"
@@ -49,12 +50,13 @@ class DualTraining {
         coefficients_(coded_.size() * layer_->n_padded_units()),
         window_(layer_->n_padded_units(), kWindow),
         gathered_(kWindow * kWindow) {
-    // Blocks of rows get cheaper towards the end: threads take them in turn.
-    team_.run([&](std::size_t part) {
-      for (std::size_t t = kRows * part; t < coded_.size(); t += kRows * team_.size()) {
-        fill_products(t, std::min(t + kRows, coded_.size()));
-      }
-    });
+    for (std::size_t first = 0; first < coded_.size(); first += kRows * team_.size()) {
+      core::interruption_point();
+      team_.run([&](std::size_t part) {
+        const std::size_t begin = std::min(first + kRows * part, coded_.size());
+        fill_products(begin, std::min(begin + kRows, coded_.size()));
+      });
+    }
     layer_->for_each_query(bins, n_threads, [&](std::size_t t, const std::int32_t* values) {
       for (std::size_t i = 0; i < layer_->n_units(); ++i) {
         potentials_[i * row_size_ + t] = values[i];
@@ -71,6 +73,7 @@ class DualTraining {
     // Corrections may wait where a window's share of their rows lies side by side.
     const std::size_t interval = in_data_order ? kFlushInterval : 1;
     for (std::size_t waiting = 0; !order.empty(); waiting += kWindow) {
+      core::interruption_point();
       if (waiting >= interval || full_) {
         flush();
         waiting = 0;

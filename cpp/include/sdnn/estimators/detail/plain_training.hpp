@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/detail/presentation_window.hpp"
 #include "sdnn/estimators/parallel_perceptron.hpp"
@@ -34,6 +35,7 @@ class PlainTraining {
     std::uint64_t* const active = words_.data();
     std::uint64_t* const positive = active + code.n_words();
     for (const std::int32_t index : order) {
+      core::interruption_point();
       const auto sample = static_cast<std::size_t>(index);
       code.encode(std::span(bins_).subspan(sample * code.n_inputs(), code.n_inputs()), active,
                   positive);

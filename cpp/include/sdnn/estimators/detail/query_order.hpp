@@ -77,7 +77,7 @@ inline std::vector<std::uint32_t> query_order(std::span<const std::int32_t> bins
   for (const std::int32_t bin : bins) largest = std::max(largest, bin);
   const auto n_bits = static_cast<int>(std::bit_width(static_cast<std::uint32_t>(largest)));
   const std::size_t n_axes = std::min<std::size_t>(n_inputs, 64);
-  const int kept = std::min(n_bits, static_cast<int>(64 / n_axes));
+  const int kept = std::min({n_bits, 31, static_cast<int>(64 / n_axes)});  // bins are below 2^31
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(n_queries);
   std::vector<std::uint32_t> axes(n_axes);
   for (std::size_t q = 0; q < n_queries; ++q) {

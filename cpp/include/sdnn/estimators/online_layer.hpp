@@ -1,0 +1,165 @@
+/// A layer for samples that come one at a time: weights in bytes, every change undone on failure.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/approximators/hidden_layer.hpp"
+#include "sdnn/coding/detail/ternary_code.hpp"
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/interruption.hpp"
+#include "sdnn/estimators/correction_rules.hpp"
+#include "sdnn/estimators/detail/presentation_window.hpp"
+#include "sdnn/estimators/detail/unit_ranking.hpp"
+#include "sdnn/estimators/parallel_perceptron.hpp"
+
+namespace sdnn::estimators {
+
+/// Learns and answers single samples with the bits of plain training.
+///
+/// The weights lie in bytes, with a second byte where one is too few: a pass reads a quarter of
+/// what the layer holds. The layer lags behind until synchronize(); nobody else may change it.
+/// Memory: about 2 bytes per weight, of which the second is touched where it is needed.
+class OnlineLayer {
+ public:
+  /// Throws std::invalid_argument if a weight or threshold does not fit (|weight| up to 16383, less
+  /// with more than 2^16 columns), or if there are more than 2^27 columns.
+  explicit OnlineLayer(std::shared_ptr<ParallelPerceptron> layer)
+      : layer_(std::move(layer)),
+        hidden_(layer_->n_units(), layer_->code().n_slots()),
+        words_(2 * layer_->code().n_words()),
+        slots_(layer_->code().n_words()),
+        potentials_(layer_->n_units()) {
+    const WeightTiles<std::int32_t>& tiles = layer_->tiles();
+    std::vector<std::int32_t> column(tiles.n_units());
+    for (std::size_t slot = 0; slot < tiles.n_slots(); ++slot) {
+      for (std::size_t i = 0; i < column.size(); ++i) column[i] = tiles.at(i, slot);
+      hidden_.add_to_column(slot, column, 1);
+    }
+    for (std::size_t i = 0; i < column.size(); ++i) hidden_.set_threshold(i, layer_->threshold(i));
+  }
+
+  const ParallelPerceptron& layer() const noexcept { return *layer_; }
+  ParallelPerceptron& layer() noexcept { return *layer_; }
+
+  /// Presents samples in their order. Shapes: bins (n_samples, n_inputs).
+  ///
+  /// Throws std::invalid_argument for bins out of range or if the rule knows another number of
+  /// samples, std::overflow_error if a weight would leave its range; nothing is changed then, nor
+  /// if it is stopped (core::interruption_point).
+  template <class Rule>
+  TrainingCount present(std::span<const std::int32_t> bins, Rule& rule) {
+    const std::size_t n_inputs = layer_->code().n_inputs();
+    layer_->code().check_bins(bins);
+    const std::size_t n_samples = bins.size() / n_inputs;
+    core::require(rule.n_samples() == n_samples, "targets or labels", "as many samples as bins has",
+                  rule.n_samples());
+    TrainingCount count;
+    done_.clear();
+    struct Undoes {  // unless all are done
+      OnlineLayer& layer;
+      std::span<const std::int32_t> bins;
+      bool is_done = false;
+      ~Undoes() {
+        if (!is_done) layer.undo(bins);
+      }
+    } undoing{*this, bins};
+    for (std::size_t sample = 0; sample < n_samples; ++sample) {
+      read(bins.subspan(sample * n_inputs, n_inputs));
+      hidden_.potentials(slots_.columns(), potentials_);
+      rule(sample, potentials_.data(), corrections_);
+      correct(sample);
+      count.n_samples += corrections_.empty() ? 0 : 1;
+      count.n_units += corrections_.size();
+      core::interruption_point(true);
+    }
+    undoing.is_done = true;
+    changed_ = changed_ || count.n_units > 0;
+    return count;
+  }
+
+  /// Shapes: bins (n_queries, n_inputs), out (n_queries, n_units). Throws std::invalid_argument for
+  /// bins out of range. Thread safety: calls may run at the same time.
+  void potentials(std::span<const std::int32_t> bins, std::span<std::int32_t> out) const {
+    const ParallelPerceptron::Code& code = layer_->code();
+    code.check_bins(bins);
+    std::vector<std::uint64_t> words(2 * code.n_words());
+    coding::ColumnLists slots(code.n_words());
+    for (std::size_t query = 0; query < bins.size() / code.n_inputs(); ++query) {
+      code.encode(bins.subspan(query * code.n_inputs(), code.n_inputs()), words.data(),
+                  words.data() + code.n_words());
+      slots.read({words.data(), words.data() + code.n_words()});
+      hidden_.potentials(slots.columns(),
+                         out.subspan(query * layer_->n_units(), layer_->n_units()));
+    }
+  }
+
+  /// Brings the layer's weights and thresholds up to date.
+  void synchronize() {
+    if (!changed_) return;
+    WeightTiles<std::int32_t>& tiles = layer_->tiles();
+    for (std::size_t i = 0; i < tiles.n_units(); ++i)
+      layer_->thresholds()[i] = hidden_.threshold(i);
+    for (std::size_t slot = 0; slot < tiles.n_slots(); ++slot) {
+      for (std::size_t i = 0; i < tiles.n_units(); ++i) tiles.at(i, slot) = hidden_.weight(i, slot);
+    }
+    changed_ = false;
+  }
+
+ private:
+  /// Corrections of units in one direction, by one sample.
+  struct Done {
+    std::size_t sample;
+    std::int32_t direction;
+    std::vector<std::uint32_t> units;
+  };
+
+  void read(std::span<const std::int32_t> bins) {
+    std::uint64_t* const positive = words_.data() + layer_->code().n_words();
+    layer_->code().encode(bins, words_.data(), positive);
+    slots_.read({words_.data(), positive});
+  }
+
+  void correct(std::size_t sample) {
+    for (const std::int32_t direction : {1, -1}) {
+      Done now{sample, direction, {}};
+      for (const Correction& correction : corrections_) {
+        if (correction.direction == direction) now.units.push_back(correction.unit);
+      }
+      if (now.units.empty()) continue;
+      std::sort(now.units.begin(), now.units.end());  // neighbours share cache lines
+      done_.push_back(std::move(now));
+      try {
+        hidden_.correct(done_.back().units, slots_.columns(), direction);
+      } catch (...) {
+        done_.pop_back();
+        throw;
+      }
+    }
+  }
+
+  void undo(std::span<const std::int32_t> bins) {
+    const std::size_t n_inputs = layer_->code().n_inputs();
+    for (; !done_.empty(); done_.pop_back()) {
+      const Done& last = done_.back();
+      read(bins.subspan(last.sample * n_inputs, n_inputs));
+      hidden_.correct(last.units, slots_.columns(), -last.direction);
+    }
+  }
+
+  std::shared_ptr<ParallelPerceptron> layer_;
+  approximators::HiddenLayer hidden_;
+  std::vector<std::uint64_t> words_;  // active, then positive
+  coding::ColumnLists slots_;
+  std::vector<std::int32_t> potentials_;
+  std::vector<Correction> corrections_;
+  std::vector<Done> done_;  // of the call at hand
+  bool changed_ = false;    // since the last synchronization
+};
+
+}  // namespace sdnn::estimators

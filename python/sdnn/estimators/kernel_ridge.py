@@ -1,0 +1,145 @@
+"""SDNNKernelRidge: ridge regression with the kernel that the network approaches."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import RegressorMixin
+from sklearn.kernel_ridge import KernelRidge
+from sklearn.utils.validation import check_is_fitted
+
+from sdnn.arguments import real
+from sdnn.estimators.coded_inputs import CodedInputs
+from sdnn.estimators.columns import input_pairs
+from sdnn.kernel import N_UNITS, AnalyticKernel
+
+__all__ = ["SDNNKernelRidge"]
+
+SAMPLES_AT_ONCE = 4096
+"""Samples whose kernel with the training sample is in memory at a time in prediction."""
+
+Self = TypeVar("Self", bound="SDNNKernelRidge")
+
+
+class SDNNKernelRidge(RegressorMixin, CodedInputs):
+    """Kernel ridge regression with the network's kernel, as of codes of infinitely many units.
+
+    For samples that are all at hand, some thousand at most, and noisy: unlike the network it has a
+    penalty on its weights. It learns nothing online. Sources: `sdnn.kernel.AnalyticKernel`;
+    scikit-learn's `KernelRidge`, which solves for the weights.
+
+    Parameters
+    ----------
+    coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
+        As of `SDNNRegressor`.
+    alpha : float, default=0.1
+        Strength of the penalty, above 0; noisy targets want more.
+    pairs : "all" or list of (modified, modifier), default="all"
+        As of `SDNNRegressor`; all pairs cost no more than two matrices per feature.
+
+    Attributes
+    ----------
+    kernel_ : AnalyticKernel
+    ridge_ : KernelRidge
+        Fitted to the kernel of the training sample.
+    X_fit_ : ndarray, shape (n_samples, n_features)
+    y_mean_ : ndarray, shape (n_outputs,) or ()
+        Mean targets, which bear no penalty.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        As everywhere in scikit-learn.
+
+    Notes
+    -----
+    ``8 n_samples^2`` bytes for the kernel matrix, and a time that grows with the cube of the
+    sample.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sdnn import SDNNKernelRidge
+    >>> X = np.random.RandomState(0).uniform(size=(200, 2))
+    >>> y = np.sin(6 * X[:, 0]) * X[:, 1]
+    >>> bool(SDNNKernelRidge(alpha=1e-3).fit(X[::2], y[::2]).score(X[1::2], y[1::2]) > 0.95)
+    True
+    """
+
+    def __init__(
+        self, coding: Any = "random-inverse", *, alpha: float = 0.1, pairs: Any = "all"
+    ) -> None:
+        self.coding = coding
+        self.alpha = alpha
+        self.pairs = pairs
+
+    def __sklearn_tags__(self) -> Any:
+        """Say that several outputs can be learned at once."""
+        tags = super().__sklearn_tags__()
+        tags.target_tags.multi_output = True
+        return tags
+
+    def fit(self: Self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Learn ranges, and weights of the training samples.
+
+        Parameters
+        ----------
+        X : array_like, shape (n_samples, n_features)
+        y : array_like, shape (n_samples,) or (n_samples, n_outputs)
+
+        Returns
+        -------
+        SDNNKernelRidge
+            Itself.
+
+        Raises
+        ------
+        ValueError
+            For an impossible parameter, or data that cannot be used.
+        """
+        if not 0 < real("alpha", self.alpha) < math.inf:
+            raise ValueError(f"alpha must be above 0 and finite, got {self.alpha!r}")
+        if y is None:
+            raise ValueError("SDNNKernelRidge requires y to be passed, but the target y is None")
+        table, targets = self._validated(X, y, multi_output=True, y_numeric=True)
+        targets = np.asarray(targets, dtype=np.float64)
+        codings = [
+            coding.fit(table[:, index], N_UNITS)
+            for index, coding in enumerate(self._codings(X, table))
+        ]
+        pairs = input_pairs(self.pairs, self._listed_names(), table.shape[1])
+        every = isinstance(self.pairs, str)
+        self.kernel_ = AnalyticKernel(codings, pairs=None if every else pairs)
+        self.X_fit_ = table
+        self.y_mean_ = targets.mean(axis=0)
+        self.ridge_ = KernelRidge(kernel="precomputed", alpha=self.alpha)
+        self.ridge_.fit(self.kernel_(table), targets - self.y_mean_)
+        return self
+
+    def predict(self, X: ArrayLike) -> NDArray[np.float64]:
+        """Predict the outputs of samples.
+
+        Parameters
+        ----------
+        X : array_like, shape (n_samples, n_features)
+
+        Returns
+        -------
+        ndarray, shape (n_samples,) or (n_samples, n_outputs)
+            As the targets' shape was in training.
+
+        Raises
+        ------
+        NotFittedError
+            Before `fit`.
+        ValueError
+            For samples that cannot be used: another number of features, NaN, unknown categories.
+        """
+        check_is_fitted(self, "ridge_")
+        table = self._finite(self._validated(X, reset=False), self.kernel_.codings)
+        parts = [
+            self.ridge_.predict(self.kernel_(table[begin : begin + SAMPLES_AT_ONCE], self.X_fit_))
+            for begin in range(0, len(table), SAMPLES_AT_ONCE)
+        ]
+        values: NDArray[np.float64] = self.y_mean_ + np.concatenate(parts)
+        return values

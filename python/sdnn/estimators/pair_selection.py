@@ -1,0 +1,82 @@
+"""Which pairs of inputs matter: repeated halving by the change of weights, by cross-validation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import clone, is_classifier
+from sklearn.model_selection import KFold, StratifiedKFold
+from sklearn.utils import _safe_indexing
+
+__all__ = ["select_pairs"]
+
+N_FOLDS = 5
+STANDARD_ERRORS = 2.0
+"""By how many of them fewer pairs must be better than all, in the folds' mean difference."""
+
+Pairs = list[tuple[int, int]]
+
+
+def halved(pairs: Pairs, importances: NDArray[np.float64]) -> Pairs:
+    """Return the more important half of the pairs, both orders of two inputs counted together.
+
+    >>> halved([(0, 1), (1, 0), (0, 2), (2, 0)], np.array([0.1, 0.1, 0.2, 0.6]))
+    [(0, 2), (2, 0)]
+    """
+    total: dict[frozenset[int], float] = {}
+    for pair, importance in zip(pairs, importances.tolist(), strict=True):
+        total[frozenset(pair)] = total.get(frozenset(pair), 0.0) + importance
+    ranked = sorted(total, key=lambda inputs: (-total[inputs], sorted(inputs)))
+    kept = set(ranked[: (len(ranked) + 1) // 2])
+    return [pair for pair in pairs if frozenset(pair) in kept]
+
+
+def halving(model: Any, X: Any, y: Any, pairs: Pairs, n_levels: int | None = None) -> list[Any]:
+    """Return the fitted models with all pairs, half of them, and so on, down to two inputs."""
+    fitted = []
+    while True:
+        fitted.append(clone(model).set_params(pairs=pairs).fit(X, y))
+        fewer = halved(pairs, fitted[-1].pair_importances_)
+        if len(fewer) == len(pairs) or len(fitted) == n_levels:
+            return fitted
+        pairs = fewer
+
+
+def select_pairs(model: Any, X: ArrayLike, y: ArrayLike, pairs: Pairs, seed: int) -> Pairs:
+    """Return the pairs with which cross-validation is best, all of them unless fewer are clearly.
+
+    In each of five folds the less important half of the pairs is left out again and again. A
+    number of pairs is taken if its score is better than that of all pairs by two standard errors
+    of the folds' differences: the best of many scores is better by chance alone.
+
+    Parameters
+    ----------
+    model : SDNNRegressor or SDNNClassifier
+        How to fit; it is cloned.
+    X, y : array_like
+        The training sample.
+    pairs : list of (int, int)
+        Candidates.
+    seed : int
+        Decides the folds.
+    """
+    labels = np.asarray(y)
+    stratified = is_classifier(model) and np.unique(labels, return_counts=True)[1].min() >= N_FOLDS
+    if len(labels) < 2 * N_FOLDS:
+        return pairs
+    splitter = (StratifiedKFold if stratified else KFold)(N_FOLDS, shuffle=True, random_state=seed)
+    scores = [
+        [
+            one.score(_safe_indexing(X, test), labels[test])
+            for one in halving(model, _safe_indexing(X, train), labels[train], pairs)
+        ]
+        for train, test in splitter.split(labels, labels)
+    ]
+    gains = np.array(scores) - np.array(scores)[:, :1]
+    level = int(np.argmax(gains.mean(axis=0)))
+    error = gains[:, level].std(ddof=1) / np.sqrt(N_FOLDS)
+    if level == 0 or gains[:, level].mean() <= STANDARD_ERRORS * error:
+        return pairs
+    return list(halving(model, X, labels, pairs, level + 1)[-1].pairs_)

@@ -1,0 +1,110 @@
+"""The estimators by the interface of the river library: samples are dictionaries, one at a time.
+
+Needs ``pip install river``; nothing else of this package does.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from river import base
+from sklearn.base import clone
+
+from sdnn.estimators.classifier import SDNNClassifier
+from sdnn.estimators.regressor import SDNNRegressor
+
+__all__ = ["RiverClassifier", "RiverRegressor"]
+
+
+class Waiting:
+    """Collects the first samples, from which ranges, categories and classes are learned."""
+
+    def __init__(self, model: Any, grace_period: int) -> None:
+        if grace_period < 2:
+            raise ValueError(f"grace_period must be at least 2, got {grace_period!r}")
+        self.model = model
+        self.grace_period = grace_period
+        self.fitted: Any = None
+        self.samples: list[dict[str, Any]] = []
+        self.targets: list[Any] = []
+
+    def _learn(self, x: dict[str, Any], y: Any) -> None:
+        if self.fitted is not None:
+            self.fitted.learn_one(x, y)
+            return
+        self.samples.append(x)
+        self.targets.append(y)
+        if len(self.samples) >= self.grace_period and self._is_enough():
+            self.fitted = clone(self.model)
+            self._begin()
+            self.samples, self.targets = [], []
+
+    def _is_enough(self) -> bool:
+        return True
+
+    def _begin(self) -> None:
+        """Learn from the samples collected."""
+        import pandas as pd
+
+        frame = pd.DataFrame(self.samples)
+        options = {}
+        if isinstance(self.fitted, SDNNClassifier):
+            options["classes"] = np.unique(self.targets)
+        self.fitted.partial_fit(frame, np.array(self.targets), **options)
+
+
+class RiverRegressor(Waiting, base.Regressor):
+    """An `SDNNRegressor` for river's streams.
+
+    Parameters
+    ----------
+    model : SDNNRegressor
+        How to learn; it is cloned. ``out_of_range="widen"`` suits streams that drift.
+    grace_period : int, default=100
+        Samples from which ranges and categories are learned first. Until then the mean target is
+        predicted.
+    """
+
+    def __init__(self, model: SDNNRegressor, grace_period: int = 100) -> None:
+        super().__init__(model, grace_period)
+
+    def learn_one(self, x: dict[str, Any], y: float) -> None:
+        """Learn one sample."""
+        self._learn(x, y)
+
+    def predict_one(self, x: dict[str, Any]) -> float:
+        """Predict one target."""
+        if self.fitted is None:
+            return float(np.mean(self.targets)) if self.targets else 0.0
+        return float(self.fitted.predict_one(x))
+
+
+class RiverClassifier(Waiting, base.Classifier):
+    """An `SDNNClassifier` for river's streams.
+
+    Parameters
+    ----------
+    model : SDNNClassifier
+        How to learn; it is cloned.
+    grace_period : int, default=100
+        Samples from which ranges, categories and the classes are learned first, and more until
+        there are two classes. Until then the most frequent label is predicted. Samples of classes
+        that come later are errors.
+    """
+
+    def __init__(self, model: SDNNClassifier, grace_period: int = 100) -> None:
+        super().__init__(model, grace_period)
+
+    def _is_enough(self) -> bool:
+        return len(set(self.targets)) > 1
+
+    def learn_one(self, x: dict[str, Any], y: Any) -> None:
+        """Learn one sample."""
+        self._learn(x, y)
+
+    def predict_one(self, x: dict[str, Any]) -> Any:
+        """Predict one label; None before the first sample."""
+        if self.fitted is None:
+            return max(set(self.targets), key=self.targets.count) if self.targets else None
+        return self.fitted.predict_one(x)

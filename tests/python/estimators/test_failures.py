@@ -1,0 +1,176 @@
+"""Whatever fails or is interrupted leaves an estimator exactly as it was."""
+
+import functools
+import os
+import pickle
+import signal
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from sdnn import SDNNClassifier, SDNNRegressor
+from sdnn.coding import RandomInverse
+
+RANDOM = np.random.RandomState(0)
+X = RANDOM.uniform(0, 1, (12, 2))
+Y = np.sin(5 * X[:, 0]) * X[:, 1]
+LABELS = np.digitize(Y, [Y.mean()])
+UNIT = RandomInverse(low=0.0, high=1.0)
+OPTIONS = {"n_pattern_units": 16, "max_iter": 2, "random_state": 0}
+
+
+class InjectedError(BaseException):
+    """As hard to swallow as KeyboardInterrupt."""
+
+
+class FailAtCall:
+    """Raises when the n-th function is called, of Python or C; counts them."""
+
+    def __init__(self, n):
+        self.n = n
+        self.n_calls = 0
+
+    def __call__(self, _frame, event, _argument):
+        if event in ("call", "c_call"):
+            self.n_calls += 1
+            if self.n_calls == self.n:
+                raise InjectedError
+
+    def stops(self, work):
+        """Whether the error came out of the work."""
+        sys.setprofile(self)
+        try:
+            work()
+        except InjectedError:
+            return True
+        finally:
+            sys.setprofile(None)
+        return False
+
+
+KINDS = {
+    "regressor": (SDNNRegressor, {"output_range": (-2, 2), "n_output_units": 8}, Y),
+    "classifier": (SDNNClassifier, {}, LABELS),
+}
+WORKS = {
+    "fit": lambda model, y: model.fit(X, y),
+    "partial_fit": lambda model, y: model.partial_fit(X, y),
+    "learn_one": lambda model, y: model.learn_one(X[3], y[3]),
+}
+
+
+def made(kind, **options):
+    estimator, own, y = KINDS[kind]
+    return estimator(UNIT, **{**OPTIONS, **own, **options}), y
+
+
+def state_of(model):
+    """All that the estimator knows, with the bits of its weights."""
+    return pickle.dumps(model)
+
+
+@pytest.mark.parametrize("training", ["auto", "block"])
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("work", WORKS)
+def test_a_failure_anywhere_leaves_the_old_model(kind, work, training):
+    model, y = made(kind, training=training)
+    model.fit(X[::-1], y[::-1]).learn_one(X[0], y[0])
+    before = state_of(model)
+    counting = FailAtCall(-1)
+    copy = WORKS[work](pickle.loads(before), y)
+    counting.stops(lambda: WORKS[work](copy, y))
+    last = counting.n_calls - 1  # the test's own call
+    places = np.random.RandomState(1).randint(1, last, size=90)
+    places = [*places, *range(max(1, last - 10), last)]
+    n_failed = 0
+    for n in places:
+        if FailAtCall(n).stops(functools.partial(WORKS[work], model, y)):
+            n_failed += 1
+            assert state_of(model) == before, n
+        else:  # some libraries go on after an error of a callback
+            model, _ = made(kind, training=training)
+            model.fit(X[::-1], y[::-1]).learn_one(X[0], y[0])
+    assert n_failed >= 90
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_failed_first_fit_leaves_an_unfitted_model(kind):
+    model, y = made(kind)
+    before = state_of(model)
+    for n in np.random.RandomState(2).randint(1, 300, size=50):
+        assert FailAtCall(n).stops(lambda: model.fit(X, y))
+        assert state_of(model) == before
+    model.set_params(training="dual", memory_limit=100)
+    before = state_of(model)
+    with pytest.raises(ValueError, match="memory_limit"):
+        model.fit(X, y)
+    assert state_of(model) == before
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_refused_samples_change_nothing(kind):
+    model, y = made(kind)
+    model.fit(X, y)
+    before = state_of(model)
+    bad = X.copy()
+    bad[5, 1] = np.nan
+    for refused in (
+        lambda: model.fit(bad, y),
+        lambda: model.partial_fit(bad, y),
+        lambda: model.partial_fit(X[:, :1], y),
+        lambda: model.learn_one(bad[5], y[5]),
+        lambda: model.learn_one(X[5, :1], y[5]),
+        lambda: model.learn_one("ab", y[5]),
+        lambda: model.learn_one({"a": 0.1, "b": 0.2}, y[5]),
+        lambda: model.learn_one(X[5], "unheard"),
+    ):
+        with pytest.raises(ValueError, match=r"."):
+            refused()
+        assert state_of(model) == before
+
+
+def seconds_until_interrupted(work):
+    """How long work goes on after SIGINT."""
+    sent = []
+
+    def interrupt():
+        sent.append(time.monotonic())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(0.4, interrupt)
+    timer.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            work()
+        return time.monotonic() - sent[0]
+    finally:
+        timer.cancel()
+        timer.join()
+
+
+MANY = RANDOM.uniform(0, 1, (6000, 4))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no SIGINT to oneself")
+@pytest.mark.parametrize("training", ["dual", "block", "plain"])
+def test_ctrl_c_ends_training_and_leaves_the_old_model(training):
+    options = {"coding": UNIT, "output_range": (-1, 2), "random_state": 0, "training": training}
+    model = SDNNRegressor(**options, max_iter=1, n_pattern_units=400).fit(MANY[:50], MANY[:50, 0])
+    before = state_of(model.set_params(max_iter=100_000))
+    targets = RANDOM.uniform(0, 1, len(MANY))
+    assert seconds_until_interrupted(lambda: model.fit(MANY, targets)) < 1
+    assert state_of(model) == before
+    n_times = 1 if training == "dual" else 20
+    samples, values = np.tile(MANY, (n_times, 1)), np.tile(targets, n_times)
+    assert seconds_until_interrupted(lambda: model.partial_fit(samples, values)) < 1
+    assert state_of(model) == before
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no SIGINT to oneself")
+def test_ctrl_c_ends_prediction():
+    model = SDNNRegressor(UNIT, max_iter=1).fit(MANY[:50], MANY[:50, 0])
+    samples = RANDOM.uniform(0, 1, (200_000, 4))
+    assert seconds_until_interrupted(lambda: model.predict(samples)) < 1

@@ -1,0 +1,231 @@
+"""Samples one at a time: the bits of partial_fit, ranges that are too narrow, river's interface."""
+
+import copy
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sdnn import SDNNClassifier, SDNNRegressor
+from sdnn.coding import Circular, RandomInverse
+from sdnn.estimators import OutOfRangeWarning
+from sdnn.estimators.network import FEW_SAMPLES
+
+RANDOM = np.random.RandomState(0)
+X = RANDOM.uniform(0, 1, (200, 4))
+Y = np.sin(5 * X[:, 0]) * X[:, 1]
+LABELS = np.digitize(Y, [-0.3, 0.3])
+NAMES = ["a", "b", "c", "d"]
+ROWS = [dict(zip(NAMES, row, strict=True)) for row in X.tolist()]
+UNIT = RandomInverse(low=0.0, high=1.0)
+MIXED = [
+    (UNIT, [0]),
+    (RandomInverse(spacing="quantile"), [1]),
+    (Circular(period=1.0), [2]),
+    ("anchor", 3),
+]
+OPTIONS = {"n_pattern_units": 40, "random_state": 1}
+
+
+def regressor(**options):
+    return SDNNRegressor(**{"coding": UNIT, "output_range": (-1.5, 1.5), **OPTIONS, **options})
+
+
+def classifier(**options):
+    return SDNNClassifier(**{"coding": UNIT, **OPTIONS, **options})
+
+
+def same(one, other):
+    np.testing.assert_array_equal(one.weights_, other.weights_)
+    np.testing.assert_array_equal(one.thresholds_, other.thresholds_)
+    assert one.n_iter_ == other.n_iter_
+
+
+@pytest.mark.parametrize("named", [False, True])
+def test_one_at_a_time_has_the_bits_of_partial_fit(named):
+    one, other = regressor(), regressor(training="plain")
+    for row, x, y in zip(ROWS, X, Y, strict=True):
+        one.learn_one(row if named else x, y)
+        other.partial_fit(x[None], [y])
+    same(one, other)
+    frame = pd.DataFrame(X, columns=NAMES) if named else X
+    singly = [one.predict_one(row if named else x) for row, x in zip(ROWS, X, strict=True)]
+    np.testing.assert_array_equal(singly, one.predict(frame))
+    assert isinstance(singly[0], float)
+
+
+@pytest.mark.parametrize("scheme", ["one_vs_rest", "one_vs_one"])
+def test_labels_one_at_a_time_have_the_bits_of_partial_fit(scheme):
+    one, other = classifier(scheme=scheme), classifier(scheme=scheme, training="block")
+    for x, label in zip(X, LABELS, strict=True):
+        one.learn_one(x, label, classes=[0, 1, 2])
+        other.partial_fit(x[None], [label], classes=[0, 1, 2])
+    same(one, other)
+    assert [one.predict_one(x) for x in X] == one.predict(X).tolist()
+
+
+def test_forms_may_take_turns():
+    one, other = regressor(), regressor(training="plain")
+    portions = [1, FEW_SAMPLES + 5, 3, 1, FEW_SAMPLES, 40]
+    begin = 0
+    for size in portions:
+        some = slice(begin, begin + size)
+        one.partial_fit(X[some], Y[some])
+        other.partial_fit(X[some], Y[some])
+        np.testing.assert_array_equal(one.predict(X[:2]), other.predict(X[:2]))
+        one = pickle.loads(pickle.dumps(one)) if size == 3 else copy.deepcopy(one)
+        begin += size
+    same(one, other)
+
+
+def test_copies_learn_apart():
+    model = regressor().learn_one(X[0], Y[0])
+    other = copy.deepcopy(model)
+    before = other.weights_
+    for x, y in zip(X, Y, strict=True):
+        model.learn_one(x, y)
+    np.testing.assert_array_equal(other.weights_, before)
+
+
+def test_inputs_of_all_codings_are_coded_alike():
+    model = regressor(coding=MIXED).fit(X, Y)
+    assert [model.predict_one(x) for x in X] == model.predict(X).tolist()
+    words = [(UNIT, [0, 1]), ("symbolic", [2])]
+    table = np.column_stack([X[:, :2].astype(object), np.where(X[:, 2] > 0.5, "u", "v")])
+    model = regressor(coding=words).fit(table, Y)
+    assert [model.predict_one(x) for x in table] == model.predict(table).tolist()
+    other = pickle.loads(pickle.dumps(model)).set_params(training="plain")
+    same(model.learn_one(list(table[0]), Y[0]), other.partial_fit(table[:1], Y[:1]))
+    with pytest.raises(ValueError, match="unknown categories"):
+        model.predict_one([0.1, 0.2, "w"])
+
+
+def test_several_outputs_one_at_a_time():
+    targets = np.stack([Y, -Y], axis=1)
+    model = regressor().fit(X, targets)
+    model.learn_one(X[0], targets[0])
+    np.testing.assert_array_equal(model.predict_one(X[3]), model.predict(X[3:4])[0])
+    with pytest.raises(ValueError, match="as many outputs as before, 2, got 1"):
+        model.learn_one(X[0], 0.5)
+
+
+def test_large_weights_are_learned_too():
+    model = regressor().fit(X, Y)
+    network = model.network_
+    network.restore(np.full_like(model.weights_, 20_000), model.thresholds_)
+    other = pickle.loads(pickle.dumps(model)).set_params(training="plain")
+    same(model.learn_one(X[0], Y[0]), other.partial_fit(X[:1], Y[:1]))
+    assert network.online(2**30) is None
+
+
+@pytest.mark.parametrize(
+    ("bad", "error"),
+    [
+        ({"a": 1.0}, r"x must have the features \['a', 'b', 'c', 'd'\]"),
+        (dict.fromkeys(["a", "b", "c", "e"], 0.5), "x must have the features"),
+        ([0.5, np.inf, 0.5, 0.5], "x must be finite numbers"),
+        ([0.5, "word", 0.5, 0.5], "x must be numbers"),
+        ([0.5], "x must have 4 features"),
+        (X[:1], "x must have 4 features"),
+    ],
+)
+def test_bad_rows_are_named(bad, error):
+    model = regressor().learn_one(ROWS[0], Y[0])
+    with pytest.raises(ValueError, match=error):
+        model.learn_one(bad, 0.1)
+    with pytest.raises(ValueError, match=error):
+        model.predict_one(bad)
+
+
+def test_bad_targets_are_named():
+    model = regressor()
+    for bad in (np.nan, "word", None, [[1.0]]):
+        with pytest.raises(ValueError, match="y must be"):
+            model.learn_one(X[0], bad)
+    with pytest.raises(ValueError, match="classes must be given"):
+        classifier().learn_one(X[0], 1)
+    with pytest.raises(ValueError, match=r"labels \[7\]"):
+        classifier().learn_one(X[0], 7, classes=[0, 1])
+    with pytest.raises(ValueError, match="mapping with words as keys"):
+        model.learn_one({1: 0.5}, 0.5)
+
+
+def test_values_beyond_a_range_are_counted_and_said_once():
+    model = regressor().fit(X, Y)
+    with pytest.warns(OutOfRangeWarning, match=r"column 2, whose range is"):
+        model.learn_one(X[0] + np.array([0, 0, 9, 0]), 0.0)
+    with pytest.warns(OutOfRangeWarning, match=r"y has 9.0, beyond output_range_ \[-1.5, 1.5\]"):
+        model.partial_fit(X[:3] + 7, [9.0, 9.0, 0.0])
+    model.learn_one(X[0] + 5, 9.0)
+    assert model.n_inputs_out_of_range_ == 1 + 12 + 4
+    assert model.n_outputs_out_of_range_ == 3
+    model.predict(X + 5)
+    assert model.n_inputs_out_of_range_ == 17
+    model.fit(X, Y)
+    assert model.n_inputs_out_of_range_ == model.n_outputs_out_of_range_ == 0
+
+
+@pytest.mark.parametrize("kind", [regressor, classifier])
+def test_values_beyond_a_range_may_be_errors(kind):
+    model = kind(out_of_range="error").fit(X, LABELS // 2)
+    with pytest.raises(ValueError, match=r"X has 3\.5 in column 1"):
+        model.learn_one([0.5, 3.5, 0.5, 0.5], 1)
+    if kind is regressor:
+        with pytest.raises(ValueError, match=r"y has 3\.5, beyond output_range_"):
+            model.learn_one(X[0], 3.5)
+    with pytest.raises(ValueError, match="out_of_range must be one of 'clip'"):
+        kind(out_of_range="stretch").fit(X, LABELS)
+
+
+def test_a_range_that_widens_follows_a_drift():
+    options = {"coding": UNIT, "random_state": 0, "n_pattern_units": 100}
+    clipping = SDNNRegressor(**options).fit(X, Y)
+    widening = SDNNRegressor(out_of_range="widen", **options).fit(X, Y)
+    for model in (clipping, widening):
+        with pytest.warns(OutOfRangeWarning):
+            model.partial_fit(X, Y + 10)
+        for _ in range(9):
+            model.partial_fit(X, Y + 10)
+    assert abs(clipping.predict(X) - (Y + 10)).min() > 5
+    assert widening.score(X, Y + 10) > 0.9
+
+
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
+def test_a_range_widens_alike_in_any_portions():
+    drifting = Y + np.linspace(0, 9, len(Y))
+    whole, parts, single = (regressor(out_of_range="widen") for _ in range(3))
+    whole.partial_fit(X, drifting)
+    for begin in range(0, len(X), 40):
+        parts.partial_fit(X[begin : begin + 40], drifting[begin : begin + 40])
+    for x, y in zip(X, drifting, strict=True):
+        single.learn_one(x, y)
+    for other in (parts, single):
+        np.testing.assert_array_equal(other.weights_, whole.weights_)
+        np.testing.assert_array_equal(other.output_range_, whole.output_range_)
+        assert other.n_outputs_out_of_range_ == whole.n_outputs_out_of_range_ > 0
+    assert whole.output_range_[0, 1] > drifting.max()
+
+
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
+def test_river_streams_are_learned():
+    pytest.importorskip("river")
+    from sdnn.estimators.river import RiverClassifier, RiverRegressor
+
+    model = RiverRegressor(SDNNRegressor(**OPTIONS, out_of_range="widen"), grace_period=50)
+    assert model.predict_one(ROWS[0]) == 0.0
+    errors = []
+    for _ in range(5):
+        for row, y in zip(ROWS, Y, strict=True):
+            errors.append(abs(model.predict_one(row) - y))
+            model.learn_one(row, y)
+    assert np.mean(errors[-200:]) < 0.5 * np.mean(np.abs(Y - Y.mean()))
+    labelled = RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
+    assert labelled.predict_one(ROWS[0]) is None
+    for _ in range(5):
+        hits = []
+        for row, label in zip(ROWS, LABELS.tolist(), strict=True):
+            hits.append(labelled.predict_one(row) == label)
+            labelled.learn_one(row, label)
+    assert np.mean(hits) > 0.8
+    assert labelled.clone().fitted is None
