@@ -68,6 +68,7 @@ GOOD = {
         "config": core.SensorConfig(), "seed": 1, "stream": core.Stream.sensor_noise
     },
     "ParallelPerceptron": lambda: {"code": code(), "n_units": 6, "seed": 1, "initial_range": 5},
+    "OnlineLayer": lambda: {"layer": core.ParallelPerceptron(code(), 6)},
     "PDeltaTrainer": lambda: {
         "layer": core.ParallelPerceptron(code(), 6), "bins": BINS, "targets": [[1.0], [2.0], [3.0]],
         "form": "auto", "memory_limit": 2**20, "n_threads": 1,

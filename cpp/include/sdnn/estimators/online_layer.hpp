@@ -133,13 +133,9 @@ class OnlineLayer {
       }
       if (now.units.empty()) continue;
       std::sort(now.units.begin(), now.units.end());  // neighbours share cache lines
+      done_.reserve(done_.size() + 1);  // once it is done, nothing may fail before it is noted
+      hidden_.correct(now.units, slots_.columns(), direction);
       done_.push_back(std::move(now));
-      try {
-        hidden_.correct(done_.back().units, slots_.columns(), direction);
-      } catch (...) {
-        done_.pop_back();
-        throw;
-      }
     }
   }
 
