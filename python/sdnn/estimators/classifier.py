@@ -14,6 +14,7 @@ from sklearn.utils.multiclass import check_classification_targets, unique_labels
 from sdnn import _core
 from sdnn.arguments import one_of, whole
 from sdnn.estimators.base import BaseSDNN
+from sdnn.estimators.columns import kept_pairs
 from sdnn.estimators.network import Network
 from sdnn.estimators.training import Trainer
 
@@ -57,7 +58,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         ColumnTransformer (inputs left out have "random-inverse").
     n_pattern_units : int, optional
         Units per pattern, even. None shares about 16,000 columns out among the pairs.
-    pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"
+    pairs : "budget", "all", "auto" or iterable of (modified, modifier), default="budget"
         Pairs of features, by number or name. A modifier of None leaves a pattern plain, which is
         also what a single feature gets. "budget" means all pairs up to 22 features, and beyond an
         even share of them drawn at random: 500 pairs, or one per feature. "auto" lets `fit` leave
@@ -160,7 +161,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     ) -> None:
         self.coding = coding
         self.n_pattern_units = n_pattern_units
-        self.pairs = pairs
+        self.pairs = kept_pairs(pairs)
         self.tables = tables
         self.out_of_range = out_of_range
         self.scheme = scheme

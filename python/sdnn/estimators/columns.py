@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -147,6 +147,11 @@ def share_of_pairs(n_inputs: int, n_most: int, seed: int) -> list[tuple[int, int
     return sorted((mu, int(mu + step) % n_inputs) for mu in range(n_inputs) for step in away)
 
 
+def kept_pairs(pairs: Any) -> Any:
+    """Return what a generator yields as a list, to be read at every fit; all else as it is."""
+    return list(pairs) if isinstance(pairs, Iterator) else pairs
+
+
 def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int) -> list[tuple[int, int]]:
     """Return the ordered pairs (modified, modifier) of features; (mu, mu) is mu's plain pattern.
 
@@ -168,7 +173,7 @@ def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int) -> list[
     if isinstance(pairs, str) and pairs == "all":
         everything = [(mu, nu) for mu in range(n_inputs) for nu in range(n_inputs) if mu != nu]
         return everything or [(0, 0)]
-    if isinstance(pairs, str) or not isinstance(pairs, Iterable):
+    if isinstance(pairs, str | Iterator) or not isinstance(pairs, Iterable):
         raise ValueError(
             "pairs must be 'budget', 'all', 'auto' or a list of (modified, modifier), "
             f"got {pairs!r}"

@@ -13,7 +13,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from sdnn.arguments import real
 from sdnn.estimators.coded_inputs import CodedInputs
-from sdnn.estimators.columns import input_pairs
+from sdnn.estimators.columns import input_pairs, kept_pairs
 from sdnn.kernel import N_UNITS, AnalyticKernel
 
 __all__ = ["SDNNKernelRidge"]
@@ -71,7 +71,7 @@ class SDNNKernelRidge(RegressorMixin, CodedInputs):
     ) -> None:
         self.coding = coding
         self.alpha = alpha
-        self.pairs = pairs
+        self.pairs = kept_pairs(pairs)
 
     def __sklearn_tags__(self) -> Any:
         """Say that several outputs can be learned at once."""

@@ -11,6 +11,7 @@ from sklearn.base import RegressorMixin
 from sdnn import _core
 from sdnn.arguments import flag, whole
 from sdnn.estimators.base import BaseSDNN
+from sdnn.estimators.columns import kept_pairs
 from sdnn.estimators.network import Network
 from sdnn.estimators.training import Trainer, run_epochs
 
@@ -42,7 +43,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         ColumnTransformer (inputs left out have "random-inverse").
     n_pattern_units : int, optional
         Units per pattern, even. None shares about 16,000 columns out among the pairs.
-    pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"
+    pairs : "budget", "all", "auto" or iterable of (modified, modifier), default="budget"
         Pairs of features, by number or name. A modifier of None leaves a pattern plain, which is
         also what a single feature gets. "budget" means all pairs up to 22 features, and beyond an
         even share of them drawn at random: 500 pairs, or one per feature. "auto" lets `fit` leave
@@ -157,7 +158,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     ) -> None:
         self.coding = coding
         self.n_pattern_units = n_pattern_units
-        self.pairs = pairs
+        self.pairs = kept_pairs(pairs)
         self.tables = tables
         self.n_output_units = n_output_units
         self.output_range = output_range

@@ -247,6 +247,15 @@ def test_copies_and_pickles_predict_the_same(estimator):
     )
 
 
+def test_pairs_may_come_from_a_generator(estimator):
+    listed = [(0, 1), (1, 2), (2, 0)]
+    made = type(estimator)(**SMALL, pairs=((mu, (mu + 1) % 3) for mu in range(3)))
+    for model in (made, clone(made), made):  # fitted again, too
+        assert list(model.fit(X, targets_of(estimator)).pairs_) == listed
+    with pytest.raises(ValueError, match="pairs must be 'budget', 'all', 'auto' or a list"):
+        clone(made).set_params(pairs=iter(listed)).fit(X, targets_of(estimator))
+
+
 def test_it_works_where_scikit_learn_puts_it(estimator):
     targets = targets_of(estimator)
     pipeline = make_pipeline(StandardScaler(), estimator)
