@@ -76,7 +76,7 @@ TEST(TrainingForm, SuitsTheEpochs) {
        {Measured{50, .029, .0002, .091, .0065}, Measured{200, .066, .0007, .097, .022},
         Measured{1000, .301, .0047, .091, .104}, Measured{3000, 1.50, .022, .095, .295},
         Measured{10000, 15.1, .24, .103, 1.02}}) {
-    for (const std::size_t n_epochs : {1, 3, 10, 30, 100}) {
+    for (const std::size_t n_epochs : {1U, 3U, 10U, 30U, 100U}) {
       const auto epochs = static_cast<double>(n_epochs);
       const double dual = at.dual_once + epochs * at.dual_epoch;
       const double block = at.block_once + epochs * at.block_epoch;

@@ -101,7 +101,7 @@ class WholeFile {
  private:
   [[noreturn]] void fail(const char* what) const {
     core::fail(std::runtime_error(path_.string() + ": " + what + ": " +
-                            std::generic_category().message(errno)));
+                                  std::generic_category().message(errno)));
   }
 
   bool close() noexcept {
