@@ -1,8 +1,6 @@
 /// How errors reach the caller: as exceptions, or where there are none, through a function of his.
 #pragma once
 
-#include <utility>
-
 #if defined(__cpp_exceptions) || defined(_CPPUNWIND)
 #define SDNN_EXCEPTIONS 1
 #else
@@ -32,9 +30,9 @@ inline ErrorHandler& error_handler() noexcept {
 /// Throws `error`. Compiled without exceptions (-fno-exceptions), hands its message to
 /// error_handler() and aborts.
 template <class Error>
-[[noreturn]] void fail(Error error) {
+[[noreturn]] void fail(const Error& error) {
 #if SDNN_EXCEPTIONS
-  throw std::move(error);
+  throw error;
 #else
   error_handler()(error.what());
   std::abort();
