@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from sdnn.agents.evaluation import episode_seed, evaluate
 from sdnn.agents.files import Arrays, Description, from_file, read, write
-from sdnn.agents.interrupts import Interrupts
 from sdnn.agents.rounds import Outcome, rounds_in
 from sdnn.agents.transition import Transition
 from sdnn.arguments import flag, has_methods, path_of, real, whole
+from sdnn.interrupts import Interrupts
 
 if TYPE_CHECKING:
     from typing_extensions import Self

@@ -19,6 +19,7 @@ from sdnn.experiments.records import CostRecord
 from sdnn.experiments.registry import AGENTS, agent_entry, cost_series
 from sdnn.experiments.results import CaseResult
 from sdnn.experiments.statistics import running_median
+from sdnn.interrupts import stay_interrupts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -194,7 +195,7 @@ def figure_bytes(figure: Figure) -> tuple[bytes, bytes]:
     from matplotlib import rc_context
 
     png, svg = BytesIO(), BytesIO()
-    with rc_context({"svg.hashsalt": "sdnn"}):
+    with stay_interrupts(), rc_context({"svg.hashsalt": "sdnn"}):
         figure.savefig(png, format="png", dpi=200, metadata={"Software": None})
         figure.savefig(svg, format="svg", metadata={"Date": None})
     return png.getvalue(), svg.getvalue()

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.interrupts import stay_interrupts
 from sdnn.runs.config import RunConfig
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
@@ -107,7 +108,9 @@ def write_curves(curves: Sequence[Curve], path: Path) -> tuple[Path, Path]:
     if path.suffix not in SUFFIXES:
         raise RunError(f"out must end in one of {', '.join(SUFFIXES)}, got {path}")
     content = BytesIO()
-    draw_curves(curves).savefig(content, format=path.suffix[1:], dpi=150)
+    figure = draw_curves(curves)
+    with stay_interrupts():
+        figure.savefig(content, format=path.suffix[1:], dpi=150)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, content.getvalue())
     numbers = path.with_suffix(".csv")

@@ -27,9 +27,9 @@ from sdnn.agents import (
     evaluate,
     load_agent,
 )
-from sdnn.agents.interrupts import Interrupts
 from sdnn.agents.training import Row
 from sdnn.arguments import whole
+from sdnn.interrupts import Interrupts
 from sdnn.runs.config import RunConfig, read_json
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, problem_of
 from sdnn.whole_files import remove_partial_files, write_whole

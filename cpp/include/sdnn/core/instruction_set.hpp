@@ -55,8 +55,10 @@ inline bool offers(InstructionSet level) noexcept {
   switch (level) {
     case InstructionSet::portable:
       return true;
+#if SDNN_NEON_KERNELS
     case InstructionSet::neon:
-      return SDNN_NEON_KERNELS != 0;
+      return true;
+#endif
 #if SDNN_X86_KERNELS
     case InstructionSet::avx2:
       return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") &&

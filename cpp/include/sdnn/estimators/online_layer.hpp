@@ -65,6 +65,7 @@ class OnlineLayer {
       OnlineLayer& layer;
       std::span<const std::int32_t> bins;
       bool is_done = false;
+      // NOLINTNEXTLINE(bugprone-exception-escape): back is always in range
       ~Undoes() {
         if (!is_done) layer.undo(bins);
       }

@@ -1,17 +1,18 @@
-"""Interrupts that wait for the end of a step, so that what is saved then is whole."""
+"""Ctrl-C that waits for the end of a step, and Ctrl-C that others' code takes for another error."""
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["Interrupts"]
+__all__ = ["Interrupts", "stay_interrupts"]
 
 
 class Interrupts:
@@ -62,3 +63,42 @@ class Interrupts:
         for each, handler in self._before.items():
             signal.signal(each, handler)
         self._ask_to_stop()
+
+
+@contextmanager
+def stay_interrupts() -> Iterator[None]:
+    """Let a Ctrl-C leave the block as what it is, whatever the code in it makes of it.
+
+    Extensions replace the exceptions of the Python code that they call, or forget them: matplotlib
+    answers a Ctrl-C with "Invalid affine transformation matrix".
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If Ctrl-C was pressed and the block did not let its exception through.
+    """
+    usual = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(usual):
+        yield
+        return
+    came = False
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        nonlocal came
+        try:
+            usual(number, frame)
+        except KeyboardInterrupt:
+            came = True
+            raise
+
+    signal.signal(signal.SIGINT, handle)
+    try:
+        yield
+    except Exception as error:
+        if came:
+            raise KeyboardInterrupt from error
+        raise
+    finally:
+        signal.signal(signal.SIGINT, usual)
+    if came:
+        raise KeyboardInterrupt

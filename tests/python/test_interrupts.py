@@ -1,12 +1,13 @@
 import os
 import signal
 import threading
+from contextlib import suppress
 
 import gymnasium as gym
 import pytest
 
 from sdnn.agents import Callback, Checkpoints, JSONLines, SDNNQLearning, Training
-from sdnn.agents.interrupts import Interrupts
+from sdnn.interrupts import Interrupts, stay_interrupts
 
 
 @pytest.fixture(autouse=True)
@@ -97,3 +98,47 @@ def test_an_interrupted_training_goes_on_exactly(tmp_path, times, saved_at):
     for name in ("cut", "whole"):
         assert (tmp_path / f"{name}.jsonl").read_text().count("\n") == loaded.n_rows
     assert (tmp_path / "cut.jsonl").read_text() == (tmp_path / "whole.jsonl").read_text()
+
+
+def press_ctrl_c():
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def press_ctrl_c_in_other_code():
+    try:
+        press_ctrl_c()
+    except KeyboardInterrupt:
+        raise ValueError("Invalid affine transformation matrix") from None
+
+
+def test_ctrl_c_stays_what_it_is_when_other_code_takes_it_for_another_error():
+    with pytest.raises(KeyboardInterrupt), stay_interrupts():
+        press_ctrl_c_in_other_code()
+    with pytest.raises(KeyboardInterrupt), stay_interrupts(), suppress(KeyboardInterrupt):
+        press_ctrl_c()
+    with pytest.raises(KeyboardInterrupt), stay_interrupts():
+        press_ctrl_c()
+
+
+def test_errors_and_ctrl_c_that_somebody_else_handled_are_left_alone():
+    with pytest.raises(ValueError, match="of its own"), stay_interrupts():
+        raise ValueError("of its own")
+    asked = []
+    with Interrupts(lambda: asked.append(1)), stay_interrupts():
+        press_ctrl_c()
+    assert asked == [1]
+    with stay_interrupts():
+        pass
+
+
+def test_other_threads_have_no_ctrl_c():
+    entered = []
+
+    def enter():
+        with stay_interrupts():
+            entered.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=enter)
+    thread.start()
+    thread.join()
+    assert entered == [signal.default_int_handler]
