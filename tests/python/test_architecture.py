@@ -43,6 +43,7 @@ PYTHON_MODULES = {
     "config": "core",
     "kernel": "coding",
     "instruction_sets": "core",
+    "interrupts": "core",
     "machine": "core",
     "toml_lines": "core",
     "typed_values": "core",
