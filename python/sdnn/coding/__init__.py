@@ -15,6 +15,7 @@ array([ 0,  0, 50, 99], dtype=int32)
 """
 
 from sdnn.coding.base import Coding
+from sdnn.coding.missing import WithMissing
 from sdnn.coding.names import CODINGS, coding_named, from_dict, to_dict
 from sdnn.coding.numeric import Anchor, Circular, CoarseCodeWarning, RandomInverse
 from sdnn.coding.symbols import CorrelationMatrix, Symbolic
@@ -28,6 +29,7 @@ __all__ = [
     "CorrelationMatrix",
     "RandomInverse",
     "Symbolic",
+    "WithMissing",
     "coding_named",
     "from_dict",
     "to_dict",

@@ -7,13 +7,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from sdnn.coding.base import Coding
+from sdnn.coding.missing import WithMissing
 from sdnn.coding.numeric import Anchor, Circular, RandomInverse
 from sdnn.coding.symbols import CorrelationMatrix, Symbolic
 
 __all__ = ["CODINGS", "coding_named", "from_dict", "to_dict"]
 
 CODINGS: dict[str, type[Coding]] = {
-    coding.name: coding for coding in (RandomInverse, Anchor, Circular, Symbolic, CorrelationMatrix)
+    coding.name: coding
+    for coding in (RandomInverse, Anchor, Circular, Symbolic, CorrelationMatrix, WithMissing)
 }
 """Every coding by its name."""
 
@@ -54,8 +56,9 @@ def to_dict(coding: Coding) -> dict[str, Any]:
     """
     if type(coding) is not CODINGS.get(coding.name):
         raise TypeError(f"only codings of sdnn.coding can be described, got {coding!r}")
-    fields: dict[str, Any] = dataclasses.asdict(coding)  # type: ignore[call-overload]
-    return {"coding": coding.name, **fields}
+    fields = {field.name: getattr(coding, field.name) for field in dataclasses.fields(coding)}  # type: ignore[arg-type]
+    plain = {k: to_dict(v) if isinstance(v, Coding) else v for k, v in fields.items()}
+    return {"coding": coding.name, **plain}
 
 
 def from_dict(data: Mapping[str, Any]) -> Coding:
@@ -69,5 +72,7 @@ def from_dict(data: Mapping[str, Any]) -> Coding:
 
 
 def tupled(value: Any) -> Any:
-    """Replace lists by tuples, all the way down."""
+    """Replace lists by tuples and descriptions of codings by codings, all the way down."""
+    if isinstance(value, Mapping):
+        return from_dict(value)
     return tuple(map(tupled, value)) if isinstance(value, list | tuple) else value

@@ -55,6 +55,7 @@ class BaseSDNN(CodedInputs):
     n_iter_no_change: int
     training: str
     memory_limit: int
+    warm_start: bool
     random_state: Any
     n_jobs: int | None
     verbose: int
@@ -76,6 +77,7 @@ class BaseSDNN(CodedInputs):
         one_of("training", self.training, _core.TRAINING_FORMS)
         flag("shuffle", self.shuffle)
         flag("early_stopping", self.early_stopping)
+        flag("warm_start", self.warm_start)
         if not isinstance(self.verbose, bool | np.bool_):
             whole("verbose", self.verbose, 0, 2**62)
         if self.n_jobs is not None:
@@ -117,6 +119,19 @@ class BaseSDNN(CodedInputs):
         self._weight_seed = weight_seed
         self.n_inputs_out_of_range_ = 0
         self._note_inputs(table)
+        return random
+
+    def _goes_on(self) -> bool:
+        """Whether `fit` is to go on with the network that is there."""
+        return bool(self.warm_start) and hasattr(self, "network_")
+
+    def _go_on(self, table: NDArray[Any]) -> np.random.RandomState:
+        """Train a copy of the network from now on; returns the generator of orders."""
+        self._check_parameters()
+        self._finite(table, self.codings_)
+        self._note_inputs(table)
+        self.network_ = self.network_.copy()
+        random: np.random.RandomState = check_random_state(self.random_state)
         return random
 
     def _select_pairs(self, X: Any, table: NDArray[Any], y: Any) -> None:

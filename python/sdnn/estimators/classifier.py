@@ -12,7 +12,7 @@ from sklearn.utils.metaestimators import available_if
 from sklearn.utils.multiclass import check_classification_targets, unique_labels
 
 from sdnn import _core
-from sdnn.arguments import one_of, whole
+from sdnn.arguments import flag, one_of, whole
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.columns import kept_pairs
 from sdnn.estimators.network import Network
@@ -94,6 +94,9 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         Form of training; the result is the same to the last bit, time and memory differ.
     memory_limit : int, default=2**30
         Bytes that weights and patterns may use, and that training may use beside them.
+    warm_start : bool, default=False
+        Whether `fit` goes on with the network that is there, its ranges, categories and sizes as
+        they were, instead of drawing a new one.
     random_state : int, RandomState or None, default=None
         Decides patterns, first weights, orders and the validation share.
     n_jobs : int, optional
@@ -155,6 +158,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         n_iter_no_change: int = 10,
         training: str = "auto",
         memory_limit: int = 2**30,
+        warm_start: bool = False,
         random_state: Any = None,
         n_jobs: int | None = None,
         verbose: int = 0,
@@ -174,6 +178,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         self.n_iter_no_change = n_iter_no_change
         self.training = training
         self.memory_limit = memory_limit
+        self.warm_start = warm_start
         self.random_state = random_state
         self.n_jobs = n_jobs
         self.verbose = verbose
@@ -207,10 +212,14 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         return self
 
     def _fit(self, X: ArrayLike, y: ArrayLike) -> None:
-        table, y = self._checked(X, y, reset=True, ensure_min_samples=2)
-        self._select_pairs(X, table, y)
-        random = self._begin(X, table, unique_labels(y))
-        self.__dict__.pop("_selected", None)
+        flag("warm_start", self.warm_start)
+        table, y = self._checked(X, y, reset=not self._goes_on(), ensure_min_samples=2)
+        if self._goes_on():
+            random = self._go_on(table)
+        else:
+            self._select_pairs(X, table, y)
+            random = self._begin(X, table, unique_labels(y))
+            self.__dict__.pop("_selected", None)
         labels = numbers_of(y, self.classes_)
         held, kept = self._split(random, len(table))
         bins = self.network_.input_code.bins(table)

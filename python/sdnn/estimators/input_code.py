@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sdnn import _core
 from sdnn.arguments import one_of
 from sdnn.coding import Coding
+from sdnn.coding.missing import missing_as_nan
 
 __all__ = [
     "COLUMN_BUDGET",
@@ -153,7 +154,8 @@ class InputCode:
         """
         indices, low, high = self._ends
         values = table if len(indices) == table.shape[1] else table[:, indices]
-        values = np.asarray(values, dtype=np.float64)
+        if values.dtype != np.float64:
+            values = missing_as_nan(values)
         beyond = (values < low) | (values > high)
         n_beyond = int(np.count_nonzero(beyond))
         if n_beyond == 0:

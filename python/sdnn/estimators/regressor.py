@@ -83,6 +83,9 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         Form of training; the result is the same to the last bit, time and memory differ.
     memory_limit : int, default=2**30
         Bytes that weights and patterns may use, and that training may use beside them.
+    warm_start : bool, default=False
+        Whether `fit` goes on with the network that is there, its ranges, categories and sizes as
+        they were, instead of drawing a new one.
     random_state : int, RandomState or None, default=None
         Decides patterns, first weights, orders and the validation share.
     n_jobs : int, optional
@@ -152,6 +155,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         n_iter_no_change: int = 10,
         training: str = "auto",
         memory_limit: int = 2**30,
+        warm_start: bool = False,
         random_state: Any = None,
         n_jobs: int | None = None,
         verbose: int = 0,
@@ -172,6 +176,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         self.n_iter_no_change = n_iter_no_change
         self.training = training
         self.memory_limit = memory_limit
+        self.warm_start = warm_start
         self.random_state = random_state
         self.n_jobs = n_jobs
         self.verbose = verbose
@@ -213,10 +218,16 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     def _fit(self, X: ArrayLike, y: ArrayLike) -> None:
         flag("refit", self.refit)
         whole("n_averaged_epochs", self.n_averaged_epochs, 1, 1000)
-        table, targets = self._checked(X, y, reset=True)
-        self._select_pairs(X, table, y)
-        random = self._begin(X, table, targets)
-        self.__dict__.pop("_selected", None)
+        if flag("warm_start", self.warm_start) and self.refit:
+            raise ValueError("refit=True trains a new network: it cannot be with warm_start=True")
+        table, targets = self._checked(X, y, reset=not self._goes_on())
+        if self._goes_on():
+            self._check_outputs(targets.shape[1])
+            random = self._go_on(table)
+        else:
+            self._select_pairs(X, table, y)
+            random = self._begin(X, table, targets)
+            self.__dict__.pop("_selected", None)
         if self.out_of_range == "widen":
             self._widen(targets.min(axis=0))
             self._widen(targets.max(axis=0))

@@ -4,6 +4,7 @@ import dataclasses
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,6 +16,7 @@ from sdnn.coding import (
     CorrelationMatrix,
     RandomInverse,
     Symbolic,
+    WithMissing,
     coding_named,
     from_dict,
     to_dict,
@@ -34,6 +36,8 @@ FITTED = {
     "circular of one": Circular(n_anchor_patterns=2, n_interpolated=9).fit(UNIT, 400),
     "symbolic": Symbolic().fit(LETTERS, 400),
     "correlation-matrix": CorrelationMatrix(matrix=LIKE).fit(LETTERS, 400),
+    "with missing": WithMissing(base=RandomInverse(length_scale=0.2)).fit(UNIT, 400),
+    "letters with missing": WithMissing(base=Symbolic()).fit(LETTERS, 400),
 }
 
 
@@ -130,7 +134,7 @@ def test_codings_survive_json(name):
 
 def test_names():
     assert set(CODINGS) == {
-        "random-inverse", "anchor", "circular", "symbolic", "correlation-matrix",
+        "random-inverse", "anchor", "circular", "symbolic", "correlation-matrix", "with-missing",
     }  # fmt: skip
     assert coding_named("symbolic") == Symbolic()
     assert coding_named(Anchor()) == Anchor()
@@ -208,3 +212,39 @@ def test_knots_are_values_and_their_mean_ranks():
     assert np.all(np.diff(values) > 0)
     assert np.all(np.diff(levels) > 0)
     assert (levels[0], levels[-1]) == (0, 1)
+
+
+def test_what_is_missing_has_the_last_bin():
+    numbers = np.array([4.0, None, 0.0, np.nan, pd.NA], dtype=object)
+    coding = WithMissing(base=Anchor(n_anchor_patterns=3, n_interpolated=1)).fit(numbers, 8)
+    assert (coding.base.low, coding.base.high, coding.size) == (0.0, 4.0, 5)
+    assert coding.ends() == (0.0, 4.0)
+    assert coding.bins(numbers).tolist() == [3, 4, 0, 4, 4]
+    assert coding.bins(np.array([2.0, np.nan])).tolist() == [2, 4]
+    np.testing.assert_array_equal(coding.patterns(8, 5)[:-1], coding.base.patterns(8, 5))
+    letters = WithMissing(base=Symbolic()).fit(np.array(["b", None, "a"], dtype=object), 8)
+    assert letters.bins(np.array(["a", "b", "new", None, ["a"]], dtype=object)).tolist() == [
+        0, 1, 2, 2, 2,
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("coding", "column", "message"),
+    [
+        (WithMissing(unknown="ignore"), UNIT, "unknown must be one of 'missing', 'error'"),
+        (WithMissing(base=WithMissing()), UNIT, "base must be a Coding without missing values"),
+        (WithMissing(base="anchor"), UNIT, "base must be a Coding"),
+        (WithMissing(), np.array([np.nan, np.nan]), "every value of an input is missing"),
+        (WithMissing(), np.array([1.0, np.inf]), "infinity"),
+        (WithMissing(), np.array(["a", None], dtype=object), "could not convert"),
+    ],
+)
+def test_what_cannot_be_coded_with_missing_values(coding, column, message):
+    with pytest.raises(ValueError, match=message):
+        coding.fit(column, 8)
+
+
+def test_unknown_categories_may_stay_an_error():
+    strict = WithMissing(base=Symbolic(), unknown="error").fit(LETTERS, 8)
+    with pytest.raises(ValueError, match="unknown categories"):
+        strict.bins(np.array(["z"]))

@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from sdnn import SDNNClassifier, SDNNRegressor
-from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic
+from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic, WithMissing
+from sdnn.estimators import OutOfRangeWarning
 from sdnn.estimators.columns import codings_of_columns, column_indices, input_pairs
 from sdnn.estimators.input_code import draw_input_code
 
@@ -76,6 +77,26 @@ def test_unknown_categories_and_missing_values_are_refused():
         model.fit(TABLE.assign(color=None), TARGETS)
     with pytest.raises(ValueError, match="infinity"):
         model.partial_fit(TABLE.assign(size=np.inf), TARGETS)
+
+
+def test_missing_values_and_unknown_categories_can_have_patterns_of_their_own(tmp_path):
+    coding = [("with-missing", ["hour", "size"]), (WithMissing(base=Symbolic()), "color")]
+    holes = TABLE.copy()
+    holes.loc[::5, "size"] = np.nan
+    holes.loc[1::5, "color"] = None
+    model = SDNNRegressor(coding, max_iter=100, **SMALL).fit(holes, TARGETS)
+    assert model.score(TABLE, TARGETS) > 0.9
+    unknown = model.predict(holes.assign(color="pink"))
+    np.testing.assert_array_equal(unknown, model.predict(holes.assign(color=pd.NA)))
+    assert np.isfinite(unknown).all()
+    row = holes.iloc[0].to_dict()
+    assert model.predict_one(row) == model.predict(holes)[0]
+    model.save(tmp_path / "model")
+    again = SDNNRegressor.load(tmp_path / "model")
+    assert again.codings_ == model.codings_
+    np.testing.assert_array_equal(again.predict(holes), model.predict(holes))
+    with pytest.warns(OutOfRangeWarning, match=r"in column 2, whose range"):
+        model.partial_fit(holes.assign(size=1e3), TARGETS)
 
 
 def test_words_without_a_coding_are_refused():

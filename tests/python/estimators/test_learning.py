@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.datasets import load_iris
+from sklearn.multioutput import MultiOutputClassifier
 
 from sdnn import SDNNClassifier, SDNNRegressor, _core
 from sdnn.coding import Circular, RandomInverse
@@ -78,6 +79,44 @@ def test_epochs_are_passes_of_partial_fit():
     same(fitted, online)
     online.partial_fit(X, Y)
     same(SDNNRegressor(**REGRESSOR, max_iter=5, shuffle=False).fit(X, Y), online)
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "targets"),
+    [(SDNNRegressor, REGRESSOR, Y), (SDNNClassifier, {**GIVEN, "n_units_per_class": 8}, LABELS)],
+)
+def test_a_warm_start_goes_on_where_fit_ended(kind, options, targets):
+    model = kind(**options, shuffle=False, warm_start=True, max_iter=2).fit(X, targets)
+    first, weights = model.network_, model.weights_
+    assert model.set_params(max_iter=3).fit(X, targets).n_iter_ == 3
+    same(model, kind(**options, shuffle=False, max_iter=5).fit(X, targets))
+    np.testing.assert_array_equal(first.weights, weights)
+    model.set_params(max_iter=1, training="dual", memory_limit=100)
+    now = model.weights_
+    with pytest.raises(ValueError, match="memory_limit"):
+        model.fit(X, targets)
+    np.testing.assert_array_equal(model.weights_, now)
+
+
+def test_a_warm_start_keeps_what_the_network_was_made_for():
+    model = SDNNRegressor(**REGRESSOR, warm_start=True).fit(X, Y)
+    with pytest.raises(ValueError, match="expecting 2 features"):
+        model.fit(X[:, :1], Y)
+    with pytest.raises(ValueError, match="as many outputs as before, 1, got 2"):
+        model.fit(X, np.column_stack([Y, Y]))
+    with pytest.raises(ValueError, match="refit=True trains a new network"):
+        model.set_params(refit=True).fit(X, Y)
+    labels = SDNNClassifier(**GIVEN, warm_start=True).fit(X[:, :1], LABELS > 0)
+    with pytest.raises(ValueError, match="not in classes"):
+        labels.fit(X[:, :1], np.full(len(X), 5))
+    with pytest.raises(TypeError, match="warm_start must be"):
+        SDNNClassifier(**GIVEN, warm_start="yes").fit(X, LABELS)
+
+
+def test_several_labels_a_sample_are_learned_by_a_classifier_each():
+    both = np.column_stack([LABELS, (X[:, 0] > 0.5).astype(int)])
+    model = MultiOutputClassifier(SDNNClassifier(**GIVEN, max_iter=50)).fit(X, both)
+    assert (model.predict(X) == both).mean() > 0.95
 
 
 def test_partial_fit_goes_on_after_fit():
