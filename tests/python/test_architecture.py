@@ -360,6 +360,65 @@ def test_headers_live_in_the_namespace_of_their_room():
         assert "#pragma once" in path.read_text(), path
 
 
+STANDARD_HEADERS = {
+    "algorithm": "(sort|nth_element|shuffle|transform|copy(_n)?|fill(_n)?|equal|find_if|all_of|any_of|"
+    "count_if|for_each|adjacent_find|partition_point|swap_ranges|minmax_element|min|max|clamp|"
+    r"ranges::(all_of|copy|equal|find_if|transform|stable_sort|sort|fill|any_of))\(",
+    "array": r"array\b",
+    "atomic": r"(atomic\b|memory_order)",
+    "bit": r"(bit_cast|popcount|countr_zero|rotl|bit_width|endian)\b",
+    "bitset": r"bitset\b",
+    "chrono": "chrono::",
+    "cmath": r"(isfinite|isnan|floor|ceil|sqrt|sin|log|lround|llround|nearbyint|remainder|copysign|"
+    r"signbit)\(",
+    "concepts": r"convertible_to\b",
+    "cstddef": r"(size_t|ptrdiff_t|byte)\b",
+    "cstdint": r"u?int(8|16|32|64)_t\b",
+    "cstdlib": r"(getenv|calloc|free|abort|llabs)\(",
+    "cstring": r"memcpy\(",
+    "exception": r"exception\b",
+    "filesystem": "filesystem::",
+    "fstream": r"(ifstream|ofstream)\b",
+    "functional": r"function\b",
+    "iomanip": r"(setprecision)\b",
+    "limits": r"numeric_limits\b",
+    "map": r"map\b",
+    "memory": r"(shared_ptr|unique_ptr|make_shared|make_unique)\b",
+    "new": r"bad_alloc\b",
+    "numeric": r"iota\b",
+    "optional": r"(optional|nullopt)\b",
+    "random": r"(mt19937|seed_seq|normal_distribution)\b",
+    "set": r"set\b",
+    "span": r"(span|as_bytes)\b",
+    "sstream": r"ostringstream\b",
+    "stdexcept": r"(invalid_argument|runtime_error|overflow_error|length_error|out_of_range|"
+    r"logic_error)\b",
+    "string": r"(string|to_string)\b",
+    "string_view": r"string_view\b",
+    "system_error": r"(error_code|generic_category)\b",
+    "thread": r"(jthread|this_thread)\b",
+    "tuple": r"(tuple|tuple_cat|apply)\b",
+    "type_traits": r"(is_\w+_v|remove_cvref_t|conditional_t|true_type|false_type|make_unsigned_t|"
+    r"integral_constant|type_identity_t)\b",
+    "utility": r"(move|swap|pair|exchange|index_sequence|make_index_sequence|declval|in_place_type)\b",
+    "variant": r"(variant|visit|get_if)\b",
+    "vector": r"(vector|erase_if)\b",
+}
+"""What of the standard library's namespace is in which of its headers."""
+
+
+def test_headers_include_what_they_use_of_the_standard_library():
+    missing = []
+    for path in headers():
+        code = re.sub(r"//.*", "", path.read_text(encoding="utf-8"))
+        missing += [
+            f"{path.relative_to(INCLUDE)}: <{name}>"
+            for name, used in STANDARD_HEADERS.items()
+            if name not in includes(path) and re.search(r"\bstd::" + used, code)
+        ]
+    assert missing == []
+
+
 def test_headers_with_floating_point_refuse_options_that_change_results():
     includes = {
         path: {

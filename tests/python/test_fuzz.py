@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 FUZZ = ROOT / "tests" / "fuzz"
 TARGETS = sorted(path.stem for path in FUZZ.glob("*_fuzz.cpp"))
-SECONDS = int(os.environ.get("SDNN_FUZZ_SECONDS", "10"))
+SECONDS = int(os.environ.get("SDNN_FUZZ_SECONDS", "12"))
 """For each target; a minute for all of them by default."""
 
 SEEDS = {"agent_file_fuzz": ROOT / "tests" / "data" / "agents"}

@@ -20,6 +20,7 @@
 #else
 #define SDNN_HAS_POSIX_FILES 0
 #include <fstream>
+#include <utility>
 #endif
 
 namespace sdnn::core {
