@@ -361,8 +361,8 @@ def test_headers_live_in_the_namespace_of_their_room():
 
 
 STANDARD_HEADERS = {
-    "algorithm": "(sort|nth_element|shuffle|transform|copy(_n)?|fill(_n)?|equal|find_if|all_of|any_of|"
-    "count_if|for_each|adjacent_find|partition_point|swap_ranges|minmax_element|min|max|clamp|"
+    "algorithm": "(sort|nth_element|shuffle|transform|copy(_n)?|fill(_n)?|equal|find_if|all_of|"
+    "any_of|count_if|for_each|adjacent_find|partition_point|swap_ranges|minmax_element|min|max|clamp|"
     r"ranges::(all_of|copy|equal|find_if|transform|stable_sort|sort|fill|any_of))\(",
     "array": r"array\b",
     "atomic": r"(atomic\b|memory_order)",
@@ -400,7 +400,8 @@ STANDARD_HEADERS = {
     "tuple": r"(tuple|tuple_cat|apply)\b",
     "type_traits": r"(is_\w+_v|remove_cvref_t|conditional_t|true_type|false_type|make_unsigned_t|"
     r"integral_constant|type_identity_t)\b",
-    "utility": r"(move|swap|pair|exchange|index_sequence|make_index_sequence|declval|in_place_type)\b",
+    "utility": r"(move|swap|pair|exchange|index_sequence|make_index_sequence|declval|"
+    r"in_place_type)\b",
     "variant": r"(variant|visit|get_if)\b",
     "vector": r"(vector|erase_if)\b",
 }
