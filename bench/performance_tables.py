@@ -1,8 +1,9 @@
-"""Puts the tables of a benchmark run into docs/performance.md.
+"""Puts the tables of benchmark runs into docs/performance.md.
 
 sdnn bench --json > docs/performance.json && python bench/performance_tables.py
 
-The profile in docs/profile.json, made by bench/profile_trial.py, becomes the last table.
+The profile in docs/profile.json, made by bench/profile_trial.py, becomes the last table. Of a run
+on a processor with AVX-512, docs/performance-avx512.json, the page has the passes only.
 """
 
 from __future__ import annotations
@@ -16,15 +17,19 @@ from sdnn.benchmarks.report import describe_run, tables
 DOCS = Path(__file__).parents[1] / "docs"
 RESULTS = DOCS / "performance.json"
 PROFILE = DOCS / "profile.json"
+AVX512 = DOCS / "performance-avx512.json"
 PAGE = DOCS / "performance.md"
 BEGIN = "<!-- tables: made by bench/performance_tables.py from performance.json -->"
+BEGIN_AVX512 = "<!-- tables: made by bench/performance_tables.py from performance-avx512.json -->"
 END = "<!-- end of tables -->"
+N_OF_PASSES = 2
+"""The first tables: the pass, and what the machine allows."""
 
 
-def to_markdown(results: dict) -> str:
-    """All tables, after the lines that say on what was measured."""
+def to_markdown(results: dict, n_tables: int | None = None) -> str:
+    """The first tables or all, after the lines that say on what was measured."""
     blocks = ["\n".join(f"- {line}" for line in describe_run(results))]
-    for table in tables(results):
+    for table in tables(results)[:n_tables]:
         lines = [f"**{table.title}**", "", _row(table.header)]
         lines += [_row(("---", *("---:",) * (len(table.header) - 1)))]
         lines += [_row(row) for row in table.rows]
@@ -54,15 +59,23 @@ def profile_table(profile: dict[str, dict[str, float]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def with_tables(page: str, results: dict, profile: dict[str, dict[str, float]]) -> str:
-    """The page with what stands between its two marks replaced."""
-    before, begin, rest = page.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise SystemExit(f"{PAGE} must hold the lines {BEGIN} and {END}")
-    return f"{before}{BEGIN}\n\n{to_markdown(results)}\n{profile_table(profile)}\n{END}{after}"
+def replaced(page: str, begin: str, text: str) -> str:
+    """The page with what stands between a mark and the next end replaced."""
+    before, begun, rest = page.partition(begin)
+    _, ended, after = rest.partition(END)
+    if not begun or not ended:
+        raise SystemExit(f"{PAGE} must hold the lines {begin} and {END}")
+    return f"{before}{begin}\n\n{text}\n{END}{after}"
+
+
+def with_tables(
+    page: str, results: dict, profile: dict[str, dict[str, float]], avx512: dict
+) -> str:
+    """The page with what stands between its marks replaced."""
+    page = replaced(page, BEGIN, f"{to_markdown(results)}\n{profile_table(profile)}")
+    return replaced(page, BEGIN_AVX512, to_markdown(avx512, N_OF_PASSES))
 
 
 if __name__ == "__main__":
-    stored = (json.loads(path.read_text()) for path in (RESULTS, PROFILE))
+    stored = (json.loads(path.read_text()) for path in (RESULTS, PROFILE, AVX512))
     PAGE.write_text(with_tables(PAGE.read_text(), *stored))

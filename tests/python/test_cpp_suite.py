@@ -24,9 +24,10 @@ def build_folder(request, tmp_path):
 @pytest.mark.parametrize(
     ("preset", "compiler"),
     [
-        ("gcc", "g++"),
-        ("clang", "clang++"),
+        ("dev", "g++"),
         ("sanitize", "clang++"),
+        pytest.param("gcc", "g++", marks=pytest.mark.slow),
+        pytest.param("clang", "clang++", marks=pytest.mark.slow),
         pytest.param("aarch64", "aarch64-linux-gnu-g++", marks=pytest.mark.slow),  # emulated
     ],
 )
