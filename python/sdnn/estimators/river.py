@@ -5,6 +5,7 @@ Needs ``pip install river``; nothing else of this package does.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,11 @@ from sdnn.estimators.classifier import SDNNClassifier
 from sdnn.estimators.regressor import SDNNRegressor
 
 __all__ = ["RiverClassifier", "RiverRegressor"]
+
+
+def named(x: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return a sample with words as names, as scikit-learn wants them; river has numbers too."""
+    return {str(name): value for name, value in x.items()}
 
 
 class Waiting:
@@ -31,9 +37,9 @@ class Waiting:
 
     def _learn(self, x: dict[str, Any], y: Any) -> None:
         if self.fitted is not None:
-            self.fitted.learn_one(x, y)
+            self.fitted.learn_one(named(x), y)
             return
-        self.samples.append(x)
+        self.samples.append(named(x))
         self.targets.append(y)
         if len(self.samples) >= self.grace_period and self._is_enough():
             self.fitted = clone(self.model)
@@ -77,7 +83,7 @@ class RiverRegressor(Waiting, base.Regressor):
         """Predict one target."""
         if self.fitted is None:
             return float(np.mean(self.targets)) if self.targets else 0.0
-        return float(self.fitted.predict_one(x))
+        return float(self.fitted.predict_one(named(x)))
 
 
 class RiverClassifier(Waiting, base.Classifier):
@@ -107,4 +113,4 @@ class RiverClassifier(Waiting, base.Classifier):
         """Predict one label; None before the first sample."""
         if self.fitted is None:
             return max(set(self.targets), key=self.targets.count) if self.targets else None
-        return self.fitted.predict_one(x)
+        return self.fitted.predict_one(named(x))
