@@ -1,6 +1,6 @@
 """The estimators by the interface of the river library: samples are dictionaries, one at a time.
 
-Needs ``pip install river``; nothing else of this package does.
+Needs river, of the extra ``sdnn[river]``; nothing else of this package does.
 """
 
 from __future__ import annotations

@@ -229,3 +229,14 @@ def test_river_streams_are_learned():
             labelled.learn_one(row, label)
     assert np.mean(hits) > 0.8
     assert labelled.clone().fitted is None
+
+
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
+def test_names_of_river_streams_may_be_numbers():
+    pytest.importorskip("river")
+    from sdnn.estimators.river import RiverRegressor
+
+    model = RiverRegressor(SDNNRegressor(**OPTIONS), grace_period=20)
+    for x, y in zip(X[:40], Y[:40], strict=True):
+        model.learn_one(dict(enumerate(x)), y)
+    assert np.isfinite(model.predict_one(dict(enumerate(X[0]))))

@@ -1,0 +1,231 @@
+"""Streams that drift, each sample predicted and then learned, beside the models of river.
+
+``python bench/estimators/streams.py docs [N_SEEDS]`` measures what ``docs/streams.csv`` lacks,
+draws ``docs/streams.png`` and writes the table of ``docs/streams.md``. Needs ``sdnn[river]``.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import re
+import sys
+import time
+import warnings
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+from compare import Rows
+from matplotlib.figure import Figure
+from river import datasets, dummy, forest, linear_model, neighbors, preprocessing, stats, tree
+from river.datasets import synth
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.neural_network import MLPRegressor
+
+from sdnn import SDNNRegressor
+from sdnn.estimators.river import RiverRegressor
+
+N_SAMPLES = 4000
+N_WINDOWS = 20
+N_FIRST = 100
+"""Samples whose predictions do not count: all models know next to nothing."""
+PAGE = Path(__file__).parents[2] / "docs" / "streams.md"
+
+
+# Streams: pairs of a dictionary and a target, from a seed.
+
+
+def wave(seed):
+    """A wave over three inputs, one of them useless, that turns and grows quicker by and by."""
+    random = np.random.RandomState(seed)
+    for number in range(N_SAMPLES):
+        a, b, c = random.uniform(-1, 1, 3)
+        angle = 2 * np.pi * number / N_SAMPLES
+        along = a * np.cos(angle) + b * np.sin(angle)
+        target = np.sin((3 + 3 * number / N_SAMPLES) * along) + 0.1 * random.normal()
+        yield {"a": a, "b": b, "c": c}, target
+
+
+def friedman(seed):
+    return synth.Friedman(seed=seed).take(N_SAMPLES)
+
+
+def drifting_friedman(kind, *positions):
+    def stream(seed):
+        options = {"transition_window": N_SAMPLES // 8} if kind == "gsg" else {}
+        return synth.FriedmanDrift(kind, positions, seed=seed, **options).take(N_SAMPLES)
+
+    return stream
+
+
+def numbers(stream):
+    for x, y in stream:
+        yield {name: float(value) for name, value in x.items()}, float(y)
+
+
+STREAMS = {
+    "Friedman": friedman,
+    "Friedman, gradual drift": drifting_friedman("gsg", N_SAMPLES // 3, 2 * N_SAMPLES // 3),
+    "Friedman, abrupt drift": drifting_friedman("gra", N_SAMPLES // 3, 2 * N_SAMPLES // 3),
+    "turning wave": wave,
+    "Trump approval": lambda seed: numbers(datasets.TrumpApproval()),
+    "chick weights": lambda seed: numbers(datasets.ChickWeights()),
+}
+"""The last two are measured data, the same for every seed; models still depend on it."""
+
+# Models, each from a seed, with the defaults of its library.
+
+
+class Perceptron:
+    """scikit-learn's MLP by river's interface, two hidden layers, one gradient step a sample."""
+
+    def __init__(self, seed):
+        self.scaler = preprocessing.StandardScaler()
+        self.target = preprocessing.StandardScaler()
+        self.model = MLPRegressor(
+            hidden_layer_sizes=(64, 64), learning_rate_init=3e-3, random_state=seed
+        )
+        self.is_fitted = False
+
+    def _row(self, x):
+        return np.array([list(self.scaler.transform_one(x).values())])
+
+    def predict_one(self, x):
+        if not self.is_fitted:
+            return 0.0
+        return self.model.predict(self._row(x))[0] * self._width() + self.target.means["y"]
+
+    def learn_one(self, x, y):
+        self.scaler.learn_one(x)
+        self.target.learn_one({"y": y})
+        scaled = (y - self.target.means["y"]) / self._width()
+        self.model.partial_fit(self._row(x), [scaled])
+        self.is_fitted = True
+
+    def _width(self):
+        return max(self.target.vars["y"], 1e-12) ** 0.5
+
+
+def scaled(model):
+    return preprocessing.StandardScaler() | model
+
+
+def ours(seed, **options):
+    return RiverRegressor(SDNNRegressor(out_of_range="widen", random_state=seed, **options))
+
+
+MODELS = {
+    "SDNN": ours,
+    "SDNN, n_pattern_units=64": lambda seed: ours(seed, n_pattern_units=64),
+    "adaptive random forest": lambda seed: forest.ARFRegressor(seed=seed),
+    "Mondrian forest (AMF)": lambda seed: forest.AMFRegressor(seed=seed),
+    "Hoeffding adaptive tree": lambda seed: tree.HoeffdingAdaptiveTreeRegressor(seed=seed),
+    "nearest neighbours": lambda seed: scaled(neighbors.KNNRegressor()),
+    "MLP 64-64": Perceptron,
+    "linear regression": lambda seed: scaled(linear_model.LinearRegression()),
+    "recent mean": lambda seed: dummy.StatisticRegressor(stats.EWMean()),
+}
+
+
+def measure(stream, model):
+    """R2, the squared errors of windows as shares of the variance, and microseconds a sample."""
+    errors, targets, times = [], [], []
+    for x, y in stream:
+        begin = time.perf_counter()
+        guess = model.predict_one(x)
+        model.learn_one(x, y)
+        times.append(time.perf_counter() - begin)
+        errors.append((guess or 0.0) - y)  # some say None before they have learned anything
+        targets.append(y)
+    squares = np.square(errors[N_FIRST:]) / np.var(targets[N_FIRST:])
+    windows = [part.mean() for part in np.array_split(squares, N_WINDOWS)]
+    return 1 - squares.mean(), windows, 1e6 * np.median(times)
+
+
+def measure_all(path, n_seeds):
+    rows = Rows(path, ("stream", "model", "seed"), ("r2", "us", "windows"))
+    for seed, stream, model in itertools.product(range(n_seeds), STREAMS, MODELS):
+        if not rows.has(stream, model, seed):
+            r2, windows, us = measure(STREAMS[stream](seed), MODELS[model](seed))
+            told = " ".join(f"{window:.4g}" for window in windows)
+            rows.add(stream, model, seed, round(r2, 5), round(us, 1), told)
+
+
+# What is drawn of the rows.
+
+
+def read(path):
+    """Rows by stream and model: lists of (r2, us, windows)."""
+    found = defaultdict(list)
+    with path.open(newline="") as file:
+        for row in csv.DictReader(file):
+            windows = [float(word) for word in row["windows"].split()]
+            found[row["stream"], row["model"]].append((float(row["r2"]), float(row["us"]), windows))
+    return found
+
+
+def interval(values):
+    """Median, and the middle eight tenths of the seeds."""
+    low, middle, high = np.quantile(values, (0.1, 0.5, 0.9))
+    return f"{middle:.2f}" + (f" [{low:.2f}, {high:.2f}]" if high - low >= 0.005 else "")
+
+
+def tables(found):
+    """Markdown: R2 of every stream and model, and the time of a sample."""
+    lines = ["| model | " + " | ".join(STREAMS) + " | us a sample |"]
+    lines.append("|---" * (len(STREAMS) + 2) + "|")
+    best = {
+        stream: max(MODELS, key=lambda model: np.median([r for r, _, _ in found[stream, model]]))
+        for stream in STREAMS
+    }
+    for model in MODELS:
+        cells = []
+        for stream in STREAMS:
+            cell = interval([r2 for r2, _, _ in found[stream, model]])
+            cells.append(f"**{cell}**" if best[stream] == model else cell)
+        times = [us for stream in STREAMS for _, us, _ in found[stream, model]]
+        lines.append(f"| {model} | " + " | ".join(cells) + f" | {np.median(times):,.0f} |")
+    return "\n".join(lines)
+
+
+def draw(found, path):
+    shown = ("SDNN", "adaptive random forest", "MLP 64-64", "Mondrian forest (AMF)")
+    colors = ("#1f5fa8", "#d9822b", "#5b8c5a", "#a05195")
+    figure = Figure(figsize=(10, 5.6), layout="constrained")
+    for axes, stream in zip(figure.subplots(2, 3).flat, STREAMS, strict=True):
+        for model, color in zip(shown, colors, strict=True):
+            windows = np.array([windows for _, _, windows in found[stream, model]])
+            low, middle, high = np.quantile(windows, (0.1, 0.5, 0.9), axis=0)
+            x = (np.arange(len(middle)) + 0.5) / len(middle)
+            axes.fill_between(x, low, high, color=color, alpha=0.15, linewidth=0)
+            axes.plot(x, middle, color=color, label=model, linewidth=1.6)
+        axes.set_yscale("log")
+        axes.set_title(stream, loc="left", fontsize=10)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.set_xlabel("share of the stream", fontsize=8)
+        axes.tick_params(labelsize=8)
+    figure.axes[0].set_ylabel("squared error / variance", fontsize=8)
+    figure.axes[3].set_ylabel("squared error / variance", fontsize=8)
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center",
+                  ncols=len(shown), frameon=False, fontsize=9)  # fmt: skip
+    figure.savefig(path, dpi=160, metadata={"Software": None})
+
+
+def main(folder, n_seeds):
+    measure_all(folder / "streams.csv", n_seeds)
+    found = read(folder / "streams.csv")
+    draw(found, folder / "streams.png")
+    begin, end = "<!-- table: bench/estimators/streams.py -->", "<!-- end of table -->"
+    page = re.sub(
+        f"(?<={begin}\n).*?(?={end})",
+        lambda _: f"\n{tables(found)}\n\n",
+        PAGE.read_text(encoding="utf-8"),
+        flags=re.DOTALL,
+    )
+    PAGE.write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore", ConvergenceWarning)
+    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 10)
