@@ -168,7 +168,8 @@ def read(path):
 def interval(values):
     """Median, and the middle eight tenths of the seeds."""
     low, middle, high = np.quantile(values, (0.1, 0.5, 0.9))
-    return f"{middle:.2f}" + (f" [{low:.2f}, {high:.2f}]" if high - low >= 0.005 else "")
+    told = ["< -10" if value < -10 else f"{value:.2f}" for value in (middle, low, high)]
+    return told[0] + (f" [{told[1]}, {told[2]}]" if high - low >= 0.005 else "")
 
 
 def tables(found):
@@ -186,7 +187,9 @@ def tables(found):
             cells.append(f"**{cell}**" if best[stream] == model else cell)
         times = [us for stream in STREAMS for _, us, _ in found[stream, model]]
         lines.append(f"| {model} | " + " | ".join(cells) + f" | {np.median(times):,.0f} |")
-    return "\n".join(lines)
+    n_seeds = min(map(len, found.values()))
+    told = f"*R2 of the predictions, medians of {n_seeds} seeds; in brackets the middle 80 %."
+    return "\n".join([*lines, "", f"{told} Best in bold.*"])
 
 
 def draw(found, path):
