@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from compare import Rows
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from river import datasets, dummy, forest, linear_model, neighbors, preprocessing, stats, tree
 from river.datasets import synth
 from sklearn.exceptions import ConvergenceWarning
@@ -204,6 +205,9 @@ def draw(found, path):
             axes.fill_between(x, low, high, color=color, alpha=0.15, linewidth=0)
             axes.plot(x, middle, color=color, label=model, linewidth=1.6)
         axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axes.yaxis.set_minor_formatter(NullFormatter())
         axes.set_title(stream, loc="left", fontsize=10)
         axes.spines[["top", "right"]].set_visible(False)
         axes.set_xlabel("share of the stream", fontsize=8)
