@@ -176,7 +176,9 @@ def load(path: str | Path, kind: type[Estimator]) -> Estimator:
         raise ValueError(f"{path} holds an {metadata.get('class')}, not an {kind.__name__}")
     try:
         return read_estimator(metadata, tensors, kind)
-    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+    except (
+        AttributeError, IndexError, KeyError, RecursionError, TypeError, ValueError,
+    ) as error:  # fmt: skip
         raise ValueError(f"{path} is damaged: {error!r}") from error
 
 
@@ -184,7 +186,7 @@ def described(text: str) -> dict[str, Any]:
     """Return the metadata that a text holds; none if it is something else."""
     try:
         metadata = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     return metadata if isinstance(metadata, dict) else {}
 

@@ -91,7 +91,7 @@ def test_other_files_are_refused(tmp_path):
         SDNNRegressor.load(tmp_path)
 
 
-@pytest.mark.parametrize("metadata", ["no JSON", "[1]", '{"format": "another"}'])
+@pytest.mark.parametrize("metadata", ["no JSON", "[1]", '{"format": "another"}', "[" * 10**5])
 def test_foreign_metadata_is_refused(metadata, tmp_path):
     path = tmp_path / "model.safetensors"
     save_file({"a": np.zeros(2)}, path, metadata={"sdnn": metadata})
@@ -126,6 +126,14 @@ def test_every_changed_byte_is_found(tmp_path):
         path.write_bytes(changed)
         with pytest.raises(ValueError, match=r"damaged|does not hold|not a safetensors|newer"):
             SDNNRegressor.load(path)
+
+
+def nested(depth):
+    """A coding within a coding within a coding."""
+    coding = {"coding": "random-inverse"}
+    for _ in range(depth):
+        coding = {"coding": "with-missing", "base": coding}
+    return coding
 
 
 def rewritten(path, change):
@@ -173,6 +181,7 @@ def test_a_file_of_a_newer_version_is_said_to_be_one(tmp_path):
         lambda metadata, tensors: metadata["plain"].update(_flat=3),
         lambda metadata, tensors: metadata["plain"].update(n_features_in_=2),
         lambda metadata, tensors: metadata["codings"][0].update(n_bins=3),
+        lambda metadata, tensors: metadata["codings"].insert(0, nested(800)),
     ],
 )
 def test_parts_that_do_not_fit_are_found_when_they_are_loaded(change, tmp_path):
