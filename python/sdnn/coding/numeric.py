@@ -43,6 +43,8 @@ def numbers(column: NDArray[Any]) -> NDArray[np.float64]:
     ValueError
         If a value is not a number, or NaN.
     """
+    if np.iscomplexobj(column):
+        raise ValueError("Complex data not supported")
     values = np.asarray(column, dtype=np.float64)
     if np.isnan(values).any():
         raise ValueError("Input contains NaN")

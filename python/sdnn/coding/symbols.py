@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,10 +18,27 @@ Category = str | float | int | bool
 
 
 def listed(categories: Any) -> tuple[Category, ...] | None:
-    """Return given categories as a tuple; ValueError for a lone word or number."""
-    if isinstance(categories, str) or not (categories is None or isinstance(categories, Iterable)):
+    """Return given categories as a tuple; ValueError for what are no words or numbers."""
+    if categories is None:
+        return None
+    if isinstance(categories, str | bytes) or not isinstance(categories, Iterable):
         raise ValueError(f"categories must be a tuple of values, got {categories!r}")
-    return None if categories is None else tuple(categories)
+    found = tuple(categories)
+    if not all(isinstance(category, Hashable) for category in found):
+        raise ValueError(f"categories must be words or numbers, got {found!r}")
+    return found
+
+
+def rows_of(matrix: Any) -> tuple[tuple[float, ...], ...]:
+    """Return the rows of a matrix of numbers; ValueError for what are none."""
+    try:
+        given = np.asarray(matrix)
+        if given.dtype.kind == "c":
+            raise ValueError("complex numbers")
+        rows = np.atleast_2d(given.astype(np.float64))
+    except (OverflowError, TypeError, ValueError) as error:
+        raise ValueError(f"matrix must be numbers, got {matrix!r}: {error}") from None
+    return tuple(map(tuple, rows.tolist()))
 
 
 def is_missing(value: Any) -> bool:
@@ -146,14 +163,14 @@ class CorrelationMatrix(Coding):
     categories: tuple[Category, ...] | None = None
 
     def __post_init__(self) -> None:
-        matrix = np.atleast_2d(np.asarray(self.matrix, dtype=np.float64))
-        object.__setattr__(self, "matrix", tuple(map(tuple, matrix.tolist())))
+        object.__setattr__(self, "matrix", rows_of(self.matrix))
         object.__setattr__(self, "categories", listed(self.categories))
 
     def fit(self, column: NDArray[Any], n_units: int) -> CorrelationMatrix:
         """Return a copy with the categories known; see `Coding.fit`."""
         matrix = np.array(self.matrix)
-        if matrix.shape[0] != matrix.shape[1] or not np.array_equal(matrix, matrix.T):
+        is_square = matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1]
+        if not is_square or not np.array_equal(matrix, matrix.T):
             raise ValueError(f"matrix must be square and symmetric, got {matrix.tolist()}")
         if not np.all(np.diag(matrix) == 1) or not np.all(np.abs(matrix) <= 1):
             raise ValueError(
@@ -163,7 +180,8 @@ class CorrelationMatrix(Coding):
         names = learned_categories(column) if self.categories is None else self.categories
         if len(set(names)) != len(matrix):
             raise ValueError(
-                f"matrix must have a row for each of {names!r}, got {len(matrix)} rows"
+                f"matrix must have a row for each of the categories {names!r}, got "
+                f"{len(matrix)} rows"
             )
         return dataclasses.replace(self, categories=names)
 

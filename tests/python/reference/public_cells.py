@@ -9,6 +9,7 @@ import re
 import numpy as np
 
 from bad_inputs import BAD, judged, parameters_of
+from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic, WithMissing
 from sdnn.environments import (
     AcrobotConfig,
     AcrobotSwingUpEnv,
@@ -126,6 +127,51 @@ def _named_loosely(parameter, call):
 def _prediction_fault(model):
     predicted = model.predict(np.zeros((2, model.n_features_in_)))
     return "" if np.isfinite(np.asarray(predicted, np.float64)).all() else f"predicts {predicted}"
+
+
+def coding_cells():
+    """A fitted coding has a bin for every value, and patterns of signs; or it is refused."""
+    numbers, letters = np.linspace(0.0, 1.0, 12), np.array(["a", "b", "c"] * 4)
+    for cls, column, given in (
+        (RandomInverse, numbers, {}),
+        (Anchor, numbers, {}),
+        (Circular, numbers, {}),
+        (Symbolic, letters, {}),
+        (CorrelationMatrix, letters, {"matrix": np.eye(3)}),
+        (WithMissing, numbers, {}),
+    ):
+        for parameter in parameters_of(cls.__init__):
+            for word, value in BAD.items():
+                cell = _coding_cell(cls, column, given, parameter, value)
+                yield f"{cls.__name__}({parameter}={word})", cell
+        for word, value in BAD.items():
+            yield f"{cls.__name__}.fit({word})", _column_cell(cls, given, value)
+
+
+def _coding_cell(cls, column, given, parameter, value):
+    def call():
+        with np.errstate(over="raise", invalid="raise", divide="raise"):
+            coding = cls(**{**given, parameter: value()}).fit(column, 40)
+            return _coding_fault(coding, coding.bins(column))
+
+    return lambda: judged(parameter, call)
+
+
+def _column_cell(cls, given, value):
+    def call():
+        column = np.atleast_1d(np.asarray(value()))
+        coding = cls(**given).fit(column, 40)
+        return _coding_fault(coding, coding.bins(column))
+
+    return lambda: _without_name(call)
+
+
+def _coding_fault(coding, bins):
+    patterns = coding.patterns(40, 1)
+    if patterns.shape != (coding.size, 40) or set(np.unique(patterns)) != {-1, 1}:
+        return f"has patterns {patterns}"
+    is_place = (bins >= 0) & (bins < coding.size)
+    return "" if is_place.all() else f"has bins {bins} of {coding.size}"
 
 
 def environment_cells():
