@@ -66,6 +66,8 @@ class TrialSettings(ABC):
         TypeError
             If approximator or learning are those of another agent.
         """
+        if not isinstance(self.agent, str):
+            raise TypeError(f"agent must be the id of an agent, got {self.agent!r}")
         entry = agent_entry(self.agent)
         for name, kind in (("approximator", entry.approximator), ("learning", entry.learning)):
             value = getattr(self, name)
@@ -73,6 +75,15 @@ class TrialSettings(ABC):
                 raise TypeError(
                     f"{name} of {self.agent} must be a {kind.__name__},"
                     f" got a {type(value).__name__}"
+                )
+
+    def check_parts(self, **kinds: type) -> None:
+        """Check that each part is of its kind; TypeError if not."""
+        for name, kind in kinds.items():
+            value = getattr(self, name)
+            if not isinstance(value, kind):
+                raise TypeError(
+                    f"{name} must be an object of {kind.__name__}, got a {type(value).__name__}"
                 )
 
     def canonical_json(self) -> str:
@@ -135,6 +146,12 @@ class TrialConfig(TrialSettings):
 
     def __post_init__(self) -> None:
         self.check_agent()
+        self.check_parts(
+            acrobot=AcrobotConfig,
+            goal=GoalScheduleConfig,
+            sensors=SensorConfig,
+            protocol=ProtocolConfig,
+        )
 
     @property
     def is_compiled(self) -> bool:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from sdnn.agents import QLearningConfig
 from sdnn.approximators import SDNNCConfig
+from sdnn.arguments import real
 from sdnn.environments import NoisySensors, UnitSensors
 from sdnn.experiments.config import TrialSettings
 from sdnn.experiments.registry import agent_entry
@@ -21,6 +23,15 @@ from sdnn.experiments.trial import EpisodeLoop, ProtocolConfig, check_protocol
 _LEARNING, _TEST = 0, 1
 _MAX_SEED = 2**31
 """Environments may hand their seed on to generators that take no larger ones."""
+
+
+def _listed(name: str, values: Any) -> tuple[Any, ...]:
+    """Return the values of a range, none if there is no range; TypeError if they are no list."""
+    if values is None:
+        return ()
+    if isinstance(values, str | bytes) or not isinstance(values, Sequence | np.ndarray):
+        raise TypeError(f"{name} must be a tuple of numbers, got {values!r}")
+    return tuple(values)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +53,11 @@ class EnvironmentConfig:
         where these are infinite.
     noise
         Standard deviation of the noise on every variable, in parts of its range, >= 0.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is of another kind, or no number where one must be.
     """
 
     id: str
@@ -49,6 +65,17 @@ class EnvironmentConfig:
     observation_low: tuple[float, ...] | None = None
     observation_high: tuple[float, ...] | None = None
     noise: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.id, str):
+            raise TypeError(f"id must be the name of a Gymnasium environment, got {self.id!r}")
+        if not isinstance(self.kwargs, Mapping):
+            raise TypeError(f"kwargs must be a mapping from names to values, got {self.kwargs!r}")
+        for name in ("observation_low", "observation_high"):
+            for value in _listed(name, getattr(self, name)):
+                real(name, value)
+        if not 0 <= real("noise", self.noise) < math.inf:
+            raise ValueError(f"noise must be finite and not negative, got {self.noise!r}")
 
     def make(
         self,
@@ -172,6 +199,7 @@ class EnvironmentTrialConfig(TrialSettings):
 
     def __post_init__(self) -> None:
         self.check_agent()
+        self.check_parts(environment=EnvironmentConfig, protocol=ProtocolConfig)
 
     @property
     def is_compiled(self) -> bool:

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
+from sdnn.arguments import real, whole
+
 MeasureName = Literal[
     "episodes_to_learn",
     "early_steps",
@@ -49,6 +51,11 @@ class MeasureConfig:
         Consecutive test episodes whose median must be good for the task to count as mastered.
     final_window
         Test episodes at the end of a trial over which its final state is measured.
+
+    Raises
+    ------
+    ValueError
+        If a value is no number, or a window is empty.
     """
 
     good_steps: float = 10.0
@@ -56,6 +63,13 @@ class MeasureConfig:
     early_episodes: int = 2_500
     stable_window: int = 50
     final_window: int = 50
+
+    def __post_init__(self) -> None:
+        if math.isnan(real("good_steps", self.good_steps)):
+            raise ValueError(f"good_steps must be a number, got {self.good_steps!r}")
+        whole("early_episodes", self.early_episodes, 0, 2**62)
+        for name in ("learned_window", "stable_window", "final_window"):
+            whole(name, getattr(self, name), 1, 2**62)
 
 
 DEFAULT_MEASURES = MeasureConfig()

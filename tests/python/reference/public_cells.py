@@ -6,6 +6,7 @@ import inspect
 import pickle
 import re
 
+import gymnasium as gym
 import numpy as np
 
 from bad_inputs import BAD, judged, parameters_of
@@ -18,6 +19,13 @@ from sdnn.environments import (
     SensorConfig,
 )
 from sdnn.estimators import SDNNClassifier, SDNNRegressor
+from sdnn.experiments import (
+    EnvironmentConfig,
+    MeasureConfig,
+    ProtocolConfig,
+    TrialConfig,
+    measures,
+)
 
 ROOMS = ("agents", "approximators", "coding", "environments", "estimators", "experiments", "runs")
 
@@ -172,6 +180,53 @@ def _coding_fault(coding, bins):
         return f"has patterns {patterns}"
     is_place = (bins >= 0) & (bins < coding.size)
     return "" if is_place.all() else f"has bins {bins} of {coding.size}"
+
+
+def experiment_cells():
+    """Settings of trials and measures are refused when they are made, or work."""
+    made = {
+        ProtocolConfig: _protocol_used,
+        EnvironmentConfig: _environment_used,
+        MeasureConfig: _measure_used,
+        TrialConfig: _trial_used,
+    }
+    for config, used in made.items():
+        for parameter in parameters_of(config.__init__):
+            for word, value in BAD.items():
+                yield (
+                    f"{config.__name__}({parameter}={word})",
+                    _experiment_cell(used, parameter, value),
+                )
+
+
+def _experiment_cell(used, parameter, value):
+    return lambda: judged(parameter, lambda: used({parameter: value()}))
+
+
+def _protocol_used(given):
+    short = {"n_learning_episodes": 2, "test_interval": 1}
+    TrialConfig(protocol=ProtocolConfig(**{**short, **given})).make_trial(1).advance(1)
+    return ""
+
+
+def _environment_used(given):
+    bounds = {"observation_low": (-1.0, -1.0, -8.0), "observation_high": (1.0, 1.0, 8.0)}
+    config = EnvironmentConfig(**{"id": "Pendulum-v1", **bounds, **given})
+    with contextlib.suppress(gym.error.Error):  # of an id that nobody has registered
+        observation, _ = config.make().reset(seed=1)
+        return "" if np.isfinite(observation).all() else f"gave {observation}"
+    return ""
+
+
+def _measure_used(given):
+    tests = np.arange(30)
+    learned = measures.episodes_to_learn(10 * tests, tests % 12, MeasureConfig(**given))
+    return "" if learned >= 0 else f"gave {learned}"
+
+
+def _trial_used(given):
+    TrialConfig(**given).make_trial(1)
+    return ""
 
 
 def environment_cells():

@@ -19,6 +19,7 @@ from sdnn.environments import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.experiments.cases import EXPERIMENTS, PAPER_TRIALS, PRESET_AGENTS, Case
 from sdnn.experiments.config import PlannedTrial, TrialConfig, TrialSettings, trial_seed
 from sdnn.experiments.environment_trial import EnvironmentConfig, EnvironmentTrialConfig
+from sdnn.experiments.errors import StudyError
 from sdnn.experiments.records import TrialKey
 from sdnn.experiments.registry import AGENTS, agent_entry
 from sdnn.experiments.sweep.settings import (
@@ -584,17 +585,19 @@ class _Reader:
         )
 
     def _in_environment(self, agent: str, settings: Settings) -> EnvironmentTrialConfig:
-        environment: EnvironmentConfig = self._build("environment", EnvironmentConfig, settings)
-        key = repr(environment)
-        if key not in self._n_observed:
-            try:
+        try:
+            environment: EnvironmentConfig = self._build("environment", EnvironmentConfig, settings)
+            key = repr(environment)
+            if key not in self._n_observed:
                 with closing(environment.make()) as made:
-                    space = made.observation_space
-            except Exception as error:  # of whatever environment
-                text = str(error) or type(error).__name__
-                where = _blamed(settings, text) or _place(settings, "environment", "id") or ()
-                raise self._file.error(where, text) from error
-            self._n_observed[key] = int((space.shape or (0,))[0])
+                    shape = made.observation_space.shape
+                self._n_observed[key] = int((shape or (0,))[0])
+        except StudyError:
+            raise
+        except Exception as error:  # of whatever environment
+            text = str(error) or type(error).__name__
+            where = _blamed(settings, text) or _place(settings, "environment", "id") or ()
+            raise self._file.error(where, text) from error
         return EnvironmentTrialConfig(
             **self._agent_parts(agent, settings, self._n_observed[key]), environment=environment
         )
