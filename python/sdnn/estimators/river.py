@@ -5,7 +5,7 @@ Needs river, of the extra ``sdnn[river]``; nothing else of this package does.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,7 @@ class Waiting:
         self.samples: list[dict[str, Any]] = []
         self.targets: list[Any] = []
 
-    def _learn(self, x: dict[str, Any], y: Any) -> None:
+    def _learn(self, x: dict[Hashable, Any], y: Any) -> None:
         if self.fitted is not None:
             self.fitted.learn_one(named(x), y)
             return
@@ -75,11 +75,11 @@ class RiverRegressor(Waiting, base.Regressor):
     def __init__(self, model: SDNNRegressor, grace_period: int = 100) -> None:
         super().__init__(model, grace_period)
 
-    def learn_one(self, x: dict[str, Any], y: float) -> None:
+    def learn_one(self, x: dict[Hashable, Any], y: float) -> None:
         """Learn one sample."""
         self._learn(x, y)
 
-    def predict_one(self, x: dict[str, Any]) -> float:
+    def predict_one(self, x: dict[Hashable, Any]) -> float:
         """Predict one target."""
         if self.fitted is None:
             return float(np.mean(self.targets)) if self.targets else 0.0
@@ -105,11 +105,11 @@ class RiverClassifier(Waiting, base.Classifier):
     def _is_enough(self) -> bool:
         return len(set(self.targets)) > 1
 
-    def learn_one(self, x: dict[str, Any], y: Any) -> None:
+    def learn_one(self, x: dict[Hashable, Any], y: Any) -> None:
         """Learn one sample."""
         self._learn(x, y)
 
-    def predict_one(self, x: dict[str, Any]) -> Any:
+    def predict_one(self, x: dict[Hashable, Any], **_options: Any) -> Any:
         """Predict one label; None before the first sample."""
         if self.fitted is None:
             return max(set(self.targets), key=self.targets.count) if self.targets else None
