@@ -69,13 +69,7 @@ class TrialSettings(ABC):
         if not isinstance(self.agent, str):
             raise TypeError(f"agent must be the id of an agent, got {self.agent!r}")
         entry = agent_entry(self.agent)
-        for name, kind in (("approximator", entry.approximator), ("learning", entry.learning)):
-            value = getattr(self, name)
-            if not isinstance(value, kind):
-                raise TypeError(
-                    f"{name} of {self.agent} must be a {kind.__name__},"
-                    f" got a {type(value).__name__}"
-                )
+        self.check_parts(approximator=entry.approximator, learning=entry.learning)
 
     def check_parts(self, **kinds: type) -> None:
         """Check that each part is of its kind; TypeError if not."""
@@ -83,7 +77,8 @@ class TrialSettings(ABC):
             value = getattr(self, name)
             if not isinstance(value, kind):
                 raise TypeError(
-                    f"{name} must be an object of {kind.__name__}, got a {type(value).__name__}"
+                    f"{name} of {self.agent} must be a {kind.__name__},"
+                    f" got a {type(value).__name__}"
                 )
 
     def canonical_json(self) -> str:
