@@ -193,7 +193,8 @@ def read_model_file(path: str | Path, library: Library = "msvc") -> LibsdnnModel
     Raises
     ------
     ValueError
-        If it is not a model file, is cut off, or its size does not fit its parameters.
+        If it is not a model file, is cut off, its size does not fit its parameters, or its weights
+        are too large for exact sums.
     """
     path = Path(path)
     content = path.read_bytes()
@@ -210,12 +211,15 @@ def read_model_file(path: str | Path, library: Library = "msvc") -> LibsdnnModel
             f"columns, got {len(content) - 4 - length}"
         )
     rows = np.frombuffer(content, "<i4", offset=4 + length).reshape(n_units, n_columns + 1)
-    layer = _core.ParallelPerceptron(
-        parameters.make_code(library),
-        n_units,
-        weights=np.ascontiguousarray(rows[:, 1:], dtype=np.int32),
-        thresholds=np.ascontiguousarray(rows[:, 0], dtype=np.int32),
-    )
+    try:
+        layer = _core.ParallelPerceptron(
+            parameters.make_code(library),
+            n_units,
+            weights=np.ascontiguousarray(rows[:, 1:], dtype=np.int32),
+            thresholds=np.ascontiguousarray(rows[:, 0], dtype=np.int32),
+        )
+    except OverflowError as error:
+        raise ValueError(f"{path} cannot be used: {error}") from None
     return LibsdnnModel(parameters=parameters, layer=layer)
 
 

@@ -76,7 +76,8 @@ class ResultStore:
         version of this one's schema. Such a file is left as it is.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: str | Path) -> None:
+        folder = Path(folder)
         self.path = folder / STORE_NAME
         if folder.exists() and not folder.is_dir():
             raise StoreError(f"the output must be a folder, but {folder} is a file")

@@ -4,7 +4,6 @@ Hashes and model files were made by LIBSDNN itself (commit 5a862cc, g++ 12, -O3)
 parameters and samples below; the hash is of thresholds and weights as its model file has them.
 """
 
-import contextlib
 import hashlib
 import math
 from pathlib import Path
@@ -191,13 +190,9 @@ def test_broken_model_files_are_refused(tmp_path):
         path.write_bytes(broken)
         with pytest.raises(ValueError, match="must"):
             libsdnn.read_model_file(path)
-    random = np.random.default_rng(1)
-    for _ in range(300):  # one byte of the parameters changed: read, or refused
-        changed = bytearray(content)
-        changed[random.integers(600)] = random.integers(256)
-        path.write_bytes(changed)
-        with contextlib.suppress(ValueError, OverflowError):
-            libsdnn.read_model_file(path)
+    path.write_bytes(content[:-8] + b"\xff\xff\xff\x7f" * 2)
+    with pytest.raises(ValueError, match=r"model\.bin cannot be used: the weights of unit"):
+        libsdnn.read_model_file(path)
 
 
 def test_tables_of_any_size_are_not_drawn(parameter_file):

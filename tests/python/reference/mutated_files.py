@@ -1,0 +1,242 @@
+"""Files that a reader may meet: good ones, changed at random places."""
+
+import dataclasses
+import functools
+import json
+import re
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from safetensors.numpy import load, save
+
+from sdnn import SDNNClassifier, SDNNRegressor
+from sdnn.agents.agent import load_agent
+from sdnn.coding import Symbolic, WithMissing
+from sdnn.estimators import libsdnn
+from sdnn.experiments import ResultStore, StoreError, TrialKey, TrialRecord, TrialRows
+from sdnn.experiments.errors import ExperimentError
+from sdnn.experiments.sweep.study import read_study
+from sdnn.runs.config import RunConfig
+from sdnn.runs.errors import RunError
+
+ROOT = Path(__file__).parents[3]
+X = np.random.RandomState(0).uniform(size=(40, 2))
+SMALL = {"n_pattern_units": 10, "max_iter": 2, "random_state": 0}
+
+EXTREME = (b"0", b"-1", b"1", b"1e400", b"-1e308", b"NaN", b"2147483648", b"9999999999999999999",
+           b"1e-320", b"null", b"true", b"[]", b"{}", b'""', b"[[[[[[[[")  # fmt: skip
+
+
+@dataclasses.dataclass(frozen=True)
+class Reader:
+    """Good files, by the name that a file must have, and how to read one of them to its end."""
+
+    name: str
+    good: Callable[[], list[bytes]]
+    read: Callable[[Path], object]
+    errors: tuple[type[Exception], ...]
+
+
+def written(*makers):
+    """What each maker writes to the path that it is given."""
+    contents = []
+    for make in makers:
+        with tempfile.TemporaryDirectory() as folder:
+            make(Path(folder) / "file")
+            contents.append((Path(folder) / "file").read_bytes())
+    return contents
+
+
+def contents_of(folder, pattern):
+    return [path.read_bytes() for path in sorted((ROOT / folder).glob(pattern))]
+
+
+def estimators():
+    coding = [("circular", [0]), (WithMissing(base=Symbolic()), [1])]
+    rounded = np.round(X, 1)
+    made = (
+        SDNNRegressor(n_output_units=9, **SMALL).fit(X, X[:, 0]),
+        SDNNRegressor(coding, n_output_units=9, **SMALL).fit(rounded, X[:, 0]),
+        SDNNClassifier(n_units_per_class=2, **SMALL).fit(X, X[:, 0] > X[:, 1]),
+    )
+    return written(*(model.save for model in made))
+
+
+def read_estimator(path):
+    for kind in (SDNNRegressor, SDNNClassifier):
+        try:
+            model = kind.load(path)
+        except ValueError as error:
+            if "holds an SDNN" not in str(error):
+                raise
+        else:
+            model.predict(np.round(X[:4], 1))
+
+
+def read_agent(path):
+    agent = load_agent(path)
+    agent.act(np.zeros(agent.observation_space.shape, agent.observation_space.dtype))
+
+
+def read_libsdnn_model(path):
+    model = libsdnn.read_model_file(path)
+    model.predict(X[:4, : len(model.parameters.inputs)])
+
+
+def store():
+    with tempfile.TemporaryDirectory() as folder:
+        rows = TrialRows(
+            episode=np.arange(1, 40, dtype=np.int32),
+            steps=np.arange(1, 40, dtype=np.int32),
+            episode_return=np.linspace(-5, 0, 39),
+            solved=np.ones(39, bool),
+        )
+        with ResultStore(folder) as results:
+            for trial in range(4):
+                results.add(
+                    TrialRecord(
+                        key=TrialKey("s4", "sdnn-c", trial, 2**40, "aa"),
+                        config="{}",
+                        version="0.1",
+                        n_decisions=57,
+                        seconds=0.5,
+                        finished_at="2026-01-01T00:00:00+00:00",
+                        rows=rows,
+                    )
+                )
+        return [results.path.read_bytes()]
+
+
+def read_store(path):
+    with ResultStore(path.parent) as results:
+        results.load()
+        results.times()
+        results.load_costs("aa")
+
+
+RUN = b"""steps = 1000
+seed = 3
+agent = "sdnn"
+preset = "general"
+[environment]
+id = "Pendulum-v1"
+[settings.approximator]
+n_pattern_units = 40
+[settings.learning]
+discount = 0.95
+"""
+
+READERS = {
+    "estimator": Reader("model.safetensors", estimators, read_estimator, (ValueError, OSError)),
+    "agent": Reader(
+        "agent.safetensors",
+        lambda: contents_of("tests/data/agents", "*.safetensors"),
+        read_agent,
+        (ValueError, OSError),
+    ),
+    "libsdnn model": Reader(
+        "model.bin",
+        lambda: contents_of("tests/python/reference/libsdnn_files", "*.bin"),
+        read_libsdnn_model,
+        (ValueError, OSError),
+    ),
+    "store": Reader("results.sqlite", store, read_store, (StoreError,)),
+    "study": Reader(
+        "study.toml",
+        lambda: contents_of("docs/studies", "*.toml"),
+        read_study,
+        (ExperimentError,),
+    ),
+    "run": Reader("run.toml", lambda: [RUN], RunConfig.read, (RunError,)),
+}
+
+
+def with_other_bytes(data, random):
+    """A few places changed, taken away, doubled, or set to a number that is seldom thought of."""
+    changed = bytearray(data)
+    for _ in range(random.randint(1, 4)):
+        place = random.randint(len(changed) + 1)
+        length = min(int(random.geometric(0.1)), len(changed) - place)
+        kind = random.randint(8)
+        if kind == 0 and place < len(changed):
+            changed[place] ^= 1 << random.randint(8)
+        elif kind == 1:
+            changed[place : place + length] = random.bytes(length)
+        elif kind == 2:
+            del changed[place : place + length]
+        elif kind == 3:
+            changed[place:place] = changed[place : place + length] * random.randint(1, 50)
+        elif kind == 4 and random.randint(4) == 0:
+            del changed[place:]
+        elif kind == 5:
+            number = (0, 1, 127, 2**31 - 1, 2**63 - 1, 2**64 - 1)[random.randint(6)]
+            changed[place : place + 8] = number.to_bytes(8, "little")
+        else:
+            numbers = list(re.finditer(rb"-?\d+(\.\d+)?", bytes(changed)))
+            if numbers:
+                found = numbers[random.randint(len(numbers))]
+                changed[found.start() : found.end()] = EXTREME[random.randint(len(EXTREME))]
+    return bytes(changed)
+
+
+def with_other_contents(data, random):
+    """A safetensors file whose metadata or arrays are others, but which is whole.
+
+    Of an estimator it says that it has no checksum, so that the reader reads on.
+    """
+    header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
+    metadata = header["__metadata__"]["sdnn"].replace("sdnn-estimator-2", "sdnn-estimator-1")
+    tensors = load(data)
+    name = sorted(tensors)[random.randint(len(tensors))]
+    kind = random.randint(5)
+    if kind == 0:
+        tensors[name] = tensors[name].astype(
+            (np.int8, np.int32, np.int64, np.float64)[random.randint(4)]
+        )
+    elif kind == 1:
+        tensors[name] = tensors[name].ravel()[: random.randint(tensors[name].size + 1)]
+    elif kind == 2 and tensors[name].size:
+        array = tensors[name].copy().ravel()
+        is_whole = array.dtype.kind in "iu"
+        array[random.randint(array.size)] = np.iinfo(array.dtype).max if is_whole else np.nan
+        tensors[name] = array.reshape(tensors[name].shape)
+    else:
+        metadata = with_other_bytes(metadata.encode(), random).decode("utf-8", "replace")
+    return save(tensors, metadata={"sdnn": metadata})
+
+
+@functools.cache
+def good_files(name):
+    return READERS[name].good()
+
+
+def read_mutation(name, number):
+    """What is wrong with how a reader takes a mutation, or ""."""
+    reader = READERS[name]
+    random = np.random.RandomState(number)
+    data = good_files(name)[number % len(good_files(name))]
+    deep = reader.name.endswith(".safetensors") and random.randint(2)
+    path = Path.cwd() / reader.name
+    path.write_bytes((with_other_contents if deep else with_other_bytes)(data, random))
+    try:
+        reader.read(path)
+    except reader.errors as error:
+        return "" if len(str(error)) > 10 else f"says no more than {error!r}"
+    return ""
+
+
+def mutation_cells(name, first, n_mutations):
+    """The good files, which must be read, and mutations of them."""
+    for number, data in enumerate(good_files(name)):
+        yield f"{name}, good file {number}", functools.partial(read_good, name, data)
+    for number in range(first, first + n_mutations):
+        yield f"{name}, mutation {number}", functools.partial(read_mutation, name, number)
+
+
+def read_good(name, data):
+    path = Path.cwd() / READERS[name].name
+    path.write_bytes(data)
+    READERS[name].read(path)
+    return ""
