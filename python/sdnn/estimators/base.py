@@ -134,7 +134,9 @@ class BaseSDNN(CodedInputs):
         random: np.random.RandomState = check_random_state(self.random_state)
         return random
 
-    def _select_pairs(self, X: Any, table: NDArray[Any], y: Any) -> None:
+    def _select_pairs(
+        self, X: Any, table: NDArray[Any], y: Any, weights: NDArray[np.float64] | None
+    ) -> None:
         """Let cross-validation select the pairs, if it is to."""
         if not (isinstance(self.pairs, str) and self.pairs == "auto") or table.shape[1] < 2:
             return
@@ -142,7 +144,7 @@ class BaseSDNN(CodedInputs):
         seed = int(check_random_state(self.random_state).randint(2**31 - 1))
         every = share_of_pairs(table.shape[1], PAIR_BUDGET, seed)
         model = clone(self).set_params(random_state=seed, early_stopping=False, verbose=0)
-        self._selected = select_pairs(model, X, y, every, seed)
+        self._selected = select_pairs(model, X, y, weights, every, seed)
 
     def _require_memory(
         self,

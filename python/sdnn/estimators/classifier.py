@@ -16,7 +16,7 @@ from sdnn.arguments import flag, one_of, whole
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.columns import kept_pairs
 from sdnn.estimators.network import Network
-from sdnn.estimators.training import Trainer
+from sdnn.estimators.training import LARGEST_WEIGHT, Trainer, sample_weights, weighted_mean
 
 __all__ = ["SDNNClassifier"]
 
@@ -26,7 +26,6 @@ OWN_SHARE = 5 / 6
 """The share of a class's units that are to fire for its own samples; for others the rest."""
 STEEPNESS = 6.0
 """Of the softmax that makes probabilities of scores."""
-LARGEST_WEIGHT = 10**6
 
 Self = TypeVar("Self", bound="SDNNClassifier")
 
@@ -183,13 +182,17 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         self.n_jobs = n_jobs
         self.verbose = verbose
 
-    def fit(self: Self, X: ArrayLike, y: ArrayLike) -> Self:
+    def fit(self: Self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
         """Learn ranges and classes, draw the network and train it.
 
         Parameters
         ----------
         X : array_like, shape (n_samples, n_features)
         y : array_like, shape (n_samples,)
+        sample_weight : array_like, shape (n_samples,), optional
+            How often each sample is presented per epoch, on average; 1 by default. What early
+            stopping holds out and "auto" compares is weighted too. Ranges and categories are
+            learned from all samples.
 
         Returns
         -------
@@ -207,17 +210,18 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             If there is no room for the weights.
         """
         work = self._scratch()
-        work._fit(X, y)
+        work._fit(X, y, sample_weight)
         self.__dict__ = work.__dict__
         return self
 
-    def _fit(self, X: ArrayLike, y: ArrayLike) -> None:
+    def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
         flag("warm_start", self.warm_start)
         table, y = self._checked(X, y, reset=not self._goes_on(), ensure_min_samples=2)
+        weights = sample_weights(sample_weight, len(table))
         if self._goes_on():
             random = self._go_on(table)
         else:
-            self._select_pairs(X, table, y)
+            self._select_pairs(X, table, y, weights)
             random = self._begin(X, table, unique_labels(y))
             self.__dict__.pop("_selected", None)
         labels = numbers_of(y, self.classes_)
@@ -225,17 +229,21 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         bins = self.network_.input_code.bins(table)
         trainer = self._trainer(self.network_, bins[kept], labels[kept], self.max_iter)
         held_table, held_labels = table[held], labels[held]
+        held_weights = None if weights is None else weights[held]
+        kept_weights = self._weights(labels[kept], None if weights is None else weights[kept])
 
         def score() -> float:
             winners = self._winners(self._decide(held_table))
-            return float(np.mean(winners == held_labels))
+            return weighted_mean(winners == held_labels, held_weights)
 
-        self._run(trainer, len(kept), random, score, self._weights(labels[kept]))
+        self._run(trainer, len(kept), random, score, kept_weights)
 
-    def _weights(self, labels: NDArray[np.int32]) -> NDArray[np.float64] | None:
-        """Return how often each sample is presented per epoch, on average."""
+    def _weights(
+        self, labels: NDArray[np.int32], weights: NDArray[np.float64] | None
+    ) -> NDArray[np.float64] | None:
+        """Return how often each sample is presented per epoch, on average, by both weights."""
         if self.class_weight is None:
-            return None
+            return weights
         present = np.unique(labels)
         of_class = np.ones(len(self.classes_))
         of_class[present] = compute_class_weight(
@@ -245,7 +253,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             raise ValueError(
                 f"class_weight must be numbers in [0, {LARGEST_WEIGHT}], got {self.class_weight!r}"
             )
-        return of_class[labels]
+        each = of_class[labels] if weights is None else of_class[labels] * weights
+        return sample_weights(each, len(labels), name="class_weight times sample_weight")
 
     def partial_fit(
         self: Self, X: ArrayLike, y: ArrayLike, classes: ArrayLike | None = None

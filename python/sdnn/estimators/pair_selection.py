@@ -33,18 +33,22 @@ def halved(pairs: Pairs, importances: NDArray[np.float64]) -> Pairs:
     return [pair for pair in pairs if frozenset(pair) in kept]
 
 
-def halving(model: Any, X: Any, y: Any, pairs: Pairs, n_levels: int | None = None) -> list[Any]:
+def halving(
+    model: Any, X: Any, y: Any, weights: Any, pairs: Pairs, n_levels: int | None = None
+) -> list[Any]:
     """Return the fitted models with all pairs, half of them, and so on, down to two inputs."""
     fitted = []
     while True:
-        fitted.append(clone(model).set_params(pairs=pairs).fit(X, y))
+        fitted.append(clone(model).set_params(pairs=pairs).fit(X, y, weights))
         fewer = halved(pairs, fitted[-1].pair_importances_)
         if len(fewer) == len(pairs) or len(fitted) == n_levels:
             return fitted
         pairs = fewer
 
 
-def select_pairs(model: Any, X: ArrayLike, y: ArrayLike, pairs: Pairs, seed: int) -> Pairs:
+def select_pairs(
+    model: Any, X: ArrayLike, y: ArrayLike, weights: Any, pairs: Pairs, seed: int
+) -> Pairs:
     """Return the pairs with which cross-validation is best, all of them unless fewer are clearly.
 
     In each of five folds the less important half of the pairs is left out again and again. A
@@ -57,6 +61,8 @@ def select_pairs(model: Any, X: ArrayLike, y: ArrayLike, pairs: Pairs, seed: int
         How to fit; it is cloned.
     X, y : array_like
         The training sample.
+    weights : ndarray, shape (n_samples,), optional
+        Of the samples, in training and in scores.
     pairs : list of (int, int)
         Candidates.
     seed : int
@@ -67,11 +73,13 @@ def select_pairs(model: Any, X: ArrayLike, y: ArrayLike, pairs: Pairs, seed: int
     if len(labels) < 2 * N_FOLDS:
         return pairs
     splitter = (StratifiedKFold if stratified else KFold)(N_FOLDS, shuffle=True, random_state=seed)
+
+    def part(rows: Any) -> tuple[Any, Any, Any]:
+        chosen = None if weights is None else weights[rows]
+        return _safe_indexing(X, rows), labels[rows], chosen
+
     scores = [
-        [
-            one.score(_safe_indexing(X, test), labels[test])
-            for one in halving(model, _safe_indexing(X, train), labels[train], pairs)
-        ]
+        [one.score(*part(test)) for one in halving(model, *part(train), pairs)]
         for train, test in splitter.split(labels, labels)
     ]
     gains = np.array(scores) - np.array(scores)[:, :1]
@@ -79,4 +87,4 @@ def select_pairs(model: Any, X: ArrayLike, y: ArrayLike, pairs: Pairs, seed: int
     error = gains[:, level].std(ddof=1) / np.sqrt(N_FOLDS)
     if level == 0 or gains[:, level].mean() <= STANDARD_ERRORS * error:
         return pairs
-    return list(halving(model, X, labels, pairs, level + 1)[-1].pairs_)
+    return list(halving(model, X, labels, weights, pairs, level + 1)[-1].pairs_)

@@ -13,7 +13,7 @@ from sdnn.arguments import flag, whole
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.columns import kept_pairs
 from sdnn.estimators.network import Network
-from sdnn.estimators.training import Trainer, run_epochs
+from sdnn.estimators.training import Trainer, run_epochs, sample_weights, weighted_mean
 
 __all__ = ["SDNNRegressor"]
 
@@ -187,13 +187,17 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         tags.target_tags.multi_output = True
         return tags
 
-    def fit(self: Self, X: ArrayLike, y: ArrayLike) -> Self:
+    def fit(self: Self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
         """Learn ranges, draw the network and train it.
 
         Parameters
         ----------
         X : array_like, shape (n_samples, n_features)
         y : array_like, shape (n_samples,) or (n_samples, n_outputs)
+        sample_weight : array_like, shape (n_samples,), optional
+            How often each sample is presented per epoch, on average; 1 by default. What early
+            stopping holds out and "auto" compares is weighted too. Ranges and categories are
+            learned from all samples.
 
         Returns
         -------
@@ -211,21 +215,22 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             If there is no room for the weights.
         """
         work = self._scratch()
-        work._fit(X, y)
+        work._fit(X, y, sample_weight)
         self.__dict__ = work.__dict__
         return self
 
-    def _fit(self, X: ArrayLike, y: ArrayLike) -> None:
+    def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
         flag("refit", self.refit)
         whole("n_averaged_epochs", self.n_averaged_epochs, 1, 1000)
         if flag("warm_start", self.warm_start) and self.refit:
             raise ValueError("refit=True trains a new network: it cannot be with warm_start=True")
         table, targets = self._checked(X, y, reset=not self._goes_on())
+        weights = sample_weights(sample_weight, len(table))
         if self._goes_on():
             self._check_outputs(targets.shape[1])
             random = self._go_on(table)
         else:
-            self._select_pairs(X, table, y)
+            self._select_pairs(X, table, y, weights)
             random = self._begin(X, table, targets)
             self.__dict__.pop("_selected", None)
         if self.out_of_range == "widen":
@@ -237,25 +242,32 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         trainer = self._trainer(self.network_, bins[kept], counts_to_learn[kept], self.max_iter)
         held_bins = bins[held]
         held_counts = self._in_counts(targets[held])
+        held_weights = None if weights is None else weights[held]
 
         def score() -> float:
             counts = self.network_.layer.counts(
                 held_bins, n_groups=self.n_outputs_, n_threads=self._n_threads()
             )
-            return -float(np.mean((held_counts - counts) ** 2))
+            return -weighted_mean((held_counts - counts) ** 2, held_weights)
 
         n_averaged = self.n_averaged_epochs
         history = self._run(
-            trainer, len(kept), random, score, n_averaged_epochs=1 if self.refit else n_averaged
+            trainer,
+            len(kept),
+            random,
+            score,
+            None if weights is None else weights[kept],
+            n_averaged_epochs=1 if self.refit else n_averaged,
         )
         self._earlier = history.earlier
         if self.refit and self.early_stopping:
-            self._refit(bins, counts_to_learn, random, history.n_epochs)
+            self._refit(bins, counts_to_learn, weights, random, history.n_epochs)
 
     def _refit(
         self,
         bins: NDArray[np.int32],
         counts: NDArray[np.float64],
+        weights: NDArray[np.float64] | None,
         random: np.random.RandomState,
         n_epochs: int,
     ) -> None:
@@ -269,6 +281,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             len(bins),
             max_iter=n_epochs,
             random=random if self.shuffle else None,
+            weights=weights,
             n_averaged_epochs=self.n_averaged_epochs,
             verbose=self.verbose,
         )

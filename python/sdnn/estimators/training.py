@@ -6,14 +6,18 @@ import dataclasses
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sdnn.estimators.network import Network
 
-__all__ = ["History", "Trainer", "run_epochs"]
+__all__ = ["History", "Trainer", "run_epochs", "sample_weights", "weighted_mean"]
+
+LARGEST_WEIGHT = 10**6
+MOST_PRESENTED = 2**28
+"""Samples presented in an epoch: their numbers are a GiB."""
 
 
 class Trainer(Protocol):
@@ -71,6 +75,46 @@ def progress_bar(verbose: int, n_epochs: int) -> Iterator[Callable[[int], None]]
             progress.update(task, advance=1, description=f"training, {n_corrected} corrected")
 
         yield _advance
+
+
+def sample_weights(
+    weights: ArrayLike | None, n_samples: int, *, name: str = "sample_weight"
+) -> NDArray[np.float64] | None:
+    """Return checked weights of samples, shape (n_samples,), or None.
+
+    Raises
+    ------
+    ValueError
+        Unless there is a finite number in [0, `LARGEST_WEIGHT`] for each sample, above 0 for some,
+        and an epoch presents `MOST_PRESENTED` samples at most.
+    """
+    if weights is None:
+        return None
+    wanted = f"{name} must be a number in [0, {LARGEST_WEIGHT}] for each of {n_samples} samples"
+    try:
+        each = np.array(weights, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"{wanted}, got {weights!r}") from None
+    if each.ndim == 0:
+        each = np.full(n_samples, each)
+    if each.shape != (n_samples,):
+        raise ValueError(f"{wanted}, got an array of shape {each.shape}")
+    if not np.all((each >= 0) & (each <= LARGEST_WEIGHT)):
+        raise ValueError(f"{wanted}, got {weights!r}")
+    if not each.any():
+        raise ValueError(f"{name} must be above 0 for some sample, got 0 for all")
+    if each.sum() > MOST_PRESENTED:
+        raise ValueError(
+            f"{name} must have a sum of at most {MOST_PRESENTED}, got {each.sum():.4g}"
+        )
+    return each
+
+
+def weighted_mean(values: NDArray[Any], weights: NDArray[np.float64] | None) -> float:
+    """Return the mean over samples; the plain one without weights or if all of them are 0."""
+    if weights is None or not weights.any():
+        return float(np.mean(values))
+    return float(np.average(values, axis=0, weights=weights).mean())
 
 
 def presented(n_samples: int, weights: NDArray[np.float64] | None, epoch: int) -> NDArray[np.int32]:

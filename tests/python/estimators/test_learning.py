@@ -12,6 +12,7 @@ from sklearn.multioutput import MultiOutputClassifier
 from sdnn import SDNNClassifier, SDNNRegressor, _core
 from sdnn.coding import Circular, RandomInverse
 from sdnn.estimators import OutOfRangeWarning
+from sdnn.estimators.training import sample_weights
 
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(0, 1, (150, 2))
@@ -309,6 +310,67 @@ def test_weights_of_classes_are_numbers_of_presentations():
             SDNNClassifier(class_weight=bad).fit(X, rare)
     with pytest.raises(ValueError, match="class_weight works in fit only"):
         SDNNClassifier(class_weight="balanced").partial_fit(X, rare, classes=[0, 1])
+
+
+@pytest.mark.parametrize("make", [SDNNRegressor, SDNNClassifier])
+def test_weights_of_samples_are_numbers_of_presentations(make):
+    times = np.arange(len(Y)) % 3
+    targets = Y if make is SDNNRegressor else LABELS
+    plain = make(**GIVEN, max_iter=3).fit(X, targets)
+    same(plain, make(**GIVEN, max_iter=3).fit(X, targets, np.ones(len(Y))))
+    given = GIVEN | ({"output_range": (-10, 10)} if make is SDNNRegressor else {})
+    weighted = make(**given, max_iter=3).fit(X, targets, times)
+    repeated = make(**given, max_iter=3).fit(X.repeat(times, 0), targets.repeat(times))
+    same(weighted, repeated)
+    assert (weighted.weights_ != plain.weights_).any()
+
+
+def test_weights_of_samples_and_classes_are_multiplied():
+    options = {**GIVEN, "max_iter": 4}
+    labels = (Y > 0).astype(int)
+    both = SDNNClassifier(**options, class_weight={0: 2, 1: 1}).fit(X, labels, np.full(len(Y), 0.5))
+    same(both, SDNNClassifier(**options).fit(X, labels, np.where(labels == 0, 1.0, 0.5)))
+
+
+def test_weights_of_samples_count_in_what_is_held_out_refitted_and_selected():
+    weights = np.where(X[:, 0] > 0.5, 1.0, 0.0)
+    wrong = np.where(X[:, 0] > 0.5, Y, 5.0)
+    options = {**GIVEN, "early_stopping": True, "max_iter": 20, "n_iter_no_change": 20}
+    model = SDNNRegressor(**options).fit(X, wrong, weights)
+    of_all = SDNNRegressor(**options).fit(X, wrong)
+    assert model.validation_scores_.max() > of_all.validation_scores_.max()
+    refitted = SDNNRegressor(**options, refit=True).fit(X, wrong, weights)
+    mine = X[:, 0] > 0.5
+    assert refitted.score(X[mine], Y[mine]) > 0.9 > refitted.score(X, wrong)
+    none_held = SDNNRegressor(**options).fit(X, Y, np.arange(len(Y)) == 0)
+    assert np.isfinite(none_held.validation_scores_).all()
+    selected = SDNNRegressor(**GIVEN, pairs="auto", max_iter=3).fit(X, wrong, weights)
+    assert set(selected.pairs_) == {(0, 1), (1, 0)}
+
+
+@pytest.mark.parametrize("make", [SDNNRegressor, SDNNClassifier])
+@pytest.mark.parametrize(
+    ("bad", "got"),
+    [
+        (np.ones(3), r"got an array of shape \(3,\)"),
+        (np.ones((len(Y), 1)), r"got an array of shape \(\d+, 1\)"),
+        (np.full(len(Y), -1), "got array"),
+        (np.full(len(Y), np.nan), "got array"),
+        (np.full(len(Y), 1e7), "got array"),
+        (np.zeros(len(Y)), "above 0 for some sample"),
+        ("heavy", "got 'heavy'"),
+    ],
+)
+def test_weights_that_mean_nothing_are_refused(make, bad, got):
+    model = make(**GIVEN)
+    with pytest.raises(ValueError, match=f"^sample_weight must be .*{got}"):
+        model.fit(X, Y if make is SDNNRegressor else LABELS, bad)
+    assert not hasattr(model, "network_")
+
+
+def test_an_epoch_has_a_largest_size():
+    with pytest.raises(ValueError, match="sample_weight must have a sum of at most 268435456"):
+        sample_weights(np.full(1000, 1e6), 1000)
 
 
 def test_training_ends_when_all_weighted_samples_are_learned():
