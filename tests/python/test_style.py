@@ -58,12 +58,7 @@ def test_clang_format_changes_nothing(pinned):
     assert done.returncode == 0, done.stderr[-8000:]
 
 
-def slow_unless_ci(test):
-    """Half a minute is too slow for every turn, not for CI."""
-    return test if os.environ.get("CI") else pytest.mark.slow(test)
-
-
-@slow_unless_ci
+@pytest.mark.slow
 @pytest.mark.timeout(1800)
 def test_clang_tidy_finds_nothing(pinned, configure, skip_unless_ci, tmp_path):
     configured = configure(ROOT, tmp_path, "--preset", "tidy")

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -20,7 +21,12 @@ namespace sdnn::coding {
 
 namespace detail {
 
-inline constexpr std::size_t kProposalsPerPoint = 4096;
+/// Asks for what will soon be read, where the compiler can say so.
+inline void prefetch([[maybe_unused]] const void* address) noexcept {
+#if defined(__GNUC__)
+  __builtin_prefetch(address);
+#endif
+}
 
 /// Patterns as bytes and their inner products, moved towards wanted ones by swaps of two units.
 class CorrelationSearch {
@@ -42,66 +48,102 @@ class CorrelationSearch {
     for (std::size_t j = 0; j < i; ++j) {
       if (nearest == i || std::llabs(wanted(i, j)) > std::llabs(wanted(i, nearest))) nearest = j;
     }
-    auto pattern = signs(i);
+    std::vector<std::int8_t> pattern(n_units_);
     if (nearest != i && wanted(i, nearest) != 0) {
       const std::int8_t factor = wanted(i, nearest) > 0 ? 1 : -1;
       for (std::size_t k = 0; k < n_units_; ++k) {
-        pattern[k] = static_cast<std::int8_t>(factor * signs(nearest)[k]);
+        pattern[k] = static_cast<std::int8_t>(factor * unit(k)[nearest]);
       }
     } else {
       for (std::size_t k = 0; k < n_units_; ++k) pattern[k] = k < n_units_ / 2 ? 1 : -1;
-      random.shuffle(pattern);
+      random.shuffle(std::span(pattern));
     }
+    for (std::size_t k = 0; k < n_units_; ++k) unit(k)[i] = pattern[k];
     for (std::size_t j = 0; j < i; ++j) {
       core::interruption_point();
       std::int64_t product = 0;
-      for (std::size_t k = 0; k < n_units_; ++k) product += std::int64_t{pattern[k]} * signs(j)[k];
+      for (std::size_t k = 0; k < n_units_; ++k) product += std::int64_t{pattern[k]} * unit(k)[j];
       products_[i * n_bins_ + j] = products_[j * n_bins_ + i] = product;
     }
   }
 
-  /// Proposes to swap a +1 and a -1 of pattern i; keeps the swap unless it raises the squared
-  /// error against the first `n_others` patterns.
-  void propose(std::size_t i, std::size_t n_others, core::Random& random) {
-    auto pattern = signs(i);
-    const std::size_t k = random.below(n_units_);
-    const std::size_t l = random.below(n_units_);
-    if (pattern[k] == pattern[l]) return;
-    std::int64_t change = 0;
-    for (std::size_t j = 0; j < n_others; ++j) {
-      if (j == i) continue;
-      const std::int64_t step = product_step(i, j, k, l);
-      change += step * (2 * (product(i, j) - wanted(i, j)) + step);
+  /// Proposes swaps in the pattern that `draw_pattern()` says, judged by the first `n_others`.
+  ///
+  /// They are drawn some way ahead of their trial, so that their units come from memory meanwhile.
+  template <class DrawPattern>
+  void propose(std::size_t n_proposals, std::size_t n_others, core::Random& random,
+               DrawPattern draw_pattern) {
+    std::array<Swap, kDrawnAhead> swaps;
+    for (std::size_t done = 0; done < n_proposals; done += swaps.size()) {
+      if (done % kProposalsPerPoint == 0) core::interruption_point();
+      const std::size_t n_drawn = std::min(swaps.size(), n_proposals - done);
+      const std::span drawn(swaps.data(), n_drawn);
+      for (auto& swap : drawn) {
+        swap.pattern = draw_pattern();
+        swap.k = random.below(n_units_);
+        swap.l = random.below(n_units_);
+        prefetch(unit(swap.k));
+        prefetch(unit(swap.l));
+      }
+      for (const auto& swap : drawn) try_swap(swap, n_others);
     }
+  }
+
+  /// The patterns one after another.
+  std::vector<std::int8_t> patterns() const {
+    std::vector<std::int8_t> by_pattern(signs_.size());
+    for (std::size_t k = 0; k < n_units_; ++k) {
+      for (std::size_t i = 0; i < n_bins_; ++i) by_pattern[i * n_units_ + k] = unit(k)[i];
+    }
+    return by_pattern;
+  }
+
+ private:
+  struct Swap {
+    std::size_t pattern, k, l;
+  };
+  static constexpr std::size_t kDrawnAhead = 32;
+  static constexpr std::size_t kProposalsPerPoint = 4096;
+
+  /// Swaps a +1 and a -1 of a pattern, unless that raises the squared error of its products with
+  /// the first `n_others`.
+  void try_swap(const Swap& swap, std::size_t n_others) {
+    const auto [i, k, l] = swap;
+    std::int8_t* const one = unit(k);
+    std::int8_t* const other = unit(l);
+    if (one[i] == other[i]) return;
+    const std::int64_t twice = other[i] - one[i];
+    const auto step = [&](std::size_t j) { return twice * (one[j] - other[j]); };
+    const std::int64_t* const products = &products_[i * n_bins_];
+    const std::int64_t* const wanted = &wanted_[i * n_bins_];
+    std::int64_t change = 0;
+    const auto add = [&](std::size_t from, std::size_t to) {
+      for (std::size_t j = from; j < to; ++j) {
+        change += step(j) * (2 * (products[j] - wanted[j]) + step(j));
+      }
+    };
+    add(0, std::min(i, n_others));
+    add(i + 1, n_others);
     if (change > 0) return;
     for (std::size_t j = 0; j < n_others; ++j) {
       if (j == i) continue;
-      products_[i * n_bins_ + j] += product_step(i, j, k, l);
+      products_[i * n_bins_ + j] += step(j);
       products_[j * n_bins_ + i] = products_[i * n_bins_ + j];
     }
-    std::swap(pattern[k], pattern[l]);
+    std::swap(one[i], other[i]);
   }
 
-  std::span<const std::int8_t> all_signs() const noexcept { return signs_; }
+  /// The signs of unit k in all patterns.
+  std::int8_t* unit(std::size_t k) noexcept { return signs_.data() + k * n_bins_; }
+  const std::int8_t* unit(std::size_t k) const noexcept { return signs_.data() + k * n_bins_; }
 
- private:
-  std::span<std::int8_t> signs(std::size_t i) noexcept {
-    return {signs_.data() + i * n_units_, n_units_};
-  }
-  std::int64_t product(std::size_t i, std::size_t j) const noexcept {
-    return products_[i * n_bins_ + j];
-  }
   std::int64_t wanted(std::size_t i, std::size_t j) const noexcept {
     return wanted_[i * n_bins_ + j];
-  }
-  /// How the product of patterns i and j moves when units k and l of pattern i swap.
-  std::int64_t product_step(std::size_t i, std::size_t j, std::size_t k, std::size_t l) noexcept {
-    return std::int64_t{signs(i)[l] - signs(i)[k]} * (signs(j)[k] - signs(j)[l]);
   }
 
   std::size_t n_bins_;
   std::size_t n_units_;
-  std::vector<std::int8_t> signs_;      // (n_bins, n_units)
+  std::vector<std::int8_t> signs_;      // (n_units, n_bins)
   std::vector<std::int64_t> products_;  // (n_bins, n_bins)
   std::vector<std::int64_t> wanted_;
 };
@@ -142,15 +184,10 @@ inline PatternTable correlation_matrix_patterns(int n_units, std::span<const dou
   const std::size_t n_proposals = units * std::min<std::size_t>(20, affordable);
   for (std::size_t i = 0; i < n_bins; ++i) {
     search.begin(i, random);
-    for (std::size_t p = 0; p < n_proposals; ++p) {
-      if (p % detail::kProposalsPerPoint == 0) core::interruption_point();
-      search.propose(i, i, random);
-    }
+    search.propose(n_proposals, i, random, [i] { return i; });
   }
-  for (std::size_t p = 0; p < n_proposals * n_bins; ++p) {
-    search.propose(random.below(n_bins), n_bins, random);
-  }
-  return PatternTable::from_signs(search.all_signs(), n_bins, units);
+  search.propose(n_proposals * n_bins, n_bins, random, [&] { return random.below(n_bins); });
+  return PatternTable::from_signs(search.patterns(), n_bins, units);
 }
 
 }  // namespace sdnn::coding
