@@ -24,8 +24,8 @@ def build_folder(request, tmp_path):
 @pytest.mark.parametrize(
     ("preset", "compiler"),
     [
-        ("sanitize", "clang++"),
-        pytest.param("dev", "g++", marks=pytest.mark.slow),
+        ("dev", "g++"),
+        pytest.param("sanitize", "clang++", marks=pytest.mark.slow),
         pytest.param("gcc", "g++", marks=pytest.mark.slow),
         pytest.param("clang", "clang++", marks=pytest.mark.slow),
         pytest.param("aarch64", "aarch64-linux-gnu-g++", marks=pytest.mark.slow),  # emulated

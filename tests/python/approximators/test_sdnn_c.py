@@ -90,8 +90,9 @@ def compare_while_learning(config, seed, n_steps, compare_weights_every):
     return n_active
 
 
-def test_the_core_agrees_with_the_paper_over_5000_learning_steps():
-    assert compare_while_learning(_core.SDNNCConfig(), 1, 5000, 1000) > 4500
+@pytest.mark.parametrize("n_steps", [1500, pytest.param(5000, marks=pytest.mark.slow)])
+def test_the_core_agrees_with_the_paper_while_it_learns(n_steps):
+    assert compare_while_learning(_core.SDNNCConfig(), 1, n_steps, 500) > 0.9 * n_steps
 
 
 @pytest.mark.parametrize("n_inputs", [5, 6])

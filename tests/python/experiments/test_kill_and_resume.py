@@ -28,13 +28,13 @@ def module():
 
 
 def test_a_killed_command_resumes_to_the_same_rows(module):
-    line = module.kill_and_resume(["reproduce", "a", "--trials", "2", "--episodes", "30"], 8, 1)
+    line = module.kill_and_resume(["reproduce", "a", "--trials", "2", "--episodes", "30"], 4, 1)
     assert "the same rows" in line
 
 
 def test_a_killed_sweep_resumes_to_the_same_rows(module, tmp_path):
     (tmp_path / "study.toml").write_text(STUDY)
-    line = module.kill_and_resume(["sweep", str(tmp_path / "study.toml")], 4, 2)
+    line = module.kill_and_resume(["sweep", str(tmp_path / "study.toml")], 2, 2)
     assert "the same rows" in line
 
 
