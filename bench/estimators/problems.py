@@ -1,0 +1,374 @@
+"""Problems that nobody tuned for: every estimator as it comes, on some twenty of them.
+
+``python bench/estimators/problems.py docs [N_SEEDS]`` measures what ``docs/problems.csv`` lacks,
+draws ``docs/problems.png`` and writes the tables of ``docs/problems.md``. Needs ``sdnn[river]``,
+whose measured data are in the package.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import sys
+import time
+import warnings
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+from compare import Rows
+from demonstration import target, training_points
+from matplotlib.figure import Figure
+from rivals import gaussian_process, scaled
+from river import datasets
+from sklearn.datasets import (
+    load_breast_cancer,
+    load_diabetes,
+    load_digits,
+    load_iris,
+    load_wine,
+    make_circles,
+    make_classification,
+    make_friedman1,
+    make_friedman2,
+    make_friedman3,
+    make_moons,
+)
+from sklearn.ensemble import (
+    HistGradientBoostingClassifier,
+    HistGradientBoostingRegressor,
+    RandomForestClassifier,
+    RandomForestRegressor,
+)
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.linear_model import LogisticRegression, RidgeCV
+from sklearn.model_selection import train_test_split
+from sklearn.neighbors import KNeighborsClassifier, KNeighborsRegressor
+from sklearn.neural_network import MLPClassifier, MLPRegressor
+from sklearn.svm import SVC, SVR
+
+from sdnn import SDNNClassifier, SDNNKernelRidge, SDNNRegressor
+
+N_TRAINING = 500
+N_TEST = 1000
+MOST_MEASURED = 1500
+"""Samples of measured data, drawn anew for each seed; three tenths of them are for the test."""
+
+PAGE = Path(__file__).parents[2] / "docs" / "problems.md"
+
+
+# Problems: inputs and targets of n samples, from a generator of random numbers.
+
+
+def uniform(random, n, n_inputs):
+    return random.uniform(-1, 1, (n, n_inputs))
+
+
+def made(maker, **options):
+    """A maker of scikit-learn, whose function may depend on the seed."""
+    return lambda random, n: maker(n, random_state=random, **options)
+
+
+def waves_and_disc(random, n):
+    X = training_points(n, random.randint(2**31))
+    return X, target(X)
+
+
+def additive(random, n):
+    X = uniform(random, n, 6)
+    return X, np.sin(np.pi * X) @ [1, 1, 1, 0.5, 0.5, 0] + 0.3 * random.normal(size=n)
+
+
+def product(random, n):
+    X = uniform(random, n, 3)
+    return X, X.prod(axis=1)
+
+
+def ridge_wave(random, n):
+    X = uniform(random, n, 4)
+    return X, np.sin(3 * X @ [1, -1, 1, 0.5]) + 0.1 * random.normal(size=n)
+
+
+def checkerboard(random, n):
+    X = uniform(random, n, 5)
+    return X, np.sign(X[:, 0] * X[:, 1]) + 0.1 * random.normal(size=n)
+
+
+def sparse_plane(random, n):
+    X = uniform(random, n, 20)
+    return X, X[:, :5] @ [3, -2, 2, 1, 1] + random.normal(size=n)
+
+
+def reach_of_arm(random, n):
+    """How far the hand of a planar arm of three joints is from a point; two inputs are useless."""
+    X = uniform(random, n, 5)
+    angles = np.cumsum(np.pi * X[:, :3], axis=1)
+    hand = np.stack([np.cos(angles).sum(axis=1), np.sin(angles).sum(axis=1)])
+    return X, np.hypot(hand[0] - 1, hand[1])
+
+
+def hour_and_place(random, n):
+    """Demand by hour and by one of eight places, each with an hour of its own, as plain numbers."""
+    hour, place = random.uniform(0, 24, n), random.randint(8, size=n)
+    peak = np.array([8, 17, 12, 3, 21, 9, 15, 19])[place]
+    y = np.cos(2 * np.pi * (hour - peak) / 24) + 0.2 * random.normal(size=n)
+    return np.stack([hour, place, random.uniform(size=n)], axis=1), y
+
+
+def parity(random, n):
+    X = uniform(random, n, 3)
+    return X, (X > 0).sum(axis=1) % 2
+
+
+def exclusive_or(random, n):
+    X = uniform(random, n, 20)
+    return X, (X[:, 0] * X[:, 1] > 0).astype(int)
+
+
+def rings(random, n):
+    X = uniform(random, n, 4)
+    return X, np.digitize(np.hypot(X[:, 0], X[:, 1]), [0.4, 0.7])
+
+
+def measured(loader):
+    """Data that are there, all or a part of them; the seed decides which are for the test."""
+    X, y = loader()
+
+    def samples(random, n):
+        kept = random.permutation(len(X))[:MOST_MEASURED]
+        return X[kept], y[kept]
+
+    samples.is_measured = True
+    return samples
+
+
+def of_scikit_learn(loader):
+    return measured(lambda: loader(return_X_y=True))
+
+
+def of_river(dataset):
+    def load():
+        rows = [(list(x.values()), y) for x, y in dataset]
+        return np.array([x for x, _ in rows], dtype=float), np.array([y for _, y in rows])
+
+    return measured(load)
+
+
+REGRESSION = {
+    "Friedman 1": made(make_friedman1, noise=1.0),
+    "Friedman 2": made(make_friedman2, noise=125.0),
+    "Friedman 3": made(make_friedman3, noise=0.1),
+    "waves and disc": waves_and_disc,
+    "sum of sines": additive,
+    "product of three": product,
+    "wave along a direction": ridge_wave,
+    "checkerboard": checkerboard,
+    "5 of 20 linear": sparse_plane,
+    "reach of an arm": reach_of_arm,
+    "hour and place": hour_and_place,
+    "diabetes": of_scikit_learn(load_diabetes),
+}
+CLASSIFICATION = {
+    "two moons": made(make_moons, noise=0.3),
+    "two circles": made(make_circles, noise=0.15, factor=0.6),
+    "rings of 2 in 4": rings,
+    "parity of 3": parity,
+    "XOR of 2 in 20": exclusive_or,
+    "clusters of 3 classes": made(
+        make_classification, n_features=10, n_informative=5, n_classes=3, n_clusters_per_class=2
+    ),
+    "iris": of_scikit_learn(load_iris),
+    "wine": of_scikit_learn(load_wine),
+    "breast cancer": of_scikit_learn(load_breast_cancer),
+    "digits": of_scikit_learn(load_digits),
+    "phishing": of_river(datasets.Phishing()),
+    "image segments": of_river(datasets.ImageSegments()),
+}
+PROBLEMS = REGRESSION | CLASSIFICATION
+
+# Models, each from a seed and the number of inputs, with the defaults of its library.
+
+
+def short(n_inputs):
+    """Units per pattern that make 4,000 columns, a quarter of what the default makes."""
+    n_pairs = min(n_inputs * (n_inputs - 1), 500)
+    return max(2, 4000 // n_pairs // 2 * 2)
+
+
+REGRESSORS = {
+    "SDNN": lambda seed, n_inputs: SDNNRegressor(random_state=seed),
+    "SDNN kernel ridge": lambda seed, n_inputs: SDNNKernelRidge(),
+    "SDNN, 10 epochs averaged": lambda seed, n_inputs: SDNNRegressor(
+        n_averaged_epochs=10, random_state=seed
+    ),
+    "SDNN, 4,000 columns": lambda seed, n_inputs: SDNNRegressor(
+        n_pattern_units=short(n_inputs), random_state=seed
+    ),
+    "gradient boosting": lambda seed, n_inputs: HistGradientBoostingRegressor(random_state=seed),
+    "random forest": lambda seed, n_inputs: RandomForestRegressor(random_state=seed),
+    "SVM": lambda seed, n_inputs: scaled(SVR()),
+    "Gaussian process": lambda seed, n_inputs: gaussian_process(n_inputs, 0.1),
+    "MLP": lambda seed, n_inputs: scaled(MLPRegressor(random_state=seed)),
+    "neighbours": lambda seed, n_inputs: scaled(KNeighborsRegressor()),
+    "linear": lambda seed, n_inputs: scaled(RidgeCV()),
+}
+CLASSIFIERS = {
+    "SDNN": lambda seed, n_inputs: SDNNClassifier(random_state=seed),
+    "SDNN, 4,000 columns": lambda seed, n_inputs: SDNNClassifier(
+        n_pattern_units=short(n_inputs), random_state=seed
+    ),
+    "gradient boosting": lambda seed, n_inputs: HistGradientBoostingClassifier(random_state=seed),
+    "random forest": lambda seed, n_inputs: RandomForestClassifier(random_state=seed),
+    "SVM": lambda seed, n_inputs: scaled(SVC()),
+    "MLP": lambda seed, n_inputs: scaled(MLPClassifier(random_state=seed)),
+    "neighbours": lambda seed, n_inputs: scaled(KNeighborsClassifier()),
+    "linear": lambda seed, n_inputs: scaled(LogisticRegression(max_iter=1000)),
+}
+VARIANTS = ("SDNN, 10 epochs averaged", "SDNN, 4,000 columns")
+"""Settings of a model that is there: they have no rank."""
+
+TABLES = {"R2": (REGRESSION, REGRESSORS), "accuracy": (CLASSIFICATION, CLASSIFIERS)}
+
+
+def samples(problem, seed):
+    """Training and test samples: X, X_test, y, y_test."""
+    random = np.random.RandomState(seed)
+    make = PROBLEMS[problem]
+    X, y = make(random, N_TRAINING + N_TEST)
+    n_training = 0.7 if hasattr(make, "is_measured") else N_TRAINING
+    labels = y if problem in CLASSIFICATION else None
+    return train_test_split(X, y, train_size=n_training, random_state=seed, stratify=labels)
+
+
+def coverage(model, X, y):
+    """The share of targets within 1.645 standard deviations of the mean of the epochs' answers."""
+    mean, deviation = model.predict(X, return_std=True)
+    return round(float(np.mean(np.abs(y - mean) <= 1.645 * deviation)), 4)
+
+
+def measure_all(path, n_seeds):
+    rows = Rows(path, ("problem", "model", "seed"), ("score", "fit_s", "coverage"))
+    for seed, (problems, models) in itertools.product(range(n_seeds), TABLES.values()):
+        for problem in problems:
+            X, X_test, y, y_test = samples(problem, seed)
+            for name, make in models.items():
+                if rows.has(problem, name, seed):
+                    continue
+                begun = time.process_time()
+                model = make(seed, X.shape[1]).fit(X, y)
+                spent = round(time.process_time() - begun, 3)
+                covered = coverage(model, X_test, y_test) if "averaged" in name else ""
+                score = round(model.score(X_test, y_test), 5)
+                rows.add(problem, name, seed, score, spent, covered)
+
+
+# What is drawn of the rows.
+
+
+def read(path):
+    """Rows by problem and model: score, seconds and coverage, which is 0 where none is told."""
+    found = defaultdict(list)
+    with path.open(newline="") as file:
+        for row in csv.DictReader(file):
+            numbers = float(row["score"]), float(row["fit_s"]), float(row["coverage"] or 0)
+            found[row["problem"], row["model"]].append(numbers)
+    return found
+
+
+def scores(found, problem, model):
+    return np.array([score for score, *_ in found[problem, model]])
+
+
+def ranks(found, problems, models):
+    """Mean rank of each model over problems, by the median scores; 1 is the best."""
+    medians = np.array(
+        [[np.median(scores(found, problem, model)) for model in models] for problem in problems]
+    )
+    better = (medians[:, None, :] > medians[:, :, None]).sum(axis=2)
+    equal = (medians[:, None, :] == medians[:, :, None]).sum(axis=2)
+    return (better + (equal + 1) / 2).mean(axis=0)
+
+
+def table(found, problems, models):
+    lines = ["| problem | " + " | ".join(models) + " |", "|---" * (len(models) + 1) + "|"]
+    for problem in problems:
+        medians = [np.median(scores(found, problem, model)) for model in models]
+        told = [f"{median:.3f}" for median in medians]
+        best = max(medians)
+        cells = [
+            f"**{cell}**" if median == best else cell
+            for cell, median in zip(told, medians, strict=True)
+        ]
+        lines.append(f"| {problem} | " + " | ".join(cells) + " |")
+    systems = [model for model in models if model not in VARIANTS]
+    rank_of = dict(zip(systems, ranks(found, problems, systems), strict=True))
+    told = [f"*{rank_of[model]:.1f}*" if model in rank_of else "" for model in models]
+    lines.append("| *mean rank* | " + " | ".join(told) + " |")
+    seconds = [
+        np.median([spent for problem in problems for _, spent, _ in found[problem, model]])
+        for model in models
+    ]
+    lines.append("| *fit, s* | " + " | ".join(f"*{spent:.2g}*" for spent in seconds) + " |")
+    return "\n".join(lines)
+
+
+def coverages(found):
+    """Between which two shares, of problems' medians, the targets are covered."""
+    name = "SDNN, 10 epochs averaged"
+    medians = [np.median([c for *_, c in found[problem, name]]) for problem in REGRESSION]
+    return min(medians), max(medians)
+
+
+def draw(found, path):
+    """A dot for each model and problem at the median, a bar over the middle 80 % of seeds."""
+    figure = Figure(figsize=(10, 6.4), layout="constrained")
+    colors = {
+        "SDNN": "#1f5fa8", "SDNN kernel ridge": "#6fa8dc", "SDNN, 10 epochs averaged": "#0b2f57",
+        "SDNN, 4,000 columns": "#36b0b0", "gradient boosting": "#d9822b",
+        "random forest": "#5b8c5a", "SVM": "#a05195", "Gaussian process": "#c2453a",
+        "MLP": "#8a7f3d", "neighbours": "#888888", "linear": "#bbbbbb",
+    }  # fmt: skip
+    for axes, (unit, (problems, models)) in zip(figure.subplots(1, 2), TABLES.items(), strict=True):
+        for row, problem in enumerate(problems):
+            for place, model in enumerate(models):
+                low, middle, high = np.quantile(
+                    scores(found, problem, model), (0.1, 0.5, 0.9)
+                ).clip(0, 1)
+                y = -row - 0.35 + 0.7 * place / (len(models) - 1)
+                ours = model.startswith("SDNN")
+                axes.plot([low, high], [y, y], color=colors[model], linewidth=1 + ours)
+                axes.plot(middle, y, "o", color=colors[model], markersize=3 + 1.5 * ours,
+                          label=model if row == 0 else None)  # fmt: skip
+        axes.set_yticks(-np.arange(len(problems)), problems, fontsize=8)
+        axes.set_ylim(-len(problems) + 0.4, 0.6)
+        for row in range(1, len(problems)):
+            axes.axhline(0.5 - row, color="#dddddd", linewidth=0.6)
+        axes.set_xlabel(f"{unit} on the test sample", fontsize=9)
+        axes.tick_params(labelsize=8)
+        axes.tick_params(axis="y", length=0)
+        axes.spines[["top", "right", "left"]].set_visible(False)
+    handles, names = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=5, frameon=False, fontsize=8)
+    figure.savefig(path, dpi=160, metadata={"Software": None})
+
+
+def main(folder, n_seeds):
+    measure_all(folder / "problems.csv", n_seeds)
+    found = read(folder / "problems.csv")
+    draw(found, folder / "problems.png")
+    page = PAGE.read_text(encoding="utf-8")
+    for unit, (problems, models) in TABLES.items():
+        begin, end = (
+            f"<!-- table: {unit}, bench/estimators/problems.py -->\n",
+            "<!-- end of table -->",
+        )
+        before, _, rest = page.partition(begin)
+        _, _, after = rest.partition(end)
+        told = table(found, problems, models)
+        page = f"{before}{begin}\n{told}\n\n{end}{after}"
+    PAGE.write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore", ConvergenceWarning)
+    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 10)
