@@ -320,7 +320,8 @@ class BaseSDNN(CodedInputs):
 
     @property
     def _fitted_network(self) -> Network:
-        check_is_fitted(self, "network_")
+        if "network_" not in self.__dict__:  # scikit-learn's check takes as long as small networks
+            check_is_fitted(self, "network_")
         return self.network_
 
     @property
