@@ -75,8 +75,8 @@ def select_pairs(
     splitter = (StratifiedKFold if stratified else KFold)(N_FOLDS, shuffle=True, random_state=seed)
 
     def part(rows: Any) -> tuple[Any, Any, Any]:
-        chosen = None if weights is None else weights[rows]
-        return _safe_indexing(X, rows), labels[rows], chosen
+        weighted = weights is not None and weights[rows].any()  # a fold may have none above 0
+        return _safe_indexing(X, rows), labels[rows], weights[rows] if weighted else None
 
     scores = [
         [one.score(*part(test)) for one in halving(model, *part(train), pairs)]

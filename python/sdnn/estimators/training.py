@@ -102,7 +102,7 @@ def sample_weights(
     if not np.all((each >= 0) & (each <= LARGEST_WEIGHT)):
         raise ValueError(f"{wanted}, got {weights!r}")
     if not each.any():
-        raise ValueError(f"{name} must be above 0 for some sample, got 0 for all")
+        raise ValueError(f"{name} must be above zero for some sample, got zero for all")
     if each.sum() > MOST_PRESENTED:
         raise ValueError(
             f"{name} must have a sum of at most {MOST_PRESENTED}, got {each.sum():.4g}"

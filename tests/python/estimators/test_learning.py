@@ -346,6 +346,7 @@ def test_weights_of_samples_count_in_what_is_held_out_refitted_and_selected():
     assert np.isfinite(none_held.validation_scores_).all()
     selected = SDNNRegressor(**GIVEN, pairs="auto", max_iter=3).fit(X, wrong, weights)
     assert set(selected.pairs_) == {(0, 1), (1, 0)}
+    SDNNRegressor(**GIVEN, pairs="auto", max_iter=2).fit(X, Y, np.arange(len(Y)) == 0)
 
 
 @pytest.mark.parametrize("make", [SDNNRegressor, SDNNClassifier])
@@ -357,7 +358,7 @@ def test_weights_of_samples_count_in_what_is_held_out_refitted_and_selected():
         (np.full(len(Y), -1), "got array"),
         (np.full(len(Y), np.nan), "got array"),
         (np.full(len(Y), 1e7), "got array"),
-        (np.zeros(len(Y)), "above 0 for some sample"),
+        (np.zeros(len(Y)), "above zero for some sample"),
         ("heavy", "got 'heavy'"),
     ],
 )
