@@ -62,6 +62,7 @@ Matrix potentials_of(const ParallelPerceptron& layer, const Bins& bins, int n_th
 Matrix counts_of(const ParallelPerceptron& layer, const Bins& bins, std::size_t n_groups,
                  int n_threads) {
   const auto values = copied(matrix(bins, "bins", layer.code().n_inputs()));
+  static_cast<void>(layer.group_size(n_groups));  // before an array of that many is asked for
   Matrix out({static_cast<std::size_t>(bins.shape(0)), n_groups});
   const std::span items(out.mutable_data(), static_cast<std::size_t>(out.size()));
   const bindings::WithoutGIL unlocked(layer);

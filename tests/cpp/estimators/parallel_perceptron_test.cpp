@@ -89,6 +89,7 @@ TEST(ParallelPerceptron, RefusesBadArguments) {
   EXPECT_THROW(layer.potentials(std::vector<std::int32_t>{2}, 1, out), std::invalid_argument);
   EXPECT_THROW(layer.potentials(std::vector<std::int32_t>{0}, 0, out), std::invalid_argument);
   EXPECT_THROW(layer.counts(std::vector<std::int32_t>{0}, 3, 1, out), std::invalid_argument);
+  EXPECT_THROW(layer.group_size(3), std::invalid_argument);
 }
 
 }  // namespace

@@ -173,14 +173,19 @@ class ParallelPerceptron {
     for_each_query(bins, n_threads, copy);
   }
 
+  /// How many units each of n_groups has. Throws std::invalid_argument unless it divides n_units.
+  std::size_t group_size(std::size_t n_groups) const {
+    core::require(n_groups > 0 && n_units() % n_groups == 0, "n_groups",
+                  "a divisor of n_units = " + std::to_string(n_units()), n_groups);
+    return n_units() / n_groups;
+  }
+
   /// How many units fire in each of `n_groups` groups of equal size. Shapes: bins
   /// (n_queries, n_inputs), out (n_queries, n_groups). Throws std::invalid_argument unless n_groups
   /// divides n_units, and like for_each_query.
   void counts(std::span<const std::int32_t> bins, std::size_t n_groups, int n_threads,
               std::span<std::int32_t> out) const {
-    core::require(n_groups > 0 && n_units() % n_groups == 0, "n_groups",
-                  "a divisor of n_units = " + std::to_string(n_units()), n_groups);
-    const std::size_t size = n_units() / n_groups;
+    const std::size_t size = group_size(n_groups);
     const auto count = [&](std::size_t query, const std::int32_t* values) {
       for (std::size_t g = 0; g < n_groups; ++g) {
         out[query * n_groups + g] = count_firing(values + g * size, size);
