@@ -13,6 +13,6 @@ N_MUTATIONS = int(os.environ.get("SDNN_MUTATIONS", "300"))
 
 @pytest.mark.parametrize("name", READERS)
 def test_damaged_files_are_refused_or_read(name):
-    n_cells, failed = failures(mutation_cells, name, 0, N_MUTATIONS)
+    n_cells, failed = failures(mutation_cells, name, N_MUTATIONS)
     assert n_cells > N_MUTATIONS
     assert not failed, "\n".join(failed[:20])

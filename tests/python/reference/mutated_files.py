@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 from safetensors.numpy import load, save
 
+from made_records import make_record
 from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.agents.agent import load_agent
 from sdnn.coding import Symbolic, WithMissing
 from sdnn.estimators import libsdnn
-from sdnn.experiments import ResultStore, StoreError, TrialKey, TrialRecord, TrialRows
+from sdnn.experiments import ResultStore, StoreError
 from sdnn.experiments.errors import ExperimentError
 from sdnn.experiments.sweep.study import read_study
 from sdnn.runs.config import RunConfig
@@ -87,25 +88,9 @@ def read_libsdnn_model(path):
 
 def store():
     with tempfile.TemporaryDirectory() as folder:
-        rows = TrialRows(
-            episode=np.arange(1, 40, dtype=np.int32),
-            steps=np.arange(1, 40, dtype=np.int32),
-            episode_return=np.linspace(-5, 0, 39),
-            solved=np.ones(39, bool),
-        )
         with ResultStore(folder) as results:
             for trial in range(4):
-                results.add(
-                    TrialRecord(
-                        key=TrialKey("s4", "sdnn-c", trial, 2**40, "aa"),
-                        config="{}",
-                        version="0.1",
-                        n_decisions=57,
-                        seconds=0.5,
-                        finished_at="2026-01-01T00:00:00+00:00",
-                        rows=rows,
-                    )
-                )
+                results.add(make_record(trial, steps=range(1, 40)))
         return [results.path.read_bytes()]
 
 
@@ -227,11 +212,11 @@ def read_mutation(name, number):
     return ""
 
 
-def mutation_cells(name, first, n_mutations):
+def mutation_cells(name, n_mutations):
     """The good files, which must be read, and mutations of them."""
     for number, data in enumerate(good_files(name)):
         yield f"{name}, good file {number}", functools.partial(read_good, name, data)
-    for number in range(first, first + n_mutations):
+    for number in range(n_mutations):
         yield f"{name}, mutation {number}", functools.partial(read_mutation, name, number)
 
 

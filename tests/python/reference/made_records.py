@@ -1,0 +1,27 @@
+"""A stored trial, made up."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from sdnn.experiments import TrialKey, TrialRecord, TrialRows
+
+
+def make_record(trial=0, config_hash="aa", steps=(50, 7), **changes):
+    n = len(steps)
+    rows = TrialRows(
+        episode=10 * np.arange(1, n + 1, dtype=np.int32),
+        steps=np.array(steps, np.int32),
+        episode_return=np.linspace(-5.0, 0.1, n),
+        solved=np.array(steps) < 50,
+    )
+    record = TrialRecord(
+        key=TrialKey("s4", "sdnn-c", trial, 2**63 - 1, config_hash),
+        config="{}",
+        version="0.1",
+        n_decisions=57,
+        seconds=0.5,
+        finished_at="2026-01-01T00:00:00+00:00",
+        rows=rows,
+    )
+    return replace(record, **changes)
