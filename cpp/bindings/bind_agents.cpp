@@ -13,6 +13,7 @@
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/presets.hpp"
 #include "sdnn/agents/q_learning.hpp"
+#include "sdnn/agents/vector_fuzzy_q_learning.hpp"
 #include "sdnn/approximators/decoupled.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
@@ -24,6 +25,7 @@ using namespace sdnn;
 using agents::FuzzyQLearning;
 using agents::FuzzyQLearningConfig;
 using agents::QLearningConfig;
+using agents::VectorFuzzyQLearning;
 using approximators::FuzzyRules;
 using approximators::FuzzyRulesConfig;
 using approximators::RBFNetwork;
@@ -69,6 +71,19 @@ void def_q_learning(py::class_<Agent>& agent) {
       .def_property_readonly("progress", &Agent::progress)
       .def_property_readonly("learning_rate", &Agent::learning_rate)
       .def_property_readonly("epsilon", &Agent::epsilon);
+  def_agent(agent);
+}
+
+/// What agents that learn by fuzzy rules have in common.
+template <class Agent>
+void def_fuzzy(py::class_<Agent>& agent) {
+  agent.def("last_action", &Agent::last_action, py::arg("environment") = 0)
+      .def(
+          "value",
+          [](Agent& self, const ArrayArgument<double>& state) {
+            return self.value(bindings::vector(state, "state"));
+          },
+          py::arg("state"), "V(state)");
   def_agent(agent);
 }
 
@@ -218,13 +233,29 @@ void bind_agents(py::module_& module) {
            py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"))
       .def_property_readonly(
           "rules", [](FuzzyQLearning& agent) -> FuzzyRules& { return agent.rules(); },
-          py::return_value_policy::reference_internal)
-      .def("last_action", &FuzzyQLearning::last_action, py::arg("environment") = 0)
+          py::return_value_policy::reference_internal);
+  def_fuzzy(fuzzy_agent);
+  py::class_<VectorFuzzyQLearning> vector_fuzzy_agent(
+      module, "VectorFuzzyQLearning", "Fuzzy Q-learning with rules for each dimension");
+  vector_fuzzy_agent
+      .def(py::init([](const FuzzyRulesConfig& approximator, std::size_t n_dimensions,
+                       const FuzzyQLearningConfig& learning, std::uint64_t seed) {
+             std::vector<FuzzyQLearning> parts;
+             for (std::size_t d = 0; d < n_dimensions; ++d) {
+               parts.emplace_back(FuzzyRules(approximator), learning,
+                                  approximators::seed_of_dimension(seed, d));
+             }
+             return VectorFuzzyQLearning(std::move(parts));
+           }),
+           py::kw_only(), py::arg("approximator"), py::arg("n_dimensions"), py::arg("learning"),
+           py::arg("seed"))
       .def(
-          "value",
-          [](FuzzyQLearning& agent, const ArrayArgument<double>& state) {
-            return agent.value(bindings::vector(state, "state"));
+          "part",
+          [](VectorFuzzyQLearning& agent, std::size_t dimension) -> FuzzyQLearning& {
+            core::require(dimension < agent.n_dimensions(), "dimension",
+                          "less than " + std::to_string(agent.n_dimensions()), dimension);
+            return agent.part(dimension);
           },
-          py::arg("state"), "V(state)");
-  def_agent(fuzzy_agent);
+          py::arg("dimension"), py::return_value_policy::reference_internal);
+  def_fuzzy(vector_fuzzy_agent);
 }

@@ -956,6 +956,39 @@ class FuzzyQLearning:
     @property
     def rules(self) -> FuzzyRules:
         ...
+class VectorFuzzyQLearning:
+    """
+    Fuzzy Q-learning with rules for each dimension
+    """
+    def __init__(self, *, approximator: FuzzyRulesConfig, n_dimensions: typing.SupportsInt | typing.SupportsIndex, learning: FuzzyQLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[float]:
+        ...
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def last_action(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[float]:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def part(self, dimension: typing.SupportsInt | typing.SupportsIndex) -> FuzzyQLearning:
+        ...
+    def restore(self, state: dict) -> None:
+        """
+        Take what `state` of one with the same settings gave; on an error nothing changes
+        """
+    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def state(self) -> dict:
+        """
+        What it remembers: arrays by name
+        """
+    def value(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> float:
+        """
+        V(state)
+        """
+    @property
+    def n_environments(self) -> int:
+        ...
 class ProtocolConfig:
     """
     How long a trial is

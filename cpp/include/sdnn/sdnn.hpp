@@ -9,6 +9,7 @@
 #include "sdnn/agents/presets.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/agents/return_range.hpp"
+#include "sdnn/agents/vector_fuzzy_q_learning.hpp"
 #include "sdnn/agents/waiting_steps.hpp"
 #include "sdnn/approximators/action_value.hpp"
 #include "sdnn/approximators/decoupled.hpp"

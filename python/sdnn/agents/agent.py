@@ -139,12 +139,12 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         self._actions = self._make_actions(action_space)
         self._progress = 0.0
         self._rates = {}
-        self._parts: list[Any] = []
+        self._compiled: Any = None
         self._warm_up: WarmUp | None = None
         if self._observations.is_settled:
-            self._parts = self._checked_parts()
+            self._compiled = self._checked()
         else:
-            self._check_parts()
+            self._check_settings()
             self._warm_up = self._new_warm_up()
 
     def _new_warm_up(self) -> WarmUp:
@@ -163,19 +163,19 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         """Make the conversion of actions; ``approximator`` is known."""
 
     @abc.abstractmethod
-    def _make_parts(self) -> list[Any]:
-        """Make the compiled agents; the observations are settled. Fills in ``approximator``."""
+    def _make(self) -> Any:
+        """Make the compiled agent; the observations are settled. Fills in ``approximator``."""
 
     def _remember_actions(self) -> None:
-        """Take up the actions that the restored parts took last, where they must know them."""
+        """Take up the actions that the restored agent took last, where it must know them."""
 
-    def _check_parts(self) -> None:
-        """Find impossible settings before the warm-up: make the parts for as many variables."""
+    def _check_settings(self) -> None:
+        """Find impossible ones before the warm-up: make an agent for as many variables."""
         trial = object.__new__(type(self))
         trial.__dict__.update(self.__dict__)
         trial._observations = copy.deepcopy(self._observations)
         trial._observations.settle(np.zeros((1, trial._observations.n_variables)))
-        trial._checked_parts()
+        trial._checked()
 
     def _core_approximator(self) -> Any:
         """Give the core's settings of one dimension, of the memory's limit its share."""
@@ -187,10 +187,10 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         share = settings.max_table_bytes // n_dimensions
         return dataclasses.replace(settings, max_table_bytes=share).to_core()
 
-    def _checked_parts(self) -> list[Any]:
-        """Make the compiled agents; an error about sizes says which space they follow from."""
+    def _checked(self) -> Any:
+        """Make the compiled agent; an error about sizes says which space they follow from."""
         try:
-            return self._make_parts()
+            return self._make()
         except ValueError as error:
             reasons = {"n_inputs": "n_inputs follows from observation_space"}
             if not self._actions.is_box:
@@ -242,9 +242,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         self._apply_progress()
 
     def _apply_progress(self) -> None:
-        for part in self._parts:
-            if hasattr(part, "set_progress"):
-                part.set_progress(self._progress)
+        if hasattr(self._compiled, "set_progress"):
+            self._compiled.set_progress(self._progress)
 
     @property
     def n_environments(self) -> int:
@@ -254,7 +253,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         steps counted, the random action that is kept. All else is shared. Where there are fewer
         than before, what waits in the others is learned. `train` sets it.
         """
-        one: Any = self._warm_up or self._parts[0]
+        one: Any = self._warm_up or self._compiled
         n: int = one.n_environments
         return n
 
@@ -263,8 +262,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         number = whole("n_environments", n, 1, 2**14)
         if self._warm_up is not None:
             self._warm_up.n_environments = number
-        for part in self._parts:
-            part.set_n_environments(number)
+        else:
+            self._compiled.set_n_environments(number)
         self._actions.forget(number)
 
     def _check_environment(self, environment: int) -> None:
@@ -285,8 +284,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         self._check_environment(environment)
         if self._warm_up is not None:
             self._warm_up.begin_episode(environment)
-        for part in self._parts:
-            part.begin_episode(environment)
+        else:
+            self._compiled.begin_episode(environment)
 
     def act(self, observation: Any, explore: bool = True, environment: int = 0) -> Any:
         """Choose the action to take, an element of the action space.
@@ -375,7 +374,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
     def _end_warm_up(self, warm_up: WarmUp) -> None:
         self._observations.settle(warm_up.observations())
-        self._parts = self._make_parts()
+        self._compiled = self._make()
         self._apply_progress()
         self._warm_up = None
         self._rates = {}
@@ -398,14 +397,14 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
                 self.begin_episode(environment)
         self.n_environments = warm_up.n_environments
 
-    def _born(self) -> list[Any]:
-        """Give the compiled agents; RuntimeError while there are none."""
+    def _born(self) -> Any:
+        """Give the compiled agent; RuntimeError while there is none."""
         if self._warm_up is not None:
             raise RuntimeError(
                 "the agent is still warming up: it knows no ranges of its observations until it has"
                 f" learned {self._warm_up_steps} transitions, or is given observation_range"
             )
-        return self._parts
+        return self._compiled
 
     def _state(self, name: str, observation: Any) -> NDArray[np.float64]:
         """Convert an observation for the compiled agents."""
@@ -525,9 +524,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     def state(self) -> Arrays:
         """Give all that the agent remembers, as arrays by name; with `description` all of it."""
         arrays: Arrays = {}
-        for number, part in enumerate(self._parts):
-            prefix = _CORE if len(self._parts) == 1 else f"{_CORE}{number}."
-            arrays |= {prefix + name: array for name, array in part.state().items()}
+        if self._compiled is not None:
+            arrays |= {_CORE + name: array for name, array in self._compiled.state().items()}
         if self._warm_up is not None:
             arrays |= {_WARM_UP + name: array for name, array in self._warm_up.state().items()}
             arrays |= {_RATE + name: np.array(value) for name, value in self._rates.items()}
@@ -569,7 +567,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             least_inputs=cls.least_inputs,
         )
         agent._actions = agent._make_actions(agent.action_space)
-        agent._parts, agent._warm_up, agent._progress, agent._rates = [], None, 0.0, {}
+        agent._compiled, agent._warm_up, agent._progress, agent._rates = None, None, 0.0, {}
         if description["observation"] is None:
             agent._warm_up = agent._new_warm_up()
             agent._warm_up.restore(part(_WARM_UP), agent._actions.check)
@@ -579,9 +577,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         else:
             agent._observations.settled_as(description["observation"])
             agent._check_state(part(_CORE))
-            agent._parts = agent._make_parts()
-            for number, core in enumerate(agent._parts):
-                core.restore(part(_CORE if len(agent._parts) == 1 else f"{_CORE}{number}."))
+            agent._compiled = agent._make()
+            agent._compiled.restore(part(_CORE))
             agent._remember_actions()
         agent.progress = float(description["progress"])
         return agent

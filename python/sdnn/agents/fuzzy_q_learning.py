@@ -144,26 +144,34 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     def _make_actions(self, space: gym.Space[Any]) -> Actions:
         return ContinuousActions(space)
 
-    def _make_parts(self) -> list[Any]:
+    def _make(self) -> Any:
         self.approximator = dataclasses.replace(
             self.approximator, n_inputs=self._observations.n_inputs
         )
         approximator, learning = self._core_approximator(), self.learning.to_core()
-        return [
-            _core.FuzzyQLearning(
-                approximator=approximator,
-                learning=learning,
-                seed=_core.seed_of_dimension(self.seed, dimension),
+        if self._is_scalar:
+            return _core.FuzzyQLearning(
+                approximator=approximator, learning=learning, seed=self.seed
             )
-            for dimension in range(self._actions.n_dimensions)
-        ]
+        return _core.VectorFuzzyQLearning(
+            approximator=approximator,
+            n_dimensions=self._actions.n_dimensions,
+            learning=learning,
+            seed=self.seed,
+        )
+
+    @property
+    def _is_scalar(self) -> bool:
+        return self._actions.n_dimensions == 1
 
     def _remember_actions(self) -> None:
         for environment in range(self.n_environments):
-            self._actions.take([part.last_action(environment) for part in self._parts], environment)
+            last = self._compiled.last_action(environment)
+            self._actions.take([last] if self._is_scalar else last, environment)
 
     def _act(self, state: NDArray[np.float64], explore: bool, environment: int) -> list[Any]:
-        return [part.act(state, explore, environment) for part in self._parts]
+        chosen: Any = self._compiled.act(state, explore, environment)
+        return [chosen] if self._is_scalar else chosen
 
     def _learn(
         self,
@@ -174,15 +182,15 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
         terminated: bool,
         environment: int,
     ) -> None:
-        for part, number in zip(self._parts, numbers, strict=True):
-            try:
-                part.learn(state, number, reward, following, terminated, environment)
-            except ValueError as error:
-                if "exploring act" not in str(error):
-                    raise
-                raise ValueError(
-                    f"observation and action must be those of the last exploring act: {error}"
-                ) from error
+        action = numbers[0] if self._is_scalar else numbers
+        try:
+            self._compiled.learn(state, action, reward, following, terminated, environment)
+        except ValueError as error:
+            if "exploring act" not in str(error):
+                raise
+            raise ValueError(
+                f"observation and action must be those of the last exploring act: {error}"
+            ) from error
 
     def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         sizes = self.approximator
@@ -202,7 +210,8 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
         RuntimeError
             While the agent is warming up.
         """
-        return self._born()[0]
+        compiled = self._born()
+        return compiled if self._is_scalar else compiled.part(0)
 
     @property
     def n_rules(self) -> int:
@@ -216,8 +225,7 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
         The mean over the dimensions, where there are several.
         """
         state = self._state("observation", observation)
-        values = [part.value(state) for part in self._parts]
-        return float(values[0]) if len(values) == 1 else float(np.mean(values))
+        return float(self._compiled.value(state))
 
     def rule_values(self, rule: int) -> NDArray[np.float32]:
         """v(rule, a) of every discrete action, shape (n_actions,); of the first dimension."""

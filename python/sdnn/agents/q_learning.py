@@ -45,7 +45,7 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
     def _n_actions_of_a_box(self) -> int:
         return self.approximator.n_actions
 
-    def _make_parts(self) -> list[Any]:
+    def _make(self) -> Any:
         n_actions = self._actions.n_actions
         sizes: dict[str, Any] = {"n_inputs": self._observations.n_inputs}
         if len(n_actions) == 1 and not self._actions.is_box:
@@ -54,14 +54,14 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
         core = self._make_core()
         for name, value in self._rates.items():
             getattr(core, f"set_{name}")(value)
-        return [core]
+        return core
 
     @abc.abstractmethod
     def _make_core(self) -> CoreAgent | CoreVectorAgent:
         """Make the compiled agent; the approximator's sizes are known."""
 
     def _act(self, state: NDArray[np.float64], explore: bool, environment: int) -> list[Any]:
-        chosen = self._parts[0].act(state, explore, environment)
+        chosen = self._compiled.act(state, explore, environment)
         return chosen if self._actions.n_dimensions > 1 else [chosen]
 
     def _learn(
@@ -74,7 +74,7 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
         environment: int,
     ) -> None:
         action = numbers if self._actions.n_dimensions > 1 else numbers[0]
-        self._parts[0].learn(state, action, reward, following, terminated, environment)
+        self._compiled.learn(state, action, reward, following, terminated, environment)
 
     @property
     def learning_rate(self) -> float:
@@ -108,14 +108,14 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
         self._set_rate("epsilon", epsilon)
 
     def _rate(self, name: str) -> float:
-        if self._parts:
-            return float(getattr(self._parts[0], name))
+        if self._compiled is not None:
+            return float(getattr(self._compiled, name))
         at_progress: float = getattr(self.learning.to_core(), f"{name}_at")(self.progress)
         return self._rates.get(name, at_progress)
 
     def _set_rate(self, name: str, value: float | None) -> None:
-        if self._parts:
-            getattr(self._parts[0], f"set_{name}")(value)
+        if self._compiled is not None:
+            getattr(self._compiled, f"set_{name}")(value)
         elif value is None:
             self._rates.pop(name, None)
         else:
@@ -133,7 +133,7 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
         RuntimeError
             While the agent is warming up.
         """
-        return self._born()[0]
+        return self._born()
 
     @property
     def n_dimensions(self) -> int:

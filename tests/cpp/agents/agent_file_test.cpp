@@ -65,6 +65,13 @@ FuzzyQLearning fuzzy_agent() {
   return {FuzzyRules({.n_inputs = 2, .n_sets = 4, .n_actions = 5}), {.trace_decay = 0.8}, kSeed};
 }
 
+VectorFuzzyQLearning vector_fuzzy_agent() {
+  const FuzzyRules rules({.n_inputs = 2, .n_sets = 4, .n_actions = 5});
+  const FuzzyQLearningConfig config{.trace_decay = 0.8};
+  return VectorFuzzyQLearning(
+      {{rules, config, kSeed}, {rules, config, approximators::seed_of_dimension(kSeed, 1)}});
+}
+
 /// Lives, is written in the middle, and goes on as the one that is read does.
 template <class Agent>
 void expect_that_a_file_goes_on(Agent agent, const char* name) {
@@ -96,6 +103,7 @@ TEST(AgentFile, TheAgentThatIsReadGoesOnAsTheOneThatWasWritten) {
   expect_that_a_file_goes_on(small_rbf(), "RBFQLearning");
   expect_that_a_file_goes_on(small_rbf_vector(), "RBFQLearning");
   expect_that_a_file_goes_on(fuzzy_agent(), "FuzzyQLearning");
+  expect_that_a_file_goes_on(vector_fuzzy_agent(), "FuzzyQLearning");
 }
 
 TEST(AgentFile, SettingsHaveTheNamesAndWordsOfTheConfigurations) {
@@ -195,6 +203,12 @@ TEST(AgentFile, SaysWhatDoesNotFit) {
   file.settings["approximator"]["n_inputs"] = 40;
   file.settings["approximator"]["max_table_bytes"] = kSeed;
   EXPECT_EQ(error_of(file), "state: rules.values must be as large as the approximator's");
+  file = agent_file_of(vector_fuzzy_agent(), 1);
+  file.settings["approximator"]["n_sets"] = 5;
+  EXPECT_EQ(error_of(file), "state: 0.rules.values must be as large as the approximator's");
+  file = agent_file_of(vector_fuzzy_agent(), 1);
+  file.tensors.erase("agent.1.rules.values");  // the rest of that dimension is still there
+  EXPECT_EQ(error_of(file).substr(0, 9), "state: 1.");
   file = agent_file_of(small_rbf(), 1);
   file.settings["n_actions"] = {8};
   EXPECT_EQ(error_of(file), "n_actions must be [7], as the approximator's, got [8]");

@@ -111,10 +111,13 @@ TEST(ActionScale, OfABoxCutsItsRangesEvenly) {
 }
 
 TEST(ActionScale, OfANumberIsThePlaceInTheRange) {
-  const ActionScale scale({{"kind", "box"}, {"low", {-2.0}}, {"high", {6.0}}, {"shape", {1}}}, {});
-  EXPECT_EQ(scale.of_normalized(-1.0), -2.0);
-  EXPECT_EQ(scale.of_normalized(-0.5), 0.0);
-  EXPECT_EQ(scale.of_normalized(1.0), 6.0);
+  const ActionScale scale(
+      {{"kind", "box"}, {"low", {-2.0, 0.0}}, {"high", {6.0, 1.0}}, {"shape", {2}}}, {0, 0});
+  EXPECT_EQ(scale.n_dimensions(), 2U);
+  EXPECT_EQ(scale.of_normalized(-1.0, 0), -2.0);
+  EXPECT_EQ(scale.of_normalized(-0.5, 0), 0.0);
+  EXPECT_EQ(scale.of_normalized(1.0, 0), 6.0);
+  EXPECT_EQ(scale.of_normalized(-0.5, 1), 0.25);
 }
 
 TEST(ActionScale, DiscreteIsStartAndIndex) {
@@ -141,7 +144,7 @@ TEST(ActionScale, NamesWhatDoesNotFit) {
   EXPECT_EQ(error_of(box, {3, 3}), "action.low must be 2 numbers, got 1");
   EXPECT_EQ(error_of({{"kind", "text"}}, {3}),
             "action.kind must be \"box\" or \"discrete\", got \"text\"");
-  EXPECT_EQ(error_of({{"kind", "discrete"}, {"start", {0}}}, {}),
+  EXPECT_EQ(error_of({{"kind", "discrete"}, {"start", {0}}}, {0}),
             "action.kind must be \"box\" or \"discrete\", got \"discrete\"");
   EXPECT_EQ(error_of({{"kind", "box"}, {"low", {2.0}}, {"high", {1.0}}}, {3}),
             "action.high must be at least action.low, got 1");
@@ -175,6 +178,11 @@ QLearning<approximators::SDNNC> sdnn() {
       3};
 }
 FuzzyQLearning fuzzy() { return {FuzzyRules({.n_inputs = 3}), {.trace_decay = 0.5}, 3}; }
+
+VectorFuzzyQLearning fuzzy_vectors() {
+  const FuzzyRules rules({.n_inputs = 3, .n_sets = 4});
+  return VectorFuzzyQLearning({{rules, {.trace_decay = 0.5}, 3}, {rules, {.trace_decay = 0.5}, 4}});
+}
 
 /// A step of a task: what is observed wanders.
 void step(Controller& controller, core::Random& random, Numbers& observed, bool is_cut,
@@ -213,6 +221,7 @@ TEST(Controller, GoesOnAfterItWasSavedAnywhere) {
   expect_that_it_goes_on(vectors());
   expect_that_it_goes_on(sdnn());
   expect_that_it_goes_on(fuzzy());
+  expect_that_it_goes_on(fuzzy_vectors());
 }
 
 TEST(Controller, DoesWhatItsAgentDoes) {
@@ -291,6 +300,7 @@ TEST(Controller, ABadArgumentChangesNothing) {
   check(plain());
   check(vectors());
   check(fuzzy());
+  check(fuzzy_vectors());
 }
 
 core::State agent_part(const AgentFile& file) {
@@ -305,7 +315,8 @@ core::State agent_part(const AgentFile& file) {
 // they did next, and what they had learned then.
 TEST(Controller, LivesAsInPython) {
   const testing::Folder folder;
-  for (const std::string name : {"sdnn", "sdnn-vector", "sdnn-discrete", "rbf", "fuzzy"}) {
+  for (const std::string name :
+       {"sdnn", "sdnn-vector", "sdnn-discrete", "rbf", "fuzzy", "fuzzy-vector"}) {
     SCOPED_TRACE(name);
     const std::filesystem::path data(SDNN_TEST_DATA "/agents");
     std::ifstream file(data / (name + ".json"));

@@ -56,16 +56,19 @@ def agents():
         "sdnn-discrete": SDNNQLearning,
         "rbf": RBFQLearning,
         "fuzzy": FuzzyQLearning,
+        "fuzzy-vector": FuzzyQLearning,
     }
+    two = gym.spaces.Box(np.array([0.0, -1.0]), np.array([1.0, 1.0]), dtype=np.float64)
     spaces = {
-        "sdnn-vector": gym.spaces.Box(
-            np.array([0.0, -1.0]), np.array([1.0, 1.0]), dtype=np.float64
-        ),
+        "sdnn-vector": two,
+        "fuzzy-vector": two,
         "sdnn-discrete": gym.spaces.Discrete(3, start=4),
     }
+    rules = {"approximator": FuzzyRulesConfig(n_sets=3, n_actions=4), "learning": fuzzy}
     settings = {
         "rbf": {"approximator": RBFNetworkConfig(n_bases=3, n_actions=7), "learning": LEARNING},
-        "fuzzy": {"approximator": FuzzyRulesConfig(n_sets=3, n_actions=4), "learning": fuzzy},
+        "fuzzy": rules,
+        "fuzzy-vector": rules,
     }
     for name, kind in made.items():
         yield (

@@ -23,6 +23,7 @@
 
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
+#include "sdnn/agents/vector_fuzzy_q_learning.hpp"
 #include "sdnn/approximators/decoupled.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
@@ -43,11 +44,16 @@ struct AgentFile {
 };
 
 /// Any agent that a file may hold.
-using AnyAgent =
-    std::variant<QLearning<approximators::SDNNC>,
-                 QLearning<approximators::Decoupled<approximators::SDNNC>>,
-                 QLearning<approximators::RBFNetwork>,
-                 QLearning<approximators::Decoupled<approximators::RBFNetwork>>, FuzzyQLearning>;
+using AnyAgent = std::variant<QLearning<approximators::SDNNC>,
+                              QLearning<approximators::Decoupled<approximators::SDNNC>>,
+                              QLearning<approximators::RBFNetwork>,
+                              QLearning<approximators::Decoupled<approximators::RBFNetwork>>,
+                              FuzzyQLearning, VectorFuzzyQLearning>;
+
+/// Whether it is one of the two that learn by fuzzy rules.
+template <class Agent>
+inline constexpr bool kIsFuzzy =
+    std::is_same_v<Agent, FuzzyQLearning> || std::is_same_v<Agent, VectorFuzzyQLearning>;
 
 /// The format that is written, and the only one that is read.
 inline constexpr std::string_view kAgentFormat = "sdnn-agent-1";
@@ -154,7 +160,7 @@ inline const nlohmann::json& member(const nlohmann::json& object, const char* ke
 template <class Agent>
 constexpr const char* class_of() noexcept {
   using approximators::Decoupled;
-  if constexpr (std::is_same_v<Agent, FuzzyQLearning>) {
+  if constexpr (kIsFuzzy<Agent>) {
     return "FuzzyQLearning";
   } else if constexpr (std::is_same_v<Agent, QLearning<approximators::RBFNetwork>> ||
                        std::is_same_v<Agent, QLearning<Decoupled<approximators::RBFNetwork>>>) {
@@ -214,6 +220,9 @@ AgentFile agent_file_of(const Agent& agent, std::uint64_t seed) {
   if constexpr (std::is_same_v<Agent, FuzzyQLearning>) {
     file.settings["approximator"] = config_to_json(agent.rules().config());
     n_actions.push_back(agent.rules().n_actions());
+  } else if constexpr (std::is_same_v<Agent, VectorFuzzyQLearning>) {
+    file.settings["approximator"] = config_to_json(agent.part(0).rules().config());
+    n_actions.assign(agent.n_dimensions(), agent.part(0).rules().n_actions());
   } else {
     if constexpr (Agent::kDecoupled) {
       file.settings["approximator"] = config_to_json(agent.action_value().part(0).config());
@@ -280,12 +289,12 @@ class AgentMaker {
     if (name != "FuzzyQLearning") {
       refuse("class", "SDNNQLearning, RBFQLearning or FuzzyQLearning", name);
     }
-    const auto config = config_from_json<FuzzyRulesConfig>(approximator(), "approximator");
-    expect_size("rules.values",
-                power(config.n_sets, config.n_inputs) * static_cast<double>(config.n_actions));
-    FuzzyQLearning agent(FuzzyRules(config), learning<FuzzyQLearningConfig>(), seed_);
-    core::restore(agent, state_);
-    return agent;
+    if (!state_.contains("0.rules.values")) return restored(fuzzy_agent("", 0));
+    std::vector<FuzzyQLearning> parts;
+    for (std::size_t d = 0; state_.contains(std::to_string(d) + ".rules.values"); ++d) {
+      parts.push_back(fuzzy_agent(std::to_string(d) + ".", d));
+    }
+    return restored(VectorFuzzyQLearning(std::move(parts)));
   }
 
  private:
@@ -293,6 +302,22 @@ class AgentMaker {
   template <class Config>
   Config learning() const {
     return config_from_json<Config>(member(settings_, "learning", "sdnn"), "learning");
+  }
+
+  template <class Agent>
+  Agent restored(Agent agent) const {
+    core::restore(agent, state_);
+    return agent;
+  }
+
+  /// Of a dimension; its tensors' names begin with `prefix`.
+  FuzzyQLearning fuzzy_agent(const std::string& prefix, std::size_t d) const {
+    using approximators::FuzzyRulesConfig;
+    const auto config = config_from_json<FuzzyRulesConfig>(approximator(), "approximator");
+    expect_size(prefix + "rules.values",
+                power(config.n_sets, config.n_inputs) * static_cast<double>(config.n_actions));
+    return {approximators::FuzzyRules(config), learning<FuzzyQLearningConfig>(),
+            approximators::seed_of_dimension(seed_, d)};
   }
 
   /// The agent has one network, or one for each of its dimensions where the state says so.

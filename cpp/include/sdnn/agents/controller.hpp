@@ -123,7 +123,7 @@ class ObservationScale {
 /// where it is start and the index.
 class ActionScale {
  public:
-  /// For an agent with so many actions in each dimension; none: one number in [-1, 1]. Throws
+  /// For an agent with so many actions in each dimension; 0: any number in [-1, 1]. Throws
   /// std::invalid_argument naming the member that does not fit.
   ActionScale(const nlohmann::json& action, std::vector<std::size_t> n_actions)
       : n_actions_(std::move(n_actions)) {
@@ -139,7 +139,7 @@ class ActionScale {
       }
       return values;
     };
-    if (kind == "discrete" && !n_actions_.empty()) {
+    if (kind == "discrete" && std::ranges::find(n_actions_, 0U) == n_actions_.end()) {
       is_discrete_ = true;
       low_ = numbers("start");
       return;
@@ -154,18 +154,18 @@ class ActionScale {
     }
   }
 
-  std::size_t n_dimensions() const noexcept { return std::max<std::size_t>(n_actions_.size(), 1); }
+  std::size_t n_dimensions() const noexcept { return n_actions_.size(); }
 
   /// Of action number `index` in dimension d.
   double of_index(std::size_t index, std::size_t d) const noexcept {
     if (is_discrete_) return low_[d] + static_cast<double>(index);
     return coding::action_value(index, n_actions_[d], low_[d], high_[d]);
   }
-  /// Of an action in [-1, 1].
-  double of_normalized(double action) const noexcept {
-    const double middle = 0.5 * (low_[0] + high_[0]);
-    const double half = 0.5 * (high_[0] - low_[0]);
-    return std::clamp(middle + half * action, low_[0], high_[0]);
+  /// Of a number in [-1, 1] in dimension d.
+  double of_normalized(double action, std::size_t d) const noexcept {
+    const double middle = 0.5 * (low_[d] + high_[d]);
+    const double half = 0.5 * (high_[d] - low_[d]);
+    return std::clamp(middle + half * action, low_[d], high_[d]);
   }
   /// The number of an action. Throws std::invalid_argument if there is none like it.
   std::size_t index_of(double action, std::size_t d) const {
@@ -244,7 +244,11 @@ class Controller {
         [&](auto& agent) {
           const auto action = agent.act(state_, explore, environment);
           if constexpr (std::is_same_v<decltype(action), const double>) {
-            action_[0] = parts_.action.of_normalized(action);
+            action_[0] = parts_.action.of_normalized(action, 0);
+          } else if constexpr (std::is_same_v<decltype(action), const std::vector<double>>) {
+            for (std::size_t d = 0; d < action_.size(); ++d) {
+              action_[d] = parts_.action.of_normalized(action[d], d);
+            }
           } else if constexpr (std::is_same_v<decltype(action), const std::size_t>) {
             action_[0] = parts_.action.of_index(action, 0);
           } else {
@@ -271,10 +275,13 @@ class Controller {
     std::visit(
         [&](auto& agent) {
           using Agent = std::remove_cvref_t<decltype(agent)>;
-          if constexpr (std::is_same_v<Agent, FuzzyQLearning>) {
-            const double last = agent.last_action(environment);
-            core::require(action[0] == parts_.action.of_normalized(last), "action",
-                          "that of the last exploring act", action[0]);
+          if constexpr (kIsFuzzy<Agent>) {
+            const auto last = agent.last_action(environment);
+            for (std::size_t d = 0; d < action.size(); ++d) {
+              core::require(action[d] == parts_.action.of_normalized(number(last, d), d),
+                            "action[" + std::to_string(d) + "]", "that of the last exploring act",
+                            action[d]);
+            }
             agent.learn(state_, last, reward, next_state_, terminated, environment);
           } else if constexpr (Agent::kDecoupled) {
             for (std::size_t d = 0; d < action.size(); ++d) {
@@ -314,6 +321,11 @@ class Controller {
     });
   }
 
+  static double number(double action, std::size_t) noexcept { return action; }
+  static double number(const std::vector<double>& action, std::size_t d) noexcept {
+    return action[d];
+  }
+
   static Parts parts_of(const AgentFile& file, const std::string& name) {
     try {
       AnyAgent agent = make_agent(file);
@@ -324,7 +336,12 @@ class Controller {
             core::require(observation.n_inputs() == known.n_inputs(), "observation.inputs",
                           std::to_string(known.n_inputs()) + ", as the agent's",
                           observation.n_inputs());
-            if constexpr (!std::is_same_v<decltype(known), const FuzzyQLearning&>) {
+            using Agent = std::remove_cvref_t<decltype(known)>;
+            if constexpr (std::is_same_v<Agent, FuzzyQLearning>) {
+              n_actions.assign(1, 0);
+            } else if constexpr (std::is_same_v<Agent, VectorFuzzyQLearning>) {
+              n_actions.assign(known.n_dimensions(), 0);
+            } else {
               for (std::size_t d = 0; d < known.n_dimensions(); ++d) {
                 n_actions.push_back(known.n_actions(d));
               }
