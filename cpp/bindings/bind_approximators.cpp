@@ -29,23 +29,47 @@ py::array_t<std::uint32_t> permutation(const SDNNC& network, std::size_t mu, std
   return py::array_t<std::uint32_t>(static_cast<py::ssize_t>(units.size()), units.data());
 }
 
-py::array_t<std::int32_t> weights(const SDNNC& network) {
+/// weight(i, j) of all units and inputs: (n, D).
+template <class Weight>
+py::array_t<std::int32_t> matrix(const SDNNC& network, const Weight& weight) {
   const std::size_t n_units = network.hidden_layer().n_units();
   const std::size_t n_columns = network.state_code().n_columns();
   py::array_t<std::int32_t> out({n_units, n_columns});
-  std::int32_t* weight = out.mutable_data();
+  std::int32_t* to = out.mutable_data();
   for (std::size_t i = 0; i < n_units; ++i) {
-    for (std::size_t j = 0; j < n_columns; ++j) *weight++ = network.weight(i, j);
+    for (std::size_t j = 0; j < n_columns; ++j) *to++ = weight(i, j);
   }
   return out;
 }
 
-py::array_t<std::int32_t> thresholds(const SDNNC& network) {
-  const auto& hidden_layer = network.hidden_layer();
-  py::array_t<std::int32_t> out(static_cast<py::ssize_t>(hidden_layer.n_units()));
-  std::int32_t* threshold = out.mutable_data();
-  for (std::size_t i = 0; i < hidden_layer.n_units(); ++i) *threshold++ = hidden_layer.threshold(i);
+/// threshold(i) of all units: (n,).
+template <class Threshold>
+py::array_t<std::int32_t> vector_of_units(const SDNNC& network, const Threshold& threshold) {
+  const std::size_t n_units = network.hidden_layer().n_units();
+  py::array_t<std::int32_t> out(static_cast<py::ssize_t>(n_units));
+  std::int32_t* to = out.mutable_data();
+  for (std::size_t i = 0; i < n_units; ++i) *to++ = threshold(i);
   return out;
+}
+
+py::array_t<std::int32_t> weights(const SDNNC& network) {
+  return matrix(network, [&](std::size_t i, std::size_t j) { return network.weight(i, j); });
+}
+
+py::array_t<std::int32_t> thresholds(const SDNNC& network) {
+  return vector_of_units(network,
+                         [&](std::size_t i) { return network.hidden_layer().threshold(i); });
+}
+
+py::array_t<std::int32_t> averaged_weights(const SDNNC& network) {
+  if (!network.has_average()) return weights(network);
+  return matrix(network,
+                [&](std::size_t i, std::size_t j) { return network.averaged_weight(i, j); });
+}
+
+py::array_t<std::int32_t> averaged_thresholds(const SDNNC& network) {
+  if (!network.has_average()) return thresholds(network);
+  return vector_of_units(network, [&](std::size_t i) { return network.averaged_threshold(i); });
 }
 
 py::array_t<std::uint32_t> first_units(const SDNNC& network) {
@@ -191,6 +215,17 @@ void bind_approximators(py::module_& module) {
       .def("permutation", &permutation, py::arg("mu"), py::arg("nu"), "sigma_mu_nu: (m,)")
       .def("weights", &weights, "A copy, in lattice steps: (n, D)")
       .def("thresholds", &thresholds, "A copy, in lattice steps: (n,)")
+      .def(
+          "averaged_values",
+          [](SDNNC& net, const ArrayArgument<double>& state) {
+            py::array_t<double> out(static_cast<py::ssize_t>(net.n_actions()));
+            net.averaged_values(bindings::vector(state, "state"),
+                                {out.mutable_data(), net.n_actions()});
+            return out;
+          },
+          py::arg("state"), "As values, by the average of the weights: (l,) -> (n_actions,)")
+      .def("averaged_weights", &averaged_weights, "Their average, or the weights: (n, D)")
+      .def("averaged_thresholds", &averaged_thresholds, "Their average, or the thresholds: (n,)")
       .def("first_units", &first_units, "Where the window of every action begins: (n_actions,)")
       .def("output_values", &output_values, "g(u) of u = 0 .. n' active units: (n' + 1,)")
       .def_property_readonly(

@@ -65,9 +65,12 @@ class SDNNCConfig:
     __hash__: typing.ClassVar[None] = None
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_pattern_units: typing.SupportsInt | typing.SupportsIndex = 200, n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex = 9, n_interpolated: typing.SupportsInt | typing.SupportsIndex = 44, balanced_anchors: bool = True, circular: collections.abc.Sequence[bool] = [], n_hidden_units: typing.SupportsInt | typing.SupportsIndex = 900, n_active_units: typing.SupportsInt | typing.SupportsIndex = 300, n_actions: typing.SupportsInt | typing.SupportsIndex = 0, q_low: typing.SupportsFloat | typing.SupportsIndex = -20.0, q_high: typing.SupportsFloat | typing.SupportsIndex = 20.0, u_low: typing.SupportsInt | typing.SupportsIndex | None = None, u_high: typing.SupportsInt | typing.SupportsIndex | None = None, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.1, lattice: typing.SupportsInt | typing.SupportsIndex = 1, initial_threshold: typing.SupportsFloat | typing.SupportsIndex = 200.0, initial_weights: InitialWeights = InitialWeights.ternary, initial_weight_limit: typing.SupportsFloat | typing.SupportsIndex = 0.1, rounding: Rounding = Rounding.half_up, max_table_bytes: typing.SupportsInt | typing.SupportsIndex = 1073741824) -> None:
+    def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_pattern_units: typing.SupportsInt | typing.SupportsIndex = 200, n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex = 9, n_interpolated: typing.SupportsInt | typing.SupportsIndex = 44, balanced_anchors: bool = True, circular: collections.abc.Sequence[bool] = [], n_hidden_units: typing.SupportsInt | typing.SupportsIndex = 900, n_active_units: typing.SupportsInt | typing.SupportsIndex = 300, n_actions: typing.SupportsInt | typing.SupportsIndex = 0, q_low: typing.SupportsFloat | typing.SupportsIndex = -20.0, q_high: typing.SupportsFloat | typing.SupportsIndex = 20.0, u_low: typing.SupportsInt | typing.SupportsIndex | None = None, u_high: typing.SupportsInt | typing.SupportsIndex | None = None, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.1, lattice: typing.SupportsInt | typing.SupportsIndex = 1, initial_threshold: typing.SupportsFloat | typing.SupportsIndex = 200.0, initial_weights: InitialWeights = InitialWeights.ternary, initial_weight_limit: typing.SupportsFloat | typing.SupportsIndex = 0.1, rounding: Rounding = Rounding.half_up, averaging_interval: typing.SupportsInt | typing.SupportsIndex = 0, max_table_bytes: typing.SupportsInt | typing.SupportsIndex = 1073741824) -> None:
         ...
     def __repr__(self) -> str:
+        ...
+    @property
+    def averaging_interval(self) -> int:
         ...
     @property
     def balanced_anchors(self) -> bool:
@@ -140,6 +143,18 @@ class SDNNC:
     def __init__(self, config: SDNNCConfig, seed: typing.SupportsInt | typing.SupportsIndex, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]]) -> None:
         """
         With the patterns of each input: (n_bins, m) of -1, +1
+        """
+    def averaged_thresholds(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        Their average, or the thresholds: (n,)
+        """
+    def averaged_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        As values, by the average of the weights: (l,) -> (n_actions,)
+        """
+    def averaged_weights(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        Their average, or the weights: (n, D)
         """
     def correct(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         """

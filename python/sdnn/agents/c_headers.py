@@ -285,9 +285,12 @@ class _Writer:
         networks, n_units, n_words = [], [], 0
         for d, network in enumerate(self.networks):
             used, first_units = _used_units(network, self.sizes.n_active_units)
-            weights, n_bits, lowest = _planes(network.weights()[used])
+            weights, n_bits, lowest = _planes(network.averaged_weights()[used])
             units = zip(
-                network.thresholds()[used].tolist(), lowest.tolist(), n_bits.tolist(), strict=True
+                network.averaged_thresholds()[used].tolist(),
+                lowest.tolist(),
+                n_bits.tolist(),
+                strict=True,
             )
             self._add_wiring(tables, d, network)
             tables.add("uint32_t", f"{self.name}_weights_{d}", weights)

@@ -32,10 +32,10 @@ class Preset:
 
 
 # A full step each time, then ever smaller ones, which rounding stills one by one; targets of five
-# steps; exploration that goes somewhere: docs/agents.md.
+# steps; exploration that goes somewhere; an average that does not swing: docs/agents.md.
 _GENERAL = Preset(
     title="as recommended for any task",
-    approximator=SDNNCConfig(n_actions=5),
+    approximator=SDNNCConfig(n_actions=5, averaging_interval=100),
     learning=QLearningConfig(
         learning_rate=1.0,
         final_learning_rate=0.1,

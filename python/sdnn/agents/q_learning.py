@@ -161,6 +161,8 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
     def q_values(self, observation: ArrayLike, dimension: int = 0) -> NDArray[np.float64]:
         """Q(observation, a) of every action of a dimension, shape (n_actions[dimension],).
 
+        By the values that greedy actions follow: those of the averaged weights, where there are.
+
         Raises
         ------
         RuntimeError
@@ -169,7 +171,11 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
             If the observation is not usable, or there is no such dimension.
         """
         state = self._state("observation", observation)
-        values: NDArray[np.float64] = self._network(self._dimension(dimension)).values(state)
+        return self._values(self._network(self._dimension(dimension)), state)
+
+    def _values(self, network: Any, state: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Ask an approximator for the values that greedy actions follow."""
+        values: NDArray[np.float64] = network.values(state)
         return values
 
     def _dimension(self, dimension: int) -> int:
@@ -306,12 +312,18 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         )
         return core
 
+    def _values(self, network: Any, state: NDArray[np.float64]) -> NDArray[np.float64]:
+        values: NDArray[np.float64] = network.averaged_values(state)
+        return values
+
     def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         sizes = self.approximator
         n_groups = self._observations.n_inputs * (self._observations.n_inputs - 1)
         shape = (sizes.n_hidden_units, n_groups * sizes.n_pattern_units)
         for prefix in self._prefixes():
             check_shape(state, prefix + "weights", shape)
+            if sizes.averaging_interval > 0:
+                check_shape(state, prefix + "average.weights", shape)
 
     def learning_report(self) -> dict[str, Any]:
         """Say what became of the corrections so far, to find settings that cannot work.

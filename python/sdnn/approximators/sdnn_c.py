@@ -64,6 +64,12 @@ class SDNNCConfig:
         Of the number of units that are to fire: to the nearest; up or down at random in proportion,
         so that no small change is lost on average; or in the direction of the change by at least
         one unit. A reading.
+    averaging_interval : int
+        With more than 0 the network keeps an average of its weights, by which greedy actions are
+        chosen; learning goes on with the weights themselves. Snapshots for it are taken after so
+        many corrections, 100 say, or after every 64th part of all, whichever is more; what was
+        learned last counts most. The weights take three times the memory. Not in the paper, which
+        has 0.
     max_table_bytes : int
         A larger network (weights, patterns, remembered potentials) is refused before memory is
         asked for; 1 GiB by default. For all action dimensions together, where an agent has several.
@@ -88,6 +94,7 @@ class SDNNCConfig:
     initial_weights: Literal["ternary", "uniform"] = "ternary"
     initial_weight_limit: float = 0.1
     rounding: Literal["half_up", "random", "away"] = added_later("half_up")
+    averaging_interval: int = added_later(0)
     max_table_bytes: int = added_later(2**30)
 
     def to_core(self) -> _core.SDNNCConfig:

@@ -408,6 +408,7 @@ QLearningConfig everything() {
 QLearning<SDNNC> sdnn_agent() {
   approximators::SDNNCConfig config = network();
   config.rounding = approximators::Rounding::random;
+  config.averaging_interval = 9;
   return {SDNNC(config, 3), everything(), 3};
 }
 
@@ -423,6 +424,30 @@ QLearning<Decoupled<SDNNC>> vector_agent() {
   config.n_actions = 5;
   parts.emplace_back(config, approximators::seed_of_dimension(3, 1));
   return {Decoupled<SDNNC>(std::move(parts)), everything(), 3};
+}
+
+TEST(QLearning, GreedyActionsFollowTheAverageWhereThereIsOne) {
+  approximators::SDNNCConfig config = network();
+  config.averaging_interval = 5;
+  QLearning<Decoupled<SDNNC>> averaging(
+      Decoupled<SDNNC>({SDNNC(config, 3), SDNNC(config, 4)}),
+      {.learning_rate = 1.0, .policy = {.tie_rule = TieRule::lowest}}, 3);
+  core::Random random(1, core::Stream::weights);
+  std::vector<double> state = {0.2, 0.8}, values(7);
+  int n_other = 0;
+  for (int t = 0; t < 300; ++t) {
+    for (double& x : state) x = random.uniform();
+    const double reward = 16.0 * random.uniform() - 8.0;
+    averaging.learn(state, {random.below(7), random.below(7)}, reward, state, true);
+    const auto greedy = averaging.act(state, false);
+    const auto own = averaging.act(state);
+    for (std::size_t d = 0; d < 2; ++d) {
+      averaging.action_value().part(d).averaged_values(state, values);
+      ASSERT_EQ(greedy[d], std::ranges::max_element(values) - values.begin());
+      n_other += greedy[d] != own[d];
+    }
+  }
+  EXPECT_GT(n_other, 0);
 }
 
 TEST(QLearning, ALifeCanBeCutAnywhere) {

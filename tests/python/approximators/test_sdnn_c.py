@@ -321,6 +321,7 @@ def test_every_field_reaches_the_core():
         initial_weights="uniform",
         initial_weight_limit=0.75,
         rounding="random",
+        averaging_interval=100,
         max_table_bytes=2**29,
     )
     core = other.to_core()
@@ -471,3 +472,35 @@ def test_patterns_of_any_coding_can_be_given():
 def test_patterns_that_do_not_fit_are_refused(tables, message):
     with pytest.raises(ValueError, match=message):
         SDNNC(SDNNCConfig(n_inputs=2, n_pattern_units=40), tables=tables)
+
+
+def test_the_average_agrees_with_its_formula():
+    config = SDNNCConfig(
+        n_inputs=3,
+        n_pattern_units=12,
+        n_hidden_units=90,
+        n_active_units=30,
+        averaging_interval=5,
+    ).to_core()
+    network, other = _core.SDNNC(config, 3), _core.SDNNC(config, 3)
+    rng = np.random.default_rng(1)
+    weights, thresholds, due, n_snapshots = 0.0, 0.0, 5, 0
+    for n in range(1, 1501):
+        target = float(rng.uniform(-20, 20))
+        network.correct(rng.random(3), int(rng.integers(network.n_actions)), target)
+        if n < due:
+            continue
+        passed = max(5, n // 64)
+        share = 1.0 if n_snapshots == 0 else 2.0 ** -max(int(np.log2(n // passed)) - 1, 0)
+        weights = weights + share * (network.weights() - weights)
+        thresholds = thresholds + share * (network.thresholds() - thresholds)
+        due, n_snapshots = n + passed, n_snapshots + 1
+        if n_snapshots % 25:
+            continue
+        # Each is rounded once; in between are some thousandths of a step.
+        np.testing.assert_allclose(network.averaged_weights(), weights, atol=0.51)
+        np.testing.assert_allclose(network.averaged_thresholds(), thresholds, atol=0.51)
+        other.set_parameters(network.averaged_weights(), network.averaged_thresholds())
+        state = rng.random(3)
+        np.testing.assert_array_equal(network.averaged_values(state), other.values(state))
+    assert n_snapshots > 100

@@ -94,6 +94,10 @@ GOOD = {
         "approximator": core.FuzzyRulesConfig(), "learning": learning(core.FuzzyQLearningConfig),
         "seed": 1,
     },
+    "VectorFuzzyQLearning": lambda: {
+        "approximator": core.FuzzyRulesConfig(), "n_dimensions": 2,
+        "learning": learning(core.FuzzyQLearningConfig), "seed": 1,
+    },
     "AcrobotTrial": lambda: {"approximator": network_config(n_inputs=4), **trial_settings()},
     "FuzzyAcrobotTrial": lambda: {
         "approximator": core.FuzzyRulesConfig(), **trial_settings(),

@@ -16,10 +16,10 @@ struct Preset {
 inline Preset paper_preset(int n_inputs) { return {.approximator = {.n_inputs = n_inputs}}; }
 
 /// For any task: a full step each time, then, as progress is told, ever smaller ones, which
-/// rounding stills one by one; targets of five steps; exploration that goes somewhere
-/// (docs/agents.md).
+/// rounding stills one by one; targets of five steps; exploration that goes somewhere; greedy
+/// actions by an average of the weights (docs/agents.md).
 inline Preset general_preset(int n_inputs) {
-  return {.approximator = {.n_inputs = n_inputs, .n_actions = 5},
+  return {.approximator = {.n_inputs = n_inputs, .n_actions = 5, .averaging_interval = 100},
           .learning = {.learning_rate = 1.0,
                        .discount = 0.99,
                        .policy = {.epsilon = 0.1, .n_greedy_steps = 0},

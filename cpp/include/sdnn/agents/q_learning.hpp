@@ -201,7 +201,8 @@ class QLearning {
     action_value_.warm_caches();
   }
 
-  /// The action to take in `state`; without `explore` a best one. Shape: state (l,) in [0, 1].
+  /// The action to take in `state`; without `explore` a best one, by the average of the weights
+  /// where the approximator keeps one. Shape: state (l,) in [0, 1].
   Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
     if (!explore) return best_action(state, false);
@@ -382,25 +383,42 @@ class QLearning {
     }
   }
 
+  /// The approximator of a dimension.
+  auto& part(std::size_t d) {
+    if constexpr (kDecoupled) {
+      return action_value_.part(d);
+    } else {
+      assert(d == 0);
+      return action_value_;
+    }
+  }
+
   /// Fills values_ of a dimension.
   std::span<const double> values(std::span<const double> state, std::size_t d) {
-    if constexpr (kDecoupled) {
-      action_value_.part(d).values(state, values_[d]);
-    } else {
-      action_value_.values(state, values_[d]);
-    }
+    part(d).values(state, values_[d]);
     return values_[d];
   }
 
+  /// As values, by the average of the weights where the approximator keeps one.
+  std::span<const double> averaged_values(std::span<const double> state, std::size_t d) {
+    if constexpr (requires { part(d).averaged_values(state, values_[d]); }) {
+      part(d).averaged_values(state, values_[d]);
+      return values_[d];
+    } else {
+      return values(state, d);
+    }
+  }
+
   Action best_action(std::span<const double> state, bool explore) {
+    const auto best = [&](std::size_t d) {
+      return policy_.best_action(explore ? values(state, d) : averaged_values(state, d), explore);
+    };
     if constexpr (kDecoupled) {
       Action action(n_dimensions());
-      for (std::size_t d = 0; d < action.size(); ++d) {
-        action[d] = policy_.best_action(values(state, d), explore);
-      }
+      for (std::size_t d = 0; d < action.size(); ++d) action[d] = best(d);
       return action;
     } else {
-      return policy_.best_action(values(state, 0), explore);
+      return best(0);
     }
   }
 

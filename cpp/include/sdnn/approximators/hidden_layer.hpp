@@ -34,6 +34,10 @@ namespace sdnn::approximators {
 /// Source: section 3.1 (layer 4, z) and Eqs. (2), (3).
 class HiddenLayer {
  public:
+  /// Units of a block, and the largest |weight| that two bytes hold.
+  static constexpr std::size_t kBlockUnits = approximators::kBlockUnits;
+  static constexpr std::int32_t kWeightLimit = 127 * 128 + 127;
+
   /// All weights and thresholds zero. The first `n_double` columns stand for two inputs each, half
   /// whose sum or difference they are: a correction moves their weights by twice its step. Throws
   /// std::invalid_argument, std::bad_alloc.
@@ -58,6 +62,7 @@ class HiddenLayer {
   std::size_t n_units() const noexcept { return n_units_; }
   std::size_t n_columns() const noexcept { return n_columns_; }
   std::size_t n_double_columns() const noexcept { return n_double_; }
+  std::size_t n_blocks() const noexcept { return n_blocks_; }
   /// The columns that a pass reads high bytes of, summed over blocks.
   std::size_t n_high_columns() const noexcept { return n_high_columns_; }
   /// The largest |weight| that is held before std::overflow_error.
@@ -68,6 +73,16 @@ class HiddenLayer {
     return bytes_[at] + (may_have_high_[unit] ? kHighByte * high_bytes_[at] : 0);
   }
   std::int32_t threshold(std::size_t unit) const noexcept { return thresholds_[unit]; }
+  /// The weights of a block's units, of which the last block may have fewer, for a column.
+  std::array<std::int32_t, kBlockUnits> weights_of(std::size_t block,
+                                                   std::size_t column) const noexcept {
+    std::array<std::int32_t, kBlockUnits> weights;
+    const std::size_t at = byte_index(block * kBlockUnits, column);
+    for (std::size_t i = 0; i < kBlockUnits; ++i) weights[i] = bytes_[at + i];
+    if (high_columns_[block].size() == 0) return weights;
+    for (std::size_t i = 0; i < kBlockUnits; ++i) weights[i] += kHighByte * high_bytes_[at + i];
+    return weights;
+  }
 
   /// Throws std::invalid_argument if |value| exceeds weight_limit().
   void set_weight(std::size_t unit, std::size_t column, std::int32_t value) {
@@ -165,7 +180,6 @@ class HiddenLayer {
   static constexpr std::int32_t kThresholdLimit = (std::int32_t{1} << 30) - 1;
   static constexpr std::int32_t kByteLimit = 127;
   static constexpr std::int32_t kHighByte = 128;
-  static constexpr std::int32_t kWeightLimit = kByteLimit * kHighByte + kByteLimit;
   static constexpr int kLargestGroup = 4;
 
   using Listed = ListedColumns<ColumnPlaces::kMost>;

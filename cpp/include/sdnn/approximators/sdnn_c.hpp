@@ -8,12 +8,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "sdnn/approximators/detail/potential_memory.hpp"
+#include "sdnn/approximators/detail/weight_average.hpp"
 #include "sdnn/approximators/error_correction.hpp"
 #include "sdnn/approximators/hidden_layer.hpp"
 #include "sdnn/approximators/output_scale.hpp"
@@ -43,6 +45,10 @@ struct CorrectionCounts {
 /// Wiring (code books, permutations) is fixed by config and seed. Reading does not change what is
 /// returned, but the network remembers the potentials of recent states and keeps them exact while
 /// it learns (see PotentialMemory), so that one decision needs at most one pass over the weights.
+///
+/// With averaging_interval > 0 it also keeps an average of its weights (see WeightAverage), of
+/// which averaged_values are the values. Learning uses the weights themselves. Not in the paper.
+///
 /// An object must not be used by two threads at once; copies share the wiring and nothing else.
 class SDNNC {
  public:
@@ -65,6 +71,8 @@ class SDNNC {
         memory_(*code_, actions_.n_hidden_units(), actions_.n_active_units()) {
     core::require_positive("learning_coefficient", config.learning_coefficient);
     core::require_in_range("lattice", config.lattice, 1, 64);
+    core::require_in_range("averaging_interval", config.averaging_interval, 0, 1000000000);
+    if (config.averaging_interval > 0) average_.emplace(hidden_layer_, config.averaging_interval);
     tabulate_values();
     initialize_weights(seed);
     initialize_thresholds();
@@ -95,25 +103,31 @@ class SDNNC {
     if (out.size() != n_actions()) {
       core::require(false, "out", std::to_string(n_actions()) + " values", out.size());
     }
-    const std::span<const std::int32_t> h = recall(state).potentials;
-    const std::int32_t* const leaving = h.data();
-    const std::int32_t* const entering = h.data() + actions_.n_active_units();
-    for (std::size_t i = 0; i < moves_.size(); ++i) {
-      moves_[i] = static_cast<std::int8_t>((entering[i] > 0) - (leaving[i] > 0));
+    fill_values(recall(state).potentials, out);
+  }
+
+  /// As values, by the average of the weights, rounded to steps of the lattice, where there is one.
+  /// The first call after the average has changed takes some milliseconds. Throws as values.
+  void averaged_values(std::span<const double> state, std::span<double> out) {
+    if (!has_average()) return values(state, out);
+    if (out.size() != n_actions()) {
+      core::require(false, "out", std::to_string(n_actions()) + " values", out.size());
     }
-    const double* const value = value_of_count_.data();
-    std::ptrdiff_t n_firing = count_in_window(h, 0);
-    out[0] = value[n_firing];
-    if (out.size() == moves_.size() + 1) {  // every window: the usual case, in a tight loop
-      for (std::size_t i = 0; i < moves_.size(); ++i) out[i + 1] = value[n_firing += moves_[i]];
-      return;
-    }
-    for (std::size_t action = 1; action < out.size(); ++action) {
-      for (std::size_t i = actions_.first_unit(action - 1); i < actions_.first_unit(action); ++i) {
-        n_firing += moves_[i];
-      }
-      out[action] = value[n_firing];
-    }
+    code_->bins_of(state, bins_);
+    Averaged& averaged = up_to_date_average();
+    fill_values(averaged.memory.recall(*code_, averaged.layer, bins_).potentials, out);
+  }
+
+  /// Whether there has been a snapshot for the average.
+  bool has_average() const noexcept { return average_ && average_->n_snapshots() > 0; }
+
+  /// The average of a weight, in the paper's order, and of a threshold, rounded to steps of the
+  /// lattice. Requires has_average().
+  std::int32_t averaged_weight(std::size_t unit, std::size_t j) const {
+    return averaged_weight_at(unit, code_->columns_of(j));
+  }
+  std::int32_t averaged_threshold(std::size_t unit) const {
+    return static_cast<std::int32_t>(rounded(average_->threshold(unit), 0));
   }
 
   /// Q(state, action). Throws like values, and std::invalid_argument for an action out of range.
@@ -130,26 +144,8 @@ class SDNNC {
                double rate = 1.0) {
     core::require(!std::isnan(target), "target", "a number", target);
     core::require(rate > 0.0 && rate <= 1.0, "rate", "in (0, 1]", rate);
-    const Remembered entry = recall(state);
-    const int n_firing = count_in_window(entry.potentials, action);
-    const double wanted = (1.0 - rate) * scale_(n_firing) + rate * target;
-    const int deficit = rounded_count(wanted, n_firing) - n_firing;
-    ++counts_.asked;
-    if (wanted < scale_.q_low() || wanted > scale_.q_high()) ++counts_.out_of_range;
-    if (deficit == 0) {
-      counts_.rounded_away += wanted != scale_(n_firing) ? 1 : 0;
-      return;
-    }
-    const std::size_t first = actions_.first_unit(action);
-    select_units(std::span(entry.potentials).subspan(first, actions_.n_active_units()), deficit,
-                 selected_);
-    if (selected_.empty()) return;
-    for (std::uint32_t& unit : selected_) unit += static_cast<std::uint32_t>(first);
-
-    const std::int32_t step = deficit > 0 ? config_.lattice : -config_.lattice;
-    hidden_layer_.correct(selected_, memory_.columns(*code_, entry.bins), step);
-    memory_.corrected(entry.bins, selected_, step);
-    ++counts_.changed;
+    correct_weights(state, action, target, rate);
+    if (average_) average_->note(counts_.asked, hidden_layer_);
   }
 
   /// The inner potentials in lattice steps (c / lattice), by a full pass. Shape: out (n,).
@@ -178,6 +174,7 @@ class SDNNC {
       values(std::vector<double>(n_inputs(), (i + 0.5) / kStates), out);
     }
     memory_ = PotentialMemory(*code_, actions_.n_hidden_units(), actions_.n_active_units());
+    if (has_average()) up_to_date_average();
   }
 
   /// Replaces weights and thresholds, in lattice steps. Shapes: weights (n, D) row by row,
@@ -193,6 +190,7 @@ class SDNNC {
       core::require_in_range("weight", weight, -largest_initial_weight(), largest_initial_weight());
     }
     replace_parameters(weights, thresholds);
+    if (average_) average_->forget(counts_.asked);
   }
 
   /// Gives the range of values other ends. What was learned keeps its place in the range, and so
@@ -229,6 +227,7 @@ class SDNNC {
     archive.number("n_changed", self.counts_.changed);
     archive.number("n_rounded_away", self.counts_.rounded_away);
     archive.number("n_out_of_range", self.counts_.out_of_range);
+    if (self.average_) archive.part("average", *self.average_);
     if constexpr (Archive::kReads) {
       archive.taking("output_range", [&] { self.set_output_range(range[0], range[1]); });
       for (const std::int32_t threshold : thresholds) {
@@ -239,6 +238,7 @@ class SDNNC {
                                 thresholds);
       });
       self.selected_.reserve(self.actions_.n_active_units());  // a copy has no room
+      self.averaged_.reset();
     }
   }
 
@@ -286,7 +286,10 @@ class SDNNC {
     const double n_units = static_cast<double>(sizes.n_hidden_units());
     const double n_columns = l * (l - 1.0) * config.n_pattern_units;
     const double pattern = 8.0 * std::ceil(config.n_pattern_units / 64.0);
-    const double weights = 2.0 * n_units * n_columns + 4.0 * n_columns;
+    double weights = 2.0 * n_units * n_columns + 4.0 * n_columns;
+    if (config.averaging_interval > 0) {  // the average, and a layer and a memory made of it
+      weights += WeightAverage::n_bytes(n_units, n_columns) + 2.0 * n_units * n_columns;
+    }
     const double patterns = l * l * n_bins * pattern;
     const double remembered = static_cast<double>(
         PotentialMemory::n_bytes(sizes.n_hidden_units(), sizes.n_active_units()));
@@ -339,20 +342,90 @@ class SDNNC {
   void replace_parameters(std::span<const std::int32_t> weights,
                           std::span<const std::int32_t> thresholds) {
     const std::size_t n_columns = code_->n_columns();
-    HiddenLayer replaced(hidden_layer_.n_units(), hidden_layer_.n_columns(),
-                         hidden_layer_.n_double_columns());
-    for (std::size_t j = 0; j < n_columns; ++j) {
-      core::interruption_point();
-      const auto columns = code_->columns_of(j);
-      for (std::size_t unit = 0; unit < hidden_layer_.n_units(); ++unit) {
-        add_weight(replaced, unit, columns, weights[unit * n_columns + j]);
-      }
-    }
-    for (std::size_t unit = 0; unit < hidden_layer_.n_units(); ++unit) {
-      replaced.set_threshold(unit, thresholds[unit]);
-    }
+    HiddenLayer replaced = layer_with(
+        [&](std::size_t unit, const auto&, std::size_t j) { return weights[unit * n_columns + j]; },
+        [&](std::size_t unit) { return thresholds[unit]; });
     hidden_layer_ = std::move(replaced);
     memory_.forget();
+  }
+
+  /// A hidden layer with the weights weight(unit, columns, j) and the thresholds threshold(unit).
+  template <class Weight, class Threshold>
+  HiddenLayer layer_with(const Weight& weight, const Threshold& threshold) const {
+    HiddenLayer layer(actions_.n_hidden_units(), code_->n_columns(), code_->n_double_columns());
+    for (std::size_t j = 0; j < code_->n_columns(); ++j) {
+      core::interruption_point();
+      const auto columns = code_->columns_of(j);
+      for (std::size_t unit = 0; unit < layer.n_units(); ++unit) {
+        add_weight(layer, unit, columns, weight(unit, columns, j));
+      }
+    }
+    for (std::size_t unit = 0; unit < layer.n_units(); ++unit) {
+      layer.set_threshold(unit, threshold(unit));
+    }
+    return layer;
+  }
+
+  /// Q of every action, where these are the potentials.
+  void fill_values(std::span<const std::int32_t> h, std::span<double> out) {
+    const std::int32_t* const leaving = h.data();
+    const std::int32_t* const entering = h.data() + actions_.n_active_units();
+    for (std::size_t i = 0; i < moves_.size(); ++i) {
+      moves_[i] = static_cast<std::int8_t>((entering[i] > 0) - (leaving[i] > 0));
+    }
+    const double* const value = value_of_count_.data();
+    std::ptrdiff_t n_firing = count_in_window(h, 0);
+    out[0] = value[n_firing];
+    if (out.size() == moves_.size() + 1) {  // every window: the usual case, in a tight loop
+      for (std::size_t i = 0; i < moves_.size(); ++i) out[i + 1] = value[n_firing += moves_[i]];
+      return;
+    }
+    for (std::size_t action = 1; action < out.size(); ++action) {
+      for (std::size_t i = actions_.first_unit(action - 1); i < actions_.first_unit(action); ++i) {
+        n_firing += moves_[i];
+      }
+      out[action] = value[n_firing];
+    }
+  }
+
+  /// A hidden layer with the average of the weights.
+  struct Averaged {
+    HiddenLayer layer;
+    PotentialMemory memory;
+    std::uint64_t n_snapshots;
+  };
+
+  Averaged& up_to_date_average() {
+    if (!averaged_) {
+      averaged_.emplace(Averaged{
+          HiddenLayer(1, 1),
+          PotentialMemory(*code_, actions_.n_hidden_units(), actions_.n_active_units()), 0});
+    }
+    if (averaged_->n_snapshots != average_->n_snapshots()) {
+      averaged_->layer =
+          layer_with([this](std::size_t unit, const auto& columns,
+                            std::size_t) { return averaged_weight_at(unit, columns); },
+                     [this](std::size_t unit) { return averaged_threshold(unit); });
+      averaged_->memory.forget();
+      averaged_->n_snapshots = average_->n_snapshots();
+    }
+    return *averaged_;
+  }
+
+  /// value / 2^(kFractionBits + more), halves up.
+  static std::int64_t rounded(std::int64_t value, int more) noexcept {
+    const int bits = WeightAverage::kFractionBits + more;
+    return (value + (std::int64_t{1} << (bits - 1))) >> bits;
+  }
+
+  std::int32_t averaged_weight_at(std::size_t unit,
+                                  const coding::StateCode::PairedColumns& columns) const noexcept {
+    std::int64_t weight = average_->weight(unit, columns.first);
+    if (columns.paired)
+      weight += columns.sign * std::int64_t{average_->weight(unit, columns.second)};
+    const std::int64_t limit = largest_initial_weight();  // no sum of two leaves the layer's range
+    return static_cast<std::int32_t>(
+        std::clamp(rounded(weight, columns.paired ? 1 : 0), -limit, limit));
   }
 
   std::int32_t weight_at(std::size_t unit,
@@ -415,6 +488,31 @@ class SDNNC {
     }
   }
 
+  /// Corrects, after the arguments have been looked at.
+  void correct_weights(std::span<const double> state, std::size_t action, double target,
+                       double rate) {
+    const Remembered entry = recall(state);
+    const int n_firing = count_in_window(entry.potentials, action);
+    const double wanted = (1.0 - rate) * scale_(n_firing) + rate * target;
+    const int deficit = rounded_count(wanted, n_firing) - n_firing;
+    ++counts_.asked;
+    if (wanted < scale_.q_low() || wanted > scale_.q_high()) ++counts_.out_of_range;
+    if (deficit == 0) {
+      counts_.rounded_away += wanted != scale_(n_firing) ? 1 : 0;
+      return;
+    }
+    const std::size_t first = actions_.first_unit(action);
+    select_units(std::span(entry.potentials).subspan(first, actions_.n_active_units()), deficit,
+                 selected_);
+    if (selected_.empty()) return;
+    for (std::uint32_t& unit : selected_) unit += static_cast<std::uint32_t>(first);
+
+    const std::int32_t step = deficit > 0 ? config_.lattice : -config_.lattice;
+    hidden_layer_.correct(selected_, memory_.columns(*code_, entry.bins), step);
+    memory_.corrected(entry.bins, selected_, step);
+    ++counts_.changed;
+  }
+
   Remembered recall(std::span<const double> state) {
     code_->bins_of(state, bins_);
     return memory_.recall(*code_, hidden_layer_, bins_);
@@ -449,6 +547,8 @@ class SDNNC {
   coding::ActionCode actions_;
   OutputScale scale_;
   HiddenLayer hidden_layer_;
+  std::optional<WeightAverage> average_;
+  std::optional<Averaged> averaged_;  ///< made when it is asked for
   core::Random rounding_;
   std::vector<double> value_of_count_;
   CorrectionCounts counts_;

@@ -45,6 +45,7 @@ struct SDNNCConfig {
   InitialWeights initial_weights = InitialWeights::ternary;
   double initial_weight_limit = 0.1;      ///< of InitialWeights::uniform, in units of c
   Rounding rounding = Rounding::half_up;  ///< of the number of units that are to fire
+  int averaging_interval = 0;  ///< least corrections between snapshots of WeightAverage; 0: none
   std::uint64_t max_table_bytes = core::kDefaultMaxTableBytes;  ///< larger networks are refused
 
   static constexpr auto fields() noexcept {
@@ -66,6 +67,7 @@ struct SDNNCConfig {
         core::field("initial_weights", &SDNNCConfig::initial_weights),
         core::field("initial_weight_limit", &SDNNCConfig::initial_weight_limit),
         core::field("rounding", &SDNNCConfig::rounding),
+        core::field("averaging_interval", &SDNNCConfig::averaging_interval),
         core::field("max_table_bytes", &SDNNCConfig::max_table_bytes));
   }
   bool operator==(const SDNNCConfig&) const = default;

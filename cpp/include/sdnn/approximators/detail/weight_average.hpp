@@ -1,0 +1,142 @@
+/// The average of a hidden layer's weights over what was learned.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "sdnn/approximators/hidden_layer.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
+
+namespace sdnn::approximators {
+
+/// A moving average of weights and thresholds whose window grows with what was learned.
+///
+/// After n corrections the weights of correction t have about the weight t / n^2: what was learned
+/// first is forgotten, the swings of late learning cancel each other. A unit's sign is then that
+/// which its potential mostly had, so a value is near the median of what it was. Snapshots are
+/// taken every `interval` corrections, later every n / 64, and move the average by a power of two
+/// of the way, about 2 / n times the corrections in between. All numbers are integers, in units of
+/// 2^-14 steps of the lattice, so equal corrections give equal bits.
+///
+/// Source: Polyak, B., Juditsky, A. (1992). Acceleration of stochastic approximation by averaging;
+/// Shamir, O., Zhang, T. (2013). Stochastic gradient descent for non-smooth optimization, section
+/// 4 (polynomial-decay averaging, with eta about 1).
+class WeightAverage {
+ public:
+  static constexpr int kFractionBits = 14;
+
+  WeightAverage(const HiddenLayer& layer, int interval)
+      : n_units_(layer.n_units()),
+        n_columns_(layer.n_columns()),
+        interval_(static_cast<std::uint64_t>(interval)),
+        due_(interval_),
+        weights_(layer.n_blocks() * n_columns_ * HiddenLayer::kBlockUnits),
+        thresholds_(n_units_) {}
+
+  static constexpr double n_bytes(double n_units, double n_columns) noexcept {
+    return n_units * (4.0 * n_columns + 8.0);
+  }
+
+  /// How many snapshots it is made of; 0: nothing is known.
+  std::uint64_t n_snapshots() const noexcept { return n_snapshots_; }
+
+  /// Tells that the layer has had so many corrections in all.
+  void note(std::uint64_t n_corrections, const HiddenLayer& layer) {
+    if (n_corrections < due_) return;
+    add(layer, shift_at(n_corrections));
+    due_ = n_corrections + std::max(interval_, n_corrections >> kLogSnapshots);
+  }
+
+  /// Forgets what it is made of: the layer has other weights now.
+  void forget(std::uint64_t n_corrections) noexcept {
+    n_snapshots_ = 0;
+    due_ = n_corrections + interval_;
+  }
+
+  /// The average of a weight and of a threshold, in 2^-14 steps.
+  std::int32_t weight(std::size_t unit, std::size_t column) const noexcept {
+    return weights_[index(unit, column)];
+  }
+  std::int64_t threshold(std::size_t unit) const noexcept { return thresholds_[unit]; }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void exchange(Self& self, Archive& archive) {
+    std::vector<std::int32_t> weights(self.n_units_ * self.n_columns_);
+    if constexpr (!Archive::kReads) {
+      for (std::size_t unit = 0; unit < self.n_units_; ++unit) {
+        for (std::size_t j = 0; j < self.n_columns_; ++j) {
+          weights[unit * self.n_columns_ + j] = self.weight(unit, j);
+        }
+      }
+    }
+    archive.fixed("weights", {self.n_units_, self.n_columns_}, weights);
+    archive.fixed("thresholds", {self.n_units_}, self.thresholds_);
+    archive.number("n_snapshots", self.n_snapshots_);
+    archive.number("due", self.due_);
+    if constexpr (Archive::kReads) {
+      for (const std::int32_t weight : weights) {
+        archive.expect(weight >= -kLargestWeight && weight <= kLargestWeight, "weights",
+                       "averages of weights");
+      }
+      for (const std::int64_t threshold : self.thresholds_) {
+        archive.expect(threshold >= -kLargestThreshold && threshold <= kLargestThreshold,
+                       "thresholds", "averages of thresholds");
+      }
+      for (std::size_t unit = 0; unit < self.n_units_; ++unit) {
+        for (std::size_t j = 0; j < self.n_columns_; ++j) {
+          self.weights_[self.index(unit, j)] = weights[unit * self.n_columns_ + j];
+        }
+      }
+    }
+  }
+
+ private:
+  static constexpr int kLogSnapshots = 6;
+  static constexpr std::int32_t kLargestWeight = HiddenLayer::kWeightLimit << kFractionBits;
+  static constexpr std::int64_t kLargestThreshold = std::int64_t{1} << (30 + kFractionBits);
+
+  /// -log2 of what a snapshot counts.
+  int shift_at(std::uint64_t n_corrections) const noexcept {
+    if (n_snapshots_ == 0) return 0;
+    const std::uint64_t passed = std::max(interval_, n_corrections >> kLogSnapshots);
+    // A cast, since older libraries give another type.
+    return std::max(static_cast<int>(std::bit_width(n_corrections / passed)) - 2, 0);
+  }
+
+  void add(const HiddenLayer& layer, int shift) {
+    const std::int32_t half = shift > 0 ? 1 << (shift - 1) : 0;
+    std::int32_t* average = weights_.data();
+    for (std::size_t block = 0; block < layer.n_blocks(); ++block) {
+      for (std::size_t column = 0; column < n_columns_; ++column) {
+        const auto weights = layer.weights_of(block, column);
+        for (std::size_t i = 0; i < weights.size(); ++i) {
+          average[i] += ((weights[i] << kFractionBits) - average[i] + half) >> shift;
+        }
+        average += weights.size();
+      }
+    }
+    for (std::size_t unit = 0; unit < n_units_; ++unit) {
+      const std::int64_t now = std::int64_t{layer.threshold(unit)} << kFractionBits;
+      thresholds_[unit] += (now - thresholds_[unit] + half) >> shift;
+    }
+    ++n_snapshots_;
+  }
+
+  std::size_t index(std::size_t unit, std::size_t column) const noexcept {
+    constexpr std::size_t kUnits = HiddenLayer::kBlockUnits;
+    return (unit / kUnits * n_columns_ + column) * kUnits + unit % kUnits;
+  }
+
+  std::size_t n_units_, n_columns_;
+  std::uint64_t interval_;
+  std::uint64_t due_;  ///< corrections at the next snapshot
+  std::uint64_t n_snapshots_ = 0;
+  core::AlignedBuffer<std::int32_t> weights_;  ///< [block][column][unit in block]
+  std::vector<std::int64_t> thresholds_;
+};
+
+}  // namespace sdnn::approximators

@@ -1,0 +1,113 @@
+#include "sdnn/approximators/detail/weight_average.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "sdnn/core/state.hpp"
+#include "states.hpp"
+
+namespace sdnn::approximators {
+namespace {
+
+constexpr std::int64_t kOne = 1 << WeightAverage::kFractionBits;
+
+TEST(WeightAverage, ByHand) {
+  HiddenLayer layer(2, 3);
+  WeightAverage average(layer, 2);
+  const auto note = [&](std::uint64_t n, std::int32_t weight) {
+    layer.set_weight(1, 2, weight);
+    layer.set_threshold(0, -weight);
+    average.note(n, layer);
+    return average.weight(1, 2);
+  };
+  EXPECT_EQ(note(1, 8), 0);
+  EXPECT_EQ(average.n_snapshots(), 0U);
+  EXPECT_EQ(note(2, 8), 8 * kOne);  // the first is all there is
+  EXPECT_EQ(note(3, 100), 8 * kOne);
+  EXPECT_EQ(note(4, 16), 16 * kOne);  // 2 * 2 / 4 of the way
+  EXPECT_EQ(note(6, 8), 8 * kOne);    // 2 * 2 / 6: the next power of two is all of it
+  EXPECT_EQ(note(8, 0), 4 * kOne);    // half of it
+  EXPECT_EQ(average.threshold(0), -4 * kOne);
+  EXPECT_EQ(note(16, 0), 3 * kOne);  // a quarter
+  EXPECT_EQ(average.n_snapshots(), 5U);
+  EXPECT_EQ(average.weight(0, 2), 0);
+}
+
+// High bytes, the last unit of a layer that fills no block, and the largest weights.
+TEST(WeightAverage, TakesWeightsOfAnySize) {
+  constexpr std::int32_t kLimit = HiddenLayer::kWeightLimit;
+  HiddenLayer layer(70, 4);
+  for (const std::int32_t weight : {127, -127, 128, -4000, kLimit, -kLimit}) {
+    layer.set_weight(69, 1, weight);
+    layer.set_weight(3, 1, -weight);
+    WeightAverage average(layer, 1);
+    average.note(1, layer);
+    EXPECT_EQ(average.weight(69, 1), weight * kOne);
+    EXPECT_EQ(average.weight(3, 1), -weight * kOne);
+    layer.set_weight(69, 1, -weight);
+    for (std::uint64_t n = 2; n < 4000; ++n) average.note(n, layer);
+    EXPECT_EQ(average.weight(69, 1), -weight * kOne) << weight;
+  }
+}
+
+// A weight that swings for ever, half of the time up: its average comes to rest in the middle.
+TEST(WeightAverage, StillsWhatSwings) {
+  HiddenLayer layer(1, 1);
+  WeightAverage average(layer, 10);
+  for (std::uint64_t n = 1; n <= 20000; ++n) {
+    layer.set_weight(0, 0, n / 700 % 2 == 0 ? 100 : -100);
+    average.note(n, layer);
+  }
+  EXPECT_LT(std::abs(average.weight(0, 0)), 20 * kOne);
+  EXPECT_LT(average.n_snapshots(), 64U + 64U * 4U);  // ever rarer: 64 log(20000 / 640) and 64
+}
+
+TEST(WeightAverage, ForgetsAndBeginsAnew) {
+  HiddenLayer layer(1, 1);
+  WeightAverage average(layer, 10);
+  layer.set_weight(0, 0, 5);
+  for (std::uint64_t n = 1; n <= 100; ++n) average.note(n, layer);
+  average.forget(100);
+  EXPECT_EQ(average.n_snapshots(), 0U);
+  layer.set_weight(0, 0, 9);
+  average.note(109, layer);
+  EXPECT_EQ(average.n_snapshots(), 0U);
+  average.note(110, layer);
+  EXPECT_EQ(average.weight(0, 0), 9 * kOne);
+}
+
+TEST(WeightAverage, GoesOnFromItsState) {
+  HiddenLayer layer(70, 3);
+  WeightAverage whole(layer, 3);
+  const auto live = [&layer](WeightAverage& average, std::uint64_t from, std::uint64_t to) {
+    for (std::uint64_t n = from; n < to; ++n) {
+      layer.set_weight(n % 70, n % 3, static_cast<std::int32_t>(n % 300) - 150);
+      average.note(n, layer);
+    }
+  };
+  live(whole, 1, 500);
+  WeightAverage resumed(layer, 3);
+  core::restore(resumed, core::state_of(whole));
+  HiddenLayer same = layer;
+  live(whole, 500, 900);
+  layer = same;
+  live(resumed, 500, 900);
+  EXPECT_EQ(core::state_of(resumed), core::state_of(whole));
+}
+
+TEST(WeightAverage, RefusesAStateThatDoesNotFit) {
+  const HiddenLayer layer(2, 3);
+  WeightAverage average(layer, 3);
+  testing::expect_that_damage_is_refused(average);
+  const core::State good = core::state_of(average);
+  testing::expect_refused(average, testing::with_number(good, "weights", std::int32_t{1} << 30, 2),
+                          "state: weights must be averages of weights");
+  testing::expect_refused(average,
+                          testing::with_number(good, "thresholds", std::int64_t{1} << 50, 1),
+                          "state: thresholds must be averages of thresholds");
+}
+
+}  // namespace
+}  // namespace sdnn::approximators
