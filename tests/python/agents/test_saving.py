@@ -38,8 +38,9 @@ GENERAL = QLearningConfig(
     value_range="seen",
 )
 RANDOMLY = SDNNCConfig(
-    n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5, rounding="random"
-)
+    n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5, rounding="random",
+    averaging_interval=7,
+)  # fmt: skip
 TRACES = FuzzyQLearningConfig(trace_decay=0.7, n_greedy_steps=0, epsilon=0.3)
 
 KINDS = {

@@ -22,7 +22,7 @@ inline Preset general_preset(int n_inputs) {
   return {.approximator = {.n_inputs = n_inputs, .n_actions = 5, .averaging_interval = 100},
           .learning = {.learning_rate = 1.0,
                        .discount = 0.99,
-                       .policy = {.epsilon = 0.1, .n_greedy_steps = 0},
+                       .policy = {.epsilon = 0.03, .n_greedy_steps = 0},
                        .n_steps = 5,
                        .max_repetitions = 100,
                        .final_learning_rate = 0.1,
