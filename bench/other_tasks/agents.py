@@ -12,10 +12,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Protocol
 
+import gymnasium as gym
 import stable_baselines
 import stream_ac
 from tasks import TASKS
-from tile_coding import TileCodingSarsa
+from tile_coding import TileCodingSarsa, listed_actions
 
 from sdnn.agents import Callback, RBFQLearning, SDNNQLearning
 from sdnn.agents.presets import PRESETS
@@ -72,8 +73,33 @@ class _Report(Callback):
         self._after_step(training.n_steps, partial(agent.act, explore=False), memory)
 
 
+class ListedActions(gym.ActionWrapper):
+    """All joint actions of a Box, 5 values in each dimension, as a Discrete space."""
+
+    def __init__(self, env) -> None:
+        super().__init__(env)
+        self._actions = listed_actions(env.action_space)
+        self.action_space = gym.spaces.Discrete(len(self._actions))
+
+    def action(self, action):
+        """Give the Box's element."""
+        return self._actions[int(action)]
+
+
 def _learn_ours(make, name, condition, steps, seed, after_step):
-    env = TASKS[name].make(condition)
+    _learn_in(TASKS[name].make(condition), make, name, condition, steps, seed, after_step)
+
+
+def _learn_joint(name, condition, steps, seed, after_step):
+    env = ListedActions(TASKS[name].make(condition))
+
+    def after(n_steps, policy, memory):
+        after_step(n_steps, lambda observation: env.action(policy(observation)), memory)
+
+    _learn_in(env, SDNNQLearning, name, condition, steps, seed, after)
+
+
+def _learn_in(env, make, name, condition, steps, seed, after_step):
     # What is said of angles is said of observations as they are.
     options = TASKS[name].options if condition == "clean" else {}
     agent = make(env.observation_space, env.action_space, seed=seed, **options)
@@ -92,6 +118,8 @@ TILINGS = {
     "MountainCar": {"n_bins": 8, "n_tilings": 8, "discount": 1.0, "epsilon": 0.0},
     "MountainCarContinuous": {"n_bins": 8, "n_tilings": 8},
     "Acrobot": {"n_bins": 4, "n_tilings": 16, "discount": 1.0, "epsilon": 0.0},
+    "Reaching": {"n_bins": 4, "n_tilings": 16},
+    "Wheels": {"n_bins": 4, "n_tilings": 16},
 }
 """Finer grids for fewer variables; tasks of -1 a step need no chance, as in the book."""
 
@@ -133,6 +161,9 @@ CONTENDERS = {
         title="SDNN-C, small",
         learn=partial(_learn_ours, partial(SDNNQLearning, preset="small")),
         tasks=("CartPole", "Pendulum", "MountainCarContinuous"),
+    ),
+    "sdnn-joint": Contender(
+        title="SDNN-C, joint actions", learn=_learn_joint, tasks=("Reaching", "Wheels")
     ),
     "rbf": Contender(
         title="RBFN",

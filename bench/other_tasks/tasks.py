@@ -9,6 +9,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+import two_torques
 from numpy.typing import NDArray
 
 from sdnn.runs import RunEnvironment
@@ -35,6 +36,8 @@ class Task:
         Mean return that solves it.
     random
         Mean return of random actions.
+    kwargs
+        Arguments of the environment.
     ranges
         Of variables for which the environment gives none, as `RunEnvironment` takes them.
     options
@@ -45,6 +48,7 @@ class Task:
     steps: int = 200_000
     solved: float
     random: float
+    kwargs: Mapping[str, Any] = field(default_factory=dict)
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
 
@@ -54,14 +58,19 @@ class Task:
 
     def make(self, condition: str, evaluation: bool = False) -> gym.Env[Any, Any]:
         """Make the environment; under all conditions but "clean" observations are in [0, 1]."""
-        environment = RunEnvironment(id=self.id, ranges=self.ranges, **CONDITIONS[condition])
+        environment = self._environment(condition)
         return environment.make("evaluation_sensor_noise" if evaluation else "sensor_noise")
 
     def ends(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Give the lowest and highest values of the variables, shape (l,)."""
         env = self.make("clean")
         env.close()
-        return RunEnvironment(id=self.id, ranges=self.ranges).ends(env)
+        return self._environment("clean").ends(env)
+
+    def _environment(self, condition: str) -> RunEnvironment:
+        return RunEnvironment(
+            id=self.id, kwargs=self.kwargs, ranges=self.ranges, **CONDITIONS[condition]
+        )
 
     def make_unscaled(self, condition: str, evaluation: bool = False) -> gym.Env[Any, Any]:
         """Make it with observations in their own units, for agents that were tuned to these.
@@ -99,5 +108,17 @@ TASKS = {
         solved=-100.0,
         random=-486.5,
         options={"angle_pairs": [(0, 1), (2, 3)]},
+    ),
+    "LunarLanderContinuous": Task(
+        id="LunarLander-v3", kwargs={"continuous": True}, steps=300_000, solved=200.0, random=-180.0
+    ),
+    # Solved is what comes near the best of some hundred proportional controllers: -13.6 and -23.6.
+    "Reaching": Task(id=two_torques.REACHING, steps=60_000, solved=-20.0, random=-112.2),
+    "Wheels": Task(
+        id=two_torques.WHEELS,
+        steps=60_000,
+        solved=-30.0,
+        random=-92.7,
+        options={"angle_pairs": [(1, 2)]},
     ),
 }

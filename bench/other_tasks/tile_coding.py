@@ -6,6 +6,7 @@ MountainCar example: replacing traces, a step size of 0.5 / n_tilings, values fr
 
 from __future__ import annotations
 
+import itertools
 from collections import deque
 
 import gymnasium as gym
@@ -39,8 +40,16 @@ class TileCoding:
         return self._first + tile @ self._stride
 
 
+def listed_actions(space):
+    """All actions of a space; a Box's with 5 values in each dimension, in all combinations."""
+    if not isinstance(space, gym.spaces.Box):
+        return list(range(space.n))
+    values = np.linspace(space.low, space.high, 5, dtype=np.float32).T
+    return [np.array(action) for action in itertools.product(*values)]
+
+
 class TileCodingSarsa:
-    """Sarsa(lambda) with replacing traces; a Box of one dimension is cut into 5 actions."""
+    """Sarsa(lambda) with replacing traces; a Box is cut into 5 actions in each dimension."""
 
     def __init__(
         self,
@@ -58,11 +67,7 @@ class TileCodingSarsa:
     ) -> None:
         self._low, self._high = ranges
         self._code = TileCoding(self._low.size, n_bins, n_tilings)
-        if isinstance(action_space, gym.spaces.Box):
-            (low,), (high,) = action_space.low, action_space.high
-            self._actions = list(np.linspace(low, high, 5, dtype=np.float32)[:, None])
-        else:
-            self._actions = list(range(action_space.n))
+        self._actions = listed_actions(action_space)
         self.weights = np.zeros((len(self._actions), self._code.n_tiles))
         self._step_size = step_size / n_tilings
         self._fade = discount * trace_decay

@@ -1,0 +1,96 @@
+"""Two tasks with two torques, in which the parts of an action matter together."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+import numpy as np
+
+REACHING, WHEELS = "bench/Reaching-v0", "bench/Wheels-v0"
+
+
+class ReachingEnv(gym.Env):
+    """An arm of two links of 1 m on a table: bring its tip to a goal and keep it there.
+
+    An episode has 60 steps of 0.1 s; each step's reward is minus the tip's distance in m. Torques
+    work against inertia and friction, and what turns the second link pushes the first one back.
+    """
+
+    action_space = gym.spaces.Box(-1.0, 1.0, (2,))
+    # Angles, their speeds, and by how much the goal's angles are larger.
+    observation_space = gym.spaces.Box(
+        np.array([-2, -2, -2, -2, -4, -4], np.float32), np.array([2, 2, 2, 2, 4, 4], np.float32)
+    )
+
+    def reset(self, *, seed=None, options=None):
+        """Begin anywhere, at rest."""
+        super().reset(seed=seed)
+        self._angles = self.np_random.uniform(-1.5, 1.5, 2)
+        self._goal = self.np_random.uniform(-1.5, 1.5, 2)
+        self._speeds = np.zeros(2)
+        return self._observation(), {}
+
+    def step(self, action):
+        """Apply two torques for 0.1 s."""
+        first, second = np.clip(action, -1.0, 1.0)
+        torques = np.array([first - 0.5 * second, second])
+        self._speeds = np.clip(0.8 * self._speeds + 0.4 * torques, -2.0, 2.0)
+        moved = self._angles + 0.1 * self._speeds
+        self._angles = np.clip(moved, -2.0, 2.0)
+        self._speeds = np.where(moved == self._angles, self._speeds, 0.0)  # at a stop
+        distance = float(np.linalg.norm(self._tip(self._angles) - self._tip(self._goal)))
+        return self._observation(), -distance, False, False, {}
+
+    def _observation(self):
+        missing = self._goal - self._angles
+        return np.concatenate([self._angles, self._speeds, missing]).astype(np.float32)
+
+    @staticmethod
+    def _tip(angles):
+        directions = np.cumsum(angles)
+        return np.array([np.cos(directions).sum(), np.sin(directions).sum()])
+
+
+class WheelsEnv(gym.Env):
+    """A cart with a motor for each of its two wheels: drive to a goal and stop there.
+
+    An episode has 60 steps of 0.1 s; each step's reward is minus the distance in m. Equal torques
+    drive, opposite ones turn: one wheel's torque is good or bad depending on the other's.
+    """
+
+    action_space = gym.spaces.Box(-1.0, 1.0, (2,))
+    # Distance, cosine and sine of the goal's bearing, speed, speed of turning.
+    observation_space = gym.spaces.Box(
+        np.array([0, -1, -1, -1, -4], np.float32), np.array([4, 1, 1, 1, 4], np.float32)
+    )
+
+    def reset(self, *, seed=None, options=None):
+        """Begin 1 m to 2 m from the goal, in any direction, at rest."""
+        super().reset(seed=seed)
+        distance, direction = (
+            self.np_random.uniform(1.0, 2.0),
+            self.np_random.uniform(-np.pi, np.pi),
+        )
+        self._position = distance * np.array([np.cos(direction), np.sin(direction)])
+        self._heading = self.np_random.uniform(-np.pi, np.pi)
+        self._speed = self._turning = 0.0
+        return self._observation(), {}
+
+    def step(self, action):
+        """Apply two torques for 0.1 s."""
+        left, right = np.clip(action, -1.0, 1.0)
+        self._speed = 0.8 * self._speed + 0.2 * (left + right) / 2
+        self._turning = 0.8 * self._turning + 0.8 * (right - left) / 2
+        self._heading += 0.1 * self._turning
+        ahead = np.array([np.cos(self._heading), np.sin(self._heading)])
+        self._position = self._position + 0.1 * self._speed * ahead
+        return self._observation(), -float(np.linalg.norm(self._position)), False, False, {}
+
+    def _observation(self):
+        distance = np.linalg.norm(self._position)
+        bearing = np.arctan2(*-self._position[::-1]) - self._heading
+        seen = [min(distance, 4.0), np.cos(bearing), np.sin(bearing), self._speed, self._turning]
+        return np.array(seen, np.float32)
+
+
+gym.register(REACHING, entry_point=ReachingEnv, max_episode_steps=60)
+gym.register(WHEELS, entry_point=WheelsEnv, max_episode_steps=60)
