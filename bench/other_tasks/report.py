@@ -153,32 +153,50 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     names = [n for n in TASKS if any(trials(rows, n, "clean", kind) for kind in CONTENDERS)]
     if not names:
         return
-    figure = Figure(figsize=(3.4 * len(names), 5.6), layout="constrained")
-    panels = figure.subplots(2, len(names), squeeze=False, sharey="col")
-    for column, name in enumerate(names):
-        for number, (kind, contender) in enumerate(CONTENDERS.items()):
-            looks = trials(rows, name, "clean", kind)
-            if not looks:
-                continue
-            returns = np.array([[float(r["mean_return"]) for r in trial] for trial in looks])
-            lower, median, upper = np.percentile(returns, (25, 50, 75), axis=0)
-            for panel, field in zip(panels[:, column], ("steps", "cpu_seconds"), strict=True):
-                x = np.median([[float(r[field]) for r in trial] for trial in looks], axis=0)
-                (line,) = panel.plot(
-                    x, median, "-" if x.size > 1 else "o", color=f"C{number}",
-                    label=contender.title, lw=1.6,
-                )  # fmt: skip
-                panel.fill_between(x, lower, upper, color=line.get_color(), alpha=0.2, lw=0)
-        for panel in panels[:, column]:
-            panel.axhline(TASKS[name].solved, color="0.4", lw=0.8, ls=":")
-            panel.set_xscale("log")
-        panels[0, column].set_title(name, loc="left", fontsize=10.5)
-        panels[0, column].set_xlabel("steps")
-        panels[1, column].set_xlabel("processor seconds")
-    for panel in panels[:, 0]:
-        panel.set_ylabel("mean return, greedy")
+    n_columns = min(len(names), 4)
+    n_blocks = -(-len(names) // n_columns)
+    figure = Figure(figsize=(3.4 * n_columns, 5.2 * n_blocks), layout="constrained")
+    grid = figure.subplots(2 * n_blocks, n_columns, squeeze=False)
+    for number, name in enumerate(names):
+        block, column = divmod(number, n_columns)
+        panels = grid[2 * block : 2 * block + 2, column]
+        _draw_task(panels, rows, name)
+        if column == 0:
+            for panel in panels:
+                panel.set_ylabel("mean return, greedy")
+    for panel in grid.ravel():
+        if not panel.has_data():
+            panel.set_axis_off()
     handles = {}
-    for panel in panels.ravel():
+    for panel in grid.ravel():
         handles.update(zip(*reversed(panel.get_legend_handles_labels()), strict=True))
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=6, fontsize=9)
     write_whole(path, figure_bytes(figure)[0])
+
+
+def _draw_task(panels, rows: Sequence[Row], name: str) -> None:
+    """Draw a task's curves into two panels."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    for number, (kind, contender) in enumerate(CONTENDERS.items()):
+        looks = trials(rows, name, "clean", kind)
+        if not looks:
+            continue
+        returns = np.array([[float(r["mean_return"]) for r in trial] for trial in looks])
+        lower, median, upper = np.percentile(returns, (25, 50, 75), axis=0)
+        for panel, field in zip(panels, ("steps", "cpu_seconds"), strict=True):
+            x = np.median([[float(r[field]) for r in trial] for trial in looks], axis=0)
+            (line,) = panel.plot(
+                x, median, "-" if x.size > 1 else "o", color=f"C{number}",
+                label=contender.title, lw=1.6,
+            )  # fmt: skip
+            panel.fill_between(x, lower, upper, color=line.get_color(), alpha=0.2, lw=0)
+    for panel in panels:
+        panel.axhline(TASKS[name].solved, color="0.4", lw=0.8, ls=":")
+        panel.set_xscale("log")
+        panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+        panel.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,g}"))
+        panel.xaxis.set_minor_formatter(NullFormatter())
+    panels[0].set_title(name, loc="left", fontsize=10.5)
+    panels[0].set_xlabel("steps")
+    panels[1].set_xlabel("processor seconds")

@@ -48,7 +48,7 @@ gym.register("examples/River-v0", entry_point=RiverEnv, max_episode_steps=100)
 # %%
 env = gym.make("examples/River-v0")
 agent = SDNNQLearning(env.observation_space, env.action_space, seed=1)
-result = agent.train(env, steps=20_000)
+result = agent.train(env, steps=40_000)
 print(f"{result.n_episodes} crossings, return of the first 50: {result.returns[:50].mean():.2f}")
 
 

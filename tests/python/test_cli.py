@@ -419,3 +419,13 @@ def test_real_quick_run(tmp_path):
         None,
     ]
     assert all(case["n_decisions"] > 0 for case in experiment["cases"])
+
+
+def test_ctrl_c_before_anything_has_begun_has_its_exit_code(monkeypatch):
+    def interrupted(**_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(main.commands["bench"], "callback", interrupted)
+    done = CliRunner().invoke(main, ["bench"])
+    assert done.exit_code == 130
+    assert "Interrupted." in done.output

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from sdnn.cli.bench import bench
 from sdnn.cli.evaluate import evaluate
 from sdnn.cli.export import export
+from sdnn.cli.output import exit_interrupted
 from sdnn.cli.plot import plot
 from sdnn.cli.record import record
 from sdnn.cli.reproduce import reproduce
@@ -42,7 +44,16 @@ def _print_cmake_dir(context: click.Context, _parameter: click.Parameter, value:
     raise click.ClickException("this copy of sdnn has no CMake package; install it with pip")
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+class _Commands(click.Group):
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; Ctrl-C has its exit code also while nothing has begun."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            exit_interrupted(ctx, "Interrupted.")
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--version",
     is_flag=True,
