@@ -21,9 +21,9 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from sdnn import environments
 from sdnn._core import __version__
 from sdnn.instruction_sets import instruction_set, set_instruction_set
+from sdnn.registration import register_when_gymnasium_is_imported
 
 if TYPE_CHECKING:
     from sdnn import (
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         approximators,
         benchmarks,
         coding,
+        environments,
         estimators,
         experiments,
         kernel,
@@ -55,6 +56,8 @@ __all__ = [
     "runs",
     "set_instruction_set",
 ]
+
+register_when_gymnasium_is_imported()
 
 
 def __getattr__(name: str) -> Any:

@@ -1,6 +1,6 @@
 """The acrobot swing-up as a Gymnasium environment, redundant and noisy sensors as wrappers.
 
-Importing ``sdnn`` registers ``sdnn/AcrobotSwingUp-v0``:
+After ``import sdnn`` Gymnasium knows ``sdnn/AcrobotSwingUp-v0``:
 
 >>> import gymnasium as gym
 >>> import sdnn
@@ -15,8 +15,6 @@ and many of them at once, stepped side by side in vector registers:
 How hard it is, is one number, ``goal_tolerance``; `TighteningGoal` lets it fall while the agent
 learns, as in the paper.
 """
-
-import gymnasium as gym
 
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.config import AcrobotConfig, GoalScheduleConfig, SensorConfig
@@ -38,19 +36,4 @@ __all__ = [
     "SensorConfig",
     "TighteningGoal",
     "UnitSensors",
-    "register_environments",
 ]
-
-
-def register_environments() -> None:
-    """Make ``sdnn/AcrobotSwingUp-v0`` known to Gymnasium; a second call changes nothing."""
-    if "sdnn/AcrobotSwingUp-v0" not in gym.registry:
-        gym.register(
-            id="sdnn/AcrobotSwingUp-v0",
-            entry_point="sdnn.environments.acrobot:AcrobotSwingUpEnv",
-            vector_entry_point="sdnn.environments.vector_env:AcrobotSwingUpVectorEnv",
-            reward_threshold=10.0,
-        )
-
-
-register_environments()

@@ -3,6 +3,8 @@
 import doctest
 import importlib
 import re
+import subprocess
+import sys
 import warnings
 
 import gymnasium as gym
@@ -10,7 +12,6 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-import sdnn
 from sdnn import _core
 from sdnn.environments import AcrobotConfig, AcrobotSwingUpEnv
 
@@ -39,8 +40,41 @@ def test_check_env(render_mode, dtype):
 
 def test_importing_the_package_registers_the_environment():
     assert ID in gym.registry
-    sdnn.environments.register_environments()
     assert isinstance(gym.make(ID).unwrapped, AcrobotSwingUpEnv)
+
+
+@pytest.mark.parametrize(
+    "imports",
+    [
+        "import sdnn, gymnasium",
+        "import gymnasium, sdnn",
+        "import sdnn, gymnasium.spaces, gymnasium",
+        "import sdnn.environments, gymnasium",
+        "import gymnasium.envs.registration, sdnn.cli, gymnasium",
+        "import sdnn, sys, gymnasium; del sys.modules['sdnn']; import sdnn",
+        # An import of Gymnasium that fails at first.
+        "import sys, sdnn; sys.modules['numpy'] = None\n"
+        "try: import gymnasium\n"
+        "except ImportError: del sys.modules['numpy']; import gymnasium",
+    ],
+)
+def test_the_environment_is_known_in_whatever_order_modules_are_imported(imports):
+    code = (
+        f"{imports}\n"
+        f"assert gymnasium.make({ID!r}).observation_space.shape == (4,)\n"
+        f"assert gymnasium.make_vec({ID!r}, num_envs=2).num_envs == 2\n"
+        "import importlib.resources, sys\n"
+        "assert importlib.resources.files('gymnasium').joinpath('__init__.py').is_file()\n"
+        "assert not any(type(finder).__module__ == 'sdnn.registration' for finder in sys.meta_path)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_sdnn_without_gymnasium_says_so():
+    code = "import sys, sdnn; sys.modules['gymnasium'] = None; sdnn.environments"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "gymnasium" in done.stderr.splitlines()[-1]
 
 
 def test_spaces():

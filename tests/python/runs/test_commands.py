@@ -398,15 +398,3 @@ def test_a_signal_ends_the_step_and_the_run_goes_on_exactly(invoke, tmp_path, nu
         for folder in ("cut", "whole")
     )
     assert cut == whole
-
-
-def test_commands_start_without_heavy_imports():
-    code = (
-        "import sys, sdnn; before = set(sys.modules); import sdnn.cli;"
-        "heavy = ('matplotlib', 'rich', 'PIL', 'safetensors', 'sdnn.agents', 'sdnn.runs');"
-        "print([m for m in heavy if m in set(sys.modules) - before])"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env=environment()
-    )
-    assert done.stdout.strip() == "[]"
