@@ -20,7 +20,7 @@ from sdnn.agents import SDNNQLearning, evaluate
 
 env = gym.make("MountainCarContinuous-v0")
 agent = SDNNQLearning(env.observation_space, env.action_space, seed=1)
-agent.train(env, steps=30_000)
+agent.train(env, steps=60_000)
 print(f"mean return in Python: {evaluate(agent, env, episodes=20).mean_return:.0f} (90 solves it)")
 
 # %% [markdown]

@@ -57,7 +57,7 @@ test = gym.make("examples/Reaching-v0")
 agent = SDNNQLearning(env.observation_space, env.action_space, seed=1)
 print("action space:", env.action_space, "- actions of each motor:", agent.n_actions)
 before = -evaluate(agent, test, episodes=50).mean_return / 40
-agent.train(env, steps=15_000)
+agent.train(env, steps=20_000)
 after = -evaluate(agent, test, episodes=50).mean_return / 40
 print(f"mean distance before: {before:.2f} m, after: {after:.2f} m")
 

@@ -32,10 +32,13 @@ class Preset:
 
 
 # A full step each time, then ever smaller ones, which rounding stills one by one; targets of five
-# steps; exploration that goes somewhere; an average that does not swing: docs/agents.md.
+# steps; exploration that goes somewhere; an average that does not swing; values in steps half as
+# large as the paper's: docs/benchmarks.md.
 _GENERAL = Preset(
     title="as recommended for any task",
-    approximator=SDNNCConfig(n_actions=5, averaging_interval=100),
+    approximator=SDNNCConfig(
+        n_hidden_units=1800, n_active_units=600, n_actions=5, averaging_interval=100
+    ),
     learning=QLearningConfig(
         learning_rate=1.0,
         final_learning_rate=0.1,
@@ -60,10 +63,12 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
             approximator=SDNNCConfig(n_actions=61),
             learning=QLearningConfig(n_steps=5),
         ),
-        # A fifth of the weights, and as many steps between the values: docs/small-processors.md.
+        # A tenth of the weights, in steps twice as large: docs/small-processors.md.
         "small": Preset(
-            title="as recommended for small processors: the general one, smaller patterns",
-            approximator=replace(_GENERAL.approximator, n_pattern_units=40),
+            title="as recommended for small processors: the general one, fewer units",
+            approximator=replace(
+                _GENERAL.approximator, n_hidden_units=900, n_active_units=300, n_pattern_units=40
+            ),
             learning=_GENERAL.learning,
         ),
     }

@@ -16,12 +16,14 @@ TEST(Presets, ThePapersAreTheDefaults) {
   EXPECT_EQ(preset.learning, QLearningConfig{});
 }
 
-TEST(Presets, TheSmallOneIsTheGeneralOneWithSmallerPatterns) {
+TEST(Presets, TheSmallOneIsTheGeneralOneWithFewerUnits) {
   const Preset small = small_preset(4);
   const Preset general = general_preset(4);
   EXPECT_EQ(small.learning, general.learning);
   approximators::SDNNCConfig resized = small.approximator;
   resized.n_pattern_units = general.approximator.n_pattern_units;
+  resized.n_hidden_units = general.approximator.n_hidden_units;
+  resized.n_active_units = general.approximator.n_active_units;
   EXPECT_EQ(resized, general.approximator);
   // At eight bits a weight, and 360 patterns for each of four inputs.
   const int n_weights = 12 * small.approximator.n_pattern_units * small.approximator.n_hidden_units;

@@ -17,9 +17,14 @@ inline Preset paper_preset(int n_inputs) { return {.approximator = {.n_inputs = 
 
 /// For any task: a full step each time, then, as progress is told, ever smaller ones, which
 /// rounding stills one by one; targets of five steps; exploration that goes somewhere; greedy
-/// actions by an average of the weights (docs/agents.md).
+/// actions by an average of the weights; values in steps half as large as the paper's
+/// (docs/benchmarks.md).
 inline Preset general_preset(int n_inputs) {
-  return {.approximator = {.n_inputs = n_inputs, .n_actions = 5, .averaging_interval = 100},
+  return {.approximator = {.n_inputs = n_inputs,
+                           .n_hidden_units = 1800,
+                           .n_active_units = 600,
+                           .n_actions = 5,
+                           .averaging_interval = 100},
           .learning = {.learning_rate = 1.0,
                        .discount = 0.99,
                        .policy = {.epsilon = 0.03, .n_greedy_steps = 0},
@@ -30,10 +35,12 @@ inline Preset general_preset(int n_inputs) {
                        .value_range = ValueRange::seen}};
 }
 
-/// The general one with smaller patterns, so that the weights fit into the flash of a small
-/// processor (docs/small-processors.md).
+/// The general one with fewer units, so that the weights fit into the flash of a small processor
+/// (docs/small-processors.md).
 inline Preset small_preset(int n_inputs) {
   Preset preset = general_preset(n_inputs);
+  preset.approximator.n_hidden_units = 900;
+  preset.approximator.n_active_units = 300;
   preset.approximator.n_pattern_units = 40;
   return preset;
 }
