@@ -46,6 +46,9 @@ class QLearningConfig:
         task itself changes; a line is what most libraries of deep Q-learning take for epsilon; an
         exponential spends more of the training near a small final value, and has none that is 0.
         Any other function of the progress: `sdnn.agents.Schedule`.
+    exploration_fraction : float
+        Part of the progress in which epsilon goes to ``final_epsilon``, where it then stays, in
+        (0, 1]. Not in the paper.
     value_range : {"given", "seen"}
         Whether Q has the approximator's range, ``q_low`` to ``q_high``, or one that grows with the
         discounted sums of the rewards that come. Not in the paper.
@@ -63,6 +66,7 @@ class QLearningConfig:
     final_epsilon: float | None = added_later(None)
     value_range: Literal["given", "seen"] = added_later("given")
     schedule: Literal["linear", "exponential"] = added_later("linear")
+    exploration_fraction: float = added_later(1.0)
 
     def to_core(self) -> _core.QLearningConfig:
         """Make the core's struct of the same values; see `sdnn.config.to_core`."""

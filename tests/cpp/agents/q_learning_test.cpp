@@ -594,6 +594,33 @@ TEST(QLearning, AnExponentialScheduleStaysBetweenItsEnds) {
   }
 }
 
+TEST(QLearning, EpsilonMayReachItsFinalValueBeforeTheEnd) {
+  const QLearningConfig config{.learning_rate = 1.0,
+                               .policy = {.epsilon = 0.5},
+                               .final_learning_rate = 0.5,
+                               .final_epsilon = 0.125,
+                               .exploration_fraction = 0.25};
+  Agent agent(LookupTable(1, 5, 2), config, 1);
+  EXPECT_EQ(agent.epsilon(), 0.5);
+  agent.set_progress(0.125);
+  EXPECT_EQ(agent.epsilon(), 0.3125);
+  EXPECT_EQ(agent.learning_rate(), 0.9375);
+  for (const double progress : {0.25, 0.3, 1.0}) {
+    agent.set_progress(progress);
+    EXPECT_EQ(agent.epsilon(), 0.125);
+  }
+  QLearningConfig exponential = config;
+  exponential.schedule = Schedule::exponential;
+  EXPECT_DOUBLE_EQ(exponential.epsilon_at(0.125), 0.25);
+  EXPECT_EQ(exponential.epsilon_at(0.3), 0.125);
+  EXPECT_EQ(message({.exploration_fraction = 0.0}),
+            "exploration_fraction must be in (0, 1], got 0");
+  EXPECT_EQ(message({.exploration_fraction = 1.5}),
+            "exploration_fraction must be in (0, 1], got 1.5");
+  const Agent steady(LookupTable(1, 5, 2), {.exploration_fraction = 0.25}, 1);
+  EXPECT_EQ(steady.config().epsilon_at(0.1), 0.1);
+}
+
 TEST(QLearning, AnExponentialScheduleHasNoEndAtZero) {
   EXPECT_EQ(message({.final_epsilon = 0.0, .schedule = Schedule::exponential}),
             "final_epsilon must be greater than 0 where the schedule is exponential, got 0");

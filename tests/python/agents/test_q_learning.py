@@ -144,6 +144,7 @@ def test_every_field_reaches_the_core():
         final_epsilon=0.25,
         value_range="seen",
         schedule="exponential",
+        exploration_fraction=0.5,
     )
     core = other.to_core()
     for field in dataclasses.fields(QLearningConfig):

@@ -60,7 +60,22 @@ def test_without_final_values_rates_stay():
         assert (agent.learning_rate, agent.epsilon) == (0.3, 0.0)
 
 
+@pytest.mark.parametrize("space", [PLANE, UNBOUNDED], ids=["born", "warming up"])
+def test_epsilon_may_reach_its_final_value_before_the_end(space):
+    agent = new_agent(space, exploration_fraction=0.25, **FALLING)
+    whole = new_agent(space, **FALLING)
+    for progress in (0.0, 0.1, 0.25, 0.26, 1.0):
+        agent.progress, whole.progress = progress, min(1.0, progress / 0.25)
+        assert agent.epsilon == whole.epsilon
+        whole.progress = progress
+        assert agent.learning_rate == whole.learning_rate
+    assert agent.epsilon == FALLING["final_epsilon"]
+
+
 def test_impossible_schedules_are_named():
+    for bad in (0.0, 1.5, float("nan")):
+        with pytest.raises(ValueError, match="exploration_fraction must be in"):
+            new_agent(exploration_fraction=bad)
     with pytest.raises(ValueError, match="schedule must be one of 'linear', 'exponential'"):
         new_agent(schedule="cosine")
     with pytest.raises(ValueError, match="final_epsilon must be greater than 0 where the schedule"):

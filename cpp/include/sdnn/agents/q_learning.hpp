@@ -52,13 +52,14 @@ struct QLearningConfig {
   std::optional<double> final_epsilon = {};        ///< at progress 1, in [0, 1]; none: the same
   ValueRange value_range = ValueRange::given;
   Schedule schedule = Schedule::linear;  ///< to the final values
+  double exploration_fraction = 1.0;     ///< of the progress, until final_epsilon; in (0, 1]
 
   /// Alpha and epsilon at a progress in [0, 1].
   double learning_rate_at(double progress) const noexcept {
     return between(learning_rate, final_learning_rate, progress);
   }
   double epsilon_at(double progress) const noexcept {
-    return between(policy.epsilon, final_epsilon, progress);
+    return between(policy.epsilon, final_epsilon, std::min(1.0, progress / exploration_fraction));
   }
 
   static constexpr auto fields() noexcept {
@@ -71,7 +72,8 @@ struct QLearningConfig {
                    core::field("final_learning_rate", &QLearningConfig::final_learning_rate),
                    core::field("final_epsilon", &QLearningConfig::final_epsilon),
                    core::field("value_range", &QLearningConfig::value_range),
-                   core::field("schedule", &QLearningConfig::schedule)));
+                   core::field("schedule", &QLearningConfig::schedule),
+                   core::field("exploration_fraction", &QLearningConfig::exploration_fraction)));
   }
   bool operator==(const QLearningConfig&) const = default;
 
@@ -339,6 +341,7 @@ class QLearning {
     core::require_in_range("max_repetitions", config.max_repetitions, 1, 1000000);
     require_rate("final_learning_rate", config.final_learning_rate.value_or(1.0));
     core::require_in_range("final_epsilon", config.final_epsilon.value_or(0.0), 0.0, 1.0);
+    require_rate("exploration_fraction", config.exploration_fraction);
     if (config.schedule == Schedule::exponential && config.final_epsilon) {
       const char* const expected = "greater than 0 where the schedule is exponential";
       core::require(config.policy.epsilon > 0.0, "epsilon", expected, config.policy.epsilon);
