@@ -49,6 +49,10 @@ class QLearningConfig:
     exploration_fraction : float
         Part of the progress in which epsilon goes to ``final_epsilon``, where it then stays, in
         (0, 1]. Not in the paper.
+    n_random_steps : int
+        First steps of the agent's life in which every action is random, whatever epsilon, 0 to
+        2**30. Not in the paper, which has 0: a rare success is found before the greedy actions have
+        learned to do nothing.
     value_range : {"given", "seen"}
         Whether Q has the approximator's range, ``q_low`` to ``q_high``, or one that grows with the
         discounted sums of the rewards that come. Not in the paper.
@@ -67,6 +71,7 @@ class QLearningConfig:
     value_range: Literal["given", "seen"] = added_later("given")
     schedule: Literal["linear", "exponential"] = added_later("linear")
     exploration_fraction: float = added_later(1.0)
+    n_random_steps: int = added_later(0)
 
     def to_core(self) -> _core.QLearningConfig:
         """Make the core's struct of the same values; see `sdnn.config.to_core`."""

@@ -309,6 +309,38 @@ TEST(QLearning, AKeptActionEndsWithTheEpisodeAndEvaluationDoesNotUseItUp) {
   EXPECT_NEAR(n_kept, 100, 36);  // P(d >= 2)
 }
 
+TEST(QLearning, TheFirstStepsOfALifeAreRandom) {
+  LookupTable table(1, 1, 1 << 17);
+  table.correct(cell(0), 5, 1.0);
+  for (const int longest : {1, 7}) {
+    Agent agent(table,
+                {.policy = {.epsilon = 0.0}, .max_repetitions = longest, .n_random_steps = 50}, 1);
+    std::size_t last = 5;
+    int n_repeated = 0;
+    for (int i = 0; i < 50; ++i) {
+      if (i % 20 == 19) agent.begin_episode();
+      EXPECT_EQ(agent.act(cell(0), false), 5U);
+      const std::size_t action = agent.act(cell(0));
+      EXPECT_NE(action, 5U);
+      n_repeated += action == last;
+      last = action;
+    }
+    EXPECT_EQ(n_repeated > 5, longest > 1);
+    agent.begin_episode();  // ends what may be kept
+    for (int i = 0; i < 20; ++i) EXPECT_EQ(agent.act(cell(0)), 5U);
+  }
+  EXPECT_EQ(message({.n_random_steps = -1}), "n_random_steps must be in [0, 1073741824], got -1");
+}
+
+TEST(QLearning, ABadStateIsNoneOfTheFirstSteps) {
+  QLearning<RBFNetwork> agent(RBFNetwork({.n_inputs = 1}),
+                              {.policy = {.epsilon = 0.0}, .n_random_steps = 1}, 1);
+  EXPECT_THROW((void)agent.act({{2.0}}), std::invalid_argument);
+  EXPECT_EQ(testing::number_of<std::int32_t>(core::state_of(agent), "n_random_left"), 1);
+  (void)agent.act(cell(0));
+  EXPECT_FALSE(core::state_of(agent).contains("n_random_left"));
+}
+
 TEST(QLearning, WithoutRepetitionsTheirStreamIsNotTouched) {
   QLearning<RBFNetwork> agent(RBFNetwork({.n_inputs = 1}),
                               {.policy = {.epsilon = 1.0, .n_greedy_steps = 0}}, 1);
@@ -402,7 +434,8 @@ QLearningConfig everything() {
           .max_repetitions = 5,
           .final_learning_rate = 0.25,
           .final_epsilon = 0.0,
-          .value_range = ValueRange::seen};
+          .value_range = ValueRange::seen,
+          .n_random_steps = 20};
 }
 
 QLearning<SDNNC> sdnn_agent() {
@@ -539,6 +572,7 @@ TEST(QLearning, RefusesEnvironmentsThatAreNone) {
 TEST(QLearning, RefusesAStateOfEnvironmentsThatDoesNotFit) {
   auto agent = rbf_agent();
   agent.set_n_environments(3);
+  for (int t = 0; t < 20; ++t) (void)agent.act(std::vector{0.5, 0.5});  // until none is left
   testing::expect_that_damage_is_refused(agent);
   const core::State good = core::state_of(agent);
   const auto refused = [&](const core::State& bad, const std::string& message) {
@@ -699,6 +733,8 @@ TEST(QLearning, OfOneDimensionDoesWhatAnAgentWithoutDimensionsDoes) {
 TEST(QLearning, RefusesAStateThatDoesNotFit) {
   auto agent = sdnn_agent();
   testing::World<QLearning<SDNNC>> world(2, 7);
+  const core::State young = core::state_of(agent);
+  while (core::state_of(agent).contains("n_random_left")) world.tick(agent);
   while (testing::number_of<std::int32_t>(core::state_of(agent), "n_kept") == 0 ||
          core::state_of(agent).at("waiting.rewards").size() < 2) {
     world.tick(agent);
@@ -718,6 +754,10 @@ TEST(QLearning, RefusesAStateThatDoesNotFit) {
   refused(with_number(good, "waiting.rewards", testing::kNaN, 1), "waiting.rewards must be finite");
   refused(with_number(good, "waiting.states", testing::kNaN, 3),
           "waiting.states must be in [0, 1]");
+  for (const int bad : {-1, 21}) {
+    refused(with_number(young, "n_random_left", bad),
+            "n_random_left must be in [0, n_random_steps]");
+  }
   refused(with_number(good, "step", -1), "step must be 0 or more");
   refused(with_number(good, "n_kept", -1), "n_kept must be in [0, max_repetitions)");
   refused(with_number(good, "n_kept", 5), "n_kept must be in [0, max_repetitions)");

@@ -145,6 +145,7 @@ def test_every_field_reaches_the_core():
         value_range="seen",
         schedule="exponential",
         exploration_fraction=0.5,
+        n_random_steps=7,
     )
     core = other.to_core()
     for field in dataclasses.fields(QLearningConfig):

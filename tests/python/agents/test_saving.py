@@ -35,6 +35,7 @@ GENERAL = QLearningConfig(
     final_epsilon=0.0,
     n_greedy_steps=0,
     max_repetitions=6,
+    n_random_steps=15,
     value_range="seen",
 )
 RANDOMLY = SDNNCConfig(

@@ -29,7 +29,7 @@ AutoresetMode = gym.vector.AutoresetMode
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
 GENERAL = QLearningConfig(
     n_steps=3, epsilon=0.3, final_epsilon=0.01, n_greedy_steps=2, max_repetitions=6,
-    value_range="seen",
+    n_random_steps=9, value_range="seen",
 )  # fmt: skip
 
 

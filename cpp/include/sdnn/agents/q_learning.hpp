@@ -53,6 +53,7 @@ struct QLearningConfig {
   ValueRange value_range = ValueRange::given;
   Schedule schedule = Schedule::linear;  ///< to the final values
   double exploration_fraction = 1.0;     ///< of the progress, until final_epsilon; in (0, 1]
+  int n_random_steps = 0;  ///< first steps of a life without greedy actions, in [0, 2^30]
 
   /// Alpha and epsilon at a progress in [0, 1].
   double learning_rate_at(double progress) const noexcept {
@@ -73,7 +74,8 @@ struct QLearningConfig {
                    core::field("final_epsilon", &QLearningConfig::final_epsilon),
                    core::field("value_range", &QLearningConfig::value_range),
                    core::field("schedule", &QLearningConfig::schedule),
-                   core::field("exploration_fraction", &QLearningConfig::exploration_fraction)));
+                   core::field("exploration_fraction", &QLearningConfig::exploration_fraction),
+                   core::field("n_random_steps", &QLearningConfig::n_random_steps)));
   }
   bool operator==(const QLearningConfig&) const = default;
 
@@ -107,6 +109,10 @@ struct QLearningConfig {
 /// Source: Dabney, W., Ostrovski, G., Barreto, A. (2021). Temporally-extended epsilon-greedy
 /// exploration (with this distribution in the place of the zeta one, which it resembles).
 ///
+/// In its first n_random_steps steps an agent takes random actions only: a rare success is found
+/// before the greedy ones have learned to do nothing. Source: the start_steps of Achiam, J. (2018),
+/// Spinning up in deep reinforcement learning, kept for some steps as above.
+///
 /// An agent may learn in several environments at once, numbered from 0: what belongs to an episode
 /// (the steps that wait, the kept action, the number of its steps, the sum of its rewards) is then
 /// kept for each, all else is shared. Which of them acts or learns when is the caller's choice.
@@ -124,6 +130,7 @@ class QLearning {
         policy_(config.policy, seed),
         repetitions_(seed, core::Stream::repetitions),
         range_(config.discount),
+        n_random_left_(config.n_random_steps),
         learning_rate_(config.learning_rate),
         episodes_(new_episode()) {
     for (std::size_t d = 0; d < n_dimensions(); ++d) values_.emplace_back(n_actions(d));
@@ -211,7 +218,11 @@ class QLearning {
     core::require_unit_values("state", state, n_inputs());  // before anything is drawn
     // Evaluating is no step of the episode: it must not move the end of the greedy phase.
     const int step = episode.step++;
-    if (episode.n_kept == 0 && !policy_.explores(step)) return best_action(state, true);
+    const bool at_random = n_random_left_ > 0;
+    if (at_random) --n_random_left_;
+    if (episode.n_kept == 0 && !at_random && !policy_.explores(step)) {
+      return best_action(state, true);
+    }
     std::vector<std::size_t>& kept = episode.kept;
     if (episode.n_kept > 0) {
       --episode.n_kept;
@@ -270,6 +281,9 @@ class QLearning {
     archive.number("progress", self.progress_);
     archive.number("learning_rate", self.set_learning_rate_);
     archive.number("epsilon", self.set_epsilon_);
+    std::optional<int> n_random_left;  // none where there are no more
+    if (self.n_random_left_ > 0) n_random_left = self.n_random_left_;
+    archive.number("n_random_left", n_random_left);
     Episodes<Episode>::exchange(
         self.episodes_, archive, [&self] { return self.new_episode(); },
         [&](auto& episode) { exchange_episode(self, episode, archive); });
@@ -279,6 +293,9 @@ class QLearning {
       archive.expect(rate > 0.0 && rate <= 1.0, "learning_rate", "in (0, 1]");
       const double epsilon = self.set_epsilon_.value_or(0.0);
       archive.expect(epsilon >= 0.0 && epsilon <= 1.0, "epsilon", "in [0, 1]");
+      self.n_random_left_ = n_random_left.value_or(0);
+      archive.expect(self.n_random_left_ >= 0 && self.n_random_left_ <= self.config_.n_random_steps,
+                     "n_random_left", "in [0, n_random_steps]");
       self.apply_rates();
     }
   }
@@ -342,6 +359,7 @@ class QLearning {
     require_rate("final_learning_rate", config.final_learning_rate.value_or(1.0));
     core::require_in_range("final_epsilon", config.final_epsilon.value_or(0.0), 0.0, 1.0);
     require_rate("exploration_fraction", config.exploration_fraction);
+    core::require_in_range("n_random_steps", config.n_random_steps, 0, 1 << 30);
     if (config.schedule == Schedule::exponential && config.final_epsilon) {
       const char* const expected = "greater than 0 where the schedule is exponential";
       core::require(config.policy.epsilon > 0.0, "epsilon", expected, config.policy.epsilon);
@@ -451,6 +469,7 @@ class QLearning {
   EpsilonGreedy policy_;
   core::Random repetitions_;
   ReturnRange range_;
+  int n_random_left_;  ///< steps that will still be random
   double progress_ = 0.0;
   std::optional<double> set_learning_rate_, set_epsilon_;
   double learning_rate_;
