@@ -61,6 +61,8 @@ def real(name: str, value: Any) -> float:
     Traceback (most recent call last):
     ValueError: period must be a number, got 'a day'
     """
+    if type(value) is float:
+        return value
     if not isinstance(value, Real) or isinstance(value, bool):
         raise ValueError(f"{name} must be a number, got {value!r}")
     try:

@@ -17,11 +17,21 @@ Numbers: TypeAlias = list[Any]
 """A number per dimension: an index, or a number in [-1, 1]."""
 
 
+_Bytes: TypeAlias = tuple[Any, bytes] | None
+"""Type and bytes of an array."""
+
+
+def _bytes_of(action: Any) -> _Bytes:
+    if isinstance(action, np.ndarray | np.generic):
+        return action.dtype, action.tobytes()
+    return None
+
+
 class Actions(abc.ABC):
     """Actions of a space as the core has them, a number for each dimension, and back.
 
     The action taken last in each environment is remembered with what it was in the core; only
-    other ones are looked up. What is remembered are its numbers, not the array given away, which
+    other ones are looked up. What is remembered are its bytes, not the array given away, which
     others may change.
 
     Parameters
@@ -44,7 +54,7 @@ class Actions(abc.ABC):
 
     def __init__(self, space: gym.Space[Any]) -> None:
         self.space = space
-        self._taken: dict[int, tuple[bytes, Numbers]] = {}
+        self._taken: dict[int, tuple[_Bytes, Numbers]] = {}
         self.is_box = isinstance(space, gym.spaces.Box)
         if isinstance(space, gym.spaces.Box):
             self.low, self.high = _finite_bounds(space)
@@ -73,15 +83,20 @@ class Actions(abc.ABC):
     def take(self, numbers: Numbers, environment: int = 0) -> Any:
         """Make the element of the space, and remember it."""
         action = self.element(numbers)
-        self._taken[environment] = (self.vector(action).tobytes(), numbers)
+        self._taken[environment] = (_bytes_of(action), numbers)
         return action
 
     def numbers(self, action: Any, environment: int = 0) -> Numbers:
         """Find what an element of the space is in the core; ValueError if it is none."""
-        values = self.vector(action)
         taken = self._taken.get(environment)
-        if taken is not None and values.tobytes() == taken[0]:
-            return taken[1]
+        if taken is None:
+            return self._find(self.vector(action))
+        known, numbers = taken
+        if known is not None and known == _bytes_of(action):
+            return numbers
+        values = self.vector(action)
+        if np.array_equal(values, self.vector(self.element(numbers))):
+            return numbers  # as a list, or in another type
         return self._find(values)
 
     def forget(self, n_environments: int) -> None:
@@ -91,10 +106,14 @@ class Actions(abc.ABC):
 
     def check(self, numbers: Numbers) -> None:
         """Raise ValueError or TypeError unless these are the numbers of an action."""
-        self.vector(self.element(numbers))
+        self.vector(self._make(numbers))
+
+    def element(self, numbers: Numbers) -> Any:
+        """Make the element of the space."""
+        return self._make(numbers)
 
     @abc.abstractmethod
-    def element(self, numbers: Numbers) -> Any:
+    def _make(self, numbers: Numbers) -> Any:
         """Make the element of the space."""
 
     @abc.abstractmethod
@@ -146,6 +165,7 @@ class IndexedActions(Actions):
     def __init__(self, space: gym.Space[Any], n_actions: int) -> None:
         super().__init__(space)
         self.n_actions = [n_actions] * self.n_dimensions if self.is_box else self._sizes
+        self._made: dict[tuple[int, ...], Any] = {}
 
     def values(self, dimension: int) -> NDArray[Any]:
         """Give the actions of a dimension in order, shape (n_actions[dimension],)."""
@@ -155,7 +175,15 @@ class IndexedActions(Actions):
         return np.array([self._value(dimension, index) for index in range(n)])
 
     def element(self, numbers: Numbers) -> Any:
-        """Make the element of the space."""
+        """Make the element of the space, or copy one that was made before."""
+        key = tuple(numbers)
+        if key not in self._made:
+            if len(self._made) == _MOST_REMEMBERED:
+                self._made.clear()
+            self._made[key] = self._make(numbers)
+        return self._made[key].copy()
+
+    def _make(self, numbers: Numbers) -> Any:
         if self.is_box:
             values = [self._value(dimension, index) for dimension, index in enumerate(numbers)]
             return self._boxed(np.array(values))
@@ -190,8 +218,8 @@ class ContinuousActions(Actions):
         if not self.is_box:
             raise TypeError(f"action_space must be a Box, got {type(space).__name__}")
 
-    def element(self, numbers: Numbers) -> Any:
-        """Make the element of the space, of numbers in [-1, 1]."""
+    def _make(self, numbers: Numbers) -> Any:
+        """Of numbers in [-1, 1]."""
         middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
         values = np.clip(middle + half * np.asarray(numbers), self.low, self.high)
         return self._boxed(values)
@@ -205,6 +233,7 @@ class ContinuousActions(Actions):
 
 
 _MOST_DIMENSIONS = 1024
+_MOST_REMEMBERED = 1024
 _MOST_ACTIONS = 2**20
 _FURTHEST = 1e300
 """Of bounds: what lies between them, times the number of an action, must stay finite."""

@@ -92,7 +92,7 @@ class UnitObservations:
                 f" and {list(self._pairs)}"
             )
         self._is_settled = False
-        self._converted: tuple[tuple[bytes, NDArray[np.float64]], ...] = ((b"", np.empty(0)),) * 2
+        self._converted: tuple[tuple[Any, NDArray[np.float64]], ...] = ((None, np.empty(0)),) * 2
         if not self._finds_pairs and not self._unknown().any():
             self._settled()
 
@@ -113,7 +113,9 @@ class UnitObservations:
 
     def flat(self, name: str, observation: Any) -> NDArray[np.float64]:
         """Flatten an observation, shape (n_variables,); ValueError if it is none, or has NaN."""
-        values = self._vector(name, observation)
+        return self._checked(name, self._vector(name, observation))
+
+    def _checked(self, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
         if np.isnan(values).any():
             raise ValueError(f"{name} must not hold NaN, got {values}")
         return values
@@ -133,20 +135,19 @@ class UnitObservations:
 
     def __call__(self, name: str, observation: Any) -> NDArray[np.float64]:
         """Convert an observation; ValueError with its ``name`` for another shape or NaN."""
-        values = self._vector(name, observation)
-        key = values.tobytes()  # not the array, which others may change
+        is_array = isinstance(observation, np.ndarray) and observation.shape == self._shape
+        values = observation if is_array else self._vector(name, observation)
+        key = values.dtype, values.tobytes()  # not the array, which others may change
         for known, state in self._converted:  # a step asks for each one three times
             if key == known:
                 return state
-        if np.isnan(values).any():
-            raise ValueError(f"{name} must not hold NaN, got {values}")
-        state = self.unit(values)
+        state = self.unit(self._checked(name, self._vector(name, values) if is_array else values))
         self._converted = (self._converted[1], (key, state))
         return state
 
     def unit(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Convert what `flat` gave, shape (n_inputs,)."""
-        scaled = (values - self.low) / (self.high - self.low)
+        scaled = (values - self.low) / self._width
         scaled = np.minimum(np.maximum(scaled, 0.0), 1.0)
         if self._plain:
             return scaled
@@ -228,7 +229,8 @@ class UnitObservations:
                 inputs.append({"variable": variable})
         while len(inputs) < self._least_inputs:
             inputs.append(dict(inputs[-1]))
-        self._converted = ((b"", np.empty(0)),) * 2
+        self._converted = ((None, np.empty(0)),) * 2
+        self._width = self.high - self.low
         self.inputs = inputs
         self._plain = inputs == [{"variable": i} for i in range(self.n_variables)]
         self._is_settled = True

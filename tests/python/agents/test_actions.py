@@ -54,6 +54,40 @@ def test_the_action_taken_is_remembered_by_its_numbers():
         actions.numbers(taken)
 
 
+def test_the_action_taken_is_known_in_other_forms():
+    actions = ContinuousActions(FLOATS)
+    taken = actions.take([0.25, -0.5])
+    for same in (taken.tolist(), taken.astype(np.float64), taken.reshape(2, 1), tuple(taken)):
+        assert actions.numbers(same) == [0.25, -0.5]
+    buttons = IndexedActions(gym.spaces.Discrete(3, start=2), 1)
+    taken = buttons.take([1])
+    for same in (taken, int(taken), np.array(taken), np.array([taken]), float(taken)):
+        assert buttons.numbers(same) == [1]
+    assert buttons.numbers(4) == [2]
+    # The same bytes, but another type: the whole number 2 is the smallest double above 0.
+    assert not buttons.space.contains(np.frombuffer(buttons.take([0]).tobytes())[0])
+    with pytest.raises(ValueError, match="action must be in Discrete"):
+        buttons.numbers(np.frombuffer(buttons.take([0]).tobytes())[0])
+
+
+def test_what_is_done_to_an_action_does_not_change_the_next():
+    actions = IndexedActions(FLOATS, 5)
+    first = actions.element([4, 0])
+    expected = first.copy()
+    first[:] = 0.5
+    assert np.array_equal(actions.element([4, 0]), expected)
+    with pytest.raises(TypeError):
+        actions.check([4.0, 0.0])
+
+
+def test_more_actions_than_are_remembered_are_made():
+    actions = IndexedActions(gym.spaces.Box(-1.0, 1.0, (1,)), 3000)
+    for index in [*range(3000), *range(3000)]:
+        element = actions.take([index])
+        assert actions.numbers(element) == [index]
+        assert element == pytest.approx(-1.0 + 2.0 * index / 2999)
+
+
 def test_random_actions_are_of_the_space_and_reach_all_of_it():
     generator = np.random.default_rng(1)
     drawn = IndexedActions(FLOATS, 3)

@@ -169,3 +169,35 @@ def test_an_angle_needs_a_range():
 def test_elements_of_other_spaces_are_refused_by_name(space, observation):
     with pytest.raises(ValueError, match="following must be of"):
         UnitObservations(space)("following", observation)
+
+
+def test_an_observation_is_known_by_its_type_bytes_and_shape():
+    space = gym.spaces.Box(-1e9, 1e9, (2,), np.float64)
+    observations = UnitObservations(space)
+    seen = np.array([1.0, -2.0])
+    first = observations("observation", seen)
+    assert observations("observation", seen) is first
+    assert observations("observation", seen.tolist()) is first
+    whole = seen.view(np.int64)  # the same bytes, other numbers
+    assert not np.array_equal(observations("observation", np.abs(whole) % 1000), first)
+    for bad in (whole.view(np.float64).reshape(2, 1), seen[:1]):
+        with pytest.raises(ValueError, match="observation must have shape"):
+            observations("observation", bad)
+    with pytest.raises(ValueError, match="observation must be numbers"):
+        observations("observation", np.array([None, None]))
+    kept = first.copy()
+    seen[:] = 5.0
+    assert not np.array_equal(observations("observation", seen), kept)
+    seen[:] = np.nan
+    with pytest.raises(ValueError, match="observation must not hold NaN"):
+        observations("observation", seen)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int8, np.uint8])
+def test_memory_does_not_change_what_is_converted(dtype):
+    space = gym.spaces.Box(0, 100, (3,), dtype)
+    observations, rng = UnitObservations(space), np.random.default_rng(3)
+    for _ in range(300):
+        one = rng.integers(0, 3, 3).astype(dtype)
+        expected = UnitObservations(space)("observation", one.tolist())
+        np.testing.assert_array_equal(observations("observation", one), expected)
