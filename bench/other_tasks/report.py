@@ -102,7 +102,7 @@ def _task_rows(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
                     str(int((returns >= task.solved).sum())),
                     f"{np.median([float(trial[-1]['cpu_seconds']) for trial in looks]):.1f} s",
                     f"{seconds:.1f} s" if np.isfinite(seconds) else "not reached",
-                    f"{n_bytes / 2**20:.1f} MiB",
+                    f"{n_bytes / 2**20:.2f} MiB",
                 )
 
 

@@ -17,14 +17,10 @@ Numbers: TypeAlias = list[Any]
 """A number per dimension: an index, or a number in [-1, 1]."""
 
 
-_Bytes: TypeAlias = tuple[Any, bytes] | None
-"""Type and bytes of an array."""
-
-
-def _bytes_of(action: Any) -> _Bytes:
-    if isinstance(action, np.ndarray | np.generic):
-        return action.dtype, action.tobytes()
-    return None
+def _bytes_of(action: Any) -> tuple[Any, bytes] | None:
+    """Give the type and bytes of what NumPy holds, as elements of spaces are; None of others."""
+    is_numpy = isinstance(action, np.ndarray | np.generic)
+    return (action.dtype, action.tobytes()) if is_numpy else None
 
 
 class Actions(abc.ABC):
@@ -54,7 +50,7 @@ class Actions(abc.ABC):
 
     def __init__(self, space: gym.Space[Any]) -> None:
         self.space = space
-        self._taken: dict[int, tuple[_Bytes, Numbers]] = {}
+        self._taken: dict[int, tuple[Any, Numbers]] = {}
         self.is_box = isinstance(space, gym.spaces.Box)
         if isinstance(space, gym.spaces.Box):
             self.low, self.high = _finite_bounds(space)
@@ -92,7 +88,7 @@ class Actions(abc.ABC):
         if taken is None:
             return self._find(self.vector(action))
         known, numbers = taken
-        if known is not None and known == _bytes_of(action):
+        if known == _bytes_of(action):
             return numbers
         values = self.vector(action)
         if np.array_equal(values, self.vector(self.element(numbers))):

@@ -113,9 +113,7 @@ class UnitObservations:
 
     def flat(self, name: str, observation: Any) -> NDArray[np.float64]:
         """Flatten an observation, shape (n_variables,); ValueError if it is none, or has NaN."""
-        return self._checked(name, self._vector(name, observation))
-
-    def _checked(self, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        values = self._vector(name, observation)
         if np.isnan(values).any():
             raise ValueError(f"{name} must not hold NaN, got {values}")
         return values
@@ -135,13 +133,13 @@ class UnitObservations:
 
     def __call__(self, name: str, observation: Any) -> NDArray[np.float64]:
         """Convert an observation; ValueError with its ``name`` for another shape or NaN."""
-        is_array = isinstance(observation, np.ndarray) and observation.shape == self._shape
-        values = observation if is_array else self._vector(name, observation)
+        fits = isinstance(observation, np.ndarray) and observation.shape == self._shape
+        values = observation if fits else self._vector(name, observation)
         key = values.dtype, values.tobytes()  # not the array, which others may change
         for known, state in self._converted:  # a step asks for each one three times
             if key == known:
                 return state
-        state = self.unit(self._checked(name, self._vector(name, values) if is_array else values))
+        state = self.unit(self.flat(name, observation))
         self._converted = (self._converted[1], (key, state))
         return state
 
