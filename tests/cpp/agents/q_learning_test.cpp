@@ -420,7 +420,9 @@ TEST(QLearning, TheRangeOfValuesFollowsTheRewards) {
   agent.learn(state, 0, -20.0, state, false);  // -20 + 8 / 2 = -16, and (10 + 16) / 4
   expect_range(-22.5, 10.0);
   agent.begin_episode();
-  agent.learn(state, 0, 10.0, state, false);
+  agent.learn(state, 0, 10.0, state, true);
+  expect_range(-22.5, 10.0);
+  for (int i = 0; i < 5; ++i) agent.learn(state, 0, 10.0, state, true);  // nothing followed
   expect_range(-22.5, 10.0);
 
   QLearning<SDNNC> given(SDNNC(network(), 1), {.discount = 0.5}, 1);

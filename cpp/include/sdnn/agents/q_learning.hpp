@@ -258,6 +258,7 @@ class QLearning {
       if (adapts_range() && range_.note(reward, episode.sum)) {
         action_value_.set_output_range(range_.low(), range_.high());
       }
+      if (terminated) episode.sum = 0.0;  // nothing follows, whether or not an episode is begun
     }
     // The next state first: the network then remembers it, corrected, for the next decision.
     const double next_value = terminated ? 0.0 : state_value(next_state);
