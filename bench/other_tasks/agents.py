@@ -13,10 +13,12 @@ from functools import partial
 from typing import Any, Protocol
 
 import gymnasium as gym
+import numpy as np
 import stable_baselines
 import stream_ac
+from numpy.typing import NDArray
 from tasks import TASKS
-from tile_coding import TileCodingSarsa, listed_actions
+from tile_coding import N_VALUES, TileCodingSarsa, listed_actions
 
 from sdnn.agents import Callback, RBFQLearning, SDNNQLearning
 from sdnn.agents.presets import PRESETS
@@ -99,11 +101,45 @@ def _learn_joint(name, condition, steps, seed, after_step):
     _learn_in(env, SDNNQLearning, name, condition, steps, seed, after)
 
 
+def ascend(values: NDArray[np.float64]) -> tuple[int, ...]:
+    """Search the largest of values, an axis for each dimension, one dimension at a time.
+
+    From the middle, until no dimension alone can do better.
+    """
+    at = [n // 2 for n in values.shape]
+    best = -np.inf
+    while values[tuple(at)] > best:
+        best = values[tuple(at)]
+        for dimension in range(len(at)):
+            line = np.moveaxis(values, dimension, -1)[tuple(np.delete(at, dimension))]
+            if line.max() > line[at[dimension]]:
+                at[dimension] = int(np.argmax(line))
+    return tuple(at)
+
+
+def _learn_joint_ascending(name, condition, steps, seed, after_step):
+    """Learn as the joint one does, and look at what its network is worth when it is searched so."""
+    env = ListedActions(TASKS[name].make(condition))
+    agent = _agent(env, SDNNQLearning, name, condition, seed)
+    shape = (N_VALUES,) * env.unwrapped.action_space.shape[0]
+
+    def policy(observation):
+        values = agent.q_values(observation).reshape(shape)
+        return env.action(np.ravel_multi_index(ascend(values), shape))
+
+    report = _Report(lambda n_steps, _, memory: after_step(n_steps, policy, memory))
+    agent.train(env, steps=steps, callbacks=[report])
+
+
 def _learn_in(env, make, name, condition, steps, seed, after_step):
+    agent = _agent(env, make, name, condition, seed)
+    agent.train(env, steps=steps, callbacks=[_Report(after_step)])
+
+
+def _agent(env, make, name, condition, seed):
     # What is said of angles is said of observations as they are.
     options = TASKS[name].options if condition == "clean" else {}
-    agent = make(env.observation_space, env.action_space, seed=seed, **options)
-    agent.train(env, steps=steps, callbacks=[_Report(after_step)])
+    return make(env.observation_space, env.action_space, seed=seed, **options)
 
 
 def _rbf(*spaces, **options):
@@ -164,6 +200,11 @@ CONTENDERS = {
     ),
     "sdnn-joint": Contender(
         title="SDNN-C, joint actions", learn=_learn_joint, tasks=("Reaching", "Wheels")
+    ),
+    "sdnn-joint-ascent": Contender(
+        title="SDNN-C, joint actions, by ascent",
+        learn=_learn_joint_ascending,
+        tasks=("Reaching", "Wheels"),
     ),
     "rbf": Contender(
         title="RBFN",

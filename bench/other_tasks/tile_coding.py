@@ -40,11 +40,14 @@ class TileCoding:
         return self._first + tile @ self._stride
 
 
+N_VALUES = 5
+
+
 def listed_actions(space):
-    """All actions of a space; a Box's with 5 values in each dimension, in all combinations."""
+    """All actions of a space; a Box's with N_VALUES in each dimension, in all combinations."""
     if not isinstance(space, gym.spaces.Box):
         return list(range(space.n))
-    values = np.linspace(space.low, space.high, 5, dtype=np.float32).T
+    values = np.linspace(space.low, space.high, N_VALUES, dtype=np.float32).T
     return [np.array(action) for action in itertools.product(*values)]
 
 
