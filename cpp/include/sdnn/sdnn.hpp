@@ -28,6 +28,7 @@
 #include "sdnn/coding/random_inverse.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/coding/state_code.hpp"
+#include "sdnn/coding/symbol_patterns.hpp"
 #include "sdnn/core/bit_layer.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/elementary.hpp"

@@ -91,6 +91,9 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     least_inputs: ClassVar[int] = 1
     """Inputs that its approximator needs."""
 
+    codes_symbols: ClassVar[bool] = False
+    """Whether a Discrete of the observations is one input of the approximator."""
+
     approximator_type: ClassVar[type[Any]]
     learning_type: ClassVar[type[Any]]
     """Of the settings."""
@@ -134,6 +137,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             ranges=observation_range,
             angles=angles,
             angle_pairs=angle_pairs,
+            symbols=self.codes_symbols,
             least_inputs=self.least_inputs,
         )
         self._actions = self._make_actions(action_space)
@@ -547,8 +551,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
         agent = cls.__new__(cls)
         approximator = dict(description["approximator"])
-        if "circular" in approximator:
-            approximator["circular"] = tuple(approximator["circular"])
+        for name in {"circular", "n_symbols"} & approximator.keys():
+            approximator[name] = tuple(approximator[name])
         agent.approximator = cls.approximator_type(**approximator)
         agent.learning = cls.learning_type(**description["learning"])
         if description["n_tables"]:
@@ -564,6 +568,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             ranges=(low, high),
             angles=asked["angles"],
             angle_pairs=asked["angle_pairs"],
+            symbols=bool(asked.get("symbols", False)),
             least_inputs=cls.least_inputs,
         )
         agent._actions = agent._make_actions(agent.action_space)

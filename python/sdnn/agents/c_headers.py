@@ -427,6 +427,11 @@ class _Writer:
                 fixed.append(f"  bins[{place}] = {name}_bin_of_direction{given};")
                 double.append(f"  bins[{place}] = {name}_bin_of_doubles{given};")
                 continue
+            if kind == "symbol":
+                given = f"(&observation[{at[0]}], {n_bins})"
+                fixed.append(f"  bins[{place}] = {name}_symbol_of_fixed{given};")
+                double.append(f"  bins[{place}] = {name}_symbol_of_double{given};")
+                continue
             low, high = self.low[at], self.high[at]
             unit = f"(observation[{at}] - ({low!r})) / {high - low!r}"
             if kind == "variable":
@@ -492,6 +497,9 @@ class _Writer:
             if kind == "angle":
                 yield f"  input {place}: the angle of cosine observation[{at[0]}] and sine"
                 yield f"    observation[{at[1]}], from -pi to pi in {n_bins} bins"
+            elif kind == "symbol":
+                last = at[0] + n_bins - 1
+                yield f"  input {place}: which of observation[{at[0]}] to observation[{last}] is 1"
             else:
                 ends = f"from {self.low[at]:.6g} to {self.high[at]:.6g} in {n_bins} bins"
                 turn = ", an angle," if kind == "circular" else ""

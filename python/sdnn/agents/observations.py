@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal, TypeAlias
 
 import gymnasium as gym
@@ -32,8 +32,9 @@ class UnitObservations:
 
     Observations are flattened as Gymnasium does it. Each observed variable then is an input, scaled
     by its range and clipped; two that are the cosine and the sine of an angle are one input, the
-    angle; one declared to be an angle wraps around in its range. Ranges that are not known are
-    taken from observations given to `settle`.
+    angle; one declared to be an angle wraps around in its range. Variables of which one is 1, as a
+    Discrete is flattened, can be one input, a symbol. Ranges that are not known are taken from
+    observations given to `settle`.
 
     Parameters
     ----------
@@ -48,8 +49,11 @@ class UnitObservations:
     angle_pairs : "none", "find" or sequence of (int, int)
         Pairs of variables that are a cosine and a sine. ``"find"``: those that lie on the unit
         circle in all observations given to `settle`.
+    symbols : bool
+        Whether a Discrete, also in a MultiDiscrete, Dict or Tuple, is one input: symbol k of n is
+        ``(k + 0.5) / n``. Otherwise it is n inputs, of which one is 1.
     least_inputs : int
-        Variables are repeated to give at least so many inputs: a network may need two.
+        Inputs are repeated to give at least so many: a network may need two.
 
     Raises
     ------
@@ -66,6 +70,7 @@ class UnitObservations:
         ranges: Range | None = None,
         angles: Sequence[int] = (),
         angle_pairs: AnglePairs = "none",
+        symbols: bool = False,
         least_inputs: int = 1,
     ) -> None:
         self._space = space
@@ -76,6 +81,7 @@ class UnitObservations:
             raise ValueError(f"observation_space must have a variable, got {space}")
         self.low, self.high = _ranges(low, high, ranges)
         self._least_inputs = least_inputs
+        self._symbols = dict(_symbols_of(space)) if symbols else {}
         self._angles = tuple(self._variable("angles", one) for one in _listed("angles", angles))
         self._finds_pairs = isinstance(angle_pairs, str) and angle_pairs == "find"
         self._pairs: tuple[tuple[int, int], ...] = ()
@@ -91,6 +97,7 @@ class UnitObservations:
                 f"angles and angle_pairs must name each variable once, got {list(self._angles)}"
                 f" and {list(self._pairs)}"
             )
+        self._check_apart(used)
         self._is_settled = False
         self._converted: tuple[tuple[Any, NDArray[np.float64]], ...] = ((None, np.empty(0)),) * 2
         if not self._finds_pairs and not self._unknown().any():
@@ -109,7 +116,12 @@ class UnitObservations:
     @property
     def circular(self) -> tuple[bool, ...]:
         """Which inputs are angles, once settled."""
-        return tuple("variable" not in one for one in self.inputs)
+        return tuple("angle" in one or "circular" in one for one in self.inputs)
+
+    @property
+    def n_symbols(self) -> tuple[int, ...]:
+        """How many symbols each input may be, 0 for a number, once settled."""
+        return tuple(one["symbol"][1] if "symbol" in one else 0 for one in self.inputs)
 
     def flat(self, name: str, observation: Any) -> NDArray[np.float64]:
         """Flatten an observation, shape (n_variables,); ValueError if it is none, or has NaN."""
@@ -149,7 +161,7 @@ class UnitObservations:
         scaled = np.minimum(np.maximum(scaled, 0.0), 1.0)
         if self._plain:
             return scaled
-        if not np.isfinite(values).all():
+        if self._has_angles and not np.isfinite(values).all():
             raise ValueError(f"observation must be finite where it has angles, got {values}")
         state = np.empty(len(self.inputs))
         for place, one in enumerate(self.inputs):
@@ -159,6 +171,9 @@ class UnitObservations:
                 cosine, sine = one["angle"]
                 angle = _core.atan2(values[sine], values[cosine])
                 state[place] = (angle + np.pi) / (2.0 * np.pi)
+            elif "symbol" in one:
+                first, n = one["symbol"]
+                state[place] = (np.argmax(values[first : first + n]) + 0.5) / n
             else:
                 at = one["circular"]
                 turns = (values[at] - self.low[at]) / (self.high[at] - self.low[at])
@@ -182,7 +197,13 @@ class UnitObservations:
         ends = (self.low, self.high)
         low, high = ([None if np.isnan(x) else float(x) for x in end] for end in ends)
         pairs = "find" if self._finds_pairs else [list(pair) for pair in self._pairs]
-        return {"angles": list(self._angles), "angle_pairs": pairs, "low": low, "high": high}
+        return {
+            "angles": list(self._angles),
+            "angle_pairs": pairs,
+            "symbols": bool(self._symbols),
+            "low": low,
+            "high": high,
+        }
 
     def description(self) -> dict[str, Any]:
         """Give what `settled_as` takes, as data that JSON can hold."""
@@ -210,6 +231,9 @@ class UnitObservations:
         self._pairs = tuple(
             self._pair(one["angle"]) for one in description["inputs"] if "angle" in one
         )
+        told = dict(_symbols_of(self._space))
+        firsts = [one["symbol"][0] for one in description["inputs"] if "symbol" in one]
+        self._symbols = {first: told[first] for first in firsts if first in told}
         self._settled()
         if [dict(one) for one in self.inputs] != [dict(one) for one in description["inputs"]]:
             raise ValueError(f"observation inputs must be {self.inputs}")
@@ -218,8 +242,14 @@ class UnitObservations:
         sines = {sine for _, sine in self._pairs}
         pairs = dict(self._pairs)
         inputs: list[dict[str, Any]] = []
+        end_of_symbol = 0
         for variable in range(self.n_variables):
-            if variable in pairs:
+            if variable in self._symbols:
+                end_of_symbol = variable + self._symbols[variable]
+                inputs.append({"symbol": [variable, self._symbols[variable]]})
+            elif variable < end_of_symbol:
+                continue
+            elif variable in pairs:
                 inputs.append({"angle": [variable, pairs[variable]]})
             elif variable in self._angles:
                 inputs.append({"circular": variable})
@@ -230,6 +260,7 @@ class UnitObservations:
         self._converted = ((None, np.empty(0)),) * 2
         self._width = self.high - self.low
         self.inputs = inputs
+        self._has_angles = any(self.circular)
         self._plain = inputs == [{"variable": i} for i in range(self.n_variables)]
         self._is_settled = True
 
@@ -247,6 +278,16 @@ class UnitObservations:
                 )
         return unknown
 
+    def _check_apart(self, used: Sequence[int]) -> None:
+        """Refuse variables that are to be angles and tell symbols."""
+        for first, n in self._symbols.items():
+            for variable in used:
+                if first <= variable < first + n:
+                    raise ValueError(
+                        f"angles and angle_pairs must name numbers, got variable {variable}, which"
+                        " is of a Discrete"
+                    )
+
     def _variable(self, name: str, number: Any) -> int:
         is_whole = isinstance(number, int | np.integer) and not isinstance(number, bool)
         if not is_whole or not 0 <= number < self.n_variables:
@@ -263,12 +304,14 @@ class UnitObservations:
     def _pairs_of(self, seen: NDArray[np.float64]) -> tuple[tuple[int, int], ...]:
         """Neighbouring variables that lie on the unit circle and move on it."""
         pairs = []
+        taken = set(self._angles)
+        taken.update(*(range(first, first + n) for first, n in self._symbols.items()))
         variable = 0
         while variable + 1 < self.n_variables:
             cosine, sine = seen[:, variable], seen[:, variable + 1]
             on_circle = np.abs(cosine * cosine + sine * sine - 1.0).max() < _ON_THE_CIRCLE
             moves = np.ptp(cosine) > _ON_THE_CIRCLE and np.ptp(sine) > _ON_THE_CIRCLE
-            is_free = not {variable, variable + 1} & set(self._angles)
+            is_free = not {variable, variable + 1} & taken
             if on_circle and moves and is_free:
                 pairs.append((variable, variable + 1))
                 variable += 1
@@ -277,6 +320,25 @@ class UnitObservations:
 
 
 _LARGEST = 1e300
+
+
+def _symbols_of(space: gym.Space[Any], first: int = 0) -> Iterator[tuple[int, int]]:
+    """Find what tells symbols in a flattened space: first variables and how many there are."""
+    if isinstance(space, gym.spaces.Discrete):
+        counts = [int(space.n)]
+    elif isinstance(space, gym.spaces.MultiDiscrete):
+        counts = [int(n) for n in space.nvec.reshape(-1)]
+    elif isinstance(space, gym.spaces.Dict | gym.spaces.Tuple):
+        parts = space.spaces.values() if isinstance(space, gym.spaces.Dict) else space.spaces
+        for part in parts:
+            yield from _symbols_of(part, first)
+            first += gym.spaces.flatdim(part)
+        return
+    else:
+        return
+    for n in counts:
+        yield first, n
+        first += n
 
 
 def _numbers(name: str, values: Any) -> NDArray[np.float64]:

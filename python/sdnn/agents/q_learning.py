@@ -256,6 +256,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
 
     approximator_type = SDNNCConfig
     least_inputs = 2
+    codes_symbols = True
 
     def __init__(
         self,
@@ -291,10 +292,10 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         return sizes.n_actions or max(sizes.n_hidden_units - sizes.n_active_units + 1, 1)
 
     def _make_core(self) -> CoreAgent | CoreVectorAgent:
-        if any(self._observations.circular) and not self.approximator.circular:
-            self.approximator = dataclasses.replace(
-                self.approximator, circular=self._observations.circular
-            )
+        for name in ("circular", "n_symbols"):
+            follows = getattr(self._observations, name)
+            if any(follows) and not getattr(self.approximator, name):
+                self.approximator = dataclasses.replace(self.approximator, **{name: follows})
         config, learning = self._core_approximator(), self.learning.to_core()
         if self.n_dimensions > 1:
             if self._tables is not None:

@@ -39,6 +39,9 @@ class SDNNCConfig:
     circular : tuple of bool
         Per input, whether the last anchor equals the first, as angles want it; empty: none. A
         reading: the paper does not say.
+    n_symbols : tuple of int
+        Per input, how many symbols it may be, each with a random pattern of its own: symbol k of n
+        is a value of ``(k + 0.5) / n``. 0 for a number; empty: numbers only. Not in the paper.
     n_hidden_units, n_active_units : int
         n and n', hidden units and units in an action's window (section 4.2: 900 and 300).
     n_actions : int
@@ -81,6 +84,7 @@ class SDNNCConfig:
     n_interpolated: int = 44
     balanced_anchors: bool = True
     circular: tuple[bool, ...] = ()
+    n_symbols: tuple[int, ...] = added_later(())
     n_hidden_units: int = 900
     n_active_units: int = 300
     n_actions: int = 0

@@ -29,6 +29,7 @@ approximators::SDNNCConfig small_network() {
           .n_anchor_patterns = 3,
           .n_interpolated = 3,
           .circular = {false, true},
+          .n_symbols = {4, 0},
           .n_hidden_units = 60,
           .n_active_units = 40,
           .n_actions = 5,
@@ -113,6 +114,7 @@ TEST(AgentFile, SettingsHaveTheNamesAndWordsOfTheConfigurations) {
   const json& approximator = settings["approximator"];
   EXPECT_EQ(approximator["n_hidden_units"], 60);
   EXPECT_EQ(approximator["circular"], json({false, true}));
+  EXPECT_EQ(approximator["n_symbols"], json({4, 0}));
   EXPECT_EQ(approximator["u_low"], nullptr);
   EXPECT_EQ(approximator["u_high"], 36);
   EXPECT_EQ(approximator["rounding"], "random");
@@ -176,6 +178,8 @@ TEST(AgentFile, SaysWhatDoesNotFit) {
   EXPECT_EQ(with("/approximator/q_low", "low"), "approximator.q_low must be a number, got \"low\"");
   EXPECT_EQ(with("/approximator/circular", {1, 0}),
             "approximator.circular[0] must be true or false, got 1");
+  EXPECT_EQ(with("/approximator/n_symbols", {4, 0.5}),
+            "approximator.n_symbols[1] must be a whole number, got 0.5");
   EXPECT_EQ(with("/approximator/rounding", "up"),
             "approximator.rounding must be one of half_up random away, got \"up\"");
   EXPECT_EQ(with("/learning/epsilon", nullptr), "learning.epsilon must be a number, got null");

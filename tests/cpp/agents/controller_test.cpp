@@ -52,6 +52,29 @@ TEST(ObservationScale, ByHand) {
   EXPECT_EQ(scaled(scale, {0.0, 0.0, 1e308, -1e308})[1], 1.0);
 }
 
+// A number between a Discrete(2) and a Discrete(3), as Gymnasium flattens them.
+json with_symbols() {
+  return {{"low", {0.0, 0.0, -1.0, 0.0, 0.0, 0.0}},
+          {"high", {1.0, 1.0, 1.0, 1.0, 1.0, 1.0}},
+          {"inputs", {{{"symbol", {0, 2}}}, {{"variable", 2}}, {{"symbol", {3, 3}}}}}};
+}
+
+TEST(ObservationScale, SymbolsByHand) {
+  const ObservationScale scale(with_symbols());
+  EXPECT_EQ(scale.n_inputs(), 3U);
+  EXPECT_EQ(scaled(scale, {1.0, 0.0, 0.0, 0.0, 0.0, 1.0}), (Numbers{0.25, 0.5, 2.5 / 3.0}));
+  EXPECT_EQ(scaled(scale, {0.0, 1.0, 1.0, 0.0, 1.0, 0.0}), (Numbers{0.75, 1.0, 0.5}));
+  EXPECT_EQ(scaled(scale, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0})[2], 0.5 / 3.0);  // the first of equals
+}
+
+TEST(ObservationScale, NamesASymbolThatDoesNotFit) {
+  for (const json& bad : {json{0, 0}, json{4, 3}, json{6, 1}, json{-1, 2}, json{0}, json{0.5, 1}}) {
+    json observation = with_symbols();
+    observation["inputs"][0]["symbol"] = bad;
+    EXPECT_THROW(ObservationScale{observation}, std::invalid_argument) << bad;
+  }
+}
+
 TEST(ObservationScale, GivesStatesWhateverIsObserved) {
   const ObservationScale scale(observation());
   core::Random random(1, core::Stream::weights);
@@ -85,10 +108,12 @@ TEST(ObservationScale, NamesWhatDoesNotFit) {
   EXPECT_EQ(error_of("/inputs/1/variable", 4),
             "observation.inputs[1] must be of a variable below 4, got 4");
   EXPECT_EQ(error_of("/inputs/0/angle", {0}),
-            "observation.inputs[0] must be a variable, an angle of two, or circular, got "
+            "observation.inputs[0] must be a variable, an angle of two, circular, or a symbol of "
+            "some, got "
             "{\"angle\":[0]}");
   EXPECT_EQ(error_of("/inputs/2", json::object()),
-            "observation.inputs[2] must be a variable, an angle of two, or circular, got {}");
+            "observation.inputs[2] must be a variable, an angle of two, circular, or a symbol of "
+            "some, got {}");
   const ObservationScale scale(observation());
   EXPECT_THROW(scaled(scale, {1.0, 2.0, 3.0}), std::invalid_argument);
   for (const double bad : {testing::kNaN, testing::kInfinity}) {
@@ -316,7 +341,7 @@ core::State agent_part(const AgentFile& file) {
 TEST(Controller, LivesAsInPython) {
   const testing::Folder folder;
   for (const std::string name :
-       {"sdnn", "sdnn-vector", "sdnn-discrete", "rbf", "fuzzy", "fuzzy-vector"}) {
+       {"sdnn", "sdnn-vector", "sdnn-discrete", "sdnn-symbols", "rbf", "fuzzy", "fuzzy-vector"}) {
     SCOPED_TRACE(name);
     const std::filesystem::path data(SDNN_TEST_DATA "/agents");
     std::ifstream file(data / (name + ".json"));

@@ -431,6 +431,25 @@ TEST(SDNNC, LearnsOverPatternsOfAnyCoding) {
   EXPECT_THROW(Network({.n_inputs = 3}, tables, 7), std::invalid_argument);  // 200 units
 }
 
+TEST(SDNNC, SymbolsHavePatternsOfTheirOwn) {
+  SDNNCConfig config = small();
+  config.n_symbols = {4, 0, 7};
+  Network network(config, 7);
+  const coding::StateCode& code = network.state_code();
+  EXPECT_EQ(code.table(0).n_bins(), 4U);
+  EXPECT_EQ(code.table(1), Network(small(), 7).state_code().table(1));  // a number is as it was
+  EXPECT_EQ(code.table(2).n_bins(), 7U);
+  core::Random random(3, core::Stream::code_books);
+  for (int i = 0; i < 60; ++i) {
+    const auto symbol = static_cast<double>(random.below(4));
+    const State state = {(symbol + 0.5) / 4.0, random.uniform(), random.uniform()};
+    network.correct(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
+    ASSERT_EQ(values(network, state), values_by_masks(network, state));
+    const State same = {(symbol + 0.9) / 4.0, state[1], state[2]};
+    ASSERT_EQ(values(network, same), values(network, state));
+  }
+}
+
 TEST(SDNNC, ARateMixesTargetAndValue) {
   Network one(small(), 5);
   Network other(small(), 5);
@@ -492,6 +511,8 @@ TEST(SDNNC, TooLargeANetworkIsRefusedBeforeMemoryIsAskedFor) {
   const std::string patterns = refusal({.n_anchor_patterns = 10000, .n_interpolated = 10000});
   EXPECT_TRUE(patterns.starts_with("n_interpolated, n_anchor_patterns, n_pattern_units"))
       << patterns;
+  const std::string symbols = refusal({.n_symbols = {1 << 24, 0, 0, 0}});
+  EXPECT_TRUE(symbols.starts_with("n_symbols, n_interpolated")) << symbols;
   const std::string potentials = refusal(
       {.n_inputs = 2, .n_pattern_units = 2, .n_hidden_units = 1 << 20, .n_active_units = 1 << 20});
   EXPECT_TRUE(potentials.starts_with("n_hidden_units or n_active_units must")) << potentials;
@@ -512,6 +533,9 @@ TEST(SDNNC, NamesTheFieldThatIsImpossible) {
             "n_active_units must be in [1, 900], got 901");
   EXPECT_EQ(message({.n_inputs = 1}), "n_inputs must be in [2, 1024], got 1");
   EXPECT_EQ(message({.circular = {true}}), "circular must be empty or one flag per input, got 1");
+  EXPECT_EQ(message({.n_symbols = {3}}), "n_symbols must be empty or a number per input, got 1");
+  EXPECT_EQ(message({.n_symbols = {0, -1, 0, 0}}), "n_symbols must be in [0, 16777216], got -1");
+  expect_named({.circular = {true, false, false, false}, .n_symbols = {3, 0, 0, 0}}, "circular");
   expect_named({.n_pattern_units = 1}, "n_pattern_units");
   expect_named({.n_anchor_patterns = 1}, "n_anchor_patterns");
   expect_named({.n_interpolated = -1}, "n_interpolated");

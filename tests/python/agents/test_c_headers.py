@@ -163,6 +163,22 @@ def tables_agent():
     return agent
 
 
+def symbols_agent():
+    """A number between two symbols, as Gymnasium flattens a Tuple."""
+    space = gym.spaces.Tuple([Discrete(3), box(2.0), Discrete(4, start=1)])
+    agent = SDNNQLearning(
+        space, box(1.0), approximator=replace(SMALL, averaging_interval=20), seed=7
+    )
+    random = np.random.default_rng(7)
+    space.seed(7)
+    agent.action_space.seed(7)
+    for _ in range(300):
+        seen, action = space.sample(), agent.action_space.sample()
+        reward = float(np.sin(2.0 * seen[0] + seen[1][0] + seen[2]) + random.normal())
+        agent.learn(Transition(seen, action, reward, space.sample(), True))
+    return agent
+
+
 AGENTS = {
     "discrete": discrete_agent,
     "circular": circular_agent,
@@ -338,6 +354,24 @@ def test_the_actions_are_the_agents(kind, agents, expectations, target, tmp_path
     for expected in expectations(kind):
         came = actions_of(command, expected.kind, expected.given, agent.n_dimensions)
         check_actions(agent, expected, came)
+
+
+def test_symbols_are_told_by_readings_of_one_and_zero(target, tmp_path):
+    agent = symbols_agent()
+    header = write_policy(tmp_path, agent)
+    command = build(tmp_path, target)
+    agent.observation_space.seed(3)
+    seen = [agent.observation_space.sample() for _ in range(1000)]
+    told = np.array([agent.flat_observation(one) for one in seen])
+    for kind, given in (
+        ("double", told),
+        ("float", told.astype(np.float32)),
+        ("fixed", np.round(told * 2.0**header.fraction_bits).astype(np.int32)),
+    ):
+        check_actions(
+            agent, expected_of(agent, kind, given, seen), actions_of(command, kind, given, 1)
+        )
+    assert "input 2: which of observation[4] to observation[7] is 1" in header.text
 
 
 def test_the_angle_of_a_pair_is_in_the_agents_bin(agents, needs, tmp_path):

@@ -9,6 +9,7 @@ from sdnn.agents import (
     RBFQLearning,
     SDNNQLearning,
     Transition,
+    load_agent,
 )
 from sdnn.approximators import SDNNCConfig
 
@@ -72,3 +73,43 @@ def test_it_lives_in_cart_pole_with_bounds_that_matter():
     )
     assert agent.n_actions == 2
     assert set(live(env, agent, 300)) == {0, 1}
+
+
+def test_a_discrete_observation_is_a_symbol():
+    """What is right in one room says nothing of the next one."""
+    right = np.random.default_rng(1).integers(0, 4, 40)
+    agent = SDNNQLearning(gym.spaces.Discrete(40), gym.spaces.Discrete(4), seed=1)
+    assert agent.approximator.n_inputs == 2
+    assert agent.approximator.n_symbols == (40, 40)
+    for room, action in np.random.default_rng(2).permutation(list(np.ndindex(40, 4)) * 15):
+        agent.learn(Transition(room, action, float(action == right[room]), room, True))
+    assert agent.learning_report()["q_range"] == (0.0, 1.25)
+    assert [agent.act(room, explore=False) for room in range(40)] == right.tolist()
+
+
+def test_a_large_discrete_space_costs_no_more_than_its_patterns():
+    """Flattened it has 500 variables, whose pairs no memory would hold."""
+    agent = SDNNQLearning(gym.spaces.Discrete(500), gym.spaces.Discrete(6), seed=1)
+    n_bytes = sum(array.nbytes for array in agent.state().values())
+    assert n_bytes < 10e6
+    for place in (0, 7, 499):
+        agent.learn(Transition(place, 3, 1.0 + place, 0, True))
+    assert agent.act(499, explore=False) == 3
+
+
+def test_files_of_agents_without_symbols_go_on_as_they_were(monkeypatch, tmp_path):
+    places = gym.spaces.Dict({"at": gym.spaces.Box(0, 1, (1,)), "room": gym.spaces.Discrete(3)})
+    monkeypatch.setattr(SDNNQLearning, "codes_symbols", False)
+    born = SDNNQLearning(places, gym.spaces.Discrete(2), approximator=SMALL, seed=1)
+    born.save(tmp_path / "agent")
+    monkeypatch.undo()
+    read = load_agent(tmp_path / "agent")
+    for step in range(50):
+        where = {"at": [step % 7 / 7], "room": step % 3}
+        actions = [agent.act(where) for agent in (born, read)]
+        assert actions[0] == actions[1]
+        for agent in (born, read):
+            agent.learn(Transition(where, actions[0], float(step % 4), where, step % 5 == 0))
+    weights = [agent.core.action_value.weights() for agent in (born, read)]
+    assert np.array_equal(*weights)
+    assert weights[0].shape == (120, 4 * 3 * 40)

@@ -86,6 +86,73 @@ def test_one_variable_is_repeated_where_two_are_needed():
     assert observations("observation", [1.0]).tolist() == [0.25, 0.25]
 
 
+GEAR = gym.spaces.Dict(
+    {
+        "speed": gym.spaces.Box(-2, 2, (2,), np.float64),
+        "gear": gym.spaces.Discrete(3, start=-1),
+        "switches": gym.spaces.Tuple([gym.spaces.MultiDiscrete([2, 5]), gym.spaces.MultiBinary(1)]),
+    }
+)
+
+
+def test_each_discrete_is_one_input_where_symbols_are_asked_for():
+    observations = UnitObservations(GEAR, symbols=True)
+    assert observations.n_variables == 3 + 2 + 2 + 5 + 1
+    assert observations.inputs == [  # Gymnasium sorts the names of a Dict
+        {"symbol": [0, 3]},
+        {"variable": 3},
+        {"variable": 4},
+        {"symbol": [5, 2]},
+        {"symbol": [7, 5]},
+        {"variable": 12},
+    ]
+    assert observations.n_symbols == (3, 0, 0, 2, 5, 0)
+    assert not any(observations.circular)
+    for gear in range(3):
+        for switch in range(5):
+            element = {
+                "speed": [1.0, np.inf],
+                "gear": np.int64(gear - 1),
+                "switches": (np.array([1, switch]), np.array([1])),
+            }
+            expected = [(gear + 0.5) / 3, 0.75, 1.0, 0.75, (switch + 0.5) / 5, 1.0]
+            assert observations("observation", element).tolist() == expected
+
+
+def test_a_lone_symbol_is_repeated_where_two_inputs_are_needed():
+    observations = UnitObservations(gym.spaces.Discrete(4), symbols=True, least_inputs=2)
+    assert observations("observation", 2).tolist() == [0.625, 0.625]
+    assert observations.n_symbols == (4, 4)
+
+
+def test_what_tells_a_symbol_is_no_angle():
+    with pytest.raises(ValueError, match="must name numbers, got variable 1, which is of a Disc"):
+        UnitObservations(GEAR, symbols=True, angles=[1])
+    with pytest.raises(ValueError, match="must name numbers, got variable 5"):
+        UnitObservations(GEAR, symbols=True, angle_pairs=[(4, 5)])
+    pair = gym.spaces.Tuple([gym.spaces.Discrete(2), gym.spaces.Box(-1, 1, (2,), np.float64)])
+    turns = np.linspace(0, 5, 40)
+    seen = np.stack([turns > 2, turns <= 2, np.cos(turns), np.sin(turns)], axis=1)
+    assert settled(pair, seen, symbols=True, angle_pairs="find").inputs == [
+        {"symbol": [0, 2]},
+        {"angle": [2, 3]},
+    ]
+
+
+def test_symbols_can_be_written_and_read_and_so_can_what_was_none():
+    first = UnitObservations(GEAR, symbols=True)
+    again = UnitObservations(GEAR)
+    again.settled_as(first.description())
+    assert again.inputs == first.inputs
+    plain = UnitObservations(GEAR)
+    again.settled_as(plain.description())
+    assert again.inputs == plain.inputs == [{"variable": i} for i in range(13)]
+    for bad in ({"symbol": [0, 2]}, {"symbol": [1, 3]}, {"symbol": [99, 3]}):
+        inputs = [bad, *first.inputs[1:]]
+        with pytest.raises(ValueError, match="observation inputs must be"):
+            again.settled_as({**first.description(), "inputs": inputs})
+
+
 @pytest.mark.parametrize(
     "space",
     [

@@ -31,6 +31,7 @@ ODD_SIZES = {
         "n_anchor_patterns": 5,
         "n_interpolated": 7,
     },
+    "symbols": {"n_inputs": 3, "n_symbols": [5, 0, 2]},
     "unbalanced": {"n_inputs": 2, "balanced_anchors": False, "n_pattern_units": 99},
     "uniform weights on a lattice": {
         "n_inputs": 3,
@@ -291,7 +292,7 @@ def test_the_defaults_are_those_of_the_core():
     config = SDNNCConfig()
     for field in dataclasses.fields(SDNNCConfig):
         value = getattr(core, field.name)
-        if field.name == "circular":
+        if field.name in ("circular", "n_symbols"):
             value = tuple(value)
         if field.name in ("initial_weights", "rounding"):
             value = value.name
@@ -308,6 +309,7 @@ def test_every_field_reaches_the_core():
         n_interpolated=5,
         balanced_anchors=False,
         circular=(True, False),
+        n_symbols=(0, 6),
         n_hidden_units=70,
         n_active_units=20,
         n_actions=9,
@@ -329,7 +331,7 @@ def test_every_field_reaches_the_core():
         assert getattr(other, field.name) != field.default, field.name
         value = getattr(core, field.name)
         expected = getattr(other, field.name)
-        if field.name == "circular":
+        if field.name in ("circular", "n_symbols"):
             expected = list(expected)
         if field.name in ("initial_weights", "rounding"):
             value = value.name
@@ -350,6 +352,8 @@ def test_configurations_are_frozen_and_keyword_only():
         ({"n_active_units": 901}, r"n_active_units must be in \[1, 900\], got 901"),
         ({"n_inputs": 1}, r"n_inputs must be in \[2, 1024\], got 1"),
         ({"circular": (True,)}, "circular must be empty or one flag per input, got 1"),
+        ({"n_symbols": (0, 3)}, "n_symbols must be empty or a number per input, got 2"),
+        ({"n_symbols": (0, 0, -3, 0)}, r"n_symbols must be in \[0, 16777216\], got -3"),
         ({"u_low": -1}, "u_low must be"),
         ({"initial_weights": "large"}, "initial_weights must be one of 'ternary', 'uniform'"),
         ({"n_pattern_units": 70000}, r"n_pattern_units must be in \[2, 65536\], got 70000"),

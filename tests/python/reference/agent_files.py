@@ -25,6 +25,7 @@ FOLDER = Path(__file__).parents[2] / "data" / "agents"
 OBSERVATIONS = gym.spaces.Box(
     np.array([-1.0, -1.0, -8.0, -np.inf]), np.array([1.0, 1.0, 8.0, np.inf]), dtype=np.float64
 )
+GEARS = gym.spaces.Dict({"gear": gym.spaces.Discrete(3, start=1), "motion": OBSERVATIONS})
 TORQUE = gym.spaces.Box(-2.0, 3.0, (1,), dtype=np.float64)
 SMALL = SDNNCConfig(
     n_pattern_units=12,
@@ -54,6 +55,7 @@ def agents():
         "sdnn": SDNNQLearning,
         "sdnn-vector": SDNNQLearning,
         "sdnn-discrete": SDNNQLearning,
+        "sdnn-symbols": SDNNQLearning,
         "rbf": RBFQLearning,
         "fuzzy": FuzzyQLearning,
         "fuzzy-vector": FuzzyQLearning,
@@ -74,9 +76,9 @@ def agents():
         yield (
             name,
             kind(
-                OBSERVATIONS,
+                GEARS if name == "sdnn-symbols" else OBSERVATIONS,
                 spaces.get(name, TORQUE),
-                angle_pairs=[(0, 1)],
+                angle_pairs=[(3, 4)] if name == "sdnn-symbols" else [(0, 1)],
                 warm_up_steps=50,
                 seed=11,
                 **settings.get(name, {"approximator": SMALL, "learning": LEARNING}),
@@ -88,25 +90,32 @@ def life(agent, rng, n_steps):
     """Lets an agent live; gives what it saw and did, step by step."""
     steps = []
     turn, speed, other = rng.uniform(-3, 3, 3)
+
+    def observe():
+        motion = [np.cos(turn), np.sin(turn), speed, other]
+        if isinstance(agent.observation_space, gym.spaces.Box):
+            return motion
+        return {"gear": int(1 + 2 * abs(speed) / 8), "motion": motion}
+
     begins = True
     for _ in range(n_steps):
-        seen = [np.cos(turn), np.sin(turn), speed, other]
+        seen = observe()
         if begins:
             agent.begin_episode()
         action = agent.act(seen)
         greedy = agent.act(seen, explore=False)
         turn, speed, other = turn + 0.2 * speed, rng.uniform(-8, 8), rng.normal()
-        following = [np.cos(turn), np.sin(turn), speed, other]
+        following = observe()
         reward, terminated = float(rng.normal()), bool(rng.random() < 0.1)
         agent.learn(Transition(seen, action, reward, following, terminated))
         steps.append(
             {
                 "begins": begins,
-                "observation": [float(x) for x in seen],
+                "observation": agent.flat_observation(seen).tolist(),
                 "action": np.atleast_1d(action).tolist(),
                 "greedy": np.atleast_1d(greedy).tolist(),
                 "reward": reward,
-                "next_observation": [float(x) for x in following],
+                "next_observation": agent.flat_observation(following).tolist(),
                 "terminated": terminated,
             }
         )

@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 from safetensors.numpy import load, save
 
@@ -78,7 +79,9 @@ def read_estimator(path):
 
 def read_agent(path):
     agent = load_agent(path)
-    agent.act(np.zeros(agent.observation_space.shape, agent.observation_space.dtype))
+    space = agent.observation_space
+    is_box = isinstance(space, gym.spaces.Box)
+    agent.act(np.zeros(space.shape, space.dtype) if is_box else space.sample())
 
 
 def read_libsdnn_model(path):

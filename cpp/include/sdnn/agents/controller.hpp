@@ -34,6 +34,7 @@ namespace sdnn::agents {
 /// | {"variable": i}     | (x_i - low_i) / (high_i - low_i), clipped to [0, 1]                 |
 /// | {"angle": [i, j]}   | (atan2(x_j, x_i) + pi) / (2 pi): x_i is the cosine, x_j the sine    |
 /// | {"circular": i}     | u - floor(u) with u = (x_i - low_i) / (high_i - low_i)              |
+/// | {"symbol": [i, n]}  | (k + 1/2) / n, where x_{i+k} is the first largest of x_i..x_{i+n-1} |
 class ObservationScale {
  public:
   /// Throws std::invalid_argument naming the member that does not fit.
@@ -74,11 +75,11 @@ class ObservationScale {
   }
 
  private:
-  enum class Kind { variable, angle, circular };
+  enum class Kind { variable, angle, circular, symbol };
   struct Input {
     Kind kind;
     std::size_t first;
-    std::size_t second;  ///< of an angle
+    std::size_t second;  ///< of an angle; how many variables tell a symbol
   };
 
   Input read_input(const nlohmann::json& input) const {
@@ -97,14 +98,26 @@ class ObservationScale {
       if (key == "angle" && value.is_array() && value.size() == 2) {
         return {Kind::angle, index(value[0]), index(value[1])};
       }
+      if (key == "symbol" && value.is_array() && value.size() == 2) {
+        const std::size_t first = index(value[0]);
+        const auto n = detail::value_from<std::uint64_t>(value[1], name);
+        core::require(n >= 1 && n <= n_observed() - first, name,
+                      "of 1 to " + std::to_string(n_observed() - first) + " variables", n);
+        return {Kind::symbol, first, static_cast<std::size_t>(n)};
+      }
     }
-    detail::refuse(name, "a variable, an angle of two, or circular", input);
+    detail::refuse(name, "a variable, an angle of two, circular, or a symbol of some", input);
   }
 
   double value(const Input& input, std::span<const double> observation) const noexcept {
     const std::size_t i = input.first;
     if (input.kind == Kind::angle) {
       return (core::atan2(observation[input.second], observation[i]) + core::kPi) / core::kTwoPi;
+    }
+    if (input.kind == Kind::symbol) {
+      const auto told = observation.subspan(i, input.second);
+      const auto k = std::ranges::max_element(told) - told.begin();
+      return (static_cast<double>(k) + 0.5) / static_cast<double>(input.second);
     }
     const double u = (observation[i] - low_[i]) / (high_[i] - low_[i]);
     if (input.kind == Kind::variable) return std::clamp(u, 0.0, 1.0);

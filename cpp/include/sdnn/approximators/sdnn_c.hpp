@@ -25,6 +25,7 @@
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/coding/permutation.hpp"
 #include "sdnn/coding/state_code.hpp"
+#include "sdnn/coding/symbol_patterns.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/detail/interruption.hpp"
@@ -59,7 +60,8 @@ class SDNNC {
       : SDNNC(config, anchor_tables(config, seed), seed) {}
 
   /// Code books of any coding, a table per input: the range [0, 1] is cut into as many equal bins
-  /// as the table has patterns. The config's fields about anchors do not matter then. Throws
+  /// as the table has patterns. The config's fields about anchors and symbols do not matter then.
+  /// Throws
   /// std::invalid_argument if n_inputs or n_pattern_units are not the tables', and as above.
   SDNNC(const SDNNCConfig& config, std::vector<coding::PatternTable> tables, std::uint64_t seed)
       : config_(config),
@@ -256,10 +258,29 @@ class SDNNC {
     core::require_in_range("n_pattern_units", config.n_pattern_units, 2, 1 << 16);
     core::require(config.circular.empty() || config.circular.size() == l, "circular",
                   "empty or one flag per input", config.circular.size());
-    require_room(config, (config.n_anchor_patterns - 1.0) * (config.n_interpolated + 1.0));
+    core::require(config.n_symbols.empty() || config.n_symbols.size() == l, "n_symbols",
+                  "empty or a number per input", config.n_symbols.size());
+    const auto n_symbols_of = [&config](std::size_t mu) {
+      return config.n_symbols.empty() ? 0 : config.n_symbols[mu];
+    };
+    double n_bins = 0.0;
+    for (std::size_t mu = 0; mu < l; ++mu) {
+      core::require_in_range("n_symbols", n_symbols_of(mu), 0, 1 << 24);
+      core::require(n_symbols_of(mu) == 0 || config.circular.empty() || !config.circular[mu],
+                    "circular", "false for an input of symbols", true);
+      n_bins += n_symbols_of(mu) > 0
+                    ? n_symbols_of(mu)
+                    : (config.n_anchor_patterns - 1.0) * (config.n_interpolated + 1.0);
+    }
+    require_room(config, n_bins);
     std::vector<coding::PatternTable> tables;
     for (std::size_t mu = 0; mu < l; ++mu) {
       core::Random random(seed, core::Stream::code_books, mu);
+      if (n_symbols_of(mu) > 0) {
+        tables.push_back(coding::symbol_patterns(n_symbols_of(mu), config.n_pattern_units,
+                                                 config.balanced_anchors, random));
+        continue;
+      }
       tables.push_back(
           coding::anchor_patterns({.n_units = config.n_pattern_units,
                                    .n_anchor_patterns = config.n_anchor_patterns,
@@ -277,7 +298,7 @@ class SDNNC {
     return n;
   }
 
-  /// Throws std::length_error if the network, with so many bins per input, has more bytes than
+  /// Throws std::length_error if the network, with so many bins of all inputs, has more bytes than
   /// config.max_table_bytes. In doubles, which no product overflows; their rounding does not
   /// matter.
   static void require_room(const SDNNCConfig& config, double n_bins) {
@@ -290,12 +311,14 @@ class SDNNC {
     if (config.averaging_interval > 0) {  // the average, and a layer and a memory made of it
       weights += WeightAverage::n_bytes(n_units, n_columns) + 2.0 * n_units * n_columns;
     }
-    const double patterns = l * l * n_bins * pattern;
+    const double patterns = l * n_bins * pattern;
     const double remembered = static_cast<double>(
         PotentialMemory::n_bytes(sizes.n_hidden_units(), sizes.n_active_units()));
     const char* largest = "n_hidden_units, n_pattern_units or n_inputs";
     if (patterns > std::max(weights, remembered)) {
-      largest = "n_interpolated, n_anchor_patterns, n_pattern_units or n_inputs";
+      largest = config.n_symbols.empty()
+                    ? "n_interpolated, n_anchor_patterns, n_pattern_units or n_inputs"
+                    : "n_symbols, n_interpolated, n_anchor_patterns or n_pattern_units";
     } else if (remembered > weights) {
       largest = "n_hidden_units or n_active_units";
     }
@@ -312,7 +335,7 @@ class SDNNC {
                     "of n_pattern_units = " + std::to_string(config.n_pattern_units) + " units",
                     table.n_units());
     }
-    require_room(config, static_cast<double>(n_patterns(tables)) / static_cast<double>(l));
+    require_room(config, static_cast<double>(n_patterns(tables)));
     std::vector<coding::Permutation> permutations;
     for (std::size_t group = 0; group < l * (l - 1); ++group) {
       core::Random random(seed, core::Stream::permutations, group);

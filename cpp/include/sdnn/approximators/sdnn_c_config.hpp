@@ -32,6 +32,7 @@ struct SDNNCConfig {
   int n_interpolated = 44;          ///< patterns between neighbouring anchors
   bool balanced_anchors = true;     ///< reading: anchors have as many +1 as -1
   std::vector<bool> circular = {};  ///< per input; empty: none (reading: p_9 independent of p_1)
+  std::vector<int> n_symbols = {};  ///< per input; 0: a number; empty: numbers only
   int n_hidden_units = 900;         ///< n
   int n_active_units = 300;         ///< n', units in an action's window
   int n_actions = 0;                ///< 0: all n - n' + 1 windows
@@ -56,6 +57,7 @@ struct SDNNCConfig {
         core::field("n_interpolated", &SDNNCConfig::n_interpolated),
         core::field("balanced_anchors", &SDNNCConfig::balanced_anchors),
         core::field("circular", &SDNNCConfig::circular),
+        core::field("n_symbols", &SDNNCConfig::n_symbols),
         core::field("n_hidden_units", &SDNNCConfig::n_hidden_units),
         core::field("n_active_units", &SDNNCConfig::n_active_units),
         core::field("n_actions", &SDNNCConfig::n_actions),

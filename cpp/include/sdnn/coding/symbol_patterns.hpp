@@ -1,0 +1,29 @@
+/// The code of symbols, which have no order: a random pattern for each.
+#pragma once
+
+#include <cstddef>
+
+#include "sdnn/coding/pattern_table.hpp"
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/interruption.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::coding {
+
+/// n_symbols independent patterns: what is learned about one symbol says nothing of another.
+///
+/// `balanced` patterns have as many +1 as -1; others are of independent fair units. Source: as the
+/// anchors of section 3.1 (layer 2). Throws std::invalid_argument naming the impossible argument.
+inline PatternTable symbol_patterns(int n_symbols, int n_units, bool balanced,
+                                    core::Random& random) {
+  core::require_in_range("n_symbols", n_symbols, 1, 1 << 24);
+  core::require_in_range("n_units", n_units, 2, 1 << 24);
+  PatternTable table(static_cast<std::size_t>(n_symbols), static_cast<std::size_t>(n_units));
+  for (std::size_t symbol = 0; symbol < table.n_bins(); ++symbol) {
+    core::interruption_point();
+    fill_random(table, symbol, balanced, random);
+  }
+  return table;
+}
+
+}  // namespace sdnn::coding

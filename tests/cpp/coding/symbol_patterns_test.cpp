@@ -1,0 +1,51 @@
+#include "sdnn/coding/symbol_patterns.hpp"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+namespace sdnn::coding {
+namespace {
+
+PatternTable table_of(int n_symbols, int n_units, bool balanced, std::uint64_t seed = 1) {
+  core::Random random(seed, core::Stream::code_books);
+  return symbol_patterns(n_symbols, n_units, balanced, random);
+}
+
+TEST(SymbolPatterns, ABalancedPatternForEach) {
+  const PatternTable table = table_of(30, 200, true);
+  EXPECT_EQ(table.n_bins(), 30U);
+  EXPECT_EQ(table.n_units(), 200U);
+  for (std::size_t k = 0; k < 30; ++k) EXPECT_EQ(table[k].count(), 100U);
+}
+
+// Independent patterns differ in half of their units: the standard deviation is below 8 of 200.
+TEST(SymbolPatterns, NeighboursAreAsFarApartAsAnyTwo) {
+  const PatternTable table = table_of(30, 200, true);
+  for (std::size_t j = 0; j < 30; ++j) {
+    for (std::size_t k = j + 1; k < 30; ++k) {
+      EXPECT_NEAR(static_cast<double>(table[j].distance(table[k])), 100.0, 40.0);
+    }
+  }
+}
+
+TEST(SymbolPatterns, OthersAreFairUnits) {
+  core::Random same(6, core::Stream::code_books);
+  const PatternTable table = table_of(2, 70, false, 6);
+  for (std::size_t symbol = 0; symbol < 2; ++symbol) {
+    for (std::size_t k = 0; k < 70; ++k) EXPECT_EQ(table[symbol][k], same.below(2) == 1);
+  }
+}
+
+TEST(SymbolPatterns, AnotherSeedGivesOthers) {
+  EXPECT_EQ(table_of(5, 40, true), table_of(5, 40, true));
+  EXPECT_NE(table_of(5, 40, true), table_of(5, 40, true, 2));
+}
+
+TEST(SymbolPatterns, NamesWhatIsImpossible) {
+  EXPECT_THROW(table_of(0, 40, true), std::invalid_argument);
+  EXPECT_THROW(table_of(2, 1, true), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sdnn::coding
