@@ -306,12 +306,24 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
                 learning=learning,
                 seed=self.seed,
             )
-        given = {} if self._tables is None else {"tables": self._tables}
+        given = {} if self._tables is None else {"tables": self._tables_for_symbols()}
         core = _core.SDNNQLearning(approximator=config, learning=learning, seed=self.seed, **given)
         self.approximator = dataclasses.replace(
             self.approximator, n_actions=core.action_value.n_actions
         )
         return core
+
+    def _tables_for_symbols(self) -> list[NDArray[np.int8]]:
+        """Compare the given tables, which the core counts, with the symbols that they stand for."""
+        tables = self._tables or []
+        for number, (table, n) in enumerate(
+            zip(tables, self._observations.n_symbols, strict=False)
+        ):
+            if n > 0 and len(table) != n:
+                raise ValueError(
+                    f"tables[{number}] must have a row for each of {n} symbols, got {len(table)}"
+                )
+        return tables
 
     def _values(self, network: Any, state: NDArray[np.float64]) -> NDArray[np.float64]:
         values: NDArray[np.float64] = network.averaged_values(state)

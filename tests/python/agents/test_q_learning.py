@@ -445,3 +445,19 @@ def test_an_agent_takes_patterns_of_any_coding():
     assert around.max() > 0.5
     with pytest.raises(ValueError, match="tables must be one per input, got 2"):
         small_agent(tables=tables[:2])
+
+
+def test_tables_have_a_row_for_each_symbol():
+    rooms = gym.spaces.MultiDiscrete([3, 4])
+
+    def agent_with(*n_rows):
+        tables = [Circular().patterns(40, seed=number)[:n] for number, n in enumerate(n_rows)]
+        return SDNNQLearning(rooms, BUTTONS, approximator=SMALL, tables=tables)
+
+    assert agent_with(3, 4).core.action_value.table(1).shape == (4, 40)
+    with pytest.raises(
+        ValueError, match=r"tables\[1\] must have a row for each of 4 symbols, got 5"
+    ):
+        agent_with(3, 5)
+    with pytest.raises(ValueError, match="tables must be one per input, got 1"):
+        agent_with(3)

@@ -53,16 +53,15 @@ struct CorrectionCounts {
 /// An object must not be used by two threads at once; copies share the wiring and nothing else.
 class SDNNC {
  public:
-  /// Code books by anchor interpolation. Throws std::invalid_argument naming the field that is
-  /// impossible; std::length_error naming bytes, max_table_bytes and what to reduce, before much
-  /// memory is asked for; std::bad_alloc.
+  /// Code books by anchor interpolation, or of symbols. Throws std::invalid_argument naming the
+  /// field that is impossible; std::length_error naming bytes, max_table_bytes and what to reduce,
+  /// before much memory is asked for; std::bad_alloc.
   SDNNC(const SDNNCConfig& config, std::uint64_t seed)
-      : SDNNC(config, anchor_tables(config, seed), seed) {}
+      : SDNNC(config, tables_of(config, seed), seed) {}
 
   /// Code books of any coding, a table per input: the range [0, 1] is cut into as many equal bins
   /// as the table has patterns. The config's fields about anchors and symbols do not matter then.
-  /// Throws
-  /// std::invalid_argument if n_inputs or n_pattern_units are not the tables', and as above.
+  /// Throws std::invalid_argument if n_inputs or n_pattern_units are not the tables', and as above.
   SDNNC(const SDNNCConfig& config, std::vector<coding::PatternTable> tables, std::uint64_t seed)
       : config_(config),
         code_(make_code(config, std::move(tables), seed)),
@@ -252,8 +251,8 @@ class SDNNC {
     return static_cast<std::size_t>(config.n_inputs);
   }
 
-  static std::vector<coding::PatternTable> anchor_tables(const SDNNCConfig& config,
-                                                         std::uint64_t seed) {
+  static std::vector<coding::PatternTable> tables_of(const SDNNCConfig& config,
+                                                     std::uint64_t seed) {
     const std::size_t l = checked_inputs(config);
     core::require_in_range("n_pattern_units", config.n_pattern_units, 2, 1 << 16);
     core::require(config.circular.empty() || config.circular.size() == l, "circular",
