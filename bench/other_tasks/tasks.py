@@ -100,7 +100,9 @@ TASKS = {
         random=22.4,
         ranges={"0": (-2.4, 2.4), "1": (-3.0, 3.0), "2": (-0.21, 0.21), "3": (-3.5, 3.5)},
     ),
-    "Pendulum": Task(id="Pendulum-v1", solved=-200.0, random=-1208.0),
+    "Pendulum": Task(
+        id="Pendulum-v1", solved=-200.0, random=-1208.0, options={"angle_pairs": [(0, 1)]}
+    ),
     "MountainCar": Task(id="MountainCar-v0", solved=-110.0, random=-200.0),
     "MountainCarContinuous": Task(id="MountainCarContinuous-v0", solved=90.0, random=-33.1),
     "Acrobot": Task(
