@@ -73,6 +73,9 @@ void set_any(Value& value, FuzzedDataProvider& input) {
                                 : static_cast<Value>(input.ConsumeIntegralInRange(-2, 40));
   } else if constexpr (std::is_same_v<Value, std::vector<bool>>) {
     value.assign(input.ConsumeIntegralInRange<std::size_t>(0, 6), input.ConsumeBool());
+  } else if constexpr (std::is_same_v<Value, std::vector<int>>) {
+    value.assign(input.ConsumeIntegralInRange<std::size_t>(0, 6), 0);
+    for (int& number : value) set_any(number, input);
   } else {  // optional
     value.reset();
     if (input.ConsumeBool()) set_any(value.emplace(), input);
