@@ -97,7 +97,12 @@ class UnitObservations:
                 f"angles and angle_pairs must name each variable once, got {list(self._angles)}"
                 f" and {list(self._pairs)}"
             )
-        self._check_apart(used)
+        of_symbols = sorted(set(used) & self._of_symbols())
+        if of_symbols:
+            raise ValueError(
+                f"angles and angle_pairs must name numbers, got variable {of_symbols[0]}, which is"
+                " of a Discrete"
+            )
         self._is_settled = False
         self._converted: tuple[tuple[Any, NDArray[np.float64]], ...] = ((None, np.empty(0)),) * 2
         if not self._finds_pairs and not self._unknown().any():
@@ -239,21 +244,19 @@ class UnitObservations:
             raise ValueError(f"observation inputs must be {self.inputs}")
 
     def _settled(self) -> None:
-        sines = {sine for _, sine in self._pairs}
         pairs = dict(self._pairs)
+        belong_to_others = self._of_symbols().union(pairs.values())
         inputs: list[dict[str, Any]] = []
-        end_of_symbol = 0
         for variable in range(self.n_variables):
             if variable in self._symbols:
-                end_of_symbol = variable + self._symbols[variable]
                 inputs.append({"symbol": [variable, self._symbols[variable]]})
-            elif variable < end_of_symbol:
+            elif variable in belong_to_others:
                 continue
             elif variable in pairs:
                 inputs.append({"angle": [variable, pairs[variable]]})
             elif variable in self._angles:
                 inputs.append({"circular": variable})
-            elif variable not in sines:
+            else:
                 inputs.append({"variable": variable})
         while len(inputs) < self._least_inputs:
             inputs.append(dict(inputs[-1]))
@@ -278,15 +281,9 @@ class UnitObservations:
                 )
         return unknown
 
-    def _check_apart(self, used: Sequence[int]) -> None:
-        """Refuse variables that are to be angles and tell symbols."""
-        for first, n in self._symbols.items():
-            for variable in used:
-                if first <= variable < first + n:
-                    raise ValueError(
-                        f"angles and angle_pairs must name numbers, got variable {variable}, which"
-                        " is of a Discrete"
-                    )
+    def _of_symbols(self) -> set[int]:
+        """Find the variables that tell symbols."""
+        return {first + k for first, n in self._symbols.items() for k in range(n)}
 
     def _variable(self, name: str, number: Any) -> int:
         is_whole = isinstance(number, int | np.integer) and not isinstance(number, bool)
@@ -304,8 +301,7 @@ class UnitObservations:
     def _pairs_of(self, seen: NDArray[np.float64]) -> tuple[tuple[int, int], ...]:
         """Neighbouring variables that lie on the unit circle and move on it."""
         pairs = []
-        taken = set(self._angles)
-        taken.update(*(range(first, first + n) for first, n in self._symbols.items()))
+        taken = self._of_symbols().union(self._angles)
         variable = 0
         while variable + 1 < self.n_variables:
             cosine, sine = seen[:, variable], seen[:, variable + 1]

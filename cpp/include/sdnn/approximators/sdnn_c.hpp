@@ -275,18 +275,16 @@ class SDNNC {
     std::vector<coding::PatternTable> tables;
     for (std::size_t mu = 0; mu < l; ++mu) {
       core::Random random(seed, core::Stream::code_books, mu);
-      if (n_symbols_of(mu) > 0) {
-        tables.push_back(coding::symbol_patterns(n_symbols_of(mu), config.n_pattern_units,
-                                                 config.balanced_anchors, random));
-        continue;
-      }
-      tables.push_back(
-          coding::anchor_patterns({.n_units = config.n_pattern_units,
-                                   .n_anchor_patterns = config.n_anchor_patterns,
-                                   .n_interpolated = config.n_interpolated,
-                                   .balanced = config.balanced_anchors,
-                                   .circular = !config.circular.empty() && config.circular[mu]},
-                                  random));
+      tables.push_back(n_symbols_of(mu) > 0
+                           ? coding::symbol_patterns(n_symbols_of(mu), config.n_pattern_units,
+                                                     config.balanced_anchors, random)
+                           : coding::anchor_patterns(
+                                 {.n_units = config.n_pattern_units,
+                                  .n_anchor_patterns = config.n_anchor_patterns,
+                                  .n_interpolated = config.n_interpolated,
+                                  .balanced = config.balanced_anchors,
+                                  .circular = !config.circular.empty() && config.circular[mu]},
+                                 random));
     }
     return tables;
   }
