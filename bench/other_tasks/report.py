@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 from agents import CONTENDERS
 from numpy.typing import NDArray
+from rows import Row
 from scipy.stats import trim_mean
 from tasks import CONDITIONS, TASKS
 
@@ -16,16 +16,7 @@ from sdnn.experiments.figures import figure_bytes, require_matplotlib
 from sdnn.experiments.statistics import Estimate, estimate_median
 from sdnn.whole_files import write_whole
 
-Row = dict[str, str]
 CONFIDENCE, N_RESAMPLES = 0.95, 2000
-
-
-def read_rows(path: Path) -> list[Row]:
-    """Rows of trials that are done."""
-    if not path.exists():
-        return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def trials(rows: Iterable[Row], name: str, condition: str, kind: str) -> list[list[Row]]:
@@ -73,7 +64,8 @@ def interquartile_mean(scores: Sequence[NDArray[np.float64]]) -> Estimate:
     return Estimate(float(trim_mean(np.concatenate(scores), 0.25)), float(lower), float(upper))
 
 
-def _markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Give a table."""
     lines = [header, ["---"] * len(header), *rows]
     return "".join("| " + " | ".join(cells) + " |\n" for cells in lines)
 
@@ -131,14 +123,14 @@ def _overall_rows(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
 
 def tables(rows: Sequence[Row]) -> str:
     """Task by task, and over tasks."""
-    each = _markdown(
+    each = markdown(
         (
             "task", "sensors", "agent", "seeds", "steps", "return at the end", "seeds that solve",
             "processor time", "of which until solved", "memory",
         ),
         _task_rows(rows),
     )  # fmt: skip
-    overall = _markdown(
+    overall = markdown(
         ("agent", "sensors", "tasks", "score (IQM)", "share of the clean score"),
         _overall_rows(rows),
     )

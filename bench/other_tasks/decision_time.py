@@ -1,0 +1,62 @@
+"""How long a decision takes in Python: acting and learning, without the environment.
+
+    python bench/other_tasks/decision_time.py [--tasks Pendulum,CartPole] [--steps 20000]
+
+Both calls are timed alone, as a robot's own loop would make them, with the settings as they come. A
+plain loop over the clock is timed beside them and taken off.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import numpy as np
+from tasks import TASKS
+
+from sdnn.agents import SDNNQLearning, Transition
+
+NANOSECONDS_A_MICROSECOND = 1000.0
+
+
+def decision_times(name: str, steps: int) -> np.ndarray:
+    """Microseconds of each step's acting and learning, shape (steps,)."""
+    task = TASKS[name]
+    env = task.make("clean")
+    agent = SDNNQLearning(env.observation_space, env.action_space, seed=0, **task.options)
+    clock = time.perf_counter_ns
+    times = np.empty(steps)
+    observation, _ = env.reset(seed=0)
+    agent.begin_episode()
+    for step in range(steps):
+        began = clock()
+        action = agent.act(observation)
+        acted = clock()
+        following, reward, terminated, truncated, _ = env.step(action)
+        stepped = clock()
+        agent.learn(Transition(observation, action, float(reward), following, terminated))
+        learned = clock()
+        times[step] = (acted - began) + (learned - stepped)
+        observation = following
+        if terminated or truncated:
+            observation, _ = env.reset()
+            agent.begin_episode()
+    between = np.median([-(clock() - clock()) for _ in range(10_000)])
+    return (times - 2 * between) / NANOSECONDS_A_MICROSECOND
+
+
+def main() -> None:
+    """Print a table."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--tasks", default="Pendulum,MountainCarContinuous,CartPole,Acrobot")
+    parser.add_argument("--steps", type=int, default=20_000)
+    options = parser.parse_args()
+    print("| task | decisions | p25 | median | p75 | p99 |\n| --- | --- | --- | --- | --- | --- |")
+    for name in options.tasks.split(","):
+        times = decision_times(name, options.steps)
+        cells = (f"{us:.1f} us" for us in np.percentile(times, (25, 50, 75, 99)))
+        print(f"| {name} | {times.size:,} | " + " | ".join(cells) + " |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,119 @@
+"""Steps and processor time until a task is solved, agents side by side.
+
+    python bench/other_tasks/until_solved.py [--seeds 10] [--tasks Pendulum,...] [--agents sdnn,...]
+        [--only-table]
+
+Every 1,000 steps a training is looked at; when 100 greedy episodes have the mean return that solves
+the task, it ends. Looks take no part in its processor time. One trial at a time, the agents of a
+seed one after the other, so that what else the machine does meets all alike. Rows go to
+docs/until-solved.csv, and what is there is not run again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from agents import CONTENDERS
+from looks import SolvedError, UntilSolved
+from report import markdown
+from rows import Row, Work, read_rows, run_missing
+from tasks import TASKS
+
+from sdnn.experiments.statistics import Estimate, estimate_median
+
+DOCS = Path(__file__).parents[2] / "docs"
+FIELDS = ("task", "condition", "agent", "seed", "steps", "cpu_seconds", "mean_return", "solved")
+INTERVAL = 1000
+OURS = "sdnn"
+
+
+def trial(work: Work) -> list[dict[str, Any]]:
+    """Train until the task is solved, or to the end."""
+    name, condition, kind, seed = work
+    task, contender = TASKS[name], CONTENDERS[kind]
+    make = task.make_unscaled if contender.in_own_units else task.make
+    steps = contender.steps.get(name, task.steps)
+    looks = UntilSolved(make(condition, evaluation=True), INTERVAL, task.solved, seed)
+    with contextlib.suppress(SolvedError):
+        contender.learn(name, condition, steps, seed, looks)
+    return [{"task": name, "condition": condition, "agent": kind, "seed": seed, **looks.row}]
+
+
+def _until_solved(rows: Sequence[Row], name: str, kind: str, field: str) -> np.ndarray:
+    """Steps or seconds by seed, infinite where the task was not solved."""
+    return np.array(
+        [
+            float(row[field]) if row["solved"] == "1" else np.inf
+            for row in rows
+            if row["task"] == name and row["agent"] == kind
+        ]
+    )
+
+
+def _interval(estimate: Estimate, digits: int = 0) -> str:
+    value, lower, upper = (
+        f"{x:,.{digits}f}" if np.isfinite(x) else "never"
+        for x in (estimate.value, estimate.lower, estimate.upper)
+    )
+    return f"{value} [{lower}, {upper}]"
+
+
+def _table_rows(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
+    for name in TASKS:
+        ours = np.median(_until_solved(rows, name, OURS, "cpu_seconds"))
+        for kind, contender in CONTENDERS.items():
+            steps = _until_solved(rows, name, kind, "steps")
+            if not steps.size:
+                continue
+            seconds = _until_solved(rows, name, kind, "cpu_seconds")
+            spent = [float(r["cpu_seconds"]) / float(r["steps"]) for r in rows
+                     if r["task"] == name and r["agent"] == kind]  # fmt: skip
+            yield (
+                name,
+                contender.title,
+                f"{np.isfinite(steps).sum()} of {steps.size}",
+                _interval(estimate_median(steps)),
+                f"{1000 * np.median(spent):.3g} ms",
+                _interval(estimate_median(seconds), 1) + " s",
+                f"{np.median(seconds) / ours:.2g}x" if np.isfinite(np.median(seconds)) else "",
+            )
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Medians over seeds, with bootstrap intervals; a seed that never solves counts as never."""
+    header = (
+        "task", "agent", "seeds that solve it", "steps until then", "a step", "processor time",
+        "of SDNN-C's",
+    )  # fmt: skip
+    return markdown(header, _table_rows(rows))
+
+
+def main() -> None:
+    """Run what is missing, then print the table."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--tasks", default="CartPole,Pendulum,MountainCarContinuous")
+    parser.add_argument("--agents", default="sdnn,tiles,sac,td3,ppo")
+    parser.add_argument("--folder", type=Path, default=DOCS)
+    parser.add_argument("--only-table", action="store_true")
+    options = parser.parse_args()
+    path = options.folder / "until-solved.csv"
+    if not options.only_table:
+        asked = [
+            (name, "clean", kind, seed)
+            for seed in range(options.seeds)
+            for name in options.tasks.split(",")
+            for kind in options.agents.split(",")
+            if name in CONTENDERS[kind].tasks
+        ]
+        run_missing(trial, asked, path, FIELDS, 1)
+    print(table(read_rows(path)))
+
+
+if __name__ == "__main__":
+    main()
