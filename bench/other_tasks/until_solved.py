@@ -63,8 +63,12 @@ def _interval(estimate: Estimate, digits: int = 0) -> str:
     return f"{value} [{lower}, {upper}]"
 
 
+def _times(ratio: float) -> str:
+    return f"{ratio:,.{0 if ratio >= 10 else 1}f}x" if np.isfinite(ratio) else ""
+
+
 def _table_rows(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
-    for name in TASKS:
+    for name in dict.fromkeys(row["task"] for row in rows):
         ours = np.median(_until_solved(rows, name, OURS, "cpu_seconds"))
         for kind, contender in CONTENDERS.items():
             steps = _until_solved(rows, name, kind, "steps")
@@ -80,7 +84,7 @@ def _table_rows(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
                 _interval(estimate_median(steps)),
                 f"{1000 * np.median(spent):.3g} ms",
                 _interval(estimate_median(seconds), 1) + " s",
-                f"{np.median(seconds) / ours:.2g}x" if np.isfinite(np.median(seconds)) else "",
+                _times(float(np.median(seconds) / ours)),
             )
 
 
