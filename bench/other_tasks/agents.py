@@ -7,7 +7,7 @@ all its environments: ``policy`` gives an observation's greedy action, ``memory(
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Protocol
@@ -17,7 +17,8 @@ import numpy as np
 import stable_baselines
 import stream_ac
 from numpy.typing import NDArray
-from tasks import TASKS
+from rows import Work
+from tasks import TASKS, Task
 from tile_coding import N_VALUES, TileCodingSarsa, listed_actions
 
 from sdnn.agents import Callback, RBFQLearning, SDNNQLearning
@@ -225,3 +226,27 @@ CONTENDERS = {
     "td3": _stable("TD3"),
     "ppo": _stable("PPO"),
 }
+
+
+def work_for(
+    n_seeds: int, conditions: Sequence[str], names: Sequence[str], kinds: Sequence[str]
+) -> list[Work]:
+    """List the trials there are, the contenders of a task and seed one after the other."""
+    return [
+        (name, condition, kind, seed)
+        for seed in range(n_seeds)
+        for condition in conditions
+        for name in names
+        for kind in kinds
+        if name in CONTENDERS[kind].tasks
+    ]
+
+
+def train(work: Work, make_looks: Callable[[gym.Env, Task, int, int], AfterStep]) -> None:
+    """Let a contender learn, under the eyes of ``make_looks(env, task, steps, seed)``."""
+    name, condition, kind, seed = work
+    task, contender = TASKS[name], CONTENDERS[kind]
+    make = task.make_unscaled if contender.in_own_units else task.make
+    steps = contender.steps.get(name, task.steps)
+    looks = make_looks(make(condition, evaluation=True), task, steps, seed)
+    contender.learn(name, condition, steps, seed, looks)

@@ -42,10 +42,10 @@ class _Watch:
 
 
 class Looks(_Watch):
-    """20 looks at equal distances; ``rows`` has one for each."""
+    """20 looks at equal distances, each a row that is added to ``rows``."""
 
-    def __init__(self, env, steps: int, seed: int) -> None:
-        self.rows: list[dict[str, Any]] = []
+    def __init__(self, env, steps: int, seed: int, rows: list[dict[str, Any]]) -> None:
+        self._rows = rows
         self._due = [steps * (i + 1) // N_LOOKS for i in range(N_LOOKS)]
         super().__init__(env, seed)
 
@@ -56,7 +56,7 @@ class Looks(_Watch):
         seconds = self._pause()
         while self._due and n_steps >= self._due[0]:
             self._due.pop(0)
-        self.rows.append(
+        self._rows.append(
             {
                 "steps": n_steps,
                 "cpu_seconds": seconds,
@@ -76,12 +76,12 @@ class SolvedError(Exception):
 class UntilSolved(_Watch):
     """Looks every so many steps, until 100 greedy episodes have a mean return that solves the task.
 
-    Ten episodes tell whether the hundred are worth playing. ``row`` is that of the last look, and
+    Ten episodes tell whether the hundred are worth playing. ``row`` takes the last look, and
     `SolvedError` ends the training.
     """
 
-    def __init__(self, env, interval: int, solved: float, seed: int) -> None:
-        self.row: dict[str, Any] = {}
+    def __init__(self, env, interval: int, solved: float, seed: int, row: dict[str, Any]) -> None:
+        self._row = row
         self._interval, self._solved, self._due = interval, solved, interval
         super().__init__(env, seed)
 
@@ -95,12 +95,9 @@ class UntilSolved(_Watch):
         if mean >= self._solved:
             mean = self._mean_return(policy, N_LAST_EPISODES)
         is_solved = mean >= self._solved
-        self.row = {
-            "steps": n_steps,
-            "cpu_seconds": seconds,
-            "mean_return": mean,
-            "solved": int(is_solved),
-        }
+        self._row.update(
+            steps=n_steps, cpu_seconds=seconds, mean_return=mean, solved=int(is_solved)
+        )
         if is_solved:
             raise SolvedError
         self._go_on()

@@ -15,7 +15,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from agents import CONTENDERS
+from agents import CONTENDERS, train, work_for
 from looks import Looks
 from report import draw, tables
 from rows import Work, read_rows, run_missing
@@ -27,14 +27,10 @@ FIELDS = ("task", "condition", "agent", "seed", "steps", "cpu_seconds", "mean_re
 
 def trial(work: Work) -> list[dict[str, Any]]:
     """Train and look."""
-    name, condition, kind, seed = work
-    task, contender = TASKS[name], CONTENDERS[kind]
-    make = task.make_unscaled if contender.in_own_units else task.make
-    steps = contender.steps.get(name, task.steps)
-    looks = Looks(make(condition, evaluation=True), steps, seed)
-    contender.learn(name, condition, steps, seed, looks)
-    own = {"task": name, "condition": condition, "agent": kind, "seed": seed}
-    return [{**own, **row} for row in looks.rows]
+    rows: list[dict[str, Any]] = []
+    train(work, lambda env, _, steps, seed: Looks(env, steps, seed, rows))
+    own = dict(zip(FIELDS, work, strict=False))
+    return [{**own, **row} for row in rows]
 
 
 def main() -> None:
@@ -50,14 +46,12 @@ def main() -> None:
     options = parser.parse_args()
     path = options.folder / "other-tasks.csv"
     if not options.only_table:
-        asked = [
-            (name, condition, kind, seed)
-            for seed in range(options.seeds)
-            for condition in options.conditions.split(",")
-            for kind in options.agents.split(",")
-            for name in options.tasks.split(",")
-            if name in CONTENDERS[kind].tasks
-        ]
+        asked = work_for(
+            options.seeds,
+            options.conditions.split(","),
+            options.tasks.split(","),
+            options.agents.split(","),
+        )
         run_missing(trial, asked, path, FIELDS, options.jobs)
     rows = read_rows(path)
     print(tables(rows))

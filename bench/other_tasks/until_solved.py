@@ -18,11 +18,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from agents import CONTENDERS
+from agents import CONTENDERS, train, work_for
 from looks import SolvedError, UntilSolved
 from report import markdown
 from rows import Row, Work, read_rows, run_missing
-from tasks import TASKS
 
 from sdnn.experiments.statistics import Estimate, estimate_median
 
@@ -34,14 +33,10 @@ OURS = "sdnn"
 
 def trial(work: Work) -> list[dict[str, Any]]:
     """Train until the task is solved, or to the end."""
-    name, condition, kind, seed = work
-    task, contender = TASKS[name], CONTENDERS[kind]
-    make = task.make_unscaled if contender.in_own_units else task.make
-    steps = contender.steps.get(name, task.steps)
-    looks = UntilSolved(make(condition, evaluation=True), INTERVAL, task.solved, seed)
+    row: dict[str, Any] = dict(zip(FIELDS, work, strict=False))
     with contextlib.suppress(SolvedError):
-        contender.learn(name, condition, steps, seed, looks)
-    return [{"task": name, "condition": condition, "agent": kind, "seed": seed, **looks.row}]
+        train(work, lambda env, task, _, seed: UntilSolved(env, INTERVAL, task.solved, seed, row))
+    return [row]
 
 
 def _until_solved(rows: Sequence[Row], name: str, kind: str, field: str) -> np.ndarray:
@@ -108,13 +103,9 @@ def main() -> None:
     options = parser.parse_args()
     path = options.folder / "until-solved.csv"
     if not options.only_table:
-        asked = [
-            (name, "clean", kind, seed)
-            for seed in range(options.seeds)
-            for name in options.tasks.split(",")
-            for kind in options.agents.split(",")
-            if name in CONTENDERS[kind].tasks
-        ]
+        asked = work_for(
+            options.seeds, ["clean"], options.tasks.split(","), options.agents.split(",")
+        )
         run_missing(trial, asked, path, FIELDS, 1)
     print(table(read_rows(path)))
 
