@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sdnn.agents.actions import Actions
 from sdnn.agents.files import Arrays, Description, from_file, read, rebuilt, register, write
-from sdnn.agents.observations import AnglePairs, Range, UnitObservations
+from sdnn.agents.observations import AnglePairs, Ranges, UnitObservations
 from sdnn.agents.spaces import space_data, space_of
 from sdnn.agents.training import Callback, Training, TrainingResult
 from sdnn.agents.transition import Transition
@@ -59,9 +59,11 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         Settings of the agent's parts.
     seed : int
         The root of every random stream of the agent.
-    observation_range : (low, high), optional
+    observation_range : (low, high) or "seen", optional
         Of the observed variables, two numbers or two for each; values outside saturate. By default
-        the bounds of the space, and what the warm-up sees where these are infinite.
+        the bounds of the space, and what the warm-up sees where these are infinite. ``"seen"``:
+        from the warm-up for all numbers but angles, a twentieth of what it sees left out at each
+        end, for spaces whose bounds are much wider than what a policy meets.
     angles : sequence of int
         Numbers of variables that are angles: their ranges wrap around.
     angle_pairs : "none", "find" or sequence of (int, int)
@@ -113,7 +115,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         learning: Learning,
         *,
         seed: int = 0,
-        observation_range: Range | None = None,
+        observation_range: Ranges | None = None,
         angles: Sequence[int] = (),
         angle_pairs: AnglePairs = "none",
         warm_up_steps: int = 1000,
@@ -228,6 +230,18 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     def is_warming_up(self) -> bool:
         """Whether the agent still acts at random to see the ranges of its observations."""
         return self._warm_up is not None
+
+    @property
+    def observation_range(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lowest and highest values of the observed variables, shapes (n_variables,), as used.
+
+        Raises
+        ------
+        RuntimeError
+            If the warm-up has not found them yet.
+        """
+        self._born()
+        return self._observations.low.copy(), self._observations.high.copy()
 
     @property
     def progress(self) -> float:
@@ -565,7 +579,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         low, high = ([np.nan if x is None else x for x in asked[end]] for end in ("low", "high"))
         agent._observations = UnitObservations(
             agent.observation_space,
-            ranges=(low, high),
+            ranges="seen" if asked.get("sees_ranges") else (low, high),
             angles=asked["angles"],
             angle_pairs=asked["angle_pairs"],
             symbols=bool(asked.get("symbols", False)),

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn import _core
 from sdnn.agents.actions import Actions, ContinuousActions
 from sdnn.agents.agent import Agent, check_shape
-from sdnn.agents.observations import AnglePairs, Range
+from sdnn.agents.observations import AnglePairs, Ranges
 from sdnn.approximators.fuzzy_rules import FuzzyRulesConfig
 from sdnn.arguments import whole
 from sdnn.config import added_later, to_core
@@ -124,7 +124,7 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
         approximator: FuzzyRulesConfig | None = None,
         learning: FuzzyQLearningConfig | None = None,
         seed: int = 0,
-        observation_range: Range | None = None,
+        observation_range: Ranges | None = None,
         angles: Sequence[int] = (),
         angle_pairs: AnglePairs = "none",
         warm_up_steps: int = 1000,

@@ -12,16 +12,19 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn import _core
 from sdnn.bounds import flat_bounds, with_infinities
 
-__all__ = ["AnglePairs", "Range", "UnitObservations"]
+__all__ = ["AnglePairs", "Ranges", "UnitObservations"]
 
 AnglePairs: TypeAlias = Literal["none", "find"] | Sequence[tuple[int, int]]
 """Which variables are the cosine and the sine of one angle."""
 
-Range: TypeAlias = tuple[ArrayLike, ArrayLike]
-"""Lowest and highest values: a number for all variables, or one for each."""
+Ranges: TypeAlias = Literal["seen"] | tuple[ArrayLike, ArrayLike]
+"""Lowest and highest values, a number for all variables or one for each; or what is seen."""
 
 _HEADROOM = 0.25
 """How much wider than what was seen a range is made at each end, in parts of it."""
+
+_RARE = 20
+"""One in so many observations is left out at each end, where ranges are asked for that are seen."""
 
 _ON_THE_CIRCLE = 1e-3
 """How far cos^2 + sin^2 may be from 1, for numbers in single precision and some rounding."""
@@ -41,9 +44,9 @@ class UnitObservations:
     space : gymnasium.Space
         That Gymnasium can flatten to a vector: Box, Discrete, MultiDiscrete, MultiBinary, Dict,
         Tuple.
-    ranges : (low, high), optional
+    ranges : (low, high) or "seen", optional
         Of the variables; by default the bounds of the space. NaN, and bounds that are infinite:
-        not known.
+        not known. ``"seen"``: of numbers where most given to `settle` are, within the bounds.
     angles : sequence of int
         Variables that are angles: the ends of their ranges are the same.
     angle_pairs : "none", "find" or sequence of (int, int)
@@ -67,7 +70,7 @@ class UnitObservations:
         self,
         space: gym.Space[Any],
         *,
-        ranges: Range | None = None,
+        ranges: Ranges | None = None,
         angles: Sequence[int] = (),
         angle_pairs: AnglePairs = "none",
         symbols: bool = False,
@@ -79,7 +82,8 @@ class UnitObservations:
         self.n_variables = low.size
         if self.n_variables == 0:
             raise ValueError(f"observation_space must have a variable, got {space}")
-        self.low, self.high = _ranges(low, high, ranges)
+        self._sees_ranges = isinstance(ranges, str) and ranges == "seen"
+        self.low, self.high = _ranges(low, high, None if self._sees_ranges else ranges)
         self._least_inputs = least_inputs
         self._symbols = dict(_symbols_of(space)) if symbols else {}
         self._angles = tuple(self._variable("angles", one) for one in _listed("angles", angles))
@@ -103,6 +107,11 @@ class UnitObservations:
                 f"angles and angle_pairs must name numbers, got variable {of_symbols[0]}, which is"
                 " of a Discrete"
             )
+        self._bounds = self.low.copy(), self.high.copy()
+        if self._sees_ranges:
+            seen = np.ones(self.n_variables, bool)
+            seen[[*self._angles, *self._of_symbols()]] = False
+            self.low[seen] = self.high[seen] = np.nan
         self._is_settled = False
         self._converted: tuple[tuple[Any, NDArray[np.float64]], ...] = ((None, np.empty(0)),) * 2
         if not self._finds_pairs and not self._unknown().any():
@@ -190,12 +199,29 @@ class UnitObservations:
         if self._finds_pairs:
             self._pairs = self._pairs_of(seen)
         unknown = self._unknown()
-        low, high = seen.min(axis=0), seen.max(axis=0)
-        low, high = np.maximum(low, -_LARGEST), np.minimum(high, _LARGEST)
-        width = np.where(high > low, high - low, np.maximum(np.abs(high), 1.0))
-        self.low = np.where(unknown, low - _HEADROOM * width, self.low)
-        self.high = np.where(unknown, high + _HEADROOM * width, self.high)
+        low, high = _widened(seen.min(axis=0), seen.max(axis=0))
+        if self._sees_ranges:
+            low, high = self._mostly(seen, low, high)
+        self.low = np.where(unknown, low, self.low)
+        self.high = np.where(unknown, high, self.high)
         self._settled()
+
+    def _mostly(
+        self, seen: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Find where variables mostly are; what hardly moves has its bounds, or low and high."""
+        n_rare = len(seen) // _RARE
+        ordered = np.sort(seen, axis=0)
+        first, last = ordered[n_rare], ordered[-1 - n_rare]
+        bounded = ~np.isnan(self._bounds[0])
+        low = np.where(bounded, self._bounds[0], low)
+        high = np.where(bounded, self._bounds[1], high)
+        wide_low, wide_high = _widened(first, last)
+        moves = last > first
+        return (
+            np.where(moves, np.maximum(wide_low, np.minimum(low, first)), low),
+            np.where(moves, np.minimum(wide_high, np.maximum(high, last)), high),
+        )
 
     def asked(self) -> dict[str, Any]:
         """Give what was asked for, as data that JSON can hold: to go on before `settle`."""
@@ -206,6 +232,7 @@ class UnitObservations:
             "angles": list(self._angles),
             "angle_pairs": pairs,
             "symbols": bool(self._symbols),
+            "sees_ranges": self._sees_ranges,
             "low": low,
             "high": high,
         }
@@ -318,6 +345,14 @@ class UnitObservations:
 _LARGEST = 1e300
 
 
+def _widened(
+    low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    low, high = np.maximum(low, -_LARGEST), np.minimum(high, _LARGEST)
+    width = np.where(high > low, high - low, np.maximum(np.abs(high), 1.0))
+    return low - _HEADROOM * width, high + _HEADROOM * width
+
+
 def _symbols_of(space: gym.Space[Any], first: int = 0) -> Iterator[tuple[int, int]]:
     """Find what tells symbols in a flattened space: first variables and how many there are."""
     if isinstance(space, gym.spaces.Discrete):
@@ -355,12 +390,12 @@ def _listed(name: str, values: Any) -> tuple[Any, ...]:
 
 
 def _ranges(
-    low: NDArray[np.float64], high: NDArray[np.float64], ranges: Range | None
+    low: NDArray[np.float64], high: NDArray[np.float64], ranges: Any
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Lowest and highest values of each variable, those given or the bounds; NaN: not known."""
     if ranges is not None:
         if not isinstance(ranges, Sequence) or isinstance(ranges, str) or len(ranges) != 2:
-            raise ValueError(f"observation_range must be (low, high), got {ranges!r}")
+            raise ValueError(f"observation_range must be (low, high) or 'seen', got {ranges!r}")
         try:
             low, high = (
                 with_infinities(

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn import _core
 from sdnn.agents.actions import Actions, IndexedActions
 from sdnn.agents.agent import Agent, check_shape
-from sdnn.agents.observations import AnglePairs, Range
+from sdnn.agents.observations import AnglePairs, Ranges
 from sdnn.agents.presets import PRESETS
 from sdnn.agents.q_learning_config import QLearningConfig
 from sdnn.approximators.rbf_network import RBFNetworkConfig
@@ -268,7 +268,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         seed: int = 0,
         tables: Sequence[ArrayLike] | None = None,
         preset: str = "general",
-        observation_range: Range | None = None,
+        observation_range: Ranges | None = None,
         angles: Sequence[int] = (),
         angle_pairs: AnglePairs = "none",
         warm_up_steps: int = 1000,
@@ -430,7 +430,7 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
         approximator: RBFNetworkConfig | None = None,
         learning: QLearningConfig | None = None,
         seed: int = 0,
-        observation_range: Range | None = None,
+        observation_range: Ranges | None = None,
         angles: Sequence[int] = (),
         angle_pairs: AnglePairs = "none",
         warm_up_steps: int = 1000,

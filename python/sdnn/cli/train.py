@@ -65,9 +65,9 @@ PRESETS = ("general", "small", "robust", "paper")
 @click.option(
     "--range",
     "ranges",
-    metavar="[VARIABLE=]LOW:HIGH",
+    metavar="[VARIABLE=]LOW:HIGH|seen",
     multiple=True,
-    help="Range of an observed variable, from 0, or of all; may be repeated.",
+    help="Range of an observed variable, from 0, or of all; may be repeated. seen: from a warm-up.",
 )
 @click.option(
     "--set",
@@ -169,7 +169,10 @@ def _config(env_id: str | None, file: Path | None, options: Mapping[str, Any]) -
         raise click.UsageError("ENV_ID must be given, or a --config that names an environment")
     kwargs = {name: value_of(text) for name, text in named_values("--env-arg", given.pop("kwargs"))}
     environment["kwargs"] = {**environment.get("kwargs", {}), **kwargs}
-    ranges = dict(_range(text) for text in given.pop("ranges"))
+    texts = given.pop("ranges")
+    if "seen" in texts:
+        settings.setdefault("agent", {})["observation_range"] = "seen"
+    ranges = dict(_range(text) for text in texts if text != "seen")
     environment["ranges"] = {**environment.get("ranges", {}), **ranges}
     for name in ("noise", "redundant"):
         if name in given:
@@ -193,7 +196,9 @@ def _range(text: str) -> tuple[str, list[float]]:
             raise ValueError
         return name or "all", [float(low), float(high)]
     except ValueError:
-        raise click.UsageError(f"--range must be [VARIABLE=]LOW:HIGH, got {text!r}") from None
+        raise click.UsageError(
+            f"--range must be [VARIABLE=]LOW:HIGH or seen, got {text!r}"
+        ) from None
 
 
 def _folder_of(config: RunConfig) -> Path:

@@ -72,6 +72,7 @@ class _AgentSettings:
 
     warm_up_steps: int = 1000
     angles: tuple[int, ...] = ()
+    observation_range: Literal["seen"] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +89,8 @@ class RunConfig:
         A key of `sdnn.agents.PRESETS`, for the agent ``"sdnn"`` only; None: ``"general"`` for it.
     settings
         What differs from the preset, or from the agent's defaults: tables ``"approximator"``,
-        ``"learning"`` and ``"agent"`` (``warm_up_steps``, ``angles``) of settings by their names.
+        ``"learning"`` and ``"agent"`` (``warm_up_steps``, ``angles``, ``observation_range``) of
+        settings by their names.
     steps, episodes
         How long it learns: one of them; by default 200,000 steps.
     seed
@@ -229,6 +231,10 @@ class RunConfig:
         }
         given |= self.settings.get("agent", {})
         if self.environment.ranges and not self.environment.changes_observations:
+            if "observation_range" in given:
+                raise ConfigError(
+                    "environment.ranges", "must not be given together with ranges that are seen"
+                )
             given["observation_range"] = self.environment.ends(env)
         try:
             return kind(

@@ -46,6 +46,40 @@ def test_only_unknown_ranges_are_learned():
     assert (observations.low[1], observations.high[1]) == (0.0, 1.0)
 
 
+def test_ranges_that_are_seen_leave_out_what_is_rare_and_stay_within_bounds():
+    space = gym.spaces.Box(
+        np.array([-100.0, 0.0, 0.0, -np.inf, -np.pi, -1.0]),
+        np.array([100.0, 4.0, 1.0, np.inf, np.pi, 1.0]),
+        dtype=np.float64,
+    )
+    seen = np.empty((40, 6))
+    seen[:, 0] = [-90.0, -80.0, *np.linspace(2.0, 6.0, 36), 70.0, 80.0]  # 2 of 40 at each end: rare
+    seen[:, 1] = np.linspace(0.0, 39.0, 40) / 10  # from 0.2 to 3.7: a quarter more is over the ends
+    seen[:, 2] = [1.0, *np.zeros(39)]  # hardly moves
+    seen[:, 3] = [-1e9, -1e9, *np.linspace(0.0, 8.0, 36), 1e9, np.inf]
+    seen[:, 4] = 0.1  # an angle
+    seen[:, 5] = [*np.zeros(20), *np.full(20, 3.0)]  # beyond its bounds
+    observations = UnitObservations(space, ranges="seen", angles=[4])
+    assert not observations.is_settled
+    observations.settle(seen)
+    assert observations.low.tolist() == [1.0, 0.0, 0.0, -2.0, -np.pi, -0.75]
+    assert observations.high.tolist() == [7.0, 4.0, 1.0, 10.0, np.pi, 3.0]
+
+
+def test_who_hardly_moves_and_has_no_bounds_has_all_that_was_seen():
+    observations = settled(UNBOUNDED, [[0.0, 5.0, 0.0]] * 39 + [[4.0, 5.0, np.inf]], ranges="seen")
+    assert observations.low[:2].tolist() == [-1.0, 3.75]
+    assert observations.high[:2].tolist() == [5.0, 6.25]
+    assert np.isfinite(observations.high[2])
+
+
+def test_symbols_have_no_range_to_be_seen():
+    space = gym.spaces.Dict({"room": gym.spaces.Discrete(3), "speed": gym.spaces.Box(-9, 9, (1,))})
+    observations = settled(space, np.eye(4), ranges="seen", symbols=True)
+    assert observations.n_symbols == (3, 0)
+    assert not settled(gym.spaces.Discrete(3), np.eye(3), ranges="seen", symbols=True).circular[0]
+
+
 def test_a_cosine_and_a_sine_become_an_angle():
     space = gym.spaces.Box(-1.0, 1.0, (3,), dtype=np.float64)
     observations = UnitObservations(space, angle_pairs=[(0, 1)])
@@ -204,7 +238,8 @@ def test_descriptions_that_do_not_fit_are_refused(change, message):
     [
         ({"ranges": (1.0, 0.0)}, "observation_range must have low < high"),
         ({"ranges": ([1.0], [2.0, 3.0, 4.0])}, "observation_range must be two numbers or two"),
-        ({"ranges": 3.0}, r"observation_range must be \(low, high\), got 3.0"),
+        ({"ranges": 3.0}, r"observation_range must be \(low, high\) or 'seen', got 3.0"),
+        ({"ranges": "all"}, r"observation_range must be \(low, high\) or 'seen', got 'all'"),
         ({"ranges": ("a", "b")}, "observation_range must be two numbers"),
         ({"angles": [2]}, "angles must be variables from 0 to 1, got 2"),
         ({"angles": ["x"]}, "angles must be variables"),

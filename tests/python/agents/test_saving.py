@@ -58,6 +58,14 @@ KINDS = {
     "sdnn, warm-up": lambda: SDNNQLearning(
         UNBOUNDED, TORQUE, approximator=SMALL, learning=GENERAL, warm_up_steps=60
     ),
+    "sdnn, ranges seen": lambda: SDNNQLearning(
+        PLANE,
+        TORQUE,
+        approximator=SMALL,
+        learning=GENERAL,
+        observation_range="seen",
+        warm_up_steps=60,
+    ),
     "sdnn, tables": lambda: SDNNQLearning(
         PLANE, TORQUE, approximator=SMALL, tables=[np.sign(np.eye(20) - 0.5)] * 2
     ),

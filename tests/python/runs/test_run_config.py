@@ -149,6 +149,23 @@ def test_angle_pairs_are_not_found_in_scaled_observations():
         RunConfig(environment=dataclasses.replace(CART_POLE, redundant=1), angle_pairs="find")
 
 
+def test_ranges_are_given_or_seen():
+    settings = {"agent": {"observation_range": "seen", "warm_up_steps": 20}}
+    environment = RunEnvironment(id="MountainCar-v0")
+    env = environment.make()
+    assert not RunConfig(environment=environment).make_agent(env).is_warming_up
+    agent = RunConfig(environment=environment, settings=settings).make_agent(env)
+    assert agent.is_warming_up
+    agent.train(env, steps=20)
+    low, high = agent.observation_range
+    assert (low > env.observation_space.low).all()
+    assert (high < env.observation_space.high).all()
+    given = dataclasses.replace(environment, ranges={"0": (-1.0, 1.0)})
+    with pytest.raises(ConfigError, match="not be given together") as caught:
+        RunConfig(environment=given, settings=settings).make_agent(env)
+    assert caught.value.key == "environment.ranges"
+
+
 def test_agents_are_made_with_preset_and_settings():
     env = CART_POLE.make()
     kinds = {"sdnn": SDNNQLearning, "rbf": RBFQLearning}
