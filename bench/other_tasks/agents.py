@@ -8,7 +8,7 @@ all its environments: ``policy`` gives an observation's greedy action, ``memory(
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Protocol
 
@@ -143,6 +143,19 @@ def _agent(env, make, name, condition, seed):
     return make(env.observation_space, env.action_space, seed=seed, **options)
 
 
+def _brief(*spaces, **options):
+    learning = replace(PRESETS["general"].learning, max_repetitions=1)
+    return SDNNQLearning(*spaces, learning=learning, **options)
+
+
+def _with_bounds(*spaces, observation_range=None, **options):
+    return SDNNQLearning(*spaces, **options)
+
+
+def _with_ranges_seen(*spaces, observation_range=None, **options):
+    return SDNNQLearning(*spaces, observation_range="seen", **options)
+
+
 def _rbf(*spaces, **options):
     general = PRESETS["general"]
     sizes = RBFNetworkConfig(n_actions=general.approximator.n_actions)
@@ -155,6 +168,7 @@ TILINGS = {
     "MountainCar": {"n_bins": 8, "n_tilings": 8, "discount": 1.0, "epsilon": 0.0},
     "MountainCarContinuous": {"n_bins": 8, "n_tilings": 8},
     "Acrobot": {"n_bins": 4, "n_tilings": 16, "discount": 1.0, "epsilon": 0.0},
+    "LunarLanderContinuous": {"n_bins": 3, "n_tilings": 16},
     "Reaching": {"n_bins": 4, "n_tilings": 16},
     "Wheels": {"n_bins": 4, "n_tilings": 16},
 }
@@ -198,6 +212,19 @@ CONTENDERS = {
         title="SDNN-C, small",
         learn=partial(_learn_ours, partial(SDNNQLearning, preset="small")),
         tasks=("CartPole", "Pendulum", "MountainCarContinuous"),
+    ),
+    "sdnn-brief": Contender(
+        title="SDNN-C, brief random actions", learn=partial(_learn_ours, _brief), tasks=tuple(TASKS)
+    ),
+    "sdnn-bounds": Contender(
+        title="SDNN-C, bounds of the space",
+        learn=partial(_learn_ours, _with_bounds),
+        tasks=("LunarLanderContinuous",),
+    ),
+    "sdnn-seen": Contender(
+        title="SDNN-C, ranges seen",
+        learn=partial(_learn_ours, _with_ranges_seen),
+        tasks=("LunarLanderContinuous",),
     ),
     "sdnn-joint": Contender(
         title="SDNN-C, joint actions", learn=_learn_joint, tasks=("Reaching", "Wheels")

@@ -168,9 +168,13 @@ def draw(rows: Sequence[Row], path: Path) -> None:
 
 def _draw_task(panels, rows: Sequence[Row], name: str) -> None:
     """Draw a task's curves into two panels."""
+    from matplotlib import colormaps
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    for number, (kind, contender) in enumerate(CONTENDERS.items()):
+    shades = colormaps["tab20"].colors  # each colour dark and light
+    for (kind, contender), color in zip(
+        CONTENDERS.items(), [*shades[::2], *shades[1::2]], strict=False
+    ):
         looks = trials(rows, name, "clean", kind)
         if not looks:
             continue
@@ -179,7 +183,7 @@ def _draw_task(panels, rows: Sequence[Row], name: str) -> None:
         for panel, field in zip(panels, ("steps", "cpu_seconds"), strict=True):
             x = np.median([[float(r[field]) for r in trial] for trial in looks], axis=0)
             (line,) = panel.plot(
-                x, median, "-" if x.size > 1 else "o", color=f"C{number}",
+                x, median, "-" if x.size > 1 else "o", color=color,
                 label=contender.title, lw=1.6,
             )  # fmt: skip
             panel.fill_between(x, lower, upper, color=line.get_color(), alpha=0.2, lw=0)

@@ -39,7 +39,8 @@ class Task:
     kwargs
         Arguments of the environment.
     ranges
-        Of variables for which the environment gives none, as `RunEnvironment` takes them.
+        Of variables for which the environment gives none, or ends that no policy comes near, as
+        `RunEnvironment` takes them.
     options
         What a user of our agents would say of the task.
     """
@@ -93,6 +94,9 @@ def _between(low, high, observation):
     return (low + observation * (high - low)).astype(np.float32)
 
 
+# What a landing goes through; the space has speeds up to 10 and turns of 2 pi.
+_LANDING = ((-1, 1), (-0.2, 1.6), (-1, 1), (-1.5, 0.5), (-1, 1), (-1.5, 1.5), (0, 1), (0, 1))
+
 TASKS = {
     "CartPole": Task(
         id="CartPole-v1",
@@ -112,7 +116,13 @@ TASKS = {
         options={"angle_pairs": [(0, 1), (2, 3)]},
     ),
     "LunarLanderContinuous": Task(
-        id="LunarLander-v3", kwargs={"continuous": True}, steps=300_000, solved=200.0, random=-210.4
+        id="LunarLander-v3",
+        kwargs={"continuous": True},
+        steps=300_000,
+        solved=200.0,
+        random=-210.4,
+        ranges={str(i): ends for i, ends in enumerate(_LANDING)},
+        options={"observation_range": tuple(zip(*_LANDING, strict=True))},
     ),
     # Solved is what comes near the best of some hundred proportional controllers: -13.6 and -23.6.
     "Reaching": Task(id=two_torques.REACHING, steps=60_000, solved=-20.0, random=-112.2),
