@@ -156,6 +156,11 @@ def _with_ranges_seen(*spaces, observation_range=None, **options):
     return SDNNQLearning(*spaces, observation_range="seen", **options)
 
 
+def _with_fewer_pairs(*spaces, **options):
+    sizes = replace(PRESETS["general"].approximator, max_pairs=24)
+    return SDNNQLearning(*spaces, approximator=sizes, **options)
+
+
 def _rbf(*spaces, **options):
     general = PRESETS["general"]
     sizes = RBFNetworkConfig(n_actions=general.approximator.n_actions)
@@ -224,6 +229,11 @@ CONTENDERS = {
     "sdnn-seen": Contender(
         title="SDNN-C, ranges seen",
         learn=partial(_learn_ours, _with_ranges_seen),
+        tasks=("LunarLanderContinuous",),
+    ),
+    "sdnn-fewer-pairs": Contender(
+        title="SDNN-C, 24 pairs of inputs",
+        learn=partial(_learn_ours, _with_fewer_pairs),
         tasks=("LunarLanderContinuous",),
     ),
     "sdnn-joint": Contender(

@@ -4,6 +4,7 @@
 
 #include <tuple>
 #include <utility>
+#include <vector>
 
 #include "arrays.hpp"
 #include "bind_config.hpp"
@@ -212,6 +213,16 @@ void bind_approximators(py::module_& module) {
             return bindings::signs_of(net.state_code().table(input));
           },
           py::arg("input"), "Patterns of an input: (n_bins, m) of -1, +1")
+      .def_property_readonly(
+          "pairs",
+          [](const SDNNC& net) {
+            std::vector<std::pair<std::size_t, std::size_t>> pairs;
+            for (const auto& pair : net.state_code().groups()) {
+              pairs.emplace_back(pair.modified, pair.modifier);
+            }
+            return pairs;
+          },
+          "(mu, nu) of every group of x_SD, in its order")
       .def("permutation", &permutation, py::arg("mu"), py::arg("nu"), "sigma_mu_nu: (m,)")
       .def("weights", &weights, "A copy, in lattice steps: (n, D)")
       .def("thresholds", &thresholds, "A copy, in lattice steps: (n,)")

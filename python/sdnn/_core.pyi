@@ -65,7 +65,7 @@ class SDNNCConfig:
     __hash__: typing.ClassVar[None] = None
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_pattern_units: typing.SupportsInt | typing.SupportsIndex = 200, n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex = 9, n_interpolated: typing.SupportsInt | typing.SupportsIndex = 44, balanced_anchors: bool = True, circular: collections.abc.Sequence[bool] = [], n_symbols: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], n_hidden_units: typing.SupportsInt | typing.SupportsIndex = 900, n_active_units: typing.SupportsInt | typing.SupportsIndex = 300, n_actions: typing.SupportsInt | typing.SupportsIndex = 0, q_low: typing.SupportsFloat | typing.SupportsIndex = -20.0, q_high: typing.SupportsFloat | typing.SupportsIndex = 20.0, u_low: typing.SupportsInt | typing.SupportsIndex | None = None, u_high: typing.SupportsInt | typing.SupportsIndex | None = None, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.1, lattice: typing.SupportsInt | typing.SupportsIndex = 1, initial_threshold: typing.SupportsFloat | typing.SupportsIndex = 200.0, initial_weights: InitialWeights = InitialWeights.ternary, initial_weight_limit: typing.SupportsFloat | typing.SupportsIndex = 0.1, rounding: Rounding = Rounding.half_up, averaging_interval: typing.SupportsInt | typing.SupportsIndex = 0, max_table_bytes: typing.SupportsInt | typing.SupportsIndex = 1073741824) -> None:
+    def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, max_pairs: typing.SupportsInt | typing.SupportsIndex = 0, n_pattern_units: typing.SupportsInt | typing.SupportsIndex = 200, n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex = 9, n_interpolated: typing.SupportsInt | typing.SupportsIndex = 44, balanced_anchors: bool = True, circular: collections.abc.Sequence[bool] = [], n_symbols: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], n_hidden_units: typing.SupportsInt | typing.SupportsIndex = 900, n_active_units: typing.SupportsInt | typing.SupportsIndex = 300, n_actions: typing.SupportsInt | typing.SupportsIndex = 0, q_low: typing.SupportsFloat | typing.SupportsIndex = -20.0, q_high: typing.SupportsFloat | typing.SupportsIndex = 20.0, u_low: typing.SupportsInt | typing.SupportsIndex | None = None, u_high: typing.SupportsInt | typing.SupportsIndex | None = None, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.1, lattice: typing.SupportsInt | typing.SupportsIndex = 1, initial_threshold: typing.SupportsFloat | typing.SupportsIndex = 200.0, initial_weights: InitialWeights = InitialWeights.ternary, initial_weight_limit: typing.SupportsFloat | typing.SupportsIndex = 0.1, rounding: Rounding = Rounding.half_up, averaging_interval: typing.SupportsInt | typing.SupportsIndex = 0, max_table_bytes: typing.SupportsInt | typing.SupportsIndex = 1073741824) -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -92,6 +92,9 @@ class SDNNCConfig:
         ...
     @property
     def learning_coefficient(self) -> float:
+        ...
+    @property
+    def max_pairs(self) -> int:
         ...
     @property
     def max_table_bytes(self) -> int:
@@ -217,6 +220,11 @@ class SDNNC:
     def output_range(self) -> tuple[float, float]:
         """
         (q_low, q_high) as they are now
+        """
+    @property
+    def pairs(self) -> list[tuple[int, int]]:
+        """
+        (mu, nu) of every group of x_SD, in its order
         """
     @property
     def u_high(self) -> int:

@@ -226,8 +226,7 @@ class _Writer:
         self.low, self.high = (description["observation"][end] for end in ("low", "high"))
         self.inputs: list[dict[str, Any]] = description["observation"]["inputs"]
         self.n_bins = [len(self.networks[0].table(i)) for i in range(len(self.inputs))]
-        n_pairs = len(self.inputs) * (len(self.inputs) - 1)
-        self.n_columns = n_pairs * self.sizes.n_pattern_units
+        self.n_columns = self.sizes.n_pairs * self.sizes.n_pattern_units
         self._check_sizes()
         self.box = self._box()
         self.fraction_bits = self._checked_fraction_bits(fraction_bits)
@@ -332,6 +331,7 @@ class _Writer:
             "n_fire_words": n_fire_words,
             "most_actions": most_actions,
             "n_pattern_units": self.sizes.n_pattern_units,
+            "n_partners": self.sizes.n_pairs // len(self.inputs),
             "pattern_bytes": -(-self.sizes.n_pattern_units // 8),
             "n_active_units": self.sizes.n_active_units,
             "widen": "  best = ${name}_ties[best];\n" if self.learning.tie_tolerance > 0.0 else "",
@@ -383,14 +383,16 @@ class _Writer:
     def _add_wiring(self, tables: _Tables, d: int, network: Any) -> None:
         inputs = range(len(self.inputs))
         rows = [np.packbits(network.table(i) > 0, axis=1, bitorder="little") for i in inputs]
-        sigma = [network.permutation(mu, nu) for mu in inputs for nu in inputs if nu != mu]
+        sigma = [network.permutation(*pair) for pair in network.pairs]
+        modifiers = np.array([nu for _, nu in network.pairs])
         tables.add("uint8_t", f"{self.name}_patterns_{d}", np.concatenate(rows).reshape(-1))
+        tables.add("uint16_t", f"{self.name}_modifiers_{d}", modifiers)
         tables.add(self._permutation_type, f"{self.name}_permutations_{d}", np.concatenate(sigma))
 
     def _table_of_networks(self, n_units: Sequence[int]) -> Iterator[str]:
         yield f"static const {self.name}_network {self.name}_networks[{len(n_units)}] = {{"
         for d, (network, n) in enumerate(zip(self.networks, n_units, strict=True)):
-            tables = ("patterns", "permutations", "weights", "units", "first_units")
+            tables = ("patterns", "modifiers", "permutations", "weights", "units", "first_units")
             names = ", ".join(f"{self.name}_{table}_{d}" for table in tables)
             yield f"  {{{names}, {n}, {network.n_actions}}},"
         yield "};"

@@ -33,11 +33,16 @@ class Preset:
 
 # A full step each time, then ever smaller ones, which rounding stills one by one; targets of five
 # steps; exploration that goes somewhere; an average that does not swing; values in steps half as
-# large as the paper's: docs/benchmarks.md.
+# large as the paper's: docs/benchmarks.md. All pairs of up to eight inputs, so that the weights of
+# many fit in memory.
 _GENERAL = Preset(
     title="as recommended for any task",
     approximator=SDNNCConfig(
-        n_hidden_units=1800, n_active_units=600, n_actions=5, averaging_interval=100
+        max_pairs=56,
+        n_hidden_units=1800,
+        n_active_units=600,
+        n_actions=5,
+        averaging_interval=100,
     ),
     learning=QLearningConfig(
         learning_rate=1.0,

@@ -331,8 +331,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
 
     def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         sizes = self.approximator
-        n_groups = self._observations.n_inputs * (self._observations.n_inputs - 1)
-        shape = (sizes.n_hidden_units, n_groups * sizes.n_pattern_units)
+        shape = (sizes.n_hidden_units, sizes.n_pairs * sizes.n_pattern_units)
         for prefix in self._prefixes():
             check_shape(state, prefix + "weights", shape)
             if sizes.averaging_interval > 0:

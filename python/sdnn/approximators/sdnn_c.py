@@ -26,6 +26,11 @@ class SDNNCConfig:
     ----------
     n_inputs : int
         l, number of inputs, at least 2 (section 3.1).
+    max_pairs : int
+        Most pairs of inputs that are formed: all l (l - 1) if there are no more or with 0; else an
+        even share of them at random, each input modified by as many others as it modifies, and by
+        one at least. Cost grows with pairs, so with many inputs it then grows as their number, not
+        as its square. Not in the paper, which has all.
     n_pattern_units : int
         m, units per pattern, 2 to 65536 (section 4.2: 200).
     n_anchor_patterns : int
@@ -79,6 +84,7 @@ class SDNNCConfig:
     """
 
     n_inputs: int = 4
+    max_pairs: int = added_later(0)
     n_pattern_units: int = 200
     n_anchor_patterns: int = 9
     n_interpolated: int = 44
@@ -100,6 +106,14 @@ class SDNNCConfig:
     rounding: Literal["half_up", "random", "away"] = added_later("half_up")
     averaging_interval: int = added_later(0)
     max_table_bytes: int = added_later(2**30)
+
+    @property
+    def n_pairs(self) -> int:
+        """How many pairs of inputs are formed; the code has ``n_pattern_units`` for each."""
+        others = self.n_inputs - 1
+        if self.max_pairs > 0:
+            others = max(1, min(others, self.max_pairs // self.n_inputs))
+        return self.n_inputs * others
 
     def to_core(self) -> _core.SDNNCConfig:
         """Make the core's struct of the same values; see `sdnn.config.to_core`."""
@@ -180,6 +194,11 @@ class SDNNC:
     def n_actions(self) -> int:
         """Number of actions."""
         return self._core.n_actions
+
+    @property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """The pairs (modified, modifier) of inputs, in the order of the code: m units each."""
+        return tuple(self._core.pairs)
 
     def values(self, state: ArrayLike) -> NDArray[np.float64]:
         """Q(state, a) for every action.

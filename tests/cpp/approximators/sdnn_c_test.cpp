@@ -431,6 +431,46 @@ TEST(SDNNC, LearnsOverPatternsOfAnyCoding) {
   EXPECT_THROW(Network({.n_inputs = 3}, tables, 7), std::invalid_argument);  // 200 units
 }
 
+TEST(SDNNC, PairsOfInputsAreAnEvenShareOfAll) {
+  const SDNNCConfig sizes{
+      .n_inputs = 7, .n_pattern_units = 20, .n_hidden_units = 60, .n_active_units = 20};
+  const auto partners = [&](int max_pairs) {
+    SDNNCConfig config = sizes;
+    config.max_pairs = max_pairs;
+    const Network network(config, 3);
+    std::vector<std::size_t> n_modifiers(7, 0);
+    std::vector<std::size_t> n_modified(7, 0);
+    for (const coding::InputPair& pair : network.state_code().groups()) {
+      ++n_modifiers[pair.modified];
+      ++n_modified[pair.modifier];
+    }
+    EXPECT_EQ(n_modifiers, std::vector<std::size_t>(7, n_modifiers[0]));
+    EXPECT_EQ(n_modified, n_modifiers);
+    return n_modifiers[0];
+  };
+  EXPECT_EQ(partners(0), 6U);
+  EXPECT_EQ(partners(1), 1U);
+  EXPECT_EQ(partners(20), 2U);
+  EXPECT_EQ(partners(21), 3U);
+  EXPECT_EQ(partners(42), 6U);
+  EXPECT_EQ(partners(1000), 6U);
+
+  SDNNCConfig config = sizes;
+  config.max_pairs = 21;
+  Network network(config, 7);
+  EXPECT_FALSE(
+      std::ranges::equal(network.state_code().groups(), Network(config, 8).state_code().groups()));
+  core::Random random(3, core::Stream::code_books);
+  for (int i = 0; i < 60; ++i) {
+    const State state = random_state(7, random);
+    network.correct(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
+    ASSERT_EQ(values(network, state), values_by_masks(network, state));
+  }
+  // All pairs are the paper's code, however they were asked for.
+  config.max_pairs = 42;
+  expect_equal_parameters(Network(config, 7), Network(sizes, 7));
+}
+
 TEST(SDNNC, SymbolsHavePatternsOfTheirOwn) {
   SDNNCConfig config = small();
   config.n_symbols = {4, 0, 7};
@@ -506,8 +546,9 @@ TEST(SDNNC, TooLargeANetworkIsRefusedBeforeMemoryIsAskedFor) {
     return "no error";
   };
   EXPECT_EQ(refusal({.n_inputs = 16, .n_pattern_units = 4096}),
-            "n_hidden_units, n_pattern_units or n_inputs must be smaller: weights, patterns and "
-            "remembered potentials need 1821434880 bytes, but max_table_bytes is 1073741824");
+            "max_pairs, n_hidden_units, n_pattern_units or n_inputs must be smaller: weights, "
+            "patterns and remembered potentials need 1821434880 bytes, but max_table_bytes is "
+            "1073741824");
   const std::string patterns = refusal({.n_anchor_patterns = 10000, .n_interpolated = 10000});
   EXPECT_TRUE(patterns.starts_with("n_interpolated, n_anchor_patterns, n_pattern_units"))
       << patterns;
@@ -533,6 +574,7 @@ TEST(SDNNC, NamesTheFieldThatIsImpossible) {
             "n_active_units must be in [1, 900], got 901");
   EXPECT_EQ(message({.n_inputs = 1}), "n_inputs must be in [2, 1024], got 1");
   EXPECT_EQ(message({.circular = {true}}), "circular must be empty or one flag per input, got 1");
+  EXPECT_EQ(message({.max_pairs = -1}), "max_pairs must be in [0, 1048576], got -1");
   EXPECT_EQ(message({.n_symbols = {3}}), "n_symbols must be empty or a number per input, got 1");
   EXPECT_EQ(message({.n_symbols = {0, -1, 0, 0}}), "n_symbols must be in [0, 16777216], got -1");
   expect_named({.circular = {true, false, false, false}, .n_symbols = {3, 0, 0, 0}}, "circular");

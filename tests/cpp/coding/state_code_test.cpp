@@ -16,18 +16,19 @@
 namespace sdnn::coding {
 namespace {
 
-StateCode small_code(std::size_t l, int m, std::uint64_t seed) {
+StateCode small_code(std::size_t l, int m, std::uint64_t seed,
+                     std::vector<std::size_t> strides = {}) {
   std::vector<PatternTable> tables;
   std::vector<Permutation> permutations;
   for (std::size_t mu = 0; mu < l; ++mu) {
     core::Random random(seed, core::Stream::code_books, mu);
     tables.push_back(anchor_patterns({.n_units = m}, random));
   }
-  for (std::size_t g = 0; g < l * (l - 1); ++g) {
+  for (std::size_t g = 0; g < l * (strides.empty() ? l - 1 : strides.size()); ++g) {
     core::Random random(seed, core::Stream::permutations, g);
     permutations.push_back(random_permutation(static_cast<std::size_t>(m), random));
   }
-  return {std::move(tables), std::move(permutations)};
+  return {std::move(tables), std::move(permutations), std::move(strides)};
 }
 
 /// The paired code of a state as words.
@@ -66,21 +67,43 @@ std::vector<int> x_sd(const StateCode& code, std::span<const Bin> bins) {
   return x;
 }
 
-// With an even number of inputs some columns are left without a partner.
-class StateCodeOfInputs : public ::testing::TestWithParam<std::size_t> {};
-INSTANTIATE_TEST_SUITE_P(Inputs, StateCodeOfInputs, ::testing::Values(2, 3, 4, 5, 6));
+struct Wiring {
+  std::size_t l;
+  std::vector<std::size_t> strides = {};
+
+  StateCode code(int m, std::uint64_t seed) const { return small_code(l, m, seed, strides); }
+  std::size_t n_partners() const { return strides.empty() ? l - 1 : strides.size(); }
+  /// Whether nu modifies mu.
+  bool has(std::size_t mu, std::size_t nu) const {
+    if (strides.empty()) return mu != nu;
+    return std::ranges::find(strides, (nu + l - mu) % l) != strides.end();
+  }
+};
+
+// With an even number of inputs, or an odd one of partners, columns are left that have no other.
+class StateCodeOfInputs : public ::testing::TestWithParam<Wiring> {};
+INSTANTIATE_TEST_SUITE_P(Inputs, StateCodeOfInputs,
+                         ::testing::Values(Wiring{2}, Wiring{3}, Wiring{4}, Wiring{5}, Wiring{6},
+                                           Wiring{6, {4}}, Wiring{5, {2, 3}}, Wiring{6, {1, 3, 4}},
+                                           Wiring{4, {1, 2, 3}}, Wiring{6, {1, 2, 4, 5}}));
 
 TEST_P(StateCodeOfInputs, TheCodeFollowsTheEquationOfLayer3) {
-  const std::size_t l = GetParam();
-  const auto code = small_code(l, 37, 5);
-  EXPECT_EQ(code.n_columns(), 37U * l * (l - 1));
+  const Wiring wiring = GetParam();
+  const std::size_t l = wiring.l;
+  const auto code = wiring.code(37, 5);
+  EXPECT_EQ(code.n_columns(), 37U * l * wiring.n_partners());
+  std::vector<InputPair> groups;
   std::vector<Bin> bins = {17, 200, 359, 0, 90, 123};
   bins.resize(l);
   const auto x = x_sd(code, bins);
   std::size_t j = 0;
   for (std::size_t mu = 0; mu < l; ++mu) {
     for (std::size_t nu = 0; nu < l; ++nu) {
-      if (nu == mu) continue;
+      if (!wiring.has(mu, nu)) {
+        EXPECT_THROW(static_cast<void>(code.permutation(mu, nu)), std::invalid_argument);
+        continue;
+      }
+      groups.push_back({.modified = mu, .modifier = nu});
       const auto& sigma = code.permutation(mu, nu);
       for (std::size_t k = 0; k < 37; ++k, ++j) {
         const int x_mu = code.table(mu)[static_cast<std::size_t>(bins[mu])][k] ? 1 : -1;
@@ -89,13 +112,15 @@ TEST_P(StateCodeOfInputs, TheCodeFollowsTheEquationOfLayer3) {
       }
     }
   }
+  EXPECT_TRUE(std::ranges::equal(code.groups(), groups));
 }
 
 // Half a sum and half a difference: one of the two is neutral, whatever the signs.
 TEST_P(StateCodeOfInputs, HalfAsManyPairedColumnsAreActive) {
-  const std::size_t l = GetParam();
-  const auto code = small_code(l, 37, 5);
-  EXPECT_EQ(code.n_double_columns(), 37U * l * (l - 1 - (l - 1) % 2));
+  const std::size_t l = GetParam().l;
+  const std::size_t k = GetParam().n_partners();
+  const auto code = GetParam().code(37, 5);
+  EXPECT_EQ(code.n_double_columns(), 37U * l * (k - k % 2));
   std::vector<Bin> bins = {17, 200, 359, 0, 90, 123};
   bins.resize(l);
   const auto x = x_sd(code, bins);
@@ -115,7 +140,7 @@ TEST_P(StateCodeOfInputs, HalfAsManyPairedColumnsAreActive) {
 }
 
 TEST_P(StateCodeOfInputs, EveryColumnOfThePairedCodeHasItsUnits) {
-  const auto code = small_code(GetParam(), 13, 5);
+  const auto code = GetParam().code(13, 5);
   std::vector<int> taken(code.n_columns(), 0);
   for (std::size_t j = 0; j < code.n_columns(); ++j) {
     const auto columns = code.columns_of(j);
@@ -130,8 +155,8 @@ TEST_P(StateCodeOfInputs, EveryColumnOfThePairedCodeHasItsUnits) {
 }
 
 TEST_P(StateCodeOfInputs, TheDifferenceIsThatOfThePairedCodes) {
-  const std::size_t l = GetParam();
-  const auto code = small_code(l, 50, 6);
+  const std::size_t l = GetParam().l;
+  const auto code = GetParam().code(50, 6);
   core::Random random(2, core::Stream::ties);
   ColumnLists changes = code.column_lists();
   for (int trial = 0; trial < 100; ++trial) {
@@ -148,8 +173,8 @@ TEST_P(StateCodeOfInputs, TheDifferenceIsThatOfThePairedCodes) {
 }
 
 TEST_P(StateCodeOfInputs, TheInnerProductIsThatOfTheDenseCodes) {
-  const std::size_t l = GetParam();
-  const auto code = small_code(l, 50, 6);
+  const std::size_t l = GetParam().l;
+  const auto code = GetParam().code(50, 6);
   core::Random random(1, core::Stream::ties);
   for (int trial = 0; trial < 200; ++trial) {
     std::vector<Bin> a(l);
@@ -199,6 +224,14 @@ TEST(StateCode, RefusesWrongWiring) {
   EXPECT_THROW(StateCode(tables, {{0, 1, 2}, {0, 1, 1}}), std::invalid_argument);
   EXPECT_NO_THROW(StateCode(tables, {{0, 1, 2}, {2, 1, 0}}));
   EXPECT_THROW(static_cast<void>(code.permutation(1, 1)), std::invalid_argument);
+  const std::vector<PatternTable> three = {code.table(0), code.table(1), code.table(0)};
+  const std::vector<Permutation> one_each = {{0, 1, 2}, {2, 1, 0}, {1, 0, 2}};
+  EXPECT_NO_THROW(StateCode(three, one_each, {2}));
+  EXPECT_THROW(StateCode(three, one_each), std::invalid_argument);  // all strides need six
+  EXPECT_THROW(StateCode(three, one_each, {0}), std::invalid_argument);
+  EXPECT_THROW(StateCode(three, one_each, {3}), std::invalid_argument);
+  EXPECT_THROW(StateCode(three, one_each, {2, 1}), std::invalid_argument);
+  EXPECT_THROW(StateCode(three, one_each, {1, 1}), std::invalid_argument);
 }
 
 }  // namespace

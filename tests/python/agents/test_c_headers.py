@@ -179,8 +179,17 @@ def symbols_agent():
     return agent
 
 
+def partners_agent():
+    """Five variables, of which each is paired with two, in another way in each dimension."""
+    return SDNNQLearning(
+        box(1.0, 2.0, 3.0, 4.0, 5.0), box(1.0, 2.0), approximator=replace(SMALL, max_pairs=10),
+        learning=learning(tie_rule="lowest"), seed=8,
+    )  # fmt: skip
+
+
 AGENTS = {
     "discrete": discrete_agent,
+    "partners": partners_agent,
     "circular": circular_agent,
     "several": several_agent,
     "pairs": pairs_agent,

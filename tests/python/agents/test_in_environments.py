@@ -97,6 +97,22 @@ def test_a_large_discrete_space_costs_no_more_than_its_patterns():
     assert agent.act(499, explore=False) == 3
 
 
+def test_of_many_variables_only_some_pairs_are_formed():
+    """All 870 pairs of 30 variables would need two gigabytes with `general`."""
+    space = gym.spaces.Box(-1.0, 1.0, (30,), dtype=np.float64)
+    agent = SDNNQLearning(space, gym.spaces.Discrete(2), preset="small", seed=1)
+    assert agent.approximator.n_pairs == 30
+    random = np.random.default_rng(1)
+    for step in range(2000):
+        agent.progress = step / 2000
+        seen = random.uniform(-1, 1, 30)
+        action = agent.act(seen)
+        agent.learn(Transition(seen, action, float(action == (seen[5] > 0)), seen, True))
+    seen = random.uniform(-1, 1, (300, 30))
+    greedy = [agent.act(one, explore=False) for one in seen]
+    assert np.mean(greedy == (seen[:, 5] > 0)) > 0.9
+
+
 def test_files_of_agents_without_symbols_go_on_as_they_were(monkeypatch, tmp_path):
     places = gym.spaces.Dict({"at": gym.spaces.Box(0, 1, (1,)), "room": gym.spaces.Discrete(3)})
     monkeypatch.setattr(SDNNQLearning, "codes_symbols", False)

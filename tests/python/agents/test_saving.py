@@ -3,6 +3,7 @@
 import copy
 import json
 import pickle
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -25,6 +26,7 @@ from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
 
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
 PLANE = gym.spaces.Box(-1.0, 1.0, (2,), dtype=np.float64)
+WIDE = gym.spaces.Box(-1.0, 1.0, (6,), dtype=np.float64)
 UNBOUNDED = gym.spaces.Box(-np.inf, np.inf, (3,), dtype=np.float64)
 TORQUE = gym.spaces.Box(-2.0, 2.0, (1,), dtype=np.float32)
 TWO_TORQUES = gym.spaces.Box(-2.0, 2.0, (2,), dtype=np.float32)
@@ -65,6 +67,9 @@ KINDS = {
         learning=GENERAL,
         observation_range="seen",
         warm_up_steps=60,
+    ),
+    "sdnn, some pairs": lambda: SDNNQLearning(
+        WIDE, TORQUE, approximator=replace(SMALL, max_pairs=12), learning=GENERAL
     ),
     "sdnn, tables": lambda: SDNNQLearning(
         PLANE, TORQUE, approximator=SMALL, tables=[np.sign(np.eye(20) - 0.5)] * 2

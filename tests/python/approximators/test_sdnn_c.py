@@ -32,6 +32,8 @@ ODD_SIZES = {
         "n_interpolated": 7,
     },
     "symbols": {"n_inputs": 3, "n_symbols": [5, 0, 2]},
+    "some pairs": {"n_inputs": 6, "max_pairs": 18, "n_pattern_units": 30},
+    "a pair for each input": {"n_inputs": 5, "max_pairs": 1},
     "unbalanced": {"n_inputs": 2, "balanced_anchors": False, "n_pattern_units": 99},
     "uniform weights on a lattice": {
         "n_inputs": 3,
@@ -208,6 +210,28 @@ def test_permutations_are_permutations_and_differ(paper_network):
     assert len(seen) == 12
 
 
+@pytest.mark.parametrize(
+    ("max_pairs", "n_partners"), [(0, 5), (1, 1), (6, 1), (17, 2), (18, 3), (29, 4), (99, 5)]
+)
+def test_an_even_share_of_pairs(max_pairs, n_partners):
+    network = SDNNC(SDNNCConfig(**SMALL | {"n_inputs": 6}, max_pairs=max_pairs), seed=1)
+    modified, modifiers = np.array(network.pairs).T
+    assert np.bincount(modified).tolist() == [n_partners] * 6
+    assert np.bincount(modifiers).tolist() == [n_partners] * 6
+    assert list(network.pairs) == sorted(set(network.pairs))
+    assert (modified != modifiers).all()
+    assert network.config.n_pairs == len(network.pairs)
+    assert network.weights().shape == (120, 40 * len(network.pairs))
+
+
+def test_which_pairs_there_are_follows_from_the_seed():
+    def pairs(seed):
+        return SDNNC(SDNNCConfig(**SMALL | {"n_inputs": 9}, max_pairs=18), seed=seed).pairs
+
+    assert pairs(1) == pairs(1)
+    assert len({pairs(seed) for seed in range(10)}) > 5
+
+
 def test_about_half_of_layer_3_is_neutral(paper_network):
     x_sd = transcribe(paper_network).x_sd(np.array([0.1, 0.4, 0.6, 0.8]))
     assert x_sd.shape == (2400,)
@@ -304,6 +328,7 @@ def test_the_defaults_are_those_of_the_core():
 def test_every_field_reaches_the_core():
     other = SDNNCConfig(
         n_inputs=2,
+        max_pairs=1,
         n_pattern_units=30,
         n_anchor_patterns=4,
         n_interpolated=5,
@@ -352,6 +377,7 @@ def test_configurations_are_frozen_and_keyword_only():
         ({"n_active_units": 901}, r"n_active_units must be in \[1, 900\], got 901"),
         ({"n_inputs": 1}, r"n_inputs must be in \[2, 1024\], got 1"),
         ({"circular": (True,)}, "circular must be empty or one flag per input, got 1"),
+        ({"max_pairs": -1}, r"max_pairs must be in \[0, 1048576\], got -1"),
         ({"n_symbols": (0, 3)}, "n_symbols must be empty or a number per input, got 2"),
         ({"n_symbols": (0, 0, -3, 0)}, r"n_symbols must be in \[0, 16777216\], got -3"),
         ({"u_low": -1}, "u_low must be"),

@@ -12,9 +12,7 @@ def transcribe(core: _core.SDNNC) -> paper.SDNNC:
     inputs = range(config.n_inputs)
     return paper.SDNNC(
         code_books=[core.table(mu) for mu in inputs],
-        permutations={
-            (mu, nu): core.permutation(mu, nu) for mu in inputs for nu in inputs if mu != nu
-        },
+        permutations={pair: core.permutation(*pair) for pair in core.pairs},
         weights=core.weights(),
         thresholds=core.thresholds(),
         n_active_units=config.n_active_units,

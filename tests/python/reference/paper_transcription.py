@@ -125,13 +125,13 @@ class SDNNC:
         return book[min(math.floor(value * len(book)), len(book) - 1)]
 
     def x_sd(self, state: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Layer 3: every pattern desensitized by every other one, shape (D,)."""
+        """Layer 3: every pattern desensitized by every other one that it has a pair with: (D,)."""
         patterns = [self.pattern(mu, float(value)) for mu, value in enumerate(state)]
         groups = [
             desensitize(x_mu, x_nu[self.permutations[mu, nu]])
             for mu, x_mu in enumerate(patterns)
             for nu, x_nu in enumerate(patterns)
-            if mu != nu
+            if (mu, nu) in self.permutations
         ]
         return np.concatenate(groups).astype(np.float32)
 

@@ -251,6 +251,25 @@ class SDNNC {
     return static_cast<std::size_t>(config.n_inputs);
   }
 
+  /// How many inputs modify each one: an even share of max_pairs, at least one.
+  static std::size_t n_partners_of(const SDNNCConfig& config) {
+    const std::size_t l = checked_inputs(config);
+    core::require_in_range("max_pairs", config.max_pairs, 0, 1 << 20);
+    if (config.max_pairs == 0) return l - 1;
+    return std::clamp<std::size_t>(static_cast<std::size_t>(config.max_pairs) / l, 1, l - 1);
+  }
+
+  /// The strides of the code, ascending: so many at random.
+  static std::vector<std::size_t> strides_of(const SDNNCConfig& config, std::uint64_t seed) {
+    core::Random random(seed, core::Stream::pairs);
+    coding::Permutation order = coding::random_permutation(checked_inputs(config) - 1, random);
+    order.resize(n_partners_of(config));
+    std::ranges::sort(order);
+    std::vector<std::size_t> strides;
+    for (const auto place : order) strides.push_back(std::size_t{place} + 1);
+    return strides;
+  }
+
   static std::vector<coding::PatternTable> tables_of(const SDNNCConfig& config,
                                                      std::uint64_t seed) {
     const std::size_t l = checked_inputs(config);
@@ -302,16 +321,17 @@ class SDNNC {
     const coding::ActionCode sizes(config.n_hidden_units, config.n_active_units, config.n_actions);
     const double l = config.n_inputs;
     const double n_units = static_cast<double>(sizes.n_hidden_units());
-    const double n_columns = l * (l - 1.0) * config.n_pattern_units;
+    const double n_partners = static_cast<double>(n_partners_of(config));
+    const double n_columns = l * n_partners * config.n_pattern_units;
     const double pattern = 8.0 * std::ceil(config.n_pattern_units / 64.0);
     double weights = 2.0 * n_units * n_columns + 4.0 * n_columns;
     if (config.averaging_interval > 0) {  // the average, and a layer and a memory made of it
       weights += WeightAverage::n_bytes(n_units, n_columns) + 2.0 * n_units * n_columns;
     }
-    const double patterns = l * n_bins * pattern;
+    const double patterns = (n_partners + 1.0) * n_bins * pattern;
     const double remembered = static_cast<double>(
         PotentialMemory::n_bytes(sizes.n_hidden_units(), sizes.n_active_units()));
-    const char* largest = "n_hidden_units, n_pattern_units or n_inputs";
+    const char* largest = "max_pairs, n_hidden_units, n_pattern_units or n_inputs";
     if (patterns > std::max(weights, remembered)) {
       largest = config.n_symbols.empty()
                     ? "n_interpolated, n_anchor_patterns, n_pattern_units or n_inputs"
@@ -333,13 +353,15 @@ class SDNNC {
                     table.n_units());
     }
     require_room(config, static_cast<double>(n_patterns(tables)));
+    const std::vector<std::size_t> strides = strides_of(config, seed);
     std::vector<coding::Permutation> permutations;
-    for (std::size_t group = 0; group < l * (l - 1); ++group) {
+    for (std::size_t group = 0; group < l * strides.size(); ++group) {
       core::Random random(seed, core::Stream::permutations, group);
       permutations.push_back(
           coding::random_permutation(static_cast<std::size_t>(config.n_pattern_units), random));
     }
-    return std::make_shared<const coding::StateCode>(std::move(tables), std::move(permutations));
+    return std::make_shared<const coding::StateCode>(std::move(tables), std::move(permutations),
+                                                     strides);
   }
 
   static OutputScale make_scale(const SDNNCConfig& config) {

@@ -27,6 +27,7 @@ enum class Rounding {
 /// Everything that defines an SDNN-C; the defaults are the paper's values.
 struct SDNNCConfig {
   int n_inputs = 4;                 ///< l >= 2
+  int max_pairs = 0;                ///< of inputs, an even share at random; 0: all l (l - 1)
   int n_pattern_units = 200;        ///< m
   int n_anchor_patterns = 9;        ///< p_1 .. p_9
   int n_interpolated = 44;          ///< patterns between neighbouring anchors
@@ -52,6 +53,7 @@ struct SDNNCConfig {
   static constexpr auto fields() noexcept {
     return std::tuple(
         core::field("n_inputs", &SDNNCConfig::n_inputs),
+        core::field("max_pairs", &SDNNCConfig::max_pairs),
         core::field("n_pattern_units", &SDNNCConfig::n_pattern_units),
         core::field("n_anchor_patterns", &SDNNCConfig::n_anchor_patterns),
         core::field("n_interpolated", &SDNNCConfig::n_interpolated),

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cassert>
+#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -23,6 +24,8 @@ namespace sdnn::coding {
 struct InputPair {
   std::size_t modified = 0;
   std::size_t modifier = 0;
+
+  auto operator<=>(const InputPair&) const = default;
 };
 
 /// Tables that pairs may share.

@@ -1,12 +1,15 @@
 /// Layers 2 and 3 as fixed wiring: from a state to its ternary code.
 #pragma once
 
+#include <algorithm>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <numeric>
 #include <span>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -17,34 +20,47 @@
 
 namespace sdnn::coding {
 
-/// The code x_SD of states in [0, 1]^l over all ordered pairs of inputs, a table per input.
+/// The code x_SD of states in [0, 1]^l over ordered pairs of inputs, a table per input.
 ///
-/// In the paper's order group (mu, nu), nu != mu, has number mu * (l - 1) + (nu < mu ? nu : nu - 1)
-/// and its unit k is unit number * m + k of x_SD: unit k of x^mu, modified by unit sigma_mu_nu[k]
-/// of x^nu. Stored, a group is in the order of the units that modify it: then all groups (mu, nu)
-/// of one nu share a gate, the plain pattern of nu.
+/// In the paper all pairs (mu, nu), nu != mu, have a *group* of m units. Here each input may have
+/// fewer partners, given by *strides*: mu is modified by mu + stride, modulo l, so that every input
+/// is modified by k others and modifies k. With all l - 1 strides it is the paper's code.
 ///
-/// The l - 1 units that unit q of x^nu modifies, one in each group (mu, nu), are neutral together.
-/// Two of them, x_j and x_k, are stored as (x_j + x_k) / 2 and (x_j - x_k) / 2. One of these is
+/// In the paper's order groups are sorted by mu, then nu. Unit k of a group is unit
+/// number * m + k of x_SD: unit k of x^mu, modified by unit sigma_mu_nu[k] of x^nu. Stored, a group
+/// is in the order of the units that modify it: then all groups (mu, nu) of one nu share a gate,
+/// the plain pattern of nu.
+///
+/// The k units that unit q of x^nu modifies, one in each group (mu, nu), are neutral together.
+/// Two of them, x_i and x_j, are stored as (x_i + x_j) / 2 and (x_i - x_j) / 2. One of these is
 /// always neutral, so whoever reads or corrects the columns that are not has half as many of them.
 /// This is the *paired code*, D columns too. Its first n_double_columns() are such halves: for each
-/// nu and each two of its groups m half sums, then m half differences, in the order of q. If l is
-/// even, the group of the last mu is left over for each nu and follows as it is.
+/// nu and each two of its groups m half sums, then m half differences, in the order of q. If k is
+/// odd, the group of the last mu is left over for each nu and follows as it is.
 class StateCode {
  public:
-  /// Wiring from given tables, one per input, and permutations, one per group.
+  /// Wiring from given tables, one per input, permutations, one per group in the paper's order, and
+  /// strides; without any, all of them.
   ///
-  /// Throws std::invalid_argument unless there are at least two tables of one pattern size, and
-  /// l (l - 1) permutations of that size.
-  StateCode(std::vector<PatternTable> tables, std::vector<Permutation> permutations)
+  /// Throws std::invalid_argument unless there are at least two tables of one pattern size,
+  /// ascending strides of 1 to l - 1, and l permutations of that size for each of them.
+  StateCode(std::vector<PatternTable> tables, std::vector<Permutation> permutations,
+            std::vector<std::size_t> strides = {})
       : tables_(checked(std::move(tables))),
         permutations_(std::move(permutations)),
+        strides_(strides.empty() ? all_strides() : std::move(strides)),
+        groups_(list_groups()),
+        ranks_(rank_groups()),
         code_(make_code()) {}
 
   std::size_t n_inputs() const noexcept { return tables_.size(); }
   std::size_t n_pattern_units() const noexcept { return tables_.front()->n_units(); }
-  std::size_t n_groups() const noexcept { return n_inputs() * (n_inputs() - 1); }
-  /// D = m l (l - 1), the length of x_SD.
+  /// k, the inputs that each one modifies and is modified by; l - 1 in the paper.
+  std::size_t n_partners() const noexcept { return strides_.size(); }
+  std::size_t n_groups() const noexcept { return n_inputs() * n_partners(); }
+  /// The pairs (mu, nu) of all groups in the paper's order.
+  std::span<const InputPair> groups() const noexcept { return groups_; }
+  /// D = m l k, the length of x_SD; m l (l - 1) in the paper.
   std::size_t n_columns() const noexcept { return n_pattern_units() * n_groups(); }
   /// Words of the paired code.
   std::size_t n_words() const noexcept { return n_groups() * code_.n_pair_words(); }
@@ -57,11 +73,12 @@ class StateCode {
 
   /// The patterns of an input. Throws std::out_of_range if there is no such input.
   const PatternTable& table(std::size_t input) const { return *tables_.at(input); }
-  /// sigma_mu_nu. Throws std::invalid_argument unless mu and nu are two different inputs.
+  /// sigma_mu_nu. Throws std::invalid_argument unless mu and nu are two inputs with a group.
   const Permutation& permutation(std::size_t mu, std::size_t nu) const {
-    core::require(mu < n_inputs() && nu < n_inputs() && mu != nu, "(mu, nu)",
-                  "two different inputs", mu * n_inputs() + nu);
-    return permutations_[group_of(mu, nu)];
+    const auto found = std::ranges::find(groups_, InputPair{.modified = mu, .modifier = nu});
+    core::require(found != groups_.end(), "(mu, nu)", "a pair of two different inputs in the code",
+                  mu * n_inputs() + nu);
+    return permutations_[static_cast<std::size_t>(found - groups_.begin())];
   }
 
   /// The bin of every input. Shapes: state (l,), bins (l,).
@@ -89,10 +106,9 @@ class StateCode {
     core::require(unit < n_columns(), "unit", "less than " + std::to_string(n_columns()), unit);
     const std::size_t m = n_pattern_units();
     const std::size_t group = unit / m;
-    const std::size_t mu = group / (n_inputs() - 1);
-    const std::size_t nu = group % (n_inputs() - 1) + (group % (n_inputs() - 1) >= mu ? 1 : 0);
+    const std::size_t nu = groups_[group].modifier;
     const std::size_t modifier = permutations_[group][unit % m];
-    const std::size_t among = mu < nu ? mu : mu - 1;  // of the groups that nu modifies
+    const std::size_t among = ranks_[group];
     const std::size_t pair = among / 2;
     if (pair == n_pairs()) return {false, n_double_columns() + nu * m + modifier, 0, 0};
     const std::size_t first = 2 * (nu * n_pairs() + pair) * m + modifier;
@@ -124,10 +140,35 @@ class StateCode {
 
  private:
   /// How often two of the groups that one input modifies are taken together.
-  std::size_t n_pairs() const noexcept { return (n_inputs() - 1) / 2; }
+  std::size_t n_pairs() const noexcept { return n_partners() / 2; }
 
-  std::size_t group_of(std::size_t mu, std::size_t nu) const noexcept {
-    return mu * (n_inputs() - 1) + (nu < mu ? nu : nu - 1);
+  std::vector<std::size_t> all_strides() const {
+    std::vector<std::size_t> strides(n_inputs() - 1);
+    std::iota(strides.begin(), strides.end(), 1);
+    return strides;
+  }
+
+  std::vector<InputPair> list_groups() const {
+    for (std::size_t i = 0; i < strides_.size(); ++i) {
+      core::require(strides_[i] > (i == 0 ? 0 : strides_[i - 1]) && strides_[i] < n_inputs(),
+                    "strides", "ascending from 1 to n_inputs - 1", strides_[i]);
+    }
+    std::vector<InputPair> groups;
+    for (std::size_t mu = 0; mu < n_inputs(); ++mu) {
+      for (const std::size_t stride : strides_) {
+        groups.push_back({.modified = mu, .modifier = (mu + stride) % n_inputs()});
+      }
+    }
+    std::ranges::sort(groups);
+    return groups;
+  }
+
+  /// For each group how many before it have the same modifier.
+  std::vector<std::size_t> rank_groups() const {
+    std::vector<std::size_t> n_before(n_inputs(), 0);
+    std::vector<std::size_t> ranks;
+    for (const InputPair& pair : groups_) ranks.push_back(n_before[pair.modifier]++);
+    return ranks;
   }
 
   static SharedTables checked(std::vector<PatternTable> tables) {
@@ -146,27 +187,31 @@ class StateCode {
   /// The groups in the order of the paired code: those that are paired, then those left over.
   SelectiveDesensitization make_code() const {
     core::require(permutations_.size() == n_groups(), "number of permutations",
-                  "n_inputs * (n_inputs - 1)", permutations_.size());
+                  "n_inputs times the number of strides", permutations_.size());
     for (const Permutation& sigma : permutations_) require_permutation(sigma, n_pattern_units());
     SharedTables modified;
     SharedTables modifiers;
     std::vector<InputPair> pairs;
-    const auto add = [&](std::size_t nu, std::size_t among) {
-      const std::size_t mu = among + (among >= nu ? 1 : 0);
-      pairs.push_back({.modified = mu, .modifier = nu});
+    std::vector<std::size_t> order(n_groups());
+    std::iota(order.begin(), order.end(), 0);
+    std::ranges::sort(order, {}, [&](std::size_t group) {
+      return std::tuple(ranks_[group] == 2 * n_pairs(), groups_[group].modifier, ranks_[group]);
+    });
+    for (const std::size_t group : order) {
+      const auto [mu, nu] = groups_[group];
+      pairs.push_back(groups_[group]);
       modified.push_back(std::make_shared<const PatternTable>(
-          permuted(*tables_[mu], inverse(permutations_[group_of(mu, nu)]))));
+          permuted(*tables_[mu], inverse(permutations_[group]))));
       modifiers.push_back(tables_[nu]);
-    };
-    for (std::size_t nu = 0; nu < n_inputs(); ++nu) {
-      for (std::size_t among = 0; among < 2 * n_pairs(); ++among) add(nu, among);
     }
-    for (std::size_t nu = 0; n_inputs() % 2 == 0 && nu < n_inputs(); ++nu) add(nu, n_inputs() - 2);
     return {std::move(modified), std::move(modifiers), std::move(pairs)};
   }
 
   SharedTables tables_;
   std::vector<Permutation> permutations_;
+  std::vector<std::size_t> strides_;
+  std::vector<InputPair> groups_;
+  std::vector<std::size_t> ranks_;
   SelectiveDesensitization code_;
 };
 

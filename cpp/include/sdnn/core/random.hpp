@@ -29,6 +29,7 @@ enum class Stream : std::uint64_t {
   useless_inputs = 10,
   repetitions = 11,
   dimensions = 12,
+  pairs = 13,
 };
 
 /// xoshiro256** (Blackman, Vigna 2018), seeded by SplitMix64 from (seed, stream, index).

@@ -56,19 +56,20 @@ class PotentialMemory {
         log_bins_(kLogSize * n_inputs_),
         log_units_(kLogSize * max_corrected),
         log_(kLogSize) {
-    // A unit of a modifier switches l - 1 inputs, which are about half as many columns: half the
-    // modifiers are active. Neighbouring bins differ in `differing` units of each pattern (about
-    // m / 2 / 45); where it is modified, in each of l - 1 groups, half of them are active and move
-    // two columns, or one twice.
+    // A unit of a modifier switches k inputs, those that it modifies, which are about half as many
+    // columns: half the modifiers are active. Neighbouring bins differ in `differing` units of each
+    // pattern (about m / 2 / 45); where it is modified, in each of k groups, half of them are
+    // active and move two columns, or one twice.
     const double l = static_cast<double>(code.n_inputs());
     const coding::PatternTable& table = code.table(0);
     const double differing = static_cast<double>(table[0].distance(
                                  table[std::min<std::size_t>(10, table.n_bins() - 1)])) /
                              10.0;
-    const std::size_t half_of_inputs = code.n_inputs() / 2;
-    const double columns_of_modifier = static_cast<double>(half_of_inputs);
-    columns_per_bin_ = (l - 1.0 + columns_of_modifier) * std::max(differing, 0.05);
-    columns_per_correction_ = 0.15 * l * (l - 1.0);
+    const double n_partners = static_cast<double>(code.n_partners());
+    const std::size_t half_of_partners = (code.n_partners() + 1) / 2;
+    const double columns_of_modifier = static_cast<double>(half_of_partners);
+    columns_per_bin_ = (n_partners + columns_of_modifier) * std::max(differing, 0.05);
+    columns_per_correction_ = 0.15 * l * n_partners;
     columns_of_pass_ = 0.5 * l * static_cast<double>(code.n_pattern_units()) * columns_of_modifier;
   }
 
