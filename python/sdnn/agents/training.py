@@ -14,10 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.evaluation import episode_seed, evaluate
-from sdnn.agents.files import Arrays, Description, from_file, read, write
+from sdnn.agents.files import Arrays, Description
 from sdnn.agents.rounds import Outcome, rounds_in
+from sdnn.agents.saved_training import (
+    SavedEpisode,
+    SavedTraining,
+    read_training,
+    write_training,
+)
 from sdnn.agents.transition import Transition
-from sdnn.arguments import flag, has_methods, path_of, real, whole
+from sdnn.arguments import has_methods, path_of, whole
 from sdnn.interrupts import Interrupts
 
 if TYPE_CHECKING:
@@ -29,7 +35,6 @@ Row: TypeAlias = Mapping[str, Any]
 """What is known of an episode or an evaluation: numbers and words by name."""
 
 _LEARNING = 0
-_ARRAYS = "training."
 
 
 class Callback:
@@ -315,38 +320,28 @@ class Training:
             If the environment is a vector that cannot be reset one by one.
         """
         self.require_repeatable()
-        arrays = self.agent.state()
+        saved = SavedTraining(
+            steps=self.steps,
+            episodes=self.episodes,
+            seed=self.seed,
+            n_steps=self.n_steps,
+            n_episodes=self.n_episodes,
+            n_rows=self.n_rows,
+            evaluate_every=self.evaluate_every,
+            evaluation_episodes=self.evaluation_episodes,
+            present=[None if one is None else self._saved(one) for one in self._present],
+        )
+        write_training(path_of("path", path), self.agent, saved)
+
+    def _saved(self, episode: _Episode) -> SavedEpisode:
         shape = (-1, *(self.agent.action_space.shape or ()))
-        for number, episode in enumerate(self._present):
-            if episode is not None:
-                prefix = _prefix(number)
-                arrays[prefix + "actions"] = np.array(episode.actions).reshape(shape)
-                arrays[prefix + "observation"] = np.asarray(
-                    self.agent.flat_observation(episode.last_observation)
-                )
-        first = self._present[0]
-        counts: dict[str, Any] = {
-            "steps": self.steps,
-            "episodes": self.episodes,
-            "seed": self.seed,
-            "n_steps": self.n_steps,
-            "n_episodes": self.n_episodes,
-            "n_rows": self.n_rows,
-            "return": 0.0 if first is None else first.sum_of_rewards,
-            "evaluate_every": self.evaluate_every,
-            "evaluation_episodes": self.evaluation_episodes,
-        }
-        if self.n_environments > 1:
-            counts["environments"] = [
-                episode
-                and {
-                    "episode": episode.number,
-                    "return": episode.sum_of_rewards,
-                    "waits": episode.outcome is not None,
-                }
-                for episode in self._present
-            ]
-        write(path_of("path", path), {**self.agent.description(), "training": counts}, arrays)
+        return SavedEpisode(
+            number=episode.number,
+            sum_of_rewards=episode.sum_of_rewards,
+            actions=np.array(episode.actions).reshape(shape),
+            observation=np.asarray(self.agent.flat_observation(episode.last_observation)),
+            waits=episode.outcome is not None,
+        )
 
     @classmethod
     def load(
@@ -380,51 +375,36 @@ class Training:
             If it is damaged, holds no training, or the environment does not repeat the episode;
             if the environment is a vector of another size, or cannot be reset one by one.
         """
-        place = path_of("path", path)
-        description, arrays = read(place)
-        if "training" not in description:
-            raise ValueError(f"{path} holds an agent and no training: Agent.load reads it")
-        agent = from_file(place, description, arrays)
-        counts = _checked_counts(place, description["training"])
+        agent, saved = read_training(path_of("path", path))
         has_goal = steps is not None or episodes is not None
         training = cls(
             agent,
             env,
-            steps=steps if has_goal else counts["steps"],
-            episodes=episodes if has_goal else counts["episodes"],
-            seed=counts["seed"],
+            steps=steps if has_goal else saved.steps,
+            episodes=episodes if has_goal else saved.episodes,
+            seed=saved.seed,
             callbacks=callbacks,
-            evaluate_every=counts["evaluate_every"],
+            evaluate_every=saved.evaluate_every,
             evaluation_env=evaluation_env,
-            evaluation_episodes=counts["evaluation_episodes"],
+            evaluation_episodes=saved.evaluation_episodes,
         )
-        training.n_steps, training.n_episodes = counts["n_steps"], counts["n_episodes"]
-        training.n_rows = counts["n_rows"]
-        saved = counts.get("environments")
-        if saved is None:
-            has_begun = _prefix(0) + "actions" in arrays
-            only = {"episode": counts["n_episodes"], "return": counts["return"], "waits": False}
-            saved = [only if has_begun else None]
-        if len(saved) != training.n_environments:
+        training.n_steps, training.n_episodes = saved.n_steps, saved.n_episodes
+        training.n_rows = saved.n_rows
+        if len(saved.present) != training.n_environments:
             raise ValueError(
-                f"env must have {len(saved)} environments, as the training had,"
+                f"env must have {len(saved.present)} environments, as the training had,"
                 f" got {training.n_environments}"
             )
         training.require_repeatable()
-        for number, told in enumerate(saved):
-            if told is not None:
-                training._present[number] = _Episode(
-                    told["episode"],
-                    None,
-                    list(_saved_array(place, arrays, _prefix(number) + "actions")),
-                    told["return"],
-                )
-        waits = [told is not None and told["waits"] for told in saved]
-        training._repeat_episodes(waits)
-        for number, episode in enumerate(training._present):
+        for number, episode in enumerate(saved.present):
             if episode is not None:
-                name = _prefix(number) + "observation"
-                training._check_repeated(episode, _saved_array(place, arrays, name))
+                training._present[number] = _Episode(
+                    episode.number, None, list(episode.actions), episode.sum_of_rewards
+                )
+        training._repeat_episodes([one is not None and one.waits for one in saved.present])
+        for now, then in zip(training._present, saved.present, strict=True):
+            if now is not None and then is not None:
+                training._check_repeated(now, then.observation)
         return training
 
     def _repeat_episodes(self, waits: list[bool]) -> None:
@@ -562,53 +542,6 @@ class Training:
     def _row(self, kind: str, **values: Any) -> Row:
         self.n_rows += 1
         return {"kind": kind, "step": self.n_steps, **values}
-
-
-def _prefix(environment: int) -> str:
-    """Of the names of an environment's arrays: the first one's as if there were no others."""
-    return f"{_ARRAYS}{environment}." if environment else _ARRAYS
-
-
-_WHOLE = {
-    "steps": (1, 2**53),
-    "episodes": (1, 2**53),
-    "seed": (0, 2**64 - 1),
-    "n_steps": (0, 2**53),
-    "n_episodes": (0, 2**53),
-    "n_rows": (0, 2**53),
-    "evaluate_every": (1, 2**53),
-    "evaluation_episodes": (1, 10**9),
-}
-"""Least and largest of what `Training.save` writes down."""
-
-
-def _checked_counts(path: Path, counts: Any) -> Mapping[str, Any]:
-    """Read what `Training.save` wrote down; ValueError that names the file."""
-    try:
-        if not isinstance(counts, dict):
-            raise TypeError(f"training must be a table, got {counts!r}")
-        for name, (low, high) in _WHOLE.items():
-            if counts[name] is not None or name not in ("steps", "episodes", "evaluate_every"):
-                whole(name, counts[name], low, high)
-        if (counts["steps"] is None) == (counts["episodes"] is None):
-            raise ValueError("one of steps and episodes must be given")
-        real("return", counts["return"])
-        for told in counts.get("environments", ()):
-            if told is not None:
-                whole("episode", told["episode"], 0, 2**53)
-                real("return", told["return"])
-                flag("waits", told["waits"])
-    except KeyError as error:
-        raise ValueError(f"{path} is damaged: training has no {error}") from None
-    except (OverflowError, TypeError, ValueError) as error:
-        raise ValueError(f"{path} is damaged: {error}") from error
-    return counts
-
-
-def _saved_array(path: Path, arrays: Arrays, name: str) -> NDArray[Any]:
-    if name not in arrays or not np.isfinite(arrays[name]).all():
-        raise ValueError(f"{path} is damaged: {name} must be there, of finite numbers")
-    return arrays[name]
 
 
 def _listed(callbacks: Iterable[Callback]) -> tuple[Callback, ...]:

@@ -1,0 +1,169 @@
+"""A training in the file of its agent: how far it is, and the episodes it is within."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.agents.files import Arrays, Description, from_file, read, write
+from sdnn.arguments import flag, real, whole
+
+__all__ = ["SavedEpisode", "SavedTraining", "read_training", "write_training"]
+
+_ARRAYS = "training."
+_LIMITS = {
+    "steps": (1, 2**53),
+    "episodes": (1, 2**53),
+    "seed": (0, 2**64 - 1),
+    "n_steps": (0, 2**53),
+    "n_episodes": (0, 2**53),
+    "n_rows": (0, 2**53),
+    "evaluate_every": (1, 2**53),
+    "evaluation_episodes": (1, 10**9),
+}
+_MAY_BE_NONE = ("steps", "episodes", "evaluate_every")
+
+
+class Saved(Protocol):
+    """What an agent's file is made of."""
+
+    def description(self) -> Description:
+        """Say what it is."""
+
+    def state(self) -> Arrays:
+        """Give what it remembers."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SavedEpisode:
+    """The present episode in one environment.
+
+    Parameters
+    ----------
+    number
+        Of all that have begun.
+    sum_of_rewards
+        Learned in it.
+    actions
+        Taken in it, shape (n, ...).
+    observation
+        The last one, flattened.
+    waits
+        Whether the last action's outcome is still to be learned.
+    """
+
+    number: int
+    sum_of_rewards: float
+    actions: NDArray[Any]
+    observation: NDArray[np.float64]
+    waits: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class SavedTraining:
+    """What `sdnn.agents.Training` goes on from; ``present`` has an entry for each environment."""
+
+    steps: int | None
+    episodes: int | None
+    seed: int
+    n_steps: int
+    n_episodes: int
+    n_rows: int
+    evaluate_every: int | None
+    evaluation_episodes: int
+    present: Sequence[SavedEpisode | None]
+
+
+def write_training(path: Path, agent: Saved, training: SavedTraining) -> None:
+    """Write both in one file; OSError if it cannot be written."""
+    arrays = agent.state()
+    for i, episode in enumerate(training.present):
+        if episode is not None:
+            arrays[_prefix(i) + "actions"] = episode.actions
+            arrays[_prefix(i) + "observation"] = episode.observation
+    first = training.present[0]
+    told: dict[str, Any] = {name: getattr(training, name) for name in _LIMITS}
+    told["return"] = 0.0 if first is None else first.sum_of_rewards
+    if len(training.present) > 1:
+        told["environments"] = [
+            episode
+            and {
+                "episode": episode.number,
+                "return": episode.sum_of_rewards,
+                "waits": episode.waits,
+            }
+            for episode in training.present
+        ]
+    write(path, {**agent.description(), "training": told}, arrays)
+
+
+def read_training(path: Path) -> tuple[Any, SavedTraining]:
+    """Read an agent and its training.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        If it is damaged or holds no training.
+    """
+    description, arrays = read(path)
+    if "training" not in description:
+        raise ValueError(f"{path} holds an agent and no training: Agent.load reads it")
+    agent = from_file(path, description, arrays)
+    told = _checked(path, description["training"])
+    environments: Iterable[Any] | None = told.get("environments")
+    if environments is None:
+        only = {"episode": told["n_episodes"], "return": told["return"], "waits": False}
+        environments = [only if _prefix(0) + "actions" in arrays else None]
+    present = [
+        None
+        if one is None
+        else SavedEpisode(
+            number=one["episode"],
+            sum_of_rewards=one["return"],
+            actions=_array(path, arrays, _prefix(i) + "actions"),
+            observation=_array(path, arrays, _prefix(i) + "observation"),
+            waits=one["waits"],
+        )
+        for i, one in enumerate(environments)
+    ]
+    return agent, SavedTraining(**{name: told[name] for name in _LIMITS}, present=present)
+
+
+def _prefix(environment: int) -> str:
+    """Of the names of an environment's arrays: the first one's as if there were no others."""
+    return f"{_ARRAYS}{environment}." if environment else _ARRAYS
+
+
+def _checked(path: Path, told: Any) -> Mapping[str, Any]:
+    try:
+        if not isinstance(told, dict):
+            raise TypeError(f"training must be a table, got {told!r}")
+        for name, (low, high) in _LIMITS.items():
+            if told[name] is not None or name not in _MAY_BE_NONE:
+                whole(name, told[name], low, high)
+        if (told["steps"] is None) == (told["episodes"] is None):
+            raise ValueError("one of steps and episodes must be given")
+        real("return", told["return"])
+        for one in told.get("environments", ()):
+            if one is not None:
+                whole("episode", one["episode"], 0, 2**53)
+                real("return", one["return"])
+                flag("waits", one["waits"])
+    except KeyError as error:
+        raise ValueError(f"{path} is damaged: training has no {error}") from None
+    except (OverflowError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} is damaged: {error}") from error
+    return told
+
+
+def _array(path: Path, arrays: Arrays, name: str) -> NDArray[Any]:
+    if name not in arrays or not np.isfinite(arrays[name]).all():
+        raise ValueError(f"{path} is damaged: {name} must be there, of finite numbers")
+    return arrays[name]
