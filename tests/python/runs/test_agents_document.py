@@ -49,7 +49,7 @@ def test_the_configuration_file_is_one(tmp_path):
 def test_the_table_of_presets_is_right():
     name, cell = r"`(\w+)\.(\w+)`(?:, `q_high`)?", r"(.*?)"
     rows = re.findall(rf"^\| {name} \| {cell} \| {cell} \| {cell} \|", TEXT, re.MULTILINE)
-    assert len(rows) == 12
+    assert len(rows) == 13
     for section, name, *cells in rows:
         for preset, cell in zip(("general", "robust", "paper"), cells, strict=True):
             chosen = PRESETS[preset]
