@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import gymnasium as gym
@@ -12,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn import _core
 from sdnn.bounds import flat_bounds, with_infinities
 
-__all__ = ["AnglePairs", "Ranges", "UnitObservations"]
+__all__ = ["AnglePairs", "RangeUse", "Ranges", "UnitObservations"]
 
 AnglePairs: TypeAlias = Literal["none", "find"] | Sequence[tuple[int, int]]
 """Which variables are the cosine and the sine of one angle."""
@@ -26,8 +28,29 @@ _HEADROOM = 0.25
 _RARE = 20
 """One in so many observations is left out at each end, where ranges are asked for that are seen."""
 
+_NOTED_EVERY = 8
+"""One in so many observations is noted, to tell how ranges are used."""
+
+_MOST_NOTED = 256
+
 _ON_THE_CIRCLE = 1e-3
 """How far cos^2 + sin^2 may be from 1, for numbers in single precision and some rounding."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RangeUse:
+    """How much of its range an observed variable has used of late.
+
+    Parameters
+    ----------
+    share_used
+        The part of the range in which it was for nine tenths of the time.
+    share_beyond
+        How often it was outside the range.
+    """
+
+    share_used: float
+    share_beyond: float
 
 
 class UnitObservations:
@@ -114,6 +137,8 @@ class UnitObservations:
             self.low[seen] = self.high[seen] = np.nan
         self._is_settled = False
         self._converted: tuple[tuple[Any, NDArray[np.float64]], ...] = ((None, np.empty(0)),) * 2
+        self._noted: deque[NDArray[np.float64]] = deque(maxlen=_MOST_NOTED)
+        self._n_until_noted = _NOTED_EVERY
         if not self._finds_pairs and not self._unknown().any():
             self._settled()
 
@@ -165,9 +190,33 @@ class UnitObservations:
         for known, state in self._converted:  # a step asks for each one three times
             if key == known:
                 return state
-        state = self.unit(self.flat(name, observation))
+        flat = self.flat(name, observation)
+        state = self.unit(flat)
         self._converted = (self._converted[1], (key, state))
+        self._n_until_noted -= 1
+        if not self._n_until_noted:
+            self._n_until_noted = _NOTED_EVERY
+            self._noted.append(flat.copy())  # may be the caller's
         return state
+
+    def range_use(self) -> list[RangeUse | None]:
+        """Tell of each variable how it used its range in the last 2,048 observations or so.
+
+        None for parts of angles and symbols, and for all before there were 160 observations.
+        """
+        use: list[RangeUse | None] = [None] * self.n_variables
+        if len(self._noted) < _RARE:
+            return use
+        noted = np.sort(self._noted, axis=0)
+        beyond = ((noted < self.low) | (noted > self.high)).mean(axis=0)
+        noted = np.clip(noted, self.low, self.high)
+        n_rare = len(noted) // _RARE
+        used = (noted[-1 - n_rare] - noted[n_rare]) / self._width
+        for variable in (one["variable"] for one in self.inputs if "variable" in one):
+            use[variable] = RangeUse(
+                share_used=float(used[variable]), share_beyond=float(beyond[variable])
+            )
+        return use
 
     def unit(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Convert what `flat` gave, shape (n_inputs,)."""

@@ -348,7 +348,12 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
             value between two that the network can give, nearer to the one it gave (a larger
             ``learning_rate``, more units or another ``rounding`` help);
             ``share_out_of_range``: those that wanted a value outside ``q_range`` (a wider range, or
-            ``value_range="seen"``); ``q_range``: (low, high) as it is.
+            ``value_range="seen"``); ``q_range``: (low, high) as it is; ``share_of_range`` and
+            ``share_beyond_range``: for each observed variable the part of its range in which it was
+            for nine tenths of the last 2,048 observations or so (a small one: ranges are too wide,
+            the network hardly tells values apart), and how often it was outside (a large one: too
+            narrow); None for angles and symbols, and until there are 160 observations since the
+            agent was made or loaded.
 
         Raises
         ------
@@ -356,6 +361,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
             While the agent is warming up.
         """
         networks = [self._network(dimension) for dimension in range(self.n_dimensions)]
+        use = self._observations.range_use()
         changed, rounded_away, out_of_range, asked = np.sum(
             [network.correction_counts for network in networks], axis=0
         ).tolist()
@@ -365,6 +371,8 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
             "share_rounded_away": rounded_away / max(asked, 1),
             "share_out_of_range": out_of_range / max(asked, 1),
             "q_range": networks[0].output_range,
+            "share_of_range": [one and one.share_used for one in use],
+            "share_beyond_range": [one and one.share_beyond for one in use],
         }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -132,6 +132,34 @@ def outcome_values(outcome: RunOutcome) -> Mapping[str, Any]:
     }
 
 
+_LITTLE_OF_A_RANGE = 0.1
+_OFTEN_BEYOND_A_RANGE = 0.1
+
+
+def _lines_of_ranges(report: Mapping[str, Any]) -> Iterator[str]:
+    """Name variables whose ranges do not suit what was observed."""
+    shares = enumerate(report["share_of_range"])
+    narrow = [i for i, share in shares if share is not None and 0.0 < share < _LITTLE_OF_A_RANGE]
+    if narrow:
+        yield (
+            f"{_variables(narrow)} moved within {_LITTLE_OF_A_RANGE:.0%} of the range:"
+            " the network can hardly tell such values apart; --range seen narrows ranges"
+        )
+    shares = enumerate(report["share_beyond_range"])
+    clipped = [i for i, share in shares if share is not None and share > _OFTEN_BEYOND_A_RANGE]
+    if clipped:
+        yield (
+            f"{_variables(clipped)} left the range more than {_OFTEN_BEYOND_A_RANGE:.0%} of the"
+            " time: the network cannot tell what is beyond; --range makes it wider"
+        )
+
+
+def _variables(numbers: Sequence[int]) -> str:
+    most = 8
+    named = ", ".join(map(str, numbers[:most])) + (", ..." if len(numbers) > most else "")
+    return f"observed variable{'s' if len(numbers) > 1 else ''} {named}"
+
+
 def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
     why = " (the target is reached)" if outcome.reason == "target" else ""
     yield f"{run.folder}: {outcome.n_steps} steps, {outcome.n_episodes} episodes{why}"
@@ -148,5 +176,7 @@ def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
             f" network, {report['share_rounded_away']:.0%} were rounded away and"
             f" {report['share_out_of_range']:.0%} out of its range of values"
         )
+    if report is not None:
+        yield from _lines_of_ranges(report)
     commands = (f"sdnn {word} {run.folder}" for word in ("plot", "evaluate", "record"))
     yield "next: " + ", ".join(commands) + " x.gif"

@@ -46,6 +46,36 @@ def test_only_unknown_ranges_are_learned():
     assert (observations.low[1], observations.high[1]) == (0.0, 1.0)
 
 
+def test_how_ranges_are_used_is_told():
+    low, high = np.array([0.0, -1.0, -np.pi, 0.0]), np.array([100.0, 1.0, np.pi, 1.0])
+    space = gym.spaces.Box(low, high, dtype=np.float64)
+    observations = UnitObservations(space, angles=[2])
+    seen = np.array([0.0, 0.0, 0.0, 0.5])
+    for t in range(800):  # one in eight is noted
+        seen[0] = 20.0 + (t // 8) / 10
+        seen[1] = 3.0 if t // 8 % 4 == 0 else 0.0
+        seen[2] = t
+        observations("observation", seen)
+        if t == 158:
+            assert observations.range_use() == [None] * 4
+    moves, jumps, angle, rests = observations.range_use()
+    assert moves.share_used == pytest.approx((29.4 - 20.5) / 100)  # 5 of 100 left out at each end
+    assert jumps.share_used == 0.5
+    assert angle is None
+    assert rests.share_used == 0.0
+    assert [one.share_beyond for one in (moves, jumps, rests)] == [0.0, 0.25, 0.0]
+
+
+def test_how_symbols_use_their_range_is_not_told():
+    space = gym.spaces.Dict({"at": gym.spaces.Box(0, 1, (1,)), "room": gym.spaces.Discrete(3)})
+    observations = UnitObservations(space, symbols=True)
+    for t in range(400):
+        observations("observation", {"at": [t % 9 / 9], "room": t % 3})
+    use = observations.range_use()
+    assert use[0].share_used > 0.8
+    assert use[1:] == [None] * 3
+
+
 def test_ranges_that_are_seen_leave_out_what_is_rare_and_stay_within_bounds():
     space = gym.spaces.Box(
         np.array([-100.0, 0.0, 0.0, -np.inf, -np.pi, -1.0]),

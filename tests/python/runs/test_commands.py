@@ -305,6 +305,15 @@ def test_a_run_is_not_overwritten(invoke):
     assert (result.exit_code, Path("file").read_text()) == (1, "mine")
 
 
+def test_ranges_that_do_not_suit_are_named(invoke):
+    options = ["--steps", 400, "--range", "0=-100:100", "--range", "1=0:0.0001"]
+    lines = invoke("train", "MountainCarContinuous-v0", *options, "--out", "one").stdout
+    assert "observed variable 0 moved within 10% of the range" in lines
+    assert "observed variable 1 left the range more than 10% of the time" in lines
+    lines = invoke("train", "MountainCarContinuous-v0", "--steps", 400, "--out", "two").stdout
+    assert "left the range" not in lines
+
+
 def test_resume_with_a_new_goal(invoke):
     done = json.loads(invoke("train", DRIFTING, *SHORT, "--out", "one", "--json").stdout)
     assert (done["n_steps"], done["reason"], done["folder"]) == (150, "done", "one")
