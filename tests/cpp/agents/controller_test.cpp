@@ -340,8 +340,8 @@ core::State agent_part(const AgentFile& file) {
 // they did next, and what they had learned then.
 TEST(Controller, LivesAsInPython) {
   const testing::Folder folder;
-  for (const std::string name :
-       {"sdnn", "sdnn-vector", "sdnn-discrete", "sdnn-symbols", "rbf", "fuzzy", "fuzzy-vector"}) {
+  for (const std::string name : {"sdnn", "sdnn-vector", "sdnn-discrete", "sdnn-symbols",
+                                 "sdnn-pairs", "rbf", "fuzzy", "fuzzy-vector"}) {
     SCOPED_TRACE(name);
     const std::filesystem::path data(SDNN_TEST_DATA "/agents");
     std::ifstream file(data / (name + ".json"));

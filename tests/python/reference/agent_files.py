@@ -6,6 +6,7 @@ the agent leaves after it.
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium as gym
@@ -56,6 +57,7 @@ def agents():
         "sdnn-vector": SDNNQLearning,
         "sdnn-discrete": SDNNQLearning,
         "sdnn-symbols": SDNNQLearning,
+        "sdnn-pairs": SDNNQLearning,
         "rbf": RBFQLearning,
         "fuzzy": FuzzyQLearning,
         "fuzzy-vector": FuzzyQLearning,
@@ -69,6 +71,7 @@ def agents():
     rules = {"approximator": FuzzyRulesConfig(n_sets=3, n_actions=4), "learning": fuzzy}
     settings = {
         "rbf": {"approximator": RBFNetworkConfig(n_bases=3, n_actions=7), "learning": LEARNING},
+        "sdnn-pairs": {"approximator": replace(SMALL, max_pairs=3), "learning": LEARNING},
         "fuzzy": rules,
         "fuzzy-vector": rules,
     }

@@ -356,8 +356,8 @@ class AgentMaker {
     core::require(n_patterns * config.n_pattern_units <= kMostCodeBytes,
                   "approximator.n_interpolated", "smaller: a code book would not fit",
                   config.n_interpolated);
-    const double l = config.n_inputs;
-    expect_size(name, 1.0 * config.n_hidden_units * config.n_pattern_units * l * (l - 1.0));
+    expect_size(name, 1.0 * config.n_hidden_units * config.n_pattern_units * config.n_inputs *
+                          config.n_partners());
   }
   void expect_weights(const std::string& name,
                       const approximators::RBFNetworkConfig& config) const {

@@ -248,22 +248,15 @@ class SDNNC {
 
   static std::size_t checked_inputs(const SDNNCConfig& config) {
     core::require_in_range("n_inputs", config.n_inputs, 2, 1024);
-    return static_cast<std::size_t>(config.n_inputs);
-  }
-
-  /// How many inputs modify each one: an even share of max_pairs, at least one.
-  static std::size_t n_partners_of(const SDNNCConfig& config) {
-    const std::size_t l = checked_inputs(config);
     core::require_in_range("max_pairs", config.max_pairs, 0, 1 << 20);
-    if (config.max_pairs == 0) return l - 1;
-    return std::clamp<std::size_t>(static_cast<std::size_t>(config.max_pairs) / l, 1, l - 1);
+    return static_cast<std::size_t>(config.n_inputs);
   }
 
   /// The strides of the code, ascending: so many at random.
   static std::vector<std::size_t> strides_of(const SDNNCConfig& config, std::uint64_t seed) {
     core::Random random(seed, core::Stream::pairs);
     coding::Permutation order = coding::random_permutation(checked_inputs(config) - 1, random);
-    order.resize(n_partners_of(config));
+    order.resize(static_cast<std::size_t>(config.n_partners()));
     std::ranges::sort(order);
     std::vector<std::size_t> strides;
     for (const auto place : order) strides.push_back(std::size_t{place} + 1);
@@ -321,7 +314,7 @@ class SDNNC {
     const coding::ActionCode sizes(config.n_hidden_units, config.n_active_units, config.n_actions);
     const double l = config.n_inputs;
     const double n_units = static_cast<double>(sizes.n_hidden_units());
-    const double n_partners = static_cast<double>(n_partners_of(config));
+    const double n_partners = config.n_partners();
     const double n_columns = l * n_partners * config.n_pattern_units;
     const double pattern = 8.0 * std::ceil(config.n_pattern_units / 64.0);
     double weights = 2.0 * n_units * n_columns + 4.0 * n_columns;

@@ -1,6 +1,7 @@
 /// Everything that defines an SDNN-C.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <tuple>
@@ -75,6 +76,12 @@ struct SDNNCConfig {
         core::field("max_table_bytes", &SDNNCConfig::max_table_bytes));
   }
   bool operator==(const SDNNCConfig&) const = default;
+
+  /// How many inputs modify each one: an even share of max_pairs, at least one.
+  int n_partners() const noexcept {
+    if (n_inputs < 2) return 0;
+    return max_pairs > 0 ? std::clamp(max_pairs / n_inputs, 1, n_inputs - 1) : n_inputs - 1;
+  }
 };
 
 }  // namespace sdnn::approximators
