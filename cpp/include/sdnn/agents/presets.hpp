@@ -21,6 +21,7 @@ inline Preset paper_preset(int n_inputs) { return {.approximator = {.n_inputs = 
 /// (docs/benchmarks.md).
 inline Preset general_preset(int n_inputs) {
   return {.approximator = {.n_inputs = n_inputs,
+                           .max_pairs = 56,
                            .n_hidden_units = 1800,
                            .n_active_units = 600,
                            .n_actions = 5,
