@@ -32,6 +32,7 @@ _NOTED_EVERY = 8
 """One in so many observations is noted, to tell how ranges are used."""
 
 _MOST_NOTED = 256
+_MOST_NOTED_VALUES = 2**20
 
 _ON_THE_CIRCLE = 1e-3
 """How far cos^2 + sin^2 may be from 1, for numbers in single precision and some rounding."""
@@ -137,7 +138,8 @@ class UnitObservations:
             self.low[seen] = self.high[seen] = np.nan
         self._is_settled = False
         self._converted: tuple[tuple[Any, NDArray[np.float64]], ...] = ((None, np.empty(0)),) * 2
-        self._noted: deque[NDArray[np.float64]] = deque(maxlen=_MOST_NOTED)
+        n_noted = max(_RARE, min(_MOST_NOTED, _MOST_NOTED_VALUES // self.n_variables))
+        self._noted: deque[NDArray[np.float64]] = deque(maxlen=n_noted)
         self._n_until_noted = _NOTED_EVERY
         if not self._finds_pairs and not self._unknown().any():
             self._settled()
