@@ -4,17 +4,50 @@ from __future__ import annotations
 
 import csv
 import os
+import time
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from io import StringIO
+from itertools import count
 from pathlib import Path
 
 PARTIAL_SUFFIX = ".partial"
 """Of a file under way."""
 
+_ABANDONED_SECONDS = 60
+_numbers = count()
+
 _PIECE_CHARACTERS = 2**20
 _GZIP = 31
 """A window of 2**15 bytes, with the header of gzip."""
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Give another name in the same folder to write to; at the end the file gets its own.
+
+    Each call gives a name that no other process or thread has.
+
+    Parameters
+    ----------
+    path
+        Its own name.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written; one that was there before stays as it was.
+    """
+    partial = path.with_name(f"{path.name}.{os.getpid()}.{next(_numbers)}{PARTIAL_SUFFIX}")
+    try:
+        yield partial
+        with partial.open("rb+") as file:
+            os.fsync(file.fileno())
+        partial.replace(path)
+        _sync_folder(path.parent)
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def write_whole(path: Path, content: bytes | Iterable[bytes]) -> None:
@@ -32,16 +65,20 @@ def write_whole(path: Path, content: bytes | Iterable[bytes]) -> None:
     OSError
         If the file cannot be written; one that was there before stays as it was.
     """
-    partial = path.with_name(path.name + PARTIAL_SUFFIX)
-    try:
-        with partial.open("wb") as file:
-            file.writelines([content] if isinstance(content, bytes) else content)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(path)
-    except BaseException:
-        partial.unlink(missing_ok=True)
-        raise
+    with whole_file(path) as partial, partial.open("wb") as file:
+        file.writelines([content] if isinstance(content, bytes) else content)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Put names on the disk, where the system and the folder's rights allow it."""
+    if not hasattr(os, "O_DIRECTORY"):
+        return
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def csv_bytes(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
@@ -71,7 +108,9 @@ def gzip_pieces(pieces: Iterable[bytes]) -> Iterator[bytes]:
     yield compressor.flush()
 
 
-def remove_partial_files(folder: Path) -> None:
-    """Remove what a killed process left under way in a folder."""
+def remove_abandoned_files(folder: Path) -> None:
+    """Remove what killed processes left under way in a folder, a minute after they last wrote."""
     for path in folder.glob(f"*{PARTIAL_SUFFIX}"):
-        path.unlink(missing_ok=True)
+        with suppress(OSError):  # another process may have removed it, or given it its own name
+            if time.time() - path.stat().st_mtime > _ABANDONED_SECONDS:
+                path.unlink()

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.actions import Actions
-from sdnn.agents.files import Arrays, Description, from_file, read, rebuilt, register, write
+from sdnn.agents.files import Arrays, Description, from_file, read, register, write
 from sdnn.agents.observations import AnglePairs, Ranges, UnitObservations
 from sdnn.agents.spaces import space_data, space_of
 from sdnn.agents.training import Callback, Training, TrainingResult
@@ -249,7 +249,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
         Settings such as ``final_epsilon`` follow it; ``train`` sets it.
         """
-        return self._progress
+        # Where an agent that is compiled knows it, a file may have come from C++.
+        return float(getattr(self._compiled, "progress", self._progress))
 
     @progress.setter
     def progress(self, progress: float) -> None:
@@ -586,7 +587,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             least_inputs=cls.least_inputs,
         )
         agent._actions = agent._make_actions(agent.action_space)
-        agent._compiled, agent._warm_up, agent._progress, agent._rates = None, None, 0.0, {}
+        agent._compiled, agent._warm_up, agent._rates = None, None, {}
+        agent.progress = float(description["progress"])
         if description["observation"] is None:
             agent._warm_up = agent._new_warm_up()
             agent._warm_up.restore(part(_WARM_UP), agent._actions.check)
@@ -599,20 +601,19 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             agent._compiled = agent._make()
             agent._compiled.restore(part(_CORE))
             agent._remember_actions()
-        agent.progress = float(description["progress"])
         return agent
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Make the kind known to files."""
+        """Make the kind known to files, by its name."""
         super().__init_subclass__(**kwargs)
-        register(cls.__name__, cls.rebuild)
+        register(cls)
 
     @abc.abstractmethod
     def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Compare sizes with the settings before memory is asked for; ValueError."""
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        return rebuilt, (self.description(), self.state())
+        return type(self).rebuild, (self.description(), self.state())
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         copied = self.rebuild(self.description(), self.state())

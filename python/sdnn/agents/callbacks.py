@@ -92,15 +92,16 @@ class EarlyStop(Callback):
         if math.isnan(self.mean_return):
             raise ValueError("mean_return must be a number, got NaN")
         self.patience = whole("patience", patience, 1, 2**53)
-        self._n_reached = 0
 
     def on_row(self, training: Training, row: Row) -> None:
-        """Look at an evaluation."""
-        if row["kind"] == "evaluation":
-            is_reached = row["mean_return"] >= self.mean_return
-            self._n_reached = self._n_reached + 1 if is_reached else 0
-            if self._n_reached >= self.patience:
-                training.stop()
+        """Look at an evaluation, and at those before it."""
+        if row["kind"] == "evaluation" and self.is_reached(training):
+            training.stop()
+
+    def is_reached(self, training: Training) -> bool:
+        """Whether the last evaluations are good enough."""
+        last = [mean_return for _, mean_return in training.evaluations[-self.patience :]]
+        return len(last) == self.patience and all(mean >= self.mean_return for mean in last)
 
 
 class Schedule(Callback):

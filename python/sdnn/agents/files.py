@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sdnn._core import __version__
 from sdnn.whole_files import write_whole
 
-__all__ = ["Arrays", "Description", "from_file", "read", "rebuilt", "register", "write"]
+__all__ = ["Arrays", "Description", "from_file", "read", "register", "write"]
 
 FORMAT = "sdnn-agent"
 FORMAT_VERSION = 1
@@ -23,19 +23,36 @@ KEY = "sdnn"
 Arrays = dict[str, NDArray[Any]]
 Description = dict[str, Any]
 
-_KINDS: dict[str, Callable[[Mapping[str, Any], Mapping[str, NDArray[Any]]], Any]] = {}
+class _Kind(Protocol):
+    __module__: str
+    __name__: str
+    __qualname__: str
+
+    def rebuild(
+        self, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], /
+    ) -> Any: ...
 
 
-def register(
-    kind: str, make: Callable[[Mapping[str, Any], Mapping[str, NDArray[Any]]], Any]
-) -> None:
-    """Say how agents of a kind are made of a description and arrays."""
-    _KINDS[kind] = make
+_KINDS: dict[str, _Kind] = {}
 
 
-def rebuilt(description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Any:
-    """Make an agent of its description and arrays; ValueError if they do not fit."""
-    return _KINDS[description["class"]](description, arrays)
+def register(kind: _Kind) -> None:
+    """Make a class of agents known by its name.
+
+    A class that is defined again, as in a notebook, takes its own place.
+
+    Raises
+    ------
+    TypeError
+        If the name is that of another class: a file could not tell them apart.
+    """
+    known = _KINDS.get(kind.__name__, kind)
+    if (known.__module__, known.__qualname__) != (kind.__module__, kind.__qualname__):
+        raise TypeError(
+            f"an agent's class needs a name of its own, for its files: {kind.__name__} is that of"
+            f" {known.__module__}.{known.__qualname__}"
+        )
+    _KINDS[kind.__name__] = kind
 
 
 def write(path: Path, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -112,6 +129,6 @@ def from_file(
 ) -> Any:
     """Make the agent of a file that has been read; ValueError that names the file."""
     try:
-        return rebuilt(description, arrays)
+        return _KINDS[description["class"]].rebuild(description, arrays)
     except (AttributeError, IndexError, KeyError, OverflowError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is damaged: {error}") from error

@@ -16,6 +16,7 @@ from sdnn.arguments import flag, real, whole
 __all__ = ["SavedEpisode", "SavedTraining", "read_training", "write_training"]
 
 _ARRAYS = "training."
+_EVALUATIONS = _ARRAYS + "evaluations"
 _LIMITS = {
     "steps": (1, 2**53),
     "episodes": (1, 2**53),
@@ -66,7 +67,11 @@ class SavedEpisode:
 
 @dataclass(frozen=True, kw_only=True)
 class SavedTraining:
-    """What `sdnn.agents.Training` goes on from; ``present`` has an entry for each environment."""
+    """What `sdnn.agents.Training` goes on from.
+
+    ``evaluations`` has steps and mean returns, shape (n, 2); ``present`` an entry for each
+    environment.
+    """
 
     steps: int | None
     episodes: int | None
@@ -76,12 +81,14 @@ class SavedTraining:
     n_rows: int
     evaluate_every: int | None
     evaluation_episodes: int
+    evaluations: NDArray[np.float64]
     present: Sequence[SavedEpisode | None]
 
 
 def write_training(path: Path, agent: Saved, training: SavedTraining) -> None:
     """Write both in one file; OSError if it cannot be written."""
     arrays = agent.state()
+    arrays[_EVALUATIONS] = training.evaluations
     for i, episode in enumerate(training.present):
         if episode is not None:
             arrays[_prefix(i) + "actions"] = episode.actions
@@ -116,6 +123,11 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
     if "training" not in description:
         raise ValueError(f"{path} holds an agent and no training: Agent.load reads it")
     agent = from_file(path, description, arrays)
+    evaluations = np.empty((0, 2))
+    if _EVALUATIONS in arrays:  # older files have none
+        evaluations = _array(path, arrays, _EVALUATIONS)
+        if evaluations.ndim != 2 or evaluations.shape[1] != 2:
+            raise ValueError(f"{path} is damaged: {_EVALUATIONS} must have shape (n, 2)")
     told = _checked(path, description["training"])
     environments: Iterable[Any] | None = told.get("environments")
     if environments is None:
@@ -133,7 +145,8 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
         )
         for i, one in enumerate(environments)
     ]
-    return agent, SavedTraining(**{name: told[name] for name in _LIMITS}, present=present)
+    limited = {name: told[name] for name in _LIMITS}
+    return agent, SavedTraining(**limited, evaluations=evaluations, present=present)
 
 
 def _prefix(environment: int) -> str:

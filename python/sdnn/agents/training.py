@@ -236,6 +236,9 @@ class Training:
         """Whole episodes."""
         self.n_rows = 0
         """Rows that the callbacks were given, since the training was begun."""
+        self.evaluations: list[tuple[int, float]] = []
+        """Steps and mean returns of all evaluations so far, also of those before it was loaded."""
+        self._rows: list[Row] = []
         self._rounds = rounds_in(env)
         self._present: list[_Episode | None] = [None] * self._rounds.n_environments
         self._first_left = 0  # the environments before it have learned this round's step
@@ -277,7 +280,6 @@ class Training:
         """
         if self._is_within_step:
             raise RuntimeError("a training that was left within a step cannot go on: load it")
-        rows: list[Row] = []
         self._stops = False
         with Interrupts(self.stop) as interrupts, ExitStack() as stack:
             for callback in self.callbacks:
@@ -287,14 +289,14 @@ class Training:
                 self._is_within_step = True
                 if self.agent.n_environments != self.n_environments:
                     self.agent.n_environments = self.n_environments
-                rows += self._step()
+                self._step()
                 self._is_within_step = False
         if interrupts.received is not None:
             raise KeyboardInterrupt
         return TrainingResult(
             n_steps=self.n_steps,
             n_episodes=self.n_episodes,
-            rows=tuple(rows),
+            rows=tuple(self._rows),
             is_finished=self.is_finished,
         )
 
@@ -329,6 +331,7 @@ class Training:
             n_rows=self.n_rows,
             evaluate_every=self.evaluate_every,
             evaluation_episodes=self.evaluation_episodes,
+            evaluations=np.array(self.evaluations, np.float64).reshape(-1, 2),
             present=[None if one is None else self._saved(one) for one in self._present],
         )
         write_training(path_of("path", path), self.agent, saved)
@@ -390,6 +393,7 @@ class Training:
         )
         training.n_steps, training.n_episodes = saved.n_steps, saved.n_episodes
         training.n_rows = saved.n_rows
+        training.evaluations = [(int(step), mean) for step, mean in saved.evaluations.tolist()]
         if len(saved.present) != training.n_environments:
             raise ValueError(
                 f"env must have {len(saved.present)} environments, as the training had,"
@@ -487,8 +491,8 @@ class Training:
             self._begin_round()
             self._first_left = 0
 
-    def _step(self) -> list[Row]:
-        """Learn a step; give the rows that follow from it."""
+    def _step(self) -> None:
+        """Learn a step, and tell the callbacks of it."""
         agent = self.agent
         i, episode, outcome = self._next_outcome()
         following, reward, terminated, _ = outcome
@@ -524,12 +528,13 @@ class Training:
             for row in rows:
                 callback.on_row(self, row)
             callback.on_step(self)
-        return rows
+        self._rows += rows
 
     def _evaluation(self) -> Row:
         assert self.evaluation_env is not None
         began = time.perf_counter()
         found = evaluate(self.agent, self.evaluation_env, self.evaluation_episodes, seed=self.seed)
+        self.evaluations.append((self.n_steps, found.mean_return))
         return self._row(
             "evaluation",
             mean_return=found.mean_return,

@@ -31,7 +31,7 @@ from sdnn.experiments.report import ExperimentReport, Report, to_json
 from sdnn.experiments.results import collect, summarize
 from sdnn.experiments.store import STORE_NAME, ResultStore
 from sdnn.experiments.trial import ProtocolConfig
-from sdnn.whole_files import csv_bytes, remove_partial_files, write_whole
+from sdnn.whole_files import csv_bytes, remove_abandoned_files, write_whole
 
 QUICK_TRIALS = 2
 QUICK_EPISODES = 300
@@ -255,7 +255,7 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
     watcher = Observer() if observer is None else observer
     plan = request.plan
     with ResultStore(request.out) as store:
-        remove_partial_files(request.out)
+        remove_abandoned_files(request.out)
         outcome = run_trials(
             plan.trials, store, executor=request.executor, jobs=request.jobs, observer=watcher
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
@@ -17,7 +17,7 @@ from sdnn.agents import Agent
 from sdnn.agents.evaluation import EVALUATION, episode_seed
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
-from sdnn.whole_files import write_whole
+from sdnn.whole_files import whole_file, write_whole
 
 __all__ = ["SUFFIXES", "Recording", "record"]
 
@@ -156,25 +156,17 @@ def _write_gif(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> 
 def _write_mp4(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> None:
     import imageio_ffmpeg
 
-    partial = path.with_name(f"{path.stem}.partial{path.suffix}")
-    writer = None
-    try:
+    with whole_file(path) as partial, ExitStack() as stack:
+        writer = None
         for frame in frames:
             # The video's pictures have even sides.
             even = np.pad(frame, [(0, n % 2) for n in frame.shape[:2]] + [(0, 0)], mode="edge")
             if writer is None:
                 size = (even.shape[1], even.shape[0])
                 writer = imageio_ffmpeg.write_frames(
-                    str(partial), size, fps=rate, macro_block_size=2, quality=7
-                )
+                    str(partial), size, fps=rate, macro_block_size=2, quality=7,
+                    output_params=["-f", "mp4"],
+                )  # fmt: skip
+                stack.enter_context(closing(writer))
                 writer.send(None)
             writer.send(np.ascontiguousarray(even))
-        if writer is not None:
-            writer.close()
-            partial.replace(path)
-    except BaseException:
-        if writer is not None:
-            writer.close()
-        raise
-    finally:
-        partial.unlink(missing_ok=True)

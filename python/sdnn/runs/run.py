@@ -32,7 +32,7 @@ from sdnn.arguments import whole
 from sdnn.interrupts import Interrupts
 from sdnn.runs.config import RunConfig, read_json
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, problem_of
-from sdnn.whole_files import remove_partial_files, write_whole
+from sdnn.whole_files import remove_abandoned_files, write_whole
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -95,22 +95,10 @@ class RunOutcome:
 class _Target(EarlyStop):
     """Stops where the target was reached, also if that was just before the run was killed."""
 
-    def __init__(self, mean_return: float, rows: Path) -> None:
-        super().__init__(mean_return)
-        self._rows = rows
-        self.is_reached = False
-
     def on_start(self, training: Training) -> None:
         """Look at the evaluation made at the present step."""
-        row = _last_row(_read_rows(self._rows)[: training.n_rows], "evaluation")
-        if row is not None and row["step"] == training.n_steps:
-            self.on_row(training, row)
-
-    def on_row(self, training: Training, row: Row) -> None:
-        """Look at an evaluation."""
-        super().on_row(training, row)
-        if row["kind"] == "evaluation":
-            self.is_reached = row["mean_return"] >= self.mean_return
+        if self.is_reached(training) and training.evaluations[-1][0] == training.n_steps:
+            training.stop()
 
 
 class Run:
@@ -211,7 +199,7 @@ class Run:
         """
         with ExitStack() as stack:
             stack.enter_context(self._locked())
-            remove_partial_files(self.folder)
+            remove_abandoned_files(self.folder)
             environment = self.config.environment
             env = stack.enter_context(closing(self.config.make_training_env()))
             evaluation_env = stack.enter_context(
@@ -221,7 +209,7 @@ class Run:
                 self._set_goal(env, evaluation_env, steps, episodes)
             target = None
             if self.config.target_return is not None and not self.goals:
-                target = _Target(self.config.target_return, self.folder / ROWS)
+                target = _Target(self.config.target_return)
             # Rows are written before the checkpoint that counts them.
             own = [JSONLines(self.folder / ROWS), target, self._checkpoints(), *callbacks]
             if self.config.tensorboard:
@@ -234,7 +222,7 @@ class Run:
             agent = training.agent
             assert isinstance(agent, Agent)  # what make_agent and load give
             agent.save(self.folder / AGENT)
-        is_target = target is not None and target.is_reached
+        is_target = target is not None and target.is_reached(training)
         reason: Reason = "target" if is_target else "done" if result.is_finished else "stopped"
         return RunOutcome(
             n_steps=result.n_steps,

@@ -3,6 +3,8 @@
 import copy
 import json
 import pickle
+import subprocess
+import sys
 from dataclasses import replace
 
 import gymnasium as gym
@@ -44,6 +46,7 @@ RANDOMLY = SDNNCConfig(
     n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5, rounding="random",
     averaging_interval=7,
 )  # fmt: skip
+FALLING = QLearningConfig(learning_rate=1.0, final_learning_rate=0.2)
 TRACES = FuzzyQLearningConfig(trace_decay=0.7, n_greedy_steps=0, epsilon=0.3)
 
 KINDS = {
@@ -166,6 +169,44 @@ def test_the_class_is_that_of_the_file(tmp_path):
     assert isinstance(RBFQLearning.load(tmp_path / "agent"), RBFQLearning)
     with pytest.raises(ValueError, match="holds a RBFQLearning, not a SDNNQLearning"):
         SDNNQLearning.load(tmp_path / "agent")
+
+
+def test_an_agent_of_ones_own_class_is_pickled_with_it(tmp_path, monkeypatch):
+    (tmp_path / "docking.py").write_text(
+        "from sdnn.agents import RBFQLearning\nclass Docker(RBFQLearning):\n    pass\n"
+    )
+    code = (
+        "import gymnasium, pickle, sys, docking\n"
+        "spaces = gymnasium.spaces.Box(-1, 1, (2,)), gymnasium.spaces.Discrete(2)\n"
+        "sys.stdout.buffer.write(pickle.dumps(docking.Docker(*spaces)))\n"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, check=True
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    assert type(pickle.loads(told.stdout)).__name__ == "Docker"
+
+
+def test_two_classes_of_agents_cannot_have_one_name():
+    with pytest.raises(TypeError, match=r"RBFQLearning is that of sdnn\.agents\."):
+        type("RBFQLearning", (SDNNQLearning,), {})
+    for _ in range(2):  # as a cell of a notebook that is run again
+        again = type("DefinedAgain", (RBFQLearning,), {})
+    agent = again(PLANE, TORQUE)
+    assert type(pickle.loads(pickle.dumps(KINDS["rbf"]()))) is RBFQLearning
+    assert type(copy.deepcopy(agent)) is again
+
+
+def test_progress_is_what_the_core_says(tmp_path):
+    """C++ keeps the description of the file it read, and writes the progress that it came to."""
+    agent = SDNNQLearning(PLANE, TORQUE, approximator=SMALL, learning=FALLING)
+    agent.save(tmp_path / "old")
+
+    def change(_, arrays):
+        arrays["agent.progress"] = np.array(0.5)
+
+    again = load_agent(changed(tmp_path / "old", tmp_path / "new", change))
+    assert (again.progress, again.learning_rate) == (0.5, 0.6)
 
 
 @pytest.fixture(scope="module")

@@ -216,6 +216,43 @@ def test_an_early_stop_waits_for_evaluations_in_a_row():
     assert (result.evaluations[-2:, 1] >= 0.6).all()
 
 
+@pytest.mark.parametrize("cut", [15, 20, 25, 29])
+def test_an_early_stop_counts_the_evaluations_before_a_training_was_loaded(tmp_path, cut):
+    def training(goal, agent):
+        stop = EarlyStop(mean_return=-1e9, patience=3)
+        return Training(
+            agent, Corridor(), steps=goal, callbacks=[stop],
+            evaluate_every=10, evaluation_env=Corridor(),
+        )  # fmt: skip
+
+    whole = training(100, corridor_agent())
+    whole.run()
+    assert whole.n_steps == 30
+    first = training(100, corridor_agent())
+    first.callbacks += (Stop(cut, tmp_path / "c"),)
+    first.run()
+    again = Training.load(
+        tmp_path / "c",
+        Corridor(),
+        callbacks=[EarlyStop(mean_return=-1e9, patience=3)],
+        evaluation_env=Corridor(),
+    )
+    assert again.evaluations == first.evaluations
+    result = again.run()
+    assert again.n_steps == 30
+    assert again.evaluations == whole.evaluations
+    assert len(result.evaluations) == 3 - cut // 10
+
+
+def test_a_result_has_the_rows_of_all_that_was_run(tmp_path):
+    training = Training(corridor_agent(), Corridor(), steps=300)
+    training.callbacks = (Stop(100, tmp_path / "c"),)
+    training.run()
+    training.callbacks = ()
+    result = training.run()
+    assert len(result.returns) == result.n_episodes > 0
+
+
 def test_an_interrupt_reaches_the_caller_after_the_callbacks(tmp_path):
     class Interrupt(Callback):
         def on_step(self, training):

@@ -1,4 +1,7 @@
 import gzip
+import os
+import threading
+import time
 
 import pytest
 
@@ -7,7 +10,7 @@ from sdnn.whole_files import (
     csv_bytes,
     csv_pieces,
     gzip_pieces,
-    remove_partial_files,
+    remove_abandoned_files,
     write_whole,
 )
 
@@ -31,10 +34,37 @@ def test_a_file_that_cannot_be_written_stays_as_it_was(tmp_path):
 
 
 def test_what_a_kill_left_is_removed_and_nothing_else(tmp_path):
-    (tmp_path / f"results.csv{PARTIAL_SUFFIX}").write_bytes(b"half")
+    left = tmp_path / f"results.csv.1.0{PARTIAL_SUFFIX}"
+    left.write_bytes(b"half")
+    (tmp_path / f"results.csv.2.0{PARTIAL_SUFFIX}").write_bytes(b"another process is writing")
     (tmp_path / "mine.txt").write_bytes(b"whole")
-    remove_partial_files(tmp_path)
-    assert [p.name for p in tmp_path.iterdir()] == ["mine.txt"]
+    long_ago = time.time() - 3600
+    for path in (left, tmp_path / "mine.txt"):
+        os.utime(path, (long_ago, long_ago))
+    remove_abandoned_files(tmp_path)
+    assert {p.name for p in tmp_path.iterdir()} == {f"results.csv.2.0{PARTIAL_SUFFIX}", "mine.txt"}
+
+
+def test_two_writers_of_one_file_leave_one_of_their_files(tmp_path):
+    path = tmp_path / "report.html"
+    contents = [bytes([letter]) * 300_000 for letter in b"ab"]
+    write_whole(path, contents[0])
+    errors = []
+
+    def write(content):
+        try:
+            for _ in range(30):
+                write_whole(path, [content[:1000], content[1000:]])
+        except OSError as error:
+            errors.append(error)
+
+    writers = [threading.Thread(target=write, args=(content,)) for content in contents]
+    for writer in writers:
+        writer.start()
+    while any(writer.is_alive() for writer in writers):
+        assert path.read_bytes() in contents
+    assert errors == []
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
 
 
 def test_csv_quotes_what_needs_it():

@@ -24,7 +24,7 @@ from sdnn.experiments.sweep.figure import draw_study
 from sdnn.experiments.sweep.page import to_html, to_markdown
 from sdnn.experiments.sweep.report import StudyReport, to_json
 from sdnn.experiments.sweep.study import Study, read_study
-from sdnn.whole_files import csv_pieces, gzip_pieces, remove_partial_files, write_whole
+from sdnn.whole_files import csv_pieces, gzip_pieces, remove_abandoned_files, write_whole
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +144,7 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Sweep:
         study.check()  # before the folder is made
     with ResultStore(request.out) as store:
         study.check(store.keys())
-        remove_partial_files(request.out)
+        remove_abandoned_files(request.out)
         outcome = run_trials(
             plan, store, executor=request.executor, jobs=request.jobs, observer=observer
         )
