@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,21 +23,12 @@ KEY = "sdnn"
 Arrays = dict[str, NDArray[Any]]
 Description = dict[str, Any]
 
-class _Kind(Protocol):
-    __module__: str
-    __name__: str
-    __qualname__: str
 
-    def rebuild(
-        self, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], /
-    ) -> Any: ...
+_KINDS: dict[str, type[Any]] = {}
 
 
-_KINDS: dict[str, _Kind] = {}
-
-
-def register(kind: _Kind) -> None:
-    """Make a class of agents known by its name.
+def register(kind: type[Any]) -> None:
+    """Make a class of agents known by its name; its ``rebuild`` makes one of a file.
 
     A class that is defined again, as in a notebook, takes its own place.
 

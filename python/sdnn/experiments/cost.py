@@ -55,8 +55,12 @@ class CostConfig:
 
     @property
     def config_hash(self) -> str:
-        """First 16 hexadecimal digits of the SHA-256 of the values."""
-        text = json.dumps(asdict(self), sort_keys=True, separators=(",", ":"))
+        """First 16 hexadecimal digits of the SHA-256 of the values, the version and the machine.
+
+        Times of another machine or version are no part of one comparison.
+        """
+        told = {**asdict(self), "version": _core.__version__, "machine": machine.description()}
+        text = json.dumps(told, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

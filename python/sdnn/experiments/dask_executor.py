@@ -495,6 +495,7 @@ class _Session:
 
     async def _run_trial(self, worker: _Worker, trial: int) -> None:
         run, planned = self._run, self._run.planned[trial]
+        run.messages.put(Started(planned))
         try:
             settings, pickled = planned.config.canonical_json(), pickle.dumps(planned)
         except Exception as error:
@@ -502,7 +503,6 @@ class _Session:
             return
         attempt = next(run.attempts)
         self._running[attempt] = planned
-        run.messages.put(Started(planned))
         key = planned.key
         try:
             record = await self._result(

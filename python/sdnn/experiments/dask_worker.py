@@ -15,6 +15,7 @@ from sdnn.experiments.config import PlannedTrial
 from sdnn.experiments.errors import ExperimentError
 from sdnn.experiments.executor import run_to_end
 from sdnn.experiments.records import TrialRecord, TrialRows
+from sdnn.experiments.trial import opened
 
 PROBE_EPISODES = 10
 """Learning episodes of a probe: few, but every part of agent and task takes part."""
@@ -34,10 +35,10 @@ def probe(planned: PlannedTrial) -> str:
     Exception
         Whatever the trial raises; an agent that is not registered is a ValueError.
     """
-    trial = planned.config.make_trial(planned.key.seed)
-    if not planned.config.is_compiled:
-        return planned.config.canonical_json()
-    trial.advance(PROBE_EPISODES)
+    with opened(planned.config.make_trial(planned.key.seed)) as trial:
+        if not planned.config.is_compiled:
+            return planned.config.canonical_json()
+        trial.advance(PROBE_EPISODES)
     rows = TrialRows.from_arrays(trial.test_rows())
     return f"{planned.config.canonical_json()} {trial.n_decisions} {rows.digest()}"
 

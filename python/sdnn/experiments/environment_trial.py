@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -18,7 +18,7 @@ from sdnn.arguments import real
 from sdnn.environments import NoisySensors, UnitSensors
 from sdnn.experiments.config import TrialSettings
 from sdnn.experiments.registry import agent_entry
-from sdnn.experiments.trial import EpisodeLoop, ProtocolConfig, check_protocol
+from sdnn.experiments.trial import EpisodeLoop, LearningAgent, ProtocolConfig, check_protocol
 
 _LEARNING, _TEST = 0, 1
 _MAX_SEED = 2**31
@@ -128,8 +128,22 @@ class EnvironmentTrial(EpisodeLoop):
 
     def __init__(self, config: EnvironmentTrialConfig, seed: int) -> None:
         check_protocol(config.protocol)
-        env = config.environment.make(seed, "sensor_noise")
-        test_env = config.environment.make(seed, "evaluation_sensor_noise")
+        with ExitStack() as stack:
+            env = config.environment.make(seed, "sensor_noise")
+            stack.callback(env.close)
+            test_env = config.environment.make(seed, "evaluation_sensor_noise")
+            stack.callback(test_env.close)
+            agent = self._agent_in(env, test_env, config, seed)
+            stack.pop_all()
+        super().__init__(agent, env, test_env, config.protocol)
+
+    @staticmethod
+    def _agent_in(
+        env: gym.Env[NDArray[np.float64], Any],
+        test_env: gym.Env[NDArray[np.float64], Any],
+        config: EnvironmentTrialConfig,
+        seed: int,
+    ) -> LearningAgent:
         n_observed = env.observation_space.shape[0] if env.observation_space.shape else 0
         if config.approximator.n_inputs != n_observed:
             raise ValueError(
@@ -139,14 +153,14 @@ class EnvironmentTrial(EpisodeLoop):
         for number, one in ((_LEARNING, env), (_TEST, test_env)):
             # Later resets go on from here.
             one.reset(seed=_environment_seed(seed, number))
-        agent = agent_entry(config.agent).make_agent(
+        agent: LearningAgent = agent_entry(config.agent).make_agent(
             env.observation_space,
             env.action_space,
             approximator=config.approximator,
             learning=config.learning,
             seed=seed,
         )
-        super().__init__(agent, env, test_env, config.protocol)
+        return agent
 
 
 def _environment_seed(seed: int, number: int) -> int:

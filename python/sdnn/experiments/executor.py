@@ -16,6 +16,7 @@ from typing import Protocol
 from sdnn import _core
 from sdnn.experiments.config import PlannedTrial
 from sdnn.experiments.records import TrialRecord, TrialRows
+from sdnn.experiments.trial import opened
 
 CHUNK_SECONDS = 0.1
 """A trial reports about this often; it is also how long an interruption waits."""
@@ -114,15 +115,15 @@ def run_to_end(
         Told the number of learning episodes done, after every piece.
     """
     begin = time.thread_time()
-    trial = planned.config.make_trial(planned.key.seed)
-    chunk = 1
-    while not trial.finished:
-        if not wanted():
-            return None
-        chunk_begin = time.monotonic()
-        trial.advance(chunk)
-        chunk = _next_chunk(chunk, time.monotonic() - chunk_begin)
-        advanced(int(trial.episode))
+    with opened(planned.config.make_trial(planned.key.seed)) as trial:
+        chunk = 1
+        while not trial.finished:
+            if not wanted():
+                return None
+            chunk_begin = time.monotonic()
+            trial.advance(chunk)
+            chunk = _next_chunk(chunk, time.monotonic() - chunk_begin)
+            advanced(int(trial.episode))
     return TrialRecord(
         key=planned.key,
         config=planned.config.canonical_json(),

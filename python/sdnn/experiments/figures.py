@@ -20,6 +20,7 @@ from sdnn.experiments.registry import AGENTS, agent_entry, cost_series
 from sdnn.experiments.results import CaseResult
 from sdnn.experiments.statistics import running_median
 from sdnn.interrupts import stay_interrupts
+from sdnn.palette import colors_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,7 +38,6 @@ SMOOTHED_TESTS = 25
 _PANEL_HEIGHT = 3.3
 _START_HEIGHT = 1.9
 
-COLORS = ("#1f5a96", "#c2542d", "#3c7d4b", "#7a5195")
 WARNING_COLOR = "#a31515"
 INK = "#2b2b2b"
 FAINT = "#6f6f6f"
@@ -98,7 +98,7 @@ def draw_experiment(
     panels = grid[:: len(heights)].ravel()
     starts = grid[1::2].ravel() if with_start else None
     agents = list(dict.fromkeys(result.agent for result in results))
-    colors = {agent: _color(list(AGENTS).index(agent)) for agent in agents}
+    colors = agent_colors(agents)
     for number, (case, axes) in enumerate(zip(experiment.cases, panels, strict=False)):
         shown = [result for result in results if result.case == case]
         axes.set_title(case.title, fontsize=10.5, loc="left", color=INK)
@@ -149,6 +149,7 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
     figure = Figure(figsize=(9.4, 4.7))
     figure.subplots_adjust(left=0.085, right=0.7, top=0.9, bottom=0.2)
     axes = figure.add_subplot()
+    colors = colors_of(range(len(cost_series())))
     for number, (_, series) in enumerate(cost_series()):
         own = sorted((c for c in costs if c.key.series == series.id), key=lambda c: c.key.n_inputs)
         if not own:
@@ -158,7 +159,7 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
             [np.percentile(cost.microseconds, (25, 50, 75)) for cost in own]
         )
         axes.errorbar(
-            x, middle, (middle - lower, upper - middle), color=_color(number),
+            x, middle, (middle - lower, upper - middle), color=colors[number],
             marker=_MARKERS[number % len(_MARKERS)], markersize=5, capsize=3, linewidth=1.2,
             label=f"{series.title}\n{series.growth}",
         )  # fmt: skip
@@ -166,7 +167,7 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
             fine = np.linspace(x[0], x[-1], 100)
             scale = middle[x.index(4)] / (4 * 3)
             axes.plot(
-                fine, scale * fine * (fine - 1), ":", color=_color(number), linewidth=1.2,
+                fine, scale * fine * (fine - 1), ":", color=colors[number], linewidth=1.2,
                 label="proportional to $d(d-1)$",
             )  # fmt: skip
     axes.set_yscale("log")
@@ -250,8 +251,10 @@ def _is_long(results: Sequence[CaseResult]) -> bool:
     return max(int(result.episode[-1]) for result in results) >= 4 * START_EPISODES
 
 
-def _color(number: int) -> str:
-    return COLORS[number % len(COLORS)]
+def agent_colors(agents: Sequence[str]) -> dict[str, str]:
+    """Give agents the colors of their places in the registry."""
+    places = list(AGENTS)
+    return dict(zip(agents, colors_of([places.index(agent) for agent in agents]), strict=True))
 
 
 def _style(axes: Axes) -> None:

@@ -6,9 +6,11 @@ the same protocol, bit for bit.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import gymnasium as gym
 import numpy as np
@@ -77,6 +79,19 @@ class Trial(Protocol):
         """Test episodes so far: arrays `episode`, `steps`, `episode_return`, `solved`, (n,)."""
 
 
+_AnyTrial = TypeVar("_AnyTrial")
+
+
+@contextmanager
+def opened(trial: _AnyTrial) -> Iterator[_AnyTrial]:
+    """Close at the end what a trial has open; those in C++ have nothing to close."""
+    try:
+        yield trial
+    finally:
+        if hasattr(trial, "close"):
+            trial.close()
+
+
 class LearningAgent(Protocol):
     """What a trial asks of an agent in Python; actions are elements of its action space."""
 
@@ -93,7 +108,8 @@ class LearningAgent(Protocol):
 class EpisodeLoop:
     """A trial over Gymnasium environments: learning episodes, and test episodes between them.
 
-    It holds the GIL, so trials of this kind do not run faster on several threads.
+    It holds the GIL, so trials of this kind do not run faster on several threads. At the end of the
+    last episode, and by `close`, both environments are closed.
 
     Parameters
     ----------
@@ -117,6 +133,7 @@ class EpisodeLoop:
         self._env = env
         self._test_env = test_env
         self._protocol = protocol
+        self._open: tuple[gym.Env[Any, Any], ...] = (env, test_env)
         self._rows: list[tuple[int, int, float, bool]] = []
         self._episode = 0
         self._n_decisions = 0
@@ -142,7 +159,7 @@ class EpisodeLoop:
         Raises
         ------
         ValueError
-            If `n_episodes` is negative.
+            If `n_episodes` is negative, or the return of a test episode is not finite.
         """
         if n_episodes < 0:
             raise ValueError(f"n_episodes must be at least 0, got {n_episodes}")
@@ -155,8 +172,14 @@ class EpisodeLoop:
             if self._episode % self._protocol.test_interval == 0:
                 self._rows.append(self._run_episode(self._test_env, learning=False))
         if self.finished:
-            self._env.close()
-            self._test_env.close()
+            self.close()
+
+    def close(self) -> None:
+        """Close both environments, if they are open still."""
+        environments, self._open = self._open, ()
+        with ExitStack() as stack:
+            for env in environments:
+                stack.callback(env.close)
 
     def test_rows(self) -> dict[str, NDArray[Any]]:
         """Test episodes so far: arrays `episode`, `steps`, `episode_return`, `solved`, (n,)."""
@@ -192,6 +215,11 @@ class EpisodeLoop:
             steps += 1
             episode_return += float(reward)
         self._n_decisions += steps
+        if not (learning or math.isfinite(episode_return)):
+            raise ValueError(
+                "rewards of env must add up to a finite number, got"
+                f" {episode_return} in the test after learning episode {self._episode}"
+            )
         return self._episode, steps, episode_return, terminated
 
 

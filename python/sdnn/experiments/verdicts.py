@@ -6,7 +6,8 @@ It was written down before the trials of Experiment B were run:
   the whole interval lies outside on one side, and is *undecided* otherwise;
 - a claim holds if all its checks hold, does not hold if one of them does not, and is undecided
   otherwise;
-- runs smaller than the paper's (10 trials x 15,000 episodes) are not judged.
+- runs smaller than the paper's (10 trials x 15,000 episodes) are not judged, nor are costs measured
+  with other settings than `CostConfig()`.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from sdnn.experiments.claims import CLAIMS, Check, Claim, Difference, Growth, Subject, describe
+from sdnn.experiments.cost import CostConfig
 from sdnn.experiments.records import CostRecord
 from sdnn.experiments.results import CaseSummary
 from sdnn.experiments.statistics import Estimate, estimate_contrast, json_number
@@ -124,7 +126,8 @@ def _judge(
         if not {quantity.n_inputs, quantity.n_fewer} <= times.keys():
             return CheckOutcome(check, None, Verdict.NOT_RUN)
         growth = estimate_contrast(times[quantity.n_inputs], times[quantity.n_fewer], np.divide)
-        return CheckOutcome(check, growth, verdict_of(check, growth))
+        wanted = CostConfig().config_hash
+        return _outcome(check, growth, all(c.key.config_hash == wanted for c in costs))
     subjects = [quantity.subject]
     if isinstance(quantity, Difference):
         subjects.append(quantity.other)
@@ -136,7 +139,9 @@ def _judge(
     else:
         values, others = (summary.uncensored(quantity.measure) for summary in found)
         estimate = estimate_contrast(values, others)
-    judged = all(summary.result.is_paper_scale for summary in found)
-    return CheckOutcome(
-        check, estimate, verdict_of(check, estimate) if judged else Verdict.NOT_JUDGED
-    )
+    return _outcome(check, estimate, all(summary.result.is_paper_scale for summary in found))
+
+
+def _outcome(check: Check, estimate: Estimate, is_full: bool) -> CheckOutcome:
+    verdict = verdict_of(check, estimate) if is_full else Verdict.NOT_JUDGED
+    return CheckOutcome(check, estimate, verdict)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.interrupts import stay_interrupts
+from sdnn.palette import colors_of
 from sdnn.runs.config import RunConfig
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
@@ -33,8 +34,6 @@ WINDOW = 20
 """Episodes in the running median of the returns, or all so far where they are fewer."""
 
 HEADER = ("task", "agent", "kind", "n_runs", "run", "step", "value", "low", "high")
-
-COLORS = ("#1f5a96", "#c2542d", "#3c7d4b", "#7a5195", "#8a6d1d", "#4a4a4a")
 
 Kind = Literal["return", "running median", "evaluation"]
 
@@ -132,12 +131,13 @@ def draw_curves(curves: Sequence[Curve]) -> Figure:
 
     tasks = list(dict.fromkeys(curve.task for curve in curves))
     agents = list(dict.fromkeys(curve.agent for curve in curves))
+    colors = dict(zip(agents, colors_of(range(len(agents))), strict=True))
     figure = Figure(figsize=(7.5, 3.6 * len(tasks)), layout="constrained")
     panels = figure.subplots(len(tasks), squeeze=False)[:, 0]
     for task, axes in zip(tasks, panels, strict=True):
         for curve in curves:
             if curve.task == task:
-                _draw(axes, curve, COLORS[agents.index(curve.agent) % len(COLORS)])
+                _draw(axes, curve, colors[curve.agent])
         axes.set_title(task, fontsize=10)
         axes.set_xlabel("steps")
         axes.set_ylabel("return")

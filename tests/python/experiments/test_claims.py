@@ -16,6 +16,7 @@ from sdnn.experiments.claims import (
     Subject,
     describe,
 )
+from sdnn.experiments.cost import QUICK_COST, CostConfig
 from sdnn.experiments.records import CostKey, CostRecord, StepTimes
 from sdnn.experiments.registry import cost_series
 from sdnn.experiments.verdicts import (
@@ -52,11 +53,10 @@ def result(case_id, agent, steps, n_trials=10, n_tests=1500):
     return summarize(CaseResult(CASES[case_id], agent, records))
 
 
-def cost(series, n_inputs, microseconds):
+def cost(series, n_inputs, microseconds, config=None):
     times = StepTimes(microseconds=np.array(microseconds, float), n_steps=1, table_bytes=1)
-    return CostRecord(
-        key=CostKey(series, n_inputs, "hash"), version="0", machine="m", finished_at="", times=times
-    )
+    key = CostKey(series, n_inputs, (config or CostConfig()).config_hash)
+    return CostRecord(key=key, version="0", machine="m", finished_at="", times=times)
 
 
 def verdicts(summaries, costs=()):
@@ -167,6 +167,8 @@ def test_growth_is_a_ratio_of_medians():
     assert growths[2] is None
     assert [c.verdict for c in outcome.checks] == [Verdict.HOLDS, Verdict.HOLDS, Verdict.NOT_RUN]
     assert outcome.verdict == Verdict.NOT_RUN
+    quick = [cost("sdnn-c", n, [10.0 * n] * 3, QUICK_COST) for n in (4, 8)]
+    assert judge_claims([], quick)[0].checks[0].verdict == Verdict.NOT_JUDGED
     polynomial = [*costs[:2], cost("rbfn", 4, [1, 1]), cost("rbfn", 8, [4, 4])]
     assert judge_claims([], polynomial)[0].verdict == Verdict.FAILS
 

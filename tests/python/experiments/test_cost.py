@@ -56,7 +56,6 @@ def test_keys_are_all_series_in_ascending_inputs():
     assert len(quick) == 3 * 7 + 4
     assert replace(SMALL, n_rounds=4).config_hash != SMALL.config_hash
     assert CostConfig().n_inputs == tuple(range(2, 9))
-    assert CostConfig().config_hash == "cfe16d17b9773885"  # under which results are stored
     assert asdict(QUICK_COST)["n_inputs"] == asdict(CostConfig())["n_inputs"]
 
 
@@ -94,6 +93,15 @@ def test_settings_of_costs_live_side_by_side(tmp_path, measured):
         assert len(store.load_costs(SMALL.config_hash)) == 8
         assert store.load() == ()
         assert records_digest(store.load()) == records_digest(())
+
+
+def test_times_of_another_machine_or_version_are_measured_anew(tmp_path, measured, monkeypatch):
+    measured(tmp_path, FakeMeasure())
+    for place, name in ((machine, "description"), (_core, "__version__")):
+        with monkeypatch.context() as patched:
+            patched.setattr(place, name, (lambda: "another") if place is machine else "9.9.9")
+            anew = FakeMeasure()
+            assert len(measured(tmp_path, anew)) == len(anew.asked) == 8
 
 
 def test_damaged_costs_are_named(tmp_path, measured):

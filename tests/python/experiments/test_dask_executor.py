@@ -1,3 +1,4 @@
+import copy
 import importlib.util
 import json
 import os
@@ -7,10 +8,12 @@ import textwrap
 import threading
 import time
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from rich.console import Console
 
 import sdnn
 from sdnn.approximators import SDNNCConfig
@@ -32,6 +35,7 @@ from sdnn.experiments import (
 )
 from sdnn.experiments.cases import EXPERIMENTS
 from sdnn.experiments.dask_worker import probe
+from sdnn.experiments.progress import ProgressObserver
 from sdnn.experiments.records import records_digest
 
 pytest.importorskip("distributed", reason='needs Dask: pip install "sdnn[dask]"')
@@ -233,6 +237,19 @@ def test_a_trial_that_raises_is_reported_and_the_others_are_done(pair, tmp_path)
     assert failed == key
     assert isinstance(error, ValueError)
     assert "discount must be" in str(error)
+
+
+def test_a_trial_that_cannot_be_sent_is_reported_and_the_others_are_done(pair, tmp_path):
+    plan = list(make_plan(2))
+    odd = copy.copy(plan[-1].config)
+    object.__setattr__(odd, "lock", threading.Lock())
+    plan[-1] = PlannedTrial(plan[-1].key, odd)
+    with ProgressObserver(Console(file=StringIO())) as observer:
+        outcome, _ = run(tmp_path, plan, pair, observer)
+    assert outcome.n_run == 3
+    (failed,) = outcome.failures
+    assert failed.key == plan[-1].key
+    assert "lock" in str(failed.error)
 
 
 OTHER_VERSION = """

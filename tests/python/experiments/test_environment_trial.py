@@ -10,18 +10,31 @@ import pytest
 
 from sdnn.agents import FuzzyQLearningConfig
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
-from sdnn.experiments import AGENTS, AgentEntry, ProtocolConfig, TrialConfig
+from sdnn.experiments import (
+    AGENTS,
+    AgentEntry,
+    PlannedTrial,
+    ProtocolConfig,
+    TrialConfig,
+    TrialKey,
+)
+from sdnn.experiments.dask_worker import probe
 from sdnn.experiments.environment_trial import EnvironmentConfig, EnvironmentTrialConfig
+from sdnn.experiments.executor import run_to_end
 
 PROTOCOL = ProtocolConfig(n_learning_episodes=6, test_interval=2)
 
 
 class Counter(gym.Env):
-    """Observes how many steps are done, and a random number; rewards 1 a step; ends after 3."""
+    """Observes how many steps are done, and a random number; rewards 1 a step; ends after 3.
+
+    `made` has those that were made.
+    """
 
     made: ClassVar = []
 
-    def __init__(self, length=3):
+    def __init__(self, length=3, reward=1.0):
+        self.reward = float(reward)
         self.observation_space = gym.spaces.Box(0.0, np.array([10.0, 1.0]), (2,), np.float64)
         self.action_space = gym.spaces.Box(-1.0, 1.0, (1,))
         self.length = length
@@ -41,7 +54,7 @@ class Counter(gym.Env):
 
     def step(self, action):
         self._steps += 1
-        return self._observation(), 1.0, self._steps == self.length, False, {}
+        return self._observation(), self.reward, self._steps == self.length, False, {}
 
     def close(self):
         self.closed = True
@@ -111,6 +124,25 @@ def test_rows_are_those_of_the_test_episodes(watched):
     assert rows["solved"].tolist() == [True, True, True]
     assert trial.n_decisions == 4 * (6 + 3)
     assert [env.closed for env in Counter.made] == [True, True]
+
+
+@pytest.mark.parametrize("reward", ["nan", "inf", 1e308])
+def test_a_return_that_is_no_number_ends_the_trial(watched, reward):
+    config = watched(kwargs={"reward": reward})
+    planned = PlannedTrial(TrialKey("counter", "watcher", 0, 1, config.config_hash), config)
+    with pytest.raises(ValueError, match="in the test after learning episode 2"):
+        run_to_end(planned, wanted=lambda: True, advanced=lambda _: None)
+    assert [env.closed for env in Counter.made] == [True, True]
+
+
+def test_environments_are_closed_whatever_happens(watched):
+    config = watched()
+    planned = PlannedTrial(TrialKey("counter", "watcher", 0, 1, config.config_hash), config)
+    assert run_to_end(planned, wanted=lambda: False, advanced=lambda _: None) is None
+    with pytest.raises(ValueError, match="n_inputs must be"):
+        replace(config, approximator=Watching(n_inputs=3)).make_trial(1)
+    probe(planned)
+    assert [env.closed for env in Counter.made] == [True] * 6
 
 
 def test_truncated_episodes_are_not_solved(watched):

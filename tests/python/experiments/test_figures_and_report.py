@@ -1,4 +1,5 @@
 import base64
+import itertools
 import json
 import math
 import re
@@ -10,6 +11,7 @@ import pytest
 
 import sdnn.experiments.reproduce as reproduce_module
 from sdnn.experiments import (
+    AGENTS,
     CaseResult,
     PlotUnavailableError,
     ProtocolConfig,
@@ -20,12 +22,13 @@ from sdnn.experiments import (
     select_experiments,
     summarize,
 )
-from sdnn.experiments.figures import SMOOTHED_TESTS, figure_bytes
+from sdnn.experiments.figures import SMOOTHED_TESTS, agent_colors, figure_bytes
 from sdnn.experiments.page import Call, to_html, to_markdown
 from sdnn.experiments.records import ROW_HEADER, records_digest, trial_rows
 from sdnn.experiments.report import ExperimentReport, Report, format_estimate, to_json
 from sdnn.experiments.reproduce import ReproduceRequest, reproduce
 from sdnn.experiments.statistics import Estimate, running_median
+from sdnn.palette import COLORS, colors_of
 
 (EXPERIMENT,) = select_experiments("a")
 
@@ -163,6 +166,14 @@ def test_a_colour_stands_for_an_agent_in_every_figure(tmp_path, fake, run):
     assert titles == ["RBFN", "SDNN-C"]
     assert one < two
     assert len(two) == 2
+
+
+def test_any_two_agents_of_a_figure_have_colors_of_their_own():
+    for pair in itertools.combinations(AGENTS, 2):
+        assert len(set(agent_colors(pair).values())) == 2
+    places = range(len(COLORS))
+    assert colors_of([*places, 0]) == [*COLORS, COLORS[0]]
+    assert colors_of([3, 3 + len(COLORS), 4]) == [COLORS[3], COLORS[4], COLORS[5]]
 
 
 def test_mixed_settings_are_refused(results):

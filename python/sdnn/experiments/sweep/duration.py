@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from sdnn.experiments.config import TrialSettings
 from sdnn.experiments.records import TrialKey, TrialTime
+from sdnn.experiments.trial import opened
 
 PROBE_SECONDS = 0.3
 """Processor time of a probe, about."""
@@ -95,12 +96,12 @@ def _duration(times: Sequence[TrialTime], config: TrialSettings, source: str) ->
 
 def _probe(key: TrialKey, config: TrialSettings) -> TrialTime:
     """Run the start of a trial."""
-    trial = config.make_trial(key.seed)
-    begin = time.thread_time()
-    seconds = 0.0
-    while seconds < PROBE_SECONDS and not trial.finished:
-        trial.advance(config.protocol.test_interval)
-        seconds = time.thread_time() - begin
+    with opened(config.make_trial(key.seed)) as trial:
+        begin = time.thread_time()
+        seconds = 0.0
+        while seconds < PROBE_SECONDS and not trial.finished:
+            trial.advance(config.protocol.test_interval)
+            seconds = time.thread_time() - begin
     return TrialTime(
         key=key,
         seconds=seconds,

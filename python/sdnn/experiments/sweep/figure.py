@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.experiments.figures import COLORS, FAINT, INK, require_matplotlib
+from sdnn.experiments.figures import FAINT, INK, agent_colors, require_matplotlib
 from sdnn.experiments.measures import MeasureName
-from sdnn.experiments.registry import AGENTS
 from sdnn.experiments.statistics import estimate_mean
 from sdnn.experiments.sweep.comparison import Comparison, Measured
 from sdnn.experiments.sweep.report import end_solved
@@ -105,11 +104,12 @@ def _draw_case(
     measured = comparison.of_case(case.id)
     names = _OF_STEPS if "final_steps" in measured[0].measures else _OF_RETURNS
     ids = [variant.id for variant in comparison.variants]
-    agents = list(AGENTS)
+    agents = (one.combination.config.agent for one in comparison.measured.values())
+    colors = agent_colors(list(dict.fromkeys(agents)))
     for axes, name in zip(pair, names, strict=True):
         for one in measured:
             variant = one.combination.variant.id
-            color = COLORS[agents.index(one.combination.config.agent) % len(COLORS)]
+            color = colors[one.combination.config.agent]
             _draw_variant(
                 axes, one, name, ids.index(variant), color, variant == comparison.study.reference
             )

@@ -140,10 +140,12 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Sweep:
     begin = time.monotonic()
     study = request.study
     plan = request.plan
-    if not (request.out / STORE_NAME).exists():
+    is_new = not (request.out / STORE_NAME).exists()
+    if is_new:
         study.check()  # before the folder is made
     with ResultStore(request.out) as store:
-        study.check(store.keys())
+        if not is_new:
+            study.check(store.keys())
         remove_abandoned_files(request.out)
         outcome = run_trials(
             plan, store, executor=request.executor, jobs=request.jobs, observer=observer

@@ -28,7 +28,7 @@ from sdnn.experiments.sweep.settings import (
     StudyFile,
     build,
 )
-from sdnn.experiments.trial import ProtocolConfig
+from sdnn.experiments.trial import ProtocolConfig, opened
 from sdnn.toml_lines import KeyPath
 from sdnn.typed_values import possible_words
 
@@ -211,7 +211,8 @@ class Study:
                 continue
             tried.add(config.config_hash)
             try:
-                config.make_trial(keys[0].seed)
+                with opened(config.make_trial(keys[0].seed)):
+                    pass
             except Exception as error:  # of whatever agent or environment
                 raise _refusal(self.file, combination, error) from error
 

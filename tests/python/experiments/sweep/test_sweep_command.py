@@ -3,6 +3,7 @@
 import csv
 import gzip
 import json
+import sys
 
 import pytest
 from click.testing import CliRunner
@@ -198,8 +199,16 @@ import numpy as np
 
 
 class Line(gym.Env):
+    n_open = n_made = 0
     observation_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
     action_space = gym.spaces.Discrete(2)
+
+    def __init__(self):
+        Line.n_open += 1
+        Line.n_made += 1
+
+    def close(self):
+        Line.n_open -= 1
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
@@ -231,4 +240,7 @@ gym.register("mine/Line-v0", entry_point=Line, max_episode_steps=30)
     assert [(r["case"], r["variant"]) for r in results] == [
         ("my_line_world:mine/Line-v0", "exact"), ("my_line_world:mine/Line-v0", "noisy"),
     ]  # fmt: skip
+    line = sys.modules["my_line_world"].Line
+    # Two variants: each is looked at and tried once, and then its two trials are run.
+    assert (line.n_made, line.n_open) == (2 * (1 + 2 + 2 * 2), 0)
     assert results[0]["measures"]["mean_return"]["median"]["value"] > 0.2
