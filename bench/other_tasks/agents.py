@@ -52,15 +52,15 @@ class Contender:
         It is run on.
     steps
         By task, where it was published with a shorter or longer training than the task's.
-    in_own_units
-        Whether it gets observations in their own units: not scaled to [0, 1].
+    make
+        Makes the environment as it sees it: ``make(task, condition, evaluation)``.
     """
 
     title: str
     learn: Learn
     tasks: tuple[str, ...]
     steps: Mapping[str, int] = field(default_factory=dict)
-    in_own_units: bool = False
+    make: Callable[[Task, str, bool], gym.Env[Any, Any]] = Task.make
 
 
 class _Report(Callback):
@@ -90,11 +90,17 @@ class ListedActions(gym.ActionWrapper):
 
 
 def _learn_ours(make, name, condition, steps, seed, after_step):
-    _learn_in(TASKS[name].make(condition), make, name, condition, steps, seed, after_step)
+    _learn_in(_environment(TASKS[name], condition), make, name, condition, steps, seed, after_step)
+
+
+def _environment(task: Task, condition: str, evaluation: bool = False):
+    """Make it as our agents see it: what is said of variables is said of them in their units."""
+    make = task.make_unscaled if task.options else task.make
+    return make(condition, evaluation)
 
 
 def _learn_joint(name, condition, steps, seed, after_step):
-    env = ListedActions(TASKS[name].make(condition))
+    env = ListedActions(_environment(TASKS[name], condition))
 
     def after(n_steps, policy, memory):
         after_step(n_steps, lambda observation: env.action(policy(observation)), memory)
@@ -120,7 +126,7 @@ def ascend(values: NDArray[np.float64]) -> tuple[int, ...]:
 
 def _learn_joint_ascending(name, condition, steps, seed, after_step):
     """Learn as the joint one does, and look at what its network is worth when it is searched so."""
-    env = ListedActions(TASKS[name].make(condition))
+    env = ListedActions(_environment(TASKS[name], condition))
     agent = _agent(env, SDNNQLearning, name, condition, seed)
     shape = (N_VALUES,) * env.unwrapped.action_space.shape[0]
 
@@ -138,8 +144,9 @@ def _learn_in(env, make, name, condition, steps, seed, after_step):
 
 
 def _agent(env, make, name, condition, seed):
-    # What is said of angles is said of observations as they are.
-    options = TASKS[name].options if condition == "clean" else {}
+    options = dict(TASKS[name].options)
+    if condition != "clean":
+        options.pop("observation_range", None)  # the space has it
     return make(env.observation_space, env.action_space, seed=seed, **options)
 
 
@@ -205,46 +212,48 @@ def _stable(algorithm):
         learn=partial(_learn_stable, algorithm),
         tasks=tuple(stable_baselines.SETTINGS[algorithm]),
         steps=stable_baselines.steps_of(algorithm),
-        in_own_units=True,
+        make=Task.make_unscaled,
     )
 
 
+def _ours(**options):
+    return Contender(make=_environment, **options)
+
+
 CONTENDERS = {
-    "sdnn": Contender(
-        title="SDNN-C", learn=partial(_learn_ours, SDNNQLearning), tasks=tuple(TASKS)
-    ),
-    "sdnn-small": Contender(
+    "sdnn": _ours(title="SDNN-C", learn=partial(_learn_ours, SDNNQLearning), tasks=tuple(TASKS)),
+    "sdnn-small": _ours(
         title="SDNN-C, small",
         learn=partial(_learn_ours, partial(SDNNQLearning, preset="small")),
         tasks=("CartPole", "Pendulum", "MountainCarContinuous"),
     ),
-    "sdnn-brief": Contender(
+    "sdnn-brief": _ours(
         title="SDNN-C, brief random actions", learn=partial(_learn_ours, _brief), tasks=tuple(TASKS)
     ),
-    "sdnn-bounds": Contender(
+    "sdnn-bounds": _ours(
         title="SDNN-C, bounds of the space",
         learn=partial(_learn_ours, _with_bounds),
         tasks=("LunarLanderContinuous",),
     ),
-    "sdnn-seen": Contender(
+    "sdnn-seen": _ours(
         title="SDNN-C, ranges seen",
         learn=partial(_learn_ours, _with_ranges_seen),
         tasks=("LunarLanderContinuous",),
     ),
-    "sdnn-fewer-pairs": Contender(
+    "sdnn-fewer-pairs": _ours(
         title="SDNN-C, 24 pairs of inputs",
         learn=partial(_learn_ours, _with_fewer_pairs),
         tasks=("LunarLanderContinuous",),
     ),
-    "sdnn-joint": Contender(
+    "sdnn-joint": _ours(
         title="SDNN-C, joint actions", learn=_learn_joint, tasks=("Reaching", "Wheels")
     ),
-    "sdnn-joint-ascent": Contender(
+    "sdnn-joint-ascent": _ours(
         title="SDNN-C, joint actions, by ascent",
         learn=_learn_joint_ascending,
         tasks=("Reaching", "Wheels"),
     ),
-    "rbf": Contender(
+    "rbf": _ours(
         title="RBFN",
         learn=partial(_learn_ours, _rbf),
         tasks=("CartPole", "Pendulum", "MountainCar", "MountainCarContinuous"),
@@ -257,7 +266,7 @@ CONTENDERS = {
         learn=_learn_stream_ac,
         tasks=stream_ac.TASKS,
         steps=dict.fromkeys(stream_ac.TASKS, 50_000),  # it takes milliseconds for each
-        in_own_units=True,
+        make=Task.make_unscaled,
     ),
     "sac": _stable("SAC"),
     "td3": _stable("TD3"),
@@ -283,7 +292,6 @@ def train(work: Work, make_looks: Callable[[gym.Env, Task, int, int], AfterStep]
     """Let a contender learn, under the eyes of ``make_looks(env, task, steps, seed)``."""
     name, condition, kind, seed = work
     task, contender = TASKS[name], CONTENDERS[kind]
-    make = task.make_unscaled if contender.in_own_units else task.make
     steps = contender.steps.get(name, task.steps)
-    looks = make_looks(make(condition, evaluation=True), task, steps, seed)
+    looks = make_looks(contender.make(task, condition, True), task, steps, seed)
     contender.learn(name, condition, steps, seed, looks)

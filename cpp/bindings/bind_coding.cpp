@@ -15,6 +15,7 @@
 #include "sdnn/coding/correlation_matrix.hpp"
 #include "sdnn/coding/detail/coded_samples.hpp"
 #include "sdnn/coding/random_inverse.hpp"
+#include "sdnn/coding/symbol_patterns.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 
@@ -93,6 +94,14 @@ void bind_coding(py::module_& module) {
       },
       py::arg("n_units"), py::arg("n_anchor_patterns"), py::arg("n_interpolated"),
       py::arg("circular"), py::arg("seed"));
+  module.def(
+      "symbol_patterns",
+      [](int n_symbols, int n_units, std::uint64_t seed) {
+        bindings::require_room_for_signs(n_symbols, n_units);
+        core::Random random(seed, core::Stream::code_books);
+        return bindings::signs_of(coding::symbol_patterns(n_symbols, n_units, true, random));
+      },
+      py::arg("n_symbols"), py::arg("n_units"), py::arg("seed"));
   module.def(
       "correlation_matrix_patterns",
       [](int n_units, const bindings::ArrayArgument<double>& correlations, std::uint64_t seed) {

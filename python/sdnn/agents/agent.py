@@ -362,7 +362,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             If an observation, the action, the reward (beyond +-1e300, for example) or
             ``terminated`` is not usable, or there is no such environment; nothing is learned then.
         OverflowError
-            If a weight would leave its range; nothing is learned then.
+            If a weight would leave its range. What waited for this transition, or other dimensions
+            of its action, may have been learned: load a checkpoint.
         """
         self._check_environment(environment)
         if not isinstance(transition, Transition):

@@ -69,7 +69,9 @@ def evaluate(
     agent
         What acts.
     env
-        Each episode resets it with a seed of its own, so that the same call gives the same result.
+        Each episode resets it with a seed of its own: every call meets the same episodes. What an
+        agent draws for its greedy actions, where several are best or all are random in a warm-up,
+        goes on from call to call, in a stream that learning does not use.
     episodes
         How many.
     seed

@@ -62,7 +62,7 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
         "paper": Preset(title="as in the paper"),
         "general": _GENERAL,
         # Few actions part the best one from its neighbours by more than sensor noise blurs, and a
-        # success that reaches the whole path at once is not forgotten: docs/readings.md.
+        # success that reaches the whole path at once is not forgotten: docs/collapse.md.
         "robust": Preset(
             title="as recommended for the paper's task: steady with noisy sensors",
             approximator=SDNNCConfig(n_actions=61),

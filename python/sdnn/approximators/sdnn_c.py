@@ -224,9 +224,9 @@ class SDNNC:
         Raises
         ------
         ValueError
-            For a bad state, action or rate, or a NaN target.
+            For a bad state, action or rate, or a NaN target; nothing has changed then.
         OverflowError
-            If a weight would leave its range. In both cases nothing has changed.
+            If a weight would leave its range; no weight has changed then.
         """
         self._core.correct(state, action, target, rate)
 

@@ -105,7 +105,7 @@ class WithMissing(Coding):
         """Draw the patterns; see `Coding.patterns`."""
         own = int(np.random.SeedSequence(seed).generate_state(1, np.uint64)[0])
         return np.vstack(
-            [self.base.patterns(n_units, seed), _core.anchor_patterns(n_units, 2, 0, False, own)]
+            [self.base.patterns(n_units, seed), _core.symbol_patterns(1, n_units, own)]
         )
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:

@@ -125,8 +125,7 @@ class Symbolic(Coding):
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
         """Draw the patterns; see `Coding.patterns`."""
-        # Every anchor but the last is a pattern of its own when nothing lies between.
-        return _core.anchor_patterns(n_units, self.size + 1, 0, False, seed)
+        return _core.symbol_patterns(self.size, n_units, seed)
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
         """Zero but for a category with itself; see `Coding.correlations`."""

@@ -24,7 +24,13 @@ def named(x: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 class Waiting:
-    """Collects the first samples, from which ranges, categories and classes are learned."""
+    """Collects the first samples, from which ranges, categories and classes are learned.
+
+    If the model refuses one of them, all are dropped, and the collecting begins anew.
+    """
+
+    least_targets = 1
+    """Different ones that have to be among the samples."""
 
     def __init__(self, model: Any, grace_period: int) -> None:
         if grace_period < 2:
@@ -36,28 +42,32 @@ class Waiting:
         self.targets: list[Any] = []
 
     def _learn(self, x: dict[Hashable, Any], y: Any) -> None:
+        sample = named(x)
         if self.fitted is not None:
-            self.fitted.learn_one(named(x), y)
+            self.fitted.learn_one(sample, y)
             return
-        self.samples.append(named(x))
+        self.samples.append(sample)
         self.targets.append(y)
-        if len(self.samples) >= self.grace_period and self._is_enough():
-            self.fitted = clone(self.model)
-            self._begin()
-            self.samples, self.targets = [], []
+        if len(self.samples) < self.grace_period or len(set(self.targets)) < self.least_targets:
+            return
+        # The model cannot say which sample it refuses, and would refuse it for ever.
+        samples, self.samples = self.samples, []
+        targets, self.targets = self.targets, []
+        try:
+            self.fitted = self._begun(samples, targets)
+        except ValueError as error:
+            raise ValueError(f"the first {len(samples)} samples are dropped: {error}") from error
 
-    def _is_enough(self) -> bool:
-        return True
-
-    def _begin(self) -> None:
-        """Learn from the samples collected."""
+    def _begun(self, samples: list[dict[str, Any]], targets: list[Any]) -> Any:
+        """Make a model that has learned the samples collected."""
         import pandas as pd
 
-        frame = pd.DataFrame(self.samples)
+        model = clone(self.model)
         options = {}
-        if isinstance(self.fitted, SDNNClassifier):
-            options["classes"] = np.unique(self.targets)
-        self.fitted.partial_fit(frame, np.array(self.targets), **options)
+        if isinstance(model, SDNNClassifier):
+            options["classes"] = np.unique(targets)
+        model.partial_fit(pd.DataFrame(samples), np.array(targets), **options)
+        return model
 
 
 class RiverRegressor(Waiting, base.Regressor):
@@ -76,7 +86,7 @@ class RiverRegressor(Waiting, base.Regressor):
         super().__init__(model, grace_period)
 
     def learn_one(self, x: dict[Hashable, Any], y: float) -> None:
-        """Learn one sample."""
+        """Learn one sample; ValueError if the model refuses it, or one of the first ones."""
         self._learn(x, y)
 
     def predict_one(self, x: dict[Hashable, Any]) -> float:
@@ -102,15 +112,14 @@ class RiverClassifier(Waiting, base.Classifier):
     def __init__(self, model: SDNNClassifier, grace_period: int = 100) -> None:
         super().__init__(model, grace_period)
 
-    def _is_enough(self) -> bool:
-        return len(set(self.targets)) > 1
+    least_targets = 2
 
     def learn_one(self, x: dict[Hashable, Any], y: Any) -> None:
-        """Learn one sample."""
+        """Learn one sample; ValueError if the model refuses it, or one of the first ones."""
         self._learn(x, y)
 
     def predict_one(self, x: dict[Hashable, Any], **_options: Any) -> Any:
         """Predict one label; None before the first sample."""
         if self.fitted is None:
-            return max(set(self.targets), key=self.targets.count) if self.targets else None
+            return max(dict.fromkeys(self.targets), key=self.targets.count) if self.targets else None
         return self.fitted.predict_one(named(x))

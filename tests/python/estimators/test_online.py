@@ -240,3 +240,32 @@ def test_names_of_river_streams_may_be_numbers():
     for x, y in zip(X[:40], Y[:40], strict=True):
         model.learn_one(dict(enumerate(x)), y)
     assert np.isfinite(model.predict_one(dict(enumerate(X[0]))))
+
+
+@pytest.mark.parametrize("kind", ["regressor", "classifier"])
+def test_a_river_stream_goes_on_after_a_sample_that_cannot_be_learned(kind):
+    pytest.importorskip("river")
+    from sdnn.estimators.river import RiverClassifier, RiverRegressor
+
+    model, targets = {
+        "regressor": (RiverRegressor(SDNNRegressor(**OPTIONS), grace_period=20), Y.tolist()),
+        "classifier": (RiverClassifier(SDNNClassifier(**OPTIONS), 20), LABELS.tolist()),
+    }[kind]
+    for number, (row, target) in enumerate(zip(ROWS[:50], targets, strict=False)):
+        if number == 19:
+            with pytest.raises(ValueError, match="the first 20 samples are dropped: .*NaN"):
+                model.learn_one(row, target)
+        else:
+            model.learn_one({**row, "b": float("nan")} if number == 5 else row, target)
+    assert model.fitted is not None
+    assert model.predict_one(ROWS[0]) is not None
+
+
+def test_labels_of_equal_number_are_predicted_in_their_order():
+    pytest.importorskip("river")
+    from sdnn.estimators.river import RiverClassifier
+
+    model = RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
+    for row, label in zip(ROWS, ["red", "green", "blue", "blue", "green", "red"], strict=False):
+        model.learn_one(row, label)
+    assert model.predict_one(ROWS[0]) == "red"

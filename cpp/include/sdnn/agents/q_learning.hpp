@@ -243,8 +243,8 @@ class QLearning {
   }
 
   /// Learns one transition. Throws std::invalid_argument for a reward that is not finite or beyond
-  /// +- 1e300 or an environment that is none, and as the approximator does; then nothing has been
-  /// learned.
+  /// +- 1e300 or an environment that is none; then nothing has been learned. Throws
+  /// std::overflow_error as the approximator does; then it may have been learned in part.
   void learn(std::span<const double> state, const Action& action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0) {
     // Refuses at once what could not be learned: a correction may come later.

@@ -140,7 +140,8 @@ class SDNNC {
   /// q_hat = (1 - rate) Q + rate * target.
   ///
   /// Source: Fig. 2, Eqs. (1) to (3); spec section 1, "Learning". Throws std::invalid_argument for
-  /// a bad state, action or rate or a NaN target, std::overflow_error; then nothing has changed.
+  /// a bad state, action or rate or a NaN target, std::overflow_error; then no weight or threshold
+  /// has changed and nothing is counted, though a random rounding may have been drawn.
   void correct(std::span<const double> state, std::size_t action, double target,
                double rate = 1.0) {
     core::require(!std::isnan(target), "target", "a number", target);
@@ -530,22 +531,26 @@ class SDNNC {
     const int n_firing = count_in_window(entry.potentials, action);
     const double wanted = (1.0 - rate) * scale_(n_firing) + rate * target;
     const int deficit = rounded_count(wanted, n_firing) - n_firing;
+    const bool changes = deficit != 0 && move_count(entry, action, deficit);
     ++counts_.asked;
     if (wanted < scale_.q_low() || wanted > scale_.q_high()) ++counts_.out_of_range;
-    if (deficit == 0) {
-      counts_.rounded_away += wanted != scale_(n_firing) ? 1 : 0;
-      return;
-    }
+    if (deficit == 0 && wanted != scale_(n_firing)) ++counts_.rounded_away;
+    if (changes) ++counts_.changed;
+  }
+
+  /// Lets `deficit` units more of the action's window fire, or fewer if it is negative, as far as
+  /// there are any; returns whether there are.
+  bool move_count(const Remembered& entry, std::size_t action, int deficit) {
     const std::size_t first = actions_.first_unit(action);
     select_units(std::span(entry.potentials).subspan(first, actions_.n_active_units()), deficit,
                  selected_);
-    if (selected_.empty()) return;
+    if (selected_.empty()) return false;
     for (std::uint32_t& unit : selected_) unit += static_cast<std::uint32_t>(first);
 
     const std::int32_t step = deficit > 0 ? config_.lattice : -config_.lattice;
     hidden_layer_.correct(selected_, memory_.columns(*code_, entry.bins), step);
     memory_.corrected(entry.bins, selected_, step);
-    ++counts_.changed;
+    return true;
   }
 
   Remembered recall(std::span<const double> state) {

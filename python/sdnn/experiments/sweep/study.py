@@ -388,7 +388,7 @@ def _case(file: StudyFile, case_id: str) -> StudyCase:
     observed = {"n_sensors": paper.n_sensors, "noise": paper.noise}
     for name, setting in settings.items():
         if name[0] == "environment" or (
-            name[0] == "sensors" and setting.value != observed.get(name[1], setting.value)
+            name[0] == "sensors" and setting.value != observed.get(name[-1], setting.value)
         ):
             raise file.error(
                 setting.where,
