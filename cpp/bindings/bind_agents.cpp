@@ -87,21 +87,6 @@ void def_fuzzy(py::class_<Agent>& agent) {
   def_agent(agent);
 }
 
-/// The networks of an action's dimensions, made by `make(config, seed)`: alike but for their
-/// numbers of actions, and all random.
-template <class Approximator, class Config, class Make>
-approximators::Decoupled<Approximator> decoupled(const Config& config,
-                                                 const std::vector<int>& n_actions,
-                                                 std::uint64_t seed, const Make& make) {
-  std::vector<Approximator> parts;
-  for (std::size_t d = 0; d < n_actions.size(); ++d) {
-    Config of_dimension = config;
-    of_dimension.n_actions = n_actions[d];
-    parts.push_back(make(of_dimension, approximators::seed_of_dimension(seed, d)));
-  }
-  return approximators::Decoupled<Approximator>(std::move(parts));
-}
-
 /// Binds Q-learning with an approximator.
 template <class Config, class Approximator, class Make>
 py::class_<agents::QLearning<Approximator>> bind_q_learning(py::module_& module, const char* name,
@@ -130,8 +115,8 @@ void bind_decoupled_q_learning(py::module_& module, const char* name, const char
   agent
       .def(py::init([make](const Config& approximator, const std::vector<int>& n_actions,
                            const QLearningConfig& learning, std::uint64_t seed) {
-             return Agent(decoupled<Approximator>(approximator, n_actions, seed, make), learning,
-                          seed);
+             return Agent(approximators::make_decoupled(approximator, n_actions, seed, make),
+                          learning, seed);
            }),
            py::kw_only(), py::arg("approximator"), py::arg("n_actions"), py::arg("learning"),
            py::arg("seed"))
@@ -240,12 +225,7 @@ void bind_agents(py::module_& module) {
   vector_fuzzy_agent
       .def(py::init([](const FuzzyRulesConfig& approximator, std::size_t n_dimensions,
                        const FuzzyQLearningConfig& learning, std::uint64_t seed) {
-             std::vector<FuzzyQLearning> parts;
-             for (std::size_t d = 0; d < n_dimensions; ++d) {
-               parts.emplace_back(FuzzyRules(approximator), learning,
-                                  approximators::seed_of_dimension(seed, d));
-             }
-             return VectorFuzzyQLearning(std::move(parts));
+             return VectorFuzzyQLearning(approximator, n_dimensions, learning, seed);
            }),
            py::kw_only(), py::arg("approximator"), py::arg("n_dimensions"), py::arg("learning"),
            py::arg("seed"))

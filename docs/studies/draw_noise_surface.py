@@ -18,7 +18,8 @@ from sdnn.experiments.figures import figure_bytes, require_matplotlib
 from sdnn.experiments.measures import final_share_solved
 from sdnn.experiments.registry import agent_entry
 from sdnn.experiments.store import ResultStore
-from sdnn.experiments.sweep.study import Study, read_study
+from sdnn.experiments.sweep.reading import read_study
+from sdnn.experiments.sweep.study import Study
 from sdnn.whole_files import write_whole
 
 STUDY = Path(__file__).with_name("noise-surface.toml")

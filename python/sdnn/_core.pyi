@@ -1292,6 +1292,8 @@ def small_preset(n_inputs: typing.SupportsInt | typing.SupportsIndex) -> tuple[S
     """
     Settings of approximator and learning, for small processors
     """
+def symbol_patterns(n_symbols: typing.SupportsInt | typing.SupportsIndex, n_units: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
+    ...
 @typing.overload
 def time_agent_steps(agent: SDNNQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """

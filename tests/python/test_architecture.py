@@ -45,6 +45,7 @@ PYTHON_MODULES = {
     "instruction_sets": "core",
     "interrupts": "core",
     "machine": "core",
+    "palette": "core",
     "registration": "environments",
     "toml_lines": "core",
     "typed_values": "core",

@@ -19,7 +19,7 @@ from sdnn.agents.observations import AnglePairs, Ranges, UnitObservations
 from sdnn.agents.spaces import space_data, space_of
 from sdnn.agents.training import Callback, Training, TrainingResult
 from sdnn.agents.transition import Transition
-from sdnn.agents.warm_up import WarmUp
+from sdnn.agents.warm_up import MOST_ENVIRONMENTS, WarmUp
 from sdnn.arguments import flag, path_of, real, seed_of, whole
 
 if TYPE_CHECKING:
@@ -278,7 +278,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
     @n_environments.setter
     def n_environments(self, n: int) -> None:
-        number = whole("n_environments", n, 1, 2**14)
+        number = whole("n_environments", n, 1, MOST_ENVIRONMENTS)
         if self._warm_up is not None:
             self._warm_up.n_environments = number
         else:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
-from fractions import Fraction
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -19,6 +18,18 @@ from numpy.typing import NDArray
 
 from sdnn._core import __version__
 from sdnn.agents.agent import Agent
+from sdnn.agents.c_tables import (
+    Tables,
+    bit_planes,
+    by_dimension,
+    directions,
+    fixed_bounds,
+    joined,
+    table_lines,
+    turns,
+    used_units,
+    wrapped,
+)
 from sdnn.agents.q_learning import SDNNQLearning
 from sdnn.arguments import path_of, whole
 from sdnn.whole_files import write_whole
@@ -30,13 +41,11 @@ _TEMPLATE = "c_header.template"
 _LARGEST_NAME = 40
 _DEFAULT_FRACTION_BITS = 16
 _MOST_FRACTION_BITS = 30
-_DIRECTION_BITS = 30
 _MOST_UNITS = 65535
 """Hidden units whose numbers fit 16 bits."""
 _MOST_WEIGHTS = 2**26
 """Some hundred megabytes of text; no small processor holds as many."""
 
-_BYTES = {"uint8_t": 1, "uint16_t": 2, "int32_t": 4, "uint32_t": 4}
 _BYTES_OF_UNIT = 8
 _BYTES_OF_NETWORK = 28
 """A struct of five pointers and two sizes where pointers have 32 bits."""
@@ -162,52 +171,6 @@ def _checked_name(name: Any) -> str:
     return str(name)
 
 
-@dataclass
-class _Tables:
-    """Constants in C, and their bytes."""
-
-    n_bytes: int = 0
-    lines: list[str] = field(default_factory=list)
-
-    def add(self, kind: str, name: str, values: NDArray[Any], comment: str = "") -> None:
-        self.n_bytes += _BYTES[kind] * values.size
-        if comment:
-            self.lines.append(f"/* {comment} */")
-        form = "UINT32_C(0x{:08x})" if "weights" in name else "{}"
-        told = values if values.size else np.zeros(1, np.int64)  # C has no empty tables
-        self.lines += _table(f"static const {kind} {name}", told, form)
-
-    def text(self) -> str:
-        return _lines(self.lines)
-
-
-def _table(declaration: str, values: NDArray[Any], form: str) -> list[str]:
-    """Write a table of one or two dimensions in C."""
-    sizes = "".join(f"[{n}]" for n in values.shape)
-    rows = [
-        _wrapped(map(form.format, row)) for row in values.reshape(-1, values.shape[-1]).tolist()
-    ]
-    if values.ndim > 1:
-        for row in rows:
-            row[0] = f"  {{{row[0].lstrip()}"
-            row[-1] = f"{row[-1].rstrip(',')}}},"
-    return [f"{declaration}{sizes} = {{", *(line for row in rows for line in row), "};"]
-
-
-def _wrapped(words: Iterable[str], width: int = 98) -> list[str]:
-    lines, line = [], " "
-    for word in words:
-        if len(line) + len(word) + 2 > width:
-            lines.append(line)
-            line = " "
-        line += f" {word},"
-    return [*lines, line]
-
-
-def _lines(lines: Iterable[str]) -> str:
-    return "".join(f"{line}\n" for line in lines)
-
-
 class _Writer:
     """Makes the header of one agent."""
 
@@ -280,11 +243,11 @@ class _Writer:
 
     def header(self) -> CHeader:
         """Make the header."""
-        tables, fixed_tables = self._common_tables(), _Tables()
+        tables, fixed_tables = self._common_tables(), Tables()
         networks, n_units, n_words = [], [], 0
         for d, network in enumerate(self.networks):
-            used, first_units = _used_units(network, self.sizes.n_active_units)
-            weights, n_bits, lowest = _planes(network.averaged_weights()[used])
+            used, first_units = used_units(network, self.sizes.n_active_units)
+            weights, n_bits, lowest = bit_planes(network.averaged_weights()[used])
             units = zip(
                 network.averaged_thresholds()[used].tolist(),
                 lowest.tolist(),
@@ -297,7 +260,7 @@ class _Writer:
             tables.n_bytes += _BYTES_OF_UNIT * used.size + _BYTES_OF_NETWORK
             networks += [
                 f"static const {self.name}_unit {self.name}_units_{d}[{used.size}] = {{",
-                *_wrapped(f"{{{h}, {low}, {bits}}}" for h, low, bits in units),
+                *wrapped(f"{{{h}, {low}, {bits}}}" for h, low, bits in units),
                 "};",
             ]
             n_units.append(used.size)
@@ -318,15 +281,16 @@ class _Writer:
             "weight_bytes": f"{4 * n_words:,}",
             "weight_bits": f"{32 * n_words / n_weights:.2f}",
             "ram_bytes": f"{ram_bytes:,}",
+            "float_ram_bytes": f"{8 * len(self.low):,}",
             "n_words": f"{n_words:,}",
-            "usage": _lines(f" * {line}".rstrip() for line in self._usage()),
+            "usage": joined(f" * {line}".rstrip() for line in self._usage()),
             "n_observed": len(self.low),
             "n_inputs": len(self.inputs),
             "n_dimensions": len(self.networks),
             "fraction_bits": self.fraction_bits,
             "tables": tables.text(),
             "permutation_type": self._permutation_type,
-            "networks": _lines(networks),
+            "networks": joined(networks),
             "n_code_words": n_code_words,
             "n_fire_words": n_fire_words,
             "most_actions": most_actions,
@@ -338,9 +302,9 @@ class _Writer:
             **(_LOWEST if self.learning.tie_rule == "lowest" else _MIDDLE),
             **(_OF_VECTORS if self.is_vector else _OF_NUMBERS),
             "fixed_tables": fixed_tables.text(),
-            "bins_of_fixed": _lines(bins_of_fixed),
+            "bins_of_fixed": joined(bins_of_fixed),
             "float_tables": self._float_tables(),
-            "bins_of_double": _lines(bins_of_double),
+            "bins_of_double": joined(bins_of_double),
         }
         text = files("sdnn.agents").joinpath(_TEMPLATE).read_text("utf-8")
         names = {"name": self.name, "NAME": self.name.upper()}
@@ -357,8 +321,8 @@ class _Writer:
 
     # The network.
 
-    def _common_tables(self) -> _Tables:
-        tables, name = _Tables(), self.name
+    def _common_tables(self) -> Tables:
+        tables, name = Tables(), self.name
         tables.add("uint32_t", f"{name}_n_bins", np.array(self.n_bins), "Bins of each input.")
         ranks, ties = self._ranks()
         about = "Ranks of the values that counts of active units stand for."
@@ -372,7 +336,7 @@ class _Writer:
         else:
             fixed = np.round(self.box.astype(np.float64) * 2.0**self.fraction_bits)
             about = f"The actions, times 2^{self.fraction_bits}."
-            fixed_actions = _by_dimension(fixed.astype(np.int64))
+            fixed_actions = by_dimension(fixed.astype(np.int64))
             tables.add("int32_t", f"{name}_action_fixed", fixed_actions, about)
         return tables
 
@@ -380,7 +344,7 @@ class _Writer:
     def _permutation_type(self) -> str:
         return "uint8_t" if self.sizes.n_pattern_units <= 256 else "uint16_t"
 
-    def _add_wiring(self, tables: _Tables, d: int, network: Any) -> None:
+    def _add_wiring(self, tables: Tables, d: int, network: Any) -> None:
         inputs = range(len(self.inputs))
         rows = [np.packbits(network.table(i) > 0, axis=1, bitorder="little") for i in inputs]
         sigma = [network.permutation(*pair) for pair in network.pairs]
@@ -409,7 +373,7 @@ class _Writer:
 
     # From observations to bins.
 
-    def _conversions(self, tables: _Tables) -> tuple[list[str], list[str]]:
+    def _conversions(self, tables: Tables) -> tuple[list[str], list[str]]:
         """Give the lines that make bins of readings, in fixed and in floating point."""
         name, known = self.name, dict[Any, str]()
         fixed, double = [], []
@@ -424,7 +388,7 @@ class _Writer:
             (kind, at), *_ = one.items()
             if kind == "angle":
                 about = "Cosine and sine of the angles where bins begin, from bin 1 on."
-                bounds = table((kind, n_bins), "directions", _directions(n_bins), about)
+                bounds = table((kind, n_bins), "directions", directions(n_bins), about)
                 given = f"({bounds}, {n_bins}, observation[{at[0]}], observation[{at[1]}])"
                 fixed.append(f"  bins[{place}] = {name}_bin_of_direction{given};")
                 double.append(f"  bins[{place}] = {name}_bin_of_doubles{given};")
@@ -438,12 +402,12 @@ class _Writer:
             unit = f"(observation[{at}] - ({low!r})) / {high - low!r}"
             if kind == "variable":
                 about = f"The least reading in each bin of observation[{at}], from bin 1 on."
-                values = _fixed_bounds(low, high, n_bins, self.fraction_bits)
+                values = fixed_bounds(low, high, n_bins, self.fraction_bits)
                 bounds = table((at, n_bins), "bounds", values, about)
                 given = f"({bounds}, {n_bins}, observation[{at}])"
                 fixed.append(f"  bins[{place}] = {name}_bin_between{given};")
             else:
-                rate, offset = _turns(low, high, self.fraction_bits)
+                rate, offset = turns(low, high, self.fraction_bits)
                 turn = f"UINT64_C({rate}) * (uint64_t)(int64_t)observation[{at}]"
                 turn += f" + UINT64_C({offset})"
                 fixed.append(f"  bins[{place}] = {name}_bin_of_turn({turn}, {n_bins});")
@@ -456,9 +420,9 @@ class _Writer:
             return ""
         is_double = self.box.dtype == np.float64
         kind, form = ("double", "{!r}") if is_double else ("float", "{!r}f")
-        actions = _by_dimension(self.box.astype(np.float64))
-        lines = _table(f"static const {kind} {self.name}_action_float", actions, form)
-        return _lines(["/* The actions. */", *lines, ""])
+        actions = by_dimension(self.box.astype(np.float64))
+        lines = table_lines(f"static const {kind} {self.name}_action_float", actions, form)
+        return joined(["/* The actions. */", *lines, ""])
 
     # Words for readers.
 
@@ -563,69 +527,3 @@ _OF_VECTORS = {
 """,
 }
 """What they look like where an action has several numbers."""
-
-
-def _by_dimension(actions: NDArray[Any]) -> NDArray[Any]:
-    """Arrange actions as a table in C, (n_actions,) or (n_dimensions, n_actions)."""
-    return actions[:, 0] if actions.shape[1] == 1 else actions.T
-
-
-def _used_units(network: Any, n_active_units: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Find the hidden units that are in a window, and where among them the windows begin."""
-    first = network.first_units().astype(np.intp)
-    used = np.unique(first[:, None] + np.arange(n_active_units))
-    return used, np.searchsorted(used, first)
-
-
-def _planes(weights: NDArray[np.int32]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Pack weights (n, D) as bit planes: words, unit by unit; planes and lowest weight of each.
-
-    A weight less the lowest one of its unit has as many bits as the unit's range needs.
-    """
-    lowest = weights.min(axis=1)
-    above = weights - lowest[:, None]
-    n_bits = np.array([int(most).bit_length() for most in above.max(axis=1)])
-    padded = np.pad(above, ((0, 0), (0, -above.shape[1] % 32)))
-    planes = [
-        np.packbits((padded >> bit & 1).astype(np.uint8), axis=1, bitorder="little").view("<u4")
-        for bit in range(n_bits.max())
-    ]
-    if not planes:
-        return np.zeros(0, np.uint32), n_bits, lowest
-    is_needed = np.arange(len(planes)) < n_bits[:, None]
-    return np.stack(planes, axis=1)[is_needed].reshape(-1), n_bits, lowest
-
-
-def _fixed_bounds(low: float, high: float, n_bins: int, fraction_bits: int) -> NDArray[Any]:
-    """Find the least readings in bins 1, 2, ... n_bins - 1, integers times 2^-fraction_bits.
-
-    Bins are calculated as those of observations are, rounding included, so that the table gives
-    every integer the same bin.
-    """
-    wanted = np.arange(1, n_bins)
-    below = np.full(wanted.shape, -(2**31) - 1)  # not in the bin, or not among the readings
-    least = np.full(wanted.shape, 2**31 - 1)  # in the bin: ranges end before
-    while (least - below > 1).any():
-        middle = (below + least) // 2
-        unit = np.clip((middle / 2.0**fraction_bits - low) / (high - low), 0.0, 1.0)
-        is_in = (unit * n_bins).astype(np.int64) >= wanted
-        least, below = np.where(is_in, middle, least), np.where(is_in, below, middle)
-    return least
-
-
-def _turns(low: float, high: float, fraction_bits: int) -> tuple[int, int]:
-    """Give a reading's unit as a part of a turn, and where reading 0 is in it; times 2^64.
-
-    Rounding must not lead from the beginning of a bin into the one before: 2^31 are added.
-    """
-    width = Fraction(high) - Fraction(low)
-    rate = round(2**64 / (width * 2**fraction_bits)) % 2**64
-    return rate, (round(-Fraction(low) / width * 2**64) + 2**31) % 2**64
-
-
-def _directions(n_bins: int) -> NDArray[Any]:
-    """Give cosine and sine of the angles where bins begin, from bin 1 on: (n_bins - 1, 2)."""
-    angles = [math.pi * (2 * b - n_bins) / n_bins for b in range(1, n_bins)]
-    ends = np.array([(math.cos(angle), math.sin(angle)) for angle in angles])
-    rounded: NDArray[Any] = np.round(ends.reshape(-1, 2) * 2**_DIRECTION_BITS).astype(np.int64)
-    return rounded

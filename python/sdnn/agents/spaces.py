@@ -21,7 +21,11 @@ def space_data(space: gym.Space[Any]) -> dict[str, Any]:
             "dtype": np.dtype(space.dtype).str,
         }
     if isinstance(space, gym.spaces.Discrete):
-        return {"discrete": int(space.n), "start": int(space.start)}
+        return {
+            "discrete": int(space.n),
+            "start": int(space.start),
+            "dtype": np.dtype(space.dtype).str,
+        }
     if isinstance(space, gym.spaces.MultiDiscrete):
         return {
             "multi_discrete": space.nvec.tolist(),
@@ -67,7 +71,10 @@ def space_of(data: Mapping[str, Any]) -> gym.Space[Any]:
         low, high = low.reshape(data["shape"]), high.reshape(data["shape"])
         return gym.spaces.Box(low, high, dtype=dtype.type)
     if "discrete" in data:
-        return gym.spaces.Discrete(data["discrete"], start=data["start"])
+        dtype = np.dtype(data.get("dtype", np.int64))  # older files do not say it
+        if dtype == np.int64:
+            return gym.spaces.Discrete(data["discrete"], start=data["start"])
+        return gym.spaces.Discrete(data["discrete"], start=data["start"], dtype=dtype.type)
     if "multi_discrete" in data:
         return gym.spaces.MultiDiscrete(
             np.array(data["multi_discrete"]),

@@ -8,7 +8,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["WarmUp"]
+__all__ = ["MOST_ENVIRONMENTS", "WarmUp"]
+
+MOST_ENVIRONMENTS = 2**14
+"""In which an agent can learn at once, as in `agents/episodes.hpp`."""
 
 Step: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64], float, NDArray[np.float64], bool]
 """Observation, action, reward, next observation, terminated."""
@@ -197,7 +200,7 @@ class WarmUp:
         if not self._acted <= set(range(n_environments)):
             raise ValueError(f"acted must be of {n_environments} environments")
         self._environments = [int(i) for i in state.get("environments", [0] * n)]
-        if any(not 0 <= i < 2**14 for i in self._environments):
+        if any(not 0 <= i < MOST_ENVIRONMENTS for i in self._environments):
             raise ValueError("environments must be numbers of environments")
         self._steps = [
             (observation, action, float(reward), following, bool(terminated))

@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from datetime import date
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -98,7 +97,7 @@ def measure(*, quick: bool = False) -> Results:
     """
     effort = QUICK if quick else Effort()
     return {
-        "sdnn": version("sdnn"),
+        "sdnn": _core.__version__,
         "date": date.today().isoformat(),
         "quick": quick,
         "machine": describe_machine(),
@@ -145,7 +144,7 @@ def measure_network(n_inputs: int, effort: Effort) -> NetworkResult:
     trial.advance(effort.n_episodes)
     parts = _core.NetworkParts(cast("_core.AcrobotTrial", trial), SEED)
     config = SDNNCConfig(n_inputs=n_inputs)
-    n_columns = config.n_pattern_units * n_inputs * (n_inputs - 1)
+    n_columns = config.n_pattern_units * config.n_pairs
     levels = available_instruction_sets()
     read = _core.BufferRead(parts.weight_bytes)
     dense: dict[str, Run] = {

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -121,7 +120,7 @@ def save(estimator: Saved, path: str | Path) -> None:
     held = vars(estimator)
     metadata = {
         "format": FORMAT,
-        "version": version("sdnn"),
+        "version": _core.__version__,
         "class": type(estimator).__name__,
         "parameters": {
             name: plain(value) for name, value in estimator.get_params(deep=False).items()
@@ -168,7 +167,7 @@ def load(path: str | Path, kind: type[Estimator]) -> Estimator:
     if int(found[1]) > 2:
         raise ValueError(
             f"{path} was written by a newer version, {metadata.get('version')}, than this one, "
-            f"{version('sdnn')}"
+            f"{_core.__version__}"
         )
     if int(found[1]) == 2 and stored.get("checksum") != checksum(stored["sdnn"], tensors):
         raise ValueError(f"{path} is damaged: its checksum is another")

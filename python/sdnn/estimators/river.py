@@ -120,6 +120,7 @@ class RiverClassifier(Waiting, base.Classifier):
 
     def predict_one(self, x: dict[Hashable, Any], **_options: Any) -> Any:
         """Predict one label; None before the first sample."""
-        if self.fitted is None:
-            return max(dict.fromkeys(self.targets), key=self.targets.count) if self.targets else None
-        return self.fitted.predict_one(named(x))
+        if self.fitted is not None:
+            return self.fitted.predict_one(named(x))
+        # The first to come where several are equally frequent.
+        return max(dict.fromkeys(self.targets), key=self.targets.count, default=None)

@@ -7,12 +7,10 @@ a trial, it is missing until it is in the store.
 
 from __future__ import annotations
 
-import signal
 import threading
-from collections.abc import Iterable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Iterable
+from contextlib import closing
 from dataclasses import dataclass
-from types import FrameType
 
 from sdnn.experiments.config import PlannedTrial
 from sdnn.experiments.executor import (
@@ -27,6 +25,7 @@ from sdnn.experiments.executor import (
 from sdnn.experiments.records import TrialKey
 from sdnn.experiments.store import ResultStore
 from sdnn.experiments.thread_executor import ThreadExecutor
+from sdnn.interrupts import Interrupts
 
 
 @dataclass(frozen=True)
@@ -150,7 +149,8 @@ def run_trials(
     failures: list[Failure] = []
     n_run = 0
     if missing:
-        with _stop_on_interrupt(stop), closing(executor.run(missing, stop)) as messages:
+        # An exception at any instruction could lose a result between queue and store.
+        with Interrupts(stop.set), closing(executor.run(missing, stop)) as messages:
             for message in messages:
                 match message:
                     case Started(trial):
@@ -175,26 +175,3 @@ def run_trials(
         failures=tuple(failures),
         interrupted=stop.is_set(),
     )
-
-
-@contextmanager
-def _stop_on_interrupt(stop: threading.Event) -> Iterator[None]:
-    """Set `stop` on the first Ctrl-C; a second one raises KeyboardInterrupt.
-
-    An exception at any instruction could lose a result between queue and store; a flag cannot.
-    Only the main thread may do this; elsewhere Ctrl-C is the caller's affair.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def handle(_signal: int, _frame: FrameType | None) -> None:
-        if stop.is_set():
-            raise KeyboardInterrupt
-        stop.set()
-
-    previous = signal.signal(signal.SIGINT, handle)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous)

@@ -186,8 +186,7 @@ def cost_series(agents: Iterable[str] | None = None) -> tuple[tuple[AgentEntry, 
 
 
 def _sdnn_c_bytes(network: SDNNCConfig) -> int:
-    n_columns = network.n_pattern_units * network.n_inputs * (network.n_inputs - 1)
-    return n_columns * network.n_hidden_units
+    return network.n_pattern_units * network.n_pairs * network.n_hidden_units
 
 
 def _rules_bytes(rules: FuzzyRulesConfig) -> int:

@@ -1,6 +1,7 @@
 """Saved agents go on exactly as they would have; damaged files are refused."""
 
 import copy
+import inspect
 import json
 import pickle
 import subprocess
@@ -185,6 +186,17 @@ def test_an_agent_of_ones_own_class_is_pickled_with_it(tmp_path, monkeypatch):
     )
     monkeypatch.syspath_prepend(tmp_path)
     assert type(pickle.loads(told.stdout)).__name__ == "Docker"
+
+
+def test_actions_keep_their_type(tmp_path):
+    if "dtype" not in inspect.signature(gym.spaces.Discrete).parameters:
+        pytest.skip("Discrete has one type in this version of Gymnasium")
+    buttons = gym.spaces.Discrete(3, start=1, dtype=np.int32)
+    agent = RBFQLearning(PLANE, buttons)
+    agent.save(tmp_path / "agent")
+    for again in (agent, load_agent(tmp_path / "agent"), copy.deepcopy(agent)):
+        assert again.action_space == buttons
+        assert again.act(np.zeros(2)).dtype == np.int32
 
 
 def test_two_classes_of_agents_cannot_have_one_name():

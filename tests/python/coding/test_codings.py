@@ -248,3 +248,12 @@ def test_unknown_categories_may_stay_an_error():
     strict = WithMissing(base=Symbolic(), unknown="error").fit(LETTERS, 8)
     with pytest.raises(ValueError, match="unknown categories"):
         strict.bins(np.array(["z"]))
+
+
+def test_there_may_be_many_symbols():
+    coding = Symbolic(categories=tuple(range(12_000))).fit(np.arange(12_000), 20)
+    patterns = coding.patterns(20, 3)
+    assert patterns.shape == (12_000, 20)
+    assert (patterns.sum(axis=1) == 0).all()
+    fewer = Symbolic(categories=(0, 1, 2)).patterns(20, 3)
+    np.testing.assert_array_equal(patterns[:3], fewer)

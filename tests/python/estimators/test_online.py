@@ -242,6 +242,7 @@ def test_names_of_river_streams_may_be_numbers():
     assert np.isfinite(model.predict_one(dict(enumerate(X[0]))))
 
 
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
 @pytest.mark.parametrize("kind", ["regressor", "classifier"])
 def test_a_river_stream_goes_on_after_a_sample_that_cannot_be_learned(kind):
     pytest.importorskip("river")
@@ -253,7 +254,7 @@ def test_a_river_stream_goes_on_after_a_sample_that_cannot_be_learned(kind):
     }[kind]
     for number, (row, target) in enumerate(zip(ROWS[:50], targets, strict=False)):
         if number == 19:
-            with pytest.raises(ValueError, match="the first 20 samples are dropped: .*NaN"):
+            with pytest.raises(ValueError, match=r"the first 20 samples are dropped: .*NaN"):
                 model.learn_one(row, target)
         else:
             model.learn_one({**row, "b": float("nan")} if number == 5 else row, target)

@@ -19,7 +19,7 @@ from sdnn.coding import Symbolic, WithMissing
 from sdnn.estimators import libsdnn
 from sdnn.experiments import ResultStore, StoreError
 from sdnn.experiments.errors import ExperimentError
-from sdnn.experiments.sweep.study import read_study
+from sdnn.experiments.sweep.reading import read_study
 from sdnn.runs.config import RunConfig
 from sdnn.runs.errors import RunError
 

@@ -289,12 +289,7 @@ class AgentMaker {
     if (name != "FuzzyQLearning") {
       refuse("class", "SDNNQLearning, RBFQLearning or FuzzyQLearning", name);
     }
-    if (!state_.contains("0.rules.values")) return restored(fuzzy_agent("", 0));
-    std::vector<FuzzyQLearning> parts;
-    for (std::size_t d = 0; state_.contains(std::to_string(d) + ".rules.values"); ++d) {
-      parts.push_back(fuzzy_agent(std::to_string(d) + ".", d));
-    }
-    return restored(VectorFuzzyQLearning(std::move(parts)));
+    return fuzzy_agent();
   }
 
  private:
@@ -310,14 +305,22 @@ class AgentMaker {
     return agent;
   }
 
-  /// Of a dimension; its tensors' names begin with `prefix`.
-  FuzzyQLearning fuzzy_agent(const std::string& prefix, std::size_t d) const {
+  /// The agent has rules, or some for each of its dimensions where the state says so.
+  AnyAgent fuzzy_agent() const {
     using approximators::FuzzyRulesConfig;
     const auto config = config_from_json<FuzzyRulesConfig>(approximator(), "approximator");
-    expect_size(prefix + "rules.values",
-                power(config.n_sets, config.n_inputs) * static_cast<double>(config.n_actions));
-    return {approximators::FuzzyRules(config), learning<FuzzyQLearningConfig>(),
-            approximators::seed_of_dimension(seed_, d)};
+    const double size =
+        power(config.n_sets, config.n_inputs) * static_cast<double>(config.n_actions);
+    const auto name_of = [](std::size_t d) { return std::to_string(d) + ".rules.values"; };
+    std::size_t n_dimensions = 0;
+    for (; state_.contains(name_of(n_dimensions)); ++n_dimensions) {
+      expect_size(name_of(n_dimensions), size);
+    }
+    const auto rule = learning<FuzzyQLearningConfig>();
+    if (n_dimensions > 0) return restored(VectorFuzzyQLearning(config, n_dimensions, rule, seed_));
+    expect_size("rules.values", size);
+    return restored(FuzzyQLearning(approximators::FuzzyRules(config), rule,
+                                   approximators::seed_of_dimension(seed_, 0)));
   }
 
   /// The agent has one network, or one for each of its dimensions where the state says so.
@@ -337,15 +340,14 @@ class AgentMaker {
       core::restore(agent, state_);
       return agent;
     }
-    std::vector<Q> parts;
     for (std::size_t d = 0; d < n_actions.size(); ++d) {
       Config of_dimension = config;
       of_dimension.n_actions = n_actions[d];
       expect_weights("action_value." + std::to_string(d) + ".weights", of_dimension);
-      parts.push_back(make(of_dimension, approximators::seed_of_dimension(seed_, d)));
     }
-    QLearning<approximators::Decoupled<Q>> agent(approximators::Decoupled<Q>(std::move(parts)),
-                                                 learning<QLearningConfig>(), seed_);
+    QLearning<approximators::Decoupled<Q>> agent(
+        approximators::make_decoupled(config, n_actions, seed_, make), learning<QLearningConfig>(),
+        seed_);
     core::restore(agent, state_);
     return agent;
   }

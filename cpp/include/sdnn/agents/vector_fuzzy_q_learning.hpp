@@ -2,12 +2,15 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/approximators/decoupled.hpp"
+#include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::agents {
@@ -25,6 +28,18 @@ class VectorFuzzyQLearning {
       core::require(part.n_inputs() == n_inputs(), "parts", "of the same inputs", part.n_inputs());
     }
   }
+
+  /// With rules alike in each dimension, and random numbers of its own. Throws as they do.
+  VectorFuzzyQLearning(const approximators::FuzzyRulesConfig& rules, std::size_t n_dimensions,
+                       const FuzzyQLearningConfig& learning, std::uint64_t seed)
+      : VectorFuzzyQLearning([&] {
+          std::vector<FuzzyQLearning> parts;
+          for (std::size_t d = 0; d < n_dimensions; ++d) {
+            parts.emplace_back(approximators::FuzzyRules(rules), learning,
+                               approximators::seed_of_dimension(seed, d));
+          }
+          return parts;
+        }()) {}
 
   /// That of the first dimension.
   const FuzzyQLearningConfig& config() const noexcept { return parts_.front().config(); }

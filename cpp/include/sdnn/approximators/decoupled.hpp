@@ -103,4 +103,19 @@ concept DecoupledActionValue = requires(Q q) {
   q.part(0);
 };
 
+/// The networks of an action's dimensions, each made by `make(config, seed)`: alike but for their
+/// numbers of actions, and all random. Throws as `make` does.
+template <class Config, class Make>
+auto make_decoupled(const Config& config, std::span<const int> n_actions, std::uint64_t seed,
+                    const Make& make) {
+  std::vector<decltype(make(config, seed))> parts;
+  parts.reserve(n_actions.size());
+  for (std::size_t d = 0; d < n_actions.size(); ++d) {
+    Config of_dimension = config;
+    of_dimension.n_actions = n_actions[d];
+    parts.push_back(make(of_dimension, seed_of_dimension(seed, d)));
+  }
+  return Decoupled(std::move(parts));
+}
+
 }  // namespace sdnn::approximators

@@ -22,8 +22,9 @@ from sdnn.experiments.store import STORE_NAME, ResultStore
 from sdnn.experiments.sweep.comparison import Comparison, compare
 from sdnn.experiments.sweep.figure import draw_study
 from sdnn.experiments.sweep.page import to_html, to_markdown
+from sdnn.experiments.sweep.reading import read_study
 from sdnn.experiments.sweep.report import StudyReport, to_json
-from sdnn.experiments.sweep.study import Study, read_study
+from sdnn.experiments.sweep.study import Study
 from sdnn.whole_files import csv_pieces, gzip_pieces, remove_abandoned_files, write_whole
 
 

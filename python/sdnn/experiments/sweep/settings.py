@@ -163,6 +163,21 @@ def _depth(name: tuple[str, ...]) -> int:
     return 3 if name[:2] == ("environment", "kwargs") else 2
 
 
+def blamed(settings: Settings, text: str) -> KeyPath | None:
+    """Find the setting that a text mentions first."""
+    mentions = [
+        (found.start(), setting.where)
+        for name, setting in settings.items()
+        if (found := re.search(rf"\b{re.escape(name[-1])}\b", text)) and name[-1] not in ("id",)
+    ]
+    return min(mentions, key=lambda m: m[0])[1] if mentions else None
+
+
+def place_of(settings: Settings, *name: str) -> KeyPath | None:
+    """Give the place of a setting, if it was set."""
+    return settings[name].where if name in settings else None
+
+
 def dotted(where: KeyPath) -> str:
     """Write a place as TOML would.
 

@@ -2,7 +2,7 @@ import sys
 
 import pytest
 
-from sdnn.experiments.sweep.study import read_study
+from sdnn.experiments.sweep.reading import read_study
 
 
 @pytest.fixture

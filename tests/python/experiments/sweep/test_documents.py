@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from sdnn.cli import main
 from sdnn.experiments import AGENTS
-from sdnn.experiments.sweep.study import read_study
+from sdnn.experiments.sweep.reading import read_study
 
 ROOT = Path(__file__).parents[4]
 PAGE = (ROOT / "docs" / "sweep.md").read_text()

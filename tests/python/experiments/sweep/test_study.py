@@ -288,7 +288,7 @@ WRONG = {
         "[cases.s4-noise]\n[cases.s4]\nsensors.noise = 0.1\n", 3,
         "cases.s4.sensors.noise: s4 is the paper's case of 4 sensors with noise 0:",
     ),
-    "no table": ("[cases.s4]\nsensors = 3\n", 2, "cases.s4.sensors: must be a table of settings"),
+    "no table of sensors": ("[cases.s4]\nsensors = 3\n", 2, "cases.s4.sensors: must be a table of"),
     "paper's case elsewhere": (
         "[cases.s4]\nenvironment = 'Pendulum-v1'\n", 2,
         "cases.s4.environment: s4 is the paper's case",

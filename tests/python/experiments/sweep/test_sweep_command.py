@@ -189,8 +189,6 @@ def test_dry_run_counts_and_estimates_without_making_a_file(invoke, tmp_path):
 
 
 def test_an_own_environment_from_a_module_beside_the_file(invoke, tmp_path, monkeypatch):
-    import sys
-
     monkeypatch.setattr(sys, "path", [*sys.path])
     (tmp_path / "my_line_world.py").write_text(
         """
