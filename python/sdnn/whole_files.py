@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 import time
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
@@ -27,7 +28,8 @@ _GZIP = 31
 def whole_file(path: Path) -> Iterator[Path]:
     """Give another name in the same folder to write to; at the end the file gets its own.
 
-    Each call gives a name that no other process or thread has.
+    Each call gives a name that no other process or thread has. A link stays one, to the new file.
+    What is no file but a device or a pipe is written to, under its own name.
 
     Parameters
     ----------
@@ -39,6 +41,10 @@ def whole_file(path: Path) -> Iterator[Path]:
     OSError
         If the file cannot be written; one that was there before stays as it was.
     """
+    path = Path(os.path.realpath(path)) if path.is_symlink() else path
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        yield path
+        return
     partial = path.with_name(f"{path.name}.{os.getpid()}.{next(_numbers)}{PARTIAL_SUFFIX}")
     try:
         yield partial
@@ -81,6 +87,11 @@ def _sync_folder(folder: Path) -> None:
             os.close(descriptor)
 
 
+def _is_partial(path: Path) -> bool:
+    """Whether `whole_file` gave the name."""
+    return re.search(r"\.\d+\.\d+$", path.name.removesuffix(PARTIAL_SUFFIX)) is not None
+
+
 def csv_bytes(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
     """Return a table as comma-separated values, UTF-8, one line feed after each row."""
     return b"".join(csv_pieces(header, rows))
@@ -110,7 +121,7 @@ def gzip_pieces(pieces: Iterable[bytes]) -> Iterator[bytes]:
 
 def remove_abandoned_files(folder: Path) -> None:
     """Remove what killed processes left under way in a folder, a minute after they last wrote."""
-    for path in folder.glob(f"*{PARTIAL_SUFFIX}"):
+    for path in filter(_is_partial, folder.glob(f"*{PARTIAL_SUFFIX}")):
         with suppress(OSError):  # another process may have removed it, or given it its own name
             if time.time() - path.stat().st_mtime > _ABANDONED_SECONDS:
                 path.unlink()

@@ -142,9 +142,17 @@ class Actions(abc.ABC):
         """Give numbers between the bounds the shape and type of the space."""
         space = self.space
         # Rounding to the type of the space must not leave it.
-        rounded = values.astype(space.dtype).reshape(space.shape or ())
+        rounded = self._rounded(values).astype(space.dtype).reshape(space.shape or ())
         boxed: NDArray[Any] = np.clip(rounded, space.low, space.high)  # type: ignore[attr-defined]
         return boxed
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether actions of a Box are whole numbers: the nearest ones, halves upwards."""
+        return self.is_box and np.dtype(self.space.dtype).kind != "f"
+
+    def _rounded(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.floor(values + 0.5) if self.is_whole else values
 
 
 class IndexedActions(Actions):
@@ -168,7 +176,7 @@ class IndexedActions(Actions):
         n = self.n_actions[dimension]
         if not self.is_box:
             return np.arange(n) + int(self.start[dimension])
-        return np.array([self._value(dimension, index) for index in range(n)])
+        return self._rounded(np.array([self._value(dimension, index) for index in range(n)]))
 
     def element(self, numbers: Numbers) -> Any:
         """Make the element of the space, or copy one that was made before."""

@@ -14,11 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.actions import Actions
-from sdnn.agents.files import Arrays, Description, from_file, read, register, write
+from sdnn.agents.files import (
+    Arrays,
+    Description,
+    completed,
+    from_file,
+    read,
+    register,
+    write,
+)
 from sdnn.agents.observations import AnglePairs, Ranges, UnitObservations
 from sdnn.agents.spaces import space_data, space_of
 from sdnn.agents.training import Callback, Training, TrainingResult
-from sdnn.agents.transition import Transition
+from sdnn.agents.transition import Transition, reward_of
 from sdnn.agents.warm_up import MOST_ENVIRONMENTS, WarmUp
 from sdnn.arguments import flag, path_of, real, seed_of, whole
 
@@ -142,6 +150,10 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             symbols=self.codes_symbols,
             least_inputs=self.least_inputs,
         )
+        try:
+            space_data(observation_space)  # what could not be saved had better not be learned
+        except TypeError as error:
+            raise TypeError(f"observation_space {error}") from None
         self._actions = self._make_actions(action_space)
         self._progress = 0.0
         self._rates = {}
@@ -370,7 +382,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             raise TypeError(f"transition must be a Transition, got {transition!r}")
         reward, terminated = transition.reward, transition.terminated
         if type(reward) is not float:
-            reward = _reward(reward)
+            reward = reward_of(reward)
         if terminated is not True and terminated is not False:
             terminated = flag("terminated", terminated)
         if self._warm_up is None:
@@ -522,6 +534,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             shape = list(self.action_space.shape or ())
             ends = {"low": actions.low.tolist(), "high": actions.high.tolist()}
             action = {"kind": "box", **ends, "shape": shape}
+            if actions.is_whole:
+                action["whole"] = True
         else:
             action = {"kind": "discrete", "start": actions.start.tolist()}
         observations = self._observations
@@ -565,6 +579,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         def part(prefix: str) -> Arrays:
             return {n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)}
 
+        description = completed(description)
         agent = cls.__new__(cls)
         approximator = dict(description["approximator"])
         for name in {"circular", "n_symbols"} & approximator.keys():
@@ -620,13 +635,6 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         copied = self.rebuild(self.description(), self.state())
         memo[id(self)] = copied
         return copied
-
-
-def _reward(reward: Any) -> float:
-    """Read a reward that is no float: NumPy's numbers, and arrays of one."""
-    if isinstance(reward, np.ndarray) and reward.size == 1 and reward.dtype.kind in "fiu":
-        return float(reward.item())
-    return real("reward", reward)
 
 
 def check_shape(state: Mapping[str, NDArray[Any]], name: str, shape: tuple[int, ...]) -> None:

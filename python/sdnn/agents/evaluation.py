@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -9,6 +10,8 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.agents.spaces import require_same_kind
+from sdnn.agents.transition import reward_of
 from sdnn.arguments import has_methods, seed_of, whole
 
 __all__ = ["Evaluation", "episode_seed", "evaluate"]
@@ -80,10 +83,12 @@ def evaluate(
     Raises
     ------
     TypeError, ValueError
-        If an argument cannot be used, such as ``episodes`` below 1.
+        If an argument cannot be used, such as ``episodes`` below 1, the environment's spaces are
+        not the agent's, or rewards do not add up to a finite number.
     """
     has_methods("agent", agent, "an agent", "act")
     has_methods("env", env, "a Gymnasium environment", "reset", "step")
+    require_same_kind(agent, env)
     seed = seed_of(seed)
     n_episodes = whole("episodes", episodes, 1, 10**9)
     returns, lengths, ends = [], [], []
@@ -93,8 +98,10 @@ def evaluate(
         while not (terminated or truncated):
             action = agent.act(observation, explore=False)
             observation, reward, terminated, truncated, _ = env.step(action)
-            episode_return += float(reward)
+            episode_return += reward_of(reward)
             length += 1
+        if not math.isfinite(episode_return):
+            raise ValueError(f"rewards of env must add up to a finite number, got {episode_return}")
         returns.append(episode_return)
         lengths.append(length)
         ends.append(terminated)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sdnn._core import __version__
 from sdnn.whole_files import write_whole
 
-__all__ = ["Arrays", "Description", "from_file", "read", "register", "write"]
+__all__ = ["Arrays", "Description", "completed", "from_file", "read", "register", "write"]
 
 FORMAT = "sdnn-agent"
 FORMAT_VERSION = 1
@@ -113,6 +113,44 @@ def _description(path: Path, text: str) -> Description:
         raise ValueError(f"{path} holds an unknown kind of agent, {description.get('class')!r}")
     checked: Description = description
     return checked
+
+
+def completed(description: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Add to a description that was begun in C++ what C++ does not ask for: spaces, mostly.
+
+    Observations are of real numbers, and an action is a Box or a button or several.
+    """
+    if "observation_space" in description:
+        return description
+    observation, action = description["observation"], description["action"]
+    ends = [observation["low"], observation["high"]]
+    space = {"box": ends, "shape": [len(ends[0])], "dtype": "<f8"}
+    if action["kind"] == "box":
+        box = [action["low"], action["high"]]
+        shape = action.get("shape", [len(box[0])])
+        actions = {"box": box, "shape": shape, "dtype": "<i8" if action.get("whole") else "<f8"}
+    elif len(action["start"]) == 1:
+        actions = {"discrete": description["n_actions"][0], "start": int(action["start"][0])}
+    else:
+        start = [int(first) for first in action["start"]]
+        actions = {"multi_discrete": description["n_actions"], "start": start, "dtype": "<i8"}
+    inputs = observation["inputs"]
+    asked = {
+        "angles": [one["circular"] for one in inputs if "circular" in one],
+        "angle_pairs": [one["angle"] for one in inputs if "angle" in one],
+        "symbols": False,
+        "low": observation["low"],
+        "high": observation["high"],
+    }
+    return {
+        "progress": 0.0,
+        "warm_up_steps": 1000,
+        "n_tables": 0,
+        **description,
+        "observation_space": space,
+        "action_space": actions,
+        "asked": asked,
+    }
 
 
 def from_file(

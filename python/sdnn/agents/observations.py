@@ -459,7 +459,14 @@ def _ranges(
                 f"observation_range must be two numbers or two times {low.size}, got {ranges!r}"
             ) from None
     known = np.isfinite(low) & np.isfinite(high)
-    if (low[known] >= high[known]).any():
-        name = "observation_space" if ranges is None else "observation_range"
-        raise ValueError(f"{name} must have low < high, got {low} to {high}")
+    for i in np.flatnonzero(known & (low >= high)):
+        name, way_out = "observation_range", ""
+        if ranges is None:
+            name = "observation_space"
+            way_out = (
+                f"; give observation_range (--range {i}=LOW:HIGH) where the variable is constant"
+            )
+        raise ValueError(
+            f"{name} must have low < high, got {low[i]} to {high[i]} of variable {i}{way_out}"
+        )
     return np.where(known, low, np.nan), np.where(known, high, np.nan)

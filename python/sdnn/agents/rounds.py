@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 import gymnasium as gym
 import numpy as np
 
+from sdnn.agents.transition import reward_of
+
 __all__ = ["Outcome", "Rounds", "rounds_in"]
 
 
@@ -25,6 +27,13 @@ class Outcome(NamedTuple):
     def ends(self) -> bool:
         """Whether the episode is over."""
         return self.terminated or self.truncated
+
+
+def own_copy(value: Any) -> Any:
+    """Copy what others may write to: environments may keep their state, or change an action."""
+    if isinstance(value, np.ndarray):
+        return value.copy()
+    return value if isinstance(value, np.generic | int | float) else copy.deepcopy(value)
 
 
 class Rounds(abc.ABC):
@@ -70,11 +79,13 @@ class _OneEnvironment(Rounds):
         self._env = env
 
     def reset(self, seeds: Mapping[int, int]) -> dict[int, Any]:
-        return {i: self._env.reset(seed=seed)[0] for i, seed in seeds.items()}
+        return {i: own_copy(self._env.reset(seed=seed)[0]) for i, seed in seeds.items()}
 
     def step(self, actions: Sequence[Any]) -> list[Outcome]:
-        observation, reward, terminated, truncated, _ = self._env.step(actions[0])
-        return [Outcome(observation, float(reward), bool(terminated), bool(truncated))]
+        observation, reward, terminated, truncated, _ = self._env.step(own_copy(actions[0]))
+        return [
+            Outcome(own_copy(observation), reward_of(reward), bool(terminated), bool(truncated))
+        ]
 
 
 class _Vector(Rounds, abc.ABC):
@@ -177,7 +188,11 @@ def _autoreset_mode(env: gym.vector.VectorEnv[Any, Any, Any]) -> str:
 
 def _resets_each(env: gym.vector.VectorEnv[Any, Any, Any]) -> bool:
     """Whether ``reset`` knows the option ``"reset_mask"``, and a seed for each environment."""
-    inner = env.unwrapped
+    inner = env
+    while isinstance(inner, gym.vector.VectorWrapper):
+        if isinstance(inner, gym.wrappers.vector.NormalizeObservation):
+            return False  # it resets all or none
+        inner = inner.env
     if inner.metadata.get("reset_mask"):
         return True
     if not hasattr(gym.vector, "AutoresetMode"):

@@ -9,7 +9,35 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["space_data", "space_of"]
+__all__ = ["require_same_kind", "space_data", "space_of"]
+
+
+def require_same_kind(agent: Any, env: Any) -> None:
+    """Check that an environment, or each of a vector, is one that an agent was made for.
+
+    Bounds and types of numbers may differ; what tells no spaces is not checked.
+
+    Raises
+    ------
+    ValueError
+        If observations or actions are of another kind or shape.
+    """
+    for name in ("observation_space", "action_space"):
+        own = getattr(agent, name, None)
+        found = getattr(env, f"single_{name}", getattr(env, name, None))
+        if own is not None and found is not None and not _is_of_kind(found, own):
+            raise ValueError(f"env must have the agent's {name}, {own}, got {found}")
+
+
+def _is_of_kind(one: gym.Space[Any], other: gym.Space[Any]) -> bool:
+    if isinstance(one, gym.spaces.Box) and isinstance(other, gym.spaces.Box):
+        return one.shape == other.shape
+    if isinstance(one, gym.spaces.Dict) and isinstance(other, gym.spaces.Dict):
+        one, other = gym.spaces.Tuple(one.values()), gym.spaces.Tuple(other.values())
+    if isinstance(one, gym.spaces.Tuple) and isinstance(other, gym.spaces.Tuple):
+        pairs = zip(one.spaces, other.spaces, strict=False)
+        return len(one) == len(other) and all(_is_of_kind(*pair) for pair in pairs)
+    return bool(one == other)
 
 
 def space_data(space: gym.Space[Any]) -> dict[str, Any]:
@@ -38,7 +66,10 @@ def space_data(space: gym.Space[Any]) -> dict[str, Any]:
         return {"dict": [[key, space_data(part)] for key, part in space.spaces.items()]}
     if isinstance(space, gym.spaces.Tuple):
         return {"tuple": [space_data(part) for part in space.spaces]}
-    raise TypeError(f"a space of kind {type(space).__name__} cannot be saved")
+    raise TypeError(
+        "must be a Box, Discrete, MultiDiscrete or MultiBinary, or a Dict or Tuple of such,"
+        f" got {space}"
+    )
 
 
 _TYPES = {

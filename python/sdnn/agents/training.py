@@ -22,6 +22,7 @@ from sdnn.agents.saved_training import (
     read_training,
     write_training,
 )
+from sdnn.agents.spaces import require_same_kind
 from sdnn.agents.transition import Transition
 from sdnn.arguments import has_methods, path_of, whole
 from sdnn.interrupts import Interrupts
@@ -177,7 +178,8 @@ class Training:
     Raises
     ------
     ValueError
-        If not one of steps and episodes is given, or something is out of range.
+        If not one of steps and episodes is given, something is out of range, or the environments'
+        spaces are not the agent's.
 
     Examples
     --------
@@ -213,6 +215,13 @@ class Training:
             has_methods(
                 "evaluation_env", evaluation_env, "a Gymnasium environment", "reset", "step"
             )
+            if evaluation_env is env:
+                raise ValueError(
+                    "evaluation_env must be another environment than env: an evaluation would end"
+                    " the episode that is learned from"
+                )
+            require_same_kind(agent, evaluation_env)
+        require_same_kind(agent, env)
         if (steps is None) == (episodes is None):
             raise ValueError(
                 f"one of steps and episodes must be given, got steps={steps}, episodes={episodes}"

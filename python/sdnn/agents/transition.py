@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-__all__ = ["Transition"]
+from sdnn.arguments import real
+
+__all__ = ["Transition", "reward_of"]
 
 
 class Transition(NamedTuple):
@@ -21,3 +24,18 @@ class Transition(NamedTuple):
     reward: float
     next_observation: ArrayLike
     terminated: bool
+
+
+def reward_of(reward: Any) -> float:
+    """Read a reward, which may be one of NumPy's numbers, an array of one, or a truth value.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If it is something else.
+    """
+    if type(reward) is float:
+        return reward
+    if isinstance(reward, np.ndarray) and reward.size == 1 and reward.dtype.kind in "fiub":
+        reward = reward.item()
+    return float(reward) if isinstance(reward, bool | np.bool_) else real("reward", reward)

@@ -6,6 +6,7 @@ the same protocol, bit for bit.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -207,7 +208,8 @@ class EpisodeLoop:
         terminated = truncated = False
         while not (terminated or truncated):
             action = self._agent.act(observation, explore=learning)
-            following, reward, terminated, truncated, _ = env.step(action)
+            # A copy: an environment may change the action, which is to be learned.
+            following, reward, terminated, truncated, _ = env.step(copy.copy(action))
             if learning:
                 ends = terminated or (truncated and not self._protocol.limit_bootstraps)
                 self._agent.learn(Transition(observation, action, float(reward), following, ends))

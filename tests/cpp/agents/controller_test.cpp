@@ -145,6 +145,18 @@ TEST(ActionScale, OfANumberIsThePlaceInTheRange) {
   EXPECT_EQ(scale.of_normalized(-0.5, 1), 0.25);
 }
 
+TEST(ActionScale, OfWholeNumbersIsTheNearest) {
+  const json bytes = {{"kind", "box"}, {"low", {0}}, {"high", {255}}, {"whole", true}};
+  const ActionScale scale(bytes, {5});
+  for (const auto& [index, action] : {std::pair(0U, 0.0), {1U, 64.0}, {2U, 128.0}, {3U, 191.0}}) {
+    EXPECT_EQ(scale.of_index(index, 0), action);
+    EXPECT_EQ(scale.index_of(action, 0), index);
+  }
+  const ActionScale continuous(bytes, {0});
+  EXPECT_EQ(continuous.of_normalized(0.0, 0), 128.0);
+  EXPECT_EQ(continuous.of_normalized(1.0, 0), 255.0);
+}
+
 TEST(ActionScale, DiscreteIsStartAndIndex) {
   const ActionScale scale({{"kind", "discrete"}, {"start", {-1, 10}}}, {3, 1});
   EXPECT_EQ(scale.of_index(2, 0), 1.0);

@@ -113,6 +113,7 @@ TEST(CorrectionRules, RefuseBadArguments) {
   EXPECT_THROW(estimators::PDeltaRule(4, targets, 1), std::invalid_argument);
   EXPECT_THROW(estimators::PDeltaRule(3, std::vector<double>{1, 1}, 2), std::invalid_argument);
   EXPECT_THROW(estimators::PDeltaRule(4, std::vector<double>{1}, 0), std::invalid_argument);
+  EXPECT_THROW(estimators::PDeltaRule(0, std::vector<double>{1}, 1), std::invalid_argument);
   const std::vector<std::int32_t> labels{0, 3};
   using estimators::PerceptronRule;
   EXPECT_THROW(PerceptronRule(3, labels, 3, ClassScheme::one_vs_rest), std::invalid_argument);

@@ -90,6 +90,10 @@ TEST(ParallelPerceptron, RefusesBadArguments) {
   EXPECT_THROW(layer.potentials(std::vector<std::int32_t>{0}, 0, out), std::invalid_argument);
   EXPECT_THROW(layer.counts(std::vector<std::int32_t>{0}, 3, 1, out), std::invalid_argument);
   EXPECT_THROW(layer.group_size(3), std::invalid_argument);
+  const std::vector<std::int32_t> two_queries{0, 0};
+  EXPECT_THROW(layer.potentials(two_queries, 1, out), std::invalid_argument);
+  EXPECT_THROW(layer.counts(two_queries, 2, 1, out), std::invalid_argument);
+  EXPECT_THROW(layer.copy_weights(out), std::invalid_argument);
 }
 
 }  // namespace

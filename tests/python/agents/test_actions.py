@@ -17,6 +17,20 @@ def test_every_dimension_of_a_box_is_cut_evenly():
     assert all(actions.element([i, j]) in FLOATS for i in range(5) for j in range(5))
 
 
+def test_whole_numbers_of_a_box_are_the_nearest():
+    bytes_ = gym.spaces.Box(0, 255, (1,), np.uint8)
+    actions = IndexedActions(bytes_, 5)
+    assert actions.values(0).tolist() == [0, 64, 128, 191, 255]
+    for index, value in enumerate([0, 64, 128, 191, 255]):
+        made = actions.element([index])
+        assert made in bytes_
+        assert made.tolist() == [value]
+        assert actions.numbers([value]) == [index]
+    switch = IndexedActions(gym.spaces.Box(0, 1, (1,), np.int64), 5)
+    assert [int(switch.element([i])[0]) for i in range(5)] == [0, 0, 1, 1, 1]
+    assert ContinuousActions(bytes_).element([0.001]).tolist() == [128]
+
+
 def test_the_nearest_action_is_found():
     actions = IndexedActions(FLOATS, 5)
     for i in range(5):

@@ -266,7 +266,10 @@ def test_descriptions_that_do_not_fit_are_refused(change, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"ranges": (1.0, 0.0)}, "observation_range must have low < high"),
+        (
+            {"ranges": (1.0, 0.0)},
+            "observation_range must have low < high, got 1.0 to 0.0 of variable 0",
+        ),
         ({"ranges": ([1.0], [2.0, 3.0, 4.0])}, "observation_range must be two numbers or two"),
         ({"ranges": 3.0}, r"observation_range must be \(low, high\) or 'seen', got 3.0"),
         ({"ranges": "all"}, r"observation_range must be \(low, high\) or 'seen', got 'all'"),

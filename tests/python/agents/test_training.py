@@ -57,11 +57,79 @@ class Corridor(gym.Env):
         return np.array([self._at + shift])
 
 
+class Careless(gym.Env):
+    """A point on a line, drawn to the middle; tells its own array, and changes the action it gets.
+
+    With ``is_careful`` neither.
+    """
+
+    observation_space = gym.spaces.Box(-1.0, 1.0, (2,), dtype=np.float64)
+    action_space = gym.spaces.Box(-1.0, 1.0, (1,), dtype=np.float64)
+
+    def __init__(self, is_careful=False):
+        self._is_careful = is_careful
+        self._state = np.zeros(2)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self._state[:] = self.np_random.uniform(-1.0, 1.0, 2)
+        self._steps = 0
+        return self._seen(), {}
+
+    def step(self, action):
+        force = action.copy() if self._is_careful else action
+        force *= 0.1
+        self._state[:] = np.clip(self._state + np.append(force, 0.0), -1.0, 1.0)
+        self._steps += 1
+        reward = np.array([-abs(self._state[0])])
+        return self._seen(), reward, np.bool_(False), self._steps == 20, {}
+
+    def _seen(self):
+        return self._state.copy() if self._is_careful else self._state
+
+
 def corridor_agent(**options):
     env = Corridor()
     return SDNNQLearning(
         env.observation_space, env.action_space, approximator=SMALL, seed=1, **options
     )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_an_environment_does_to_its_arrays_spoils_nothing(kind):
+    make, options = KINDS[kind]
+    agents = []
+    for is_careful in (True, False):
+        env = Careless(is_careful)
+        agents.append(make(env.observation_space, env.action_space, seed=3, **options))
+        agents[-1].train(env, steps=300, evaluate_every=100, evaluation_env=Careless(is_careful))
+    assert states_equal(*agents)
+
+
+def test_an_environment_that_does_not_fit_is_refused():
+    agent = corridor_agent()
+    env = Corridor()
+    with pytest.raises(ValueError, match="evaluation_env must be another environment than env"):
+        agent.train(env, steps=10, evaluate_every=5, evaluation_env=env)
+    for name, space in (
+        ("observation_space", gym.spaces.Box(0.0, 4.0, (2,), dtype=np.float64)),
+        ("action_space", gym.spaces.Discrete(3)),
+    ):
+        other = Corridor()
+        setattr(other, name, space)
+        with pytest.raises(ValueError, match=f"env must have the agent's {name}, .*, got "):
+            agent.train(other, steps=10)
+        with pytest.raises(ValueError, match=f"env must have the agent's {name}, .*, got "):
+            evaluate(agent, other)
+
+
+def test_rewards_of_an_evaluation_must_be_numbers():
+    class Broken(Corridor):
+        def step(self, action):
+            return *super().step(action)[:1], float("nan"), False, self._steps > 3, {}
+
+    with pytest.raises(ValueError, match="rewards of env must add up to a finite number, got nan"):
+        evaluate(corridor_agent(), Broken())
 
 
 class Killed(Checkpoints):

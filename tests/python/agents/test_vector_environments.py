@@ -379,6 +379,18 @@ def test_an_environment_that_resets_itself_is_learned_without_the_steps_of_reset
             assert learner.learned[i][:80] == expected[:80]
 
 
+def test_observations_that_are_normalized_together_are_learned():
+    from gymnasium.wrappers.vector import NormalizeObservation
+
+    envs = NormalizeObservation(SyncVectorEnv([lambda: gym.make("CartPole-v1")] * 2))
+    agent = SDNNQLearning(
+        envs.single_observation_space, envs.single_action_space, warm_up_steps=50, seed=1
+    )
+    result = agent.train(envs, steps=200)  # it refuses to reset one of them
+    assert result.n_steps == 200
+    assert result.n_episodes > 2
+
+
 def test_cart_poles_that_gymnasium_makes_by_itself_are_learned():
     envs = gym.make_vec("CartPole-v1", num_envs=3)  # no SyncVectorEnv
     agent = SDNNQLearning(

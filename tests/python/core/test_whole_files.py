@@ -37,12 +37,32 @@ def test_what_a_kill_left_is_removed_and_nothing_else(tmp_path):
     left = tmp_path / f"results.csv.1.0{PARTIAL_SUFFIX}"
     left.write_bytes(b"half")
     (tmp_path / f"results.csv.2.0{PARTIAL_SUFFIX}").write_bytes(b"another process is writing")
-    (tmp_path / "mine.txt").write_bytes(b"whole")
+    mine = [tmp_path / "mine.txt", tmp_path / f"mine{PARTIAL_SUFFIX}"]
     long_ago = time.time() - 3600
-    for path in (left, tmp_path / "mine.txt"):
+    for path in (left, *mine):
+        path.write_bytes(b"old")
         os.utime(path, (long_ago, long_ago))
     remove_abandoned_files(tmp_path)
-    assert {p.name for p in tmp_path.iterdir()} == {f"results.csv.2.0{PARTIAL_SUFFIX}", "mine.txt"}
+    assert set(tmp_path.iterdir()) == {tmp_path / f"results.csv.2.0{PARTIAL_SUFFIX}", *mine}
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a system of POSIX")
+def test_links_and_pipes_stay_what_they_are(tmp_path):
+    target, link, pipe = tmp_path / "target", tmp_path / "link", tmp_path / "pipe"
+    target.write_bytes(b"old")
+    link.symlink_to(target)
+    write_whole(link, b"new")
+    assert link.is_symlink()
+    assert target.read_bytes() == b"new"
+    os.mkfifo(pipe)
+    read = []
+    reader = threading.Thread(target=lambda: read.append(pipe.read_bytes()))
+    reader.start()
+    write_whole(pipe, b"through")
+    reader.join()
+    assert read == [b"through"]
+    assert pipe.is_fifo()
+    assert len(list(tmp_path.iterdir())) == 3
 
 
 def test_two_writers_of_one_file_leave_one_of_their_files(tmp_path):

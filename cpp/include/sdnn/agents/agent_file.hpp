@@ -270,6 +270,10 @@ class AgentMaker {
       state_.emplace(name.substr(kStatePrefix.size()), tensor);
     }
     seed_ = value_from<std::uint64_t>(member(settings_, "seed", "sdnn"), "seed");
+    if (settings_.contains("observation") && settings_["observation"].is_null()) {
+      throw std::invalid_argument(
+          "the agent is still in its warm-up, and has learned nothing: train it on in Python");
+    }
     if (settings_.value("n_tables", nlohmann::json(0)) != 0) {
       throw std::invalid_argument("n_tables must be 0: patterns of its own are for Python only");
     }

@@ -133,7 +133,7 @@ class ObservationScale {
 /// As the file's "action" says it: {"kind": "box", "low": [..], "high": [..], "shape": [..]}, where
 /// dimension d has n_actions[d] values evenly from low to high (coding::action_value), or an action
 /// a in [-1, 1] is (low + high) / 2 + (high - low) / 2 a; or {"kind": "discrete", "start": [..]},
-/// where it is start and the index.
+/// where it is start and the index. With "whole": true a box has the nearest whole numbers.
 class ActionScale {
  public:
   /// For an agent with so many actions in each dimension; 0: any number in [-1, 1]. Throws
@@ -160,6 +160,9 @@ class ActionScale {
     if (kind != "box") detail::refuse("action.kind", R"("box" or "discrete")", kind);
     low_ = numbers("low");
     high_ = numbers("high");
+    if (action.contains("whole")) {
+      is_whole_ = detail::value_from<bool>(action["whole"], "action.whole");
+    }
     for (std::size_t d = 0; d < low_.size(); ++d) {
       core::require_in_range("action.low", low_[d], -kFurthest, kFurthest);
       core::require_in_range("action.high", high_[d], -kFurthest, kFurthest);
@@ -172,13 +175,14 @@ class ActionScale {
   /// Of action number `index` in dimension d.
   double of_index(std::size_t index, std::size_t d) const noexcept {
     if (is_discrete_) return low_[d] + static_cast<double>(index);
-    return coding::action_value(index, n_actions_[d], low_[d], high_[d]);
+    return rounded(coding::action_value(index, n_actions_[d], low_[d], high_[d]));
   }
   /// Of a number in [-1, 1] in dimension d.
   double of_normalized(double action, std::size_t d) const noexcept {
     const double middle = 0.5 * (low_[d] + high_[d]);
     const double half = 0.5 * (high_[d] - low_[d]);
-    return std::clamp(middle + half * action, low_[d], high_[d]);
+    return std::clamp(rounded(std::clamp(middle + half * action, low_[d], high_[d])), low_[d],
+                      high_[d]);
   }
   /// The number of an action. Throws std::invalid_argument if there is none like it.
   std::size_t index_of(double action, std::size_t d) const {
@@ -192,6 +196,10 @@ class ActionScale {
   }
 
  private:
+  double rounded(double action) const noexcept {
+    return is_whole_ ? std::floor(action + 0.5) : action;
+  }
+
   /// The number of the action that is the next one below, or about that.
   std::size_t nearest(double action, std::size_t d) const noexcept {
     const double step = is_discrete_
@@ -206,6 +214,7 @@ class ActionScale {
   static constexpr double kFurthest = 1e300;  // of bounds: what lies between them stays finite
 
   bool is_discrete_ = false;
+  bool is_whole_ = false;
   std::vector<std::size_t> n_actions_;
   std::vector<double> low_, high_;  ///< low_ is where discrete actions start
 };

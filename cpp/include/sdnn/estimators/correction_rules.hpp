@@ -40,9 +40,10 @@ class PDeltaRule {
   /// Targets in units of the firing count, not rounded: (t - b) / a.
   ///
   /// Shapes: targets (n_samples, n_groups). Throws std::invalid_argument if a target is not finite,
-  /// or if n_groups does not divide n_units.
+  /// if n_units is 0, or if n_groups does not divide it.
   PDeltaRule(std::size_t n_units, std::span<const double> targets, std::size_t n_groups)
       : n_groups_(n_groups) {
+    core::require_in_range("n_units", n_units, 1, std::size_t{1} << 20);
     core::require(n_groups > 0 && n_units % n_groups == 0, "n_groups",
                   "a divisor of n_units = " + std::to_string(n_units), n_groups);
     core::require(targets.size() % n_groups == 0, "targets", "n_groups values per sample",
@@ -64,6 +65,7 @@ class PDeltaRule {
   }
 
   std::size_t n_samples() const noexcept { return targets_.size() / n_groups_; }
+  std::size_t n_units() const noexcept { return n_groups_ * group_size_; }
 
   /// Overwrites `corrections` with those of a sample. Shapes: potentials (n_units,).
   void operator()(std::size_t sample, const std::int32_t* potentials,
@@ -155,7 +157,7 @@ class PerceptronRule {
   /// n_units is not what the scheme needs.
   PerceptronRule(std::size_t n_units, std::span<const std::int32_t> labels, std::size_t n_classes,
                  ClassScheme scheme)
-      : labels_(labels.begin(), labels.end()) {
+      : n_units_(n_units), labels_(labels.begin(), labels.end()) {
     const std::size_t needed = n_units_for(scheme, n_classes);
     core::require(n_units == needed, "n_units",
                   std::to_string(needed) + " for " + std::to_string(n_classes) + " classes",
@@ -182,6 +184,7 @@ class PerceptronRule {
   }
 
   std::size_t n_samples() const noexcept { return labels_.size(); }
+  std::size_t n_units() const noexcept { return n_units_; }
 
   /// Overwrites `corrections` with those of a sample. Shapes: potentials (n_units,).
   void operator()(std::size_t sample, const std::int32_t* potentials,
@@ -193,6 +196,7 @@ class PerceptronRule {
   }
 
  private:
+  std::size_t n_units_;
   std::vector<std::int32_t> labels_;
   std::vector<std::vector<Correction>> wanted_;  // per class: what each of its units should do
 };

@@ -49,9 +49,9 @@ class OnlineLayer {
 
   /// Presents samples in their order. Shapes: bins (n_samples, n_inputs).
   ///
-  /// Throws std::invalid_argument for bins out of range or if the rule knows another number of
-  /// samples, std::overflow_error if a weight would leave its range; nothing is changed then, nor
-  /// if it is stopped (core::interruption_point).
+  /// Throws std::invalid_argument for bins out of range or if the rule is for another number of
+  /// samples or units, std::overflow_error if a weight would leave its range; nothing is changed
+  /// then, nor if it is stopped (core::interruption_point).
   template <class Rule>
   TrainingCount present(std::span<const std::int32_t> bins, Rule& rule) {
     const std::size_t n_inputs = layer_->code().n_inputs();
@@ -59,6 +59,8 @@ class OnlineLayer {
     const std::size_t n_samples = bins.size() / n_inputs;
     core::require(rule.n_samples() == n_samples, "targets or labels", "as many samples as bins has",
                   rule.n_samples());
+    core::require(rule.n_units() == layer_->n_units(), "rule", "for as many units as the layer has",
+                  rule.n_units());
     TrainingCount count;
     done_.clear();
     struct Undoes {  // unless all are done

@@ -95,8 +95,10 @@ class ParallelPerceptron {
   }
   std::int32_t threshold(std::size_t unit) const noexcept { return thresholds_[unit]; }
 
-  /// All weights, in the order of the columns. Shapes: out (n_units, n_columns).
+  /// All weights, in the order of the columns. Shapes: out (n_units, n_columns). Throws
+  /// std::invalid_argument for another size.
   void copy_weights(std::span<std::int32_t> out) const {
+    require_size(out, n_units() * code_->n_columns());
     const std::vector<std::size_t> slots = slots_of_columns();
     std::int32_t* weight = out.data();
     for (std::size_t i = 0; i < n_units(); ++i) {
@@ -164,9 +166,10 @@ class ParallelPerceptron {
   }
 
   /// Potentials in the order of the queries. Shapes: bins (n_queries, n_inputs), out
-  /// (n_queries, n_units). Throws like for_each_query.
+  /// (n_queries, n_units). Throws like for_each_query, and for an out of another size.
   void potentials(std::span<const std::int32_t> bins, int n_threads,
                   std::span<std::int32_t> out) const {
+    require_size(out, bins.size() / code_->n_inputs() * n_units());
     const auto copy = [&](std::size_t query, const std::int32_t* values) {
       std::copy_n(values, n_units(), out.data() + query * n_units());
     };
@@ -182,10 +185,11 @@ class ParallelPerceptron {
 
   /// How many units fire in each of `n_groups` groups of equal size. Shapes: bins
   /// (n_queries, n_inputs), out (n_queries, n_groups). Throws std::invalid_argument unless n_groups
-  /// divides n_units, and like for_each_query.
+  /// divides n_units, for an out of another size, and like for_each_query.
   void counts(std::span<const std::int32_t> bins, std::size_t n_groups, int n_threads,
               std::span<std::int32_t> out) const {
     const std::size_t size = group_size(n_groups);
+    require_size(out, bins.size() / code_->n_inputs() * n_groups);
     const auto count = [&](std::size_t query, const std::int32_t* values) {
       for (std::size_t g = 0; g < n_groups; ++g) {
         out[query * n_groups + g] = count_firing(values + g * size, size);
@@ -195,6 +199,12 @@ class ParallelPerceptron {
   }
 
  private:
+  static void require_size(std::span<std::int32_t> out, std::size_t n) {
+    if (out.size() != n) {
+      core::require(false, "out", "of " + std::to_string(n) + " numbers", out.size());
+    }
+  }
+
   ParallelPerceptron(std::shared_ptr<const Code> code, std::size_t n_units)
       : code_(std::move(code)) {
     core::require_in_range("n_units", n_units, 1, std::size_t{1} << 20);

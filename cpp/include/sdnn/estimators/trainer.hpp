@@ -33,8 +33,8 @@ template <class Rule>
 class Trainer {
  public:
   /// Shapes: bins (n_samples, n_inputs). Throws std::invalid_argument for bins out of range or if
-  /// the rule knows another number of samples, std::length_error if `form` (other than automatic)
-  /// needs more than `memory_limit` bytes.
+  /// the rule is for another number of samples or units, std::length_error if `form` (other than
+  /// automatic) needs more than `memory_limit` bytes.
   Trainer(std::shared_ptr<ParallelPerceptron> layer, std::span<const std::int32_t> bins, Rule rule,
           TrainingForm form = TrainingForm::automatic, std::size_t memory_limit = kMemoryLimit,
           int n_threads = 1, std::size_t n_epochs = kExpectedEpochs)
@@ -44,6 +44,9 @@ class Trainer {
     n_samples_ = bins.size() / layer_->code().n_inputs();
     core::require(rule_.n_samples() == n_samples_, "targets or labels",
                   std::to_string(n_samples_) + " samples as bins has", rule_.n_samples());
+    core::require(rule_.n_units() == layer_->n_units(), "rule",
+                  "for " + std::to_string(layer_->n_units()) + " units, as the layer has",
+                  rule_.n_units());
     form_ =
         choose_form(form, layer_->n_units(), layer_->code(), n_samples_, memory_limit, n_epochs);
     const auto memory = [&](bool keeps_plans) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <span>
 #include <string>
 
@@ -27,6 +28,26 @@ TEST(WholeFile, IsThereWhenItIsFinished) {
   }
   EXPECT_EQ(testing::content_of(folder / "file"), "one, two");
   EXPECT_EQ(folder.n_files(), 1U);
+}
+
+TEST(WholeFile, ALinkStaysOne) {
+  const testing::Folder folder;
+  testing::write_content(folder / "target", "before");
+  std::filesystem::create_symlink(folder / "target", folder / "link");
+  WholeFile file(folder / "link");
+  write(file, "after");
+  file.finish();
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  EXPECT_EQ(testing::content_of(folder / "target"), "after");
+}
+
+TEST(WholeFile, ADeviceIsWrittenTo) {
+  const std::filesystem::path device = "/dev/null";
+  if (!std::filesystem::exists(device)) GTEST_SKIP() << "needs " << device;
+  WholeFile file(device);
+  write(file, "anything");
+  file.finish();
+  EXPECT_TRUE(std::filesystem::is_character_file(device));
 }
 
 TEST(WholeFile, LeavesNothingWhereItIsNotFinished) {

@@ -25,7 +25,8 @@
 
 namespace sdnn::core {
 
-/// A file that is written under another name in the same folder, and gets its own at the end.
+/// A file that is written under another name in the same folder, and gets its own at the end. What
+/// is no file but a device or a pipe is written to.
 ///
 /// `write` may be called many times; `finish` makes the file be there. Without it, or after an
 /// error, what was there before stays, and nothing else is left. Throws std::runtime_error naming
@@ -33,13 +34,9 @@ namespace sdnn::core {
 /// `finish` returns.
 class WholeFile {
  public:
-  explicit WholeFile(std::filesystem::path path) : path_(std::move(path)), partial_(path_) {
-    static std::atomic<unsigned> counter{0};
-#if SDNN_HAS_POSIX_FILES
-    (partial_ += '.') += std::to_string(::getpid());
-#endif
-    (partial_ += '.') += std::to_string(counter++);
-    partial_ += ".partial";
+  explicit WholeFile(const std::filesystem::path& path)
+      : path_(target_of(path)), partial_(path_), is_special_(is_special(path_)) {
+    if (!is_special_) partial_ += partial_suffix();
 #if SDNN_HAS_POSIX_FILES
     file_ = ::open(partial_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     if (file_ < 0) fail("cannot be written");
@@ -47,7 +44,7 @@ class WholeFile {
     file_.open(partial_, std::ios::binary | std::ios::trunc);
     if (!file_) fail("cannot be written");
 #endif
-    is_under_way_ = true;
+    is_under_way_ = !is_special_;
   }
   WholeFile(const WholeFile&) = delete;
   WholeFile& operator=(const WholeFile&) = delete;
@@ -77,12 +74,13 @@ class WholeFile {
 
   void finish() {
 #if SDNN_HAS_POSIX_FILES
-    if (::fsync(file_) != 0) fail("cannot be written");
+    if (!is_special_ && ::fsync(file_) != 0) fail("cannot be written");
 #else
     file_.flush();
     if (!file_) fail("cannot be written");
 #endif
     if (!close()) fail("cannot be written");
+    if (is_special_) return;
     std::error_code error;
     std::filesystem::rename(partial_, path_, error);
     if (error) {
@@ -100,6 +98,34 @@ class WholeFile {
   }
 
  private:
+  /// What a link leads to: the link stays.
+  static std::filesystem::path target_of(const std::filesystem::path& path) {
+    std::error_code ignored;
+    if (!std::filesystem::is_symlink(path, ignored)) return path;
+    const auto target = std::filesystem::weakly_canonical(path, ignored);
+    return ignored ? path : target;
+  }
+
+  /// Whether it is a device or a pipe, which cannot get another file in its place.
+  static bool is_special(const std::filesystem::path& path) {
+    std::error_code ignored;
+    const auto kind = std::filesystem::status(path, ignored).type();
+    using std::filesystem::file_type;
+    return kind == file_type::character || kind == file_type::block || kind == file_type::fifo ||
+           kind == file_type::socket;
+  }
+
+  /// One that no other process or thread has.
+  static std::string partial_suffix() {
+    static std::atomic<unsigned> counter{0};
+    std::string suffix;
+#if SDNN_HAS_POSIX_FILES
+    (suffix += '.') += std::to_string(::getpid());
+#endif
+    (suffix += '.') += std::to_string(counter++);
+    return suffix += ".partial";
+  }
+
   [[noreturn]] void fail(const char* what) const {
     core::fail(std::runtime_error(path_.string() + ": " + what + ": " +
                                   std::generic_category().message(errno)));
@@ -118,6 +144,7 @@ class WholeFile {
 
   std::filesystem::path path_;
   std::filesystem::path partial_;
+  bool is_special_;
   bool is_under_way_ = false;
 #if SDNN_HAS_POSIX_FILES
   int file_ = -1;
