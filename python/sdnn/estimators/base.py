@@ -220,15 +220,14 @@ class BaseSDNN(CodedInputs):
 
         Single samples are learned in place: nothing that may fail may follow.
         """
-        few = len(bins) <= FEW_SAMPLES and self.training == "auto"
-        online = self.network_.online(self.memory_limit) if few else None
-        if online is not None:
+        if len(bins) <= FEW_SAMPLES and self.training == "auto":
             try:
-                self._present_online(online, bins, targets)
+                if self.network_.learn_online(
+                    lambda online: self._present_online(online, bins, targets), self.memory_limit
+                ):
+                    return
             except OverflowError:
                 pass  # the other forms of training have room for larger weights
-            else:
-                return
         network = self.network_.copy()
         trainer = self._trainer(network, bins, targets, n_epochs=1)
         trainer.present(np.arange(len(bins), dtype=np.int32))

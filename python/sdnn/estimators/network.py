@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import threading
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,8 @@ FEW_SAMPLES = 32
 
 class Network:
     """N units over the code of the inputs; weights and thresholds are exact integers.
+
+    Any number of threads may read it at once, as long as none trains it.
 
     Parameters
     ----------
@@ -42,7 +46,7 @@ class Network:
     ) -> None:
         self.input_code = input_code
         self.n_units = n_units
-        self._online: _core.OnlineLayer | None = None
+        self._forget_online()
         try:
             self._layer = _core.ParallelPerceptron(
                 input_code.core, n_units, seed=seed, weights=weights, thresholds=thresholds
@@ -67,19 +71,36 @@ class Network:
         """Build the core's object again."""
         self.__init__(**state)  # type: ignore[misc]
 
+    def _forget_online(self) -> None:
+        """Have no layer for single samples."""
+        self._online: _core.OnlineLayer | None = None
+        # Marks of what the online layer learned last, and of what the other one has of it.
+        self._learned: object = None
+        self._synchronized: object = None
+        self._lock = threading.RLock()
+
     @property
     def layer(self) -> _core.ParallelPerceptron:
         """The core's layer as it is now; who trains it trains a `copy`, or a fresh network."""
-        if self._online is not None:
-            self._online.synchronize()
+        # Only then: the core refuses to synchronize what another thread reads.
+        if self._synchronized is not self._learned:
+            self._synchronize()
         return self._layer
+
+    def _synchronize(self) -> None:
+        """Bring the layer up to date; one thread does, the others wait."""
+        with self._lock:
+            learned = self._learned
+            if self._online is not None and self._synchronized is not learned:
+                self._online.synchronize()
+                self._synchronized = learned
 
     def copy(self) -> Network:
         """Return a network with the same code and weights of its own."""
         other = object.__new__(Network)
         other.input_code = self.input_code
         other.n_units = self.n_units
-        other._online = None
+        other._forget_online()
         other._layer = self.layer.copy()
         return other
 
@@ -92,9 +113,25 @@ class Network:
         if self._online is None and 2 * self.n_units * self.input_code.core.n_columns <= (
             memory_limit
         ):
-            with contextlib.suppress(ValueError, MemoryError):
-                self._online = _core.OnlineLayer(self._layer)
+            with self._lock, contextlib.suppress(ValueError, MemoryError):
+                self._online = self._online or _core.OnlineLayer(self._layer)
         return self._online
+
+    def learn_online(
+        self, present: Callable[[_core.OnlineLayer], object], memory_limit: int
+    ) -> bool:
+        """Let the layer of `online` learn what ``present`` presents to it; False if there is none.
+
+        Samples are learned in place: nothing that may fail follows.
+        """
+        online = self.online(memory_limit)
+        if online is None:
+            return False
+        begun, ended = object(), object()
+        self._learned = begun  # an interrupt may come between learning and the other mark
+        present(online)
+        self._learned = ended
+        return True
 
     @property
     def weights(self) -> NDArray[np.int32]:
@@ -108,7 +145,7 @@ class Network:
 
     def restore(self, weights: NDArray[np.int32], thresholds: NDArray[np.int32]) -> None:
         """Go back to earlier weights and thresholds."""
-        self._online = None
+        self._forget_online()
         self._layer = _core.ParallelPerceptron(
             self.input_code.core, self.n_units, weights=weights, thresholds=thresholds
         )
@@ -120,7 +157,7 @@ class Network:
     def potentials_of_bins(self, bins: NDArray[np.int32], n_threads: int) -> NDArray[np.int32]:
         """Potentials, (n_samples, n inputs in pairs) to (n_samples, n_units)."""
         if self._online is not None and len(bins) <= FEW_SAMPLES:
-            return self._online.potentials(bins)
+            return self._online_potentials(self._online, bins)
         return self.layer.potentials(bins, n_threads=n_threads)
 
     def counts(self, table: NDArray[Any], n_groups: int, n_threads: int) -> NDArray[np.int32]:
@@ -132,7 +169,14 @@ class Network:
     ) -> NDArray[np.int32]:
         """How many units fire, (n_samples, n inputs in pairs) to (n_samples, n_groups)."""
         if self._online is not None and len(bins) <= FEW_SAMPLES:
-            firing = (self._online.potentials(bins) > 0).reshape(len(bins), n_groups, -1)
+            potentials = self._online_potentials(self._online, bins)
+            firing = (potentials > 0).reshape(len(bins), n_groups, -1)
             counts: NDArray[np.int32] = firing.sum(axis=2, dtype=np.int32)
             return counts
         return self.layer.counts(bins, n_groups=n_groups, n_threads=n_threads)
+
+    def _online_potentials(
+        self, online: _core.OnlineLayer, bins: NDArray[np.int32]
+    ) -> NDArray[np.int32]:
+        with self._lock:  # the core refuses to read what another thread synchronizes
+            return online.potentials(bins)

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pandas as pd
@@ -77,6 +78,25 @@ def test_forms_may_take_turns():
         one = pickle.loads(pickle.dumps(one)) if size == 3 else copy.deepcopy(one)
         begin += size
     same(one, other)
+
+
+@pytest.mark.parametrize("learns", [False, True])
+@pytest.mark.parametrize("kind", [regressor, classifier])
+def test_threads_may_predict_at_once(kind, learns):
+    model = kind(n_pattern_units=200).fit(X, LABELS // 2)
+    if learns:
+        model.learn_one(X[0], 1)
+    else:
+        model.predict_one(X[0])
+    expected = copy.deepcopy(model).predict(X).tolist()
+    works = [
+        lambda: model.predict(X).tolist() == expected,
+        lambda: model.predict(X[:9]).tolist() == expected[:9],
+        lambda: model.predict_one(X[5]) == expected[5],
+    ]
+    with ThreadPoolExecutor(4) as pool:
+        outcomes = [pool.submit(works[number % 3]) for number in range(300)]
+        assert all(outcome.result() for outcome in outcomes)
 
 
 def test_copies_learn_apart():
