@@ -35,7 +35,11 @@ N_UNITS = 2000
 
 def fitted(coding: str | Coding, n_units: int) -> Coding:
     """Return a coding that knows its bins; on [0, 1] where it has not learned a range."""
-    return coding_named(coding).fit(np.array([0.0, 1.0]), n_units)
+    one = coding_named(coding)
+    ends = None if one.learns else one.ends()
+    # Where all values were equal the range is one point, which only such a column fits again.
+    is_constant = ends is not None and ends[0] == ends[1]
+    return one.fit(np.array(ends if is_constant else [0.0, 1.0]), n_units)
 
 
 def correlations(coding: str | Coding, n_units: int = N_UNITS) -> NDArray[np.float64]:

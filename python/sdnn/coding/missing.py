@@ -70,16 +70,17 @@ class WithMissing(Coding):
     def fit(self, column: NDArray[Any], n_units: int) -> WithMissing:
         """Return a copy whose coding is fitted to the values that are there; see `Coding.fit`."""
         one_of("unknown", self.unknown, ("missing", "error"))
-        if not isinstance(self.base, Coding) or isinstance(self.base, WithMissing):
-            raise ValueError(f"base must be a Coding without missing values, got {self.base!r}")
+        learns = self.learns  # before all else: it says if the base is none
         there = self._values(column[self._is_there(column)])
-        if self.base.learns and len(there) == 0:
+        if learns and len(there) == 0:
             raise ValueError("every value of an input is missing: there is nothing to learn")
         return dataclasses.replace(self, base=self.base.fit(there, n_units))
 
     @property
     def learns(self) -> bool:
         """Whether ``fit`` learns from the sample."""
+        if not isinstance(self.base, Coding) or isinstance(self.base, WithMissing):
+            raise ValueError(f"base must be a Coding without missing values, got {self.base!r}")
         return self.base.learns
 
     @property

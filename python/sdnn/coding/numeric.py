@@ -16,6 +16,7 @@ from sdnn.coding.base import Coding, known
 from sdnn.coding.ranges import (
     Knots,
     bins_of_positions,
+    checked_knots,
     learned_range,
     positions,
     quantile_knots,
@@ -67,11 +68,11 @@ class RandomInverse(Coding):
         q and r of the method: number of bins, and units of each sign that flip from bin to bin.
     spacing : {"even", "quantile"}
         Bins of equal width, or of equal share of the training sample (robust to outliers and
-        skew; a range cannot be given then).
+        skew; a range cannot be given then, but with knots).
     low, high : float, optional
         The range; values beyond it count as its ends. Learned from the sample where None.
     knots : tuple of (value, position), optional
-        Learned by ``spacing="quantile"``.
+        Learned by ``spacing="quantile"``; learned with the range, or given with it.
     """
 
     name: ClassVar[str] = "random-inverse"
@@ -86,14 +87,18 @@ class RandomInverse(Coding):
     def fit(self, column: NDArray[Any], n_units: int) -> RandomInverse:
         """Return a copy with range, ``n_bins`` and ``n_flipped`` known; see `Coding.fit`."""
         one_of("spacing", self.spacing, ("even", "quantile"))
-        if self.spacing == "quantile" and not (self.low is None and self.high is None):
+        is_learned = self.knots is not None and not self.learns
+        has_range = not (self.low is None and self.high is None)
+        if self.spacing == "quantile" and has_range and not is_learned:
             raise ValueError("low and high cannot be given with spacing='quantile'")
         if not 0 < real("length_scale", self.length_scale) <= LONGEST:
             raise ValueError(f"length_scale must be in (0, {LONGEST}], got {self.length_scale!r}")
         values = numbers(column)
         low, high = learned_range(values, self.low, self.high)
         n_bins, n_flipped = self._bins_and_flips(n_units)
-        knots = quantile_knots(values) if self.spacing == "quantile" else None
+        knots = None
+        if self.spacing == "quantile":
+            knots = checked_knots(self.knots, low, high) if is_learned else quantile_knots(values)
         return dataclasses.replace(
             self, n_bins=n_bins, n_flipped=n_flipped, low=low, high=high, knots=knots
         )

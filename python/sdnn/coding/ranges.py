@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 
 from sdnn.arguments import real
 
-__all__ = ["MAX_KNOTS", "bins_of_positions", "learned_range", "positions", "quantile_knots"]
+__all__ = [
+    "MAX_KNOTS",
+    "bins_of_positions",
+    "checked_knots",
+    "learned_range",
+    "positions",
+    "quantile_knots",
+]
 
 MAX_KNOTS = 129
 """Knots that hold a column's distribution; beyond so many the codes hardly differ."""
@@ -26,14 +33,16 @@ def learned_range(
     Raises
     ------
     ValueError
-        If the ends are not finite or in the wrong order.
+        If the ends are not finite or in the wrong order. Equal ends are those of a column that
+        has one value only.
     """
     ends = (
         float(np.min(column)) if low is None else real("low", low),
         float(np.max(column)) if high is None else real("high", high),
     )
     given = low is not None and high is not None
-    if not all(map(math.isfinite, ends)) or (given and ends[0] >= ends[1]):
+    is_constant = ends[0] == ends[1] and bool(np.all(column == ends[0]))
+    if not all(map(math.isfinite, ends)) or (given and ends[0] >= ends[1] and not is_constant):
         raise ValueError(f"low and high must be finite, low < high, got {ends[0]} and {ends[1]}")
     return ends[0], max(ends)
 
@@ -52,6 +61,30 @@ def quantile_knots(column: NDArray[Any]) -> Knots:
     if len(values) > MAX_KNOTS:
         kept = np.unique(np.searchsorted(levels, np.linspace(0, 1, MAX_KNOTS)))
         values, levels = values[kept], levels[kept]
+    return tuple(zip(values.tolist(), levels.tolist(), strict=True))
+
+
+def checked_knots(knots: Any, low: float, high: float) -> Knots:
+    """Return knots that an earlier fit has learned.
+
+    Raises
+    ------
+    ValueError
+        Unless values and positions rise, from (low, 0) to (high, 1).
+    """
+    ends: tuple[float, ...] = ()
+    is_rising = False
+    try:
+        values, levels = np.array(knots, dtype=np.float64).T
+        ends = (values[0], levels[0], values[-1], levels[-1])
+        is_rising = bool(np.all(values[1:] > values[:-1]) and np.all(levels[1:] > levels[:-1]))
+    except (IndexError, TypeError, ValueError):
+        pass
+    if not is_rising or ends != (low, 0.0, high, 1.0 if low < high else 0.0):
+        raise ValueError(
+            f"knots must be (value, position) in rising order from ({low}, 0) to ({high}, 1), "
+            f"got {knots!r}"
+        )
     return tuple(zip(values.tolist(), levels.tolist(), strict=True))
 
 

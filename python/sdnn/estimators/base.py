@@ -193,16 +193,6 @@ class BaseSDNN(CodedInputs):
         order = random.permutation(n_samples)
         return np.sort(order[:n_held]), np.sort(order[n_held:])
 
-    def _scratch(self: Self) -> Self:
-        """Return an estimator to be trained instead of this one, which takes its attributes over.
-
-        So whatever fails leaves this one as it was. They share what they have until then: nothing
-        of it may be changed in place.
-        """
-        work = object.__new__(type(self))
-        work.__dict__.update(self.__dict__)
-        return work
-
     @abc.abstractmethod
     def _trainer(
         self, network: Network, bins: NDArray[np.int32], targets: NDArray[Any], n_epochs: int

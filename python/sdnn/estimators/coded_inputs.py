@@ -47,6 +47,16 @@ class CodedInputs(BaseEstimator):
                 raise ValueError(f"{coding!r} must have the fields {sorted(fields)}") from None
         return self
 
+    def _scratch(self: Self) -> Self:
+        """Return an estimator to be trained instead of this one, which takes its attributes over.
+
+        So whatever fails leaves this one as it was. They share what they have until then: nothing
+        of it may be changed in place.
+        """
+        work = object.__new__(type(self))
+        work.__dict__.update(self.__dict__)
+        return work
+
     def _validated(self, X: Any, y: Any = "no_validation", **options: Any) -> Any:
         """Check data by scikit-learn's rules; words are let through where a coding takes them."""
         if isinstance(self.coding, list | tuple):

@@ -97,6 +97,12 @@ class SDNNKernelRidge(RegressorMixin, CodedInputs):
         ValueError
             For an impossible parameter, or data that cannot be used.
         """
+        work = self._scratch()
+        work._fit(X, y)
+        self.__dict__ = work.__dict__
+        return self
+
+    def _fit(self, X: ArrayLike, y: ArrayLike) -> None:
         if not 0 < real("alpha", self.alpha) < math.inf:
             raise ValueError(f"alpha must be above 0 and finite, got {self.alpha!r}")
         if y is None:
@@ -114,7 +120,6 @@ class SDNNKernelRidge(RegressorMixin, CodedInputs):
         self.y_mean_ = targets.mean(axis=0)
         self.ridge_ = KernelRidge(kernel="precomputed", alpha=self.alpha)
         self.ridge_.fit(self.kernel_(table), targets - self.y_mean_)
-        return self
 
     def predict(self, X: ArrayLike) -> NDArray[np.float64]:
         """Predict the outputs of samples.

@@ -204,6 +204,38 @@ def test_lone_categories_are_refused(categories):
             make(categories=categories)
 
 
+@pytest.mark.parametrize(
+    "column", [np.arange(30.0) ** 2, np.full(5, 2.5), np.array([-1e308, 1e308])]
+)
+@pytest.mark.parametrize(
+    "coding", [RandomInverse(), RandomInverse(spacing="quantile"), Anchor(), WithMissing()]
+)
+def test_what_was_learned_is_not_learned_again(coding, column):
+    learned = coding.fit(column, 400)
+    assert not learned.learns
+    assert learned.fit(np.array(learned.ends()), 400) == learned
+    if column[0] < column[-1]:
+        assert learned.fit(np.array([7.0, 8.0]), 400) == learned
+
+
+@pytest.mark.parametrize(
+    "knots",
+    [
+        ((0.0, 0.0), (2.0, 1.0)),
+        ((0.0, 0.0), (0.5, 0.8), (0.4, 0.9), (1.0, 1.0)),
+        ((0.0, 0.0), (0.5, 0.9), (0.6, 0.8), (1.0, 1.0)),
+        ((0.0, 0.1), (1.0, 1.0)),
+        ((0.0,), (1.0, 1.0)),
+        (0.0, 1.0),
+        (("a", 0.0), (1.0, 1.0)),
+        5,
+    ],
+)
+def test_impossible_knots_are_named(knots):
+    with pytest.raises(ValueError, match="knots must be"):
+        RandomInverse(spacing="quantile", low=0.0, high=1.0, knots=knots).fit(UNIT, 400)
+
+
 def test_knots_are_values_and_their_mean_ranks():
     assert quantile_knots(np.array([5.0])) == ((5.0, 0.0),)
     knots = quantile_knots(np.random.RandomState(0).normal(size=5000))

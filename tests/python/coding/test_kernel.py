@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sdnn import SDNNRegressor, kernel
-from sdnn.coding import Circular, RandomInverse, Symbolic
+from sdnn.coding import Anchor, Circular, RandomInverse, Symbolic, WithMissing
 
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(0, 1, (12, 3))
@@ -42,6 +42,30 @@ def test_by_hand():
     np.testing.assert_allclose(alone([[0.05]], [[0.25]]), [[rho**2]])
     with pytest.raises(ValueError, match="n_inputs must be given"):
         kernel.AnalyticKernel("anchor")
+
+
+COLUMNS = {"different": RANDOM.lognormal(0, 2, 30), "equal": np.full(30, 3.5)}
+
+
+@pytest.mark.parametrize("column", COLUMNS)
+@pytest.mark.parametrize(
+    "coding",
+    [
+        RandomInverse(length_scale=0.2),
+        RandomInverse(spacing="quantile"),
+        Anchor(),
+        WithMissing(base=RandomInverse(spacing="quantile")),
+    ],
+)
+def test_learned_codings_are_taken_as_they_are(coding, column):
+    learned = coding.fit(COLUMNS[column], 400)
+    one = kernel.AnalyticKernel([learned, learned], n_units=400)
+    assert one.codings == (learned, learned)
+    samples = np.stack([COLUMNS[column]] * 2, axis=1)
+    rho = learned.correlations(400)[np.ix_(*[learned.bins(COLUMNS[column])] * 2)]
+    np.testing.assert_allclose(one(samples), (1 + rho) / 2 * rho)
+    assert kernel.similarity(learned, 400).shape == (learned.size, learned.size)
+    assert kernel.plot_similarity(learned, 400) is not None
 
 
 def test_similarity_scatters_about_the_correlations():

@@ -66,6 +66,35 @@ def test_tables_and_searches_are_taken():
     assert clone(both).get_params() == both.get_params()
 
 
+@pytest.mark.parametrize("coding", ["random-inverse", "anchor", RandomInverse(spacing="quantile")])
+def test_a_constant_column_is_taken_as_by_the_network(coding):
+    constant = np.column_stack([X, np.full(len(X), 7.0)])
+    for model in (SDNNKernelRidge(coding), SDNNRegressor(coding, random_state=0)):
+        assert model.fit(constant, Y).score(constant, Y) > 0.9
+
+
+def test_learned_codings_are_not_learned_again():
+    codings = SDNNRegressor(RandomInverse(spacing="quantile"), random_state=0).fit(X, Y).codings_
+    model = SDNNKernelRidge([(coding, [i]) for i, coding in enumerate(codings)])
+    assert [c.knots for c in model.fit(X[:50], Y[:50]).kernel_.codings] == [
+        c.knots for c in codings
+    ]
+
+
+def test_a_failed_fit_leaves_the_old_model(monkeypatch):
+    model = SDNNKernelRidge().fit(X, Y)
+    before = pickle.dumps(model)
+    words = np.where(X > 0.5, "u", "v")
+    for samples, targets in [(words, Y), (X[:, :2], Y[:9]), (np.full_like(X, np.inf), Y)]:
+        with pytest.raises(ValueError, match=r"."):
+            model.fit(samples, targets)
+        assert pickle.dumps(model) == before
+    monkeypatch.setattr(AnalyticKernel, "__call__", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        model.fit(X[:, :2], Y)
+    assert pickle.dumps(model) == before
+
+
 @pytest.mark.parametrize(
     ("parameters", "error"),
     [
