@@ -16,7 +16,7 @@ array([[1.  , 0.52, 0.15]])
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,6 +32,9 @@ __all__ = ["AnalyticKernel", "correlations", "plot_similarity", "similarity"]
 N_UNITS = 2000
 """Units per pattern where none are named."""
 
+ENTRIES_AT_ONCE = 2**18
+"""Entries of a kernel matrix, each the sum over all inputs, that are computed at a time."""
+
 
 def fitted(coding: str | Coding, n_units: int) -> Coding:
     """Return a coding that knows its bins; on [0, 1] where it has not learned a range."""
@@ -40,6 +43,18 @@ def fitted(coding: str | Coding, n_units: int) -> Coding:
     # Where all values were equal the range is one point, which only such a column fits again.
     is_constant = ends is not None and ends[0] == ends[1]
     return one.fit(np.array(ends if is_constant else [0.0, 1.0]), n_units)
+
+
+def shared(matrices: Iterable[NDArray[np.float64]]) -> tuple[NDArray[np.float64], ...]:
+    """Return the matrices, equal ones as one in memory."""
+    different: list[NDArray[np.float64]] = []
+    found = []
+    for matrix in matrices:
+        same = (other for other in different if np.array_equal(other, matrix))
+        found.append(next(same, matrix))
+        if found[-1] is matrix:
+            different.append(matrix)
+    return tuple(found)
 
 
 def correlations(coding: str | Coding, n_units: int = N_UNITS) -> NDArray[np.float64]:
@@ -117,7 +132,7 @@ class AnalyticKernel:
         self.codings = tuple(fitted(one, n_units) for one in coding)
         self.pairs = tuple(every if pairs is None else pairs)
         self._every = pairs is None
-        self._correlations = tuple(one.correlations(n_units) for one in self.codings)
+        self._correlations = shared(one.correlations(n_units) for one in self.codings)
 
     def __call__(self, X: ArrayLike, Y: ArrayLike | None = None) -> NDArray[np.float64]:
         """Compute the kernel of each two samples.
@@ -144,20 +159,33 @@ class AnalyticKernel:
                 raise ValueError(
                     f"{name} must have shape (n, {len(self.codings)}), got {table.shape}"
                 )
-        rho = [
-            matrix[np.ix_(coding.bins(one[:, index]), coding.bins(other[:, index]))]
-            for index, (coding, matrix) in enumerate(
-                zip(self.codings, self._correlations, strict=True)
-            )
+        bins = [
+            (coding.bins(one[:, index]), coding.bins(other[:, index]))
+            for index, coding in enumerate(self.codings)
         ]
-        total = np.zeros((len(one), len(other)))
-        if self._every and len(rho) > 2:  # the sum over nu != mu by the sums over all
+        kernel = np.empty((len(one), len(other)))
+        n_rows = max(1, ENTRIES_AT_ONCE // max(1, len(other)))
+        for begin in range(0, len(one), n_rows):
+            rows = slice(begin, begin + n_rows)
+            of_inputs = (
+                matrix[np.ix_(of_one[rows], of_other)]
+                for matrix, (of_one, of_other) in zip(self._correlations, bins, strict=True)
+            )
+            kernel[rows] = self._of_correlations(of_inputs, np.zeros_like(kernel[rows]))
+        return kernel
+
+    def _of_correlations(
+        self, of_inputs: Iterator[NDArray[np.float64]], total: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the kernel by the correlations of each input; ``total`` is zeros to work in."""
+        if self._every and len(self.codings) > 2:  # the sum over nu != mu by the sums over all
             squares = np.zeros_like(total)
-            for of_input in rho:
+            for of_input in of_inputs:
                 total += of_input
                 squares += of_input**2
-            n_inputs = len(rho)
+            n_inputs = len(self.codings)
             return ((n_inputs - 1) * total + total**2 - squares) / (2 * n_inputs * (n_inputs - 1))
+        rho = list(of_inputs)
         for mu, nu in self.pairs:
             total += 2 * rho[mu] if mu == nu else (1 + rho[nu]) / 2 * rho[mu]
         return total / sum(2 if mu == nu else 1 for mu, nu in self.pairs)

@@ -53,8 +53,10 @@ class SDNNKernelRidge(RegressorMixin, CodedInputs):
 
     Notes
     -----
-    ``8 n_samples^2`` bytes for the kernel matrix, and a time that grows with the cube of the
-    sample.
+    `fit` takes ``32 n_samples^2`` bytes for any number of features: the kernel matrix, which is
+    kept, and three copies that scikit-learn's solver makes. `predict` takes ``32768 n_samples``
+    bytes. Beside these there are ``8 n_bins^2`` bytes for the correlations of each different
+    coding, of 1,000 bins by default. Time grows with the cube of the sample.
 
     Examples
     --------

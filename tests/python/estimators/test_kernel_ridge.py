@@ -1,6 +1,7 @@
 """Ridge regression with the analytic kernel."""
 
 import pickle
+import tracemalloc
 
 import numpy as np
 import pandas as pd
@@ -79,6 +80,19 @@ def test_learned_codings_are_not_learned_again():
     assert [c.knots for c in model.fit(X[:50], Y[:50]).kernel_.codings] == [
         c.knots for c in codings
     ]
+
+
+@pytest.mark.parametrize("pairs", ["all", [(number, number - 1) for number in range(20)]])
+def test_memory_does_not_grow_with_the_features(pairs):
+    n_samples, n_bins = 1200, 1000
+    samples = np.random.RandomState(0).uniform(0, 1, (n_samples, 20))
+    tracemalloc.start()
+    try:
+        SDNNKernelRidge(pairs=pairs).fit(samples, samples[:, 0])
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 32 * n_samples**2 + 3 * 8 * n_bins**2
 
 
 def test_a_failed_fit_leaves_the_old_model(monkeypatch):
