@@ -152,7 +152,12 @@ def kept_pairs(pairs: Any) -> Any:
     return list(pairs) if isinstance(pairs, Iterator) else pairs
 
 
-def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int) -> list[tuple[int, int]]:
+def input_pairs(
+    pairs: Any,
+    names: Sequence[str] | None,
+    n_inputs: int,
+    words: tuple[str, ...] = ("budget", "all", "auto"),
+) -> list[tuple[int, int]]:
     """Return the ordered pairs (modified, modifier) of features; (mu, mu) is mu's plain pattern.
 
     Parameters
@@ -162,6 +167,8 @@ def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int) -> list[
         pair of different features, and the plain pattern where there is one feature only.
     names, n_inputs
         As of `column_indices`.
+    words : tuple of str
+        What the user may say instead of a list, for the message.
 
     Examples
     --------
@@ -174,9 +181,9 @@ def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int) -> list[
         everything = [(mu, nu) for mu in range(n_inputs) for nu in range(n_inputs) if mu != nu]
         return everything or [(0, 0)]
     if isinstance(pairs, str | Iterator) or not isinstance(pairs, Iterable):
+        possible = ", ".join(map(repr, words))
         raise ValueError(
-            "pairs must be 'budget', 'all', 'auto' or a list of (modified, modifier), "
-            f"got {pairs!r}"
+            f"pairs must be {possible} or a list of (modified, modifier), got {pairs!r}"
         )
     found = []
     for pair in pairs:

@@ -37,8 +37,10 @@ class SDNNKernelRidge(RegressorMixin, CodedInputs):
         As of `SDNNRegressor`.
     alpha : float, default=0.1
         Strength of the penalty, above 0; noisy targets want more.
-    pairs : "all" or list of (modified, modifier), default="all"
-        As of `SDNNRegressor`; all pairs cost no more than two matrices per feature.
+    pairs : "all" or iterable of (modified, modifier), default="all"
+        Pairs of features, by number or name; a modifier of None leaves a pattern plain, which is
+        also what a single feature gets. All pairs take no more time than one per feature, so
+        there is no "budget" of them as of `SDNNRegressor`, nor "auto".
 
     Attributes
     ----------
@@ -115,7 +117,7 @@ class SDNNKernelRidge(RegressorMixin, CodedInputs):
             coding.fit(table[:, index], N_UNITS)
             for index, coding in enumerate(self._codings(X, table))
         ]
-        pairs = input_pairs(self.pairs, self._listed_names(), table.shape[1])
+        pairs = input_pairs(self.pairs, self._listed_names(), table.shape[1], words=("all",))
         every = isinstance(self.pairs, str)
         self.kernel_ = AnalyticKernel(codings, pairs=None if every else pairs)
         self.X_fit_ = table

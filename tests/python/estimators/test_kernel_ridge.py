@@ -115,6 +115,8 @@ def test_a_failed_fit_leaves_the_old_model(monkeypatch):
         ({"alpha": 0}, "alpha must be above 0"),
         ({"alpha": "much"}, "alpha must be a number"),
         ({"pairs": [(0, 9)]}, "there is no number 9"),
+        ({"pairs": "budget"}, r"^pairs must be 'all' or a list of .*, got 'budget'$"),
+        ({"pairs": "auto"}, r"^pairs must be 'all' or a list of .*, got 'auto'$"),
         ({"coding": "unheard"}, "coding must be one of"),
     ],
 )
