@@ -6,6 +6,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from sdnn.coding.base import Coding
 from sdnn.coding.missing import WithMissing
 from sdnn.coding.numeric import Anchor, Circular, RandomInverse
@@ -57,8 +59,16 @@ def to_dict(coding: Coding) -> dict[str, Any]:
     if type(coding) is not CODINGS.get(coding.name):
         raise TypeError(f"only codings of sdnn.coding can be described, got {coding!r}")
     fields = {field.name: getattr(coding, field.name) for field in dataclasses.fields(coding)}  # type: ignore[arg-type]
-    plain = {k: to_dict(v) if isinstance(v, Coding) else v for k, v in fields.items()}
-    return {"coding": coding.name, **plain}
+    return {"coding": coding.name, **{name: plain(value) for name, value in fields.items()}}
+
+
+def plain(value: Any) -> Any:
+    """Replace codings by their descriptions and NumPy's numbers by Python's, in tuples too."""
+    if isinstance(value, Coding):
+        return to_dict(value)
+    if isinstance(value, tuple):
+        return tuple(map(plain, value))
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def from_dict(data: Mapping[str, Any]) -> Coding:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -59,27 +60,35 @@ def plain(value: Any) -> Any:
     Raises
     ------
     TypeError
-        For anything else than words, numbers, codings, and lists of them.
+        For anything else than words, numbers, codings, and lists and dictionaries of them.
     """
     if isinstance(value, Coding):
         return to_dict(value)
     if isinstance(value, np.ndarray | np.generic):
         return plain(value.tolist())
     if isinstance(value, slice):
-        return {"slice": [value.start, value.stop, value.step]}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
+        return {"slice": [plain(end) for end in (value.start, value.stop, value.step)]}
+    if isinstance(value, Mapping):  # whose keys may be numbers, which those of JSON are not
+        return {"dict": [[plain(key), plain(item)] for key, item in value.items()]}
     if isinstance(value, np.random.RandomState):
         return None  # a fitted model draws no more
     if value is None or isinstance(value, str | int | float | bool):
         return value
+    if hasattr(value, "__array__"):  # columns and labels of pandas
+        return plain(np.asarray(value))
+    if isinstance(value, Iterable) and not isinstance(value, bytes | Iterator):
+        return [plain(item) for item in value]
     raise TypeError(f"a parameter cannot be saved: {value!r}")
 
 
 def restored(value: Any) -> Any:
     """Undo `plain`."""
     if isinstance(value, dict):
-        return slice(*value["slice"]) if "slice" in value else from_dict(value)
+        if "slice" in value:
+            return slice(*value["slice"])
+        if "dict" in value:
+            return {restored(key): restored(item) for key, item in value["dict"]}
+        return from_dict(value)
     return [restored(item) for item in value] if isinstance(value, list) else value
 
 

@@ -7,9 +7,19 @@ import pandas as pd
 import pytest
 from safetensors import safe_open
 from safetensors.numpy import save_file
+from sklearn.base import clone
+from sklearn.model_selection import GridSearchCV
 
 from sdnn import SDNNClassifier, SDNNRegressor
-from sdnn.coding import Circular, Coding, CorrelationMatrix, RandomInverse
+from sdnn.coding import (
+    Anchor,
+    Circular,
+    Coding,
+    CorrelationMatrix,
+    RandomInverse,
+    Symbolic,
+    WithMissing,
+)
 
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(0, 1, (60, 3))
@@ -43,6 +53,57 @@ MODELS = {
 def in_lists(parameters):
     """JSON knows no tuples: compare as if there were none."""
     return str(parameters).translate(str.maketrans("()", "[]"))
+
+
+FRAME = pd.DataFrame({"a": X[:, 0], "b": np.digitize(X[:, 1], [0.3, 0.6]), "c": X[:, 2]})
+LABELS = np.digitize(Y, [0])
+NUMPY = (np.int64(40), np.float32(0.3), np.bool_(True))
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        SDNNClassifier(class_weight={0: 1.0, 1: 2.5}, **SMALL),
+        SDNNClassifier(class_weight={label: np.float32(2) for label in np.unique(LABELS)}, **SMALL),
+        SDNNRegressor(RandomInverse(n_bins=NUMPY[0], length_scale=NUMPY[1]), **SMALL),
+        SDNNRegressor(WithMissing(base=RandomInverse(low=np.float32(-1), high=NUMPY[0])), **SMALL),
+        SDNNRegressor([(Symbolic(categories=np.arange(3)), ["b"])], **SMALL),
+        SDNNRegressor([(Anchor(n_interpolated=np.int32(9)), FRAME.columns[:2])], **SMALL),
+        SDNNRegressor([("anchor", range(2))], **SMALL),
+        SDNNRegressor([("anchor", {"a", "b"})], **SMALL),
+        SDNNRegressor([("anchor", pd.Series([True, False, True]))], **SMALL),
+        SDNNRegressor([("anchor", slice(NUMPY[0] - 40, np.int64(2)))], **SMALL),
+        SDNNRegressor(pairs=np.array([[0, 1], [1, 2]]), n_jobs=np.int64(1), verbose=NUMPY[2] & 0),
+        SDNNRegressor(output_range=pd.DataFrame([[-3, 3]]), early_stopping=NUMPY[2], **SMALL),
+    ],
+)
+def test_settings_may_be_of_numpy_and_pandas(model, tmp_path):
+    model.set_params(max_iter=2, n_pattern_units=np.int64(62)).fit(FRAME, LABELS)
+    path = tmp_path / "model.safetensors"
+    model.save(path)
+    same = type(model).load(path)
+    np.testing.assert_array_equal(same.predict(FRAME), model.predict(FRAME))
+    assert same.codings_ == model.codings_
+    if isinstance(model, SDNNClassifier):
+        assert same.class_weight == model.class_weight
+    elif not isinstance(model.coding, list):
+        assert same.coding == model.coding
+    again = [clone(one).set_params(random_state=0).fit(FRAME, LABELS) for one in (same, model)]
+    np.testing.assert_array_equal(again[0].weights_, again[1].weights_)
+
+
+def test_what_a_search_has_found_can_be_saved(tmp_path):
+    grid = {"coding__n_bins": np.arange(20, 50, 10), "coding__length_scale": NUMPY[1:2]}
+    found = GridSearchCV(SDNNRegressor(**SMALL), grid, cv=2).fit(X, Y).best_estimator_
+    found.save(tmp_path / "model.safetensors")
+    assert SDNNRegressor.load(tmp_path / "model.safetensors").coding == found.coding
+
+
+def test_what_has_no_values_cannot_be_saved(tmp_path):
+    for columns in (lambda _: [0], iter([0]), b"a"):
+        model = SDNNRegressor(**SMALL).fit(X, Y).set_params(coding=[("anchor", columns)])
+        with pytest.raises(TypeError, match="a parameter cannot be saved"):
+            model.save(tmp_path / "model.safetensors")
 
 
 @pytest.mark.parametrize("name", MODELS)
