@@ -20,6 +20,19 @@ Self = TypeVar("Self", bound="CodedInputs")
 WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
 
 
+def as_it_came(X: Any) -> Any:
+    """Return samples with words as they are to be checked: every value of its own type."""
+    if hasattr(X, "columns") and hasattr(X, "astype"):
+        return X.astype(object)  # pandas has no common type of categories and its own numbers
+    if hasattr(X, "dtype"):
+        return X
+    try:
+        is_of_words = np.asarray(X).dtype.kind in "SU"
+    except ValueError:  # rows of different lengths
+        return X
+    return np.array(X, dtype=object) if is_of_words else X  # else numbers and NaN become words
+
+
 class CodedInputs(BaseEstimator):
     """Validation of samples for estimators with a parameter ``coding``."""
 
@@ -66,10 +79,8 @@ class CodedInputs(BaseEstimator):
         checks: dict[str, Any] = (
             {"dtype": np.float64} if numeric else {"dtype": None, "ensure_all_finite": False}
         )
-        if not numeric and hasattr(X, "columns") and hasattr(X, "astype"):
-            X = X.astype(object)  # pandas has no common type of categories and its own numbers
         try:
-            return validate_data(self, X, y, **checks, **options)
+            return validate_data(self, X if numeric else as_it_came(X), y, **checks, **options)
         except ValueError as error:
             if "could not convert string" in str(error) and np.asarray(X).dtype.kind in "OSU":
                 raise ValueError(f"{error}; {WORDS_HINT}") from None

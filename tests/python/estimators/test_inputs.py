@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sdnn import SDNNClassifier, SDNNRegressor
+from sdnn import SDNNClassifier, SDNNKernelRidge, SDNNRegressor
 from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic, WithMissing
 from sdnn.estimators import OutOfRangeWarning
 from sdnn.estimators.columns import codings_of_columns, column_indices, input_pairs
@@ -65,6 +65,42 @@ def test_mixed_inputs_are_learned(tables):
     assert model.score(TABLE, TARGETS) > 0.99
     day_later = TABLE.assign(hour=TABLE["hour"] + 24)
     np.testing.assert_allclose(model.predict(day_later), model.predict(TABLE), atol=0.1)
+
+
+LISTED = TABLE[["color", "size"]].values.tolist()
+WORDS = [("symbolic", [0])]
+
+
+@pytest.mark.parametrize("kind", [SDNNRegressor, SDNNKernelRidge])
+def test_lists_of_words_and_numbers_have_the_bits_of_tables(kind):
+    options = SMALL if kind is SDNNRegressor else {}
+    listed = kind(WORDS, **options).fit(LISTED, TARGETS)
+    other = kind(WORDS, **options).fit(TABLE[["color", "size"]].to_numpy(), TARGETS)
+    np.testing.assert_array_equal(listed.predict(LISTED[:9]), other.predict(LISTED[:9]))
+
+
+def test_numbers_in_lists_with_words_stay_numbers():
+    counts = [[color, size > 5, int(size)] for color, size in LISTED]
+    model = SDNNRegressor([("symbolic", [0, 1, 2])], **SMALL).fit(counts, TARGETS)
+    assert [coding.categories for coding in model.codings_] == [
+        ("blue", "green", "red"), (False, True), tuple(range(1, 9)),
+    ]  # fmt: skip
+    assert model.predict_one(counts[0]) == model.predict(counts[:1])[0]
+    assert model.predict_one(["red", True, 3]) == model.predict([["red", True, 3]])[0]
+    with pytest.raises(ValueError, match=r"all words or all numbers"):
+        model.fit([["red", True, 3], ["blue", True, "4"]], [0, 1])
+
+
+@pytest.mark.parametrize("missing", [float("nan"), np.nan, None])
+def test_missing_values_in_lists_of_words_are_seen(missing):
+    gaps = [[missing, size] if size > 8 else [color, size] for color, size in LISTED]
+    with pytest.raises(ValueError, match="a missing value is not a category"):
+        SDNNRegressor(WORDS, **SMALL).fit(gaps, TARGETS)
+    model = SDNNRegressor([(WithMissing(base=Symbolic()), [0])], **SMALL).fit(gaps, TARGETS)
+    assert model.codings_[0].base.categories == ("blue", "green", "red")
+    assert model.predict([[missing, 9.0]]) == model.predict([["pink", 9.0]])
+    with pytest.raises(ValueError, match="inhomogeneous"):
+        model.fit([["red", 1.0], ["blue"]], [0, 1])
 
 
 def test_unknown_categories_and_missing_values_are_refused():
