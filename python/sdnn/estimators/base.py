@@ -28,7 +28,7 @@ from sdnn.estimators.input_code import (
     pattern_units_for,
 )
 from sdnn.estimators.network import FEW_SAMPLES, Network
-from sdnn.estimators.pair_selection import select_pairs
+from sdnn.estimators.pair_selection import select_pairs, with_categories
 from sdnn.estimators.training import History, Trainer, run_epochs
 
 __all__ = ["BaseSDNN", "OutOfRangeWarning"]
@@ -144,6 +144,10 @@ class BaseSDNN(CodedInputs):
         seed = int(check_random_state(self.random_state).randint(2**31 - 1))
         every = share_of_pairs(table.shape[1], PAIR_BUDGET, seed)
         model = clone(self).set_params(random_state=seed, early_stopping=False, verbose=0)
+        codings = self._codings(X, table)
+        known = [with_categories(coding, table[:, i]) for i, coding in enumerate(codings)]
+        if known != codings:
+            model.set_params(coding=[(coding, [index]) for index, coding in enumerate(known)])
         self._selected = select_pairs(model, X, y, weights, every, seed)
 
     def _require_memory(

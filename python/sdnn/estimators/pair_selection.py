@@ -10,7 +10,9 @@ from sklearn.base import clone, is_classifier
 from sklearn.model_selection import KFold, StratifiedKFold
 from sklearn.utils import _safe_indexing
 
-__all__ = ["select_pairs"]
+from sdnn.coding import Coding, CorrelationMatrix, Symbolic, WithMissing
+
+__all__ = ["select_pairs", "with_categories"]
 
 N_FOLDS = 5
 STANDARD_ERRORS = 2.0
@@ -33,6 +35,18 @@ def halved(pairs: Pairs, importances: NDArray[np.float64]) -> Pairs:
     return [pair for pair in pairs if frozenset(pair) in kept]
 
 
+def with_categories(coding: Coding, column: NDArray[Any]) -> Coding:
+    """Return a coding that knows the categories of the whole column, where a part may lack some.
+
+    Where unknown categories count as missing, a part may do without.
+    """
+    base = coding.base if isinstance(coding, WithMissing) else coding
+    is_strict = not isinstance(coding, WithMissing) or coding.unknown == "error"
+    if isinstance(base, CorrelationMatrix) or (isinstance(base, Symbolic) and is_strict):
+        return coding.fit(column, n_units=2)
+    return coding
+
+
 def halving(
     model: Any, X: Any, y: Any, weights: Any, pairs: Pairs, n_levels: int | None = None
 ) -> list[Any]:
@@ -53,7 +67,8 @@ def select_pairs(
 
     In each of five folds the less important half of the pairs is left out again and again. A
     number of pairs is taken if its score is better than that of all pairs by two standard errors
-    of the folds' differences: the best of many scores is better by chance alone.
+    of the folds' differences: the best of many scores is better by chance alone. A fold that has
+    nearly all samples of a class, so that the others have one class only, is left out.
 
     Parameters
     ----------
@@ -81,10 +96,11 @@ def select_pairs(
     scores = [
         [one.score(*part(test)) for one in halving(model, *part(train), pairs)]
         for train, test in splitter.split(labels, labels)
+        if not is_classifier(model) or len(np.unique(labels[train])) > 1
     ]
     gains = np.array(scores) - np.array(scores)[:, :1]
     level = int(np.argmax(gains.mean(axis=0)))
-    error = gains[:, level].std(ddof=1) / np.sqrt(N_FOLDS)
+    error = gains[:, level].std(ddof=1) / np.sqrt(len(scores))
     if level == 0 or gains[:, level].mean() <= STANDARD_ERRORS * error:
         return pairs
     return list(halving(model, X, labels, weights, pairs, level + 1)[-1].pairs_)

@@ -3,9 +3,11 @@
 import itertools
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from sdnn import SDNNClassifier, SDNNRegressor, _core
+from sdnn.coding import CorrelationMatrix, Symbolic, WithMissing
 
 X = np.random.RandomState(0).uniform(size=(600, 8))
 XOR = ((X[:, 2] > 0.5) ^ (X[:, 5] > 0.5)).astype(int)
@@ -47,6 +49,39 @@ def test_all_pairs_stay_where_all_matter():
 def test_few_samples_and_single_features_select_nothing(kind):
     assert len(kind(**OPTIONS, pairs="auto").fit(X[:8], XOR[:8]).pairs_) == 56
     assert kind(**OPTIONS, pairs="auto").fit(X[:, :1], XOR).pairs_ == ((0, 0),)
+
+
+LETTERS = np.where(X[:, 2] > 0.5, "u", "v").astype(object)
+LETTERS[17] = "once"
+CATEGORIES = {
+    "symbolic": "symbolic",
+    "matrix": CorrelationMatrix(matrix=np.eye(3)),
+    "missing": WithMissing(base=Symbolic()),
+    "error": WithMissing(base=Symbolic(), unknown="error"),
+    "missing matrix": WithMissing(base=CorrelationMatrix(matrix=np.eye(3))),
+}
+
+
+@pytest.mark.parametrize("name", CATEGORIES)
+def test_a_category_may_occur_once(name):
+    frame = pd.DataFrame({"a": X[:, 0], "letter": LETTERS, "b": X[:, 5], "c": X[:, 6]})[:100]
+    codings = [(CATEGORIES[name], ["letter"]), ("anchor", ["c"])]
+    model = SDNNRegressor(codings, pairs="auto", **OPTIONS).fit(frame, X[:100, 2] + X[:100, 5])
+    given = SDNNRegressor(codings, pairs=model.pairs_, **OPTIONS)
+    given.fit(frame, X[:100, 2] + X[:100, 5])
+    assert model.coding == codings
+    assert model.codings_ == given.codings_
+    np.testing.assert_array_equal(model.weights_, given.weights_)
+
+
+@pytest.mark.parametrize("n_rare", [1, 3])
+def test_a_class_may_occur_once(n_rare):
+    labels = np.repeat([0, 1], [40 - n_rare, n_rare])
+    model = SDNNClassifier(**OPTIONS, n_units_per_class=4, pairs="auto").fit(X[:40, :3], labels)
+    assert set(model.pairs_) <= {(0, 1), (1, 0), (0, 2), (2, 0), (1, 2), (2, 1)}
+    rest = XOR[:40].copy()
+    rest[0] = 2
+    assert SDNNClassifier(**OPTIONS, pairs="auto").fit(X[:40, :3], rest).score(X[:1, :3], [2]) == 1
 
 
 def test_importances_survive_files(tmp_path):
