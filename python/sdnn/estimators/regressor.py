@@ -74,7 +74,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         the best weights.
     refit : bool, default=False
         Whether to train anew on the whole sample after early stopping, for the best number of
-        epochs.
+        epochs; without early stopping nothing is.
     validation_fraction : float, default=0.1
         The fraction that early stopping holds out.
     n_iter_no_change : int, default=10
@@ -250,17 +250,17 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             )
             return -weighted_mean((held_counts - counts) ** 2, held_weights)
 
-        n_averaged = self.n_averaged_epochs
+        is_first = self.refit and self.early_stopping
         history = self._run(
             trainer,
             len(kept),
             random,
             score,
             None if weights is None else weights[kept],
-            n_averaged_epochs=1 if self.refit else n_averaged,
+            n_averaged_epochs=1 if is_first else self.n_averaged_epochs,
         )
         self._earlier = history.earlier
-        if self.refit and self.early_stopping:
+        if is_first:
             self._refit(bins, counts_to_learn, weights, random, history.n_epochs)
 
     def _refit(

@@ -449,6 +449,9 @@ def test_refitting_trains_on_everything_for_the_best_number_of_epochs():
     best = int(np.argmax(model.validation_scores_))
     whole = SDNNRegressor(**options, max_iter=best + 1).fit(X, noisy)
     np.testing.assert_array_equal(model.weights_, whole.weights_)
+    options["n_averaged_epochs"] = 4
+    one, other = (SDNNRegressor(**options, max_iter=6, refit=refit) for refit in (False, True))
+    np.testing.assert_array_equal(one.fit(X, noisy).predict(X), other.fit(X, noisy).predict(X))
     with pytest.raises(TypeError, match="refit must be True or False"):
         SDNNRegressor(refit="yes").fit(X, Y)
     with pytest.raises(ValueError, match="n_averaged_epochs must be a whole number"):
