@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
@@ -94,7 +94,9 @@ class BaseSDNN(CodedInputs):
             if self.n_pattern_units % 2:
                 raise ValueError(f"n_pattern_units must be even, got {self.n_pattern_units}")
 
-    def _start(self, X: Any, table: NDArray[Any], n_units: int) -> np.random.RandomState:
+    def _start(
+        self, X: Any, table: NDArray[Any], n_units: int, n_networks: int = 1
+    ) -> np.random.RandomState:
         """Fit the codings, draw tables and first weights; returns the generator of orders."""
         self._check_parameters()
         listed = self._listed_names()
@@ -113,7 +115,7 @@ class BaseSDNN(CodedInputs):
         fitted = [
             coding.fit(table[:, index], n_pattern_units) for index, coding in enumerate(codings)
         ]
-        self._require_memory(n_units, len(pairs), n_pattern_units, fitted, pairs)
+        self._require_memory(n_units, n_networks, n_pattern_units, fitted, pairs)
         code = draw_input_code(fitted, pairs, n_pattern_units, self.tables, code_seed)
         self.network_ = Network(code, n_units, seed=weight_seed)
         self._weight_seed = weight_seed
@@ -125,9 +127,13 @@ class BaseSDNN(CodedInputs):
         """Whether `fit` is to go on with the network that is there."""
         return bool(self.warm_start) and hasattr(self, "network_")
 
-    def _go_on(self, table: NDArray[Any]) -> np.random.RandomState:
+    def _go_on(self, table: NDArray[Any], n_networks: int = 1) -> np.random.RandomState:
         """Train a copy of the network from now on; returns the generator of orders."""
         self._check_parameters()
+        if n_networks > 1:
+            code = self.network_.input_code
+            n_units = self.network_.n_units
+            self._require_memory(n_units, n_networks, code.n_units, code.codings, code.pairs)
         self._finite(table, self.codings_)
         self._note_inputs(table)
         self.network_ = self.network_.copy()
@@ -153,18 +159,19 @@ class BaseSDNN(CodedInputs):
     def _require_memory(
         self,
         n_units: int,
-        n_pairs: int,
+        n_networks: int,
         n_pattern_units: int,
-        codings: list[Coding],
-        pairs: list[tuple[int, int]],
+        codings: Sequence[Coding],
+        pairs: Sequence[tuple[int, int]],
     ) -> None:
         """ValueError if weights and patterns take more than the limit, before they are there."""
-        n_bytes = 4 * n_units * n_pairs * n_pattern_units
+        n_bytes = 4 * n_networks * n_units * len(pairs) * n_pattern_units
         n_bytes += code_bytes(codings, pairs, n_pattern_units)
         if n_bytes > self.memory_limit:
+            averaged = f" in {n_networks} networks to be averaged" if n_networks > 1 else ""
             raise ValueError(
-                f"n_pattern_units={n_pattern_units} of {n_pairs} pairs, read by {n_units} units, "
-                f"need {n_bytes} bytes for weights and patterns, more than "
+                f"n_pattern_units={n_pattern_units} of {len(pairs)} pairs, read by {n_units} "
+                f"units{averaged}, need {n_bytes} bytes for weights and patterns, more than "
                 f"memory_limit={self.memory_limit}"
             )
 

@@ -10,7 +10,7 @@ from sklearn.base import RegressorMixin
 
 from sdnn import _core
 from sdnn.arguments import flag, whole
-from sdnn.estimators.base import BaseSDNN
+from sdnn.estimators.base import MOST_EPOCHS, BaseSDNN
 from sdnn.estimators.columns import kept_pairs
 from sdnn.estimators.network import Network
 from sdnn.estimators.training import Trainer, run_epochs, sample_weights, weighted_mean
@@ -82,7 +82,8 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     training : {"auto", "dual", "block", "plain"}, default="auto"
         Form of training; the result is the same to the last bit, time and memory differ.
     memory_limit : int, default=2**30
-        Bytes that weights and patterns may use, and that training may use beside them.
+        Bytes that weights and patterns may use, and that training may use beside them. The
+        networks that are averaged count, and with early stopping those of the best epochs too.
     warm_start : bool, default=False
         Whether `fit` goes on with the network that is there, its ranges, categories and sizes as
         they were, instead of drawing a new one.
@@ -228,10 +229,10 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         weights = sample_weights(sample_weight, len(table))
         if self._goes_on():
             self._check_outputs(targets.shape[1])
-            random = self._go_on(table)
+            random = self._go_on(table, self._n_networks())
         else:
             self._select_pairs(X, table, y, weights)
-            random = self._begin(X, table, targets)
+            random = self._begin(X, table, targets, self._n_networks())
             self.__dict__.pop("_selected", None)
         if self.out_of_range == "widen":
             self._widen(targets.min(axis=0))
@@ -262,6 +263,13 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         self._earlier = history.earlier
         if is_first:
             self._refit(bins, counts_to_learn, weights, random, history.n_epochs)
+
+    def _n_networks(self) -> int:
+        """Return the most networks that `fit` has in memory, those that are averaged among them."""
+        n_epochs = whole("max_iter", self.max_iter, 1, MOST_EPOCHS)
+        n_earlier = min(self.n_averaged_epochs, n_epochs) - 1
+        has_best = flag("early_stopping", self.early_stopping) and not self.refit
+        return 1 + (2 if has_best else 1) * n_earlier  # the best ones beside the last ones
 
     def _refit(
         self,
@@ -463,7 +471,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         return table, targets.reshape(len(targets), -1)
 
     def _begin(
-        self, X: Any, table: NDArray[Any], targets: NDArray[np.float64]
+        self, X: Any, table: NDArray[Any], targets: NDArray[np.float64], n_networks: int = 1
     ) -> np.random.RandomState:
         self.n_outputs_ = targets.shape[1]
         self.output_range_ = self._range_of(targets)
@@ -471,7 +479,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         self._earlier = ()
         n_units = whole("n_output_units", self.n_output_units, 1, 2**20)
         self._counts_of_range = n_units
-        return self._start(X, table, self.n_outputs_ * n_units)
+        return self._start(X, table, self.n_outputs_ * n_units, n_networks)
 
     def _range_of(self, targets: NDArray[np.float64]) -> NDArray[np.float64]:
         if self.output_range is not None:

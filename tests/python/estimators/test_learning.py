@@ -12,6 +12,7 @@ from sklearn.multioutput import MultiOutputClassifier
 from sdnn import SDNNClassifier, SDNNRegressor, _core
 from sdnn.coding import Circular, RandomInverse
 from sdnn.estimators import OutOfRangeWarning
+from sdnn.estimators.input_code import code_bytes
 from sdnn.estimators.training import sample_weights
 
 RANDOM = np.random.RandomState(0)
@@ -418,6 +419,29 @@ def test_answers_of_the_last_epochs_are_averaged(tmp_path):
     assert model.predict(X, return_std=True)[1].max() == 0
     plain = SDNNRegressor(**options, max_iter=6).fit(X, noisy)
     same(plain.learn_one(X[0], Y[0]), model)
+
+
+def test_networks_that_are_averaged_count_in_memory():
+    plain = {**REGRESSOR, "output_range": (-3, 3)}
+    model = SDNNRegressor(**plain, max_iter=2).fit(X, Y)
+    weights = 4 * model.weights_.size
+    table_bytes = code_bytes(model.codings_, model.pairs_, model.network_.input_code.n_units)
+    options = {**plain, "n_averaged_epochs": 5}
+    for more, n_networks in [
+        ({"max_iter": 8}, 5),
+        ({"max_iter": 3}, 3),
+        ({"max_iter": 8, "early_stopping": True}, 9),
+        ({"max_iter": 8, "early_stopping": True, "refit": True}, 5),
+    ]:
+        room = n_networks * weights + table_bytes
+        SDNNRegressor(**options, **more, training="plain", memory_limit=room).fit(X, Y)
+        model = SDNNRegressor(**options, **more, training="plain", memory_limit=room - 1)
+        with pytest.raises(ValueError, match=f"in {n_networks} networks to be averaged, need"):
+            model.fit(X, Y)
+        model.partial_fit(X, Y).learn_one(X[0], Y[0])  # which average nothing
+    model.set_params(warm_start=True, refit=False, early_stopping=False)
+    with pytest.raises(ValueError, match="in 5 networks to be averaged, need"):
+        model.fit(X, Y)
 
 
 def test_averaging_helps_on_noisy_targets():
