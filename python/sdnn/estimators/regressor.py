@@ -234,10 +234,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
             self._select_pairs(X, table, y, weights)
             random = self._begin(X, table, targets, self._n_networks())
             self.__dict__.pop("_selected", None)
-        if self.out_of_range == "widen":
-            self._widen(targets.min(axis=0))
-            self._widen(targets.max(axis=0))
-        counts_to_learn = self._counts_to_learn(targets)
+        counts_to_learn = self._counts_to_learn(targets, at_once=True)
         bins = self.network_.input_code.bins(table)
         held, kept = self._split(random, len(table))
         trainer = self._trainer(self.network_, bins[kept], counts_to_learn[kept], self.max_iter)
@@ -300,7 +297,9 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
 
         Samples given one at a time, in any portions, or all at once give the same weights, which
         are also those of `fit` with ``max_iter=1, shuffle=False``, provided that ranges and
-        categories are given. What is not given is learned from the samples of the first call.
+        categories are given. What is not given is learned from the samples of the first call. With
+        ``out_of_range="widen"`` `fit` differs if a target is beyond the range: there all of them
+        widen it first, here each as it comes.
 
         Parameters
         ----------
@@ -523,8 +522,13 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         values: NDArray[np.float64] = self._step() * counts + self.output_range_[:, 0]
         return values
 
-    def _counts_to_learn(self, targets: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Targets in counts; those beyond the range are counted, refused, or widen it."""
+    def _counts_to_learn(
+        self, targets: NDArray[np.float64], at_once: bool = False
+    ) -> NDArray[np.float64]:
+        """Targets in counts; those beyond the range are counted, refused, or widen it.
+
+        They widen it one after the other, as if they came so, or all at once.
+        """
         counts = self._in_counts(targets)
         if counts.min() >= 0 and counts.max() <= self._counts_of_range:
             return counts
@@ -542,6 +546,11 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         if self.out_of_range == "clip":
             self.n_outputs_out_of_range_ += int(np.count_nonzero(outside))
             return counts
+        if at_once:
+            self.n_outputs_out_of_range_ += int(np.count_nonzero(outside))
+            self._widen(targets.min(axis=0))
+            self._widen(targets.max(axis=0))
+            return self._in_counts(targets)
         begin = 0
         for row in np.flatnonzero(outside.any(axis=1)).tolist():
             counts[begin:row] = self._in_counts(targets[begin:row])

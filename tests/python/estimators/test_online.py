@@ -211,6 +211,23 @@ def test_a_range_that_widens_follows_a_drift():
     assert widening.score(X, Y + 10) > 0.9
 
 
+def test_fit_counts_and_says_what_widens_a_range():
+    targets = np.stack([9 * Y, Y], axis=1)
+    beyond = int(np.count_nonzero(abs(targets) > 1.5))
+    model = regressor(out_of_range="widen")
+    with pytest.warns(OutOfRangeWarning, match=r"beyond output_range_ .* widen it") as caught:
+        model.fit(X, targets)
+    assert len(caught) == 1
+    assert caught[0].filename == __file__
+    assert model.n_outputs_out_of_range_ == beyond > 0
+    low = 9 * Y.min() - 0.2 * (1.5 - 9 * Y.min())
+    high = 9 * Y.max() + 0.2 * (9 * Y.max() - low)
+    np.testing.assert_allclose(model.output_range_[0], [low, high])
+    assert model.output_range_[1].tolist() == [-1.5, 1.5]
+    model.set_params(warm_start=True).fit(X, targets)
+    assert model.n_outputs_out_of_range_ == beyond
+
+
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
 def test_a_range_widens_alike_in_any_portions():
     drifting = Y + np.linspace(0, 9, len(Y))
