@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import contextlib
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -17,7 +18,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from sdnn import _core
 from sdnn.arguments import flag, one_of, real, whole
-from sdnn.coding import Coding
+from sdnn.coding import Coding, WithMissing
 from sdnn.estimators import files
 from sdnn.estimators.coded_inputs import CodedInputs
 from sdnn.estimators.columns import input_pairs, share_of_pairs
@@ -253,15 +254,7 @@ class BaseSDNN(CodedInputs):
     def _row(self, x: Any) -> NDArray[Any]:
         """Return one sample, shape (n_features,), checked; see `learn_one`."""
         if isinstance(x, Mapping):
-            names = getattr(self, "feature_names_in_", None)
-            if names is None:
-                raise ValueError("x must be a 1-D array: the features were learned without names")
-            try:
-                values: Any = [x[name] for name in names] if len(x) == len(names) else None
-            except KeyError:
-                values = None
-            if values is None:
-                raise ValueError(f"x must have the features {names.tolist()}, got {list(x)}")
+            values: Any = self._values_of(x)
         else:
             values = x
         if self._fitted_network.input_code.is_numeric:
@@ -276,6 +269,21 @@ class BaseSDNN(CodedInputs):
         if row.shape != (self.n_features_in_,):
             raise ValueError(f"x must have {self.n_features_in_} features, got {x!r}")
         return row if row.dtype == np.float64 else self._finite(row[None], self.codings_)[0]
+
+    def _values_of(self, x: Mapping[Any, Any]) -> list[Any]:
+        """Return a sample's values in the order of the features, None for one that is missing."""
+        names = getattr(self, "feature_names_in_", None)
+        if names is None:
+            raise ValueError("x must be a 1-D array: the features were learned without names")
+        if len(x) == len(names):
+            with contextlib.suppress(KeyError):
+                return [x[name] for name in names]
+        coded = zip(names, self.codings_, strict=True)
+        optional = {name for name, coding in coded if isinstance(coding, WithMissing)}
+        if not set(names) - optional <= set(x) <= set(names):
+            but = f", of which {sorted(optional)} may be missing" if optional else ""
+            raise ValueError(f"x must have the features {names.tolist()}{but}, got {list(x)}")
+        return [x.get(name) for name in names]
 
     def _table_of_one(self, x: Any) -> NDArray[Any]:
         """Return the first sample of all as a table; a mapping gives names to the features."""

@@ -310,7 +310,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         Parameters
         ----------
         x : array_like of shape (n_features,), or mapping from feature names to values
-            The names of a mapping that comes first of all are those of the features.
+            The names of a mapping that comes first of all are those of the features. Later ones
+            may lack features whose coding is `WithMissing`: their values are missing.
         y : label
         classes : array_like, shape (n_classes,), optional
             All labels that can occur; needed in the first call.
@@ -358,6 +359,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         Parameters
         ----------
         x : array_like of shape (n_features,), or mapping from feature names to values
+            As of `learn_one`.
 
         Raises
         ------

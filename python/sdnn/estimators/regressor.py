@@ -339,7 +339,8 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         Parameters
         ----------
         x : array_like of shape (n_features,), or mapping from feature names to values
-            The names of a mapping that comes first of all are those of the features.
+            The names of a mapping that comes first of all are those of the features. Later ones
+            may lack features whose coding is `WithMissing`: their values are missing.
         y : float or array_like of shape (n_outputs,)
 
         Returns
@@ -393,6 +394,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         Parameters
         ----------
         x : array_like of shape (n_features,), or mapping from feature names to values
+            As of `learn_one`.
 
         Returns
         -------

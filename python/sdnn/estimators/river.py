@@ -76,7 +76,9 @@ class RiverRegressor(Waiting, base.Regressor):
     Parameters
     ----------
     model : SDNNRegressor
-        How to learn; it is cloned. ``out_of_range="widen"`` suits streams that drift.
+        How to learn; it is cloned. ``out_of_range="widen"`` suits streams that drift. Features
+        that samples may lack want the coding "with-missing", or another `WithMissing`; the first
+        samples have to show all features.
     grace_period : int, default=100
         Samples from which ranges and categories are learned first. Until then the mean target is
         predicted.
@@ -102,7 +104,7 @@ class RiverClassifier(Waiting, base.Classifier):
     Parameters
     ----------
     model : SDNNClassifier
-        How to learn; it is cloned.
+        How to learn; it is cloned. Features that samples may lack as of `RiverRegressor`.
     grace_period : int, default=100
         Samples from which ranges, categories and the classes are learned first, and more until
         there are two classes. Until then the most frequent label is predicted. Samples of classes

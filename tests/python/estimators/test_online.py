@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from sdnn import SDNNClassifier, SDNNRegressor
-from sdnn.coding import Circular, RandomInverse
+from sdnn.coding import Circular, RandomInverse, Symbolic, WithMissing
 from sdnn.estimators import OutOfRangeWarning
 from sdnn.estimators.network import FEW_SAMPLES
 
@@ -97,6 +97,21 @@ def test_threads_may_predict_at_once(kind, learns):
     with ThreadPoolExecutor(4) as pool:
         outcomes = [pool.submit(works[number % 3]) for number in range(300)]
         assert all(outcome.result() for outcome in outcomes)
+
+
+def test_features_that_may_be_missing_may_be_left_out():
+    codings = [("with-missing", ["b"]), (WithMissing(base=Symbolic()), ["word"])]
+    rows = [{**row, "word": "uv"[row["d"] > 0.5]} for row in ROWS]
+    rows[3] = {**rows[3], "b": None, "word": None}
+    model = SDNNRegressor(codings, **OPTIONS).fit(pd.DataFrame(rows), Y)
+    lacking = {name: value for name, value in rows[3].items() if name not in ("b", "word")}
+    assert model.predict_one(lacking) == model.predict_one(rows[3])
+    other = copy.deepcopy(model)
+    same(model.learn_one(lacking, 0.5), other.learn_one(rows[3], 0.5))
+    error = r"x must have the features \['a', .*\], of which \['b', 'word'\] may be missing, got"
+    for bad in ({**lacking, "e": 1.0}, {"b": 0.5, "word": "u"}, {**lacking, "word": "u", "e": 1.0}):
+        with pytest.raises(ValueError, match=error):
+            model.predict_one(bad)
 
 
 def test_copies_learn_apart():
@@ -307,3 +322,22 @@ def test_labels_of_equal_number_are_predicted_in_their_order():
     for row, label in zip(ROWS, ["red", "green", "blue", "blue", "green", "red"], strict=False):
         model.learn_one(row, label)
     assert model.predict_one(ROWS[0]) == "red"
+
+
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
+def test_features_of_river_streams_may_come_and_go():
+    pytest.importorskip("river")
+    from sdnn.estimators.river import RiverRegressor
+
+    with_gaps = RiverRegressor(SDNNRegressor("with-missing", **OPTIONS), grace_period=20)
+    without = RiverRegressor(SDNNRegressor(**OPTIONS), grace_period=20)
+    for number, (row, y) in enumerate(zip(ROWS[:60], Y, strict=False)):
+        sample = {name: row[name] for name in NAMES if number % 5 or name != "c"}
+        with_gaps.learn_one(sample, y)
+        if number < 20 or "c" in sample:
+            without.learn_one(row, y)
+    lacking = {name: ROWS[0][name] for name in "abd"}
+    assert with_gaps.predict_one(lacking) == with_gaps.predict_one({**lacking, "c": None})
+    for use in (without.predict_one, lambda x: without.learn_one(x, 0.5)):
+        with pytest.raises(ValueError, match=r"x must have the features .* got \['a', 'b', 'd'\]"):
+            use(lacking)
