@@ -366,10 +366,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         NotFittedError, ValueError
             As of `predict`.
         """
-        network = self._fitted_network
-        network.online(self.memory_limit)
-        bins = network.input_code.bins_of_row(self._row(x))
-        decision = self._decision_of_bins(bins, n_threads=1)
+        decision = self._decision_of_bins(self._bins_of_one(x), n_threads=1)
         return self.classes_[self._winners(decision)[0]]
 
     def decision_function(self, X: ArrayLike) -> NDArray[np.float64]:
@@ -445,7 +442,38 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             As of `predict`.
         """
         table = self._table(X)
-        scores = self._scores(self.network_.input_code.bins(table), self._n_threads())
+        return self._probabilities(self.network_.input_code.bins(table), self._n_threads())
+
+    @available_if(_has_several_units)  # type: ignore[untyped-decorator]
+    def predict_proba_one(self, x: Any) -> NDArray[np.float64]:
+        """Estimate the probabilities of one sample: `predict_proba` of a row, without its overhead.
+
+        Parameters
+        ----------
+        x : array_like of shape (n_features,), or mapping from feature names to values
+            As of `learn_one`.
+
+        Returns
+        -------
+        ndarray, shape (n_classes,)
+            In the order of ``classes_``.
+
+        Raises
+        ------
+        NotFittedError, ValueError
+            As of `predict`.
+        """
+        of_one: NDArray[np.float64] = self._probabilities(self._bins_of_one(x), n_threads=1)[0]
+        return of_one
+
+    def _bins_of_one(self, x: Any) -> NDArray[np.int32]:
+        """Return the bins of one sample, whose answer is wanted without overhead."""
+        network = self._fitted_network
+        network.online(self.memory_limit)
+        return network.input_code.bins_of_row(self._row(x))
+
+    def _probabilities(self, bins: NDArray[np.int32], n_threads: int) -> NDArray[np.float64]:
+        scores = self._scores(bins, n_threads)
         raised = np.exp(STEEPNESS * (scores - scores.max(axis=1, keepdims=True)))
         probabilities: NDArray[np.float64] = raised / raised.sum(axis=1, keepdims=True)
         return probabilities

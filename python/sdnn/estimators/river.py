@@ -5,6 +5,7 @@ Needs river, of the extra ``sdnn[river]``; nothing else of this package does.
 
 from __future__ import annotations
 
+import collections
 from collections.abc import Hashable, Mapping
 from typing import Any
 
@@ -107,8 +108,8 @@ class RiverClassifier(Waiting, base.Classifier):
         How to learn; it is cloned. Features that samples may lack as of `RiverRegressor`.
     grace_period : int, default=100
         Samples from which ranges, categories and the classes are learned first, and more until
-        there are two classes. Until then the most frequent label is predicted. Samples of classes
-        that come later are errors.
+        there are two classes. Until then the most frequent label is predicted, and the share of
+        each label so far is its probability. Samples of classes that come later are errors.
     """
 
     def __init__(self, model: SDNNClassifier, grace_period: int = 100) -> None:
@@ -126,3 +127,20 @@ class RiverClassifier(Waiting, base.Classifier):
             return self.fitted.predict_one(named(x))
         # The first to come where several are equally frequent.
         return max(dict.fromkeys(self.targets), key=self.targets.count, default=None)
+
+    def predict_proba_one(self, x: dict[Hashable, Any], **_options: Any) -> dict[Any, float]:
+        """Estimate the probability of each label; none before the first sample.
+
+        Of the first samples it is each label's share so far. NotImplementedError if the model has
+        one unit per class or pair of classes, which tell no probabilities.
+        """
+        if not hasattr(self.model, "predict_proba_one"):
+            raise NotImplementedError(
+                "probabilities need scheme='one_vs_rest' and more than one of n_units_per_class, "
+                f"got {self.model!r}"
+            )
+        if self.fitted is None:
+            n_samples = len(self.targets)
+            return {y: n / n_samples for y, n in collections.Counter(self.targets).items()}
+        each = self.fitted.predict_proba_one(named(x)).tolist()
+        return dict(zip(self.fitted.classes_.tolist(), each, strict=True))

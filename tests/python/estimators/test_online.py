@@ -341,3 +341,42 @@ def test_features_of_river_streams_may_come_and_go():
     for use in (without.predict_one, lambda x: without.learn_one(x, 0.5)):
         with pytest.raises(ValueError, match=r"x must have the features .* got \['a', 'b', 'd'\]"):
             use(lacking)
+
+
+@pytest.mark.parametrize("n_classes", [2, 3])
+def test_probabilities_of_one_have_the_bits_of_those_of_many(n_classes):
+    model = classifier().fit(X, np.minimum(LABELS, n_classes - 1))
+    each = [model.predict_proba_one(row) for row in X[:50]]
+    np.testing.assert_array_equal(each, model.predict_proba(X[:50]))
+    assert not hasattr(classifier(scheme="one_vs_one"), "predict_proba_one")
+    assert not hasattr(classifier(n_units_per_class=1), "predict_proba_one")
+
+
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
+def test_river_measures_and_wraps_what_has_probabilities():
+    pytest.importorskip("river")
+    from river import evaluate, metrics, multiclass
+
+    from sdnn.estimators.river import RiverClassifier
+
+    model = RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
+    assert model.predict_proba_one(ROWS[0]) == {}
+    for row, label in zip(ROWS, ["red", "green", "red", "red"], strict=False):
+        model.learn_one(row, label)
+    assert model.predict_proba_one(ROWS[0]) == {"red": 0.75, "green": 0.25}
+    single = RiverClassifier(SDNNClassifier(**OPTIONS, scheme="one_vs_one"))
+    with pytest.raises(NotImplementedError, match="probabilities need scheme='one_vs_rest'"):
+        single.predict_proba_one(ROWS[0])
+    stream = list(zip(ROWS, (Y > 0.2).tolist(), strict=True)) * 3
+    model = RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
+    metric = evaluate.progressive_val_score(stream, model, metrics.ROCAUC() + metrics.LogLoss())
+    assert metric[0].get() > 0.9
+    assert metric[1].get() < 0.5
+    shares = model.predict_proba_one(ROWS[0])
+    assert list(map(type, shares)) == [bool, bool]
+    assert model.predict_one(ROWS[0]) == max(shares, key=shares.get)
+    wrapped = multiclass.OneVsRestClassifier(
+        RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
+    )
+    stream = list(zip(ROWS, LABELS.tolist(), strict=True)) * 3
+    assert evaluate.progressive_val_score(stream, wrapped, metrics.Accuracy()).get() > 0.7
