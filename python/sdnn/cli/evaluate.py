@@ -7,7 +7,13 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.run_options import json_option, run_argument, run_command, seed_option
+from sdnn.cli.run_options import (
+    json_option,
+    run_argument,
+    run_command,
+    seed_option,
+    words_of_run,
+)
 
 
 @click.command()
@@ -23,7 +29,7 @@ def evaluate(folder: Path, episodes: int, seed: int | None, as_json: bool) -> No
 
     from sdnn.runs import Run
 
-    with run_command():
+    with run_command(words_of_run(folder)):
         found = Run.open(folder).evaluate(episodes, seed)
     returns = found.returns
     low, median, high = np.percentile(returns, (25, 50, 75)).tolist()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.run_options import json_option, run_command
+from sdnn.cli.run_options import json_option, run_command, words_of_run
 
 
 @click.command()
@@ -37,7 +37,7 @@ def export(
     from sdnn.agents import export_c_header, load_agent
     from sdnn.runs import Run
 
-    with run_command():
+    with run_command(words_of_run(source)):
         try:
             agent = Run.open(source).agent() if source.is_dir() else load_agent(source)
         except ValueError as error:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.run_options import run_command
+from sdnn.cli.run_options import option_words, run_command
 
 
 @click.command()
@@ -35,6 +35,6 @@ def plot(folders: tuple[Path, ...], out: Path | None) -> None:
 
     chosen = tuple(dict.fromkeys(folders))
     path = out or (chosen[0] / "curves.png" if len(chosen) == 1 else Path("curves.png"))
-    with run_command():
+    with run_command(option_words):
         files = write_curves(curves_of([Run.open(folder) for folder in chosen]), path)
     click.echo("wrote " + " and ".join(map(str, files)))

@@ -6,7 +6,13 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.run_options import json_option, run_argument, run_command, train_run
+from sdnn.cli.run_options import (
+    json_option,
+    run_argument,
+    run_command,
+    train_run,
+    words_of_run,
+)
 
 
 @click.command()
@@ -24,5 +30,5 @@ def resume(folder: Path, steps: int | None, episodes: int | None, as_json: bool)
     """
     from sdnn.runs import Run
 
-    with run_command(folder):
+    with run_command(words_of_run(folder), folder=folder):
         train_run(Run.open(folder), as_json, steps=steps, episodes=episodes)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ import click
 from sdnn.cli.output import EXIT_INTERRUPTED
 
 if TYPE_CHECKING:
-    from sdnn.runs import Run, RunOutcome
+    from sdnn.runs import ConfigError, Run, RunOutcome
 
 EXIT_TERMINATED = 143
 
@@ -48,6 +49,66 @@ def option_of(key: str) -> str:
     return "--" + key.replace("_", "-")
 
 
+_CAUSES = {"environment.ranges": ("environment.noise", "environment.redundant")}
+"""Of what is missing: what asks for it."""
+
+
+class Origins:
+    """Where the values of a configuration come from: options, and a file before them."""
+
+    def __init__(self) -> None:
+        self._places: dict[str, str] = {}
+
+    def add_file(self, path: Path) -> None:
+        """Note the values of a file; ConfigError if it cannot be read."""
+        from sdnn.runs.config import places_in
+
+        self._places |= places_in(path)
+
+    def add_option(self, key: str) -> None:
+        """Note that an option gave a value, whatever a file says."""
+        self._places[key] = ""
+
+    def words(self, error: ConfigError) -> str:
+        """Tell an error with the option, or with file, line and key."""
+        place = self._place(error.key, error.problem)
+        return f"{place}: {error.key}: {error.problem}" if place else option_words(error)
+
+    def _place(self, key: str, problem: str) -> str:
+        if key in self._places:
+            return self._places[key]
+        near = [one for one in self._places if _is_in(one, key) or _is_in(key, one)]
+        near = near or [one for one in _CAUSES.get(key, ()) if one in self._places]
+        near = near or [one for one in self._places if _is_in(one, _table_of(key))]
+        words = set(re.findall(r"\w+", problem))
+        near.sort(key=lambda one: one.rpartition(".")[2] not in words)
+        return self._places[near[0]] if near else ""
+
+
+def _is_in(key: str, table: str) -> bool:
+    return key.startswith(f"{table}.")
+
+
+def _table_of(key: str) -> str:
+    return key.rpartition(".")[0]
+
+
+def option_words(error: ConfigError) -> str:
+    """Tell an error in what options gave."""
+    return f"{option_of(error.key)}: {error.problem}"
+
+
+def words_of_run(folder: Path) -> Callable[[ConfigError], str]:
+    """Tell errors in what a run's own configuration says; its goal may be an option."""
+
+    def words(error: ConfigError) -> str:
+        if error.key in ("steps", "episodes"):
+            return option_words(error)
+        return f"{folder / 'config.json'}: {error.key}: {error.problem}"
+
+    return words
+
+
 def value_of(text: str) -> Any:
     """Read a value as TOML has it, such as 0.5, true or [1, 2]; anything else is a text."""
     if sys.version_info >= (3, 11):
@@ -72,11 +133,13 @@ def named_values(option: str, pairs: Iterable[str]) -> Iterator[tuple[str, str]]
 
 
 @contextmanager
-def run_command(folder: Path | None = None) -> Iterator[None]:
+def run_command(
+    words: Callable[[ConfigError], str], *, folder: Path | None = None
+) -> Iterator[None]:
     """Let environments be modules of the present folder, and tell errors that users can mend.
 
-    They become a line and an exit code; those of a configuration that comes from options, not from
-    a file, name the option. ``folder`` is what an interrupted run goes on from.
+    They become a line and an exit code. ``words`` tells those of a configuration that do not say
+    where it stands; ``folder`` is what an interrupted run goes on from.
     """
     from sdnn.runs import ConfigError, RunError, RunTerminatedError
 
@@ -85,9 +148,7 @@ def run_command(folder: Path | None = None) -> Iterator[None]:
     try:
         yield
     except ConfigError as error:
-        if error.place:
-            raise click.UsageError(str(error)) from error
-        raise click.UsageError(f"{option_of(error.key)}: {error.problem}") from error
+        raise click.UsageError(str(error) if error.place else words(error)) from error
     except RunTerminatedError as error:
         _tell_how_to_resume("terminated", folder)
         raise click.exceptions.Exit(EXIT_TERMINATED) from error

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sdnn.cli.run_options import json_option, named_values, run_command, train_run, value_of
+from sdnn.cli.run_options import (
+    Origins,
+    json_option,
+    named_values,
+    run_command,
+    train_run,
+    value_of,
+)
 
 if TYPE_CHECKING:
     from sdnn.runs import RunConfig
@@ -129,8 +136,9 @@ def train(
     and, in the end, the agent. Ctrl-C stops after a checkpoint; `sdnn resume` goes on, also after a
     crash, as if nothing had happened.
     """
-    with run_command():
-        config = _config(env_id, file, options)
+    origins = Origins()
+    with run_command(origins.words):
+        config = _config(env_id, file, options, origins)
         folder = out or _folder_of(config)
         if dry_run:
             from sdnn.runs import Run
@@ -138,7 +146,7 @@ def train(
             Run(folder, config).check()
             click.echo(json.dumps({"folder": str(folder), **config.values()}, indent=2))
             return
-    with run_command(folder):
+    with run_command(origins.words, folder=folder):
         from sdnn.runs import Run
 
         if (folder / "config.json").exists():
@@ -149,11 +157,19 @@ def train(
         train_run(run, as_json, steps=None, episodes=None)
 
 
-def _config(env_id: str | None, file: Path | None, options: Mapping[str, Any]) -> RunConfig:
-    """Make the configuration of a file, and of options, which come before it."""
+def _config(
+    env_id: str | None, file: Path | None, options: Mapping[str, Any], origins: Origins
+) -> RunConfig:
+    """Make the configuration of a file, and of options, which come before it.
+
+    ``origins`` is told where each value comes from.
+    """
     from sdnn.runs import RunConfig
 
-    values = {} if file is None else RunConfig.read(file, env_id).values()
+    values: dict[str, Any] = {}
+    if file is not None:
+        values = RunConfig.read(file, env_id).values()
+        origins.add_file(file)
     values.pop("version", None)
     environment = dict(values.get("environment", {}))
     settings = {section: dict(own) for section, own in values.get("settings", {}).items()}
@@ -163,24 +179,34 @@ def _config(env_id: str | None, file: Path | None, options: Mapping[str, Any]) -
         if not dot:
             raise click.UsageError(f"--set {name}: must be SECTION.NAME, such as learning.discount")
         settings.setdefault(section, {})[setting] = value_of(text)
+        origins.add_option(f"settings.{name}")
     if env_id is not None:
         environment["id"] = env_id
+        origins.add_option("environment.id")
     if "id" not in environment:
         raise click.UsageError("ENV_ID must be given, or a --config that names an environment")
     kwargs = {name: value_of(text) for name, text in named_values("--env-arg", given.pop("kwargs"))}
     environment["kwargs"] = {**environment.get("kwargs", {}), **kwargs}
+    for name in kwargs:
+        origins.add_option(f"environment.kwargs.{name}")
     texts = given.pop("ranges")
     if "seen" in texts:
         settings.setdefault("agent", {})["observation_range"] = "seen"
+        origins.add_option("settings.agent.observation_range")
     ranges = dict(_range(text) for text in texts if text != "seen")
     environment["ranges"] = {**environment.get("ranges", {}), **ranges}
+    for name in ranges:
+        origins.add_option(f"environment.ranges.{name}")
     for name in ("noise", "redundant"):
         if name in given:
             environment[name] = given.pop(name)
+            origins.add_option(f"environment.{name}")
     if "steps" in given and "episodes" in given:
         raise click.UsageError("--steps and --episodes must not be given together")
     if "steps" in given or "episodes" in given:
         values = {name: v for name, v in values.items() if name not in ("steps", "episodes")}
+    for name in given:
+        origins.add_option(name)
     if given.get("agent", "sdnn") != "sdnn" and "preset" not in given:
         values.pop("preset", None)
     return RunConfig.from_values(

@@ -6,7 +6,7 @@ import dataclasses
 import json
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -37,7 +37,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["AGENTS", "DEFAULT_STEPS", "RunConfig", "read_json", "read_values"]
+__all__ = ["AGENTS", "DEFAULT_STEPS", "RunConfig", "places_in", "read_json", "read_values"]
 
 FORMAT = "sdnn-run"
 FORMAT_VERSION = 1
@@ -345,6 +345,27 @@ def read_values(path: Path) -> tuple[dict[str, Any], dict[Any, int]]:
         line = re.search(r"at line (\d+)", str(error))
         place = f"{path}:{line[1]}" if line else str(path)
         raise ConfigError("", f"must be TOML: {error}", place) from error
+
+
+def places_in(path: Path) -> dict[str, str]:
+    """Say where each value of a file stands, by its key: the file, and the line in TOML.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be read or is something else.
+    """
+    values, lines = read_values(path)
+    return {key: place_of(path, lines, key) for key in _keys_of(values)}
+
+
+def _keys_of(values: Mapping[str, Any], table: str = "") -> Iterator[str]:
+    """List the keys of values, with dots between tables."""
+    for name, value in values.items():
+        if isinstance(value, Mapping) and value:
+            yield from _keys_of(value, f"{table}{name}.")
+        else:
+            yield table + name
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -293,6 +293,96 @@ def test_an_error_in_a_file_names_file_line_and_key(invoke, tmp_path):
     assert "mine.toml:2: steps: must be a whole number" in result.stderr
 
 
+NOISY_FILE = """\
+[environment]
+id = "CartPole-v1"
+noise = 0.1
+"""
+FILE = """\
+agent = "rbf"
+[environment]
+id = "CartPole-v1"
+ranges = { 1 = [-3, 3], 9 = [-3, 3] }
+kwargs.colour = 5
+[settings]
+learning.discount = 1.5
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "arguments", "words"),
+    [
+        ('environment = "Nothing-v0"\n', [], "mine.toml:1: environment.id: no environment"),
+        ('environment = "A"\n', ["Nothing-v0"], "Error: ENV_ID: no environment 'Nothing-v0'"),
+        ('[environment]\nid = "Nothing-v0"\n', [], "mine.toml:2: environment.id: no environ"),
+        (FILE, [], "mine.toml:5: environment.kwargs: CartPole-v1 cannot be made"),
+        (
+            FILE,
+            ["--env-arg", "max_episode_steps=9"],
+            "mine.toml:5: environment.kwargs: CartPole-v1 cannot be made",
+        ),
+        (FILE, ["Pendulum-v1", "--env-arg", "g=[]"], "mine.toml:5: environment.kwargs: Pend"),
+        (
+            FILE.replace("colour", "max_episode_steps"),
+            ["--env-arg", "shape=1"],
+            "Error: --env-arg: CartPole-v1 cannot be made",
+        ),
+        (
+            FILE.replace("kwargs.colour", "# "),
+            [],
+            "mine.toml:4: environment.ranges.9: CartPole-v1 has the variables 0 to 3, got 9",
+        ),
+        (
+            FILE.replace("kwargs.colour", "# ").replace("9 =", "3 ="),
+            [],
+            "mine.toml:7: settings.learning.discount: discount must be in [0, 1], got 1.5",
+        ),
+        (
+            FILE.replace("kwargs.colour", "# ").replace("9 =", "3 ="),
+            ["--set", "learning.discount=2"],
+            "Error: --set learning.discount: discount must be in [0, 1], got 2",
+        ),
+        (
+            FILE.replace("kwargs.colour", "# ").replace("9 =", "3 ="),
+            ["--range", "8=0:1"],
+            "Error: --range: CartPole-v1 has the variables 0 to 3, got 8",
+        ),
+        (NOISY_FILE, [], "mine.toml:3: environment.ranges: noise and redundant need the range"),
+        (NOISY_FILE, ["--noise", 0.2], "Error: --range: noise and redundant need the range"),
+        (
+            "[settings.agent]\nobservation_range = 'seen'\n",
+            ["CartPole-v1", "--range", "0:1"],
+            "Error: --range: must not be given together with ranges that are seen",
+        ),
+        (
+            "[settings.approximator]\nn_hidden_units = 1000000000\n",
+            ["CartPole-v1"],
+            "mine.toml:2: settings.approximator.n_hidden_units: ",
+        ),
+    ],
+)
+def test_mistakes_in_a_file_are_told_apart_from_those_in_options(
+    invoke, tmp_path, text, arguments, words
+):
+    (tmp_path / "mine.toml").write_text(text)
+    result = invoke("train", "--config", "mine.toml", *arguments)
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
+
+
+def test_mistakes_in_a_runs_own_configuration_name_its_file(invoke, tmp_path):
+    assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
+    path = Path("one/config.json")
+    path.write_text(path.read_text().replace("Drifting-v0", "Gone-v0"))
+    for command in (["resume", "one"], ["evaluate", "one"], ["record", "one", "x.gif"]):
+        result = invoke(*command)
+        assert result.exit_code == 2
+        assert f"Error: {path}: environment.id: no environment" in result.stderr
+    result = invoke("resume", "one", "--steps", 170)
+    assert f"Error: {path}: environment.id: no environment" in result.stderr
+
+
 def test_a_run_is_not_overwritten(invoke):
     assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
     before = Path("one/rows.jsonl").read_bytes()
