@@ -239,5 +239,7 @@ def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
         )
     if report is not None:
         yield from _lines_of_ranges(report)
-    commands = (f"sdnn {word} {run.folder}" for word in ("plot", "evaluate", "record"))
-    yield "next: " + ", ".join(commands) + " x.gif"
+    commands = [f"sdnn plot {run.folder}", f"sdnn evaluate {run.folder}"]
+    if outcome.has_pictures:
+        commands.append(f"sdnn record {run.folder} x.gif")
+    yield "next: " + ", ".join(commands)

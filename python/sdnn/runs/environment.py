@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sdnn.arguments import real, whole
 from sdnn.bounds import flat_bounds
 from sdnn.environments import NoisySensors, RedundantSensors, UnitSensors
-from sdnn.runs.errors import ConfigError, problem_of
+from sdnn.runs.errors import ConfigError, RunError, problem_of
 
 __all__ = ["ALL", "MeanOfNeighbours", "RunEnvironment"]
 
@@ -131,9 +131,13 @@ class RunEnvironment:
         ------
         ConfigError
             If there is no such environment, it cannot be made, or ranges are missing or wrong.
+        RunError
+            If it can be made, but not with this render mode.
         """
         env = self._bare(render_mode)
         try:
+            if render_mode is not None and env.render_mode != render_mode:
+                raise RunError(_no_pictures(self.id, render_mode))
             low, high = self.ends(env)
             if not self.changes_observations:
                 return env
@@ -202,7 +206,14 @@ class RunEnvironment:
         except (gym.error.Error, ImportError) as error:
             raise ConfigError("environment.id", f"no environment {self.id!r}: {error}") from error
         except Exception as error:  # whatever a user's environment raises
+            if render_mode is not None:
+                self._bare(None).close()
+                raise RunError(_no_pictures(self.id, render_mode)) from error
             key = "environment.kwargs" if self.kwargs else "environment.id"
             raise ConfigError(
                 key, f"{self.id} cannot be made: {type(error).__name__}: {error}"
             ) from error
+
+
+def _no_pictures(name: str, render_mode: str) -> str:
+    return f"{name} cannot be rendered as pictures ({render_mode})"

@@ -125,8 +125,6 @@ def record(
     root = run.fresh_seed if seed is None else seed
     environment = run.config.environment
     with closing(environment.make("evaluation_sensor_noise", render_mode="rgb_array")) as env:
-        if env.render_mode != "rgb_array":
-            raise RunError(f"{environment.id} cannot be rendered as pictures (rgb_array)")
         recording = Recording(agent, env, episode_seed(root, EVALUATION, 0), max_steps)
         rate = float(env.metadata.get("render_fps") or FRAMES_PER_SECOND)
         path.parent.mkdir(parents=True, exist_ok=True)

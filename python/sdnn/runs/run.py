@@ -83,6 +83,8 @@ class RunOutcome:
     learning_report
         See `sdnn.agents.SDNNQLearning.learning_report`; None for other agents and while it is
         warming up.
+    has_pictures
+        Whether the environment says that it can be rendered as pictures, as `record` needs it.
     """
 
     n_steps: int
@@ -90,6 +92,7 @@ class RunOutcome:
     reason: Reason
     last_evaluation: Row | None
     learning_report: Mapping[str, Any] | None
+    has_pictures: bool
 
 
 class _Target(EarlyStop):
@@ -230,6 +233,7 @@ class Run:
             reason=reason,
             last_evaluation=_last_row(self.rows(), "evaluation"),
             learning_report=_report(agent),
+            has_pictures=_has_pictures(evaluation_env),
         )
 
     def agent(self) -> Agent[Any, Any]:
@@ -387,6 +391,10 @@ def _report(agent: object) -> Mapping[str, Any] | None:
     if not isinstance(agent, SDNNQLearning) or agent.is_warming_up:
         return None
     return agent.learning_report()
+
+
+def _has_pictures(env: gym.Env[Any, Any]) -> bool:
+    return "rgb_array" in ((env.metadata or {}).get("render_modes") or ())
 
 
 _KEYS = {"kind", "step"}

@@ -33,4 +33,19 @@ class DriftingEnv(gym.Env):
         return picture
 
 
+class UnseenEnv(gym.Env):
+    """As in docs/agents.md: nothing is said about rendering."""
+
+    observation_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
+    action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return self.np_random.uniform(-1.0, 1.0, 2), {}
+
+    def step(self, action):
+        return self.np_random.uniform(-1.0, 1.0, 2), float(action[0]), False, False, {}
+
+
+gym.register("tests/Unseen-v0", entry_point=UnseenEnv, max_episode_steps=20)
 gym.register("tests/Drifting-v0", entry_point=DriftingEnv, max_episode_steps=40)

@@ -53,6 +53,7 @@ def test_train_evaluate_plot_record(invoke, tmp_path):
     assert lines[1].startswith("last evaluation, after 140 steps: mean return ")
     assert "corrections" in lines[2]
     assert f"sdnn plot {folder}" in lines[-1]
+    assert lines[-1].endswith(f"sdnn record {folder} x.gif")
 
     found = json.loads(invoke("evaluate", folder, "--episodes", 3, "--seed", 9, "--json").stdout)
     returns = Run.open(folder).evaluate(3, 9).returns
@@ -84,6 +85,17 @@ def test_train_evaluate_plot_record(invoke, tmp_path):
     recorded = invoke("record", folder, "x.gif", "--steps", 4)
     assert recorded.stdout.startswith("wrote x.gif: 5 frames, return ")
     assert (tmp_path / "x.gif").read_bytes().startswith(b"GIF89a")
+
+
+@pytest.mark.filterwarnings("ignore:.*render_mode")
+def test_an_environment_that_cannot_be_rendered_is_not_recorded(invoke, tmp_path):
+    done = invoke("train", "drifting_env:tests/Unseen-v0", *SHORT, "--out", "one")
+    assert done.stdout.splitlines()[-1] == "next: sdnn plot one, sdnn evaluate one"
+    result = invoke("record", "one", "x.gif")
+    assert (result.exit_code, result.stdout) == (1, "")
+    name = "drifting_env:tests/Unseen-v0"
+    assert result.stderr == f"Error: {name} cannot be rendered as pictures (rgb_array)\n"
+    assert not (tmp_path / "x.gif").exists()
 
 
 def test_export_writes_a_c_header_of_a_run_or_an_agents_file(invoke, tmp_path):
