@@ -32,6 +32,7 @@ from sdnn.arguments import whole
 from sdnn.interrupts import Interrupts
 from sdnn.runs.config import RunConfig, read_json
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, problem_of
+from sdnn.runs.spaces import check_spaces
 from sdnn.whole_files import remove_abandoned_files, write_whole
 
 if TYPE_CHECKING:
@@ -267,11 +268,12 @@ class Run:
         Raises
         ------
         RunError
-            If there is no checkpoint yet, or its file is damaged.
+            If there is no checkpoint yet, its file is damaged, or the environment differs.
         """
         root = self.fresh_seed if seed is None else seed
         agent = self.agent()
         with closing(self.config.environment.make("evaluation_sensor_noise")) as env:
+            check_spaces(agent, env, self.config.environment.id)
             return evaluate(agent, env, episodes, seed=root)
 
     @property
@@ -312,6 +314,8 @@ class Run:
             training = Training.load(path, env, callbacks=callbacks, evaluation_env=evaluation_env)
         except ValueError as error:
             raise RunError(str(error)) from error
+        assert isinstance(training.agent, Agent)  # what load gives
+        check_spaces(training.agent, evaluation_env, self.config.environment.id)
         if len(_read_rows(self.folder / ROWS)) < training.n_rows:
             raise RunError(
                 f"{self.folder / ROWS} must have the {training.n_rows} rows that were written"

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-import drifting_env  # noqa: F401
+import drifting_env
 from sdnn.agents import PRESETS, RBFQLearning, SDNNQLearning, c_header
 from sdnn.cli import main
 from sdnn.cli.run_options import option_of, value_of
@@ -393,6 +393,39 @@ def test_mistakes_in_a_runs_own_configuration_name_its_file(invoke, tmp_path):
         assert f"Error: {path}: environment.id: no environment" in result.stderr
     result = invoke("resume", "one", "--steps", 170)
     assert f"Error: {path}: environment.id: no environment" in result.stderr
+
+
+class WiderEnv(drifting_env.DriftingEnv):
+    observation_space = gym.spaces.Box(-np.inf, np.inf, (3,), np.float64)
+
+    def reset(self, *, seed=None, options=None):
+        observation, info = super().reset(seed=seed, options=options)
+        return np.append(observation, 0.0), info
+
+
+class StrongerEnv(drifting_env.DriftingEnv):
+    action_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        (WiderEnv, "observations that the agent learned with, Box(-inf, inf, (2,), float64), got"),
+        (StrongerEnv, "actions that the agent learned with, Box(-1.0, 1.0, (1,), float32), got"),
+    ],
+)
+def test_an_environment_that_differs_now_is_one_line(invoke, monkeypatch, kind, words):
+    short = (*SHORT, "--env-arg", "max_episode_steps=5")  # ends with an episode
+    assert invoke("train", DRIFTING, *short, "--out", "one").exit_code == 0
+    monkeypatch.setattr(gym.registry["tests/Drifting-v0"], "entry_point", kind)
+    for command in (
+        ["evaluate", "one"],
+        ["record", "one", "x.gif"],
+        ["resume", "one", "--steps", 170],
+    ):
+        result = invoke(*command)
+        assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
+        assert f"Error: {DRIFTING} must have the {words}" in result.stderr
 
 
 def test_a_run_is_not_overwritten(invoke):
