@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from sdnn.cli.run_options import (
+    WARMING_UP,
     json_option,
     run_argument,
     run_command,
@@ -43,6 +44,7 @@ def evaluate(folder: Path, episodes: int, seed: int | None, as_json: bool) -> No
         "range": [float(returns.min()), float(returns.max())],
         "mean_length": float(found.lengths.mean()),
         "share_terminated": float(found.terminated.mean()),
+        "is_warming_up": found.is_warming_up,
     }
     if as_json:
         click.echo(json.dumps({**values, "returns": returns.tolist()}, indent=2))
@@ -56,3 +58,5 @@ def evaluate(folder: Path, episodes: int, seed: int | None, as_json: bool) -> No
         f"{values['mean_length']:.6g} steps on average,"
         f" {values['share_terminated']:.0%} of the episodes terminated"
     )
+    if found.is_warming_up:
+        click.echo(WARMING_UP)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.run_options import run_argument, run_command, seed_option, words_of_run
+from sdnn.cli.run_options import WARMING_UP, run_argument, run_command, seed_option, words_of_run
 
 
 @click.command()
@@ -29,3 +29,5 @@ def record(folder: Path, out: Path, seed: int | None, steps: int | None) -> None
     with run_command(words_of_run(folder)):
         recording = record_run(Run.open(folder), out, seed=seed, max_steps=steps)
     click.echo(f"wrote {out}: {recording.n_frames} frames, return {recording.total_reward:.6g}")
+    if recording.is_warming_up:
+        click.echo(WARMING_UP)

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 EXIT_TERMINATED = 143
 
+WARMING_UP = "the agent is still warming up: it acts at random and has learned nothing yet"
+
 run_argument = click.argument(
     "folder", metavar="RUN", type=click.Path(exists=True, file_okay=False, path_type=Path)
 )
@@ -188,6 +190,7 @@ def outcome_values(outcome: RunOutcome) -> Mapping[str, Any]:
         "n_steps": outcome.n_steps,
         "n_episodes": outcome.n_episodes,
         "reason": outcome.reason,
+        "is_warming_up": outcome.is_warming_up,
         "last_evaluation": outcome.last_evaluation,
         "learning_report": None if report is None else dict(report),
     }
@@ -224,6 +227,11 @@ def _variables(numbers: Sequence[int]) -> str:
 def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
     why = " (the target is reached)" if outcome.reason == "target" else ""
     yield f"{run.folder}: {outcome.n_steps} steps, {outcome.n_episodes} episodes{why}"
+    if outcome.is_warming_up:
+        yield (
+            f"{WARMING_UP}; that takes {run.config.warm_up_steps} steps:"
+            f" sdnn resume {run.folder} --steps N goes on"
+        )
     row = outcome.last_evaluation
     if row is not None:
         yield (

@@ -9,7 +9,7 @@ evaluations), ``checkpoint.safetensors`` (where it goes on) and, once it is fini
 from sdnn.runs.config import AGENTS, RunConfig
 from sdnn.runs.environment import RunEnvironment
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
-from sdnn.runs.run import Goal, Run, RunOutcome
+from sdnn.runs.run import Goal, Run, RunEvaluation, RunOutcome
 
 __all__ = [
     "AGENTS",
@@ -19,6 +19,7 @@ __all__ = [
     "RunConfig",
     "RunEnvironment",
     "RunError",
+    "RunEvaluation",
     "RunOutcome",
     "RunTerminatedError",
 ]

@@ -169,6 +169,12 @@ class RunConfig:
             )
         object.__setattr__(self, "settings", self._checked_settings())
 
+    @property
+    def warm_up_steps(self) -> int:
+        """Steps that an agent acts at random first where it has to see its ranges."""
+        of_agent = self.settings.get("agent", {})
+        return int(of_agent.get("warm_up_steps", _AgentSettings.warm_up_steps))
+
     def _checked_settings(self) -> Settings:
         _, approximator, learning = AGENTS[self.agent]
         kinds = {"approximator": approximator, "learning": learning, "agent": _AgentSettings}

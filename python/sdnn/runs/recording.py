@@ -62,6 +62,11 @@ class Recording:
         self.n_frames = 0
         self.total_reward = 0.0
 
+    @property
+    def is_warming_up(self) -> bool:
+        """Whether the agent has learned nothing yet: all its actions are random."""
+        return self._agent.is_warming_up
+
     def frames(self) -> Iterator[NDArray[np.uint8]]:
         """Run the episode; give the frames, shape (height, width, 3).
 

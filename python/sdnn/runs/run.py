@@ -38,7 +38,7 @@ from sdnn.whole_files import remove_abandoned_files, write_whole
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["Goal", "Run", "RunOutcome"]
+__all__ = ["Goal", "Run", "RunEvaluation", "RunOutcome"]
 
 CONFIG = "config.json"
 ROWS = "rows.jsonl"
@@ -84,6 +84,8 @@ class RunOutcome:
     learning_report
         See `sdnn.agents.SDNNQLearning.learning_report`; None for other agents and while it is
         warming up.
+    is_warming_up
+        Whether the agent has only acted at random so far, to see ranges, and learned nothing.
     has_pictures
         Whether the environment says that it can be rendered as pictures, as `record` needs it.
     """
@@ -93,7 +95,23 @@ class RunOutcome:
     reason: Reason
     last_evaluation: Row | None
     learning_report: Mapping[str, Any] | None
+    is_warming_up: bool
     has_pictures: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunEvaluation(Evaluation):
+    """The outcome of some greedy episodes of a run's agent.
+
+    Parameters
+    ----------
+    returns, lengths, terminated
+        See `sdnn.agents.Evaluation`.
+    is_warming_up
+        Whether the agent has learned nothing yet: all its actions are random.
+    """
+
+    is_warming_up: bool
 
 
 class _Target(EarlyStop):
@@ -234,6 +252,7 @@ class Run:
             reason=reason,
             last_evaluation=_last_row(self.rows(), "evaluation"),
             learning_report=_report(agent),
+            is_warming_up=agent.is_warming_up,
             has_pictures=_has_pictures(evaluation_env),
         )
 
@@ -255,7 +274,7 @@ class Run:
         except ValueError as error:
             raise RunError(str(error)) from error
 
-    def evaluate(self, episodes: int = 10, seed: int | None = None) -> Evaluation:
+    def evaluate(self, episodes: int = 10, seed: int | None = None) -> RunEvaluation:
         """Run greedy episodes with the agent as it is now.
 
         Parameters
@@ -274,7 +293,13 @@ class Run:
         agent = self.agent()
         with closing(self.config.environment.make("evaluation_sensor_noise")) as env:
             check_spaces(agent, env, self.config.environment.id)
-            return evaluate(agent, env, episodes, seed=root)
+            found = evaluate(agent, env, episodes, seed=root)
+        return RunEvaluation(
+            returns=found.returns,
+            lengths=found.lengths,
+            terminated=found.terminated,
+            is_warming_up=agent.is_warming_up,
+        )
 
     @property
     def fresh_seed(self) -> int:

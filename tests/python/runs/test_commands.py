@@ -449,6 +449,23 @@ def test_ranges_that_do_not_suit_are_named(invoke):
     assert "left the range" not in lines
 
 
+def test_a_warm_up_that_is_not_over_is_told(invoke):
+    told = "the agent is still warming up: it acts at random and has learned nothing yet"
+    begun = ("--steps", 59, "--evaluate-every", 50, "--evaluation-episodes", 1, *SMALL)
+    lines = invoke("train", DRIFTING, *begun, "--out", "one").stdout.splitlines()
+    assert lines[1] == f"{told}; that takes 60 steps: sdnn resume one --steps N goes on"
+    assert invoke("evaluate", "one", "--episodes", 1).stdout.splitlines()[-1] == told
+    assert invoke("record", "one", "x.gif", "--steps", 2).stdout.splitlines()[-1] == told
+    evaluate = ("evaluate", "one", "--episodes", 1, "--json")
+    assert json.loads(invoke(*evaluate).stdout)["is_warming_up"] is True
+    done = json.loads(invoke("resume", "one", "--json").stdout)
+    assert (done["is_warming_up"], done["learning_report"]) == (True, None)
+    assert "warming up" not in invoke("resume", "one", "--steps", 60).stdout
+    assert "warming up" not in invoke("evaluate", "one", "--episodes", 1).stdout
+    assert json.loads(invoke(*evaluate).stdout)["is_warming_up"] is False
+    assert json.loads(invoke("resume", "one", "--json").stdout)["is_warming_up"] is False
+
+
 def test_resume_with_a_new_goal(invoke):
     done = json.loads(invoke("train", DRIFTING, *SHORT, "--out", "one", "--json").stdout)
     assert (done["n_steps"], done["reason"], done["folder"]) == (150, "done", "one")
