@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
+from sdnn.cli.output import json_text
 from sdnn.cli.run_options import (
     WARMING_UP,
     json_option,
@@ -33,12 +33,15 @@ def evaluate(folder: Path, episodes: int, seed: int | None, as_json: bool) -> No
     with run_command(words_of_run(folder)):
         found = Run.open(folder).evaluate(episodes, seed)
     returns = found.returns
-    low, median, high = np.percentile(returns, (25, 50, 75)).tolist()
+    with np.errstate(invalid="ignore"):  # of returns that are no numbers
+        low, median, high = np.percentile(returns, (25, 50, 75)).tolist()
+        mean = found.mean_return
+        deviation = float(returns.std(ddof=1)) if episodes > 1 else None
     values = {
         "folder": str(folder),
         "n_episodes": episodes,
-        "mean_return": found.mean_return,
-        "standard_deviation": float(returns.std(ddof=1)) if episodes > 1 else None,
+        "mean_return": mean,
+        "standard_deviation": deviation,
         "median_return": median,
         "quartiles": [low, high],
         "range": [float(returns.min()), float(returns.max())],
@@ -47,9 +50,9 @@ def evaluate(folder: Path, episodes: int, seed: int | None, as_json: bool) -> No
         "is_warming_up": found.is_warming_up,
     }
     if as_json:
-        click.echo(json.dumps({**values, "returns": returns.tolist()}, indent=2))
+        click.echo(json_text({**values, "returns": returns.tolist()}))
         return
-    click.echo(f"{folder}: mean return {found.mean_return:.6g} over {episodes} greedy episodes")
+    click.echo(f"{folder}: mean return {mean:.6g} over {episodes} greedy episodes")
     click.echo(
         f"median {median:.6g}, quartiles {low:.6g} to {high:.6g}, all {returns.min():.6g} to"
         f" {returns.max():.6g}"
@@ -58,5 +61,9 @@ def evaluate(folder: Path, episodes: int, seed: int | None, as_json: bool) -> No
         f"{values['mean_length']:.6g} steps on average,"
         f" {values['share_terminated']:.0%} of the episodes terminated"
     )
+    if n_odd := episodes - int(np.isfinite(returns).sum()):
+        click.echo(
+            f"{n_odd} of {episodes} returns are no finite numbers: see the environment's rewards"
+        )
     if found.is_warming_up:
         click.echo(WARMING_UP)

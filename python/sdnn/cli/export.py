@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from pathlib import Path
 
 import click
 
+from sdnn.cli.output import json_text
 from sdnn.cli.run_options import json_option, run_command, words_of_run
 
 
@@ -50,7 +50,7 @@ def export(
             raise click.ClickException(f"{source}: {error}") from error
     if as_json:
         values = {k: v for k, v in dataclasses.asdict(header).items() if k != "text"}
-        click.echo(json.dumps({"file": str(path), **values}, indent=2))
+        click.echo(json_text({"file": str(path), **values}))
         return
     click.echo(
         f"wrote {path}: {header.flash_bytes:,} bytes of constants, {header.ram_bytes:,} bytes of"

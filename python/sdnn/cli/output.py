@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import math
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
@@ -21,6 +23,19 @@ EXIT_FAILURE = 1
 EXIT_INTERRUPTED = 130
 PLAIN_WIDTH = 160
 """Width of tables that go to a file or pipe."""
+
+
+def json_text(values: Any) -> str:
+    """Write values as JSON; numbers that it does not have, NaN and infinite ones, as null."""
+    return json.dumps(_finite(values), indent=2, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {name: _finite(one) for name, one in value.items()}
+    return [_finite(one) for one in value] if isinstance(value, list | tuple) else value
 
 
 def report_outcome(context: click.Context, outcome: RunOutcome, out: Path) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import sys
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sdnn.cli.output import EXIT_INTERRUPTED
+from sdnn.cli.output import EXIT_INTERRUPTED, json_text
 
 if TYPE_CHECKING:
     from sdnn.runs import ConfigError, Run, RunOutcome
@@ -177,7 +176,7 @@ def train_run(run: Run, as_json: bool, *, steps: int | None, episodes: int | Non
         callbacks.append(ProgressLine(Console(stderr=True), run.config.environment.id))
     outcome = run.train(steps=steps, episodes=episodes, callbacks=callbacks)
     if as_json:
-        click.echo(json.dumps({"folder": str(run.folder), **outcome_values(outcome)}, indent=2))
+        click.echo(json_text({"folder": str(run.folder), **outcome_values(outcome)}))
         return
     for line in _outcome_lines(run, outcome):
         click.echo(line)

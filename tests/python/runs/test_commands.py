@@ -449,6 +449,45 @@ def test_ranges_that_do_not_suit_are_named(invoke):
     assert "left the range" not in lines
 
 
+def strict_json(text):
+    def refuse(word):
+        raise ValueError(f"{word} is not JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+@pytest.mark.parametrize("reward", [np.nan, np.inf, -np.inf])
+def test_rewards_that_are_no_numbers_are_null_in_json(invoke, monkeypatch, reward):
+    assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
+
+    class Strange(drifting_env.DriftingEnv):
+        n_episodes = 0
+
+        def reset(self, **options):
+            Strange.n_episodes += 1
+            return super().reset(**options)
+
+        def step(self, action):
+            observation, own, *others = super().step(action)
+            return observation, reward if Strange.n_episodes % 2 else own, *others
+
+    monkeypatch.setattr(gym.registry["tests/Drifting-v0"], "entry_point", Strange)
+    found = strict_json(invoke("evaluate", "one", "--episodes", 4, "--json").stdout)
+    assert [value is None for value in found["returns"]] == [True, False, True, False]
+    assert (found["mean_return"], found["standard_deviation"]) == (None, None)
+    assert found["mean_length"] > 0
+    text = invoke("evaluate", "one", "--episodes", 4).stdout
+    assert "2 of 4 returns are no finite numbers: see the environment's rewards" in text
+
+    rows = Path("one/rows.jsonl").read_text().splitlines()
+    last = max(n for n, row in enumerate(rows) if '"evaluation"' in row)
+    row = json.loads(rows[last])
+    rows[last] = json.dumps({**row, "mean_return": float(reward)})
+    Path("one/rows.jsonl").write_text("\n".join(rows) + "\n")
+    done = strict_json(invoke("resume", "one", "--json").stdout)
+    assert done["last_evaluation"] == {**row, "mean_return": None}
+
+
 def test_a_warm_up_that_is_not_over_is_told(invoke):
     told = "the agent is still warming up: it acts at random and has learned nothing yet"
     begun = ("--steps", 59, "--evaluate-every", 50, "--evaluation-episodes", 1, *SMALL)
