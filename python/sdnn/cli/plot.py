@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.run_options import option_words, run_command
+from sdnn.cli.run_options import check_ending, option_words, run_command
 
 
 @click.command()
@@ -31,8 +31,10 @@ def plot(folders: tuple[Path, ...], out: Path | None) -> None:
     only: the median of their evaluations with the quartiles over the runs. A panel per task.
     """
     from sdnn.runs import Run
-    from sdnn.runs.curves import curves_of, write_curves
+    from sdnn.runs.curves import SUFFIXES, curves_of, write_curves
 
+    if out is not None:
+        check_ending("--out", out, SUFFIXES)
     chosen = tuple(dict.fromkeys(folders))
     path = out or (chosen[0] / "curves.png" if len(chosen) == 1 else Path("curves.png"))
     with run_command(option_words):

@@ -7,7 +7,14 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.run_options import WARMING_UP, run_argument, run_command, seed_option, words_of_run
+from sdnn.cli.run_options import (
+    WARMING_UP,
+    check_ending,
+    run_argument,
+    run_command,
+    seed_option,
+    words_of_run,
+)
 
 
 @click.command()
@@ -24,8 +31,10 @@ def record(folder: Path, out: Path, seed: int | None, steps: int | None) -> None
     """
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # pictures need no screen
     from sdnn.runs import Run
+    from sdnn.runs.recording import SUFFIXES
     from sdnn.runs.recording import record as record_run
 
+    check_ending("OUT", out, SUFFIXES)
     with run_command(words_of_run(folder)):
         recording = record_run(Run.open(folder), out, seed=seed, max_steps=steps)
     click.echo(f"wrote {out}: {recording.n_frames} frames, return {recording.total_reward:.6g}")

@@ -124,6 +124,12 @@ def value_of(text: str) -> Any:
         return text
 
 
+def check_ending(option: str, path: Path, endings: Sequence[str]) -> None:
+    """Check what a file is to become; UsageError with the option's name if it is something else."""
+    if path.suffix not in endings:
+        raise click.UsageError(f"{option} must end in one of {', '.join(endings)}, got {path}")
+
+
 def named_values(option: str, pairs: Iterable[str]) -> Iterator[tuple[str, str]]:
     """Split texts like ``name=value``; UsageError with the option's name if one is none."""
     for pair in pairs:

@@ -529,13 +529,22 @@ def test_folders_that_are_no_runs(invoke, tmp_path, command):
     assert "Error: empty holds no run" in result.stderr
 
 
-def test_other_failures_are_exit_code_1(invoke):
+def test_files_of_other_kinds_are_wrong_usage(invoke):
     assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
-    result = invoke("record", "one", "x.avi")
-    assert (result.exit_code, "must end in one of .gif, .mp4" in result.stderr) == (1, True)
-    result = invoke("plot", "one", "--out", "x.doc")
-    assert (result.exit_code, "must end in one of .png" in result.stderr) == (1, True)
-    assert invoke("evaluate", "one", "--episodes", 0).exit_code == 2
+    for command, words in (
+        (["record", "one", "x.avi"], "OUT must end in one of .gif, .mp4, got x.avi"),
+        (["plot", "one", "--out", "x.jpg"], "--out must end in one of .png, .svg, .pdf, got x.jpg"),
+        (["evaluate", "one", "--episodes", 0], "--episodes"),
+    ):
+        result = invoke(*command)
+        assert (result.exit_code, words in result.stderr) == (2, True), result.stderr
+
+
+def test_other_failures_are_exit_code_1(invoke, monkeypatch):
+    assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
+    monkeypatch.setattr("sdnn.runs.recording.find_spec", lambda name: None)
+    result = invoke("record", "one", "x.gif")
+    assert (result.exit_code, "x.gif needs Pillow" in result.stderr) == (1, True)
 
 
 @pytest.mark.parametrize(
