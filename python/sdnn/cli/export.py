@@ -33,29 +33,46 @@ from sdnn.cli.run_options import json_option, run_command, words_of_run
 def export(
     source: Path, path: Path, name: str | None, fraction_bits: int | None, as_json: bool
 ) -> None:
-    """Write the agent of RUN, a run's folder or an agent's file, in a form for other programs."""
-    from sdnn.agents import export_c_header, load_agent
+    """Write the agent of RUN, a run's folder or an agent's file, in a form for other programs.
+
+    The header observes what the agent did: with --noise or --redundant, variables scaled to [0, 1].
+    It says from which ranges.
+    """
+    from sdnn.agents import c_header, load_agent
     from sdnn.runs import Run
+    from sdnn.runs.scaling import scaling_of
+    from sdnn.whole_files import write_whole
 
     with run_command(words_of_run(source)):
         try:
+            run = Run.open(source) if source.is_dir() else Run.of_agent_file(source)
             agent = Run.open(source).agent() if source.is_dir() else load_agent(source)
         except ValueError as error:
             raise click.ClickException(str(error)) from error
         try:
-            header = export_c_header(agent, path, name=name, fraction_bits=fraction_bits)
+            header = c_header(
+                agent, path.stem if name is None else name, fraction_bits=fraction_bits
+            )
         except ValueError as error:
             raise _usage_error(error, is_named=name is not None) from error
         except (TypeError, RuntimeError) as error:
             raise click.ClickException(f"{source}: {error}") from error
+        scaling = None if run is None else scaling_of(run.config.environment)
+        comment = "" if scaling is None else scaling.c_comment()
+        write_whole(path, (comment + header.text).encode())
     if as_json:
         values = {k: v for k, v in dataclasses.asdict(header).items() if k != "text"}
+        values["scaling"] = None if scaling is None else scaling.values()
         click.echo(json_text({"file": str(path), **values}))
         return
     click.echo(
         f"wrote {path}: {header.flash_bytes:,} bytes of constants, {header.ram_bytes:,} bytes of"
         f" arrays on the stack, {header.n_words:,} words of weights read per decision"
     )
+    if scaling is not None:
+        click.echo("it observes each variable scaled from its range to [0, 1], as its run did:")
+        for line in scaling.lines():
+            click.echo(f"  {line}")
 
 
 def _usage_error(error: ValueError, is_named: bool) -> click.ClickException:

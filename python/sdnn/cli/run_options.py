@@ -223,9 +223,30 @@ def _lines_of_ranges(report: Mapping[str, Any]) -> Iterator[str]:
         )
 
 
-def _variables(numbers: Sequence[int]) -> str:
+def _lines_of_scaling(run: Run) -> Iterator[str]:
+    """Say what the agent needs wherever else it acts."""
+    from sdnn.runs.scaling import scaling_of
+
+    scaling = scaling_of(run.config.environment)
+    if scaling is None or scaling.ranges is None:
+        return
+    ends = zip(*scaling.ranges, strict=True)
+    words = _listed([f"{i} from {low:.6g} to {high:.6g}" for i, (low, high) in enumerate(ends)])
+    if scaling.n_redundant:
+        words += f", and means of neighbours ({scaling.n_redundant})"
+    yield (
+        f"the agent observes variables scaled to [0, 1], {words}: elsewhere it needs the same, as"
+        f" sdnn.runs.Run.open({str(run.folder)!r}).config.environment.make() gives it"
+    )
+
+
+def _listed(words: Sequence[str]) -> str:
     most = 8
-    named = ", ".join(map(str, numbers[:most])) + (", ..." if len(numbers) > most else "")
+    return ", ".join(words[:most]) + (", ..." if len(words) > most else "")
+
+
+def _variables(numbers: Sequence[int]) -> str:
+    named = _listed([str(number) for number in numbers])
     return f"observed variable{'s' if len(numbers) > 1 else ''} {named}"
 
 
@@ -252,6 +273,7 @@ def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
         )
     if report is not None:
         yield from _lines_of_ranges(report)
+    yield from _lines_of_scaling(run)
     commands = [f"sdnn plot {run.folder}", f"sdnn evaluate {run.folder}"]
     if outcome.has_pictures:
         commands.append(f"sdnn record {run.folder} x.gif")

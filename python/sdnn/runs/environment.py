@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -16,12 +17,22 @@ from sdnn.bounds import flat_bounds
 from sdnn.environments import NoisySensors, RedundantSensors, UnitSensors
 from sdnn.runs.errors import ConfigError, RunError, problem_of
 
-__all__ = ["ALL", "MeanOfNeighbours", "RunEnvironment"]
+__all__ = ["ALL", "Ends", "MeanOfNeighbours", "RunEnvironment", "neighbours"]
 
 ALL = "all"
 """The key of the range of all variables that have no other."""
 
 Ends = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+def neighbours(n_variables: int, n_redundant: int) -> Iterator[tuple[int, int]]:
+    """Give the variables whose means are redundant ones.
+
+    >>> list(neighbours(3, 4))
+    [(0, 1), (1, 2), (2, 0), (0, 1)]
+    """
+    for i in range(n_redundant):
+        yield i % n_variables, (i + 1) % n_variables
 
 
 class MeanOfNeighbours:
@@ -155,7 +166,7 @@ class RunEnvironment:
                 )
             env = UnitSensors(env, low, high)
             if self.redundant:
-                pairs = [(i % low.size, (i + 1) % low.size) for i in range(self.redundant)]
+                pairs = neighbours(low.size, self.redundant)
                 env = RedundantSensors(env, [MeanOfNeighbours(*pair) for pair in pairs])
             if self.noise:
                 env = NoisySensors(env, self.noise, edge="saturate", stream=stream)
@@ -163,6 +174,32 @@ class RunEnvironment:
         except BaseException:
             env.close()
             raise
+
+    def scaled_ranges(self) -> Ends:
+        """Give the lowest and highest values of the variables that are scaled to [0, 1].
+
+        With noise or redundant variables the agent knows no others. Where it acts without them,
+        it needs ``UnitSensors(env, low, high)``.
+
+        Returns
+        -------
+        low, high : numpy.ndarray
+            Shapes (n_variables,).
+
+        Raises
+        ------
+        ConfigError
+            As `make`; or if nothing is scaled, since there is neither noise nor redundancy.
+
+        Examples
+        --------
+        >>> RunEnvironment(id="MountainCar-v0", noise=0.1).scaled_ranges()[1].round(2).tolist()
+        [0.6, 0.07]
+        """
+        if not self.changes_observations:
+            raise ConfigError("environment.ranges", "scale nothing without noise or redundant")
+        with closing(self._bare(None)) as env:
+            return self.ends(env)
 
     def ends(self, env: gym.Env[Any, Any]) -> Ends:
         """Give the lowest and highest values of the flattened observation; infinite: not known.

@@ -186,6 +186,17 @@ class Run:
             raise ConfigError("goals", f"must be a list of goals: {error}", str(path)) from error
         return cls(place, RunConfig.read(path), read)
 
+    @classmethod
+    def of_agent_file(cls, path: str | Path) -> Self | None:
+        """Find the run whose agent or checkpoint a file is; None if it is of none."""
+        file = Path(path)
+        if file.name not in (AGENT, CHECKPOINT) or not (file.parent / CONFIG).exists():
+            return None
+        try:
+            return cls.open(file.parent)
+        except RunError:  # a file of that name that is something else
+            return None
+
     def check(self) -> None:
         """Make all that is needed once, to see that it works; ConfigError if not."""
         with closing(self.config.environment.make()) as env:

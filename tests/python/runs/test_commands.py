@@ -117,6 +117,55 @@ def test_export_writes_a_c_header_of_a_run_or_an_agents_file(invoke, tmp_path):
     assert "text" not in told
 
 
+SCALED = ("--noise", 0.01, "--redundant", 1, "--range", "-4:4", "--range", "1=-2:3")
+SCALED_LINES = [
+    "observation[0]: variable 0, from -4.0 to 4.0",
+    "observation[1]: variable 1, from -2.0 to 3.0",
+    "observation[2]: the mean of observation[0] and observation[1]",
+]
+
+
+def test_what_a_noisy_or_redundant_run_observes_is_said_where_it_is_used_elsewhere(invoke):
+    done = invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one")
+    assert done.stdout.splitlines()[-2] == (
+        "the agent observes variables scaled to [0, 1], 0 from -4 to 4, 1 from -2 to 3, and means"
+        " of neighbours (1): elsewhere it needs the same, as"
+        " sdnn.runs.Run.open('one').config.environment.make() gives it"
+    )
+    for source in ("one", "one/agent.safetensors", "one/checkpoint.safetensors"):
+        done = invoke("export", source, "--c-header", "a.h")
+        assert [line.strip() for line in done.stdout.splitlines()[2:]] == SCALED_LINES
+        comment, rest = Path("a.h").read_text().split(" */\n", 1)
+        assert rest == c_header(Run.open("one").agent(), "a").text
+        assert comment.startswith("/* What this policy observes is scaled, ")
+        assert [line.removeprefix(" *   ") for line in comment.splitlines()[4:]] == SCALED_LINES
+    told = json.loads(invoke("export", "one", "--c-header", "a.h", "--json").stdout)
+    assert told["scaling"] == {"ranges": [[-4.0, 4.0], [-2.0, 3.0]], "redundant": 1}
+
+
+def test_an_agents_file_that_is_of_no_run_is_exported_as_it_is(invoke):
+    assert invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one").exit_code == 0
+    Path("agent.safetensors").write_bytes(Path("one/agent.safetensors").read_bytes())
+    Path("one/mine.safetensors").write_bytes(Path("one/agent.safetensors").read_bytes())
+    text = c_header(Run.open("one").agent(), "a").text
+    for source in ("agent.safetensors", "one/mine.safetensors"):
+        assert invoke("export", source, "--c-header", "a.h").exit_code == 0
+        assert Path("a.h").read_text() == text
+    Path("config.json").write_text("of another program")
+    told = json.loads(invoke("export", "agent.safetensors", "--c-header", "a.h", "--json").stdout)
+    assert (Path("a.h").read_text(), told["scaling"]) == (text, None)
+
+
+def test_a_run_is_exported_where_its_environment_cannot_be_made(invoke):
+    assert invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one").exit_code == 0
+    path = Path("one/config.json")
+    path.write_text(path.read_text().replace("Drifting-v0", "Gone-v0"))
+    done = invoke("export", "one", "--c-header", "a.h")
+    assert done.exit_code == 0
+    assert "not known here" in done.stdout
+    assert "not known here" in Path("a.h").read_text()
+
+
 def test_export_says_what_is_wrong(invoke, tmp_path):
     space = gym.spaces.Box(-1.0, 1.0, (2,))
     SDNNQLearning(space, space).save("sdnn.safetensors")

@@ -1,10 +1,13 @@
+import re
+
 import gymnasium as gym
 import numpy as np
 import pytest
 
 import drifting_env  # noqa: F401
-from sdnn.environments import NoisySensors
+from sdnn.environments import NoisySensors, UnitSensors
 from sdnn.runs import ConfigError, RunEnvironment
+from sdnn.runs.scaling import scaling_of
 
 
 def test_without_noise_the_agent_gets_what_there_is():
@@ -22,6 +25,40 @@ def test_redundant_variables_are_means_of_neighbours_in_a_circle():
     mean = 0.5 * (first + second)
     np.testing.assert_allclose(observation, [first, second, mean, mean, mean], rtol=1e-15)
     assert env.observation_space == gym.spaces.Box(0.0, 1.0, (5,), np.float64)
+
+
+@pytest.mark.parametrize("redundant", [1, 5])
+def test_the_words_for_what_is_scaled_are_true(redundant):
+    environment = RunEnvironment(
+        id="tests/Drifting-v0", ranges={"all": (-0.3, 0.4), "1": (-4.0, 4.0)}, redundant=redundant
+    )
+    scaled, bare = environment.make(), gym.make("tests/Drifting-v0")
+    low, high = environment.scaled_ranges()
+    lines = list(scaling_of(environment).lines())
+    for seed in range(5):
+        known = {}
+        values, _ = bare.reset(seed=seed)
+        for line in lines:
+            name, variable, first, last, one, other = re.fullmatch(
+                r"(\S+): (?:variable (\d), from (\S+) to (\S+)|the mean of (\S+) and (\S+))", line
+            ).groups()
+            if variable is None:
+                known[name] = (known[one] + known[other]) / 2
+            else:
+                part = (values[int(variable)] - float(first)) / (float(last) - float(first))
+                known[name] = min(max(part, 0.0), 1.0)
+        observation, _ = scaled.reset(seed=seed)
+        assert list(known) == [f"observation[{i}]" for i in range(2 + redundant)]
+        np.testing.assert_allclose(observation, list(known.values()), rtol=1e-15)
+        unit, _ = UnitSensors(bare, low, high).reset(seed=seed)
+        assert np.array_equal(observation[:2], unit)
+
+
+def test_nothing_is_scaled_without_noise_and_redundancy():
+    environment = RunEnvironment(id="tests/Drifting-v0", ranges={"all": (-0.3, 0.4)})
+    assert scaling_of(environment) is None
+    with pytest.raises(ConfigError, match="scale nothing without noise or redundant"):
+        environment.scaled_ranges()
 
 
 def test_noise_is_in_parts_of_the_range_and_follows_the_reset():
