@@ -28,15 +28,19 @@ def plot(folders: tuple[Path, ...], out: Path | None) -> None:
 
     One run of its kind: returns of its episodes as points, their running median, and the mean
     return of each evaluation with the quartiles over its episodes. Runs that differ in their seeds
-    only: the median of their evaluations with the quartiles over the runs. A panel per task.
+    only: the median of their evaluations with the quartiles over the runs. Runs that differ in
+    anything else stay apart. A panel per task.
     """
     from sdnn.runs import Run
-    from sdnn.runs.curves import SUFFIXES, curves_of, write_curves
+    from sdnn.runs.curves import SUFFIXES, curves_and_notes, write_curves
 
     if out is not None:
         check_ending("--out", out, SUFFIXES)
     chosen = tuple(dict.fromkeys(folders))
     path = out or (chosen[0] / "curves.png" if len(chosen) == 1 else Path("curves.png"))
     with run_command(option_words):
-        files = write_curves(curves_of([Run.open(folder) for folder in chosen]), path)
+        curves, notes = curves_and_notes([Run.open(folder) for folder in chosen])
+        files = write_curves(curves, path)
+    for note in notes:
+        click.echo(f"note: {note}", err=True)
     click.echo("wrote " + " and ".join(map(str, files)))

@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.agents.training import Row
 from sdnn.interrupts import stay_interrupts
 from sdnn.palette import colors_of
-from sdnn.runs.config import RunConfig
 from sdnn.runs.errors import RunError
+from sdnn.runs.groups import Group, groups_of
 from sdnn.runs.run import Run
 from sdnn.whole_files import csv_bytes, write_whole
 
@@ -26,12 +27,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["SUFFIXES", "Curve", "curves_of", "draw_curves", "write_curves"]
+__all__ = ["SUFFIXES", "Curve", "curves_and_notes", "curves_of", "draw_curves", "write_curves"]
 
 SUFFIXES = (".png", ".svg", ".pdf")
 
 WINDOW = 20
 """Episodes in the running median of the returns, or all so far where they are fewer."""
+
+_NOTHING = "no episode and no evaluation"
 
 HEADER = ("task", "agent", "kind", "n_runs", "run", "step", "value", "low", "high")
 
@@ -45,7 +48,7 @@ class Curve:
     Parameters
     ----------
     task, agent
-        What was learned by what: runs that agree in both differ in their seeds only.
+        What was learned by what: of several runs, which differ in their seeds only.
     kind
         Of episodes their returns, or the running median of these; or the evaluations: of one run
         the mean, of several the median of their means.
@@ -72,26 +75,37 @@ class Curve:
 
 
 def curves_of(runs: Sequence[Run]) -> list[Curve]:
-    """Make the curves of runs; those of one task and agent become one.
+    """Make the curves of runs; those that differ in their seeds only become one.
 
     Raises
     ------
     RunError
         If there is nothing to draw yet, or rows cannot be read.
     """
-    groups: dict[tuple[str, str], list[Run]] = {}
-    for run in runs:
-        groups.setdefault((_task(run.config), _agent(run.config)), []).append(run)
+    return curves_and_notes(runs)[0]
+
+
+def curves_and_notes(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
+    """Make the same, and a line about each run of which something could not be drawn.
+
+    Raises
+    ------
+    RunError
+        As `curves_of`.
+    """
     curves: list[Curve] = []
-    for (task, agent), members in groups.items():
-        if len(members) == 1:
-            curves += _curves_of_one(task, agent, members[0])
+    notes: list[str] = []
+    for group in groups_of(runs):
+        if len(group.runs) == 1:
+            made = _curves_of_one(group, group.runs[0], group.runs[0].rows())
+            told = [] if made else [f"{group.runs[0].folder}: {_NOTHING} is whole yet"]
         else:
-            curves += _curve_of_several(task, agent, members)
+            made, told = _curves_of_several(group)
+        curves += made
+        notes += told
     if not curves:
-        folders = ", ".join(str(run.folder) for run in runs)
-        raise RunError(f"{folders}: no episode and no evaluation is whole yet: nothing to draw")
-    return curves
+        raise RunError("; ".join(notes) + ": nothing to draw")
+    return curves, notes
 
 
 def write_curves(curves: Sequence[Curve], path: Path) -> tuple[Path, Path]:
@@ -161,11 +175,14 @@ def _draw(axes: Axes, curve: Curve, color: str) -> None:
         axes.fill_between(curve.steps, curve.low, curve.high, color=color, alpha=0.2, lw=0)
 
 
-def _curves_of_one(task: str, agent: str, run: Run) -> list[Curve]:
-    rows = run.rows()
-    episodes = [row for row in rows if row["kind"] == "episode"]
-    evaluations = [row for row in rows if row["kind"] == "evaluation"]
-    names: dict[str, Any] = {"task": task, "agent": agent, "n_runs": 1, "run": str(run.folder)}
+def _curves_of_one(group: Group, run: Run, rows: Sequence[Row]) -> list[Curve]:
+    episodes, evaluations = _of_kind(rows, "episode"), _of_kind(rows, "evaluation")
+    names: dict[str, Any] = {
+        "task": group.task,
+        "agent": group.agent,
+        "n_runs": 1,
+        "run": str(run.folder),
+    }
     curves = []
     if episodes:
         steps, returns = _episodes(episodes)
@@ -184,38 +201,41 @@ def _curves_of_one(task: str, agent: str, run: Run) -> list[Curve]:
     return curves
 
 
-def _curve_of_several(task: str, agent: str, runs: Sequence[Run]) -> list[Curve]:
+def _curves_of_several(group: Group) -> tuple[list[Curve], list[str]]:
+    """Make the one curve of runs, and notes on what it leaves out."""
+    rows = {run: run.rows() for run in group.runs}
     kind: Kind = "evaluation"
-    series = []
-    for run in runs:
-        rows = [row for row in run.rows() if row["kind"] == "evaluation"]
-        series.append(_evaluations(rows))
-    if not all(len(steps) for steps, _ in series):
+    series = {run: _evaluations(_of_kind(rows[run], "evaluation")) for run in group.runs}
+    if not any(len(steps) for steps, _ in series.values()):
         kind = "running median"
-        series = []
-        for run in runs:
-            steps, returns = _episodes([row for row in run.rows() if row["kind"] == "episode"])
-            series.append((steps, _running_median(returns)))
-    if not all(len(steps) for steps, _ in series):
-        return []
-    steps = _steps_of_all([steps for steps, _ in series], is_grid=kind == "evaluation")
+        for run in group.runs:
+            steps, returns = _episodes(_of_kind(rows[run], "episode"))
+            series[run] = steps, _running_median(returns)
+    what = "no evaluation" if kind == "evaluation" else _NOTHING
+    notes = [f"{run.folder}: {what} is whole yet" for run in group.runs if not len(series[run][0])]
+    series = {run: one for run, one in series.items() if len(one[0])}
+    if len(series) < 2:
+        return [curve for run in series for curve in _curves_of_one(group, run, rows[run])], notes
+    folders = ", ".join(str(run.folder) for run in series)
+    steps = _steps_of_all([own for own, _ in series.values()], is_grid=kind == "evaluation")
     if not len(steps):
-        return []
-    values = np.array([np.interp(steps, own, numbers) for own, numbers in series])
+        return [], [*notes, f"{folders}: they have no step in common"]
+    if kind == "evaluation" and any(own[-1] > steps[-1] for own, _ in series.values()):
+        notes.append(f"{folders}: drawn to step {steps[-1]}, which all of them have reached")
+    values = np.array([np.interp(steps, own, numbers) for own, numbers in series.values()])
     low, middle, high = np.percentile(values, (25, 50, 75), axis=0)
-    return [
-        Curve(
-            task=task,
-            agent=agent,
-            kind=kind,
-            n_runs=len(runs),
-            run="",
-            steps=steps,
-            values=middle,
-            low=low,
-            high=high,
-        )
-    ]
+    curve = Curve(
+        task=group.task,
+        agent=group.agent,
+        kind=kind,
+        n_runs=len(series),
+        run="",
+        steps=steps,
+        values=middle,
+        low=low,
+        high=high,
+    )
+    return [curve], notes
 
 
 def _steps_of_all(all_steps: Sequence[NDArray[np.int64]], is_grid: bool) -> NDArray[np.int64]:
@@ -232,6 +252,10 @@ def _steps_of_all(all_steps: Sequence[NDArray[np.int64]], is_grid: bool) -> NDAr
     )
 
 
+def _of_kind(rows: Sequence[Row], kind: str) -> list[Row]:
+    return [row for row in rows if row["kind"] == kind]
+
+
 def _episodes(rows: Sequence[Any]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     steps = np.array([row["step"] for row in rows], np.int64)
     return steps, np.array([row["return"] for row in rows], np.float64)
@@ -245,28 +269,6 @@ def _evaluations(rows: Sequence[Any]) -> tuple[NDArray[np.int64], NDArray[np.flo
 def _running_median(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Median of each number and those before it, `WINDOW` in all."""
     return np.array([np.median(values[max(0, i + 1 - WINDOW) : i + 1]) for i in range(len(values))])
-
-
-def _task(config: RunConfig) -> str:
-    environment = config.environment
-    words = [environment.id]
-    words += [f"{name}={value}" for name, value in environment.kwargs.items()]
-    words += [f"range {key}: {low} to {high}" for key, (low, high) in environment.ranges.items()]
-    if environment.noise:
-        words.append(f"noise {environment.noise}")
-    if environment.redundant:
-        words.append(f"{environment.redundant} redundant")
-    return ", ".join(words)
-
-
-def _agent(config: RunConfig) -> str:
-    words = [config.agent if config.preset is None else f"{config.agent} {config.preset}"]
-    words += [
-        f"{name}={value}" for values in config.settings.values() for name, value in values.items()
-    ]
-    if config.angle_pairs != "none":
-        words.append("angle pairs")
-    return ", ".join(words)
 
 
 def _csv_rows(curves: Sequence[Curve]) -> Iterable[tuple[object, ...]]:

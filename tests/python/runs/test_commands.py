@@ -202,6 +202,19 @@ def test_several_runs_are_drawn_where_one_is(invoke, tmp_path):
     assert {(one["kind"], one["n_runs"], one["run"]) for one in drawn} == {("evaluation", "2", "")}
 
 
+def test_what_a_figure_leaves_out_is_told(invoke, tmp_path):
+    for seed in (1, 2):
+        short = SHORT if seed == 1 else ("--dry-run", *SHORT)
+        values = invoke("train", DRIFTING, *short, "--seed", seed, "--out", f"run{seed}").stdout
+    config = json.loads(values)
+    del config["folder"]
+    Path("run2").mkdir()
+    Path("run2/config.json").write_text(json.dumps(config))
+    done = invoke("plot", "run1", "run2")
+    assert (done.exit_code, done.stdout) == (0, "wrote curves.png and curves.csv\n")
+    assert done.stderr == "note: run2: no evaluation is whole yet\n"
+
+
 def test_dry_run_shows_the_configuration_and_writes_nothing(invoke, tmp_path):
     done = invoke(
         "train", "CartPole-v1", "--agent", "sdnn", "--preset", "robust", "--episodes", 7,

@@ -5,14 +5,15 @@ import json
 import numpy as np
 import pytest
 
-from sdnn.runs import Run, RunConfig, RunEnvironment, RunError
-from sdnn.runs.curves import curves_of, draw_curves, write_curves
+from sdnn.runs import Goal, Run, RunConfig, RunEnvironment, RunError
+from sdnn.runs.curves import curves_and_notes, curves_of, draw_curves, write_curves
+from sdnn.runs.groups import groups_of
 
 CONFIG = RunConfig(environment=RunEnvironment(id="CartPole-v1"))
 
 
-def make(folder, config, returns=(), evaluations=()):
-    """Make a run that nobody trained: an episode every 10 steps, an evaluation every 20."""
+def make(folder, config, returns=(), evaluations=(), every=20):
+    """Make a run that nobody trained: an episode every 10 steps, an evaluation every 20 or so."""
     run = Run.create(folder, config)
     rows = [
         {"kind": "episode", "step": 10 * (n + 1), "return": float(value)}
@@ -21,7 +22,7 @@ def make(folder, config, returns=(), evaluations=()):
     rows += [
         {
             "kind": "evaluation",
-            "step": 20 * (n + 1),
+            "step": every * (n + 1),
             "mean_return": float(np.mean(values)),
             "returns": list(values),
         }
@@ -104,6 +105,141 @@ def test_tasks_and_agents_are_parted(tmp_path):
         ("CartPole-v1, max_episode_steps=9, range all: -4.0 to 4.0, noise 0.02", "sdnn general"),
     }
     assert len(draw_curves(curves).axes) == 2
+
+
+def configs_that_differ():
+    yield CONFIG
+    for change in (
+        {"steps": 300},
+        {"steps": None, "episodes": 300},
+        {"n_envs": 4},
+        {"evaluate_every": 500},
+        {"evaluate_every": 0},
+        {"evaluation_episodes": 3},
+        {"target_return": 400.0},
+        {"version": "0.0.1"},
+        {"angle_pairs": "find"},
+        {"settings": {"learning": {"discount": 0.5}}},
+        {"environment": RunEnvironment(id="CartPole-v1", kwargs={"sutton_barto_reward": True})},
+        {"environment": RunEnvironment(id="CartPole-v1", kwargs={"sutton_barto_reward": 1})},
+    ):
+        yield dataclasses.replace(CONFIG, **change)
+
+
+def test_only_runs_that_differ_in_their_seeds_are_put_together(tmp_path):
+    configs = list(configs_that_differ())
+    folders = {}
+    for n, config in enumerate(configs):
+        for seed in (1, 2):
+            folder = tmp_path / f"{n}-{seed}"
+            Run(folder, config).folder.mkdir()
+            (folder / "config.json").write_text(
+                json.dumps(
+                    dataclasses.replace(
+                        config, seed=seed, checkpoint_every=seed, tensorboard=seed == 2
+                    ).values()
+                )
+            )
+            folders[folder] = n
+    groups = groups_of([Run.open(folder) for folder in folders])
+    assert [[folders[run.folder] for run in group.runs] for group in groups] == [
+        [n, n] for n in range(len(configs))
+    ]
+    assert len({(group.task, group.agent) for group in groups}) == len(groups)
+
+
+def test_names_say_in_what_runs_differ(tmp_path):
+    long = dataclasses.replace(CONFIG, steps=600)
+    short = dataclasses.replace(CONFIG, steps=300)
+    goals = {
+        "a": (long, []),
+        "b": (short, []),
+        "c": (short, [Goal(at_step=300, steps=600)]),
+        "d": (short, [Goal(at_step=150, steps=600)]),
+        "e": (dataclasses.replace(short, n_envs=4), []),
+    }
+    groups = groups_of([Run(tmp_path / name, *parts) for name, parts in goals.items()])
+    assert [group.agent.removeprefix("sdnn general, ") for group in groups] == [
+        "600 steps, 1 environment",
+        "300 steps, 1 environment",
+        "300 steps, then 600 steps, 1 environment",
+        "300 steps, then from 150 on 600 steps, 1 environment",
+        "300 steps, 4 environments",
+    ]
+
+
+def test_goals_that_follow_from_the_seed_keep_runs_together(tmp_path):
+    of_episodes = dataclasses.replace(CONFIG, steps=None, episodes=30)
+    targeted = dataclasses.replace(CONFIG, target_return=5.0)
+    for config, one, other in (
+        (of_episodes, Goal(at_step=271, episodes=60), Goal(at_step=300, episodes=60)),
+        (targeted, Goal(at_step=271, steps=600), Goal(at_step=300, steps=600)),
+    ):
+        runs = [
+            Run(tmp_path / str(goal.at_step), dataclasses.replace(config, seed=goal.at_step), goals)
+            for goal in (one, other)
+            for goals in [[goal]]
+        ]
+        assert len(groups_of(runs)) == 1
+
+
+def test_runs_that_are_evaluated_at_other_steps_are_both_drawn(tmp_path):
+    runs = [
+        make(
+            tmp_path / str(every),
+            dataclasses.replace(CONFIG, evaluate_every=every),
+            [1, 2],
+            [[3]],
+            every=every,
+        )
+        for every in (500, 700)
+    ]
+    third = dataclasses.replace(CONFIG, environment=RunEnvironment(id="Acrobot-v1"))
+    runs.append(make(tmp_path / "other", third, [1]))
+    curves, notes = curves_and_notes(runs)
+    assert notes == []
+    assert [
+        (curve.agent, curve.steps.tolist()) for curve in curves if curve.kind == "evaluation"
+    ] == [
+        ("sdnn general, evaluated every 500 steps", [500]),
+        ("sdnn general, evaluated every 700 steps", [700]),
+    ]
+    assert {curve.run for curve in curves} == {str(run.folder) for run in runs}
+
+
+def test_runs_of_other_lengths_are_not_cut(tmp_path):
+    runs = [
+        make(tmp_path / str(n), dataclasses.replace(CONFIG, steps=20 * n), [], [[3]] * n)
+        for n in (2, 5)
+    ]
+    assert [curve.steps[-1] for curve in curves_of(runs)] == [40, 100]
+
+
+def test_what_is_left_out_of_several_runs_is_told(tmp_path):
+    seeds = [dataclasses.replace(CONFIG, seed=seed) for seed in range(4)]
+    whole = make(tmp_path / "whole", seeds[0], [1], [[2], [4], [6]])
+    short = make(tmp_path / "short", seeds[1], [1], [[0], [2]])
+    begun = make(tmp_path / "begun", seeds[2], [1])
+    empty = make(tmp_path / "empty", seeds[3])
+    (curve,), notes = curves_and_notes([whole, short, begun, empty])
+    assert (curve.n_runs, curve.kind, curve.values.tolist()) == (2, "evaluation", [1, 3])
+    assert notes == [
+        f"{begun.folder}: no evaluation is whole yet",
+        f"{empty.folder}: no evaluation is whole yet",
+        f"{whole.folder}, {short.folder}: drawn to step 40, which all of them have reached",
+    ]
+    curves, notes = curves_and_notes([whole, begun])
+    assert [(curve.kind, curve.run) for curve in curves] == [
+        (kind, str(whole.folder)) for kind in ("return", "running median", "evaluation")
+    ]
+    assert notes == [f"{begun.folder}: no evaluation is whole yet"]
+    late = make(tmp_path / "late", dataclasses.replace(CONFIG, seed=9), [], [[1]], every=30)
+    with pytest.raises(RunError) as caught:
+        curves_of([short, late])
+    folders = f"{short.folder}, {late.folder}"
+    assert str(caught.value) == f"{folders}: they have no step in common: nothing to draw"
+    with pytest.raises(RunError, match=r"no episode and no evaluation is whole yet; .* yet: noth"):
+        curves_of([empty, make(tmp_path / "new", CONFIG)])
 
 
 def test_files_hold_the_numbers(tmp_path):
