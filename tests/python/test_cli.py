@@ -4,6 +4,7 @@ import json
 import os
 import re
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
@@ -169,6 +170,25 @@ def test_dry_run_makes_nothing_and_counts_what_is_stored(invoke, tmp_path):
     )
     assert plan["n_learning_episodes"] == 300
     assert [(row["planned"], row["stored"]) for row in plan["trials"]] == [(5, 2), (5, 2)]
+
+
+def test_dry_run_looks_at_a_folder_that_cannot_be_written(invoke, tmp_path, monkeypatch):
+    invoke("reproduce", "a", "--quick")
+    files = sorted((tmp_path / "results").iterdir())
+    opened = []
+
+    def connect(place, **options):
+        opened.append(str(place))
+        return real_connect(place, **options)
+
+    real_connect = sqlite3.connect
+    monkeypatch.setattr("sdnn.experiments.store.sqlite3.connect", connect)
+    monkeypatch.setattr("sdnn.experiments.store._is_writable", lambda _: False)
+    result = invoke("reproduce", "a", "--quick", "--dry-run")
+    assert result.stdout.count("2 trials x 300 episodes, 2 of them stored in results") == 2
+    assert opened
+    assert all(place.endswith("?mode=ro&immutable=1") for place in opened)
+    assert sorted((tmp_path / "results").iterdir()) == files
 
 
 def test_dry_run_counts_costs_too(invoke, no_costs):

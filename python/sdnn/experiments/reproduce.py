@@ -212,7 +212,7 @@ def count_stored(request: ReproduceRequest) -> StoredCounts:
     trial_keys: set[TrialKey] = set()
     known_costs: set[CostKey] = set()
     if (request.out / STORE_NAME).exists() or request.out.is_file():
-        with ResultStore(request.out) as store:
+        with ResultStore(request.out, read_only=True) as store:
             trial_keys = store.keys()
             found = store.load_costs(request.cost_config.config_hash)
             known_costs = {record.key for record in found}

@@ -7,6 +7,7 @@ as a whole or not at all. Trials under different settings live side by side unde
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
 from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
@@ -68,6 +69,9 @@ class ResultStore:
     ----------
     folder
         Folder of the file, made if missing.
+    read_only
+        Whether it is only looked at: then nothing is made, and the folder may be one that cannot be
+        written.
 
     Raises
     ------
@@ -76,15 +80,20 @@ class ResultStore:
         version of this one's schema. Such a file is left as it is.
     """
 
-    def __init__(self, folder: str | Path) -> None:
+    def __init__(self, folder: str | Path, *, read_only: bool = False) -> None:
         folder = Path(folder)
         self.path = folder / STORE_NAME
         if folder.exists() and not folder.is_dir():
             raise StoreError(f"the output must be a folder, but {folder} is a file")
         with _as_store_error(self.path):
-            folder.mkdir(parents=True, exist_ok=True)
+            if not read_only:
+                folder.mkdir(parents=True, exist_ok=True)
             is_new = _inspect(self.path)
-            self._connection = sqlite3.connect(self.path, timeout=BUSY_SECONDS)
+            if read_only and not is_new and not _is_writable(folder):
+                self._connection = _connect_to_read(self.path)
+                return
+            place = ":memory:" if read_only and is_new else self.path
+            self._connection = sqlite3.connect(place, timeout=BUSY_SECONDS)
             try:
                 self._prepare(is_new)
             except BaseException:
@@ -325,9 +334,7 @@ def _inspect(path: Path) -> bool:
     with path.open("rb") as file:
         if file.read(16) != b"SQLite format 3\0":
             raise sqlite3.DatabaseError("no SQLite file")
-    connection = sqlite3.connect(
-        f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=BUSY_SECONDS
-    )
+    connection = _connect_to_read(path)
     try:
         application_id = connection.execute("PRAGMA application_id").fetchone()[0]
         version = connection.execute("PRAGMA user_version").fetchone()[0]
@@ -350,3 +357,20 @@ def _inspect(path: Path) -> bool:
         return False
     finally:
         connection.close()
+
+
+def _is_writable(folder: Path) -> bool:
+    return os.access(folder, os.W_OK)
+
+
+def _connect_to_read(path: Path) -> sqlite3.Connection:
+    """Open a file for reading, also in a folder that cannot be written.
+
+    There SQLite cannot make what it keeps beside a file for those who write it at the same time. It
+    needs none of that unless a log is there, which holds what is not yet in the file.
+    """
+    log = path.with_name(f"{path.name}-wal")
+    has_log = log.exists() and log.stat().st_size > 0
+    is_fixed = not has_log and not _is_writable(path.parent)
+    uri = f"{path.absolute().as_uri()}?mode=ro" + ("&immutable=1" if is_fixed else "")
+    return sqlite3.connect(uri, uri=True, timeout=BUSY_SECONDS)

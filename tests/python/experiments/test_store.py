@@ -1,4 +1,5 @@
 import os
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -64,6 +65,65 @@ def test_settings_live_side_by_side(tmp_path):
         (found,) = store.load([make_record(config_hash="bb").key])
         assert found.rows.steps.tolist() == [3, 3]
         assert len(store.keys()) == 2
+
+
+def test_a_folder_that_is_only_looked_at_stays_as_it_is(tmp_path, monkeypatch):
+    path, digest = filled(tmp_path / "full", 3)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "empty" / path.name).touch()
+    for is_writable in (True, False):
+        if not is_writable:
+            monkeypatch.setattr("sdnn.experiments.store._is_writable", lambda _: False)
+        content = path.read_bytes()
+        with ResultStore(path.parent, read_only=True) as store:
+            assert records_digest(store.load()) == digest
+            assert len(store.times()) == 3
+            if not is_writable:
+                assert list(path.parent.iterdir()) == [path]
+                with pytest.raises(StoreError, match="readonly"):
+                    store.add(make_record(7))
+        assert list(path.parent.iterdir()) == [path]
+        assert path.read_bytes() == content
+        for folder in (tmp_path / "empty", tmp_path / "none"):
+            with ResultStore(folder, read_only=True) as store:
+                assert store.keys() == set()
+                assert store.times() == store.load_costs("aa") == ()
+        assert (tmp_path / "empty" / path.name).stat().st_size == 0
+        assert not (tmp_path / "none").exists()
+
+
+READING = """
+import sys
+from sdnn.experiments import ResultStore
+with ResultStore(sys.argv[1], read_only=True) as store:
+    print(len(store.keys()), len(store.load()))
+"""
+
+
+@pytest.mark.parametrize("is_killed", [False, True])
+def test_a_folder_on_a_file_system_that_is_read_only(tmp_path, is_killed):
+    path, _ = filled(tmp_path / "out", 2)
+    if is_killed:  # what is beside the file is left, and holds the third trial
+        with ResultStore(tmp_path / "out") as store:
+            store.add(make_record(2, steps=range(1, 60)))
+            shutil.copytree(tmp_path / "out", tmp_path / "killed")
+        path = tmp_path / "killed" / path.name
+        assert path.with_name(f"{path.name}-wal").stat().st_size > 0
+    mount = 'mount --bind "$1" "$1" && mount -o remount,ro,bind "$1" && ! touch "$1/x" && shift'
+    apart = ("unshare", "--map-root-user", "--mount", "sh", "-c")
+    if (
+        shutil.which("unshare") is None
+        or subprocess.run([*apart, mount, "sh", path.parent], capture_output=True).returncode
+    ):
+        pytest.skip("needs the right to mount a folder read-only")
+    done = subprocess.run(
+        [*apart, f'{mount} && exec "$@"', "sh", path.parent, sys.executable, "-c", READING,
+         path.parent],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (0, "3 3\n" if is_killed else "2 2\n"), done.stderr
 
 
 def test_same_trial_twice_is_one_trial_and_other_rows_are_refused(tmp_path):

@@ -78,7 +78,7 @@ def forecast(request: SweepRequest) -> Forecast:
     stored: set[TrialKey] = set()
     durations = Durations(())
     if (request.out / STORE_NAME).exists() or request.out.is_file():
-        with ResultStore(request.out) as store:
+        with ResultStore(request.out, read_only=True) as store:
             stored = store.keys()
             durations = Durations(store.times())
     study.check(stored)
