@@ -18,6 +18,8 @@ from click.testing import CliRunner
 import sdnn
 from sdnn.cli import main
 from sdnn.experiments import AGENTS, AgentEntry, register
+from sdnn.experiments.cases import MOST_EPISODES, select_experiments
+from sdnn.experiments.reproduce import ReproduceRequest
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +63,8 @@ def test_help_and_version(invoke):
         (["reproduce", "a", "--trials", "many"], "--trials"),
         (["reproduce", "a", "--episodes", -5], "--episodes"),
         (["reproduce", "a", "--episodes", 9], "episodes must be at least 10"),
+        (["reproduce", "a", "--episodes", 3_000_000_000], "--episodes"),
+        (["reproduce", "a", "--episodes", 10**8 + 1, "--dry-run"], "--episodes"),
         (["reproduce", "a", "--jobs", 0], "--jobs"),
         (["reproduce", "a", "--seed", -1], "--seed"),
         (["reproduce", "a", "--fast"], "--fast"),
@@ -96,6 +100,15 @@ def test_quick_run_writes_marked_files_and_one_summary_line(invoke, tmp_path):
     assert "not judged" in result.stdout
     assert "4 of 4 trials are stored in out (4 run now)" in result.stdout.splitlines()[-1]
     assert "(0 run now)" in invoke("reproduce", "a", "--quick", "--out", "out").stdout
+
+
+def test_the_most_episodes_make_a_trial(tmp_path):
+    parts = {"experiments": select_experiments("a"), "out": tmp_path, "n_trials": 1}
+    request = ReproduceRequest(**parts, n_episodes=MOST_EPISODES)
+    planned = request.plan.trials[0]
+    planned.config.make_trial(planned.key.seed)
+    with pytest.raises(ValueError, match="episodes must be at most 100000000, got 100000001"):
+        _ = ReproduceRequest(**parts, n_episodes=MOST_EPISODES + 1).plan
 
 
 @pytest.fixture

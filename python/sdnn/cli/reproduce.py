@@ -18,7 +18,13 @@ from sdnn.cli.output import (
     report_outcome,
     with_progress,
 )
-from sdnn.experiments.cases import PRESET_AGENTS, WORDS, includes_cost, select_experiments
+from sdnn.experiments.cases import (
+    MOST_EPISODES,
+    PRESET_AGENTS,
+    WORDS,
+    includes_cost,
+    select_experiments,
+)
 
 if TYPE_CHECKING:
     from sdnn.experiments.executor import Executor
@@ -35,7 +41,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--episodes",
-    type=click.IntRange(min=1),
+    type=click.IntRange(1, MOST_EPISODES),
     help="Learning episodes per trial.  [default: 15000, as in the paper]",
 )
 @executor_options

@@ -15,6 +15,9 @@ PAPER_TRIALS = 10
 PAPER_EPISODES = 15_000
 """Learning episodes per trial in the paper."""
 
+MOST_EPISODES = 10**8
+"""Learning episodes per trial at most: the rows of more test episodes fill the memory."""
+
 SENSOR_NOISE = 0.02
 """Standard deviation of the noise in the paper's Cases II to IV."""
 

@@ -11,7 +11,13 @@ from typing import Any
 
 from sdnn import _core, machine
 from sdnn.experiments import figures, page
-from sdnn.experiments.cases import EXPERIMENTS, PAPER_EPISODES, PAPER_TRIALS, Experiment
+from sdnn.experiments.cases import (
+    EXPERIMENTS,
+    MOST_EPISODES,
+    PAPER_EPISODES,
+    PAPER_TRIALS,
+    Experiment,
+)
 from sdnn.experiments.config import PlannedTrial, plan_trials
 from sdnn.experiments.cost import QUICK_COST, CostConfig, cost_keys, measure_costs
 from sdnn.experiments.engine import Observer, RunOutcome, run_trials
@@ -111,7 +117,8 @@ class ReproduceRequest:
         Raises
         ------
         ValueError
-            If the trials would be too short to hold a test episode.
+            If the trials would be too short to hold a test episode, or have more than
+            `MOST_EPISODES`.
         """
         n_episodes = self.n_episodes or (QUICK_EPISODES if self.quick else PAPER_EPISODES)
         protocol = ProtocolConfig(n_learning_episodes=n_episodes)
@@ -120,6 +127,8 @@ class ReproduceRequest:
                 f"episodes must be at least {protocol.test_interval}, the distance of test"
                 f" episodes, got {n_episodes}"
             )
+        if n_episodes > MOST_EPISODES:
+            raise ValueError(f"episodes must be at most {MOST_EPISODES}, got {n_episodes}")
         return protocol
 
     @cached_property
@@ -129,7 +138,7 @@ class ReproduceRequest:
         Raises
         ------
         ValueError
-            If the trials would be too short to hold a test episode, no agent has one of the ids,
+            If the trials are too short or too long (see `protocol`), no agent has one of the ids,
             or only costs are asked for, of agents that have none.
         """
         n_trials = self.n_trials or (QUICK_TRIALS if self.quick else PAPER_TRIALS)
