@@ -102,6 +102,48 @@ def test_quick_run_writes_marked_files_and_one_summary_line(invoke, tmp_path):
     assert "(0 run now)" in invoke("reproduce", "a", "--quick", "--out", "out").stdout
 
 
+@pytest.mark.parametrize(
+    ("options", "mark"),
+    [
+        ({}, ""),
+        ({"n_trials": 10, "n_episodes": 15_000}, ""),
+        ({"quick": True, "n_trials": 2, "n_episodes": 300}, "-quick"),
+        ({"n_trials": 2}, "-2-trials"),
+        ({"n_episodes": 100}, "-100-episodes"),
+        ({"n_trials": 2, "n_episodes": 15_000, "seed": 7}, "-2-trials-seed-7"),
+        ({"quick": True, "n_trials": 10}, "-10-trials-quick"),
+        ({"agents": ("rbfn", "fql")}, "-rbfn-fql"),
+        ({"agents": ("sdnn-c-robust",)}, "-sdnn-c-robust"),
+        ({"agents": ("sdnn-c",), "presets": ("robust",)}, "-sdnn-c-with-robust"),
+        ({"presets": ("robust", "general"), "quick": True}, "-robust-general-quick"),
+    ],
+)
+def test_requests_of_other_results_have_other_names(tmp_path, options, mark):
+    request = ReproduceRequest(experiments=select_experiments("a"), out=tmp_path, **options)
+    assert request.file_name("table.json") == f"table{mark}.json"
+
+
+def test_a_smaller_run_leaves_the_files_of_a_full_one(invoke, tmp_path):
+    invoke("reproduce", "a", "--trials", 10, "--out", "out", "--episodes", 15_000)
+    files = [path for path in (tmp_path / "out").iterdir() if path.suffix != ".sqlite"]
+    before = {path: path.read_bytes() for path in files}
+    assert {path.name for path in files} >= {"report.html", "results.csv", "table.json"}
+    for options in (("--trials", 2), ("--episodes", 1000), ("--seed", 1)):
+        assert invoke("reproduce", "a", "--out", "out", *options).exit_code == 0
+    for agent in (("--agent", "sdnn-c", "--preset", "robust"), ("--agent", "sdnn-c-robust")):
+        assert invoke("reproduce", "a", "--out", "out", "--quick", *agent).exit_code == 0
+    assert {path: path.read_bytes() for path in files} == before
+    names = {path.name for path in (tmp_path / "out").glob("table*")}
+    assert names == {
+        "table.json",
+        "table-2-trials.json",
+        "table-1000-episodes.json",
+        "table-seed-1.json",
+        "table-sdnn-c-with-robust-quick.json",
+        "table-sdnn-c-robust-quick.json",
+    }
+
+
 def test_the_most_episodes_make_a_trial(tmp_path):
     parts = {"experiments": select_experiments("a"), "out": tmp_path, "n_trials": 1}
     request = ReproduceRequest(**parts, n_episodes=MOST_EPISODES)
@@ -161,7 +203,8 @@ def test_results_do_not_depend_on_jobs(invoke):
 def test_json_is_the_file(invoke, tmp_path):
     result = invoke("reproduce", "a", "--trials", 3, "--episodes", 1000, "--json", "--seed", 5)
     table = json.loads(result.stdout)
-    assert table == json.loads((tmp_path / "results" / "table.json").read_text())
+    name = "table-3-trials-1000-episodes-seed-5.json"
+    assert table == json.loads((tmp_path / "results" / name).read_text())
     assert table["seed"] == 5
     assert table["quick"] is False
     (experiment,) = table["experiments"]

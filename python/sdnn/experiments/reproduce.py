@@ -76,11 +76,12 @@ class ReproduceRequest:
     out
         Folder of the result file, figures and tables.
     n_trials
-        Trials per case and agent; default the paper's, or `QUICK_TRIALS`.
+        Trials per case and agent; default the paper's, or `QUICK_TRIALS`. Files of others are named
+        so.
     n_episodes
-        Learning episodes per trial; default the paper's, or `QUICK_EPISODES`.
+        The same of learning episodes per trial; default the paper's, or `QUICK_EPISODES`.
     seed
-        Root of all seeds.
+        Root of all seeds; files of another than 0 are named so.
     jobs
         Trials at the same time; default one for each core.
     executor
@@ -120,7 +121,7 @@ class ReproduceRequest:
             If the trials would be too short to hold a test episode, or have more than
             `MOST_EPISODES`.
         """
-        n_episodes = self.n_episodes or (QUICK_EPISODES if self.quick else PAPER_EPISODES)
+        n_episodes = self.n_episodes or self._default_episodes
         protocol = ProtocolConfig(n_learning_episodes=n_episodes)
         if n_episodes < protocol.test_interval:
             raise ValueError(
@@ -141,7 +142,7 @@ class ReproduceRequest:
             If the trials are too short or too long (see `protocol`), no agent has one of the ids,
             or only costs are asked for, of agents that have none.
         """
-        n_trials = self.n_trials or (QUICK_TRIALS if self.quick else PAPER_TRIALS)
+        n_trials = self.n_trials or self._default_trials
         by_id = {experiment.id: experiment for experiment in (*EXPERIMENTS, *self.experiments)}
         known = [
             experiment.with_agents(self.agents).with_presets(self.presets)
@@ -172,10 +173,34 @@ class ReproduceRequest:
         return QUICK_COST if self.quick else CostConfig()
 
     def file_name(self, name: str) -> str:
-        """Name of a file of this request, such as ``table-rbfn-quick.json``."""
+        """Name of a file of this request, such as ``table-rbfn-3-trials-quick.json``.
+
+        Requests that give other results have other names.
+        """
         stem, _, kind = name.rpartition(".")
-        marks = [*self.agents, *self.presets, *(["quick"] if self.quick else [])]
+        marks = list(self.agents)
+        if self.agents and self.presets:
+            marks.append("with")  # sdnn-c with robust is not the agent sdnn-c-robust
+        marks += self.presets
+        for word, given, default in (
+            ("trials", self.n_trials, self._default_trials),
+            ("episodes", self.n_episodes, self._default_episodes),
+        ):
+            if given and given != default:
+                marks.append(f"{given}-{word}")
+        if self.seed:
+            marks.append(f"seed-{self.seed}")
+        if self.quick:
+            marks.append("quick")
         return "-".join([stem, *marks]) + f".{kind}"
+
+    @property
+    def _default_trials(self) -> int:
+        return QUICK_TRIALS if self.quick else PAPER_TRIALS
+
+    @property
+    def _default_episodes(self) -> int:
+        return QUICK_EPISODES if self.quick else PAPER_EPISODES
 
 
 @dataclass(frozen=True)
