@@ -26,18 +26,26 @@ def require_same_kind(agent: Any, env: Any) -> None:
         own = getattr(agent, name, None)
         found = getattr(env, f"single_{name}", getattr(env, name, None))
         if own is not None and found is not None and not _is_of_kind(found, own):
-            raise ValueError(f"env must have the agent's {name}, {own}, got {found}")
+            raise ValueError(f"env must have the agent's {name}, {_line(own)}, got {_line(found)}")
 
 
-def _is_of_kind(one: gym.Space[Any], other: gym.Space[Any]) -> bool:
-    if isinstance(one, gym.spaces.Box) and isinstance(other, gym.spaces.Box):
-        return one.shape == other.shape
-    if isinstance(one, gym.spaces.Dict) and isinstance(other, gym.spaces.Dict):
-        one, other = gym.spaces.Tuple(one.values()), gym.spaces.Tuple(other.values())
-    if isinstance(one, gym.spaces.Tuple) and isinstance(other, gym.spaces.Tuple):
-        pairs = zip(one.spaces, other.spaces, strict=False)
-        return len(one) == len(other) and all(_is_of_kind(*pair) for pair in pairs)
-    return bool(one == other)
+def _is_of_kind(found: gym.Space[Any], own: gym.Space[Any]) -> bool:
+    if isinstance(own, gym.spaces.Dict) and isinstance(found, gym.spaces.Dict):
+        return own.keys() == found.keys() and all(_is_of_kind(found[key], own[key]) for key in own)
+    if isinstance(own, gym.spaces.Tuple) and isinstance(found, gym.spaces.Tuple):
+        return len(own) == len(found) and all(map(_is_of_kind, found, own))
+    if own.shape != found.shape:
+        return False
+    if isinstance(own, gym.spaces.Discrete) and isinstance(found, gym.spaces.Discrete):
+        return bool(own.n == found.n and own.start == found.start)
+    if isinstance(own, gym.spaces.MultiDiscrete) and isinstance(found, gym.spaces.MultiDiscrete):
+        return bool((own.nvec == found.nvec).all() and (own.start == found.start).all())
+    kinds = (gym.spaces.Box, gym.spaces.MultiBinary)
+    return any(isinstance(own, kind) and isinstance(found, kind) for kind in kinds)
+
+
+def _line(space: gym.Space[Any]) -> str:
+    return " ".join(str(space).split())
 
 
 def space_data(space: gym.Space[Any]) -> dict[str, Any]:

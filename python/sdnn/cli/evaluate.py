@@ -33,15 +33,12 @@ def evaluate(folder: Path, episodes: int, seed: int | None, as_json: bool) -> No
     with run_command(words_of_run(folder)):
         found = Run.open(folder).evaluate(episodes, seed)
     returns = found.returns
-    with np.errstate(invalid="ignore"):  # of returns that are no numbers
-        low, median, high = np.percentile(returns, (25, 50, 75)).tolist()
-        mean = found.mean_return
-        deviation = float(returns.std(ddof=1)) if episodes > 1 else None
+    low, median, high = np.percentile(returns, (25, 50, 75)).tolist()
     values = {
         "folder": str(folder),
         "n_episodes": episodes,
-        "mean_return": mean,
-        "standard_deviation": deviation,
+        "mean_return": found.mean_return,
+        "standard_deviation": float(returns.std(ddof=1)) if episodes > 1 else None,
         "median_return": median,
         "quartiles": [low, high],
         "range": [float(returns.min()), float(returns.max())],
@@ -52,7 +49,7 @@ def evaluate(folder: Path, episodes: int, seed: int | None, as_json: bool) -> No
     if as_json:
         click.echo(json_text({**values, "returns": returns.tolist()}))
         return
-    click.echo(f"{folder}: mean return {mean:.6g} over {episodes} greedy episodes")
+    click.echo(f"{folder}: mean return {found.mean_return:.6g} over {episodes} greedy episodes")
     click.echo(
         f"median {median:.6g}, quartiles {low:.6g} to {high:.6g}, all {returns.min():.6g} to"
         f" {returns.max():.6g}"
@@ -61,9 +58,5 @@ def evaluate(folder: Path, episodes: int, seed: int | None, as_json: bool) -> No
         f"{values['mean_length']:.6g} steps on average,"
         f" {values['share_terminated']:.0%} of the episodes terminated"
     )
-    if n_odd := episodes - int(np.isfinite(returns).sum()):
-        click.echo(
-            f"{n_odd} of {episodes} returns are no finite numbers: see the environment's rewards"
-        )
     if found.is_warming_up:
         click.echo(WARMING_UP)

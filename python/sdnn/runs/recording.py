@@ -17,7 +17,6 @@ from sdnn.agents import Agent
 from sdnn.agents.evaluation import EVALUATION, episode_seed
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
-from sdnn.runs.spaces import check_spaces
 from sdnn.whole_files import whole_file, write_whole
 
 __all__ = ["SUFFIXES", "Recording", "record"]
@@ -131,7 +130,7 @@ def record(
     root = run.fresh_seed if seed is None else seed
     environment = run.config.environment
     with closing(environment.make("evaluation_sensor_noise", render_mode="rgb_array")) as env:
-        check_spaces(agent, env, environment.id)
+        run.check_spaces(agent, env)
         recording = Recording(agent, env, episode_seed(root, EVALUATION, 0), max_steps)
         rate = float(env.metadata.get("render_fps") or FRAMES_PER_SECOND)
         path.parent.mkdir(parents=True, exist_ok=True)

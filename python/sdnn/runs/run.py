@@ -27,12 +27,12 @@ from sdnn.agents import (
     evaluate,
     load_agent,
 )
+from sdnn.agents.spaces import require_same_kind
 from sdnn.agents.training import Row
 from sdnn.arguments import whole
 from sdnn.interrupts import Interrupts
 from sdnn.runs.config import RunConfig, read_json
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, problem_of
-from sdnn.runs.spaces import check_spaces
 from sdnn.whole_files import remove_abandoned_files, write_whole
 
 if TYPE_CHECKING:
@@ -303,7 +303,7 @@ class Run:
         root = self.fresh_seed if seed is None else seed
         agent = self.agent()
         with closing(self.config.environment.make("evaluation_sensor_noise")) as env:
-            check_spaces(agent, env, self.config.environment.id)
+            self.check_spaces(agent, env)
             found = evaluate(agent, env, episodes, seed=root)
         return RunEvaluation(
             returns=found.returns,
@@ -311,6 +311,13 @@ class Run:
             terminated=found.terminated,
             is_warming_up=agent.is_warming_up,
         )
+
+    def check_spaces(self, agent: Agent[Any, Any], env: gym.Env[Any, Any]) -> None:
+        """Check that the environment still is what the agent learned in; RunError if not."""
+        try:
+            require_same_kind(agent, env)
+        except ValueError as error:
+            raise RunError(f"{self.config.environment.id} has changed: {error}") from error
 
     @property
     def fresh_seed(self) -> int:
@@ -350,8 +357,6 @@ class Run:
             training = Training.load(path, env, callbacks=callbacks, evaluation_env=evaluation_env)
         except ValueError as error:
             raise RunError(str(error)) from error
-        assert isinstance(training.agent, Agent)  # what load gives
-        check_spaces(training.agent, evaluation_env, self.config.environment.id)
         if len(_read_rows(self.folder / ROWS)) < training.n_rows:
             raise RunError(
                 f"{self.folder / ROWS} must have the {training.n_rows} rows that were written"

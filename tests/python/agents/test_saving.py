@@ -333,9 +333,7 @@ def test_a_file_is_whole_or_not_there(saved, tmp_path):
     agent.save(tmp_path / "agent")
     before = (tmp_path / "agent").read_bytes()
     agent.observation_space = gym.spaces.Graph(PLANE, None)
-    with pytest.raises(
-        TypeError, match=r"must be a Box, .* of such, got Graph"
-    ):
+    with pytest.raises(TypeError, match=r"must be a Box, .* of such, got Graph"):
         agent.save(tmp_path / "agent")
     assert (tmp_path / "agent").read_bytes() == before
     assert [file.name for file in tmp_path.iterdir()] == ["agent"]

@@ -3,8 +3,7 @@ import numpy as np
 import pytest
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Tuple
 
-from sdnn.runs import RunError
-from sdnn.runs.spaces import check_spaces
+from sdnn.agents.spaces import require_same_kind
 
 SPACES = (
     Box(-1.0, 1.0, (2,)),
@@ -38,10 +37,10 @@ def test_each_space_is_like_itself_only(own):
             (Spaces(SPACES[0], own), Spaces(SPACES[0], given)),
         ):
             if given is own:
-                check_spaces(*pair, "task")
+                require_same_kind(*pair)
             else:
-                with pytest.raises(RunError, match=r"task must have the (observations|actions)"):
-                    check_spaces(*pair, "task")
+                with pytest.raises(ValueError, match="env must have the agent's"):
+                    require_same_kind(*pair)
 
 
 @pytest.mark.parametrize(
@@ -53,11 +52,11 @@ def test_each_space_is_like_itself_only(own):
     ],
 )
 def test_bounds_and_types_may_differ(own, given):
-    check_spaces(Spaces(own), Spaces(given), "task")
+    require_same_kind(Spaces(own), Spaces(given))
 
 
 def test_long_spaces_are_told_in_a_line():
     wide = gym.spaces.Box(np.arange(40.0), np.arange(40.0) + 1, dtype=np.float64)
-    with pytest.raises(RunError) as caught:
-        check_spaces(Spaces(wide), Spaces(SPACES[0]), "task")
+    with pytest.raises(ValueError, match="observation_space") as caught:
+        require_same_kind(Spaces(wide), Spaces(SPACES[0]))
     assert "\n" not in str(caught.value)
