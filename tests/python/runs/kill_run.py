@@ -18,8 +18,9 @@ from sdnn.runs import Run, RunConfig
 
 def steps_done(run):
     try:
-        env = run.config.environment.make()
-        return Training.load(run.folder / "checkpoint.safetensors", env, evaluation_env=env).n_steps
+        env, evaluation_env = (run.config.environment.make() for _ in range(2))
+        path = run.folder / "checkpoint.safetensors"
+        return Training.load(path, env, evaluation_env=evaluation_env).n_steps
     except FileNotFoundError:
         return 0
 

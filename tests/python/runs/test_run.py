@@ -134,8 +134,9 @@ def test_after_an_error_a_run_goes_on_from_the_last_checkpoint(whole, tmp_path):
     run = Run.create(tmp_path / "run", CONFIG)
     with pytest.raises(ZeroDivisionError):
         run.train(callbacks=[FailAt(155)])
-    env = CONFIG.environment.make()
-    kept = Training.load(run.folder / "checkpoint.safetensors", env, evaluation_env=env)
+    env, evaluation_env = (CONFIG.environment.make() for _ in range(2))
+    path = run.folder / "checkpoint.safetensors"
+    kept = Training.load(path, env, evaluation_env=evaluation_env)
     assert kept.n_steps == 140
     run.train()
     assert contents(run) == contents(whole(CONFIG))
