@@ -326,6 +326,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         ValueError, OverflowError, MemoryError
             As of `partial_fit`; nothing is changed then.
         """
+        self._refuse_class_weight()
         work = self._scratch()
         if hasattr(self, "network_"):
             if classes is not None and not np.array_equal(unique_labels(classes), self.classes_):
@@ -478,9 +479,14 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         probabilities: NDArray[np.float64] = raised / raised.sum(axis=1, keepdims=True)
         return probabilities
 
-    def _checked(self, X: Any, y: Any, **options: Any) -> tuple[NDArray[Any], NDArray[Any]]:
-        if self.class_weight is not None and not options.get("ensure_min_samples"):
+    def _refuse_class_weight(self) -> None:
+        """Refuse it where samples come piece by piece."""
+        if self.class_weight is not None:
             raise ValueError(f"class_weight works in fit only, got {self.class_weight!r}")
+
+    def _checked(self, X: Any, y: Any, **options: Any) -> tuple[NDArray[Any], NDArray[Any]]:
+        if not options.get("ensure_min_samples"):
+            self._refuse_class_weight()
         table, y = self._validated(X, y, **options)
         check_classification_targets(y)
         return table, y

@@ -311,6 +311,8 @@ def test_weights_of_classes_are_numbers_of_presentations():
             SDNNClassifier(class_weight=bad).fit(X, rare)
     with pytest.raises(ValueError, match="class_weight works in fit only"):
         SDNNClassifier(class_weight="balanced").partial_fit(X, rare, classes=[0, 1])
+    with pytest.raises(ValueError, match="class_weight works in fit only"):
+        balanced.learn_one(X[0], 1)
 
 
 @pytest.mark.parametrize("make", [SDNNRegressor, SDNNClassifier])
