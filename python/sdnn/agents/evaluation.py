@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -18,6 +19,10 @@ __all__ = ["Evaluation", "episode_seed", "evaluate"]
 
 EVALUATION = 1
 """The kind of episodes that `episode_seed` gives seeds to."""
+
+
+_LONG = 100_000
+"""Steps of an episode that make one wonder."""
 
 
 class Acts(Protocol):
@@ -67,6 +72,8 @@ def evaluate(
 ) -> Evaluation:
     """Run greedy episodes, in which nothing is learned and nothing of the agent's future changes.
 
+    An episode that seems not to end is warned of.
+
     Parameters
     ----------
     agent
@@ -100,6 +107,13 @@ def evaluate(
             observation, reward, terminated, truncated, _ = env.step(action)
             episode_return += reward_of(reward)
             length += 1
+            if length == _LONG:
+                warnings.warn(
+                    f"an evaluation's episode has had {_LONG:,} steps and goes on; an environment"
+                    " whose episodes may never end needs a time limit (max_episode_steps)",
+                    RuntimeWarning,
+                    stacklevel=2,
+                )
         if not math.isfinite(episode_return):
             raise ValueError(f"rewards of env must add up to a finite number, got {episode_return}")
         returns.append(episode_return)

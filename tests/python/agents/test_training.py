@@ -123,6 +123,20 @@ def test_an_environment_that_does_not_fit_is_refused():
             evaluate(agent, other)
 
 
+def test_an_evaluation_that_seems_not_to_end_is_warned_of():
+    class Endless(Corridor):
+        def step(self, action):
+            self._steps += 1
+            return np.zeros(1), 0.0, self._steps == 100_001, False, {}
+
+    class Stays:
+        def act(self, observation, explore=True):
+            return 0
+
+    with pytest.warns(RuntimeWarning, match="has had 100,000 steps and goes on.*max_episode_steps"):
+        assert evaluate(Stays(), Endless(), 1).lengths.tolist() == [100_001]
+
+
 def test_rewards_of_an_evaluation_must_be_numbers():
     class Broken(Corridor):
         def step(self, action):
