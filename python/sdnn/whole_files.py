@@ -41,10 +41,10 @@ def whole_file(path: Path) -> Iterator[Path]:
     OSError
         If the file cannot be written; one that was there before stays as it was.
     """
-    path = Path(os.path.realpath(path)) if path.is_symlink() else path
     if path.exists() and not (path.is_file() or path.is_dir()):
         yield path
         return
+    path = Path(os.path.realpath(path)) if path.is_symlink() else path
     partial = path.with_name(f"{path.name}.{os.getpid()}.{next(_numbers)}{PARTIAL_SUFFIX}")
     try:
         yield partial

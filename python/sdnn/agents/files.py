@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 from sdnn._core import __version__
 from sdnn.whole_files import write_whole
 
-__all__ = ["Arrays", "Description", "completed", "from_file", "read", "register", "write"]
+__all__ = [
+    "Arrays",
+    "Description",
+    "completed",
+    "from_file",
+    "read",
+    "rebuilt",
+    "register",
+    "write",
+]
 
 FORMAT = "sdnn-agent"
 FORMAT_VERSION = 1
@@ -30,20 +39,27 @@ _KINDS: dict[str, type[Any]] = {}
 def register(kind: type[Any]) -> None:
     """Make a class of agents known by its name; its ``rebuild`` makes one of a file.
 
-    A class that is defined again, as in a notebook, takes its own place.
+    A class that is defined again, as in a notebook or by a script that is imported too, takes the
+    place of the one before.
 
     Raises
     ------
     TypeError
-        If the name is that of another class: a file could not tell them apart.
+        If the name is that of a class of this package: a file could not tell them apart.
     """
     known = _KINDS.get(kind.__name__, kind)
-    if (known.__module__, known.__qualname__) != (kind.__module__, kind.__qualname__):
+    is_ours = known.__module__.partition(".")[0] == "sdnn"
+    if is_ours and known.__module__ != kind.__module__:
         raise TypeError(
             f"an agent's class needs a name of its own, for its files: {kind.__name__} is that of"
             f" {known.__module__}.{known.__qualname__}"
         )
     _KINDS[kind.__name__] = kind
+
+
+def rebuilt(description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Any:
+    """Make an agent of its description and arrays; older pickles name this function."""
+    return _KINDS[description["class"]].rebuild(description, arrays)
 
 
 def write(path: Path, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -158,6 +174,6 @@ def from_file(
 ) -> Any:
     """Make the agent of a file that has been read; ValueError that names the file."""
     try:
-        return _KINDS[description["class"]].rebuild(description, arrays)
+        return rebuilt(description, arrays)
     except (AttributeError, IndexError, KeyError, OverflowError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is damaged: {error}") from error

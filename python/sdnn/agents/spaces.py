@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeAlias
 
 import gymnasium as gym
 import numpy as np
@@ -15,33 +15,65 @@ __all__ = ["require_same_kind", "space_data", "space_of"]
 def require_same_kind(agent: Any, env: Any) -> None:
     """Check that an environment, or each of a vector, is one that an agent was made for.
 
-    Bounds and types of numbers may differ; what tells no spaces is not checked.
+    What it observes must be possible in the agent's space, but for bounds, and its actions must be
+    as many. What tells no spaces is not checked.
 
     Raises
     ------
     ValueError
-        If observations or actions are of another kind or shape.
+        If it does not fit.
     """
-    for name in ("observation_space", "action_space"):
+    for name, fits in (("observation_space", _can_observe), ("action_space", _acts_alike)):
         own = getattr(agent, name, None)
         found = getattr(env, f"single_{name}", getattr(env, name, None))
-        if own is not None and found is not None and not _is_of_kind(found, own):
+        if own is not None and found is not None and not fits(own, found):
             raise ValueError(f"env must have the agent's {name}, {_line(own)}, got {_line(found)}")
 
 
-def _is_of_kind(found: gym.Space[Any], own: gym.Space[Any]) -> bool:
+_Numbers = (
+    gym.spaces.Box,
+    gym.spaces.Discrete,
+    gym.spaces.MultiDiscrete,
+    gym.spaces.MultiBinary,
+)
+
+
+def _can_observe(own: gym.Space[Any], found: gym.Space[Any]) -> bool:
     if isinstance(own, gym.spaces.Dict) and isinstance(found, gym.spaces.Dict):
-        return own.keys() == found.keys() and all(_is_of_kind(found[key], own[key]) for key in own)
+        return own.keys() == found.keys() and all(_can_observe(own[key], found[key]) for key in own)
     if isinstance(own, gym.spaces.Tuple) and isinstance(found, gym.spaces.Tuple):
-        return len(own) == len(found) and all(map(_is_of_kind, found, own))
-    if own.shape != found.shape:
+        return len(own) == len(found) and all(map(_can_observe, own, found))
+    if isinstance(own, gym.spaces.Box):
+        return isinstance(found, _Numbers) and own.shape == found.shape
+    return own.shape == found.shape and _is_within(_wholes(found), _wholes(own))
+
+
+def _acts_alike(own: gym.Space[Any], found: gym.Space[Any]) -> bool:
+    if isinstance(own, gym.spaces.Box) and isinstance(found, gym.spaces.Box):
+        return own.low.size == found.low.size
+    return _wholes(own) is not None and _wholes(own) == _wholes(found)
+
+
+_Wholes: TypeAlias = "list[tuple[int, int]] | None"
+"""The first and the last whole number of each dimension; None of other spaces."""
+
+
+def _wholes(space: gym.Space[Any]) -> _Wholes:
+    if isinstance(space, gym.spaces.Discrete):
+        return [(int(space.start), int(space.start + space.n - 1))]
+    if isinstance(space, gym.spaces.MultiDiscrete):
+        first, n = np.ravel(space.start).tolist(), np.ravel(space.nvec).tolist()
+        return [(a, a + k - 1) for a, k in zip(first, n, strict=True)]
+    if isinstance(space, gym.spaces.MultiBinary):
+        return [(0, 1)] * int(np.prod(space.shape))
+    return None
+
+
+def _is_within(found: _Wholes, own: _Wholes) -> bool:
+    if found is None or own is None or len(found) != len(own):
         return False
-    if isinstance(own, gym.spaces.Discrete) and isinstance(found, gym.spaces.Discrete):
-        return bool(own.n == found.n and own.start == found.start)
-    if isinstance(own, gym.spaces.MultiDiscrete) and isinstance(found, gym.spaces.MultiDiscrete):
-        return bool((own.nvec == found.nvec).all() and (own.start == found.start).all())
-    kinds = (gym.spaces.Box, gym.spaces.MultiBinary)
-    return any(isinstance(own, kind) and isinstance(found, kind) for kind in kinds)
+    pairs = zip(found, own, strict=True)
+    return all(mine[0] <= one[0] and one[1] <= mine[1] for one, mine in pairs)
 
 
 def _line(space: gym.Space[Any]) -> str:

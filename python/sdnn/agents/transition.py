@@ -38,4 +38,6 @@ def reward_of(reward: Any) -> float:
         return reward
     if isinstance(reward, np.ndarray) and reward.size == 1 and reward.dtype.kind in "fiub":
         reward = reward.item()
-    return float(reward) if isinstance(reward, bool | np.bool_) else real("reward", reward)
+    if hasattr(reward, "__float__") and not isinstance(reward, np.ndarray):
+        return float(reward)  # a truth value, or a number of another library
+    return real("reward", reward)

@@ -66,6 +66,11 @@ def learned_categories(column: NDArray[Any]) -> tuple[Category, ...]:
         raise ValueError("the categories of an input must be all words or all numbers") from None
 
 
+def _as_word(value: Any) -> Any:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return str(value) if is_number and value == value else value
+
+
 def bins_of_categories(column: NDArray[Any], categories: tuple[Category, ...]) -> NDArray[np.int32]:
     """Return the place of each value among the categories.
 
@@ -75,6 +80,9 @@ def bins_of_categories(column: NDArray[Any], categories: tuple[Category, ...]) -
         If a value is none of them.
     """
     places = {category: place for place, category in enumerate(categories)}
+    if all(isinstance(category, str) for category in categories):
+        # Lists of words and numbers were all words once: models that learned so know "1.0".
+        column = np.array([_as_word(value) for value in column.tolist()], dtype=object)
     try:
         return np.array([places[value] for value in column.tolist()], dtype=np.int32)
     except (KeyError, TypeError):

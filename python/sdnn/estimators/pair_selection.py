@@ -98,6 +98,8 @@ def select_pairs(
         for train, test in splitter.split(labels, labels)
         if not is_classifier(model) or len(np.unique(labels[train])) > 1
     ]
+    if len(scores) < 2:
+        return pairs
     gains = np.array(scores) - np.array(scores)[:, :1]
     level = int(np.argmax(gains.mean(axis=0)))
     error = gains[:, level].std(ddof=1) / np.sqrt(len(scores))

@@ -357,7 +357,14 @@ class Run:
             training = Training.load(path, env, callbacks=callbacks, evaluation_env=evaluation_env)
         except ValueError as error:
             raise RunError(str(error)) from error
-        if len(_read_rows(self.folder / ROWS)) < training.n_rows:
+        rows = _read_rows(self.folder / ROWS)
+        if not training.evaluations:  # older checkpoints do not have them
+            training.evaluations = [
+                (row["step"], row["mean_return"])
+                for row in rows[: training.n_rows]
+                if row["kind"] == "evaluation"
+            ]
+        if len(rows) < training.n_rows:
             raise RunError(
                 f"{self.folder / ROWS} must have the {training.n_rows} rows that were written"
                 f" before {path.name}: it was changed"

@@ -152,6 +152,10 @@ TEST(ActionScale, OfWholeNumbersIsTheNearest) {
     EXPECT_EQ(scale.of_index(index, 0), action);
     EXPECT_EQ(scale.index_of(action, 0), index);
   }
+  const ActionScale few({{"kind", "box"}, {"low", {0}}, {"high", {2}}, {"whole", true}}, {5});
+  for (std::size_t a = 0; a < 5; ++a) {  // 0, 1, 1, 2, 2
+    EXPECT_EQ(few.of_index(few.index_of(few.of_index(a, 0), 0), 0), few.of_index(a, 0));
+  }
   const ActionScale continuous(bytes, {0});
   EXPECT_EQ(continuous.of_normalized(0.0, 0), 128.0);
   EXPECT_EQ(continuous.of_normalized(1.0, 0), 255.0);

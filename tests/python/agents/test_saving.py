@@ -24,7 +24,7 @@ from sdnn.agents import (
     Transition,
     load_agent,
 )
-from sdnn.agents.files import read
+from sdnn.agents.files import read, rebuilt
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
 from stopped_training import states_equal
 
@@ -203,8 +203,8 @@ def test_actions_keep_their_type(tmp_path):
 def test_two_classes_of_agents_cannot_have_one_name():
     with pytest.raises(TypeError, match=r"RBFQLearning is that of sdnn\.agents\."):
         type("RBFQLearning", (SDNNQLearning,), {})
-    for _ in range(2):  # as a cell of a notebook that is run again
-        again = type("DefinedAgain", (RBFQLearning,), {})
+    for module in ("__main__", "__main__", "script"):  # a notebook's cell, a script imported too
+        again = type("DefinedAgain", (RBFQLearning,), {"__module__": module})
     agent = again(PLANE, TORQUE)
     assert type(pickle.loads(pickle.dumps(KINDS["rbf"]()))) is RBFQLearning
     assert type(copy.deepcopy(agent)) is again
@@ -226,6 +226,13 @@ def test_what_was_begun_in_cpp_is_read(kind, tmp_path):
     for one in (agent, again):
         lived(one, 60, 90)
     assert states_equal(agent, again)
+
+
+def test_older_pickles_are_read():
+    agent = lived(KINDS["rbf"](), 0, 30)
+    told = pickle.dumps((rebuilt, (agent.description(), agent.state())))
+    make, arguments = pickle.loads(told)
+    same_state(make(*arguments), agent)
 
 
 def test_progress_is_what_the_core_says(tmp_path):

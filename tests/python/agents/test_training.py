@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+from decimal import Decimal
 
 import gymnasium as gym
 import numpy as np
@@ -135,6 +136,16 @@ def test_an_evaluation_that_seems_not_to_end_is_warned_of():
 
     with pytest.warns(RuntimeWarning, match="has had 100,000 steps and goes on.*max_episode_steps"):
         assert evaluate(Stays(), Endless(), 1).lengths.tolist() == [100_001]
+
+
+@pytest.mark.parametrize("reward", [np.float32(1), np.array([1]), Decimal(1), True, np.array(1.0)])
+def test_rewards_of_other_kinds_are_numbers_too(reward):
+    class Kind(Corridor):
+        def step(self, action):
+            return super().step(action)[0], reward, False, self._steps == 8, {}
+
+    assert corridor_agent().train(Kind(), episodes=2).returns.tolist() == [8.0, 8.0]
+    assert evaluate(corridor_agent(), Kind(), 1).mean_return == 8.0
 
 
 def test_rewards_of_an_evaluation_must_be_numbers():

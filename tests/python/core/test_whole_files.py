@@ -2,6 +2,7 @@ import gzip
 import os
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
@@ -62,6 +63,12 @@ def test_links_and_pipes_stay_what_they_are(tmp_path):
     reader.join()
     assert read == [b"through"]
     assert pipe.is_fifo()
+    ends = os.pipe()
+    if Path(f"/dev/fd/{ends[1]}").exists():  # as /dev/stdout: a link to no name
+        write_whole(Path(f"/dev/fd/{ends[1]}"), b"through, too")
+        assert os.read(ends[0], 100) == b"through, too"
+    for end in ends:
+        os.close(end)
     assert len(list(tmp_path.iterdir())) == 3
 
 

@@ -90,3 +90,9 @@ def test_importances_survive_files(tmp_path):
     model.save(path)
     same = SDNNClassifier.load(path)
     np.testing.assert_array_equal(same.pair_importances_, model.pair_importances_)
+
+
+def test_a_single_class_is_a_clear_error():
+    X = np.random.RandomState(0).uniform(size=(60, 3))
+    with pytest.raises(ValueError, match="at least two classes"):
+        SDNNClassifier(pairs="auto", max_iter=2).fit(X, np.zeros(60))

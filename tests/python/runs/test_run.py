@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from safetensors import safe_open
+from safetensors.numpy import load_file, save_file
 
 import drifting_env  # noqa: F401
 from sdnn.agents import Callback, Training, load_agent
@@ -261,3 +263,17 @@ def test_folders_that_hold_no_run_or_a_damaged_one(whole, tmp_path):
     config.write_text(config.read_text().replace('"steps": 400', '"steps": "many"', 1))
     with pytest.raises(ConfigError, match=r"config\.json: steps: must be a whole number"):
         Run.open(run.folder)
+
+
+def test_a_target_reached_in_an_older_version_stays_reached(tmp_path):
+    run = Run.create(tmp_path / "run", dataclasses.replace(CONFIG, target_return=-1e9))
+    ended = run.train()
+    assert ended.reason == "target"
+    path = run.folder / "checkpoint.safetensors"
+    with safe_open(path, framework="numpy") as file:
+        metadata = file.metadata()
+    arrays = load_file(path)
+    del arrays["training.evaluations"]
+    save_file(arrays, path, metadata)
+    again = Run.open(run.folder).train()
+    assert (again.reason, again.n_steps) == ("target", ended.n_steps)

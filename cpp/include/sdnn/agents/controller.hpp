@@ -171,6 +171,8 @@ class ActionScale {
   }
 
   std::size_t n_dimensions() const noexcept { return n_actions_.size(); }
+  /// Whether several numbers of actions may stand for one action.
+  bool is_whole() const noexcept { return is_whole_; }
 
   /// Of action number `index` in dimension d.
   double of_index(std::size_t index, std::size_t d) const noexcept {
@@ -186,10 +188,12 @@ class ActionScale {
   }
   /// The number of an action. Throws std::invalid_argument if there is none like it.
   std::size_t index_of(double action, std::size_t d) const {
-    for (std::size_t index = nearest(action, d), end = std::min(index + 2, n_actions_[d]);
-         index < end; ++index) {
+    const std::size_t first = nearest(action, d);
+    for (std::size_t index = first, end = std::min(first + 2, n_actions_[d]); index < end;
+         ++index) {
       if (of_index(index, d) == action) return index;
     }
+    if (first > 0 && of_index(first - 1, d) == action) return first - 1;
     core::require(false, "action[" + std::to_string(d) + "]", "one that the agent can take",
                   action);
     return 0;
@@ -206,7 +210,9 @@ class ActionScale {
                             ? 1.0
                             : (high_[d] - low_[d]) /
                                   static_cast<double>(std::max<std::size_t>(n_actions_[d] - 1, 1));
-    const double position = std::floor((action - low_[d]) / step + 0.25);
+    const double place = (action - low_[d]) / step;
+    // Of whole numbers, which may be beside an even place, the nearest as Python has it.
+    const double position = is_whole_ ? std::nearbyint(place) : std::floor(place + 0.25);
     const double last = static_cast<double>(n_actions_[d] - 1);
     return position > 0.0 ? static_cast<std::size_t>(std::min(position, last)) : 0;
   }
@@ -273,13 +279,19 @@ class Controller {
             }
           } else if constexpr (std::is_same_v<decltype(action), const std::size_t>) {
             action_[0] = parts_.action.of_index(action, 0);
+            indices_[0] = action;
           } else {
             for (std::size_t d = 0; d < action_.size(); ++d) {
               action_[d] = parts_.action.of_index(action[d], d);
+              indices_[d] = action[d];
             }
           }
         },
         parts_.agent);
+    if (explore && parts_.action.is_whole()) {
+      if (taken_.size() <= environment) taken_.resize(environment + 1);
+      taken_[environment] = {action_, indices_};
+    }
     return action_;
   }
 
@@ -307,12 +319,12 @@ class Controller {
             agent.learn(state_, last, reward, next_state_, terminated, environment);
           } else if constexpr (Agent::kDecoupled) {
             for (std::size_t d = 0; d < action.size(); ++d) {
-              indices_[d] = parts_.action.index_of(action[d], d);
+              indices_[d] = index_of(action, d, environment);
             }
             agent.learn(state_, indices_, reward, next_state_, terminated, environment);
           } else {
-            agent.learn(state_, parts_.action.index_of(action[0], 0), reward, next_state_,
-                        terminated, environment);
+            agent.learn(state_, index_of(action, 0, environment), reward, next_state_, terminated,
+                        environment);
           }
         },
         parts_.agent);
@@ -326,6 +338,15 @@ class Controller {
   }
 
  private:
+  /// The number of an action: that of the last exploring act where it is the same one.
+  std::size_t index_of(std::span<const double> action, std::size_t d,
+                       std::size_t environment) const {
+    if (environment < taken_.size() && std::ranges::equal(taken_[environment].action, action)) {
+      return taken_[environment].indices[d];
+    }
+    return parts_.action.index_of(action[d], d);
+  }
+
   struct Parts {
     AnyAgent agent;
     ObservationScale observation;
@@ -381,6 +402,12 @@ class Controller {
   Parts parts_;
   std::vector<double> state_, next_state_, action_;
   std::vector<std::size_t> indices_;
+  /// What was explored last in each environment, where several numbers stand for one action.
+  struct Taken {
+    std::vector<double> action;
+    std::vector<std::size_t> indices;
+  };
+  std::vector<Taken> taken_;
 };
 
 }  // namespace sdnn::agents
