@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,6 +40,8 @@ def reward_of(reward: Any) -> float:
         return reward
     if isinstance(reward, np.ndarray) and reward.size == 1 and reward.dtype.kind in "fiub":
         reward = reward.item()
-    if hasattr(reward, "__float__") and not isinstance(reward, np.ndarray):
-        return float(reward)  # a truth value, or a number of another library
+    is_number = isinstance(reward, Real) and not isinstance(reward, bool)
+    if not is_number and hasattr(reward, "__float__") and not isinstance(reward, np.ndarray | type):
+        with suppress(OverflowError, TypeError, ValueError):
+            return float(reward)  # a truth value, or a number of another library
     return real("reward", reward)
