@@ -32,7 +32,6 @@ KEY = "sdnn"
 Arrays = dict[str, NDArray[Any]]
 Description = dict[str, Any]
 
-
 _KINDS: dict[str, type[Any]] = {}
 
 

@@ -1,4 +1,4 @@
-"""Gymnasium spaces as data that JSON can hold."""
+"""Gymnasium spaces: whether those of agent and environment fit, and as data that JSON can hold."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def require_same_kind(agent: Any, env: Any) -> None:
             raise ValueError(f"env must have the agent's {name}, {_line(own)}, got {_line(found)}")
 
 
-_Numbers = (
+_NUMBERS = (
     gym.spaces.Box,
     gym.spaces.Discrete,
     gym.spaces.MultiDiscrete,
@@ -44,7 +44,7 @@ def _can_observe(own: gym.Space[Any], found: gym.Space[Any]) -> bool:
     if isinstance(own, gym.spaces.Tuple) and isinstance(found, gym.spaces.Tuple):
         return len(own) == len(found) and all(map(_can_observe, own, found))
     if isinstance(own, gym.spaces.Box):
-        return isinstance(found, _Numbers) and own.shape == found.shape
+        return isinstance(found, _NUMBERS) and own.shape == found.shape
     return own.shape == found.shape and _is_within(_wholes(found), _wholes(own))
 
 

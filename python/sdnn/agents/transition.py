@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,19 +28,19 @@ class Transition(NamedTuple):
 
 
 def reward_of(reward: Any) -> float:
-    """Read a reward, which may be one of NumPy's numbers, an array of one, or a truth value.
+    """Read a reward: a number, also of another library, an array of one, or a truth value.
 
     Raises
     ------
-    TypeError, ValueError
+    OverflowError, ValueError
         If it is something else.
     """
     if type(reward) is float:
         return reward
     if isinstance(reward, np.ndarray) and reward.size == 1 and reward.dtype.kind in "fiub":
         reward = reward.item()
-    is_number = isinstance(reward, Real) and not isinstance(reward, bool)
-    if not is_number and hasattr(reward, "__float__") and not isinstance(reward, np.ndarray | type):
+    is_real = not isinstance(reward, np.ndarray | np.complexfloating)
+    if is_real and hasattr(reward, "__float__"):
         with suppress(OverflowError, TypeError, ValueError):
-            return float(reward)  # a truth value, or a number of another library
-    return real("reward", reward)
+            return float(reward)
+    return real("reward", reward)  # for its message

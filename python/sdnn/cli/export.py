@@ -46,7 +46,7 @@ def export(
     with run_command(words_of_run(source)):
         try:
             run = Run.open(source) if source.is_dir() else Run.of_agent_file(source)
-            agent = Run.open(source).agent() if source.is_dir() else load_agent(source)
+            agent = run.agent() if run and source.is_dir() else load_agent(source)
         except ValueError as error:
             raise click.ClickException(str(error)) from error
         try:

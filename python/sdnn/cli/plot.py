@@ -32,14 +32,14 @@ def plot(folders: tuple[Path, ...], out: Path | None) -> None:
     anything else stay apart. A panel per task.
     """
     from sdnn.runs import Run
-    from sdnn.runs.curves import SUFFIXES, curves_and_notes, write_curves
+    from sdnn.runs.curves import SUFFIXES, curves_of, write_curves
 
     if out is not None:
         check_ending("--out", out, SUFFIXES)
     chosen = tuple(dict.fromkeys(folders))
     path = out or (chosen[0] / "curves.png" if len(chosen) == 1 else Path("curves.png"))
     with run_command(option_words):
-        curves, notes = curves_and_notes([Run.open(folder) for folder in chosen])
+        curves, notes = curves_of([Run.open(folder) for folder in chosen])
         files = write_curves(curves, path)
     for note in notes:
         click.echo(f"note: {note}", err=True)

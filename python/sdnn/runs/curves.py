@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["SUFFIXES", "Curve", "curves_and_notes", "curves_of", "draw_curves", "write_curves"]
+__all__ = ["SUFFIXES", "Curve", "curves_of", "draw_curves", "write_curves"]
 
 SUFFIXES = (".png", ".svg", ".pdf")
 
@@ -74,24 +74,15 @@ class Curve:
     high: NDArray[np.float64] | None = None
 
 
-def curves_of(runs: Sequence[Run]) -> list[Curve]:
+def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
     """Make the curves of runs; those that differ in their seeds only become one.
+
+    With them comes a line about each run of which something could not be drawn.
 
     Raises
     ------
     RunError
         If there is nothing to draw yet, or rows cannot be read.
-    """
-    return curves_and_notes(runs)[0]
-
-
-def curves_and_notes(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
-    """Make the same, and a line about each run of which something could not be drawn.
-
-    Raises
-    ------
-    RunError
-        As `curves_of`.
     """
     curves: list[Curve] = []
     notes: list[str] = []

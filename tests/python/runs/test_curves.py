@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sdnn.runs import Goal, Run, RunConfig, RunEnvironment, RunError
-from sdnn.runs.curves import curves_and_notes, curves_of, draw_curves, write_curves
+from sdnn.runs.curves import curves_of, draw_curves, write_curves
 from sdnn.runs.groups import groups_of
 
 CONFIG = RunConfig(environment=RunEnvironment(id="CartPole-v1"))
@@ -34,7 +34,7 @@ def make(folder, config, returns=(), evaluations=(), every=20):
 
 def test_one_run(tmp_path):
     run = make(tmp_path / "run", CONFIG, [1, 5, 3], [[1, 2, 3, 4, 10], [5, 5, 5, 5, 5]])
-    returns, medians, evaluations = curves_of([run])
+    returns, medians, evaluations = curves_of([run])[0]
     assert (returns.task, returns.agent) == ("CartPole-v1", "sdnn general")
     assert (returns.kind, returns.steps.tolist(), returns.values.tolist()) == (
         "return", [10, 20, 30], [1, 5, 3],
@@ -48,7 +48,7 @@ def test_one_run(tmp_path):
 
 def test_the_running_median_is_of_twenty_episodes(tmp_path):
     run = make(tmp_path / "run", CONFIG, range(50))
-    _, medians = curves_of([run])
+    _, medians = curves_of([run])[0]
     assert medians.values[-1] == np.median(range(30, 50))
 
 
@@ -63,7 +63,7 @@ def test_several_runs_of_one_task_are_one_curve(tmp_path):
         )
         for seed in range(3)
     ]
-    (curve,) = curves_of(runs)
+    (curve,) = curves_of(runs)[0]
     assert (curve.kind, curve.n_runs) == ("evaluation", 3)
     assert curve.steps.tolist() == [20, 40]  # which all of them have
     assert curve.values.tolist() == [2, 1]
@@ -78,7 +78,7 @@ def test_several_runs_without_evaluations_have_the_median_of_running_medians(tmp
         make(tmp_path / str(n), dataclasses.replace(CONFIG, seed=n), [n] * (5 + n))
         for n in range(2)
     ]
-    (curve,) = curves_of(runs)
+    (curve,) = curves_of(runs)[0]
     assert (curve.kind, curve.steps[0], curve.steps[-1]) == ("running median", 10, 50)
     assert set(curve.values.tolist()) == {0.5}
 
@@ -98,7 +98,7 @@ def test_tasks_and_agents_are_parted(tmp_path):
         make(tmp_path / str(n), config, [1])
         for n, config in enumerate((CONFIG, noisy, set_otherwise))
     ]
-    curves = curves_of(runs)
+    curves = curves_of(runs)[0]
     assert {(curve.task, curve.agent) for curve in curves} == {
         ("CartPole-v1", "sdnn general"),
         ("CartPole-v1", "sdnn general, discount=0.9"),
@@ -196,7 +196,7 @@ def test_runs_that_are_evaluated_at_other_steps_are_both_drawn(tmp_path):
     ]
     third = dataclasses.replace(CONFIG, environment=RunEnvironment(id="Acrobot-v1"))
     runs.append(make(tmp_path / "other", third, [1]))
-    curves, notes = curves_and_notes(runs)
+    curves, notes = curves_of(runs)
     assert notes == []
     assert [
         (curve.agent, curve.steps.tolist()) for curve in curves if curve.kind == "evaluation"
@@ -212,7 +212,7 @@ def test_runs_of_other_lengths_are_not_cut(tmp_path):
         make(tmp_path / str(n), dataclasses.replace(CONFIG, steps=20 * n), [], [[3]] * n)
         for n in (2, 5)
     ]
-    assert [curve.steps[-1] for curve in curves_of(runs)] == [40, 100]
+    assert [curve.steps[-1] for curve in curves_of(runs)[0]] == [40, 100]
 
 
 def test_what_is_left_out_of_several_runs_is_told(tmp_path):
@@ -221,14 +221,14 @@ def test_what_is_left_out_of_several_runs_is_told(tmp_path):
     short = make(tmp_path / "short", seeds[1], [1], [[0], [2]])
     begun = make(tmp_path / "begun", seeds[2], [1])
     empty = make(tmp_path / "empty", seeds[3])
-    (curve,), notes = curves_and_notes([whole, short, begun, empty])
+    (curve,), notes = curves_of([whole, short, begun, empty])
     assert (curve.n_runs, curve.kind, curve.values.tolist()) == (2, "evaluation", [1, 3])
     assert notes == [
         f"{begun.folder}: no evaluation is whole yet",
         f"{empty.folder}: no evaluation is whole yet",
         f"{whole.folder}, {short.folder}: drawn to step 40, which all of them have reached",
     ]
-    curves, notes = curves_and_notes([whole, begun])
+    curves, notes = curves_of([whole, begun])
     assert [(curve.kind, curve.run) for curve in curves] == [
         (kind, str(whole.folder)) for kind in ("return", "running median", "evaluation")
     ]
@@ -246,7 +246,7 @@ def test_files_hold_the_numbers(tmp_path):
     run = make(tmp_path / "run", CONFIG, [1.25], [[1, 2]])
     magic = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
     for suffix, first in magic.items():
-        figure, numbers = write_curves(curves_of([run]), tmp_path / "new" / f"x{suffix}")
+        figure, numbers = write_curves(curves_of([run])[0], tmp_path / "new" / f"x{suffix}")
         assert figure.read_bytes().startswith(first)
     rows = list(csv.DictReader(numbers.read_text().splitlines()))
     assert [(row["kind"], row["step"], row["value"]) for row in rows] == [
@@ -254,7 +254,7 @@ def test_files_hold_the_numbers(tmp_path):
     ]  # fmt: skip
     assert (rows[2]["low"], rows[2]["high"], rows[2]["run"]) == ("1.25", "1.75", str(run.folder))
     with pytest.raises(RunError, match="must end in one of"):
-        write_curves(curves_of([run]), tmp_path / "x.doc")
+        write_curves(curves_of([run])[0], tmp_path / "x.doc")
 
 
 def test_what_cannot_be_drawn(tmp_path, monkeypatch):
