@@ -17,7 +17,7 @@ from sdnn.experiments.config import PlannedTrial
 from sdnn.experiments.engine import Observer, RunOutcome, run_trials
 from sdnn.experiments.executor import Executor
 from sdnn.experiments.measures import MeasureName
-from sdnn.experiments.records import ROW_HEADER, TrialKey, TrialRecord, records_digest, trial_rows
+from sdnn.experiments.records import ROW_HEADER, TrialRecord, records_digest, trial_rows
 from sdnn.experiments.store import STORE_NAME, ResultStore
 from sdnn.experiments.sweep.comparison import Comparison, compare
 from sdnn.experiments.sweep.figure import draw_study
@@ -158,7 +158,8 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Sweep:
     comparison = compare(study, records)
     if not comparison.measured:
         return Sweep(outcome)
-    shown = [record for record in records if record.key in _keys(comparison)]
+    complete = {key for pair in comparison.measured for key in study.keys(*pair)}
+    shown = [record for record in records if record.key in complete]
     report = StudyReport(
         comparison=comparison, version=_core.__version__, digest=records_digest(shown)
     )
@@ -170,10 +171,6 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Sweep:
         processor_seconds=sum(record.seconds for record in shown),
     )
     return Sweep(outcome, report, *_write(request, report, call))
-
-
-def _keys(comparison: Comparison) -> set[TrialKey]:
-    return {key for pair in comparison.measured for key in comparison.study.keys(*pair)}
 
 
 def _write(
