@@ -454,3 +454,17 @@ def test_no_drawer_for_things_without_a_place():
     for folder in ("cpp", "python", "tests", "bench", "docs", "cmake"):
         for path in (ROOT / folder).rglob("*"):
             assert path.stem not in forbidden, path
+
+
+def test_the_documents_name_files_that_are_there():
+    rooms = (ROOT / name for name in ("cpp", "python", "bench", "tests", "docs"))
+    there = {f"/{path.as_posix()}" for room in rooms for path in room.rglob("*.*")}
+    pages = [ROOT / "README.md", ROOT / "REPRODUCTION.md", ROOT / "CONTRIBUTING.md"]
+    named = [
+        (page.name, name)
+        for page in (*pages, *(ROOT / "docs").rglob("*.md"))
+        for name in re.findall(r"`(\w+(?:/\w+)+\.(?:hpp|cpp|py))`", page.read_text("utf-8"))
+    ]
+    assert len(named) > 50
+    for page, name in named:
+        assert any(path.endswith(f"/{name}") for path in there), f"{page}: {name}"

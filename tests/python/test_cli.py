@@ -45,7 +45,8 @@ def invoke(monkeypatch, tmp_path, fake):
 
 
 def test_help_and_version(invoke):
-    assert "reproduce" in invoke("--help").stdout
+    said = invoke("--help").stdout
+    assert all(re.search(rf"^  {name} .*\w\.$", said, re.MULTILINE) for name in main.commands)
     version, compiler, *others = invoke("--version").stdout.splitlines()
     assert version == f"sdnn {sdnn.__version__}"
     assert re.fullmatch(r"compiler (GCC|.*[Cc]lang|MSVC) .*\d.*", compiler)

@@ -86,6 +86,13 @@ def test_the_cpp_example_builds_against_the_installed_package(cmake, configure, 
     assert Path(found).resolve() == Path(folder).resolve()
 
 
+def test_a_missing_json_library_is_named(configure, tmp_path):
+    none = "-DCMAKE_DISABLE_FIND_PACKAGE_nlohmann_json=ON"
+    done = configure(ROOT, tmp_path / "library", none)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "nlohmann-json3-dev" in done.stdout
+
+
 def test_eigen_is_found_in_the_python_that_the_shell_would_start(
     configure, skip_unless_ci, tmp_path, monkeypatch
 ):

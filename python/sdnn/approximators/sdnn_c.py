@@ -76,7 +76,7 @@ class SDNNCConfig:
         With more than 0 the network keeps an average of its weights, by which greedy actions are
         chosen; learning goes on with the weights themselves. Snapshots for it are taken after so
         many corrections, 100 say, or after every 64th part of all, whichever is more; what was
-        learned last counts most. The weights take three times the memory. Not in the paper, which
+        learned last counts most. The weights take four times the memory. Not in the paper, which
         has 0.
     max_table_bytes : int
         A larger network (weights, patterns, remembered potentials) is refused before memory is

@@ -9,7 +9,7 @@ import click
 from sdnn.cli.output import make_console
 
 
-@click.command()
+@click.command(short_help="Measure how quick the library is on this machine.")
 @click.option("--quick", is_flag=True, help="Few repetitions: to see that it works.")
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON.")
 def bench(quick: bool, as_json: bool) -> None:

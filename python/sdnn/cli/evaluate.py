@@ -17,7 +17,7 @@ from sdnn.cli.run_options import (
 )
 
 
-@click.command()
+@click.command(short_help="Say how good the agent of a run is now.")
 @run_argument
 @click.option(
     "--episodes", type=click.IntRange(1, 10**9), default=100, show_default=True, help="How many."

@@ -11,7 +11,7 @@ from sdnn.cli.output import json_text
 from sdnn.cli.run_options import json_option, run_command, words_of_run
 
 
-@click.command()
+@click.command(short_help="Write a run's policy as a C header, for small processors.")
 @click.argument("source", metavar="RUN", type=click.Path(exists=True, path_type=Path))
 @click.option(
     "--c-header",

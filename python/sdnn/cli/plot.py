@@ -9,7 +9,7 @@ import click
 from sdnn.cli.run_options import check_ending, option_words, run_command
 
 
-@click.command()
+@click.command(short_help="Draw the learning curves of runs.")
 @click.argument(
     "folders",
     metavar="RUN...",

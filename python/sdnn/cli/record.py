@@ -17,7 +17,7 @@ from sdnn.cli.run_options import (
 )
 
 
-@click.command()
+@click.command(short_help="Record an episode of a run as .gif or .mp4.")
 @run_argument
 @click.argument("out", metavar="OUT", type=click.Path(dir_okay=False, path_type=Path))
 @seed_option

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from sdnn.experiments.reproduce import ReproduceRequest, Reproduction
 
 
-@click.command()
+@click.command(short_help="Run the paper's experiments and write a report.")
 @click.argument("experiment", type=click.Choice(WORDS), default="all")
 @click.option(
     "--trials",

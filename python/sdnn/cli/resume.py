@@ -15,7 +15,7 @@ from sdnn.cli.run_options import (
 )
 
 
-@click.command()
+@click.command(short_help="Go on with a run, from its last checkpoint.")
 @run_argument
 @click.option(
     "--steps", type=click.IntRange(min=1), help="A new goal: steps in all, whatever the target."

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from sdnn.experiments.sweep.run import Sweep, SweepRequest
 
 
-@click.command()
+@click.command(short_help="Run a study: variants of any setting, trial by trial.")
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.option(
     "--trials",

@@ -26,7 +26,7 @@ AGENTS = ("sdnn", "rbf", "fuzzy")
 PRESETS = ("general", "small", "robust", "paper")
 
 
-@click.command()
+@click.command(short_help="Learn in a Gymnasium environment.")
 @click.argument("env_id", metavar="[ENV_ID]", required=False)
 @click.option("--agent", type=click.Choice(AGENTS), help="Who learns.  [default: sdnn]")
 @click.option(

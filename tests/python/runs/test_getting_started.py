@@ -1,6 +1,8 @@
 """What docs/getting-started.md shows works as it stands there."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -46,3 +48,25 @@ def test_the_commands_run(tmp_path, monkeypatch):
         assert done.exit_code == 0, f"{words}: {done.output}"
     assert (tmp_path / "results" / "ties-report.html").exists()
     assert (tmp_path / "car.gif").stat().st_size > 1000
+
+
+def test_the_robots_program_learns_on(tmp_path, monkeypatch, cmake, configure, skip_unless_ci):
+    monkeypatch.chdir(tmp_path)
+    (python,) = (code for code in blocks("python") if "robot.safetensors" in code)
+    exec(compile(python, "getting-started.md", "exec"), {})
+    saved = (tmp_path / "robot.safetensors").read_bytes()
+    for language in ("cpp", "cmake"):
+        (text,) = blocks(language)
+        name = re.match(r"(?://|#) (\S+)\n", text)[1]
+        (tmp_path / name).write_text(text)
+    command = [sys.executable, "-m", "sdnn", "--cmakedir"]
+    folder = subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    quick = ("-DCMAKE_BUILD_TYPE=None", "-DCMAKE_CXX_FLAGS=-O1")
+    done = configure(tmp_path, tmp_path / "build", f"-Dsdnn_ROOT={folder}", *quick)
+    if "nlohmann-json3-dev" in done.stdout:
+        skip_unless_ci("needs nlohmann/json: apt install nlohmann-json3-dev")
+    assert done.returncode == 0, done.stdout + done.stderr
+    done = cmake("--build", tmp_path / "build")
+    assert done.returncode == 0, done.stdout + done.stderr
+    subprocess.run([tmp_path / "build" / "robot"], check=True)
+    assert (tmp_path / "robot.safetensors").read_bytes() != saved

@@ -39,8 +39,8 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
     """Draw a study: for each case two panels, one below the other, with a line for each variant.
 
     Faint dots are trials, since outcomes often lie in two heaps; a large dot is their median, of
-    shares their mean, and a bar its interval. It is filled where a variant differs from the
-    reference.
+    shares their mean, and a bar its interval. It is filled for the reference and where a variant
+    differs from it.
 
     Parameters
     ----------
@@ -90,8 +90,8 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
     figure.text(
         0.012, 0.07 / height,
         "Faint dots: trials. Large dot: their median (of the share solved: mean) with its 95 %"
-        " interval; filled: differs from the reference\ntrial by trial (the interval of the mean"
-        " paired difference leaves 0 out)."
+        " interval; filled: the reference, and what\ndiffers from it trial by trial (the interval"
+        " of the mean paired difference leaves 0 out)."
         " Numbers at the right: trials that end solved.\n" + footer,
         fontsize=6.5, va="bottom", color=FAINT, linespacing=1.4,
     )  # fmt: skip

@@ -259,6 +259,7 @@ def test_the_table_is_json(mixed):
 def test_the_figure_is_the_same_each_time_and_shows_every_trial(mixed):
     figure = draw_study(mixed.comparison, "footer")
     assert figure_bytes(figure) == figure_bytes(draw_study(mixed.comparison, "footer"))
+    assert "filled: the reference, and what" in figure.texts[-1].get_text()
     assert len(figure.axes) == 4
     assert [axes.get_title("left") for axes in figure.axes] == [
         "Case I: 4 inputs, no noise", "A pendulum", "", "",
