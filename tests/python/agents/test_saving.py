@@ -323,6 +323,14 @@ def changed(path, to, change):
             lambda d, a: d["approximator"].update(n_hidden_units=2**20),
             r"is damaged: action_value.weights must have shape \(1048576, 40\)",
         ),
+        (
+            lambda d, a: d["approximator"].update(n_symbols=[2**30, 0], max_table_bytes=2**62),
+            "is damaged: n_interpolated or n_symbols must be smaller.*, got 17179874944 bytes",
+        ),
+        (
+            lambda d, a: d["approximator"].update(n_inputs=0, max_pairs=2),
+            "is damaged: integer division",
+        ),
         (lambda d, a: a.pop("agent.step"), "is damaged: state: step must be there"),
         (
             lambda d, a: a.update({"agent.other": np.zeros(1)}),
