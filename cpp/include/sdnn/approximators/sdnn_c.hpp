@@ -54,14 +54,14 @@ class SDNNC {
   /// field that is impossible; std::length_error naming bytes, max_table_bytes and what to reduce,
   /// before much memory is asked for; std::bad_alloc.
   SDNNC(const SDNNCConfig& config, std::uint64_t seed)
-      : SDNNC(config, detail::code_books_of(config, seed), seed) {}
+      : SDNNC(config, code_books_of(config, seed), seed) {}
 
   /// Code books of any coding, a table per input: the range [0, 1] is cut into as many equal bins
   /// as the table has patterns. The config's fields about anchors and symbols do not matter then.
   /// Throws std::invalid_argument if n_inputs or n_pattern_units are not the tables', and as above.
   SDNNC(const SDNNCConfig& config, std::vector<coding::PatternTable> tables, std::uint64_t seed)
       : config_(config),
-        code_(detail::wiring_of(config, std::move(tables), seed)),
+        code_(wiring_of(config, std::move(tables), seed)),
         actions_(config.n_hidden_units, config.n_active_units, config.n_actions),
         scale_(make_scale(config)),
         hidden_layer_(actions_.n_hidden_units(), code_->n_columns(), code_->n_double_columns()),
@@ -92,7 +92,7 @@ class SDNNC {
   /// Whether config and this seed give its code books, so that they make it anew: not those of a
   /// network that was given tables. Makes them. Throws as the constructor.
   bool is_wired_by(std::uint64_t seed) const {
-    const auto tables = detail::code_books_of(config_, seed);
+    const auto tables = code_books_of(config_, seed);
     for (std::size_t i = 0; i < tables.size(); ++i) {
       if (tables[i] != code_->table(i)) return false;
     }

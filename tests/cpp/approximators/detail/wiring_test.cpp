@@ -10,7 +10,7 @@
 
 #include "sdnn/approximators/sdnn_c.hpp"
 
-namespace sdnn::approximators::detail {
+namespace sdnn::approximators {
 namespace {
 
 SDNNCConfig five_inputs() {
@@ -91,4 +91,4 @@ TEST(Wiring, TheSizeOfCodeBooksIsANumberForAnyFields) {
 }
 
 }  // namespace
-}  // namespace sdnn::approximators::detail
+}  // namespace sdnn::approximators

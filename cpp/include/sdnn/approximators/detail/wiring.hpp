@@ -24,7 +24,6 @@
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::approximators {
-namespace detail {
 
 inline std::size_t checked_inputs(const SDNNCConfig& config) {
   core::require_in_range("n_inputs", config.n_inputs, 2, 1024);
@@ -134,5 +133,4 @@ inline std::shared_ptr<const coding::StateCode> wiring_of(const SDNNCConfig& con
                                                    strides);
 }
 
-}  // namespace detail
 }  // namespace sdnn::approximators
