@@ -20,7 +20,9 @@ if(NOT TARGET Eigen3::Eigen)
     _sdnn_find_eigen(HINTS "${_sdnn_site_packages}")
   endif()
 endif()
+set(sdnn_eigen_missing "")  # what to say of it
 if(NOT TARGET Eigen3::Eigen)
-  message(FATAL_ERROR "sdnn needs Eigen >= 3.4: pip install cmeel-eigen, apt install libeigen3-dev, "
-                      "or set -DEigen3_DIR=<folder with Eigen3Config.cmake>")
+  string(CONCAT sdnn_eigen_missing
+    "sdnn needs Eigen >= 3.4: pip install cmeel-eigen, apt install libeigen3-dev, "
+    "or set -DEigen3_DIR=<folder with Eigen3Config.cmake>")
 endif()

@@ -112,6 +112,24 @@ def test_eigen_is_found_in_the_python_that_the_shell_would_start(
     assert site.resolve() in Path(found).resolve().parents
 
 
+@pytest.mark.parametrize("required", [False, True])
+def test_without_eigen_sdnn_is_not_found(required, configure, tmp_path):
+    config = (ROOT / "cmake" / "sdnnConfig.cmake.in").read_text().replace("@PACKAGE_INIT@", "")
+    (tmp_path / "sdnnConfig.cmake").write_text(config)
+    for name in ("FindEigenAnyway.cmake", "AgentFiles.cmake"):
+        (tmp_path / name).write_text((ROOT / "cmake" / name).read_text())
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.21)\nproject(robot LANGUAGES NONE)\n"
+        f"find_package(sdnn {'REQUIRED' if required else 'QUIET'})\n"
+        'message(STATUS "found: ${sdnn_FOUND}")\n'
+    )
+    given = (f"-Dsdnn_DIR={tmp_path.as_posix()}", "-DCMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON")
+    done = configure(tmp_path, tmp_path / "build", *given)
+    said = " ".join((done.stdout + done.stderr).split())
+    assert done.returncode == (1 if required else 0), said
+    assert ("sdnn needs Eigen >= 3.4" if required else "found: 0") in said
+
+
 def test_no_build_is_tied_to_the_machine_it_ran_on():
     rooms = [ROOT / name for name in ("cpp", "cmake", "tests", "bench", "docs", "python")]
     builds = [ROOT / "CMakeLists.txt", ROOT / "pyproject.toml"]

@@ -23,7 +23,7 @@ from sdnn.agents.files import (
     register,
     write,
 )
-from sdnn.agents.observations import AnglePairs, Ranges, UnitObservations
+from sdnn.agents.observations import AnglePairs, Ranges, UnitObservations, without_repeats
 from sdnn.agents.spaces import space_data, space_of
 from sdnn.agents.training import Callback, Training, TrainingResult
 from sdnn.agents.transition import Transition, reward_of
@@ -594,11 +594,12 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         agent._warm_up_steps = whole("warm_up_steps", description["warm_up_steps"], 2, 10**7)
         asked = description["asked"]
         low, high = ([np.nan if x is None else x for x in asked[end]] for end in ("low", "high"))
+        pairs: Any = asked["angle_pairs"]
         agent._observations = UnitObservations(
             agent.observation_space,
             ranges="seen" if asked.get("sees_ranges") else (low, high),
-            angles=asked["angles"],
-            angle_pairs=asked["angle_pairs"],
+            angles=without_repeats(asked["angles"]),  # files of loaded agents had some
+            angle_pairs=pairs if pairs == "find" else without_repeats(pairs),
             symbols=bool(asked.get("symbols", False)),
             least_inputs=cls.least_inputs,
         )

@@ -174,5 +174,5 @@ def from_file(
     """Make the agent of a file that has been read; ValueError that names the file."""
     try:
         return rebuilt(description, arrays)
-    except (AttributeError, IndexError, KeyError, OverflowError, TypeError, ValueError) as error:
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is damaged: {error}") from error

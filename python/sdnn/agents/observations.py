@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn import _core
 from sdnn.bounds import flat_bounds, with_infinities
 
-__all__ = ["AnglePairs", "RangeUse", "Ranges", "UnitObservations"]
+__all__ = ["AnglePairs", "RangeUse", "Ranges", "UnitObservations", "without_repeats"]
 
 AnglePairs: TypeAlias = Literal["none", "find"] | Sequence[tuple[int, int]]
 """Which variables are the cosine and the sine of one angle."""
@@ -52,6 +53,11 @@ class RangeUse:
 
     share_used: float
     share_beyond: float
+
+
+def without_repeats(listed: Iterable[Any]) -> list[Any]:
+    """Give a list without what only repeats the one before, as inputs of one variable are."""
+    return [one for one, _ in itertools.groupby(listed)]
 
 
 class UnitObservations:
@@ -306,16 +312,13 @@ class UnitObservations:
         if not np.isfinite(high - low).all():
             raise ValueError("observation ranges must be finite")
         self.low, self.high = low, high
+        inputs = without_repeats(description["inputs"])
         self._angles = tuple(
-            self._variable("circular", one["circular"])
-            for one in description["inputs"]
-            if "circular" in one
+            self._variable("circular", one["circular"]) for one in inputs if "circular" in one
         )
-        self._pairs = tuple(
-            self._pair(one["angle"]) for one in description["inputs"] if "angle" in one
-        )
+        self._pairs = tuple(self._pair(one["angle"]) for one in inputs if "angle" in one)
         told = dict(_symbols_of(self._space))
-        firsts = [one["symbol"][0] for one in description["inputs"] if "symbol" in one]
+        firsts = [one["symbol"][0] for one in inputs if "symbol" in one]
         self._symbols = {first: told[first] for first in firsts if first in told}
         self._settled()
         if [dict(one) for one in self.inputs] != [dict(one) for one in description["inputs"]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Generic, TypeAlias, TypeVar
 
@@ -22,6 +23,9 @@ from sdnn.approximators.sdnn_c import SDNNCConfig, pattern_tables
 from sdnn.arguments import choice, real, whole
 
 __all__ = ["RBFQLearning", "SDNNQLearning"]
+
+_MOST_CODE_BYTES = 2**30
+"""Of an agent in a file, whose weights may be few."""
 
 
 CoreAgent: TypeAlias = _core.SDNNQLearning | _core.RBFQLearning
@@ -332,6 +336,13 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
     def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         sizes = self.approximator
         shape = (sizes.n_hidden_units, sizes.n_pairs * sizes.n_pattern_units)
+        # Code books are in no array. Those of agents take less than their weights.
+        most_code_bytes = max(_MOST_CODE_BYTES // self.n_dimensions, 2 * math.prod(shape))
+        if self._tables is None and sizes.n_code_bytes > most_code_bytes:
+            raise ValueError(
+                "n_interpolated or n_symbols must be smaller: code books would not fit, got"
+                f" {sizes.n_code_bytes} bytes"
+            )
         for prefix in self._prefixes():
             check_shape(state, prefix + "weights", shape)
             if sizes.averaging_interval > 0:

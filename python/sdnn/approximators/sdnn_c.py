@@ -115,6 +115,15 @@ class SDNNCConfig:
             others = max(1, min(others, self.max_pairs // self.n_inputs))
         return self.n_inputs * others
 
+    @property
+    def n_code_bytes(self) -> int:
+        """How many bytes the patterns take, by anchors and of symbols, plain and permuted."""
+        symbols = [n for n in self.n_symbols if n > 0]
+        n_per_number = (self.n_anchor_patterns - 1) * (self.n_interpolated + 1)
+        n_bins = sum(symbols) + n_per_number * (self.n_inputs - len(symbols))
+        n_partners = self.n_pairs // self.n_inputs
+        return (n_partners + 1) * n_bins * 8 * -(-self.n_pattern_units // 64)
+
     def to_core(self) -> _core.SDNNCConfig:
         """Make the core's struct of the same values; see `sdnn.config.to_core`."""
         return to_core(self, _core.SDNNCConfig)

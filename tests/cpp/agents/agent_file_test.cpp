@@ -108,9 +108,9 @@ TEST(AgentFile, TheAgentThatIsReadGoesOnAsTheOneThatWasWritten) {
 }
 
 TEST(AgentFile, SettingsHaveTheNamesAndWordsOfTheConfigurations) {
-  const json settings = agent_file_of(small_vector(), 7).settings;
+  const json settings = agent_file_of(small_vector(), kSeed).settings;
   EXPECT_EQ(settings["n_actions"], json({5, 7}));
-  EXPECT_EQ(settings["seed"], 7);
+  EXPECT_EQ(settings["seed"], kSeed);
   const json& approximator = settings["approximator"];
   EXPECT_EQ(approximator["n_hidden_units"], 60);
   EXPECT_EQ(approximator["circular"], json({false, true}));
@@ -124,6 +124,39 @@ TEST(AgentFile, SettingsHaveTheNamesAndWordsOfTheConfigurations) {
   EXPECT_EQ(settings["learning"]["learning_rate"], 0.5);
   EXPECT_EQ(settings["learning"]["final_epsilon"], nullptr);
   EXPECT_EQ(config_from_json<approximators::SDNNCConfig>(approximator, "x"), small_network());
+}
+
+// A reader makes an agent anew of its settings and seed, so these must be all that it was made of.
+TEST(AgentFile, SaysNothingOfAnAgentThatItCouldNotGiveBack) {
+  const auto error_of = [](const auto& agent, std::uint64_t seed) -> std::string {
+    try {
+      (void)agent_file_of(agent, seed);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(error_of(small_sdnn(), kSeed), "no error");
+  EXPECT_EQ(error_of(small_sdnn(), 7),
+            "seed must be that of the network, whose tables must be its own, got 7");
+  auto config = small_network();
+  const SDNNC network(config, kSeed);
+  const SDNNC other(config, {network.state_code().table(0), network.state_code().table(0)}, kSeed);
+  EXPECT_NE(error_of(QLearning<SDNNC>(other, {}, kSeed), kSeed), "no error");
+  // Its own seed is that of the first dimension only.
+  EXPECT_NE(
+      error_of(QLearning<Decoupled<SDNNC>>(Decoupled<SDNNC>({network, network}), {}, kSeed), kSeed),
+      "no error");
+  const RBFNetwork narrow({.n_inputs = 2, .width = 0.5}), wide({.n_inputs = 2, .width = 0.7});
+  const Decoupled<RBFNetwork> unlike({narrow, wide}), alike({narrow, narrow});
+  EXPECT_EQ(error_of(QLearning<Decoupled<RBFNetwork>>(unlike, {}, 1), 1),
+            "agent must have parts of one configuration");
+  EXPECT_EQ(error_of(QLearning<Decoupled<RBFNetwork>>(alike, {}, 1), 1), "no error");
+  const FuzzyRules rules({.n_inputs = 2, .n_sets = 4, .n_actions = 5});
+  EXPECT_EQ(
+      error_of(VectorFuzzyQLearning({{rules, {.discount = 0.9}, 1}, {rules, {.discount = 0.8}, 2}}),
+               1),
+      "agent must have parts of one configuration");
 }
 
 TEST(AgentFile, WhatTheLibraryDoesNotKnowIsKept) {
@@ -192,8 +225,11 @@ TEST(AgentFile, SaysWhatDoesNotFit) {
   EXPECT_EQ(with("/approximator/n_hidden_units", 1000000),
             "state: action_value.0.weights must be as large as the approximator's");
   EXPECT_EQ(with("/approximator/n_interpolated", 2000000000),
-            "approximator.n_interpolated must be smaller: a code book would not fit, got "
-            "2000000000");
+            "approximator.n_interpolated or n_symbols must be smaller: code books would not fit, "
+            "got 6.4e+10");
+  EXPECT_EQ(with("/approximator/n_symbols", {1 << 30, 1 << 30}),
+            "approximator.n_interpolated or n_symbols must be smaller: code books would not fit, "
+            "got 3.43597e+10");
   AgentFile file = good;
   file.settings.erase("seed");
   EXPECT_EQ(error_of(file), "sdnn.seed must be there");

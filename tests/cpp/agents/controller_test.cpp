@@ -318,6 +318,31 @@ TEST(Controller, OfSeveralRobotsDoesWhatItsAgentDoes) {
   EXPECT_EQ(core::state_of(std::get<FuzzyQLearning>(other.agent())), core::state_of(agent));
 }
 
+// Of 5 actions on 0, 1 and 2 the second and the third are 1; alone it is the third, the nearest.
+TEST(Controller, RemembersWhichNumberAWholeActionWasWhileItsRobotIsThere) {
+  const Numbers observed = {1.0, 0.0, 4.0, 11.0}, state = {0.5, 0.75, 0.25};
+  const EpsilonGreedyConfig at_random = {.epsilon = 1.0, .n_greedy_steps = 0};
+  for (const bool leaves : {false, true}) {
+    QLearning<RBFNetwork> agent(plain().action_value(), {.policy = at_random}, 3);
+    AgentFile file = file_of(agent);
+    file.settings["action"] = {{"kind", "box"}, {"low", {0}}, {"high", {2}}, {"whole", true}};
+    Controller controller(file);
+    agent.set_n_environments(2);
+    controller.set_n_environments(2);
+    for (std::size_t index = 0; index != 1;) {
+      index = agent.act(state, true, 1);
+      ASSERT_EQ(controller.act(observed, true, 1)[0], std::floor(0.5 * double(index) + 0.5));
+    }
+    if (leaves) {
+      for (const std::size_t n : {1U, 2U}) controller.set_n_environments(n);
+    }
+    controller.learn(observed, Numbers{1.0}, 1.0, observed, true, 1);
+    agent.learn(state, leaves ? 2 : 1, 1.0, state, true, 1);
+    EXPECT_EQ(core::state_of(std::get<QLearning<RBFNetwork>>(controller.agent()).action_value()),
+              core::state_of(agent.action_value()));
+  }
+}
+
 TEST(Controller, ABadArgumentChangesNothing) {
   const Numbers good(4, 0.5), shorter(3, 0.5), nan = {0.5, 0.5, testing::kNaN, 0.5};
   const auto check = [&](const auto& agent) {

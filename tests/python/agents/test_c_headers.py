@@ -3,6 +3,7 @@
 import doctest
 import functools
 import importlib
+import itertools
 import math
 import shutil
 import subprocess
@@ -416,6 +417,42 @@ def test_the_angle_of_a_pair_is_in_the_agents_bin(agents, needs, tmp_path):
     expected = np.minimum((np.array(unit) * n_bins).astype(int), n_bins - 1)
     assert expected[: bounds.size].tolist() == list(range(n_bins - 1))
     np.testing.assert_array_equal(found, np.column_stack([expected, expected]))
+
+
+def test_what_the_library_refuses_is_defined(agents, needs, tmp_path):
+    """NaN is the lowest; an angle of NaN or infinity is 0. Conversions of NaN would be caught."""
+    needs("clang")
+    for name, agent in (("pairs", agents["pairs"]), ("symbols", symbols_agent())):
+        (tmp_path / f"{name}.h").write_text(c_header(agent, name).text)
+    source = """
+        #define PAIRS_USE_FLOAT
+        #define SYMBOLS_USE_FLOAT
+        #include "pairs.h"
+        #include "symbols.h"
+        #include <stdio.h>
+        int main(void) {
+          double x[3] = {0, 0, 0}, y[8] = {0}; uint32_t bins[SYMBOLS_N_INPUTS];
+          while (scanf("%lf %lf %lf", &y[0], &y[1], &y[2]) == 3) {
+            x[0] = y[0]; x[1] = y[1]; x[2] = y[2];
+            pairs_bins_of_double(x, bins); printf("%d %d ", (int)bins[0], (int)bins[1]);
+            symbols_bins_of_double(y, bins); printf("%d\\n", (int)bins[0]);
+          }
+          return 0;
+        }
+    """
+    (tmp_path / "bins.c").write_text(source + "\n")
+    caught = ("-fsanitize=undefined,float-cast-overflow", "-fno-sanitize-recover=all")
+    run("clang", *STRICT, *caught, tmp_path / "bins.c", "-o", tmp_path / "bins")
+    numbers = [math.nan, math.inf, -math.inf, 0.5]
+    points = list(itertools.product(numbers, repeat=3))
+    text = "".join(f"{x} {y} {z}\n" for x, y, z in points)
+    found = np.array(run(tmp_path / "bins", input=text.encode()).split(), int).reshape(-1, 3)
+    for (x, y, z), (angle, speed, symbol) in zip(points, found.tolist(), strict=True):
+        finite = math.isfinite(x) and math.isfinite(y)
+        assert angle == (5 * 9 * 5 // 8 if finite else 5 * 9 // 2)  # an eighth of a turn beyond 0
+        assert speed == {-math.inf: 0, 0.5: 5 * 9 * 8.5 // 16, math.inf: 44}.get(z, 0)
+        known = [number for number in (x, y, z) if not math.isnan(number)]
+        assert not known or (x, y, z)[symbol] == max(known)
 
 
 def test_the_integer_path_needs_no_library_and_no_floating_point(agents, target, tmp_path):

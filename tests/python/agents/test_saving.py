@@ -210,6 +210,50 @@ def test_two_classes_of_agents_cannot_have_one_name():
     assert type(copy.deepcopy(agent)) is again
 
 
+ONE_ANGLE = [{"angles": [0]}, {"angle_pairs": [(1, 0)]}]
+
+
+def one_angle(angle):
+    """An agent whose one angle is both inputs that its network needs."""
+    circle = gym.spaces.Box(-1.0, 1.0, (1 if "angles" in angle else 2,), dtype=np.float64)
+    return SDNNQLearning(circle, TORQUE, approximator=SMALL, learning=GENERAL, **angle)
+
+
+@pytest.mark.parametrize("angle", ONE_ANGLE)
+def test_an_agent_that_sees_one_angle_is_loaded_again_and_again(angle, tmp_path):
+    agent = again = lived(one_angle(angle), 0, 40)
+    for copied in range(3):
+        again.save(tmp_path / f"{copied}")
+        again = copy.deepcopy(load_agent(tmp_path / f"{copied}"))
+    assert (tmp_path / "0").read_bytes() == (tmp_path / "2").read_bytes()
+    same_state(lived(agent, 40, 60), lived(again, 40, 60))
+
+
+@pytest.mark.parametrize("angle", ONE_ANGLE)
+def test_files_that_name_an_angle_twice_are_read(angle, tmp_path):
+    """Those of agents that had been loaded before they were saved."""
+    agent = lived(one_angle(angle), 0, 40)
+    agent.save(tmp_path / "once")
+
+    def change(description, _):
+        for name in angle:
+            description["asked"][name] *= 2
+
+    again = load_agent(changed(tmp_path / "once", tmp_path / "twice", change))
+    same_state(agent, again)
+
+
+def test_one_angle_that_was_begun_in_cpp_is_read(tmp_path):
+    one_angle(ONE_ANGLE[0]).save(tmp_path / "python")
+
+    def change(description, _):
+        for name in ("asked", "observation_space", "action_space", "warm_up_steps", "n_tables"):
+            del description[name]
+
+    again = load_agent(changed(tmp_path / "python", tmp_path / "cpp", change))
+    assert again.description()["asked"]["angles"] == [0]
+
+
 @pytest.mark.parametrize("kind", ["sdnn", "sdnn, vector", "fuzzy", "sdnn, switches"])
 def test_what_was_begun_in_cpp_is_read(kind, tmp_path):
     """C++ says what an agent learns with, sees and does, and nothing of spaces."""
@@ -278,6 +322,14 @@ def changed(path, to, change):
         (
             lambda d, a: d["approximator"].update(n_hidden_units=2**20),
             r"is damaged: action_value.weights must have shape \(1048576, 40\)",
+        ),
+        (
+            lambda d, a: d["approximator"].update(n_symbols=[2**30, 0], max_table_bytes=2**62),
+            "is damaged: n_interpolated or n_symbols must be smaller.*, got 17179874944 bytes",
+        ),
+        (
+            lambda d, a: d["approximator"].update(n_inputs=0, max_pairs=2),
+            "is damaged: integer division",
         ),
         (lambda d, a: a.pop("agent.step"), "is damaged: state: step must be there"),
         (

@@ -28,6 +28,8 @@
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/safetensors.hpp"
 #include "sdnn/core/state.hpp"
 #include "sdnn/core/version.hpp"
@@ -212,7 +214,30 @@ Config config_from_json(const nlohmann::json& object, const std::string& name) {
   return config;
 }
 
-/// What a file of this agent holds, with nothing of others. `seed` is that of its construction.
+namespace detail {
+
+inline void require_alike(bool are_alike) {
+  if (!are_alike) throw std::invalid_argument("agent must have parts of one configuration");
+}
+
+/// Throws std::invalid_argument unless a network is what a reader makes of this configuration, but
+/// for the number of actions, and seed.
+template <class Network, class Config>
+void require_remade(const Network& network, Config config, std::uint64_t seed) {
+  config.n_actions = network.config().n_actions;
+  require_alike(network.config() == config);
+  if constexpr (requires { network.is_wired_by(seed); }) {
+    core::require(network.is_wired_by(seed), "seed",
+                  "that of the network, whose tables must be its own", seed);
+  }
+}
+
+}  // namespace detail
+
+/// What a file of this agent holds, with nothing of others. `seed` is that of its network's
+/// construction, of further dimensions approximators::seed_of_dimension(seed, d). Throws
+/// std::invalid_argument for another, for a network that was given tables, and for parts that
+/// differ in more than their numbers of actions: no file can say so.
 template <class Agent>
 AgentFile agent_file_of(const Agent& agent, std::uint64_t seed) {
   AgentFile file;
@@ -222,11 +247,22 @@ AgentFile agent_file_of(const Agent& agent, std::uint64_t seed) {
     n_actions.push_back(agent.rules().n_actions());
   } else if constexpr (std::is_same_v<Agent, VectorFuzzyQLearning>) {
     file.settings["approximator"] = config_to_json(agent.part(0).rules().config());
+    for (std::size_t d = 0; d < agent.n_dimensions(); ++d) {
+      const auto& part = agent.part(d);
+      detail::require_alike(part.config() == agent.config() &&
+                            part.rules().config() == agent.part(0).rules().config());
+    }
     n_actions.assign(agent.n_dimensions(), agent.part(0).rules().n_actions());
   } else {
     if constexpr (Agent::kDecoupled) {
-      file.settings["approximator"] = config_to_json(agent.action_value().part(0).config());
+      const auto& parts = agent.action_value();
+      file.settings["approximator"] = config_to_json(parts.part(0).config());
+      for (std::size_t d = 0; d < agent.n_dimensions(); ++d) {
+        detail::require_remade(parts.part(d), parts.part(0).config(),
+                               approximators::seed_of_dimension(seed, d));
+      }
     } else {
+      detail::require_remade(agent.action_value(), agent.action_value().config(), seed);
       file.settings["approximator"] = config_to_json(agent.action_value().config());
     }
     for (std::size_t d = 0; d < agent.n_dimensions(); ++d) n_actions.push_back(agent.n_actions(d));
@@ -335,7 +371,7 @@ class AgentMaker {
         value_from<std::vector<int>>(member(settings_, "n_actions", "sdnn"), "n_actions");
     if (n_actions.empty()) refuse("n_actions", "one number per dimension", settings_["n_actions"]);
     if (!state_.contains("action_value.0.weights")) {
-      expect_weights("action_value.weights", config);
+      expect_weights("action_value.weights", config, 1);
       QLearning<Q> agent(make(config, seed_), learning<QLearningConfig>(), seed_);
       if (n_actions.size() != 1 || agent.n_actions(0) != static_cast<std::size_t>(n_actions[0])) {
         refuse("n_actions", "[" + std::to_string(agent.n_actions(0)) + "], as the approximator's",
@@ -347,7 +383,8 @@ class AgentMaker {
     for (std::size_t d = 0; d < n_actions.size(); ++d) {
       Config of_dimension = config;
       of_dimension.n_actions = n_actions[d];
-      expect_weights("action_value." + std::to_string(d) + ".weights", of_dimension);
+      expect_weights("action_value." + std::to_string(d) + ".weights", of_dimension,
+                     n_actions.size());
     }
     QLearning<approximators::Decoupled<Q>> agent(
         approximators::make_decoupled(config, n_actions, seed_, make), learning<QLearningConfig>(),
@@ -356,17 +393,22 @@ class AgentMaker {
     return agent;
   }
 
-  void expect_weights(const std::string& name, const approximators::SDNNCConfig& config) const {
-    // A code book has 10^8 patterns at most; those of agents have some hundred.
-    const double n_patterns = (config.n_anchor_patterns * 1.0) * (config.n_interpolated + 1.0);
-    core::require(n_patterns * config.n_pattern_units <= kMostCodeBytes,
-                  "approximator.n_interpolated", "smaller: a code book would not fit",
-                  config.n_interpolated);
+  void expect_weights(const std::string& name, const approximators::SDNNCConfig& config,
+                      std::size_t n_dimensions) const {
+    // Code books are in no tensor. Those of agents take less than their weights.
+    const auto found = state_.find(name);
+    const double n_weight_bytes =
+        found == state_.end() ? 0.0 : static_cast<double>(found->second.bytes.size());
+    const double n_code_bytes = config.pattern_bytes(config.n_bins());
+    core::require(n_code_bytes <=
+                      std::max(kMostCodeBytes / static_cast<double>(n_dimensions), n_weight_bytes),
+                  "approximator.n_interpolated or n_symbols", "smaller: code books would not fit",
+                  n_code_bytes);
     expect_size(name, 1.0 * config.n_hidden_units * config.n_pattern_units * config.n_inputs *
                           config.n_partners());
   }
-  void expect_weights(const std::string& name,
-                      const approximators::RBFNetworkConfig& config) const {
+  void expect_weights(const std::string& name, const approximators::RBFNetworkConfig& config,
+                      std::size_t) const {
     expect_size(name, power(config.n_bases, config.n_inputs + 1));
   }
 
@@ -385,7 +427,7 @@ class AgentMaker {
     return product;
   }
 
-  static constexpr double kMostCodeBytes = 1e9;
+  static constexpr double kMostCodeBytes = core::kDefaultMaxTableBytes;
 
   const nlohmann::json& settings_;
   core::State state_;

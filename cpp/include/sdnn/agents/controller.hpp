@@ -251,6 +251,7 @@ class Controller {
   /// own, and a number from 0. Throws as the agent does.
   void set_n_environments(std::size_t n) {
     std::visit([n](auto& agent) { agent.set_n_environments(n); }, parts_.agent);
+    if (taken_.size() > n) taken_.resize(n);  // others may come later
   }
   std::size_t n_environments() const {
     return std::visit([](const auto& agent) { return agent.n_environments(); }, parts_.agent);

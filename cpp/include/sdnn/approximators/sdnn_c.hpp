@@ -16,18 +16,15 @@
 
 #include "sdnn/approximators/detail/potential_memory.hpp"
 #include "sdnn/approximators/detail/weight_average.hpp"
+#include "sdnn/approximators/detail/wiring.hpp"
 #include "sdnn/approximators/error_correction.hpp"
 #include "sdnn/approximators/hidden_layer.hpp"
 #include "sdnn/approximators/output_scale.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"
 #include "sdnn/coding/action_code.hpp"
-#include "sdnn/coding/anchor_patterns.hpp"
 #include "sdnn/coding/pattern_table.hpp"
-#include "sdnn/coding/permutation.hpp"
 #include "sdnn/coding/state_code.hpp"
-#include "sdnn/coding/symbol_patterns.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/random.hpp"
 
@@ -57,14 +54,14 @@ class SDNNC {
   /// field that is impossible; std::length_error naming bytes, max_table_bytes and what to reduce,
   /// before much memory is asked for; std::bad_alloc.
   SDNNC(const SDNNCConfig& config, std::uint64_t seed)
-      : SDNNC(config, tables_of(config, seed), seed) {}
+      : SDNNC(config, code_books_of(config, seed), seed) {}
 
   /// Code books of any coding, a table per input: the range [0, 1] is cut into as many equal bins
   /// as the table has patterns. The config's fields about anchors and symbols do not matter then.
   /// Throws std::invalid_argument if n_inputs or n_pattern_units are not the tables', and as above.
   SDNNC(const SDNNCConfig& config, std::vector<coding::PatternTable> tables, std::uint64_t seed)
       : config_(config),
-        code_(make_code(config, std::move(tables), seed)),
+        code_(wiring_of(config, std::move(tables), seed)),
         actions_(config.n_hidden_units, config.n_active_units, config.n_actions),
         scale_(make_scale(config)),
         hidden_layer_(actions_.n_hidden_units(), code_->n_columns(), code_->n_double_columns()),
@@ -91,6 +88,16 @@ class SDNNC {
   const CorrectionCounts& correction_counts() const noexcept { return counts_; }
   std::size_t n_inputs() const noexcept { return code_->n_inputs(); }
   std::size_t n_actions() const noexcept { return actions_.n_actions(); }
+
+  /// Whether config and this seed give its code books, so that they make it anew: not those of a
+  /// network that was given tables. Makes them. Throws as the constructor.
+  bool is_wired_by(std::uint64_t seed) const {
+    const auto tables = code_books_of(config_, seed);
+    for (std::size_t i = 0; i < tables.size(); ++i) {
+      if (tables[i] != code_->table(i)) return false;
+    }
+    return true;
+  }
 
   /// The weight of a hidden unit for a unit of x_SD, in the paper's order, in lattice steps.
   std::int32_t weight(std::size_t unit, std::size_t j) const {
@@ -246,117 +253,6 @@ class SDNNC {
 
  private:
   using Remembered = PotentialMemory::Entry;
-
-  static std::size_t checked_inputs(const SDNNCConfig& config) {
-    core::require_in_range("n_inputs", config.n_inputs, 2, 1024);
-    core::require_in_range("max_pairs", config.max_pairs, 0, 1 << 20);
-    return static_cast<std::size_t>(config.n_inputs);
-  }
-
-  /// The strides of the code, ascending: so many at random.
-  static std::vector<std::size_t> strides_of(const SDNNCConfig& config, std::uint64_t seed) {
-    core::Random random(seed, core::Stream::pairs);
-    coding::Permutation order = coding::random_permutation(checked_inputs(config) - 1, random);
-    order.resize(static_cast<std::size_t>(config.n_partners()));
-    std::ranges::sort(order);
-    std::vector<std::size_t> strides;
-    for (const auto place : order) strides.push_back(std::size_t{place} + 1);
-    return strides;
-  }
-
-  static std::vector<coding::PatternTable> tables_of(const SDNNCConfig& config,
-                                                     std::uint64_t seed) {
-    const std::size_t l = checked_inputs(config);
-    core::require_in_range("n_pattern_units", config.n_pattern_units, 2, 1 << 16);
-    core::require(config.circular.empty() || config.circular.size() == l, "circular",
-                  "empty or one flag per input", config.circular.size());
-    core::require(config.n_symbols.empty() || config.n_symbols.size() == l, "n_symbols",
-                  "empty or a number per input", config.n_symbols.size());
-    const auto n_symbols_of = [&config](std::size_t mu) {
-      return config.n_symbols.empty() ? 0 : config.n_symbols[mu];
-    };
-    double n_bins = 0.0;
-    for (std::size_t mu = 0; mu < l; ++mu) {
-      core::require_in_range("n_symbols", n_symbols_of(mu), 0, 1 << 24);
-      core::require(n_symbols_of(mu) == 0 || config.circular.empty() || !config.circular[mu],
-                    "circular", "false for an input of symbols", true);
-      n_bins += n_symbols_of(mu) > 0
-                    ? n_symbols_of(mu)
-                    : (config.n_anchor_patterns - 1.0) * (config.n_interpolated + 1.0);
-    }
-    require_room(config, n_bins);
-    std::vector<coding::PatternTable> tables;
-    for (std::size_t mu = 0; mu < l; ++mu) {
-      core::Random random(seed, core::Stream::code_books, mu);
-      tables.push_back(n_symbols_of(mu) > 0
-                           ? coding::symbol_patterns(n_symbols_of(mu), config.n_pattern_units,
-                                                     config.balanced_anchors, random)
-                           : coding::anchor_patterns(
-                                 {.n_units = config.n_pattern_units,
-                                  .n_anchor_patterns = config.n_anchor_patterns,
-                                  .n_interpolated = config.n_interpolated,
-                                  .balanced = config.balanced_anchors,
-                                  .circular = !config.circular.empty() && config.circular[mu]},
-                                 random));
-    }
-    return tables;
-  }
-
-  static std::size_t n_patterns(const std::vector<coding::PatternTable>& tables) {
-    std::size_t n = 0;
-    for (const coding::PatternTable& table : tables) n += table.n_bins();
-    return n;
-  }
-
-  /// Throws std::length_error if the network, with so many bins of all inputs, has more bytes than
-  /// config.max_table_bytes. In doubles, which no product overflows; their rounding does not
-  /// matter.
-  static void require_room(const SDNNCConfig& config, double n_bins) {
-    const coding::ActionCode sizes(config.n_hidden_units, config.n_active_units, config.n_actions);
-    const double l = config.n_inputs;
-    const double n_units = static_cast<double>(sizes.n_hidden_units());
-    const double n_partners = config.n_partners();
-    const double n_columns = l * n_partners * config.n_pattern_units;
-    const double pattern = 8.0 * std::ceil(config.n_pattern_units / 64.0);
-    double weights = 2.0 * n_units * n_columns + 4.0 * n_columns;
-    if (config.averaging_interval > 0) {  // the average, and a layer and a memory made of it
-      weights += WeightAverage::n_bytes(n_units, n_columns) + 2.0 * n_units * n_columns;
-    }
-    const double patterns = (n_partners + 1.0) * n_bins * pattern;
-    const double remembered = static_cast<double>(
-        PotentialMemory::n_bytes(sizes.n_hidden_units(), sizes.n_active_units()));
-    const char* largest = "max_pairs, n_hidden_units, n_pattern_units or n_inputs";
-    if (patterns > std::max(weights, remembered)) {
-      largest = config.n_symbols.empty()
-                    ? "n_interpolated, n_anchor_patterns, n_pattern_units or n_inputs"
-                    : "n_symbols, n_interpolated, n_anchor_patterns or n_pattern_units";
-    } else if (remembered > weights) {
-      largest = "n_hidden_units or n_active_units";
-    }
-    core::require_table_bytes(largest, "weights, patterns and remembered potentials",
-                              weights + patterns + remembered, config.max_table_bytes);
-  }
-
-  static std::shared_ptr<const coding::StateCode> make_code(
-      const SDNNCConfig& config, std::vector<coding::PatternTable> tables, std::uint64_t seed) {
-    const std::size_t l = checked_inputs(config);
-    core::require(tables.size() == l, "tables", "one per input", tables.size());
-    for (const coding::PatternTable& table : tables) {
-      core::require(table.n_units() == static_cast<std::size_t>(config.n_pattern_units), "tables",
-                    "of n_pattern_units = " + std::to_string(config.n_pattern_units) + " units",
-                    table.n_units());
-    }
-    require_room(config, static_cast<double>(n_patterns(tables)));
-    const std::vector<std::size_t> strides = strides_of(config, seed);
-    std::vector<coding::Permutation> permutations;
-    for (std::size_t group = 0; group < l * strides.size(); ++group) {
-      core::Random random(seed, core::Stream::permutations, group);
-      permutations.push_back(
-          coding::random_permutation(static_cast<std::size_t>(config.n_pattern_units), random));
-    }
-    return std::make_shared<const coding::StateCode>(std::move(tables), std::move(permutations),
-                                                     strides);
-  }
 
   static OutputScale make_scale(const SDNNCConfig& config) {
     const int u_low = config.u_low.value_or(config.n_active_units / 15);

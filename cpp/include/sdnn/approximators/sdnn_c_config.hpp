@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <tuple>
@@ -81,6 +82,21 @@ struct SDNNCConfig {
   int n_partners() const noexcept {
     if (n_inputs < 2) return 0;
     return max_pairs > 0 ? std::clamp(max_pairs / n_inputs, 1, n_inputs - 1) : n_inputs - 1;
+  }
+  /// Bins of all inputs by anchors and symbols, and the bytes of the patterns of so many bins,
+  /// plain and permuted for each partner. Of any fields, impossible ones too: hence doubles.
+  double n_bins() const noexcept {
+    double n_of_symbols = 0.0;
+    double n_numbers = n_inputs;
+    for (const int n : n_symbols) {
+      if (n <= 0) continue;
+      n_of_symbols += n;
+      n_numbers -= 1.0;
+    }
+    return n_of_symbols + n_numbers * (n_anchor_patterns - 1.0) * (n_interpolated + 1.0);
+  }
+  double pattern_bytes(double n_bins) const noexcept {
+    return (n_partners() + 1.0) * n_bins * 8.0 * std::ceil(n_pattern_units / 64.0);
   }
 };
 

@@ -23,11 +23,11 @@ class ColumnSet {
   std::size_t size() const noexcept { return size_; }
   bool holds(std::size_t column) const noexcept { return words_[column / 64][column % 64]; }
   void add(std::size_t column) noexcept {
-    size_ += holds(column) ? 0 : 1;
+    size_ += holds(column) ? 0U : 1U;
     words_[column / 64][column % 64] = true;
   }
   void remove(std::size_t column) noexcept {
-    size_ -= holds(column) ? 1 : 0;
+    size_ -= holds(column) ? 1U : 0U;
     words_[column / 64][column % 64] = false;
   }
   const core::BitWord* words() const noexcept { return words_.data(); }
