@@ -331,6 +331,30 @@ def test_an_early_stop_counts_the_evaluations_before_a_training_was_loaded(tmp_p
         evaluation_env=Corridor(),
     )
     assert again.evaluations == first.evaluations
+def test_a_training_goes_on_from_an_observation_that_is_infinite(tmp_path):
+    class Echo(Corridor):
+        """Nothing comes back from ahead where the corridor goes on, as of a sonar."""
+
+        observation_space = gym.spaces.Box(0.0, np.inf, (1,), dtype=np.float64)
+
+        def _seen(self):
+            return np.array([np.inf if self._at == 1 else self._at])
+
+    def begun(callbacks=()):
+        agent = SDNNQLearning(
+            Echo.observation_space, Echo.action_space, approximator=SMALL, observation_range=(0, 4)
+        )
+        return Training(agent, Echo(), steps=60, callbacks=callbacks)
+
+    whole = begun()
+    whole.run()
+    for cut in range(1, 10):
+        begun([Stop(cut, tmp_path / "t")]).run()
+        again = Training.load(tmp_path / "t", Echo())
+        again.run()
+        assert states_equal(whole.agent, again.agent)
+
+
     result = again.run()
     assert again.n_steps == 30
     assert again.evaluations == whole.evaluations
