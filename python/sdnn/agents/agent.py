@@ -42,6 +42,7 @@ _CORE = "agent."
 _WARM_UP = "warm_up."
 _TABLE = "table."
 _RATE = "rate."
+_TAKEN = "taken."
 
 Approximator = TypeVar("Approximator")
 Learning = TypeVar("Learning")
@@ -184,8 +185,11 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     def _make(self) -> Any:
         """Make the compiled agent; the observations are settled. Fills in ``approximator``."""
 
-    def _remember_actions(self) -> None:
-        """Take up the actions that the restored agent took last, where it must know them."""
+    def _remember_actions(self, taken: Mapping[str, NDArray[Any]]) -> None:
+        """Take up the actions that the restored agent took last, where it must know them.
+
+        ``taken`` has those that only the agent's file knows, by the environments' numbers.
+        """
 
     def _check_settings(self) -> None:
         """Find impossible ones before the warm-up: make an agent for as many variables."""
@@ -563,6 +567,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         if self._warm_up is not None:
             arrays |= {_WARM_UP + name: array for name, array in self._warm_up.state().items()}
             arrays |= {_RATE + name: np.array(value) for name, value in self._rates.items()}
+        unclear = self._actions.unclear().items()
+        arrays |= {f"{_TAKEN}{i}": np.array(numbers, np.uint64) for i, numbers in unclear}
         arrays |= {f"{_TABLE}{i}": table for i, table in enumerate(self._tables or ())}
         return arrays
 
@@ -616,7 +622,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             agent._check_state(part(_CORE))
             agent._compiled = agent._make()
             agent._compiled.restore(part(_CORE))
-            agent._remember_actions()
+            agent._remember_actions(part(_TAKEN))
         return agent
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
