@@ -10,7 +10,7 @@ from sdnn.agents.presets import PRESETS, Preset
 from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.agents.q_learning_config import QLearningConfig
 from sdnn.agents.training import Callback, Training, TrainingResult
-from sdnn.agents.transition import Transition
+from sdnn.agents.transition import Transition, UnusableStepError
 
 __all__ = [
     "PRESETS",
@@ -33,6 +33,7 @@ __all__ = [
     "Training",
     "TrainingResult",
     "Transition",
+    "UnusableStepError",
     "c_header",
     "evaluate",
     "export_c_header",

@@ -490,6 +490,52 @@ def test_an_environment_that_differs_now_is_one_line(invoke, monkeypatch, kind, 
         assert f"env must have the agent's {words}" in result.stderr
 
 
+BROKEN = "drifting_env:tests/Broken-v0"
+
+
+def test_a_reward_that_is_none_is_told_with_its_step_and_what_is_saved(invoke):
+    often = ("--steps", 400, "--evaluate-every", 0, "--checkpoint-every", 100, *SMALL)
+    result = invoke("train", BROKEN, *often, "--out", "one run")
+    assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
+    assert f"{BROKEN}: env gave what cannot be learned, in step 250 (step " in result.stderr
+    assert "reward must be finite, got nan; the first 200 steps are saved" in result.stderr
+    assert "sdnn resume 'one run' goes on there" in result.stderr
+    assert invoke("resume", "one run").exit_code == 0  # its life is another one
+    result = invoke("train", BROKEN, *often, "--env-arg", "at=50", "--out", "two")
+    assert result.exit_code == 1
+    assert "nothing is saved yet: sdnn resume two begins again" in result.stderr
+
+
+def test_a_broken_evaluation_is_one_line(invoke, monkeypatch):
+    assert invoke("train", BROKEN, *SHORT, "--out", "one").exit_code == 0
+    config = json.loads(Path("one/config.json").read_text())
+    config["environment"]["kwargs"] = {"at": 3}
+    Path("one/config.json").write_text(json.dumps(config))
+    for command in (["evaluate", "one"], ["record", "one", "x.gif"]):
+        result = invoke(*command)
+        assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
+        assert f"Error: {BROKEN}: env gave what cannot be evaluated, in step 3 of" in result.stderr
+
+
+def test_an_environment_that_raises_is_told_as_it_is(invoke):
+    failing = ("--env-arg", "error=stalled", "--steps", 400, "--evaluate-every", 0, *SMALL)
+    arguments = [str(one) for one in ("train", BROKEN, *failing, "--out", "one run")]
+    result = CliRunner().invoke(main, arguments)
+    assert isinstance(result.exception, RuntimeError)
+    assert result.stderr == "failed; sdnn resume 'one run' goes on\n"
+
+
+def test_what_cannot_be_printed_is_one_line(invoke, tmp_path):
+    assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
+    command = f"{sys.executable} -m sdnn resume one --json"
+    for out, errors in (("> /dev/full", "Error: [Errno 28] No space left"), ("| true", "")):
+        done = subprocess.run(
+            ["sh", "-c", f"{command} {out}"], env=environment(), capture_output=True, text=True
+        )
+        assert done.stderr.startswith(errors), done.stderr
+        assert done.stderr.count("\n") == bool(errors), done.stderr
+
+
 def test_a_run_is_not_overwritten(invoke):
     assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
     before = Path("one/rows.jsonl").read_bytes()
