@@ -9,6 +9,7 @@ from sdnn.agents.fuzzy_q_learning import FuzzyQLearning, FuzzyQLearningConfig
 from sdnn.agents.presets import PRESETS, Preset
 from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.agents.q_learning_config import QLearningConfig
+from sdnn.agents.scaling import Scaling
 from sdnn.agents.training import Callback, Training, TrainingResult
 from sdnn.agents.transition import Transition, UnusableStepError
 
@@ -28,6 +29,7 @@ __all__ = [
     "QLearningConfig",
     "RBFQLearning",
     "SDNNQLearning",
+    "Scaling",
     "Schedule",
     "TensorBoard",
     "Training",

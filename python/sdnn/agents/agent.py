@@ -24,6 +24,7 @@ from sdnn.agents.files import (
     write,
 )
 from sdnn.agents.observations import AnglePairs, Ranges, UnitObservations
+from sdnn.agents.scaling import Scaling
 from sdnn.agents.spaces import space_data, space_of
 from sdnn.agents.training import Callback, Training, TrainingResult
 from sdnn.agents.transition import Transition, reward_of
@@ -112,6 +113,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     approximator: Approximator
     learning: Learning
     _actions: Actions
+    _scaling: Scaling | None = None
     _tables: list[NDArray[np.int8]] | None = None
     _rates: dict[str, float]
     """That were set during the warm-up: by name."""
@@ -258,6 +260,26 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         """
         self._born()
         return self._observations.low.copy(), self._observations.high.copy()
+
+    @property
+    def scaling(self) -> Scaling | None:
+        """How its run scaled what it observes, with ``--noise`` or ``--redundant``; None: not.
+
+        `train` and `evaluate` refuse environments that do not scale their observations then. May be
+        set, and is kept in files.
+
+        Raises
+        ------
+        TypeError
+            If it is set to anything else.
+        """
+        return self._scaling
+
+    @scaling.setter
+    def scaling(self, scaling: Scaling | None) -> None:
+        if not isinstance(scaling, Scaling | None):
+            raise TypeError(f"scaling must be a Scaling or None, got {scaling!r}")
+        self._scaling = scaling
 
     @property
     def progress(self) -> float:
@@ -543,6 +565,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         else:
             action = {"kind": "discrete", "start": actions.start.tolist()}
         observations = self._observations
+        scaling = {} if self.scaling is None else {"scaling": self.scaling.values()}
         return {
             "class": type(self).__name__,
             "seed": self.seed,
@@ -557,6 +580,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             "asked": observations.asked(),
             "observation": observations.description() if observations.is_settled else None,
             "n_tables": len(self._tables or ()),
+            **scaling,
         }
 
     def state(self) -> Arrays:
@@ -608,6 +632,9 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             symbols=bool(asked.get("symbols", False)),
             least_inputs=cls.least_inputs,
         )
+        if "scaling" in description:
+            n_variables = agent._observations.n_variables
+            agent.scaling = Scaling.of_values(description["scaling"], n_variables)
         agent._actions = agent._make_actions(agent.action_space)
         agent._compiled, agent._warm_up, agent._rates = None, None, {}
         agent.progress = float(description["progress"])

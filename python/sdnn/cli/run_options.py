@@ -234,15 +234,10 @@ def _lines_of_ranges(report: Mapping[str, Any]) -> Iterator[str]:
 
 def _lines_of_scaling(run: Run) -> Iterator[str]:
     """Say what the agent needs wherever else it acts."""
-    from sdnn.runs.scaling import scaling_of
-
-    scaling = scaling_of(run.config.environment)
-    if scaling is None or scaling.ranges is None:
+    scaling = run.config.environment.scaling()
+    words = "" if scaling is None else scaling.words()
+    if not words:
         return
-    ends = zip(*scaling.ranges, strict=True)
-    words = _listed([f"{i} from {low:.6g} to {high:.6g}" for i, (low, high) in enumerate(ends)])
-    if scaling.n_redundant:
-        words += f", and means of neighbours ({scaling.n_redundant})"
     yield (
         f"the agent observes variables scaled to [0, 1], {words}: elsewhere it needs the same, as"
         f" sdnn.runs.Run.open({str(run.folder)!r}).config.environment.make() gives it"

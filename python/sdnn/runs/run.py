@@ -300,10 +300,26 @@ class Run:
         if path is None:
             begins = command_line("sdnn", "resume", self.folder)
             raise RunError(f"{self.folder} has no checkpoint yet: {begins} begins it")
+        return self.agent_in(path)
+
+    def agent_in(self, path: str | Path) -> Agent[Any, Any]:
+        """Load an agent of the run from one of its files.
+
+        Raises
+        ------
+        RunError
+            If the file is damaged.
+        """
         try:
-            return load_agent(path)
+            return self._with_scaling(load_agent(path))
         except ValueError as error:
             raise RunError(str(error)) from error
+
+    def _with_scaling(self, agent: Agent[Any, Any]) -> Agent[Any, Any]:
+        """Let the agent of an older file know how the run scales what it observes."""
+        if agent.scaling is None:
+            agent.scaling = self.config.environment.scaling()
+        return agent
 
     def evaluate(self, episodes: int = 10, seed: int | None = None) -> RunEvaluation:
         """Run greedy episodes with the agent as it is now.
@@ -381,6 +397,8 @@ class Run:
             training = Training.load(path, env, callbacks=callbacks, evaluation_env=evaluation_env)
         except ValueError as error:
             raise RunError(str(error)) from error
+        assert isinstance(training.agent, Agent)  # what load gives
+        self._with_scaling(training.agent)
         rows = _read_rows(self.folder / ROWS)
         if not training.evaluations:  # older checkpoints do not have them
             training.evaluations = [

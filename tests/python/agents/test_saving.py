@@ -296,6 +296,18 @@ def changed(path, to, change):
             lambda d, a: a.update({"agent.progress": np.array(np.nan)}),
             r"is damaged: state: progress must be in \[0, 1\]",
         ),
+        (
+            lambda d, a: a.update({"taken.0": np.array([5], np.uint64)}),
+            "is damaged: the action taken must be 1 indices",
+        ),
+        (
+            lambda d, a: d.update(scaling={"ranges": [[0, 1]], "redundant": 0}),
+            "is damaged: scaling must be of 2 observed numbers, got 1",
+        ),
+        (
+            lambda d, a: d.update(scaling={"ranges": [[0, 1], [1, 1]], "redundant": 0}),
+            "is damaged: ranges must be pairs, finite, low < high",
+        ),
     ],
 )
 def test_what_does_not_fit_is_named(saved, tmp_path, change, message):
