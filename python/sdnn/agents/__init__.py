@@ -9,8 +9,9 @@ from sdnn.agents.fuzzy_q_learning import FuzzyQLearning, FuzzyQLearningConfig
 from sdnn.agents.presets import PRESETS, Preset
 from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.agents.q_learning_config import QLearningConfig
+from sdnn.agents.scaling import Scaling
 from sdnn.agents.training import Callback, Training, TrainingResult
-from sdnn.agents.transition import Transition
+from sdnn.agents.transition import Transition, UnusableStepError
 
 __all__ = [
     "PRESETS",
@@ -28,11 +29,13 @@ __all__ = [
     "QLearningConfig",
     "RBFQLearning",
     "SDNNQLearning",
+    "Scaling",
     "Schedule",
     "TensorBoard",
     "Training",
     "TrainingResult",
     "Transition",
+    "UnusableStepError",
     "c_header",
     "evaluate",
     "export_c_header",

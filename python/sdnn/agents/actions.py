@@ -100,6 +100,10 @@ class Actions(abc.ABC):
         for environment in [i for i in self._taken if i >= n_environments]:
             del self._taken[environment]
 
+    def unclear(self) -> dict[int, Numbers]:
+        """Give those taken last that an element of the space does not tell, by environment."""
+        return {}
+
     def check(self, numbers: Numbers) -> None:
         """Raise ValueError or TypeError unless these are the numbers of an action."""
         self.vector(self._make(numbers))
@@ -195,6 +199,21 @@ class IndexedActions(Actions):
             return self.space.start + numbers[0]
         indices = np.asarray(numbers, np.int64) + self.start
         return indices.astype(self.space.dtype).reshape(self.space.shape or ())
+
+    def unclear(self) -> dict[int, Numbers]:
+        """Give those taken last of which several are one element: whole numbers are rounded to."""
+        return {
+            environment: numbers
+            for environment, (_, numbers) in self._taken.items()
+            if self._find(self.vector(self.element(numbers))) != list(numbers)
+        }
+
+    def remember(self, environment: int, indices: NDArray[Any]) -> None:
+        """Take up what `unclear` gave; ValueError if it is none."""
+        fits = indices.shape == (self.n_dimensions,) and indices.dtype.kind in "iu"
+        if not fits or not ((indices >= 0) & (indices < self.n_actions)).all():
+            raise ValueError(f"the action taken must be {self.n_dimensions} indices, got {indices}")
+        self.take(indices.tolist(), environment)
 
     def random(self, generator: np.random.Generator) -> Numbers:
         """Draw an index in each dimension."""

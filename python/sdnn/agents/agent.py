@@ -24,6 +24,7 @@ from sdnn.agents.files import (
     write,
 )
 from sdnn.agents.observations import AnglePairs, Ranges, UnitObservations, without_repeats
+from sdnn.agents.scaling import Scaling
 from sdnn.agents.spaces import space_data, space_of
 from sdnn.agents.training import Callback, Training, TrainingResult
 from sdnn.agents.transition import Transition, reward_of
@@ -42,6 +43,7 @@ _CORE = "agent."
 _WARM_UP = "warm_up."
 _TABLE = "table."
 _RATE = "rate."
+_TAKEN = "taken."
 
 Approximator = TypeVar("Approximator")
 Learning = TypeVar("Learning")
@@ -111,6 +113,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     approximator: Approximator
     learning: Learning
     _actions: Actions
+    _scaling: Scaling | None = None
     _tables: list[NDArray[np.int8]] | None = None
     _rates: dict[str, float]
     """That were set during the warm-up: by name."""
@@ -184,8 +187,11 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     def _make(self) -> Any:
         """Make the compiled agent; the observations are settled. Fills in ``approximator``."""
 
-    def _remember_actions(self) -> None:
-        """Take up the actions that the restored agent took last, where it must know them."""
+    def _remember_actions(self, taken: Mapping[str, NDArray[Any]]) -> None:
+        """Take up the actions that the restored agent took last, where it must know them.
+
+        ``taken`` has those that only the agent's file knows, by the environments' numbers.
+        """
 
     def _check_settings(self) -> None:
         """Find impossible ones before the warm-up: make an agent for as many variables."""
@@ -254,6 +260,26 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         """
         self._born()
         return self._observations.low.copy(), self._observations.high.copy()
+
+    @property
+    def scaling(self) -> Scaling | None:
+        """How its run scaled what it observes, with ``--noise`` or ``--redundant``; None: not.
+
+        `train` and `evaluate` refuse environments that do not scale their observations then. May be
+        set, and is kept in files.
+
+        Raises
+        ------
+        TypeError
+            If it is set to anything else.
+        """
+        return self._scaling
+
+    @scaling.setter
+    def scaling(self, scaling: Scaling | None) -> None:
+        if not isinstance(scaling, Scaling | None):
+            raise TypeError(f"scaling must be a Scaling or None, got {scaling!r}")
+        self._scaling = scaling
 
     @property
     def progress(self) -> float:
@@ -539,6 +565,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         else:
             action = {"kind": "discrete", "start": actions.start.tolist()}
         observations = self._observations
+        scaling = {} if self.scaling is None else {"scaling": self.scaling.values()}
         return {
             "class": type(self).__name__,
             "seed": self.seed,
@@ -553,6 +580,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             "asked": observations.asked(),
             "observation": observations.description() if observations.is_settled else None,
             "n_tables": len(self._tables or ()),
+            **scaling,
         }
 
     def state(self) -> Arrays:
@@ -563,6 +591,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         if self._warm_up is not None:
             arrays |= {_WARM_UP + name: array for name, array in self._warm_up.state().items()}
             arrays |= {_RATE + name: np.array(value) for name, value in self._rates.items()}
+        unclear = self._actions.unclear().items()
+        arrays |= {f"{_TAKEN}{i}": np.array(numbers, np.uint64) for i, numbers in unclear}
         arrays |= {f"{_TABLE}{i}": table for i, table in enumerate(self._tables or ())}
         return arrays
 
@@ -603,6 +633,9 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             symbols=bool(asked.get("symbols", False)),
             least_inputs=cls.least_inputs,
         )
+        if "scaling" in description:
+            n_variables = agent._observations.n_variables
+            agent.scaling = Scaling.of_values(description["scaling"], n_variables)
         agent._actions = agent._make_actions(agent.action_space)
         agent._compiled, agent._warm_up, agent._rates = None, None, {}
         agent.progress = float(description["progress"])
@@ -617,7 +650,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             agent._check_state(part(_CORE))
             agent._compiled = agent._make()
             agent._compiled.restore(part(_CORE))
-            agent._remember_actions()
+            agent._remember_actions(part(_TAKEN))
         return agent
 
     def __init_subclass__(cls, **kwargs: Any) -> None:

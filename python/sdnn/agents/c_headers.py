@@ -306,12 +306,14 @@ class _Writer:
             "float_tables": self._float_tables(),
             "bins_of_double": joined(bins_of_double),
         }
+        scaling = self.agent.scaling
+        comment = "" if scaling is None else scaling.c_comment()
         text = files("sdnn.agents").joinpath(_TEMPLATE).read_text("utf-8")
         names = {"name": self.name, "NAME": self.name.upper()}
         return CHeader(
             name=self.name,
             # What is filled in has names in it too.
-            text=Template(Template(text).safe_substitute(values)).substitute(names),
+            text=comment + Template(Template(text).safe_substitute(values)).substitute(names),
             fraction_bits=self.fraction_bits,
             flash_bytes=flash_bytes,
             weight_bytes=4 * n_words,

@@ -55,11 +55,17 @@ class Checkpoints(Callback):
         The file; each checkpoint takes the place of the one before, as a whole.
     every
         Steps between two.
+
+    Attributes
+    ----------
+    n_saved : int or None
+        Steps that the training had learned when it was saved last; None: not yet.
     """
 
     def __init__(self, path: str | Path, every: int = 10_000) -> None:
         self.path = path_of("path", path)
         self.every = whole("every", every, 1, 2**53)
+        self.n_saved: int | None = None
 
     def on_start(self, training: Training) -> None:
         """Raise ValueError where the training cannot be saved, before it learns for nothing."""
@@ -68,12 +74,16 @@ class Checkpoints(Callback):
     def on_step(self, training: Training) -> None:
         """Save where it is due."""
         if training.n_steps % self.every == 0:
-            training.save(self.path)
+            self._save(training)
 
     def on_end(self, training: Training) -> None:
         """Save where the training ends, unless an error left a step half done."""
         if not training.is_within_step:
-            training.save(self.path)
+            self._save(training)
+
+    def _save(self, training: Training) -> None:
+        training.save(self.path)
+        self.n_saved = training.n_steps
 
 
 class EarlyStop(Callback):

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.spaces import require_same_kind
-from sdnn.agents.transition import reward_of
+from sdnn.agents.transition import UnusableStepError, reward_of
 from sdnn.arguments import has_methods, seed_of, whole
 
-__all__ = ["Evaluation", "episode_seed", "evaluate"]
+__all__ = ["Evaluation", "episode_seed", "evaluate", "greedy_episode"]
 
 EVALUATION = 1
 """The kind of episodes that `episode_seed` gives seeds to."""
@@ -90,8 +91,11 @@ def evaluate(
     Raises
     ------
     TypeError, ValueError
-        If an argument cannot be used, such as ``episodes`` below 1, the environment's spaces are
-        not the agent's, or rewards do not add up to a finite number.
+        If an argument cannot be used, such as ``episodes`` below 1, or the environment's spaces are
+        not the agent's.
+    UnusableStepError
+        If the environment gives an observation or a reward that cannot be used, or rewards that do
+        not add up to a finite number: a `ValueError` that names step and episode.
     """
     has_methods("agent", agent, "an agent", "act")
     has_methods("env", env, "a Gymnasium environment", "reset", "step")
@@ -100,25 +104,62 @@ def evaluate(
     n_episodes = whole("episodes", episodes, 1, 10**9)
     returns, lengths, ends = [], [], []
     for episode in range(n_episodes):
-        observation, _ = env.reset(seed=episode_seed(seed, EVALUATION, episode))
-        episode_return, length, terminated, truncated = 0.0, 0, False, False
-        while not (terminated or truncated):
-            action = agent.act(observation, explore=False)
-            observation, reward, terminated, truncated, _ = env.step(action)
-            episode_return += reward_of(reward)
-            length += 1
-            if length == _LONG:
+        for now in greedy_episode(agent, env, seed, episode):
+            if now.n_steps == _LONG:
                 warnings.warn(
                     f"an evaluation's episode has had {_LONG:,} steps and goes on; an environment"
                     " whose episodes may never end needs a time limit (max_episode_steps)",
                     RuntimeWarning,
                     stacklevel=2,
                 )
-        if not math.isfinite(episode_return):
-            raise ValueError(f"rewards of env must add up to a finite number, got {episode_return}")
-        returns.append(episode_return)
-        lengths.append(length)
-        ends.append(terminated)
+        returns.append(now.total_reward)
+        lengths.append(now.n_steps)
+        ends.append(now.terminated)
     return Evaluation(
         returns=np.array(returns), lengths=np.array(lengths), terminated=np.array(ends, bool)
     )
+
+
+class GreedyEpisode(NamedTuple):
+    """How far a greedy episode is."""
+
+    n_steps: int
+    total_reward: float
+    terminated: bool
+
+
+def greedy_episode(
+    agent: Acts, env: gym.Env[Any, Any], seed: int, number: int
+) -> Iterator[GreedyEpisode]:
+    """Run an episode of an evaluation: give how far it is after the reset and after every step.
+
+    Raises
+    ------
+    UnusableStepError
+        See `evaluate`.
+    """
+    observation, _ = env.reset(seed=episode_seed(seed, EVALUATION, number))
+    now, truncated = GreedyEpisode(0, 0.0, False), False
+
+    def unusable(problem: object) -> UnusableStepError:
+        where = f"step {now.n_steps}" if now.n_steps else "the reset"
+        return UnusableStepError(
+            f"env gave what cannot be evaluated, in {where} of greedy episode {number}: {problem}"
+        )
+
+    yield now
+    while not (now.terminated or truncated):
+        try:
+            action = agent.act(observation, explore=False)
+        except ValueError as error:
+            raise unusable(error) from error
+        observation, reward, terminated, truncated, _ = env.step(action)
+        now = GreedyEpisode(now.n_steps + 1, now.total_reward, terminated)
+        try:
+            total = now.total_reward + reward_of(reward)
+        except ValueError as error:
+            raise unusable(error) from error
+        if not math.isfinite(total):
+            raise unusable(f"rewards of env must add up to a finite number, got {total}")
+        now = now._replace(total_reward=total)
+        yield now

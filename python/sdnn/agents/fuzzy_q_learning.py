@@ -164,7 +164,7 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     def _is_scalar(self) -> bool:
         return self._actions.n_dimensions == 1
 
-    def _remember_actions(self) -> None:
+    def _remember_actions(self, taken: Mapping[str, NDArray[Any]]) -> None:
         for environment in range(self.n_environments):
             last = self._compiled.last_action(environment)
             self._actions.take([last] if self._is_scalar else last, environment)

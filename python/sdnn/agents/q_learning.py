@@ -64,6 +64,11 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
     def _make_core(self) -> CoreAgent | CoreVectorAgent:
         """Make the compiled agent; the approximator's sizes are known."""
 
+    def _remember_actions(self, taken: Mapping[str, NDArray[Any]]) -> None:
+        for environment in range(self.n_environments):
+            if str(environment) in taken:
+                self._actions.remember(environment, taken[str(environment)])
+
     def _act(self, state: NDArray[np.float64], explore: bool, environment: int) -> list[Any]:
         chosen = self._compiled.act(state, explore, environment)
         return chosen if self._actions.n_dimensions > 1 else [chosen]

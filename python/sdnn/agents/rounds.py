@@ -10,16 +10,17 @@ from typing import Any, NamedTuple
 import gymnasium as gym
 import numpy as np
 
-from sdnn.agents.transition import reward_of
-
 __all__ = ["Outcome", "Rounds", "rounds_in"]
 
 
 class Outcome(NamedTuple):
-    """What an action led to; ``observation`` is the last of the episode where it ended."""
+    """What an action led to, as it is: the reward may be none.
+
+    ``observation`` is the last of the episode where it ended.
+    """
 
     observation: Any
-    reward: float
+    reward: Any
     terminated: bool
     truncated: bool
 
@@ -83,9 +84,7 @@ class _OneEnvironment(Rounds):
 
     def step(self, actions: Sequence[Any]) -> list[Outcome]:
         observation, reward, terminated, truncated, _ = self._env.step(own_copy(actions[0]))
-        return [
-            Outcome(own_copy(observation), reward_of(reward), bool(terminated), bool(truncated))
-        ]
+        return [Outcome(own_copy(observation), reward, bool(terminated), bool(truncated))]
 
 
 class _Vector(Rounds, abc.ABC):
@@ -116,7 +115,7 @@ class _Vector(Rounds, abc.ABC):
                     )
                 last[i] = copy.deepcopy(infos["final_obs"][i])
         outcomes = [
-            Outcome(last[i], float(rewards[i]), bool(terminated[i]), bool(truncated[i]))
+            Outcome(last[i], rewards[i], bool(terminated[i]), bool(truncated[i]))
             for i in range(self.n_environments)
         ]
         return outcomes, seen

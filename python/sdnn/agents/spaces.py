@@ -18,16 +18,37 @@ def require_same_kind(agent: Any, env: Any) -> None:
     What it observes must be possible in the agent's space, but for bounds, and its actions must be
     as many. What tells no spaces is not checked.
 
+    Where the agent's run scaled its observations, the environment must have scaled ones, too.
+
     Raises
     ------
     ValueError
         If it does not fit.
     """
+    scaling = getattr(agent, "scaling", None)
+    if scaling is not None and not _is_unit(_space_of(env, "observation_space")):
+        raise ValueError(
+            "env must give observations scaled to [0, 1], as the agent's run did"
+            f" ({scaling.words() or 'from which ranges is not known'}): UnitSensors(env,"
+            " *agent.scaling.ends) of sdnn.environments, or Run.open(folder).config.environment"
+            " of sdnn.runs"
+        )
     for name, fits in (("observation_space", _can_observe), ("action_space", _acts_alike)):
         own = getattr(agent, name, None)
-        found = getattr(env, f"single_{name}", getattr(env, name, None))
+        found = _space_of(env, name)
         if own is not None and found is not None and not fits(own, found):
             raise ValueError(f"env must have the agent's {name}, {_line(own)}, got {_line(found)}")
+
+
+def _space_of(env: Any, name: str) -> Any:
+    return getattr(env, f"single_{name}", getattr(env, name, None))
+
+
+def _is_unit(space: Any) -> bool:
+    """Whether all that is observed lies in [0, 1]; what tells no space is not checked."""
+    if not isinstance(space, gym.spaces.Box):
+        return space is None
+    return bool((space.low >= 0.0).all() and (space.high <= 1.0).all())
 
 
 _NUMBERS = (

@@ -23,7 +23,7 @@ from sdnn.agents.saved_training import (
     write_training,
 )
 from sdnn.agents.spaces import require_same_kind
-from sdnn.agents.transition import Transition
+from sdnn.agents.transition import Transition, UnusableStepError, reward_of
 from sdnn.arguments import has_methods, path_of, whole
 from sdnn.interrupts import Interrupts
 
@@ -284,6 +284,9 @@ class Training:
         KeyboardInterrupt
             After the end of the step in which it came and the callbacks' ``on_end``; a second one
             at once.
+        UnusableStepError
+            If the environment gives an observation or a reward that cannot be learned, such as NaN:
+            a `ValueError` that names step and episode.
         RuntimeError
             If an error left a step of this training half done before.
         """
@@ -478,7 +481,7 @@ class Training:
         for i, observation in first.items():
             self._begin_episode(i, numbers[i], observation)
         actions = [
-            None if episode is None else self.agent.act(episode.observation, environment=i)
+            None if episode is None else self._action(i, episode)
             for i, episode in enumerate(self._present)
         ]
         for i, outcome in enumerate(self._rounds.step(actions)):
@@ -488,6 +491,20 @@ class Training:
             else:
                 episode.actions.append(actions[i])
                 episode.outcome = outcome
+
+    def _action(self, environment: int, episode: _Episode) -> Any:
+        try:
+            return self.agent.act(episode.observation, environment=environment)
+        except ValueError as error:
+            raise self._unusable(error, environment, episode) from error
+
+    def _unusable(self, error: Exception, environment: int, episode: _Episode) -> UnusableStepError:
+        where = f"step {len(episode.actions)}" if episode.actions else "the reset"
+        whose = f" in environment {environment}" if self.n_environments > 1 else ""
+        return UnusableStepError(
+            f"env gave what cannot be learned, in step {self.n_steps + 1} ({where} of episode"
+            f" {episode.number}{whose}): {error}"
+        )
 
     def _next_outcome(self) -> tuple[int, _Episode, Outcome]:
         """Find the first environment whose last step is still to be learned."""
@@ -504,11 +521,15 @@ class Training:
         """Learn a step, and tell the callbacks of it."""
         agent = self.agent
         i, episode, outcome = self._next_outcome()
-        following, reward, terminated, _ = outcome
-        agent.learn(
-            Transition(episode.observation, episode.actions[-1], reward, following, terminated),
-            environment=i,
-        )
+        following, told, terminated, _ = outcome
+        try:
+            reward = reward_of(told)
+            agent.learn(
+                Transition(episode.observation, episode.actions[-1], reward, following, terminated),
+                environment=i,
+            )
+        except ValueError as error:
+            raise self._unusable(error, i, episode) from error
         episode.observation, episode.outcome = following, None
         episode.sum_of_rewards += reward
         self.n_steps += 1

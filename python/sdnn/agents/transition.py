@@ -10,7 +10,11 @@ from numpy.typing import ArrayLike
 
 from sdnn.arguments import real
 
-__all__ = ["Transition", "reward_of"]
+__all__ = ["Transition", "UnusableStepError", "reward_of"]
+
+
+class UnusableStepError(ValueError):
+    """An environment gave what cannot be learned or added up: the message says where."""
 
 
 class Transition(NamedTuple):

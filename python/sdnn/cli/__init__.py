@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 from typing import Any
 
@@ -46,11 +47,18 @@ def _print_cmake_dir(context: click.Context, _parameter: click.Parameter, value:
 
 class _Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command; Ctrl-C has its exit code also while nothing has begun."""
+        """Run a command; Ctrl-C has its exit code also while nothing has begun.
+
+        What cannot be read or written, also what is printed, is told in a line.
+        """
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:
             exit_interrupted(ctx, "Interrupted.")
+        except OSError as error:
+            if error.errno == errno.EPIPE:  # nobody reads on: Click ends quietly
+                raise
+            raise click.ClickException(str(error)) from error
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})

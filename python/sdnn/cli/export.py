@@ -40,13 +40,15 @@ def export(
     """
     from sdnn.agents import c_header, load_agent
     from sdnn.runs import Run
-    from sdnn.runs.scaling import scaling_of
     from sdnn.whole_files import write_whole
 
     with run_command(words_of_run(source)):
         try:
             run = Run.open(source) if source.is_dir() else Run.of_agent_file(source)
-            agent = run.agent() if run and source.is_dir() else load_agent(source)
+            if run is None:
+                agent = load_agent(source)
+            else:
+                agent = run.agent() if source.is_dir() else run.agent_in(source)
         except ValueError as error:
             raise click.ClickException(str(error)) from error
         try:
@@ -57,9 +59,8 @@ def export(
             raise _usage_error(error, is_named=name is not None) from error
         except (TypeError, RuntimeError) as error:
             raise click.ClickException(f"{source}: {error}") from error
-        scaling = None if run is None else scaling_of(run.config.environment)
-        comment = "" if scaling is None else scaling.c_comment()
-        write_whole(path, (comment + header.text).encode())
+        write_whole(path, header.text.encode())
+    scaling = agent.scaling
     if as_json:
         values = {k: v for k, v in dataclasses.asdict(header).items() if k != "text"}
         values["scaling"] = None if scaling is None else scaling.values()

@@ -97,7 +97,7 @@ def experiment_command(context: click.Context) -> Iterator[None]:
         yield
     except StudyError as error:
         raise click.UsageError(str(error)) from error
-    except (ExperimentError, OSError) as error:
+    except ExperimentError as error:
         raise click.ClickException(str(error)) from error
     except KeyboardInterrupt:
         exit_interrupted(context, "interrupted; what was finished is stored")

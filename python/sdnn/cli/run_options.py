@@ -159,15 +159,24 @@ def run_command(
     except RunTerminatedError as error:
         _tell_how_to_resume("terminated", folder)
         raise click.exceptions.Exit(EXIT_TERMINATED) from error
-    except (RunError, OSError) as error:
+    except RunError as error:
         raise click.ClickException(str(error)) from error
     except KeyboardInterrupt as error:
         _tell_how_to_resume("interrupted", folder)
         raise click.exceptions.Exit(EXIT_INTERRUPTED) from error
+    except (click.ClickException, click.exceptions.Exit, OSError):
+        raise
+    except Exception:  # of an environment, whose author needs all of it
+        if folder is not None and folder.exists():
+            _tell_how_to_resume("failed", folder)
+        raise
 
 
 def _tell_how_to_resume(what: str, folder: Path | None) -> None:
-    goes_on = "" if folder is None or not folder.exists() else f"; sdnn resume {folder} goes on"
+    from sdnn.runs.errors import command_line
+
+    is_begun = folder is not None and folder.exists()
+    goes_on = f"; {command_line('sdnn', 'resume', folder)} goes on" if is_begun else ""
     click.echo(what + goes_on, err=True)
 
 
@@ -225,15 +234,10 @@ def _lines_of_ranges(report: Mapping[str, Any]) -> Iterator[str]:
 
 def _lines_of_scaling(run: Run) -> Iterator[str]:
     """Say what the agent needs wherever else it acts."""
-    from sdnn.runs.scaling import scaling_of
-
-    scaling = scaling_of(run.config.environment)
-    if scaling is None or scaling.ranges is None:
+    scaling = run.config.environment.scaling()
+    words = "" if scaling is None else scaling.words()
+    if not words:
         return
-    ends = zip(*scaling.ranges, strict=True)
-    words = _listed([f"{i} from {low:.6g} to {high:.6g}" for i, (low, high) in enumerate(ends)])
-    if scaling.n_redundant:
-        words += f", and means of neighbours ({scaling.n_redundant})"
     yield (
         f"the agent observes variables scaled to [0, 1], {words}: elsewhere it needs the same, as"
         f" sdnn.runs.Run.open({str(run.folder)!r}).config.environment.make() gives it"
@@ -251,12 +255,14 @@ def _variables(numbers: Sequence[int]) -> str:
 
 
 def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
+    from sdnn.runs.errors import command_line
+
     why = " (the target is reached)" if outcome.reason == "target" else ""
     yield f"{run.folder}: {outcome.n_steps} steps, {outcome.n_episodes} episodes{why}"
     if outcome.is_warming_up:
         yield (
             f"{WARMING_UP}; that takes {run.config.warm_up_steps} steps:"
-            f" sdnn resume {run.folder} --steps N goes on"
+            f" {command_line('sdnn', 'resume', run.folder, '--steps', 'N')} goes on"
         )
     row = outcome.last_evaluation
     if row is not None:
@@ -274,7 +280,7 @@ def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
     if report is not None:
         yield from _lines_of_ranges(report)
     yield from _lines_of_scaling(run)
-    commands = [f"sdnn plot {run.folder}", f"sdnn evaluate {run.folder}"]
+    commands: list[tuple[object, ...]] = [("plot", run.folder), ("evaluate", run.folder)]
     if outcome.has_pictures:
-        commands.append(f"sdnn record {run.folder} x.gif")
-    yield "next: " + ", ".join(commands)
+        commands.append(("record", run.folder, "x.gif"))
+    yield "next: " + ", ".join(command_line("sdnn", *words) for words in commands)

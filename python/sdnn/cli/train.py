@@ -148,10 +148,12 @@ def train(
             return
     with run_command(origins.words, folder=folder):
         from sdnn.runs import Run
+        from sdnn.runs.errors import command_line
 
         if (folder / "config.json").exists():
+            goes_on = command_line("sdnn", "resume", folder)
             raise click.UsageError(
-                f"--out: {folder} holds a run already: sdnn resume {folder} goes on with it"
+                f"--out: {folder} holds a run already: {goes_on} goes on with it"
             )
         run = Run.create(folder, config)
         train_run(run, as_json, steps=None, episodes=None)

@@ -243,7 +243,7 @@ class RunConfig:
                 )
             given["observation_range"] = self.environment.ends(env)
         try:
-            return kind(
+            agent = kind(
                 env.observation_space,
                 env.action_space,
                 seed=self.seed,
@@ -252,6 +252,8 @@ class RunConfig:
             )
         except (TypeError, ValueError, OverflowError, MemoryError) as error:
             raise ConfigError(self._key_of(str(error)), str(error)) from error
+        agent.scaling = self.environment.scaling()
+        return agent
 
     def _key_of(self, message: str) -> str:
         """Find the setting that a message is about; else the environment, whose spaces are."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -12,27 +12,18 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.agents.scaling import Scaling, neighbours
 from sdnn.arguments import real, whole
 from sdnn.bounds import flat_bounds
 from sdnn.environments import NoisySensors, RedundantSensors, UnitSensors
 from sdnn.runs.errors import ConfigError, RunError, problem_of
 
-__all__ = ["ALL", "Ends", "MeanOfNeighbours", "RunEnvironment", "neighbours"]
+__all__ = ["ALL", "Ends", "MeanOfNeighbours", "RunEnvironment"]
 
 ALL = "all"
 """The key of the range of all variables that have no other."""
 
 Ends = tuple[NDArray[np.float64], NDArray[np.float64]]
-
-
-def neighbours(n_variables: int, n_redundant: int) -> Iterator[tuple[int, int]]:
-    """Give the variables whose means are redundant ones.
-
-    >>> list(neighbours(3, 4))
-    [(0, 1), (1, 2), (2, 0), (0, 1)]
-    """
-    for i in range(n_redundant):
-        yield i % n_variables, (i + 1) % n_variables
 
 
 class MeanOfNeighbours:
@@ -200,6 +191,20 @@ class RunEnvironment:
             raise ConfigError("environment.ranges", "scale nothing without noise or redundant")
         with closing(self._bare(None)) as env:
             return self.ends(env)
+
+    def scaling(self) -> Scaling | None:
+        """Say how what an agent observes is scaled; None: not at all.
+
+        The ranges are not known where the environment cannot be made.
+        """
+        if not self.changes_observations:
+            return None
+        try:
+            low, high = self.scaled_ranges()
+        except RunError:
+            return Scaling(ranges=None, n_redundant=self.redundant)
+        ranges = tuple(zip(low.tolist(), high.tolist(), strict=True))
+        return Scaling(ranges=ranges, n_redundant=self.redundant)
 
     def ends(self, env: gym.Env[Any, Any]) -> Ends:
         """Give the lowest and highest values of the flattened observation; infinite: not known.

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-__all__ = ["ConfigError", "RunError", "RunTerminatedError", "problem_of"]
+import shlex
+
+__all__ = ["ConfigError", "RunError", "RunTerminatedError", "command_line", "problem_of"]
 
 
 class RunError(Exception):
@@ -40,3 +42,12 @@ def problem_of(error: ValueError) -> str:
     'must be at least 1, got 0'
     """
     return str(error).partition(" ")[2]
+
+
+def command_line(*words: object) -> str:
+    """Write a command as a shell takes it, whatever is in its words.
+
+    >>> command_line("sdnn", "plot", "my runs/first")
+    "sdnn plot 'my runs/first'"
+    """
+    return shlex.join(map(str, words))

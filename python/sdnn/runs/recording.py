@@ -13,8 +13,8 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents import Agent
-from sdnn.agents.evaluation import EVALUATION, episode_seed
+from sdnn.agents import Agent, UnusableStepError
+from sdnn.agents.evaluation import greedy_episode
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
 from sdnn.whole_files import whole_file, write_whole
@@ -42,7 +42,7 @@ class Recording:
     env
         With the render mode ``"rgb_array"``.
     seed
-        Of the episode's reset.
+        Root of the episodes' seeds.
     max_steps
         Ends the picture before the episode's end.
 
@@ -73,16 +73,14 @@ class Recording:
         ------
         RunError
             If the environment gives something else than pictures.
+        UnusableStepError
+            See `sdnn.agents.evaluate`.
         """
-        observation, _ = self._env.reset(seed=self._seed)
-        yield self._frame()
-        ended = False
-        while not ended and (self._max_steps is None or self.n_frames <= self._max_steps):
-            action = self._agent.act(observation, explore=False)
-            observation, reward, terminated, truncated, _ = self._env.step(action)
-            self.total_reward += float(reward)
-            ended = terminated or truncated
+        for now in greedy_episode(self._agent, self._env, self._seed, 0):
+            self.total_reward = now.total_reward
             yield self._frame()
+            if now.n_steps == self._max_steps:
+                break
 
     def _frame(self) -> NDArray[np.uint8]:
         try:
@@ -116,8 +114,8 @@ def record(
     Raises
     ------
     RunError
-        If the name has another end, a package is missing, the environment cannot be rendered or
-        differs, or there is no agent yet.
+        If the name has another end, a package is missing, the environment cannot be rendered,
+        differs or gives what cannot be evaluated, or there is no agent yet.
     OSError
         If the file cannot be written.
     """
@@ -131,11 +129,14 @@ def record(
     environment = run.config.environment
     with closing(environment.make("evaluation_sensor_noise", render_mode="rgb_array")) as env:
         run.check_spaces(agent, env)
-        recording = Recording(agent, env, episode_seed(root, EVALUATION, 0), max_steps)
+        recording = Recording(agent, env, root, max_steps)
         rate = float(env.metadata.get("render_fps") or FRAMES_PER_SECOND)
         path.parent.mkdir(parents=True, exist_ok=True)
         write = _write_gif if path.suffix == ".gif" else _write_mp4
-        write(path, recording.frames(), rate)
+        try:
+            write(path, recording.frames(), rate)
+        except UnusableStepError as error:
+            raise RunError(f"{environment.id}: {error}") from error
     return recording
 
 

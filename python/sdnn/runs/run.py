@@ -24,6 +24,7 @@ from sdnn.agents import (
     SDNNQLearning,
     TensorBoard,
     Training,
+    UnusableStepError,
     evaluate,
     load_agent,
 )
@@ -32,7 +33,7 @@ from sdnn.agents.training import Row
 from sdnn.arguments import whole
 from sdnn.interrupts import Interrupts
 from sdnn.runs.config import RunConfig, read_json
-from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, problem_of
+from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line, problem_of
 from sdnn.whole_files import remove_abandoned_files, write_whole
 
 if TYPE_CHECKING:
@@ -62,11 +63,23 @@ class Goal:
         Steps it had learned then.
     steps, episodes
         How many it is to learn in all: one of them.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, or not one of ``steps`` and ``episodes`` is given.
     """
 
     at_step: int
     steps: int | None = None
     episodes: int | None = None
+
+    def __post_init__(self) -> None:
+        whole("at_step", self.at_step, 0, 2**53)
+        if (self.steps is None) == (self.episodes is None):
+            raise ValueError("steps or episodes must be given")
+        name = "episodes" if self.steps is None else "steps"
+        whole(name, getattr(self, name), 1, 2**53)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,7 +170,8 @@ class Run:
         """
         place = Path(folder)
         if (place / CONFIG).exists():
-            raise RunError(f"{place} holds a run already: sdnn resume {place} goes on with it")
+            goes_on = command_line("sdnn", "resume", place)
+            raise RunError(f"{place} holds a run already: {goes_on} goes on with it")
         if place.exists() and (not place.is_dir() or any(place.iterdir())):
             raise RunError(f"{place} is there already, and no run: take another folder")
         cls(place, config).check()
@@ -182,7 +196,7 @@ class Run:
         goals = read_json(path).pop("goals", [])
         try:
             read = [Goal(**goal) for goal in goals]
-        except TypeError as error:
+        except (TypeError, ValueError) as error:
             raise ConfigError("goals", f"must be a list of goals: {error}", str(path)) from error
         return cls(place, RunConfig.read(path), read)
 
@@ -226,7 +240,8 @@ class Run:
         KeyboardInterrupt, RunTerminatedError
             For SIGINT and SIGTERM, once the present step is done and a checkpoint is written.
         RunError
-            If a file is damaged, another process trains the run, or the environment differs.
+            If a file is damaged, another process trains the run, or the environment differs or
+            gives what cannot be learned: the message then says in which step, and what is saved.
         OSError
             If a file cannot be read or written.
         """
@@ -244,12 +259,18 @@ class Run:
             if self.config.target_return is not None and not self.goals:
                 target = _Target(self.config.target_return)
             # Rows are written before the checkpoint that counts them.
-            own = [JSONLines(self.folder / ROWS), target, self._checkpoints(), *callbacks]
+            checkpoints = Checkpoints(self.folder / CHECKPOINT, self.config.checkpoint_every)
+            own = [JSONLines(self.folder / ROWS), target, checkpoints, *callbacks]
             if self.config.tensorboard:
                 own.append(self._tensorboard())
             training = self._training(env, evaluation_env, [one for one in own if one is not None])
-            with Interrupts(training.stop, (signal.SIGTERM,)) as terminations:
-                result = training.run()
+            n_saved = training.n_steps
+            try:
+                with Interrupts(training.stop, (signal.SIGTERM,)) as terminations:
+                    result = training.run()
+            except UnusableStepError as error:
+                n_saved = checkpoints.n_saved or n_saved
+                raise RunError(f"{environment.id}: {error}; {self._saved(n_saved)}") from error
             if terminations.received is not None:
                 raise RunTerminatedError(f"terminated after {training.n_steps} steps")
             agent = training.agent
@@ -277,13 +298,28 @@ class Run:
         """
         path = next((p for p in map(self.folder.joinpath, (CHECKPOINT, AGENT)) if p.exists()), None)
         if path is None:
-            raise RunError(
-                f"{self.folder} has no checkpoint yet: sdnn resume {self.folder} begins it"
-            )
+            begins = command_line("sdnn", "resume", self.folder)
+            raise RunError(f"{self.folder} has no checkpoint yet: {begins} begins it")
+        return self.agent_in(path)
+
+    def agent_in(self, path: str | Path) -> Agent[Any, Any]:
+        """Load an agent of the run from one of its files.
+
+        Raises
+        ------
+        RunError
+            If the file is damaged.
+        """
         try:
-            return load_agent(path)
+            return self._with_scaling(load_agent(path))
         except ValueError as error:
             raise RunError(str(error)) from error
+
+    def _with_scaling(self, agent: Agent[Any, Any]) -> Agent[Any, Any]:
+        """Let the agent of an older file know how the run scales what it observes."""
+        if agent.scaling is None:
+            agent.scaling = self.config.environment.scaling()
+        return agent
 
     def evaluate(self, episodes: int = 10, seed: int | None = None) -> RunEvaluation:
         """Run greedy episodes with the agent as it is now.
@@ -298,13 +334,17 @@ class Run:
         Raises
         ------
         RunError
-            If there is no checkpoint yet, its file is damaged, or the environment differs.
+            If there is no checkpoint yet, its file is damaged, or the environment differs or gives
+            what cannot be evaluated.
         """
         root = self.fresh_seed if seed is None else seed
         agent = self.agent()
         with closing(self.config.environment.make("evaluation_sensor_noise")) as env:
             self.check_spaces(agent, env)
-            found = evaluate(agent, env, episodes, seed=root)
+            try:
+                found = evaluate(agent, env, episodes, seed=root)
+            except UnusableStepError as error:
+                raise RunError(f"{self.config.environment.id}: {error}") from error
         return RunEvaluation(
             returns=found.returns,
             lengths=found.lengths,
@@ -357,6 +397,8 @@ class Run:
             training = Training.load(path, env, callbacks=callbacks, evaluation_env=evaluation_env)
         except ValueError as error:
             raise RunError(str(error)) from error
+        assert isinstance(training.agent, Agent)  # what load gives
+        self._with_scaling(training.agent)
         rows = _read_rows(self.folder / ROWS)
         if not training.evaluations:  # older checkpoints do not have them
             training.evaluations = [
@@ -411,8 +453,12 @@ class Run:
             ]
         write_whole(self.folder / CONFIG, (json.dumps(values, indent=2) + "\n").encode())
 
-    def _checkpoints(self) -> Checkpoints:
-        return Checkpoints(self.folder / CHECKPOINT, self.config.checkpoint_every)
+    def _saved(self, n_steps: int) -> str:
+        """Say what is left of a training that failed."""
+        goes_on = command_line("sdnn", "resume", self.folder)
+        if n_steps == 0:
+            return f"nothing is saved yet: {goes_on} begins again once the environment is mended"
+        return f"the first {n_steps} steps are saved: {goes_on} goes on there once it is mended"
 
     def _tensorboard(self) -> TensorBoard:
         try:
@@ -432,7 +478,7 @@ class Run:
         try:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
+            except BlockingIOError as error:
                 raise RunError(f"{self.folder} is being trained by another process") from error
             yield
         finally:
@@ -449,7 +495,23 @@ def _has_pictures(env: gym.Env[Any, Any]) -> bool:
     return "rgb_array" in ((env.metadata or {}).get("render_modes") or ())
 
 
-_KEYS = {"kind", "step"}
+def _is_row(row: Any) -> bool:
+    """Whether it has what rows of its kind have."""
+    if not isinstance(row, dict) or type(row.get("step")) is not int:
+        return False
+    if not 0 <= row["step"] <= 2**53:
+        return False
+    if row.get("kind") == "episode":
+        return _is_number(row.get("return"))
+    if row.get("kind") == "evaluation":
+        returns = row.get("returns")
+        are_numbers = isinstance(returns, list) and returns and all(map(_is_number, returns))
+        return bool(are_numbers) and _is_number(row.get("mean_return"))
+    return "kind" in row
+
+
+def _is_number(value: Any) -> bool:
+    return type(value) in (int, float)
 
 
 def _read_rows(path: Path) -> list[Row]:
@@ -462,7 +524,7 @@ def _read_rows(path: Path) -> list[Row]:
             row = json.loads(line)
         except ValueError:
             row = None
-        if not isinstance(row, dict) or not set(row) >= _KEYS:
+        if not _is_row(row):
             raise RunError(f"{path}:{number}: must be a row of a training, got {line[:80]!r}")
         rows.append(row)
     return rows

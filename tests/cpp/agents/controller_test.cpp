@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -242,9 +243,11 @@ void step(Controller& controller, core::Random& random, Numbers& observed, bool 
 }
 
 template <class Agent>
-void expect_that_it_goes_on(const Agent& agent) {
+void expect_that_it_goes_on(const Agent& agent, bool is_whole = false) {
   const testing::Folder folder;
-  Controller whole(file_of(agent)), cut(file_of(agent));
+  AgentFile file = file_of(agent);
+  if (is_whole) file.settings["action"]["whole"] = true;
+  Controller whole(file), cut(file);
   core::Random random(5, core::Stream::weights), same(5, core::Stream::weights);
   Numbers observed(4), same_observed(4);
   for (int t = 0; t < 60; ++t) {
@@ -263,6 +266,22 @@ TEST(Controller, GoesOnAfterItWasSavedAnywhere) {
   expect_that_it_goes_on(sdnn());
   expect_that_it_goes_on(fuzzy());
   expect_that_it_goes_on(fuzzy_vectors());
+  const bool is_whole = true;  // then several actions of a network are one
+  expect_that_it_goes_on(sdnn(), is_whole);
+  expect_that_it_goes_on(fuzzy(), is_whole);
+  expect_that_it_goes_on(fuzzy_vectors(), is_whole);
+}
+
+TEST(Controller, RefusesAnActionTakenThatIsNone) {
+  AgentFile file = file_of(vectors());
+  file.settings["action"]["whole"] = true;
+  using Indices = std::vector<std::uint64_t>;
+  for (const Indices& taken : {Indices{0}, Indices{0, 5}, Indices{0, 1, 2}}) {
+    core::StateWriter writer;
+    writer.numbers("taken.0", taken);
+    file.tensors.insert_or_assign("taken.0", writer.state.at("taken.0"));
+    EXPECT_THROW(Controller{file}, std::runtime_error);
+  }
 }
 
 TEST(Controller, DoesWhatItsAgentDoes) {

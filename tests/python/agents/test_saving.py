@@ -33,6 +33,7 @@ PLANE = gym.spaces.Box(-1.0, 1.0, (2,), dtype=np.float64)
 WIDE = gym.spaces.Box(-1.0, 1.0, (6,), dtype=np.float64)
 UNBOUNDED = gym.spaces.Box(-np.inf, np.inf, (3,), dtype=np.float64)
 TORQUE = gym.spaces.Box(-2.0, 2.0, (1,), dtype=np.float32)
+GEARS = gym.spaces.Box(-1, 1, (2,), dtype=np.int64)  # of 5 actions each two are one gear
 TWO_TORQUES = gym.spaces.Box(-2.0, 2.0, (2,), dtype=np.float32)
 MIXED = gym.spaces.Dict({"at": PLANE, "lamp": gym.spaces.Discrete(2)})
 GENERAL = QLearningConfig(
@@ -61,6 +62,9 @@ KINDS = {
     ),
     "sdnn, switches": lambda: SDNNQLearning(
         PLANE, gym.spaces.MultiDiscrete([2, 3]), approximator=SMALL, learning=GENERAL
+    ),
+    "sdnn, whole numbers": lambda: SDNNQLearning(
+        PLANE, GEARS, approximator=SMALL, learning=GENERAL, seed=5
     ),
     "sdnn, warm-up": lambda: SDNNQLearning(
         UNBOUNDED, TORQUE, approximator=SMALL, learning=GENERAL, warm_up_steps=60
@@ -343,6 +347,18 @@ def changed(path, to, change):
         (
             lambda d, a: a.update({"agent.progress": np.array(np.nan)}),
             r"is damaged: state: progress must be in \[0, 1\]",
+        ),
+        (
+            lambda d, a: a.update({"taken.0": np.array([5], np.uint64)}),
+            "is damaged: the action taken must be 1 indices",
+        ),
+        (
+            lambda d, a: d.update(scaling={"ranges": [[0, 1]], "redundant": 0}),
+            "is damaged: scaling must be of 2 observed numbers, got 1",
+        ),
+        (
+            lambda d, a: d.update(scaling={"ranges": [[0, 1], [1, 1]], "redundant": 0}),
+            "is damaged: ranges must be pairs, finite, low < high",
         ),
     ],
 )

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 from decimal import Decimal
 
@@ -18,6 +19,7 @@ from sdnn.agents import (
     RBFQLearning,
     SDNNQLearning,
     Training,
+    UnusableStepError,
     evaluate,
 )
 from sdnn.approximators import SDNNCConfig
@@ -157,6 +159,65 @@ def test_rewards_of_an_evaluation_must_be_numbers():
         evaluate(corridor_agent(), Broken())
 
 
+class Broken(Corridor):
+    """Gives something else at a step, or by its second reset, than a corridor does."""
+
+    def __init__(self, at=11, **given):
+        super().__init__()
+        self._at_step, self._given, self._n_steps, self._n_resets = at, given, 0, 0
+
+    def reset(self, *, seed=None, options=None):
+        seen, told = super().reset(seed=seed)
+        self._n_resets += 1
+        return (self._given.get("first", seen) if self._n_resets == 2 else seen), told
+
+    def step(self, action):
+        seen, *_ = super().step(0)
+        self._n_steps += 1
+        given = self._given if self._n_steps == self._at_step else {}
+        return given.get("seen", seen), given.get("reward", 1.0), False, self._steps == 8, {}
+
+
+BROKEN = [
+    ({"reward": np.nan}, "step 3", "got nan"),
+    ({"reward": np.inf}, "step 3", "got inf"),
+    ({"reward": "much"}, "step 3", "reward must be a number, got 'much'"),
+    ({"seen": np.array([np.nan])}, "step 3", "observation must not hold NaN"),
+    ({"seen": np.zeros(2)}, "step 3", "observation must have shape (1,), got (2,)"),
+    ({"first": np.array([np.nan])}, "the reset", "observation must not hold NaN"),
+]
+
+
+@pytest.mark.parametrize(("given", "where", "problem"), BROKEN)
+def test_what_cannot_be_learned_or_evaluated_is_told_with_its_place(given, where, problem):
+    with pytest.raises(UnusableStepError, match=re.escape(problem)) as told:
+        corridor_agent().train(Broken(**given), steps=40)
+    step = 9 if where == "the reset" else 11
+    assert f"in step {step} ({where} of episode 1): " in str(told.value)
+    with pytest.raises(UnusableStepError, match=re.escape(problem)) as told:
+        evaluate(corridor_agent(), Broken(**given))
+    assert f"in {where} of greedy episode 1: " in str(told.value)
+
+
+def test_of_several_environments_the_one_is_told_that_cannot_be_learned_from():
+    envs = gym.vector.SyncVectorEnv([Corridor, lambda: Broken(reward=np.nan)])
+    with pytest.raises(
+        UnusableStepError, match=r"of episode \d in environment 1\): reward must be"
+    ):
+        corridor_agent().train(envs, steps=40)
+
+
+def test_what_an_environment_raises_is_raised():
+    class Failing(Corridor):
+        def step(self, action):
+            raise ValueError("no current")
+
+    for use in (lambda agent, env: agent.train(env, steps=9), evaluate):
+        with pytest.raises(ValueError, match=r"^no current$") as told:
+            use(corridor_agent(), Failing())
+        assert not isinstance(told.value, UnusableStepError)
+
+
 class Killed(Checkpoints):
     """Has no time for a last checkpoint."""
 
@@ -266,6 +327,30 @@ def test_an_unbounded_environment_is_warmed_up_and_learned(tmp_path):
     for cut in (1, 150, 199, 200, 201, 350):
         begun([Stop(cut, tmp_path / "t")]).run()
         again = Training.load(tmp_path / "t", env)
+        again.run()
+        assert states_equal(whole.agent, again.agent)
+
+
+def test_a_training_goes_on_from_an_observation_that_is_infinite(tmp_path):
+    class Echo(Corridor):
+        """Nothing comes back from ahead where the corridor goes on, as of a sonar."""
+
+        observation_space = gym.spaces.Box(0.0, np.inf, (1,), dtype=np.float64)
+
+        def _seen(self):
+            return np.array([np.inf if self._at == 1 else self._at])
+
+    def begun(callbacks=()):
+        agent = SDNNQLearning(
+            Echo.observation_space, Echo.action_space, approximator=SMALL, observation_range=(0, 4)
+        )
+        return Training(agent, Echo(), steps=60, callbacks=callbacks)
+
+    whole = begun()
+    whole.run()
+    for cut in range(1, 10):
+        begun([Stop(cut, tmp_path / "t")]).run()
+        again = Training.load(tmp_path / "t", Echo())
         again.run()
         assert states_equal(whole.agent, again.agent)
 

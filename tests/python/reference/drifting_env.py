@@ -33,6 +33,22 @@ class DriftingEnv(gym.Env):
         return picture
 
 
+class BrokenEnv(DriftingEnv):
+    """Breaks at a step of its life: gives a reward that is none, or raises an error."""
+
+    def __init__(self, at=250, error="", render_mode=None):
+        super().__init__(render_mode=render_mode)
+        self.at, self.error = at, error
+        self.n_steps = 0
+
+    def step(self, action):
+        self.n_steps += 1
+        observation, reward, *ends = super().step(action)
+        if self.n_steps == self.at and self.error:
+            raise RuntimeError(self.error)
+        return observation, np.nan if self.n_steps == self.at else reward, *ends
+
+
 class UnseenEnv(gym.Env):
     """As in docs/agents.md: nothing is said about rendering."""
 
@@ -49,3 +65,4 @@ class UnseenEnv(gym.Env):
 
 gym.register("tests/Unseen-v0", entry_point=UnseenEnv, max_episode_steps=20)
 gym.register("tests/Drifting-v0", entry_point=DriftingEnv, max_episode_steps=40)
+gym.register("tests/Broken-v0", entry_point=BrokenEnv, max_episode_steps=40)

@@ -1,6 +1,7 @@
 import csv
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -11,13 +12,16 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from safetensors import safe_open
+from safetensors.numpy import load_file, save_file
 
 import drifting_env
-from sdnn.agents import PRESETS, RBFQLearning, SDNNQLearning, c_header
+from sdnn.agents import PRESETS, RBFQLearning, SDNNQLearning, c_header, evaluate, load_agent
 from sdnn.cli import main
 from sdnn.cli.run_options import option_of, value_of
 from sdnn.cli.train import AGENTS as AGENT_WORDS
 from sdnn.cli.train import PRESETS as PRESET_WORDS
+from sdnn.environments import UnitSensors
 from sdnn.runs import AGENTS, Run, RunConfig
 
 SMALL = (
@@ -26,6 +30,7 @@ SMALL = (
 )  # fmt: skip
 SHORT = ("--steps", 150, "--evaluate-every", 70, "--evaluation-episodes", 2, *SMALL)
 DRIFTING = "drifting_env:tests/Drifting-v0"
+AGENT_FILES = ("agent.safetensors", "checkpoint.safetensors")
 
 
 @pytest.fixture
@@ -135,31 +140,76 @@ def test_what_a_noisy_or_redundant_run_observes_is_said_where_it_is_used_elsewhe
     for source in ("one", "one/agent.safetensors", "one/checkpoint.safetensors"):
         done = invoke("export", source, "--c-header", "a.h")
         assert [line.strip() for line in done.stdout.splitlines()[2:]] == SCALED_LINES
-        comment, rest = Path("a.h").read_text().split(" */\n", 1)
-        assert rest == c_header(Run.open("one").agent(), "a").text
+        text = Path("a.h").read_text()
+        assert text == c_header(Run.open("one").agent(), "a").text
+        comment, _ = text.split(" */\n", 1)
         assert comment.startswith("/* What this policy observes is scaled, ")
         assert [line.removeprefix(" *   ") for line in comment.splitlines()[4:]] == SCALED_LINES
     told = json.loads(invoke("export", "one", "--c-header", "a.h", "--json").stdout)
     assert told["scaling"] == {"ranges": [[-4.0, 4.0], [-2.0, 3.0]], "redundant": 1}
 
 
-def test_an_agents_file_that_is_of_no_run_is_exported_as_it_is(invoke):
+def test_a_copied_agents_file_says_what_its_run_scaled(invoke):
     assert invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one").exit_code == 0
     Path("agent.safetensors").write_bytes(Path("one/agent.safetensors").read_bytes())
-    Path("one/mine.safetensors").write_bytes(Path("one/agent.safetensors").read_bytes())
-    text = c_header(Run.open("one").agent(), "a").text
-    for source in ("agent.safetensors", "one/mine.safetensors"):
-        assert invoke("export", source, "--c-header", "a.h").exit_code == 0
-        assert Path("a.h").read_text() == text
     Path("config.json").write_text("of another program")
     told = json.loads(invoke("export", "agent.safetensors", "--c-header", "a.h", "--json").stdout)
-    assert (Path("a.h").read_text(), told["scaling"]) == (text, None)
+    assert told["scaling"] == {"ranges": [[-4.0, 4.0], [-2.0, 3.0]], "redundant": 1}
+    assert all(line in Path("a.h").read_text() for line in SCALED_LINES)
+
+    agent = load_agent("agent.safetensors")
+    environment = Run.open("one").config.environment
+    assert agent.scaling == pickle.loads(pickle.dumps(agent)).scaling == environment.scaling()
+    assert evaluate(agent, environment.make(), 1).lengths.size == 1
+    words = (
+        r"scaled to \[0, 1\], as the agent's run did \(0 from -4 to 4, 1 from -2 to 3, and means"
+    )
+    for use in (evaluate, lambda agent, env: agent.train(env, steps=1)):
+        with pytest.raises(ValueError, match=words):
+            use(agent, gym.make("tests/Drifting-v0"))
+
+
+def test_the_scaling_that_an_agent_tells_is_what_it_needs(invoke):
+    noisy = ("--noise", 0.01, "--range", "-4:4")
+    assert invoke("train", DRIFTING, *SHORT, *noisy, "--out", "one").exit_code == 0
+    agent = load_agent("one/agent.safetensors")
+    env = UnitSensors(gym.make("tests/Drifting-v0"), *agent.scaling.ends)
+    assert evaluate(agent, env, 1).lengths.size == 1
+    agent.scaling = None
+    assert evaluate(agent, gym.make("tests/Drifting-v0"), 1).lengths.size == 1
+    with pytest.raises(TypeError, match="scaling must be a Scaling or None, got 0"):
+        agent.scaling = 0
+
+
+def without_scaling(path):
+    """Make a file as versions wrote that did not tell what was scaled."""
+    with safe_open(path, framework="numpy") as file:
+        metadata = file.metadata()
+    described = json.loads(metadata["sdnn"])
+    del described["scaling"]
+    save_file(load_file(path), path, {**metadata, "sdnn": json.dumps(described)})
+
+
+def test_of_older_files_the_run_says_what_it_scales(invoke):
+    assert invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one").exit_code == 0
+    content = [Path("one", name).read_bytes() for name in AGENT_FILES]
+    for name in AGENT_FILES:
+        without_scaling(Path("one", name))
+    Path("agent.safetensors").write_bytes(Path("one/agent.safetensors").read_bytes())
+    for source in ("one", "one/agent.safetensors", "one/checkpoint.safetensors"):
+        assert SCALED_LINES[0] in invoke("export", source, "--c-header", "a.h").stdout
+    told = invoke("export", "agent.safetensors", "--c-header", "a.h", "--json").stdout
+    assert json.loads(told)["scaling"] is None
+    assert invoke("resume", "one").exit_code == 0
+    assert content == [Path("one", name).read_bytes() for name in AGENT_FILES]
 
 
 def test_a_run_is_exported_where_its_environment_cannot_be_made(invoke):
     assert invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one").exit_code == 0
     path = Path("one/config.json")
     path.write_text(path.read_text().replace("Drifting-v0", "Gone-v0"))
+    assert SCALED_LINES[0] in invoke("export", "one", "--c-header", "a.h").stdout
+    without_scaling(Path("one/checkpoint.safetensors"))
     done = invoke("export", "one", "--c-header", "a.h")
     assert done.exit_code == 0
     assert "not known here" in done.stdout
@@ -488,6 +538,52 @@ def test_an_environment_that_differs_now_is_one_line(invoke, monkeypatch, kind, 
         result = invoke(*command)
         assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
         assert f"env must have the agent's {words}" in result.stderr
+
+
+BROKEN = "drifting_env:tests/Broken-v0"
+
+
+def test_a_reward_that_is_none_is_told_with_its_step_and_what_is_saved(invoke):
+    often = ("--steps", 400, "--evaluate-every", 0, "--checkpoint-every", 100, *SMALL)
+    result = invoke("train", BROKEN, *often, "--out", "one run")
+    assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
+    assert f"{BROKEN}: env gave what cannot be learned, in step 250 (step " in result.stderr
+    assert "reward must be finite, got nan; the first 200 steps are saved" in result.stderr
+    assert "sdnn resume 'one run' goes on there" in result.stderr
+    assert invoke("resume", "one run").exit_code == 0  # its life is another one
+    result = invoke("train", BROKEN, *often, "--env-arg", "at=50", "--out", "two")
+    assert result.exit_code == 1
+    assert "nothing is saved yet: sdnn resume two begins again" in result.stderr
+
+
+def test_a_broken_evaluation_is_one_line(invoke, monkeypatch):
+    assert invoke("train", BROKEN, *SHORT, "--out", "one").exit_code == 0
+    config = json.loads(Path("one/config.json").read_text())
+    config["environment"]["kwargs"] = {"at": 3}
+    Path("one/config.json").write_text(json.dumps(config))
+    for command in (["evaluate", "one"], ["record", "one", "x.gif"]):
+        result = invoke(*command)
+        assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
+        assert f"Error: {BROKEN}: env gave what cannot be evaluated, in step 3 of" in result.stderr
+
+
+def test_an_environment_that_raises_is_told_as_it_is(invoke):
+    failing = ("--env-arg", "error=stalled", "--steps", 400, "--evaluate-every", 0, *SMALL)
+    arguments = [str(one) for one in ("train", BROKEN, *failing, "--out", "one run")]
+    result = CliRunner().invoke(main, arguments)
+    assert isinstance(result.exception, RuntimeError)
+    assert result.stderr == "failed; sdnn resume 'one run' goes on\n"
+
+
+def test_what_cannot_be_printed_is_one_line(invoke, tmp_path):
+    assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
+    command = f"{sys.executable} -m sdnn resume one --json"
+    for out, errors in (("> /dev/full", "Error: [Errno 28] No space left"), ("| true", "")):
+        done = subprocess.run(
+            ["sh", "-c", f"{command} {out}"], env=environment(), capture_output=True, text=True
+        )
+        assert done.stderr.startswith(errors), done.stderr
+        assert done.stderr.count("\n") == bool(errors), done.stderr
 
 
 def test_a_run_is_not_overwritten(invoke):

@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 import drifting_env
+from sdnn.agents.evaluation import EVALUATION, episode_seed
 from sdnn.runs import Run, RunConfig, RunEnvironment, RunError
 from sdnn.runs.recording import record
 
@@ -41,7 +42,7 @@ def test_gif_has_a_frame_per_state(run, tmp_path):
         picture.seek(0)
         first = np.asarray(picture.convert("RGB"))
     env = gym.make("tests/Drifting-v0", render_mode="rgb_array")
-    env.reset(seed=recording._seed)
+    env.reset(seed=episode_seed(5, EVALUATION, 0))
     assert np.array_equal(first, env.render())
 
 

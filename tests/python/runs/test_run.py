@@ -1,4 +1,5 @@
 import dataclasses
+import errno
 import json
 import os
 import random
@@ -215,11 +216,18 @@ def test_nothing_is_written_for_what_cannot_work(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_two_processes_do_not_train_one_run(tmp_path):
+def _no_locks(*_):
+    raise OSError(errno.ENOLCK, "No locks available")
+
+
+def test_two_processes_do_not_train_one_run(tmp_path, monkeypatch):
     run = Run.create(tmp_path / "run", CONFIG)
     with run._locked(), pytest.raises(RunError, match="trained by another process"):
         run.train()
     assert run.train(steps=20).n_steps == 20
+    monkeypatch.setattr("fcntl.flock", _no_locks)
+    with pytest.raises(OSError, match="No locks available"):
+        run.train()
 
 
 def test_agents_and_evaluations(whole):
@@ -252,6 +260,16 @@ def test_folders_that_hold_no_run_or_a_damaged_one(whole, tmp_path):
     rows.write_bytes(b"cake\n" + kept)
     with pytest.raises(RunError, match=r"rows\.jsonl:1: must be a row"):
         run.rows()
+    for row in (
+        {"kind": "episode", "step": 1},
+        {"kind": "episode", "step": 1, "return": "much"},
+        {"kind": "episode", "step": 0.5, "return": 1.0},
+        {"kind": "evaluation", "step": 1, "mean_return": 1.0, "returns": []},
+        {"kind": "evaluation", "step": 1, "mean_return": None, "returns": [1.0]},
+    ):
+        rows.write_bytes(json.dumps(row).encode() + b"\n" + kept)
+        with pytest.raises(RunError, match=r"rows\.jsonl:1: must be a row"):
+            run.rows()
     rows.write_bytes(kept + b'{"kind": "epi')  # killed while it wrote
     assert len(run.rows()) == len(kept.splitlines())
     (run.folder / "checkpoint.safetensors").write_bytes(b"cake")
@@ -260,6 +278,12 @@ def test_folders_that_hold_no_run_or_a_damaged_one(whole, tmp_path):
     with pytest.raises(RunError, match=r"checkpoint\.safetensors is no agent's file"):
         run.train()
     config = run.folder / "config.json"
+    told = json.loads(config.read_text())
+    for goal in ({"at_step": "x", "steps": 9}, {"at_step": 1}, {"at_step": 1, "steps": -5}, 7):
+        config.write_text(json.dumps({**told, "goals": [goal]}))
+        with pytest.raises(ConfigError, match=r"config\.json: goals: must be a list of goals: "):
+            Run.open(run.folder)
+    config.write_text(json.dumps(told, indent=2))
     config.write_text(config.read_text().replace('"steps": 400', '"steps": "many"', 1))
     with pytest.raises(ConfigError, match=r"config\.json: steps: must be a whole number"):
         Run.open(run.folder)

@@ -7,7 +7,6 @@ import pytest
 import drifting_env  # noqa: F401
 from sdnn.environments import NoisySensors, UnitSensors
 from sdnn.runs import ConfigError, RunEnvironment
-from sdnn.runs.scaling import scaling_of
 
 
 def test_without_noise_the_agent_gets_what_there_is():
@@ -34,7 +33,7 @@ def test_the_words_for_what_is_scaled_are_true(redundant):
     )
     scaled, bare = environment.make(), gym.make("tests/Drifting-v0")
     low, high = environment.scaled_ranges()
-    lines = list(scaling_of(environment).lines())
+    lines = list(environment.scaling().lines())
     for seed in range(5):
         known = {}
         values, _ = bare.reset(seed=seed)
@@ -56,7 +55,7 @@ def test_the_words_for_what_is_scaled_are_true(redundant):
 
 def test_nothing_is_scaled_without_noise_and_redundancy():
     environment = RunEnvironment(id="tests/Drifting-v0", ranges={"all": (-0.3, 0.4)})
-    assert scaling_of(environment) is None
+    assert environment.scaling() is None
     with pytest.raises(ConfigError, match="scale nothing without noise or redundant"):
         environment.scaled_ranges()
 

@@ -174,6 +174,11 @@ class ActionScale {
   /// Whether several numbers of actions may stand for one action.
   bool is_whole() const noexcept { return is_whole_; }
 
+  /// Whether these are the numbers of an action, one in each dimension.
+  bool has(std::span<const std::uint64_t> indices) const noexcept {
+    return std::ranges::equal(indices, n_actions_, std::ranges::less());
+  }
+
   /// Of action number `index` in dimension d.
   double of_index(std::size_t index, std::size_t d) const noexcept {
     if (is_discrete_) return low_[d] + static_cast<double>(index);
@@ -289,9 +294,9 @@ class Controller {
           }
         },
         parts_.agent);
-    if (explore && parts_.action.is_whole()) {
+    if (explore && parts_.action.is_whole() && !is_fuzzy()) {
       if (taken_.size() <= environment) taken_.resize(environment + 1);
-      taken_[environment] = {action_, indices_};
+      taken_[environment] = {action_, {indices_.begin(), indices_.end()}};
     }
     return action_;
   }
@@ -335,10 +340,53 @@ class Controller {
   void write(const std::filesystem::path& path) const {
     AgentFile file = file_;
     std::visit([&file](const auto& agent) { update_state(file, agent); }, parts_.agent);
+    for (std::size_t i = 0; i < taken_.size(); ++i) {
+      if (!is_unclear(taken_[i])) continue;
+      core::StateWriter writer;
+      writer.numbers(kTaken + std::to_string(i), taken_[i].indices);
+      file.tensors.merge(writer.state);
+    }
     write_agent_file(path, file);
   }
 
  private:
+  /// What was explored last in an environment, where several numbers stand for one action.
+  struct Taken {
+    std::vector<double> action;
+    std::vector<std::uint64_t> indices;
+  };
+  static constexpr const char* kTaken = "taken.";
+
+  /// Whether the action does not tell its numbers.
+  bool is_unclear(const Taken& taken) const {
+    for (std::size_t d = 0; d < taken.action.size(); ++d) {
+      if (parts_.action.index_of(taken.action[d], d) != taken.indices[d]) return true;
+    }
+    return false;
+  }
+
+  /// Takes up what `write` wrote.
+  void restore_taken(const std::string& name) {
+    core::StateReader reader(file_.tensors);
+    for (std::size_t i = 0, n = n_environments(); i < n; ++i) {
+      const std::string key = kTaken + std::to_string(i);
+      if (!file_.tensors.contains(key)) continue;
+      Taken taken;
+      try {
+        reader.numbers(key, taken.indices);
+        reader.expect(parts_.action.has(taken.indices), key, "the numbers of an action");
+      } catch (const std::invalid_argument& error) {
+        throw std::runtime_error(name + error.what());
+      }
+      for (std::size_t d = 0; d < taken.indices.size(); ++d) {
+        taken.action.push_back(parts_.action.of_index(taken.indices[d], d));
+      }
+      taken_.resize(std::max(taken_.size(), i + 1));
+      taken_[i] = std::move(taken);
+    }
+    std::erase_if(file_.tensors, [](const auto& item) { return item.first.starts_with(kTaken); });
+  }
+
   /// The number of an action: that of the last exploring act where it is the same one.
   std::size_t index_of(std::span<const double> action, std::size_t d,
                        std::size_t environment) const {
@@ -363,6 +411,13 @@ class Controller {
     std::erase_if(file_.tensors, [](const auto& item) {  // the agent has them
       return item.first.starts_with(detail::kStatePrefix);
     });
+    restore_taken(name);
+  }
+
+  bool is_fuzzy() const {
+    return std::visit(
+        [](const auto& agent) { return kIsFuzzy<std::remove_cvref_t<decltype(agent)>>; },
+        parts_.agent);
   }
 
   static double number(double action, std::size_t) noexcept { return action; }
@@ -403,12 +458,7 @@ class Controller {
   Parts parts_;
   std::vector<double> state_, next_state_, action_;
   std::vector<std::size_t> indices_;
-  /// What was explored last in each environment, where several numbers stand for one action.
-  struct Taken {
-    std::vector<double> action;
-    std::vector<std::size_t> indices;
-  };
-  std::vector<Taken> taken_;
+  std::vector<Taken> taken_;  ///< for each environment
 };
 
 }  // namespace sdnn::agents

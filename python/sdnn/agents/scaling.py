@@ -1,0 +1,119 @@
+"""What an agent observes where its run scaled the variables of its environment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.arguments import real, whole
+
+__all__ = ["Scaling", "neighbours"]
+
+
+def neighbours(n_variables: int, n_redundant: int) -> Iterator[tuple[int, int]]:
+    """Give the variables whose means are redundant ones.
+
+    >>> list(neighbours(3, 4))
+    [(0, 1), (1, 2), (2, 0), (0, 1)]
+    """
+    for i in range(n_redundant):
+        yield i % n_variables, (i + 1) % n_variables
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scaling:
+    """What a run with noise or redundant variables makes of what its environment gives.
+
+    Parameters
+    ----------
+    ranges
+        Lowest and highest value of each variable, which become 0 and 1; None: they are not known.
+    n_redundant
+        How many means of neighbours follow them: of variables 0 and 1, of 1 and 2, ..., of the last
+        and 0, and so on in a circle.
+
+    Raises
+    ------
+    ValueError
+        For ranges that are not finite, low < high, and numbers out of range.
+
+    Examples
+    --------
+    >>> scaling = Scaling(ranges=((-4.0, 4.0), (0.0, 1.0)), n_redundant=1)
+    >>> scaling.words()
+    '0 from -4 to 4, 1 from 0 to 1, and means of neighbours (1)'
+    """
+
+    ranges: tuple[tuple[float, float], ...] | None
+    n_redundant: int = 0
+
+    def __post_init__(self) -> None:
+        whole("n_redundant", self.n_redundant, 0, 1000)
+        if self.ranges is None:
+            return
+        try:
+            pairs = tuple((real("ranges", a), real("ranges", b)) for a, b in self.ranges)
+        except (OverflowError, TypeError, ValueError):
+            pairs = ()
+        if not pairs or not all(-np.inf < low < high < np.inf for low, high in pairs):
+            raise ValueError(f"ranges must be pairs, finite, low < high, got {self.ranges!r}")
+        object.__setattr__(self, "ranges", pairs)
+
+    @property
+    def ends(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Lowest and highest values, shapes (n,): what `sdnn.environments.UnitSensors` takes."""
+        if self.ranges is None:
+            return None
+        low, high = np.array(self.ranges, np.float64).T
+        return low, high
+
+    def words(self) -> str:
+        """Say it in a line; "" where ranges are not known."""
+        if self.ranges is None:
+            return ""
+        most = 8
+        ranges = [f"{i} from {low:.6g} to {high:.6g}" for i, (low, high) in enumerate(self.ranges)]
+        words = ", ".join(ranges[:most]) + (", ..." if len(ranges) > most else "")
+        return words + (f", and means of neighbours ({self.n_redundant})" * (self.n_redundant > 0))
+
+    def lines(self) -> Iterator[str]:
+        """Say of each observed number what it is."""
+        if self.ranges is None:
+            yield "not known here, where the environment cannot be made: the ranges of its space,"
+            yield "or those of config.json"
+            return
+        n_variables = len(self.ranges)
+        for i, (low, high) in enumerate(self.ranges):
+            yield f"observation[{i}]: variable {i}, from {low!r} to {high!r}"
+        for i, (first, second) in enumerate(neighbours(n_variables, self.n_redundant)):
+            means = f"observation[{first}] and observation[{second}]"
+            yield f"observation[{n_variables + i}]: the mean of {means}"
+
+    def values(self) -> dict[str, Any]:
+        """Give it as JSON has it."""
+        ranges = None if self.ranges is None else [list(pair) for pair in self.ranges]
+        return {"ranges": ranges, "redundant": self.n_redundant}
+
+    @classmethod
+    def of_values(cls, values: Mapping[str, Any], n_variables: int) -> Scaling:
+        """Make it of what `values` gave; ValueError if it does not fit so many numbers."""
+        scaling = cls(ranges=values["ranges"], n_redundant=values["redundant"])
+        n = None if scaling.ranges is None else len(scaling.ranges) + scaling.n_redundant
+        if n not in (None, n_variables):
+            raise ValueError(f"scaling must be of {n_variables} observed numbers, got {n}")
+        return scaling
+
+    def c_comment(self) -> str:
+        """Say it at the top of a C header."""
+        lines = (
+            "What this policy observes is scaled, since its run had noise or redundant variables:",
+            "each variable from its range to [0, 1], (value - low) / (high - low), and what lies",
+            "beyond the range to 0 or 1. Wherever an observation has units below, it is these.",
+            "",
+            *(f"  {line}" for line in self.lines()),
+        )
+        return "\n".join(["/* " + lines[0], *(f" * {one}".rstrip() for one in lines[1:]), " */\n"])
