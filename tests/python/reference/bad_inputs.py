@@ -401,6 +401,7 @@ def arguments(agent, parameters):
         "environment": 0,
         "n_environments": 1,
         "learning_rate": None,
+        "scaling": None,
         "epsilon": None,
         "transition": Transition(HERE, agent.last, 1.0, [0.3, 0.4], False),
         "dimension": 0,
