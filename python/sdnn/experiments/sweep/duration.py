@@ -8,6 +8,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from sdnn.experiments.config import TrialSettings
+from sdnn.experiments.errors import ExperimentError
+from sdnn.experiments.progress import describe
 from sdnn.experiments.records import TrialKey, TrialTime
 from sdnn.experiments.trial import opened
 
@@ -59,6 +61,11 @@ class Durations:
             Which trial; its number does not matter.
         config
             Its settings.
+
+        Raises
+        ------
+        ExperimentError
+            If a probe fails, as the trial would.
         """
         alike = [t for t in self._times if t.key[:2] == key[:2]]
         same = [t for t in alike if t.key.config_hash == key.config_hash]
@@ -69,7 +76,11 @@ class Durations:
                 return _duration(chosen, config, f"{counted} of {words}")
         pair = (key.case_id, key.agent)
         if pair not in self._probes:
-            self._probes[pair] = _probe(key, config)
+            try:
+                self._probes[pair] = _probe(key, config)
+            except Exception as error:  # whatever a trial raises
+                message = f"{type(error).__name__}: {error}"
+                raise ExperimentError(f"{describe(key)} fails: {message}") from error
         return _duration([self._probes[pair]], config, "a probe")
 
 

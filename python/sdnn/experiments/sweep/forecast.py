@@ -72,6 +72,8 @@ def forecast(request: SweepRequest) -> Forecast:
         If there is no variant of that name.
     StoreError
         If the result file cannot be used.
+    ExperimentError
+        If a trial that is begun to see how long it takes fails.
     """
     study = request.study
     plan = request.plan

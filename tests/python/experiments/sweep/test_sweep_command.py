@@ -188,6 +188,16 @@ def test_dry_run_counts_and_estimates_without_making_a_file(invoke, tmp_path):
     assert {t["seconds_of_a_trial"] for t in done["trials"]} == {None}
 
 
+def test_a_trial_that_raises_is_told_by_a_dry_run(invoke, fake):
+    class Raising(fake.FakeTrial):
+        def advance(self, n):
+            raise OverflowError("a weight would leave its range")
+
+    result = invoke("sweep", "mine.toml", "--dry-run", trial=Raising)
+    message = "Error: SDNN-C s4, trial 1 fails: OverflowError: a weight would leave its range\n"
+    assert (result.exit_code, result.stdout, result.stderr) == (1, "", message)
+
+
 def test_an_own_environment_from_a_module_beside_the_file(invoke, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [*sys.path])
     (tmp_path / "my_line_world.py").write_text(
