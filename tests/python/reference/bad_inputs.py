@@ -419,7 +419,6 @@ def arguments(agent, parameters):
         "every": 3,
         "mean_return": 5.0,
         "patience": 1,
-        "scaling": None,
     }
     return {name: good[name] for name in parameters}
 
