@@ -17,6 +17,7 @@ from sdnn.agents import (
     FuzzyQLearningConfig,
     QLearningConfig,
     RBFQLearning,
+    Scaling,
     SDNNQLearning,
     Transition,
 )
@@ -133,6 +134,8 @@ def write(folder):
         rng = np.random.default_rng(5)
         life(agent, rng, 120)
         agent.progress = 0.5
+        if name == "fuzzy":  # as after a run with noise
+            agent.scaling = Scaling(ranges=((-1.0, 1.0),) * 3, n_redundant=1)
         agent.save(folder / f"{name}.safetensors")
         steps = life(agent, rng, N_STEPS)
         agent.save(folder / f"{name}-after.safetensors")
