@@ -78,7 +78,7 @@ class HiddenLayer {
                                                    std::size_t column) const noexcept {
     std::array<std::int32_t, kBlockUnits> weights;
     const std::size_t at = byte_index(block * kBlockUnits, column);
-    for (std::size_t i = 0; i < kBlockUnits; ++i) weights[i] = bytes_[at + i];
+    for (std::size_t i = 0; i < kBlockUnits; ++i) weights[i] = std::int32_t{bytes_[at + i]};
     if (high_columns_[block].size() == 0) return weights;
     for (std::size_t i = 0; i < kBlockUnits; ++i) weights[i] += kHighByte * high_bytes_[at + i];
     return weights;
