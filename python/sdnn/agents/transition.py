@@ -36,7 +36,7 @@ def reward_of(reward: Any) -> float:
 
     Raises
     ------
-    OverflowError, ValueError
+    ValueError
         If it is something else.
     """
     if type(reward) is float:
@@ -47,4 +47,7 @@ def reward_of(reward: Any) -> float:
     if is_real and hasattr(reward, "__float__"):
         with suppress(OverflowError, TypeError, ValueError):
             return float(reward)
-    return real("reward", reward)  # for its message
+    try:
+        return real("reward", reward)  # for its message
+    except OverflowError as error:  # which would say of `Agent.learn` that a weight left its range
+        raise ValueError(str(error)) from None

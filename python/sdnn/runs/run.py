@@ -264,13 +264,13 @@ class Run:
             if self.config.tensorboard:
                 own.append(self._tensorboard())
             training = self._training(env, evaluation_env, [one for one in own if one is not None])
-            n_saved = training.n_steps
+            began_at = training.n_steps
             try:
                 with Interrupts(training.stop, (signal.SIGTERM,)) as terminations:
                     result = training.run()
             except UnusableStepError as error:
-                n_saved = checkpoints.n_saved or n_saved
-                raise RunError(f"{environment.id}: {error}; {self._saved(n_saved)}") from error
+                saved = self._saved(checkpoints.n_saved or began_at)
+                raise RunError(f"{environment.id}: {error}; {saved}") from error
             if terminations.received is not None:
                 raise RunTerminatedError(f"terminated after {training.n_steps} steps")
             agent = training.agent

@@ -181,6 +181,7 @@ class Broken(Corridor):
 BROKEN = [
     ({"reward": np.nan}, "step 3", "got nan"),
     ({"reward": np.inf}, "step 3", "got inf"),
+    ({"reward": 10**400}, "step 3", "reward must be a number of less than 1.8e308, got more"),
     ({"reward": "much"}, "step 3", "reward must be a number, got 'much'"),
     ({"seen": np.array([np.nan])}, "step 3", "observation must not hold NaN"),
     ({"seen": np.zeros(2)}, "step 3", "observation must have shape (1,), got (2,)"),
