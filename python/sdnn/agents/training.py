@@ -285,8 +285,9 @@ class Training:
             After the end of the step in which it came and the callbacks' ``on_end``; a second one
             at once.
         UnusableStepError
-            If the environment gives an observation or a reward that cannot be learned, such as NaN:
-            a `ValueError` that names step and episode.
+            If the environment gives an observation or a reward that cannot be learned, such as NaN
+            or one with which a weight would leave its range: a `ValueError` that names step and
+            episode.
         RuntimeError
             If an error left a step of this training half done before.
         """
@@ -528,7 +529,7 @@ class Training:
                 Transition(episode.observation, episode.actions[-1], reward, following, terminated),
                 environment=i,
             )
-        except ValueError as error:
+        except (ValueError, OverflowError) as error:
             raise self._unusable(error, i, episode) from error
         episode.observation, episode.outcome = following, None
         episode.sum_of_rewards += reward
