@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import random
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ _RARE = 20
 """One in so many observations is left out at each end, where ranges are asked for that are seen."""
 
 _NOTED_EVERY = 8
-"""One in so many observations is noted, to tell how ranges are used."""
+"""One in so many observations is noted in the mean, to tell how ranges are used."""
 
 _MOST_NOTED = 256
 _MOST_NOTED_VALUES = 2**20
@@ -146,7 +147,8 @@ class UnitObservations:
         self._converted: tuple[tuple[Any, NDArray[np.float64]], ...] = ((None, np.empty(0)),) * 2
         n_noted = max(_RARE, min(_MOST_NOTED, _MOST_NOTED_VALUES // self.n_variables))
         self._noted: deque[NDArray[np.float64]] = deque(maxlen=n_noted)
-        self._n_until_noted = _NOTED_EVERY
+        self._gaps = random.Random(0)
+        self._n_until_noted = self._gap()
         if not self._finds_pairs and not self._unknown().any():
             self._settled()
 
@@ -203,14 +205,18 @@ class UnitObservations:
         self._converted = (self._converted[1], (key, state))
         self._n_until_noted -= 1
         if not self._n_until_noted:
-            self._n_until_noted = _NOTED_EVERY
+            self._n_until_noted = self._gap()
             self._noted.append(flat.copy())  # may be the caller's
         return state
+
+    def _gap(self) -> int:
+        """Draw how many observations until one is noted: even gaps meet episodes in step."""
+        return self._gaps.randint(1, 2 * _NOTED_EVERY - 1)
 
     def range_use(self) -> list[RangeUse | None]:
         """Tell of each variable how it used its range in the last 2,048 observations or so.
 
-        None for parts of angles and symbols, and for all before there were 160 observations.
+        None for parts of angles and symbols, and for all before there were about 160 observations.
         """
         use: list[RangeUse | None] = [None] * self.n_variables
         if len(self._noted) < _RARE:

@@ -368,8 +368,8 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
             ``share_beyond_range``: for each observed variable the part of its range in which it was
             for nine tenths of the last 2,048 observations or so (a small one: ranges are too wide,
             the network hardly tells values apart), and how often it was outside (a large one: too
-            narrow); None for angles and symbols, and until there are 160 observations since the
-            agent was made or loaded.
+            narrow); None for angles and symbols, and until there are about 160 observations since
+            the agent was made or loaded.
 
         Raises
         ------

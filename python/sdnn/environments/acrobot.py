@@ -10,9 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.arguments import choice, one_of, real
+from sdnn.environments.acrobot_motion import AcrobotMotion
 from sdnn.environments.config import AcrobotConfig
 
 if TYPE_CHECKING:
+    from gymnasium.core import RenderFrame
+
     from sdnn.environments.acrobot_picture import AcrobotPicture
 
 __all__ = ["AcrobotSwingUpEnv"]
@@ -111,7 +114,9 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
 
     - `config`: an `AcrobotConfig`, all the numbers above;
     - `goal_tolerance`: the factor of the goal's speed limits, >= 0;
-    - `render_mode`: `"rgb_array"`, `"human"` or None (needs pygame-ce);
+    - `render_mode`: `"human"`, a window in real time; `"rgb_array"`, a picture at each decision;
+      `"rgb_array_list"`, all pictures since the last `render()`, 25 a second; or None. Pictures
+      need pygame-ce;
     - `dtype`: `"float32"`, or `"float64"` for actions and observations without rounding: then a
       loop in Python meets the compiled trial bit for bit.
 
@@ -157,7 +162,7 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
-        "render_modes": ["human", "rgb_array"],
+        "render_modes": ["human", "rgb_array", "rgb_array_list"],
         "render_fps": 4,
     }
 
@@ -183,6 +188,11 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         self._torque = 0.0
         self._success = False
         self._picture: AcrobotPicture | None = None
+        self._pictures: list[RenderFrame] = []
+        self._motion: AcrobotMotion | None = None
+        if render_mode in ("human", "rgb_array_list"):
+            self._motion = AcrobotMotion(self.config)
+            self.metadata = {**self.metadata, "render_fps": round(1.0 / self._motion.interval)}
         self.action_space = gym.spaces.Box(-1.0, 1.0, (1,), self._dtype)
         self.observation_space = gym.spaces.Box(0.0, 1.0, (4,), self._dtype)
 
@@ -225,8 +235,9 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         self._torque = 0.0
         self._success = False
         self._acrobot.reset()
-        if self.render_mode == "human":
-            self.render()
+        self._pictures.clear()
+        if self._motion is not None:
+            self._show(self._acrobot.state(), self._acrobot.tip_height())
         return self._observation(), self._info()
 
     def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
@@ -250,10 +261,14 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         if share.size != 1 or not abs(share.item()) <= 1.0:
             raise ValueError(f"action must be one number in [-1, 1], got {action!r}")
         self._torque = self.config.max_torque * share.item()
+        before = self._acrobot.state()
         reward, terminated, truncated = self._acrobot.step(self._torque, self._tolerance)
+        if self._motion is not None:
+            for state, height in self._motion.between(before, self._torque, self._tolerance):
+                self._show(state, height)
         self._success = terminated
-        if self.render_mode == "human":
-            self.render()
+        if self._motion is not None:
+            self._show(self._acrobot.state(), self._acrobot.tip_height())
         return self._observation(), reward, terminated, truncated, self._info()
 
     @property
@@ -261,21 +276,39 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         """The true state: theta1, theta2 in [-pi, pi), their speeds in rad/s, shape (4,)."""
         return self._acrobot.state()
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """Draw the present state: shape (500, 500, 3) for ``"rgb_array"``, else None."""
+    def render(self) -> RenderFrame | list[RenderFrame] | None:
+        """Draw the present state.
+
+        Returns
+        -------
+        ndarray, shape (500, 500, 3), or list of these, or None
+            With ``"rgb_array"`` one, with ``"rgb_array_list"`` those of all states since the last
+            call, a ``"render_fps"``-th second apart, else none.
+        """
         if self.render_mode is None:
-            gym.logger.warn("render() needs a render_mode: 'rgb_array' or 'human'")
+            gym.logger.warn("render() needs a render_mode: 'human', 'rgb_array', 'rgb_array_list'")
             return None
+        if self.render_mode == "rgb_array_list":
+            pictures, self._pictures = self._pictures, []
+            return pictures
+        return self._draw(self._acrobot.state(), self._acrobot.tip_height())
+
+    def _show(self, state: NDArray[np.float64], tip_height: float) -> None:
+        picture = self._draw(state, tip_height)
+        if picture is not None:
+            self._pictures.append(picture)
+
+    def _draw(self, state: NDArray[np.float64], tip_height: float) -> NDArray[np.uint8] | None:
         if self._picture is None:
             from sdnn.environments.acrobot_picture import AcrobotPicture
 
             window_fps = self.metadata["render_fps"] if self.render_mode == "human" else None
             self._picture = AcrobotPicture(self.config, window_fps)
         return self._picture.draw(
-            state=self._acrobot.state(),
+            state=state,
             torque=self._torque,
             decision=self._acrobot.decisions(),
-            tip_height=self._acrobot.tip_height(),
+            tip_height=tip_height,
             solved=self._success,
         )
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sdnn.agents import Agent, UnusableStepError
 from sdnn.agents.evaluation import greedy_episode
+from sdnn.runs.environment import RunEnvironment
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
 from sdnn.whole_files import whole_file, write_whole
@@ -40,7 +41,7 @@ class Recording:
     agent
         What acts.
     env
-        With the render mode ``"rgb_array"``.
+        With the render mode ``"rgb_array"`` or ``"rgb_array_list"``.
     seed
         Root of the episodes' seeds.
     max_steps
@@ -49,7 +50,7 @@ class Recording:
     Attributes
     ----------
     n_frames
-        So far: one more than steps.
+        So far: with ``"rgb_array"`` one more than steps.
     total_reward
         So far.
     """
@@ -78,27 +79,32 @@ class Recording:
         """
         for now in greedy_episode(self._agent, self._env, self._seed, 0):
             self.total_reward = now.total_reward
-            yield self._frame()
+            yield from self._frames()
             if now.n_steps == self._max_steps:
                 break
 
-    def _frame(self) -> NDArray[np.uint8]:
+    def _frames(self) -> Iterator[NDArray[np.uint8]]:
         try:
-            frame = np.asarray(self._env.render())
+            rendered: Any = self._env.render()
         except gym.error.DependencyNotInstalled as error:
             raise RunError(f"pictures of this environment need more: {error}") from error
-        if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8:
-            raise RunError(
-                f"render() must give a picture of red, green and blue, got {frame!r:.80}"
-            )
-        self.n_frames += 1
-        return frame
+        for one in rendered if isinstance(rendered, list) else [rendered]:
+            frame = np.asarray(one)
+            if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8:
+                raise RunError(
+                    f"render() must give a picture of red, green and blue, got {frame!r:.80}"
+                )
+            self.n_frames += 1
+            yield frame
 
 
 def record(
     run: Run, path: Path, *, seed: int | None = None, max_steps: int | None = None
 ) -> Recording:
     """Record a greedy episode of a run's agent as it is now.
+
+    With what environments show between steps, where they have the render mode
+    ``"rgb_array_list"`` themselves.
 
     Parameters
     ----------
@@ -127,7 +133,7 @@ def record(
     agent = run.agent()
     root = run.fresh_seed if seed is None else seed
     environment = run.config.environment
-    with closing(environment.make("evaluation_sensor_noise", render_mode="rgb_array")) as env:
+    with closing(_filmed(environment)) as env:
         run.check_spaces(agent, env)
         recording = Recording(agent, env, root, max_steps)
         rate = float(env.metadata.get("render_fps") or FRAMES_PER_SECOND)
@@ -140,19 +146,35 @@ def record(
     return recording
 
 
+def _filmed(environment: RunEnvironment) -> gym.Env[Any, Any]:
+    env = environment.make("evaluation_sensor_noise", render_mode="rgb_array")
+    if "rgb_array_list" not in env.metadata["render_modes"]:
+        return env
+    env.close()
+    return environment.make("evaluation_sensor_noise", render_mode="rgb_array_list")
+
+
 def _write_gif(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> None:
     from PIL import Image
 
-    # Few colors each: an hour's frames in full color would fill the memory.
-    pictures = (Image.fromarray(frame).quantize(128) for frame in frames)
-    first = next(pictures)
+    shown = min(rate, _FASTEST_GIF)
+
+    def pictures() -> Iterator[Image.Image]:
+        for frame in frames:
+            # Few colors each: an hour's frames in full color would fill the memory.
+            picture = Image.fromarray(frame).quantize(128)
+            yield picture
+        yield from [picture] * round(shown)  # the end stays for a second before it begins anew
+
+    all_pictures = pictures()
+    first = next(all_pictures)
     content = BytesIO()
     first.save(
         content,
         format="GIF",
         save_all=True,
-        append_images=pictures,
-        duration=round(1000 / min(rate, _FASTEST_GIF)),
+        append_images=all_pictures,
+        duration=round(1000 / shown),
         loop=0,
     )
     write_whole(path, content.getvalue())

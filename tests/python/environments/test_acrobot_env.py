@@ -2,33 +2,46 @@
 
 import doctest
 import importlib
+import itertools
 import re
 import subprocess
 import sys
 import warnings
+from typing import ClassVar
 
 import gymnasium as gym
 import numpy as np
+import pygame
 import pytest
 from gymnasium.utils.env_checker import check_env
 
 from sdnn import _core
 from sdnn.environments import AcrobotConfig, AcrobotSwingUpEnv
+from sdnn.environments.acrobot_motion import AcrobotMotion
 
 ID = "sdnn/AcrobotSwingUp-v0"
+
+
+class Impatient:
+    """A clock that only counts."""
+
+    ticks: ClassVar[list[float]] = []
+
+    def tick(self, rate):
+        self.ticks.append(rate)
 
 
 @pytest.fixture(autouse=True)
 def no_screen(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    monkeypatch.setitem(AcrobotSwingUpEnv.metadata, "render_fps", 1000)  # no waiting
+    monkeypatch.setattr(pygame.time, "Clock", Impatient)
 
 
 def shares(n, seed=0):
     return np.random.default_rng(seed).uniform(-1.0, 1.0, n)
 
 
-@pytest.mark.parametrize("render_mode", [None, "rgb_array", "human"])
+@pytest.mark.parametrize("render_mode", [None, "rgb_array", "rgb_array_list", "human"])
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 def test_check_env(render_mode, dtype):
     env = gym.make(f"sdnn:{ID}", render_mode=render_mode, dtype=dtype)
@@ -220,12 +233,92 @@ def test_renders_what_happens():
     env.close()
 
 
-def test_human_mode_draws_by_itself_and_returns_nothing():
+def test_human_mode_draws_by_itself_in_real_time_and_returns_nothing(monkeypatch):
+    monkeypatch.setattr(Impatient, "ticks", [])
     env = AcrobotSwingUpEnv(render_mode="human")
     env.reset()
     env.step([1.0])
+    assert Impatient.ticks == 26 * [25]
     assert env.render() is None
     env.close()
+
+
+def test_a_list_of_pictures_has_the_movement_between_decisions():
+    whole, parts = AcrobotSwingUpEnv(render_mode="rgb_array"), []
+    env = AcrobotSwingUpEnv(render_mode="rgb_array_list")
+    assert env.metadata["render_fps"] == 25
+    assert whole.metadata["render_fps"] == 4
+    for one in (whole, env):
+        one.reset()
+    for torque in (1.0, -1.0):
+        parts += env.render()
+        np.testing.assert_array_equal(parts[-1], whole.render())
+        assert env.render() == []
+        for one in (whole, env):
+            one.step([torque])
+    parts += env.render()
+    assert len(parts) == 51
+    steps = [(a != b).any(axis=2).mean() for a, b in itertools.pairwise(parts)]
+    assert min(steps) > 0.0  # every picture differs from the one before
+    env.step([0.0])
+    env.reset()
+    (hanging,) = env.render()
+    np.testing.assert_array_equal(hanging, parts[0])
+    env.close()
+    whole.close()
+
+
+def test_a_list_of_pictures_ends_with_the_goal():
+    env = AcrobotSwingUpEnv(render_mode="rgb_array_list", goal_tolerance=1e6)
+    rng = np.random.default_rng(0)
+    env.reset()
+    terminated = False
+    while not terminated:
+        env.render()
+        _, _, terminated, truncated, info = env.step([rng.uniform(-1.0, 1.0)])
+        if truncated:
+            env.reset()
+    pictures = env.render()
+    assert info["is_success"]
+    assert 1 <= len(pictures) <= 25
+
+    def is_green(picture):  # the tip, the line and the words
+        red, green, blue = np.moveaxis(picture.astype(int), 2, 0)
+        return ((green > red + 40) & (green > blue + 20)).sum()
+
+    assert is_green(pictures[-1]) > 1.2 * is_green(pictures[0])
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("interval", "step", "n_pictures", "rate"),
+    [(1.0, 0.02, 25, 25), (0.5, 0.02, 25, 50), (0.5, 0.05, 10, 20), (0.02, 0.02, 1, 50)],
+)
+def test_pictures_divide_the_decision_interval(interval, step, n_pictures, rate):
+    config = AcrobotConfig(decision_interval=interval, integration_step=step)
+    env = AcrobotSwingUpEnv(config=config, render_mode="rgb_array_list")
+    env.reset()
+    env.render()
+    env.step([1.0])
+    assert len(env.render()) == n_pictures
+    assert env.metadata["render_fps"] == rate
+    env.close()
+
+
+def test_states_between_decisions_are_on_the_way_of_the_acrobot():
+    config = AcrobotConfig()
+    acrobot = _core.Acrobot(config.to_core())
+    acrobot.step(3.0, 0.0)
+    before = acrobot.state()
+    states = [state for state, _ in AcrobotMotion(config).between(before, -7.0, 0.0)]
+    acrobot.step(-7.0, 0.0)
+    short = _core.Acrobot(AcrobotConfig(decision_interval=0.04, max_decisions=99).to_core())
+    short.set_state(before)
+    for state in states:
+        short.step(-7.0, 0.0)
+        np.testing.assert_array_equal(state, short.state())
+    short.step(-7.0, 0.0)
+    np.testing.assert_allclose(short.state(), acrobot.state(), rtol=1e-9)
 
 
 def test_render_without_a_mode_warns():

@@ -38,7 +38,8 @@ def test_gif_has_a_frame_per_state(run, tmp_path):
         for number in range(picture.n_frames):
             picture.seek(number)
             durations += picture.info["duration"]
-        assert durations == 100 * recording.n_frames  # equal neighbours are one, shown longer
+        # Equal neighbours are one that is shown longer, the last one for a second more.
+        assert durations == 100 * recording.n_frames + 1000
         picture.seek(0)
         first = np.asarray(picture.convert("RGB"))
     env = gym.make("tests/Drifting-v0", render_mode="rgb_array")
@@ -59,6 +60,19 @@ def test_mp4_has_even_sides_and_all_frames(run, tmp_path):
     assert "10 fps" in done.stderr
     assert re.findall(r"frame= *(\d+)", done.stderr)[-1] == str(recording.n_frames)
     assert [path.name for path in tmp_path.iterdir()] == ["x.mp4"]
+
+
+def test_what_moves_between_decisions_is_filmed(tmp_path):
+    config = RunConfig(
+        environment=RunEnvironment(id="sdnn/AcrobotSwingUp-v0"), agent="rbf", steps=60
+    )
+    run = Run.create(tmp_path / "run", config)
+    run.train()
+    recording = record(run, tmp_path / "x.gif", max_steps=2)
+    assert recording.n_frames == 51
+    with Image.open(tmp_path / "x.gif") as picture:
+        assert picture.n_frames == 51
+        assert picture.info["duration"] == 40
 
 
 @pytest.mark.parametrize(("suffix", "package"), [("gif", "Pillow"), ("mp4", "imageio-ffmpeg")])
