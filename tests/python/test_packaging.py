@@ -184,7 +184,7 @@ SHIPPED = (
     r"python/sdnn/([a-z_]+/){0,2}[a-z_]+\.pyi?|python/sdnn/py\.typed",
     r"python/sdnn/experiments/(sweep/)?[a-z]+\.html\.jinja",
     r"python/sdnn/agents/c_header\.template",
-    r"(tests|bench|docs)/.*\.(py|c|cpp|hpp|txt|md|json|csv|png|svg|toml|ipynb|bin|safetensors)",
+    r"(tests|bench|docs)/.*\.(py|c|cpp|hpp|txt|md|json|csv|png|gif|svg|toml|ipynb|bin|safetensors)",
 )
 """Every file of a source distribution matches one of these."""
 
