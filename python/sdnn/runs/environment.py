@@ -18,7 +18,7 @@ from sdnn.bounds import flat_bounds
 from sdnn.environments import NoisySensors, RedundantSensors, UnitSensors
 from sdnn.runs.errors import ConfigError, RunError, problem_of
 
-__all__ = ["ALL", "Ends", "MeanOfNeighbours", "RunEnvironment"]
+__all__ = ["ALL", "Ends", "MeanOfNeighbours", "RunEnvironment", "render_modes"]
 
 ALL = "all"
 """The key of the range of all variables that have no other."""
@@ -255,6 +255,11 @@ class RunEnvironment:
             raise ConfigError(
                 key, f"{self.id} cannot be made: {type(error).__name__}: {error}"
             ) from error
+
+
+def render_modes(env: gym.Env[Any, Any]) -> tuple[str, ...]:
+    """Give the render modes that an environment says it has; none where it says nothing."""
+    return tuple((env.metadata or {}).get("render_modes") or ())
 
 
 def _no_pictures(name: str, render_mode: str) -> str:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sdnn.agents import Agent, UnusableStepError
 from sdnn.agents.evaluation import greedy_episode
-from sdnn.runs.environment import RunEnvironment
+from sdnn.runs.environment import RunEnvironment, render_modes
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
 from sdnn.whole_files import whole_file, write_whole
@@ -136,7 +136,7 @@ def record(
     with closing(_filmed(environment)) as env:
         run.check_spaces(agent, env)
         recording = Recording(agent, env, root, max_steps)
-        rate = float(env.metadata.get("render_fps") or FRAMES_PER_SECOND)
+        rate = float((env.metadata or {}).get("render_fps") or FRAMES_PER_SECOND)
         path.parent.mkdir(parents=True, exist_ok=True)
         write = _write_gif if path.suffix == ".gif" else _write_mp4
         try:
@@ -148,7 +148,7 @@ def record(
 
 def _filmed(environment: RunEnvironment) -> gym.Env[Any, Any]:
     env = environment.make("evaluation_sensor_noise", render_mode="rgb_array")
-    if "rgb_array_list" not in env.metadata["render_modes"]:
+    if "rgb_array_list" not in render_modes(env):
         return env
     env.close()
     return environment.make("evaluation_sensor_noise", render_mode="rgb_array_list")

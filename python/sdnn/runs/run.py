@@ -33,6 +33,7 @@ from sdnn.agents.training import Row
 from sdnn.arguments import whole
 from sdnn.interrupts import Interrupts
 from sdnn.runs.config import RunConfig, read_json
+from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line, problem_of
 from sdnn.whole_files import remove_abandoned_files, write_whole
 
@@ -285,7 +286,7 @@ class Run:
             last_evaluation=_last_row(self.rows(), "evaluation"),
             learning_report=_report(agent),
             is_warming_up=agent.is_warming_up,
-            has_pictures=_has_pictures(evaluation_env),
+            has_pictures="rgb_array" in render_modes(evaluation_env),
         )
 
     def agent(self) -> Agent[Any, Any]:
@@ -489,10 +490,6 @@ def _report(agent: object) -> Mapping[str, Any] | None:
     if not isinstance(agent, SDNNQLearning) or agent.is_warming_up:
         return None
     return agent.learning_report()
-
-
-def _has_pictures(env: gym.Env[Any, Any]) -> bool:
-    return "rgb_array" in ((env.metadata or {}).get("render_modes") or ())
 
 
 def _is_row(row: Any) -> bool:

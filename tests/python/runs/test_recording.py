@@ -62,6 +62,13 @@ def test_mp4_has_even_sides_and_all_frames(run, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["x.mp4"]
 
 
+@pytest.mark.filterwarnings("ignore:.*render_modes")
+def test_an_environment_need_not_say_how_it_is_rendered(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(drifting_env.DriftingEnv, "metadata", {})
+    assert record(run, tmp_path / "x.gif", max_steps=3).n_frames == 4
+    assert run.train(steps=101).has_pictures is False
+
+
 def test_what_moves_between_decisions_is_filmed(tmp_path):
     config = RunConfig(
         environment=RunEnvironment(id="sdnn/AcrobotSwingUp-v0"), agent="rbf", steps=60
