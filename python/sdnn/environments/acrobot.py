@@ -237,7 +237,7 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         self._acrobot.reset()
         self._pictures.clear()
         if self._motion is not None:
-            self._show(self._acrobot.state(), self._acrobot.tip_height())
+            self._show(self._draw_present())
         return self._observation(), self._info()
 
     def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
@@ -263,12 +263,11 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         self._torque = self.config.max_torque * share.item()
         before = self._acrobot.state()
         reward, terminated, truncated = self._acrobot.step(self._torque, self._tolerance)
-        if self._motion is not None:
-            for state, height in self._motion.between(before, self._torque, self._tolerance):
-                self._show(state, height)
         self._success = terminated
         if self._motion is not None:
-            self._show(self._acrobot.state(), self._acrobot.tip_height())
+            for state, height in self._motion.between(before, self._torque, self._tolerance):
+                self._show(self._draw(state, height, solved=False))
+            self._show(self._draw_present())
         return self._observation(), reward, terminated, truncated, self._info()
 
     @property
@@ -291,14 +290,19 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         if self.render_mode == "rgb_array_list":
             pictures, self._pictures = self._pictures, []
             return pictures
-        return self._draw(self._acrobot.state(), self._acrobot.tip_height())
+        return self._draw_present()
 
-    def _show(self, state: NDArray[np.float64], tip_height: float) -> None:
-        picture = self._draw(state, tip_height)
+    def _show(self, picture: NDArray[np.uint8] | None) -> None:
+        """Keep a picture for `render`; in a window it is seen already."""
         if picture is not None:
             self._pictures.append(picture)
 
-    def _draw(self, state: NDArray[np.float64], tip_height: float) -> NDArray[np.uint8] | None:
+    def _draw_present(self) -> NDArray[np.uint8] | None:
+        return self._draw(self._acrobot.state(), self._acrobot.tip_height(), self._success)
+
+    def _draw(
+        self, state: NDArray[np.float64], tip_height: float, solved: bool
+    ) -> NDArray[np.uint8] | None:
         if self._picture is None:
             from sdnn.environments.acrobot_picture import AcrobotPicture
 
@@ -309,7 +313,7 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
             torque=self._torque,
             decision=self._acrobot.decisions(),
             tip_height=tip_height,
-            solved=self._success,
+            solved=solved,
         )
 
     def close(self) -> None:

@@ -82,6 +82,8 @@ class Recording:
             yield from self._frames()
             if now.n_steps == self._max_steps:
                 break
+        if self.n_frames == 0:
+            raise RunError("render() must give pictures, got none")
 
     def _frames(self) -> Iterator[NDArray[np.uint8]]:
         try:
