@@ -13,10 +13,16 @@ from io import StringIO
 from itertools import count
 from pathlib import Path
 
+try:
+    import fcntl
+except ImportError:  # not on this system
+    fcntl = None  # type: ignore[assignment]
+
 PARTIAL_SUFFIX = ".partial"
 """Of a file under way."""
 
 _ABANDONED_SECONDS = 60
+"""After which a file under way is nobody's, where files cannot be locked."""
 _numbers = count()
 
 _PIECE_CHARACTERS = 2**20
@@ -47,10 +53,11 @@ def whole_file(path: Path) -> Iterator[Path]:
     path = Path(os.path.realpath(path)) if path.is_symlink() else path
     partial = path.with_name(f"{path.name}.{os.getpid()}.{next(_numbers)}{PARTIAL_SUFFIX}")
     try:
-        yield partial
-        with partial.open("rb+") as file:
-            os.fsync(file.fileno())
-        partial.replace(path)
+        with _held(partial):
+            yield partial
+            with partial.open("rb+") as file:
+                os.fsync(file.fileno())
+            partial.replace(path)
         _sync_folder(path.parent)
     finally:
         partial.unlink(missing_ok=True)
@@ -73,6 +80,44 @@ def write_whole(path: Path, content: bytes | Iterable[bytes]) -> None:
     """
     with whole_file(path) as partial, partial.open("wb") as file:
         file.writelines([content] if isinstance(content, bytes) else content)
+
+
+def lock(descriptor: int) -> bool | None:
+    """Lock an open file for this process alone; the lock of a killed process is gone with it.
+
+    Returns
+    -------
+    bool or None
+        Whether the file is locked now: False if another process holds it, None where files cannot
+        be locked.
+    """
+    if fcntl is None:
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # not in this folder
+        return None
+    return True
+
+
+@contextmanager
+def _held(partial: Path) -> Iterator[None]:
+    """Make a file under way and keep it locked, so that nobody takes it for an abandoned one."""
+    if fcntl is None:  # where, too, an open file cannot be given another name
+        yield
+        return
+    while True:
+        descriptor = os.open(partial, os.O_RDWR | os.O_CREAT, 0o666)
+        # Between these two lines another process may have removed it.
+        if lock(descriptor) is not False and partial.exists():
+            break
+        os.close(descriptor)
+    try:
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def _sync_folder(folder: Path) -> None:
@@ -120,8 +165,13 @@ def gzip_pieces(pieces: Iterable[bytes]) -> Iterator[bytes]:
 
 
 def remove_abandoned_files(folder: Path) -> None:
-    """Remove what killed processes left under way in a folder, a minute after they last wrote."""
+    """Remove what killed processes left under way in a folder."""
     for path in filter(_is_partial, folder.glob(f"*{PARTIAL_SUFFIX}")):
         with suppress(OSError):  # another process may have removed it, or given it its own name
-            if time.time() - path.stat().st_mtime > _ABANDONED_SECONDS:
+            with path.open("rb+") as file:
+                is_abandoned = lock(file.fileno())
+                if is_abandoned:
+                    path.unlink()
+            age = time.time() - path.stat().st_mtime if is_abandoned is None else 0.0
+            if age > _ABANDONED_SECONDS:
                 path.unlink()

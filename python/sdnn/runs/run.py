@@ -35,7 +35,7 @@ from sdnn.interrupts import Interrupts
 from sdnn.runs.config import RunConfig, read_json
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line, problem_of
-from sdnn.whole_files import remove_abandoned_files, write_whole
+from sdnn.whole_files import lock, remove_abandoned_files, write_whole
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -470,17 +470,10 @@ class Run:
     @contextmanager
     def _locked(self) -> Iterator[None]:
         """Keep other processes from training the same run; a killed one's lock is gone with it."""
-        try:
-            import fcntl
-        except ImportError:  # not on this system
-            yield
-            return
         file = os.open(self.folder / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
         try:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                raise RunError(f"{self.folder} is being trained by another process") from error
+            if lock(file) is False:
+                raise RunError(f"{self.folder} is being trained by another process")
             yield
         finally:
             os.close(file)

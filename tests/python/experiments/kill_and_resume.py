@@ -143,7 +143,10 @@ def kill_and_resume(arguments: list[str], n_kills: int, seed: int) -> str:
                 print(f"\rkilled {killed.total()} times", end="", file=sys.stderr, flush=True)
             found = content(folder)
             for name, value in expected.items():
-                assert found[name] == value, f"{name} of {folder.name} differ after kills"
+                assert found[name] == value, (
+                    f"{name} of {folder.name} differ after kills: {found[name]!r:.2000} instead of"
+                    f" {value!r:.2000}"
+                )
     print(file=sys.stderr)
     ways = ", ".join(f"{way} {number}" for way, number in sorted(killed.items()))
     return (

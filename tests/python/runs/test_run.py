@@ -225,9 +225,8 @@ def test_two_processes_do_not_train_one_run(tmp_path, monkeypatch):
     with run._locked(), pytest.raises(RunError, match="trained by another process"):
         run.train()
     assert run.train(steps=20).n_steps == 20
-    monkeypatch.setattr("fcntl.flock", _no_locks)
-    with pytest.raises(OSError, match="No locks available"):
-        run.train()
+    monkeypatch.setattr("fcntl.flock", _no_locks)  # as in some folders of networks
+    assert run.train(steps=40).n_steps == 40
 
 
 def test_agents_and_evaluations(whole):
