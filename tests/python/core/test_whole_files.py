@@ -1,11 +1,14 @@
 import gzip
 import os
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
 
 import pytest
 
+from sdnn import whole_files
 from sdnn.whole_files import (
     PARTIAL_SUFFIX,
     csv_bytes,
@@ -14,6 +17,21 @@ from sdnn.whole_files import (
     remove_abandoned_files,
     write_whole,
 )
+
+WRITE_SLOWLY = """
+import sys, time
+from pathlib import Path
+from sdnn.whole_files import whole_file
+
+with whole_file(Path(sys.argv[1])) as partial:
+    partial.write_bytes(b"half")
+    print("half", flush=True)
+    time.sleep(600)
+"""
+
+
+def under_way(folder: Path) -> list[Path]:
+    return sorted(folder.glob(f"*{PARTIAL_SUFFIX}"))
 
 
 def test_a_file_is_written_as_a_whole(tmp_path):
@@ -34,17 +52,53 @@ def test_a_file_that_cannot_be_written_stays_as_it_was(tmp_path):
         write_whole(tmp_path / "no" / "folder", b"")
 
 
-def test_what_a_kill_left_is_removed_and_nothing_else(tmp_path):
-    left = tmp_path / f"results.csv.1.0{PARTIAL_SUFFIX}"
-    left.write_bytes(b"half")
-    (tmp_path / f"results.csv.2.0{PARTIAL_SUFFIX}").write_bytes(b"another process is writing")
-    mine = [tmp_path / "mine.txt", tmp_path / f"mine{PARTIAL_SUFFIX}"]
-    long_ago = time.time() - 3600
-    for path in (left, *mine):
-        path.write_bytes(b"old")
-        os.utime(path, (long_ago, long_ago))
+def test_only_what_a_killed_process_left_is_removed(tmp_path):
+    write_whole(tmp_path / "rows.csv", b"old")
+    foreign = tmp_path / f"notes{PARTIAL_SUFFIX}"  # whose name we never gave
+    foreign.write_bytes(b"mine")
+    command = [sys.executable, "-c", WRITE_SLOWLY, str(tmp_path / "rows.csv")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+        try:
+            assert process.stdout.readline() == b"half\n"
+            found = under_way(tmp_path)
+            assert len(found) == 2
+            remove_abandoned_files(tmp_path)
+            assert under_way(tmp_path) == found
+        finally:
+            process.kill()
     remove_abandoned_files(tmp_path)
-    assert set(tmp_path.iterdir()) == {tmp_path / f"results.csv.2.0{PARTIAL_SUFFIX}", *mine}
+    assert under_way(tmp_path) == [foreign]
+    assert (tmp_path / "rows.csv").read_bytes() == b"old"
+
+
+@pytest.mark.parametrize(("seconds", "stays"), [(0, True), (3600, False)])
+def test_where_files_cannot_be_locked_their_age_counts(tmp_path, monkeypatch, seconds, stays):
+    monkeypatch.setattr(whole_files, "fcntl", None)
+    left = tmp_path / f"rows.csv.1.0{PARTIAL_SUFFIX}"
+    mine = [tmp_path / "mine.txt", tmp_path / f"mine{PARTIAL_SUFFIX}"]
+    for path in (left, *mine):
+        path.write_bytes(b"half")
+        os.utime(path, (time.time() - seconds,) * 2)
+    remove_abandoned_files(tmp_path)
+    assert set(tmp_path.iterdir()) == {*mine, *([left] if stays else [])}
+    write_whole(tmp_path / "rows.csv", b"whole")
+    assert (tmp_path / "rows.csv").read_bytes() == b"whole"
+
+
+def test_a_file_removed_before_it_was_locked_is_made_again(tmp_path, monkeypatch):
+    locks = []
+
+    def removed_first(descriptor: int) -> bool:
+        if not locks:
+            for path in under_way(tmp_path):
+                path.unlink()
+        locks.append(descriptor)
+        return True
+
+    monkeypatch.setattr(whole_files, "lock", removed_first)
+    write_whole(tmp_path / "rows.csv", b"whole")
+    assert len(locks) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["rows.csv"]
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a system of POSIX")
