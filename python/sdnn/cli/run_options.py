@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -164,12 +165,30 @@ def run_command(
     except KeyboardInterrupt as error:
         _tell_how_to_resume("interrupted", folder)
         raise click.exceptions.Exit(EXIT_INTERRUPTED) from error
-    except (click.ClickException, click.exceptions.Exit, OSError):
+    except (click.ClickException, click.exceptions.Exit):
         raise
-    except Exception:  # of an environment, whose author needs all of it
-        if folder is not None and folder.exists():
-            _tell_how_to_resume("failed", folder)
+    except OSError as error:
+        if not _is_of_environment(error):
+            raise  # a file's of ours
+        _tell_failure(folder)
+        raise RuntimeError(f"the environment failed: {error}") from error
+    except Exception:
+        _tell_failure(folder)
         raise
+
+
+def _tell_failure(folder: Path | None) -> None:
+    """Of an environment, whose author needs all of the error, too."""
+    if folder is not None and folder.exists():
+        _tell_how_to_resume("failed", folder)
+
+
+def _is_of_environment(error: BaseException) -> bool:
+    """Whether a method of an environment was at work when it was raised."""
+    import gymnasium as gym
+
+    frames = traceback.walk_tb(error.__traceback__)
+    return any(isinstance(frame.f_locals.get("self"), gym.Env) for frame, _ in frames)
 
 
 def _tell_how_to_resume(what: str, folder: Path | None) -> None:

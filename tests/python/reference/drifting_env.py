@@ -1,5 +1,7 @@
 """An environment of one's own: two unbounded variables, chance of its own, one torque."""
 
+import builtins
+
 import gymnasium as gym
 import numpy as np
 
@@ -36,16 +38,16 @@ class DriftingEnv(gym.Env):
 class BrokenEnv(DriftingEnv):
     """Breaks at a step of its life: gives a reward that is none, or raises an error."""
 
-    def __init__(self, at=250, error="", render_mode=None):
+    def __init__(self, at=250, error="", kind="RuntimeError", render_mode=None):
         super().__init__(render_mode=render_mode)
-        self.at, self.error = at, error
+        self.at, self.error, self.kind = at, error, getattr(builtins, kind)
         self.n_steps = 0
 
     def step(self, action):
         self.n_steps += 1
         observation, reward, *ends = super().step(action)
         if self.n_steps == self.at and self.error:
-            raise RuntimeError(self.error)
+            raise self.kind(self.error)
         return observation, np.nan if self.n_steps == self.at else reward, *ends
 
 

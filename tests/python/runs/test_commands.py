@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import traceback
 from pathlib import Path
 
 import gymnasium as gym
@@ -567,12 +568,17 @@ def test_a_broken_evaluation_is_one_line(invoke, monkeypatch):
         assert f"Error: {BROKEN}: env gave what cannot be evaluated, in step 3 of" in result.stderr
 
 
-def test_an_environment_that_raises_is_told_as_it_is(invoke):
-    failing = ("--env-arg", "error=stalled", "--steps", 400, "--evaluate-every", 0, *SMALL)
-    arguments = [str(one) for one in ("train", BROKEN, *failing, "--out", "one run")]
+@pytest.mark.parametrize("kind", ["RuntimeError", "TimeoutError", "BrokenPipeError"])
+def test_an_environment_that_raises_is_told_as_it_is(invoke, kind):
+    failing = ("--env-arg", "error=stalled", "--env-arg", f"kind={kind}")
+    short = ("--steps", 400, "--evaluate-every", 0, *SMALL)
+    arguments = [str(one) for one in ("train", BROKEN, *failing, *short, "--out", "one run")]
     result = CliRunner().invoke(main, arguments)
     assert isinstance(result.exception, RuntimeError)
     assert result.stderr == "failed; sdnn resume 'one run' goes on\n"
+    error = result.exception.__cause__ or result.exception
+    assert type(error).__name__ == kind
+    assert traceback.extract_tb(error.__traceback__)[-1].filename.endswith("drifting_env.py")
 
 
 def test_what_cannot_be_printed_is_one_line(invoke, tmp_path):
