@@ -10,7 +10,7 @@ from sdnn.agents.presets import PRESETS, Preset
 from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.agents.q_learning_config import QLearningConfig
 from sdnn.agents.scaling import Scaling
-from sdnn.agents.training import Callback, Training, TrainingResult
+from sdnn.agents.training import Callback, Training, TrainingResult, UnrepeatedEpisodeError
 from sdnn.agents.transition import Transition, UnusableStepError
 
 __all__ = [
@@ -35,6 +35,7 @@ __all__ = [
     "Training",
     "TrainingResult",
     "Transition",
+    "UnrepeatedEpisodeError",
     "UnusableStepError",
     "c_header",
     "evaluate",

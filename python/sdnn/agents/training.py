@@ -24,18 +24,22 @@ from sdnn.agents.saved_training import (
 )
 from sdnn.agents.spaces import require_same_kind
 from sdnn.agents.transition import Transition, UnusableStepError, reward_of
-from sdnn.arguments import has_methods, path_of, whole
+from sdnn.arguments import flag, has_methods, path_of, whole
 from sdnn.interrupts import Interrupts
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["Callback", "Row", "Training", "TrainingResult"]
+__all__ = ["Callback", "Row", "Training", "TrainingResult", "UnrepeatedEpisodeError"]
 
 Row: TypeAlias = Mapping[str, Any]
 """What is known of an episode or an evaluation: numbers and words by name."""
 
 _LEARNING = 0
+
+
+class UnrepeatedEpisodeError(ValueError):
+    """An environment does not repeat the episode in which a training was saved."""
 
 
 class Callback:
@@ -142,7 +146,7 @@ class Training:
     number. A training can therefore go on exactly after `load`, from within an episode too: the
     episode is repeated from its reset with the actions that were taken, which gives the environment
     the state it had, whatever environment it is, as long as equal seeds and actions give equal
-    episodes.
+    episodes. Where they do not, new episodes can be begun instead.
 
     A *vector environment* is several environments in which one agent learns. In each round it
     chooses an action for each of them, in their order, all step together, and then it learns what
@@ -369,6 +373,7 @@ class Training:
         evaluation_env: gym.Env[Any, Any] | None = None,
         steps: int | None = None,
         episodes: int | None = None,
+        repeat_episodes: bool = True,
     ) -> Self:
         """Read a training that `save` wrote, to go on exactly where it was.
 
@@ -382,15 +387,23 @@ class Training:
             As in the constructor.
         steps, episodes
             Another goal; by default as it was.
+        repeat_episodes
+            False: what has begun is left, and new episodes begin. For robots, which should not
+            repeat what they did, and where equal seeds and actions do not give equal episodes. All
+            else goes on as it was, in any number of environments; the bits are no longer those of a
+            training that was not stopped.
 
         Raises
         ------
         OSError
             If the file cannot be read.
+        UnrepeatedEpisodeError
+            If the environment does not repeat the episode: a `ValueError`.
         ValueError
-            If it is damaged, holds no training, or the environment does not repeat the episode;
-            if the environment is a vector of another size, or cannot be reset one by one.
+            If it is damaged or holds no training; if episodes are to be repeated, and the
+            environment is a vector of another size, or cannot be reset one by one.
         """
+        does_repeat = flag("repeat_episodes", repeat_episodes)
         agent, saved = read_training(path_of("path", path))
         has_goal = steps is not None or episodes is not None
         training = cls(
@@ -407,6 +420,8 @@ class Training:
         training.n_steps, training.n_episodes = saved.n_steps, saved.n_episodes
         training.n_rows = saved.n_rows
         training.evaluations = [(int(step), mean) for step, mean in saved.evaluations.tolist()]
+        if not does_repeat:
+            return training
         if len(saved.present) != training.n_environments:
             raise ValueError(
                 f"env must have {len(saved.present)} environments, as the training had,"
@@ -457,7 +472,7 @@ class Training:
     def _check_repeated(self, episode: _Episode, observation: NDArray[np.float64]) -> None:
         found = self.agent.flat_observation(episode.last_observation)
         if not np.array_equal(found, observation):
-            raise ValueError(
+            raise UnrepeatedEpisodeError(
                 "env must repeat the episode in which the training was saved: the same seed and"
                 f" actions led to {found}, not to {observation}"
             )

@@ -21,14 +21,23 @@ from sdnn.cli.run_options import (
     "--steps", type=click.IntRange(min=1), help="A new goal: steps in all, whatever the target."
 )
 @click.option("--episodes", type=click.IntRange(min=1), help="The same in episodes.")
+@click.option(
+    "--new-episode", is_flag=True,
+    help="Begin a new episode instead of repeating the present one: for robots, and where"
+    " environments do not repeat themselves.",
+)  # fmt: skip
 @json_option
-def resume(folder: Path, steps: int | None, episodes: int | None, as_json: bool) -> None:
+def resume(
+    folder: Path, steps: int | None, episodes: int | None, new_episode: bool, as_json: bool
+) -> None:
     """Go on with RUN, a folder of `sdnn train`, from its last checkpoint.
 
-    It becomes what it would have been without the stop, bit for bit. A run that is done stays as it
-    is unless --steps or --episodes says more.
+    It becomes what it would have been without the stop, bit for bit: the episode in which it
+    stopped is repeated first, with the actions that were taken. A run that is done stays as it is
+    unless --steps or --episodes says more.
     """
     from sdnn.runs import Run
 
     with run_command(words_of_run(folder), folder=folder):
-        train_run(Run.open(folder), as_json, steps=steps, episodes=episodes)
+        run = Run.open(folder)
+        train_run(run, as_json, steps=steps, episodes=episodes, repeat_episodes=not new_episode)

@@ -199,7 +199,14 @@ def _tell_how_to_resume(what: str, folder: Path | None) -> None:
     click.echo(what + goes_on, err=True)
 
 
-def train_run(run: Run, as_json: bool, *, steps: int | None, episodes: int | None) -> None:
+def train_run(
+    run: Run,
+    as_json: bool,
+    *,
+    steps: int | None = None,
+    episodes: int | None = None,
+    repeat_episodes: bool = True,
+) -> None:
     """Train a run, with a line of progress on a terminal, and print what came of it."""
     callbacks = []
     if sys.stderr.isatty():
@@ -208,7 +215,9 @@ def train_run(run: Run, as_json: bool, *, steps: int | None, episodes: int | Non
         from sdnn.agents.progress import ProgressLine
 
         callbacks.append(ProgressLine(Console(stderr=True), run.config.environment.id))
-    outcome = run.train(steps=steps, episodes=episodes, callbacks=callbacks)
+    outcome = run.train(
+        steps=steps, episodes=episodes, callbacks=callbacks, repeat_episodes=repeat_episodes
+    )
     if as_json:
         click.echo(json_text({"folder": str(run.folder), **outcome_values(outcome)}))
         return

@@ -156,7 +156,7 @@ def train(
                 f"--out: {folder} holds a run already: {goes_on} goes on with it"
             )
         run = Run.create(folder, config)
-        train_run(run, as_json, steps=None, episodes=None)
+        train_run(run, as_json)
 
 
 def _config(

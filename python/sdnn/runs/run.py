@@ -24,6 +24,7 @@ from sdnn.agents import (
     SDNNQLearning,
     TensorBoard,
     Training,
+    UnrepeatedEpisodeError,
     UnusableStepError,
     evaluate,
     load_agent,
@@ -225,6 +226,7 @@ class Run:
         steps: int | None = None,
         episodes: int | None = None,
         callbacks: Iterable[Callback] = (),
+        repeat_episodes: bool = True,
     ) -> RunOutcome:
         """Learn until the goal is reached, from the beginning or where the run stopped.
 
@@ -235,6 +237,8 @@ class Run:
             default the goal is as it was.
         callbacks
             More of them.
+        repeat_episodes
+            See `sdnn.agents.Training.load`.
 
         Raises
         ------
@@ -255,7 +259,7 @@ class Run:
                 closing(environment.make("evaluation_sensor_noise"))
             )
             if steps is not None or episodes is not None:
-                self._set_goal(env, evaluation_env, steps, episodes)
+                self._set_goal(env, evaluation_env, steps, episodes, repeat_episodes)
             target = None
             if self.config.target_return is not None and not self.goals:
                 target = _Target(self.config.target_return)
@@ -264,7 +268,8 @@ class Run:
             own = [JSONLines(self.folder / ROWS), target, checkpoints, *callbacks]
             if self.config.tensorboard:
                 own.append(self._tensorboard())
-            training = self._training(env, evaluation_env, [one for one in own if one is not None])
+            told = [one for one in own if one is not None]
+            training = self._training(env, evaluation_env, told, repeat_episodes)
             began_at = training.n_steps
             try:
                 with Interrupts(training.stop, (signal.SIGTERM,)) as terminations:
@@ -378,7 +383,11 @@ class Run:
     # Parts.
 
     def _training(
-        self, env: TrainingEnv, evaluation_env: gym.Env[Any, Any], callbacks: list[Callback]
+        self,
+        env: TrainingEnv,
+        evaluation_env: gym.Env[Any, Any],
+        callbacks: list[Callback],
+        repeat_episodes: bool,
     ) -> Training:
         path = self.folder / CHECKPOINT
         if not path.exists():
@@ -395,7 +404,13 @@ class Run:
                 evaluation_episodes=self.config.evaluation_episodes,
             )
         try:
-            training = Training.load(path, env, callbacks=callbacks, evaluation_env=evaluation_env)
+            training = Training.load(
+                path, env, callbacks=callbacks, evaluation_env=evaluation_env,
+                repeat_episodes=repeat_episodes,
+            )  # fmt: skip
+        except UnrepeatedEpisodeError as error:
+            begins = command_line("sdnn", "resume", self.folder, "--new-episode")
+            raise RunError(f"{error}; {begins} begins a new one") from error
         except ValueError as error:
             raise RunError(str(error)) from error
         assert isinstance(training.agent, Agent)  # what load gives
@@ -420,11 +435,12 @@ class Run:
         evaluation_env: gym.Env[Any, Any],
         steps: int | None,
         episodes: int | None,
+        repeat_episodes: bool,
     ) -> None:
         """Note a new goal: in the checkpoint, which is followed, then in the configuration."""
         if steps is not None and episodes is not None:
             raise ConfigError("episodes", "must not be given together with steps")
-        training = self._training(env, evaluation_env, [])
+        training = self._training(env, evaluation_env, [], repeat_episodes)
         name, goal, done = (
             ("steps", steps, training.n_steps)
             if steps is not None

@@ -16,11 +16,15 @@ from sdnn.agents import (
     EarlyStop,
     FuzzyQLearning,
     JSONLines,
+    QLearningConfig,
     RBFQLearning,
     SDNNQLearning,
     Training,
+    Transition,
+    UnrepeatedEpisodeError,
     UnusableStepError,
     evaluate,
+    load_agent,
 )
 from sdnn.approximators import SDNNCConfig
 from stopped_training import Stop, states_equal
@@ -368,8 +372,66 @@ def test_a_training_goes_on_from_an_observation_that_is_infinite(tmp_path):
 def test_an_environment_that_does_not_repeat_itself_is_refused(tmp_path):
     env = Corridor(is_random=True)
     Training(corridor_agent(), env, steps=500, callbacks=[Stop(20, tmp_path / "t")]).run()
-    with pytest.raises(ValueError, match="env must repeat the episode"):
+    with pytest.raises(UnrepeatedEpisodeError, match="env must repeat the episode"):
         Training.load(tmp_path / "t", env)
+
+
+def test_new_episodes_begin_where_none_are_repeated(tmp_path):
+    env = Corridor(is_random=True)
+    first = corridor_agent()
+    path = tmp_path / "rows.jsonl"
+    callbacks = [JSONLines(path), Stop(20, tmp_path / "t")]
+    Training(first, env, steps=200, callbacks=callbacks).run()
+    new = Corridor(is_random=True)
+    training = Training.load(
+        tmp_path / "t", new, callbacks=[JSONLines(path)], repeat_episodes=False
+    )
+    assert new.seeds == [], "nothing happens in the environment before it goes on"
+    assert states_equal(training.agent, first)
+    assert training.n_steps == 20
+    assert training.run().n_steps == 200
+    assert new.seeds[0] == env.seeds[-1], "the episode that was left is the next one"
+    rows = [json.loads(line) for line in path.read_text().splitlines()]
+    assert [row["episode"] for row in rows] == list(range(training.n_episodes))
+    assert [row["step"] for row in rows] == sorted(row["step"] for row in rows)
+    unfinished = 20 - sum(row["length"] for row in rows if row["step"] <= 20)
+    assert unfinished > 0
+    learned = sum(row["length"] for row in rows)
+    assert rows[-1]["step"] == learned + unfinished, "the steps of what was left count"
+
+
+def test_between_episodes_nothing_is_repeated_anyway(tmp_path):
+    class StopBetween(Callback):
+        def on_row(self, training, row):
+            if row["episode"] == 5:
+                training.stop()
+
+    training = Training(corridor_agent(), Corridor(), steps=200, callbacks=[StopBetween()])
+    training.run()
+    training.save(tmp_path / "t")
+    one, other = (
+        Training.load(tmp_path / "t", Corridor(), repeat_episodes=does) for does in (True, False)
+    )
+    assert one.run().n_steps == other.run().n_steps == 200
+    assert states_equal(one.agent, other.agent)
+
+
+def test_what_waits_is_learned_when_a_new_episode_begins(tmp_path):
+    env = Corridor()
+    learning = QLearningConfig(n_steps=3)
+    Training(
+        corridor_agent(learning=learning), env, steps=200, callbacks=[Stop(20, tmp_path / "t")]
+    ).run()
+    with_training = Training.load(tmp_path / "t", Corridor(), steps=21, repeat_episodes=False)
+    with_training.run()
+    by_hand, at = load_agent(tmp_path / "t"), Corridor()
+    observation, _ = at.reset(seed=env.seeds[-1])
+    by_hand.begin_episode()
+    action = by_hand.act(observation)
+    following, reward, terminated, _, _ = at.step(action)
+    by_hand.learn(Transition(observation, action, reward, following, terminated))
+    by_hand.progress = 1.0
+    assert states_equal(with_training.agent, by_hand)
 
 
 def test_another_goal_goes_further(tmp_path):

@@ -437,6 +437,15 @@ def test_another_vector_is_refused(tmp_path):
     assert Training.load(tmp_path / "t", sync(1)).run().n_steps == 50
 
 
+def test_new_episodes_begin_in_any_number_of_environments(tmp_path):
+    Training(sdnn_agent(), sync(3), steps=50, callbacks=[Stop(20, tmp_path / "t")]).run()
+    for other in (sync(3), sync(2), sync(5), Walk(), Opaque(2, "NEXT_STEP")):
+        training = Training.load(tmp_path / "t", other, repeat_episodes=False)
+        assert training.n_steps == 20
+        assert training.run().n_steps == 50
+        assert training.agent.n_environments == training.n_environments
+
+
 @pytest.mark.parametrize("agent", [sdnn_agent(), fuzzy_agent(), sdnn_agent(Unbounded())])
 def test_impossible_environments_are_named(agent):
     agent.n_environments = 2

@@ -419,6 +419,7 @@ def arguments(agent, parameters):
         "every": 3,
         "mean_return": 5.0,
         "patience": 1,
+        "repeat_episodes": True,
     }
     return {name: good[name] for name in parameters}
 

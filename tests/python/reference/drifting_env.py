@@ -51,6 +51,17 @@ class BrokenEnv(DriftingEnv):
         return observation, np.nan if self.n_steps == self.at else reward, *ends
 
 
+class RestlessEnv(DriftingEnv):
+    """Drifts as it likes, whatever the seed, as a robot does; counts the steps of all of them."""
+
+    n_steps = 0
+
+    def step(self, action):
+        RestlessEnv.n_steps += 1
+        self.state += np.random.default_rng().normal(0.0, 0.1, 2)
+        return super().step(action)
+
+
 class UnseenEnv(gym.Env):
     """As in docs/agents.md: nothing is said about rendering."""
 
@@ -67,4 +78,5 @@ class UnseenEnv(gym.Env):
 
 gym.register("tests/Unseen-v0", entry_point=UnseenEnv, max_episode_steps=20)
 gym.register("tests/Drifting-v0", entry_point=DriftingEnv, max_episode_steps=40)
+gym.register("tests/Restless-v0", entry_point=RestlessEnv, max_episode_steps=40)
 gym.register("tests/Broken-v0", entry_point=BrokenEnv, max_episode_steps=40)

@@ -568,6 +568,21 @@ def test_a_broken_evaluation_is_one_line(invoke, monkeypatch):
         assert f"Error: {BROKEN}: env gave what cannot be evaluated, in step 3 of" in result.stderr
 
 
+def test_an_environment_that_does_not_repeat_itself_begins_a_new_episode(invoke):
+    restless = ("drifting_env:tests/Restless-v0", *SHORT, "--evaluate-every", 0)
+    assert invoke("train", *restless, "--steps", 70, "--out", "one run").exit_code == 0
+    result = invoke("resume", "one run", "--steps", 100)
+    assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
+    assert "env must repeat the episode" in result.stderr
+    assert "; sdnn resume 'one run' --new-episode begins a new one" in result.stderr
+    drifting_env.RestlessEnv.n_steps = 0
+    result = invoke("resume", "one run", "--steps", 100, "--new-episode")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert drifting_env.RestlessEnv.n_steps == 30, "what was done before is not done again"
+    rows = [json.loads(line) for line in Path("one run/rows.jsonl").read_text().splitlines()]
+    assert [row["episode"] for row in rows] == list(range(len(rows)))
+
+
 @pytest.mark.parametrize("kind", ["RuntimeError", "TimeoutError", "BrokenPipeError"])
 def test_an_environment_that_raises_is_told_as_it_is(invoke, kind):
     failing = ("--env-arg", "error=stalled", "--env-arg", f"kind={kind}")
