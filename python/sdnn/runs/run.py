@@ -215,7 +215,7 @@ class Run:
 
     def check(self) -> None:
         """Make all that is needed once, to see that it works; ConfigError if not."""
-        with closing(self.config.environment.make()) as env:
+        with closing(self.config.environment.make()) as env, self._evaluation_env():
             self.config.make_agent(env)
         if self.config.tensorboard:
             self._tensorboard()
@@ -255,9 +255,7 @@ class Run:
             remove_abandoned_files(self.folder)
             environment = self.config.environment
             env = stack.enter_context(closing(self.config.make_training_env()))
-            evaluation_env = stack.enter_context(
-                closing(environment.make("evaluation_sensor_noise"))
-            )
+            evaluation_env = stack.enter_context(self._evaluation_env())
             if steps is not None or episodes is not None:
                 self._set_goal(env, evaluation_env, steps, episodes, repeat_episodes)
             target = None
@@ -291,7 +289,7 @@ class Run:
             last_evaluation=_last_row(self.rows(), "evaluation"),
             learning_report=_report(agent),
             is_warming_up=agent.is_warming_up,
-            has_pictures="rgb_array" in render_modes(evaluation_env),
+            has_pictures="rgb_array" in render_modes(_one_of(env)),
         )
 
     def agent(self) -> Agent[Any, Any]:
@@ -382,10 +380,24 @@ class Run:
 
     # Parts.
 
+    @contextmanager
+    def _evaluation_env(self) -> Iterator[gym.Env[Any, Any] | None]:
+        """Make an environment for evaluations where there are any; there may be one robot only."""
+        if not self.config.evaluate_every:
+            yield None
+            return
+        try:
+            env = self.config.environment.make("evaluation_sensor_noise")
+        except ConfigError as error:
+            problem = f"needs a second environment, or must be 0: {error.problem}"
+            raise ConfigError("evaluate_every", problem) from error
+        with closing(env):
+            yield env
+
     def _training(
         self,
         env: TrainingEnv,
-        evaluation_env: gym.Env[Any, Any],
+        evaluation_env: gym.Env[Any, Any] | None,
         callbacks: list[Callback],
         repeat_episodes: bool,
     ) -> Training:
@@ -393,7 +405,7 @@ class Run:
         if not path.exists():
             goal = self.goals[-1] if self.goals else self.config
             return Training(
-                self.config.make_agent(evaluation_env),
+                self.config.make_agent(_one_of(env)),
                 env,
                 steps=goal.steps,
                 episodes=goal.episodes,
@@ -432,7 +444,7 @@ class Run:
     def _set_goal(
         self,
         env: TrainingEnv,
-        evaluation_env: gym.Env[Any, Any],
+        evaluation_env: gym.Env[Any, Any] | None,
         steps: int | None,
         episodes: int | None,
         repeat_episodes: bool,
@@ -493,6 +505,14 @@ class Run:
             yield
         finally:
             os.close(file)
+
+
+def _one_of(env: TrainingEnv) -> gym.Env[Any, Any]:
+    """Give a single environment of those that the agent learns in."""
+    if isinstance(env, gym.vector.VectorEnv):
+        assert isinstance(env, gym.vector.SyncVectorEnv)  # what the configuration makes
+        return env.envs[0]
+    return env
 
 
 def _report(agent: object) -> Mapping[str, Any] | None:

@@ -62,6 +62,21 @@ class RestlessEnv(DriftingEnv):
         return super().step(action)
 
 
+class OnlyEnv(DriftingEnv):
+    """There is one of it, as of a robot: a second one cannot be made before the first is closed."""
+
+    n_open = 0
+
+    def __init__(self, render_mode=None):
+        if OnlyEnv.n_open:
+            raise ConnectionError("the port is in use")
+        OnlyEnv.n_open += 1
+        super().__init__(render_mode=render_mode)
+
+    def close(self):
+        OnlyEnv.n_open -= 1
+
+
 class UnseenEnv(gym.Env):
     """As in docs/agents.md: nothing is said about rendering."""
 
@@ -78,5 +93,6 @@ class UnseenEnv(gym.Env):
 
 gym.register("tests/Unseen-v0", entry_point=UnseenEnv, max_episode_steps=20)
 gym.register("tests/Drifting-v0", entry_point=DriftingEnv, max_episode_steps=40)
+gym.register("tests/Only-v0", entry_point=OnlyEnv, max_episode_steps=40)
 gym.register("tests/Restless-v0", entry_point=RestlessEnv, max_episode_steps=40)
 gym.register("tests/Broken-v0", entry_point=BrokenEnv, max_episode_steps=40)

@@ -568,6 +568,26 @@ def test_a_broken_evaluation_is_one_line(invoke, monkeypatch):
         assert f"Error: {BROKEN}: env gave what cannot be evaluated, in step 3 of" in result.stderr
 
 
+def test_without_evaluations_one_environment_is_open_at_a_time(invoke):
+    only = ("drifting_env:tests/Only-v0", *SHORT)
+    assert invoke("train", *only, "--evaluate-every", 0, "--out", "one").exit_code == 0
+    for command in (
+        ["resume", "one", "--steps", 170],
+        ["resume", "one", "--steps", 190, "--new-episode"],
+        ["evaluate", "one", "--episodes", 1],
+        ["record", "one", "x.gif"],
+        ["export", "one", "--c-header", "x.h"],
+    ):
+        assert invoke(*command).exit_code == 0, command
+        assert drifting_env.OnlyEnv.n_open == 0
+    result = invoke("train", *only, "--out", "two")
+    assert result.exit_code == 2
+    assert "--evaluate-every: needs a second environment, or must be 0: " in result.stderr
+    assert "tests/Only-v0 cannot be made: ConnectionError: the port is in use" in result.stderr
+    assert not Path("two").exists()
+    assert drifting_env.OnlyEnv.n_open == 0
+
+
 def test_an_environment_that_does_not_repeat_itself_begins_a_new_episode(invoke):
     restless = ("drifting_env:tests/Restless-v0", *SHORT, "--evaluate-every", 0)
     assert invoke("train", *restless, "--steps", 70, "--out", "one run").exit_code == 0
