@@ -121,6 +121,33 @@ class TrainingResult:
         return np.array(found, np.float64).reshape(-1, 2)
 
 
+class _Actions:
+    """The actions of an episode in one array, which grows: an episode may have millions of them."""
+
+    def __init__(self, taken: NDArray[Any] | None = None) -> None:
+        self._n = 0 if taken is None else len(taken)
+        self._array = taken if self._n else None
+        self.last: Any = None if self._array is None else self._array[-1]
+
+    def __len__(self) -> int:
+        return self._n
+
+    @property
+    def taken(self) -> NDArray[Any]:
+        """All of them, shape (n, ...)."""
+        return np.empty(0) if self._array is None else self._array[: self._n]
+
+    def append(self, action: Any) -> None:
+        if self._array is None:
+            one = np.asarray(action)
+            self._array = np.empty((16, *one.shape), one.dtype)
+        elif self._n == len(self._array):
+            self._array = np.concatenate([self._array, np.empty_like(self._array)])
+        self._array[self._n] = action
+        self._n += 1
+        self.last = action
+
+
 @dataclass
 class _Episode:
     """The present episode in one environment.
@@ -130,7 +157,7 @@ class _Episode:
 
     number: int
     observation: Any
-    actions: list[Any] = field(default_factory=list)
+    actions: _Actions = field(default_factory=_Actions)
     sum_of_rewards: float = 0.0
     outcome: Outcome | None = None
 
@@ -358,7 +385,7 @@ class Training:
         return SavedEpisode(
             number=episode.number,
             sum_of_rewards=episode.sum_of_rewards,
-            actions=np.array(episode.actions).reshape(shape),
+            actions=episode.actions.taken.reshape(shape),
             observation=np.asarray(self.agent.flat_observation(episode.last_observation)),
             waits=episode.outcome is not None,
         )
@@ -431,7 +458,7 @@ class Training:
         for number, episode in enumerate(saved.present):
             if episode is not None:
                 training._present[number] = _Episode(
-                    episode.number, None, list(episode.actions), episode.sum_of_rewards
+                    episode.number, None, _Actions(episode.actions), episode.sum_of_rewards
                 )
         training._repeat_episodes([one is not None and one.waits for one in saved.present])
         for now, then in zip(training._present, saved.present, strict=True):
@@ -456,9 +483,9 @@ class Training:
             for i in starts:
                 present[i].observation = seen[i]
             actions = [
-                present[i].actions[t - n_rounds]
+                present[i].actions.taken[t - n_rounds]
                 if i in present and t >= n_rounds - len(present[i].actions)
-                else longest.actions[t]
+                else longest.actions.taken[t]
                 for i in self._numbers
             ]
             outcomes = self._rounds.step(actions)
@@ -541,7 +568,9 @@ class Training:
         try:
             reward = reward_of(told)
             agent.learn(
-                Transition(episode.observation, episode.actions[-1], reward, following, terminated),
+                Transition(
+                    episode.observation, episode.actions.last, reward, following, terminated
+                ),
                 environment=i,
             )
         except (ValueError, OverflowError) as error:

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import signal
+import tracemalloc
 from decimal import Decimal
 
 import gymnasium as gym
@@ -432,6 +433,35 @@ def test_what_waits_is_learned_when_a_new_episode_begins(tmp_path):
     by_hand.learn(Transition(observation, action, reward, following, terminated))
     by_hand.progress = 1.0
     assert states_equal(with_training.agent, by_hand)
+
+
+def test_an_episode_without_an_end_takes_little_memory(tmp_path):
+    class Endless(Corridor):
+        def step(self, action):
+            self._at = int(np.clip(self._at + (1 if action else -1), 0, 4))
+            return self._seen(), float(self._at == 2), False, False, {}
+
+    class Watch(Callback):
+        def __init__(self):
+            self.bytes = {}
+
+        def on_step(self, training):
+            if training.n_steps in (2_000, 20_000):
+                self.bytes[training.n_steps] = tracemalloc.get_traced_memory()[0]
+
+    watch = Watch()
+    training = Training(corridor_agent(), Endless(), steps=20_500, callbacks=[watch])
+    tracemalloc.start()
+    try:
+        training.run()
+    finally:
+        tracemalloc.stop()
+    assert (watch.bytes[20_000] - watch.bytes[2_000]) / 18_000 < 32
+    training.save(tmp_path / "t")
+    again = Training.load(tmp_path / "t", Endless(), steps=20_600)
+    training.steps = 20_600
+    assert training.run().n_steps == again.run().n_steps == 20_600
+    assert states_equal(training.agent, again.agent)
 
 
 def test_another_goal_goes_further(tmp_path):
