@@ -21,6 +21,8 @@ from sdnn.experiments.report import (
     COST_NOTE,
     MEASURES,
     NOTE,
+    POWER_HEADER,
+    POWER_NOTE,
     QUICK_WARNING,
     RULE_NOTE,
     Report,
@@ -28,6 +30,7 @@ from sdnn.experiments.report import (
     claim_rows,
     cost_header,
     cost_rows,
+    power_rows,
 )
 from sdnn.experiments.results import CaseResult
 from sdnn.experiments.verdicts import Verdict
@@ -137,6 +140,9 @@ def to_html(report: Report, pictures: Mapping[str, bytes], call: Call) -> str:
         case_header=CASE_HEADER,
         claim_header=CLAIM_HEADER,
         claim_rows=claim_rows(report.claims, report.last_episode),
+        power_header=POWER_HEADER,
+        power_rows=power_rows(report),
+        power_note=POWER_NOTE,
         kind_of=verdicts,
         measures={name.replace("_", " "): text for name, text in MEASURES.items()},
         note=NOTE,

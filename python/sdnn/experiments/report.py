@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, Experiment
-from sdnn.experiments.claims import Growth, Quantity, describe
+from sdnn.experiments.claims import Claim, Growth, Quantity, describe
 from sdnn.experiments.measures import DEFAULT_MEASURES, MeasureName
+from sdnn.experiments.power import MULTIPLES, N_DRAWS, Power, powers
 from sdnn.experiments.records import CostRecord
 from sdnn.experiments.registry import agent_entry, cost_series
 from sdnn.experiments.results import CaseSummary
 from sdnn.experiments.statistics import DEFAULT_BOOTSTRAP, Estimate
-from sdnn.experiments.verdicts import ClaimOutcome, judge_claims
+from sdnn.experiments.verdicts import CheckOutcome, ClaimOutcome, judge_claims
 
 QUICK_WARNING = "A quick look at a fraction of the experiments, not their result."
 
@@ -34,6 +35,7 @@ CASE_HEADER = (
     "us/decision",
 )
 CLAIM_HEADER = ("claim", "the paper says", "measured", "paper", "ours", "verdict")
+POWER_HEADER = ("claim", "measured", "ours", *(f"{n} x the trials" for n in MULTIPLES))
 
 MEASURES: dict[MeasureName, str] = {
     "episodes_to_learn": (
@@ -67,6 +69,11 @@ RULE_NOTE = (
     " before the trials were run, does not hold if the whole interval lies outside on one side, and"
     " is undecided otherwise. Runs smaller than"
     f" {PAPER_TRIALS} trials x {PAPER_EPISODES:,} episodes are not judged."
+)
+
+POWER_NOTE = (
+    "What more trials would say, by drawing so many from those that are there,"
+    f" {N_DRAWS} times: in how many of these draws the line would hold / would not."
 )
 
 COST_NOTE = (
@@ -126,6 +133,13 @@ class Report:
         """The claims that these results speak about."""
         return judge_claims([s for e in self.experiments for s in e.summaries], self.costs)
 
+    @cached_property
+    def powers(self) -> tuple[tuple[Claim, CheckOutcome, tuple[Power, ...]], ...]:
+        """What more trials would say of the checks that are undecided."""
+        checked = ((outcome.claim, one) for outcome in self.claims for one in outcome.checks)
+        found = ((claim, one, powers(one)) for claim, one in checked)
+        return tuple(row for row in found if row[2])
+
     @property
     def last_episode(self) -> int:
         """Learning episodes of a trial."""
@@ -143,11 +157,14 @@ class Report:
         if self.claims:
             claims = claim_rows(self.claims, self.last_episode)
             tables.append(("Beside the paper's claims", CLAIM_HEADER, claims))
+        if self.powers:
+            tables.append(("What is undecided", POWER_HEADER, power_rows(self)))
         return tables
 
     def notes(self) -> list[str]:
         """Say what the tables mean."""
         notes = [RULE_NOTE] if self.claims else []
+        notes += [POWER_NOTE] if self.powers else []
         if self.experiments:
             notes += [NOTE, *(f"{n.replace('_', ' ')}: {text}." for n, text in MEASURES.items())]
         return [*notes, COST_NOTE] if self.costs else notes
@@ -224,6 +241,18 @@ def claim_rows(outcomes: Sequence[ClaimOutcome], last_episode: int) -> list[tupl
             rows.append(
                 (*start, describe(quantity), checked.check.paper, ours, checked.verdict.value)
             )
+    return rows
+
+
+def power_rows(report: Report) -> list[tuple[str, ...]]:
+    """Rows of the table of what is undecided, under `POWER_HEADER`."""
+    rows: list[tuple[str, ...]] = []
+    for claim, checked, found in report.powers:
+        quantity = checked.check.quantity
+        assert checked.estimate is not None  # else it is not run
+        ours = _format_quantity(quantity, checked.estimate, report.last_episode)
+        chances = (f"{100 * one.holds:.0f} / {100 * one.fails:.0f} %" for one in found)
+        rows.append((str(claim.number), describe(quantity), ours, *chances))
     return rows
 
 
@@ -305,4 +334,12 @@ def to_json(report: Report) -> dict[str, Any]:
         ],
         "costs": [cost.to_json() for cost in report.costs],
         "claims": [outcome.to_json(report.last_episode) for outcome in report.claims],
+        "powers": [
+            {
+                "claim": claim.number,
+                "measured": describe(checked.check.quantity),
+                "with": [asdict(one) for one in found],
+            }
+            for claim, checked, found in report.powers
+        ],
     }

@@ -255,6 +255,18 @@ def _resampled(
 
 
 def _with_interval(value: float, distribution: FloatArray, config: BootstrapConfig) -> Estimate:
-    tail = (1 - config.confidence) / 2
-    lower, upper = np.quantile(distribution, (tail, 1 - tail), method="inverted_cdf")
+    lower, upper = tails(distribution, config.confidence)
     return Estimate(value, float(lower), float(upper))
+
+
+def tails(distribution: FloatArray, confidence: float) -> FloatArray:
+    """Return the ends of the middle part of distributions over the last axis, values of theirs.
+
+    Examples
+    --------
+    >>> tails(np.arange(101.0), 0.9)
+    array([ 5., 95.])
+    """
+    tail = (1 - confidence) / 2
+    ends = np.quantile(distribution, (tail, 1 - tail), axis=-1, method="inverted_cdf")
+    return np.asarray(ends, np.float64)

@@ -13,11 +13,12 @@ It was written down before the trials of Experiment B were run:
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sdnn.experiments.claims import CLAIMS, Check, Claim, Difference, Growth, Subject, describe
 from sdnn.experiments.cost import CostConfig
@@ -47,11 +48,15 @@ def verdict_of(check: Check, estimate: Estimate) -> Verdict:
 
 @dataclass(frozen=True)
 class CheckOutcome:
-    """A check with what our data give; no estimate where its trials were not run."""
+    """A check with what our data give; no estimate where its trials were not run.
+
+    ``samples`` are the trials' values that it was judged by: one array, or two of a difference.
+    """
 
     check: Check
     estimate: Estimate | None
     verdict: Verdict
+    samples: tuple[NDArray[np.float64], ...] = field(default=(), compare=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -134,14 +139,23 @@ def _judge(
     if not summaries.keys() >= set(subjects):
         return CheckOutcome(check, None, Verdict.NOT_RUN)
     found = [summaries[subject] for subject in subjects]
+    samples: tuple[NDArray[np.float64], ...]
     if len(found) == 1:
+        samples = (found[0].values[quantity.measure],)
         estimate = found[0].medians[quantity.measure]
     else:
         values, others = (summary.uncensored(quantity.measure) for summary in found)
+        samples = (values, others)
         estimate = estimate_contrast(values, others)
-    return _outcome(check, estimate, all(summary.result.is_paper_scale for summary in found))
+    is_full = all(summary.result.is_paper_scale for summary in found)
+    return _outcome(check, estimate, is_full, samples)
 
 
-def _outcome(check: Check, estimate: Estimate, is_full: bool) -> CheckOutcome:
+def _outcome(
+    check: Check,
+    estimate: Estimate,
+    is_full: bool,
+    samples: tuple[NDArray[np.float64], ...] = (),
+) -> CheckOutcome:
     verdict = verdict_of(check, estimate) if is_full else Verdict.NOT_JUDGED
-    return CheckOutcome(check, estimate, verdict)
+    return CheckOutcome(check, estimate, verdict, samples)

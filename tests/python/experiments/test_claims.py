@@ -17,8 +17,18 @@ from sdnn.experiments.claims import (
     describe,
 )
 from sdnn.experiments.cost import QUICK_COST, CostConfig
+from sdnn.experiments.page import Call, to_html
+from sdnn.experiments.power import MULTIPLES, Power, drawn_medians, powers
 from sdnn.experiments.records import CostKey, CostRecord, StepTimes
 from sdnn.experiments.registry import cost_series
+from sdnn.experiments.report import (
+    POWER_HEADER,
+    POWER_NOTE,
+    ExperimentReport,
+    Report,
+    to_json,
+)
+from sdnn.experiments.statistics import estimate_contrast, estimate_median
 from sdnn.experiments.verdicts import (
     CheckOutcome,
     ClaimOutcome,
@@ -148,10 +158,84 @@ def test_trials_that_disagree_leave_a_claim_undecided():
     assert found[2] == Verdict.UNDECIDED
 
 
+def test_reports_tell_what_more_trials_would_say():
+    split = [4] * 7 + [50] * 3
+    summaries = (result("s4", "sdnn-c", split), result("s6", "sdnn-c", 4))
+    report = Report(
+        experiments=(ExperimentReport(EXPERIMENTS[0], summaries),), costs=(), quick=False, seed=0,
+        version="0", digest="d" * 64,
+    )  # fmt: skip
+    *_, (title, header, rows) = report.tables()
+    assert (title, header) == ("What is undecided", POWER_HEADER)
+    assert POWER_NOTE in report.notes()
+    row = next(row for row in rows if row[:2] == ("2", "final steps: SDNN-C, 4 inputs"))
+    assert row[-1] == "100 / 0 %"
+    told = to_json(report)["powers"]
+    assert [one["claim"] for one in told] == [int(row[0]) for row in rows]
+    one = next(one for one in told if one["measured"] == row[1])
+    assert one["with"][-1] == {"n_trials": 320, "holds": 1.0, "fails": 0.0}
+    picture = b"<svg xmlns='http://www.w3.org/2000/svg'/>"
+    call = Call(machine="", seconds=1, n_run=0, n_planned=0, processor_seconds=0)
+    assert "What is undecided" in to_html(report, {"experiment-a": picture}, call)
+    decided = replace(report, experiments=(ExperimentReport(EXPERIMENTS[0], summaries[1:]),))
+    assert decided.tables()[-1][0] == "Beside the paper's claims"
+    assert "What is undecided" not in to_html(decided, {"experiment-a": picture}, call)
+
+
 @pytest.mark.parametrize("size", [{"n_trials": 9}, {"n_tests": 1499}])
 def test_less_than_the_papers_scale_is_not_judged(size):
     found = verdicts([result("s4", "sdnn-c", 4, **size), result("s6", "sdnn-c", 4)])
     assert found[1] == found[2] == Verdict.NOT_JUDGED
+
+
+def outcome_of(values, others=None, **limits):
+    samples = tuple(np.array(v, float) for v in (values, others) if v is not None)
+    estimate = estimate_median(values) if others is None else estimate_contrast(values, others)
+    check = Check(Median("final_steps", Subject("s4")), "", **limits)
+    return CheckOutcome(check, estimate, verdict_of(check, estimate), samples)
+
+
+def test_power_is_of_what_is_undecided_only():
+    undecided = outcome_of([3, 4, 5, 9], at_most=5)
+    assert undecided.verdict == Verdict.UNDECIDED
+    assert [one.n_trials for one in powers(undecided)] == [4 * n for n in MULTIPLES]
+    assert powers(undecided) == powers(undecided)
+    assert powers(outcome_of([3, 4, 4, 4], at_most=5)) == ()
+    growth = CheckOutcome(undecided.check, undecided.estimate, Verdict.UNDECIDED)
+    assert powers(growth) == ()
+
+
+def test_power_says_what_more_trials_would_decide():
+    mostly_good = powers(outcome_of([4] * 7 + [math.inf] * 3, at_most=5))
+    assert [one.fails for one in mostly_good] == [0.0] * len(MULTIPLES)
+    assert mostly_good[0].holds < 0.9
+    assert mostly_good[-1].holds == 1.0
+    mostly_bad = powers(outcome_of([4] * 4 + [50] * 8, at_most=5))
+    assert mostly_bad[-1] == Power(12 * MULTIPLES[-1], 0.0, 1.0)
+    for one in powers(outcome_of([4] * 5 + [50] * 5, at_most=5)):  # a coin, however often thrown
+        assert one.holds + one.fails < 0.2
+    apart = powers(outcome_of([9, 10, 11, 30], [5, 8, 9, 10], at_least=1))
+    assert apart[-1].holds > 0.95
+    assert apart[-1].fails == 0.0
+
+
+@pytest.mark.parametrize("multiple", [1, 3, 4])
+def test_power_draws_medians_as_resampling_does(multiple):
+    """Order statistics of uniform numbers against resamples: the same means and spreads."""
+    sample = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
+    drawn = drawn_medians(sample, multiple, np.random.default_rng(1))
+    generator = np.random.default_rng(2)
+    n = multiple * sample.size
+    others = np.empty_like(drawn)
+    for row in others:
+        trials = generator.choice(sample, n)
+        row[:] = np.median(generator.choice(trials, (row.size, n)), axis=1)
+    error = others.mean(axis=1).std() * math.sqrt(2 / len(others))
+    assert drawn.mean() == pytest.approx(others.mean(), abs=4 * error)
+    for quantile in (0.1, 0.5, 0.9):
+        mine, theirs = (np.quantile(d, quantile, axis=1) for d in (drawn, others))
+        error = max(theirs.std(), 0.05) * math.sqrt(2 / len(others))
+        assert mine.mean() == pytest.approx(theirs.mean(), abs=4 * error)
 
 
 def test_growth_is_a_ratio_of_medians():
