@@ -67,10 +67,6 @@ class Checkpoints(Callback):
         self.every = whole("every", every, 1, 2**53)
         self.n_saved: int | None = None
 
-    def on_start(self, training: Training) -> None:
-        """Raise ValueError where the training cannot be saved, before it learns for nothing."""
-        training.require_repeatable()
-
     def on_step(self, training: Training) -> None:
         """Save where it is due."""
         if training.n_steps % self.every == 0:

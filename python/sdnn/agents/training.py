@@ -183,7 +183,7 @@ class Training:
     so do all autoreset modes.
 
     A vector environment that cannot be reset one by one with seeds is seeded at the beginning only,
-    and resets itself. Agents learn in it, but such a training cannot be saved. That is any with
+    and resets itself. Agents learn in it, but its episodes cannot be repeated. That is any with
     Gymnasium 1.0, and any other than these two, unless its autoreset mode is ``DISABLED`` or its
     metadata say ``"reset_mask": True``.
 
@@ -344,15 +344,15 @@ class Training:
             is_finished=self.is_finished,
         )
 
-    def require_repeatable(self) -> None:
-        """Raise ValueError if the episodes of the environment cannot be repeated, nor saved."""
+    def _require_repeatable(self) -> None:
         if self._rounds.can_repeat:
             return
         raise ValueError(
-            "env must reset each of its environments with a seed of its own where a training is"
-            f" saved, got {type(self.env.unwrapped).__name__}: take SyncVectorEnv or AsyncVectorEnv"
-            " of Gymnasium 1.1 or newer, as gymnasium.make_vec(..., vectorization_mode='sync')"
-            " makes it, with shared memory or the autoreset mode DISABLED"
+            "env must reset each of its environments with a seed of its own where episodes are"
+            f" repeated, got {type(self.env.unwrapped).__name__}: repeat_episodes=False begins new"
+            " ones; or take SyncVectorEnv or AsyncVectorEnv of Gymnasium 1.1 or newer, as"
+            " gymnasium.make_vec(..., vectorization_mode='sync') makes it, with shared memory or"
+            " the autoreset mode DISABLED"
         )
 
     def save(self, path: str | Path) -> None:
@@ -362,10 +362,7 @@ class Training:
         ------
         OSError
             If the file cannot be written.
-        ValueError
-            If the environment is a vector that cannot be reset one by one.
         """
-        self.require_repeatable()
         saved = SavedTraining(
             steps=self.steps,
             episodes=self.episodes,
@@ -454,7 +451,7 @@ class Training:
                 f"env must have {len(saved.present)} environments, as the training had,"
                 f" got {training.n_environments}"
             )
-        training.require_repeatable()
+        training._require_repeatable()
         for number, episode in enumerate(saved.present):
             if episode is not None:
                 training._present[number] = _Episode(

@@ -17,6 +17,7 @@ from sdnn.agents import (
     SDNNQLearning,
     Training,
     Transition,
+    UnrepeatedEpisodeError,
 )
 from sdnn.agents.evaluation import episode_seed
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
@@ -409,17 +410,20 @@ def test_cart_poles_that_gymnasium_makes_by_itself_are_learned():
         lambda: AsyncVectorEnv([Walk] * 2, shared_memory=False),
     ],
 )
-def test_what_cannot_be_repeated_is_not_saved(make, tmp_path):
+def test_what_cannot_be_repeated_goes_on_with_new_episodes_only(make, tmp_path):
     vector = make()
-    training = Training(sdnn_agent(), vector, steps=20)
+    checkpoints = Checkpoints(tmp_path / "t", 1000)
+    training = Training(sdnn_agent(), vector, steps=20, callbacks=[checkpoints])
     training.run()
     with pytest.raises(ValueError, match="env must reset each of its environments with a seed"):
-        training.save(tmp_path / "t")
-    checkpoints = Checkpoints(tmp_path / "t", 1000)
-    with pytest.raises(ValueError, match="vectorization_mode='sync'"):
-        Training(sdnn_agent(), vector, steps=20, callbacks=[checkpoints]).run()
+        Training.load(tmp_path / "t", vector)
+    again = Training.load(tmp_path / "t", vector, steps=50, repeat_episodes=False)
+    assert states_equal(again.agent, training.agent)
+    assert again.run().n_steps == 50
+    with pytest.raises(UnrepeatedEpisodeError, match="env must repeat the episode"):
+        Training.load(tmp_path / "t", sync(2))
     Training(sdnn_agent(), sync(2), steps=20, callbacks=[checkpoints]).run()
-    with pytest.raises(ValueError, match="env must reset each of its environments with a seed"):
+    with pytest.raises(ValueError, match="repeat_episodes=False begins new ones; or take Sync"):
         Training.load(tmp_path / "t", vector)
     vector.close()
 
