@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
@@ -13,6 +13,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.agents.episode import Actions, Episode
 from sdnn.agents.evaluation import episode_seed, evaluate
 from sdnn.agents.files import Arrays, Description
 from sdnn.agents.rounds import Outcome, rounds_in
@@ -119,51 +120,6 @@ class TrainingResult:
         """Steps and mean returns of the evaluations, shape (n, 2)."""
         found = [(r["step"], r["mean_return"]) for r in self.rows if r["kind"] == "evaluation"]
         return np.array(found, np.float64).reshape(-1, 2)
-
-
-class _Actions:
-    """The actions of an episode in one array, which grows: an episode may have millions of them."""
-
-    def __init__(self, taken: NDArray[Any] | None = None) -> None:
-        self._n = 0 if taken is None else len(taken)
-        self._array = taken if self._n else None
-        self.last: Any = None if self._array is None else self._array[-1]
-
-    def __len__(self) -> int:
-        return self._n
-
-    @property
-    def taken(self) -> NDArray[Any]:
-        """All of them, shape (n, ...)."""
-        return np.empty(0) if self._array is None else self._array[: self._n]
-
-    def append(self, action: Any) -> None:
-        if self._array is None:
-            one = np.asarray(action)
-            self._array = np.empty((16, *one.shape), one.dtype)
-        elif self._n == len(self._array):
-            self._array = np.concatenate([self._array, np.empty_like(self._array)])
-        self._array[self._n] = action
-        self._n += 1
-        self.last = action
-
-
-@dataclass
-class _Episode:
-    """The present episode in one environment.
-
-    ``observation`` is what was observed before ``outcome``, if that is still to be learned.
-    """
-
-    number: int
-    observation: Any
-    actions: _Actions = field(default_factory=_Actions)
-    sum_of_rewards: float = 0.0
-    outcome: Outcome | None = None
-
-    @property
-    def last_observation(self) -> Any:
-        return self.observation if self.outcome is None else self.outcome.observation
 
 
 class Training:
@@ -280,7 +236,7 @@ class Training:
         """Steps and mean returns of all evaluations so far, also of those before it was loaded."""
         self._rows: list[Row] = []
         self._rounds = rounds_in(env)
-        self._present: list[_Episode | None] = [None] * self._rounds.n_environments
+        self._present: list[Episode | None] = [None] * self._rounds.n_environments
         self._first_left = 0  # the environments before it have learned this round's step
         self._stops = False
         self._is_within_step = False
@@ -377,7 +333,7 @@ class Training:
         )
         write_training(path_of("path", path), self.agent, saved)
 
-    def _saved(self, episode: _Episode) -> SavedEpisode:
+    def _saved(self, episode: Episode) -> SavedEpisode:
         shape = (-1, *(self.agent.action_space.shape or ()))
         return SavedEpisode(
             number=episode.number,
@@ -454,8 +410,8 @@ class Training:
         training._require_repeatable()
         for number, episode in enumerate(saved.present):
             if episode is not None:
-                training._present[number] = _Episode(
-                    episode.number, None, _Actions(episode.actions), episode.sum_of_rewards
+                training._present[number] = Episode(
+                    episode.number, None, Actions(episode.actions), episode.sum_of_rewards
                 )
         training._repeat_episodes([one is not None and one.waits for one in saved.present])
         for now, then in zip(training._present, saved.present, strict=True):
@@ -493,7 +449,7 @@ class Training:
                 else:
                     episode.outcome = outcomes[i]
 
-    def _check_repeated(self, episode: _Episode, observation: NDArray[np.float64]) -> None:
+    def _check_repeated(self, episode: Episode, observation: NDArray[np.float64]) -> None:
         found = self.agent.flat_observation(episode.last_observation)
         if not np.array_equal(found, observation):
             raise UnrepeatedEpisodeError(
@@ -509,7 +465,7 @@ class Training:
         return episode_seed(self.seed, _LEARNING, episode)
 
     def _begin_episode(self, environment: int, number: int, observation: Any) -> None:
-        self._present[environment] = _Episode(number, observation)
+        self._present[environment] = Episode(number, observation)
         self.agent.begin_episode(environment)
 
     def _begin_round(self) -> None:
@@ -532,13 +488,13 @@ class Training:
                 episode.actions.append(actions[i])
                 episode.outcome = outcome
 
-    def _action(self, environment: int, episode: _Episode) -> Any:
+    def _action(self, environment: int, episode: Episode) -> Any:
         try:
             return self.agent.act(episode.observation, environment=environment)
         except ValueError as error:
             raise self._unusable(error, environment, episode) from error
 
-    def _unusable(self, error: Exception, environment: int, episode: _Episode) -> UnusableStepError:
+    def _unusable(self, error: Exception, environment: int, episode: Episode) -> UnusableStepError:
         where = f"step {len(episode.actions)}" if episode.actions else "the reset"
         whose = f" in environment {environment}" if self.n_environments > 1 else ""
         return UnusableStepError(
@@ -546,7 +502,7 @@ class Training:
             f" {episode.number}{whose}): {error}"
         )
 
-    def _next_outcome(self) -> tuple[int, _Episode, Outcome]:
+    def _next_outcome(self) -> tuple[int, Episode, Outcome]:
         """Find the first environment whose last step is still to be learned."""
         while True:
             for i in range(self._first_left, self.n_environments):
@@ -566,7 +522,7 @@ class Training:
             reward = reward_of(told)
             agent.learn(
                 Transition(
-                    episode.observation, episode.actions.last, reward, following, terminated
+                    episode.observation, episode.actions.taken[-1], reward, following, terminated
                 ),
                 environment=i,
             )

@@ -256,10 +256,9 @@ class Run:
             environment = self.config.environment
             env = stack.enter_context(closing(self.config.make_training_env()))
             evaluation_env = stack.enter_context(self._evaluation_env())
-            if steps is not None or episodes is not None:
-                self._set_goal(env, evaluation_env, steps, episodes, repeat_episodes)
+            has_goal = steps is not None or episodes is not None
             target = None
-            if self.config.target_return is not None and not self.goals:
+            if self.config.target_return is not None and not (self.goals or has_goal):
                 target = _Target(self.config.target_return)
             # Rows are written before the checkpoint that counts them.
             checkpoints = Checkpoints(self.folder / CHECKPOINT, self.config.checkpoint_every)
@@ -268,6 +267,8 @@ class Run:
                 own.append(self._tensorboard())
             told = [one for one in own if one is not None]
             training = self._training(env, evaluation_env, told, repeat_episodes)
+            if has_goal:
+                self._set_goal(training, steps, episodes)
             began_at = training.n_steps
             try:
                 with Interrupts(training.stop, (signal.SIGTERM,)) as terminations:
@@ -441,18 +442,10 @@ class Run:
             )
         return training
 
-    def _set_goal(
-        self,
-        env: TrainingEnv,
-        evaluation_env: gym.Env[Any, Any] | None,
-        steps: int | None,
-        episodes: int | None,
-        repeat_episodes: bool,
-    ) -> None:
+    def _set_goal(self, training: Training, steps: int | None, episodes: int | None) -> None:
         """Note a new goal: in the checkpoint, which is followed, then in the configuration."""
         if steps is not None and episodes is not None:
             raise ConfigError("episodes", "must not be given together with steps")
-        training = self._training(env, evaluation_env, [], repeat_episodes)
         name, goal, done = (
             ("steps", steps, training.n_steps)
             if steps is not None
