@@ -73,7 +73,7 @@ class Checkpoints(Callback):
             self._save(training)
 
     def on_end(self, training: Training) -> None:
-        """Save where the training ends, unless an error left a step half done."""
+        """Save where the training ends, be it by an environment's error, but not within a step."""
         if not training.is_within_step:
             self._save(training)
 

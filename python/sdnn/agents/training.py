@@ -248,7 +248,10 @@ class Training:
 
     @property
     def is_within_step(self) -> bool:
-        """Whether an error or a second interrupt left a step half done: it cannot be saved then."""
+        """Whether a callback's error or a second interrupt left a step half done.
+
+        It cannot be saved then.
+        """
         return self._is_within_step
 
     @property
@@ -266,6 +269,10 @@ class Training:
     def run(self) -> TrainingResult:
         """Learn until all is done, a callback stops, or the user interrupts.
 
+        What the environment raises is raised, after the callbacks' ``on_end``, and so is
+        `UnusableStepError`. What has been learned stays; the episodes in which it happened are
+        left, and new ones begin with the next ``run``.
+
         Raises
         ------
         KeyboardInterrupt
@@ -276,7 +283,7 @@ class Training:
             or one with which a weight would leave its range: a `ValueError` that names step and
             episode.
         RuntimeError
-            If an error left a step of this training half done before.
+            If an error of a callback left a step of this training half done before.
         """
         if self._is_within_step:
             raise RuntimeError("a training that was left within a step cannot go on: load it")
@@ -289,7 +296,13 @@ class Training:
                 self._is_within_step = True
                 if self.agent.n_environments != self.n_environments:
                     self.agent.n_environments = self.n_environments
-                self._step()
+                try:
+                    learned = self._learn_step()
+                except Exception:
+                    self._leave_episodes()
+                    self._is_within_step = False
+                    raise
+                self._note_step(*learned)
                 self._is_within_step = False
         if interrupts.received is not None:
             raise KeyboardInterrupt
@@ -464,6 +477,11 @@ class Training:
     def _seed_of(self, episode: int) -> int:
         return episode_seed(self.seed, _LEARNING, episode)
 
+    def _leave_episodes(self) -> None:
+        """Begin anew in every environment with the next step; what has been learned stays."""
+        self._rounds = rounds_in(self.env)
+        self._present = [None] * self.n_environments
+
     def _begin_episode(self, environment: int, number: int, observation: Any) -> None:
         self._present[environment] = Episode(number, observation)
         self.agent.begin_episode(environment)
@@ -513,14 +531,12 @@ class Training:
             self._begin_round()
             self._first_left = 0
 
-    def _step(self) -> None:
-        """Learn a step, and tell the callbacks of it."""
-        agent = self.agent
+    def _learn_step(self) -> tuple[int, Episode, Outcome]:
         i, episode, outcome = self._next_outcome()
         following, told, terminated, _ = outcome
         try:
             reward = reward_of(told)
-            agent.learn(
+            self.agent.learn(
                 Transition(
                     episode.observation, episode.actions.taken[-1], reward, following, terminated
                 ),
@@ -531,6 +547,11 @@ class Training:
         episode.observation, episode.outcome = following, None
         episode.sum_of_rewards += reward
         self.n_steps += 1
+        return i, episode, outcome
+
+    def _note_step(self, i: int, episode: Episode, outcome: Outcome) -> None:
+        """Count what ends with the step, evaluate where it is due, and tell the callbacks."""
+        agent = self.agent
         rows: list[Row] = []
         if outcome.ends:
             where = {"environment": i} if self.n_environments > 1 else {}
@@ -541,7 +562,7 @@ class Training:
                     **where,
                     **{"return": episode.sum_of_rewards},
                     length=len(episode.actions),
-                    terminated=terminated,
+                    terminated=outcome.terminated,
                 )
             )
             self.n_episodes += 1

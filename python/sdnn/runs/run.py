@@ -479,8 +479,8 @@ class Run:
         """Say what is left of a training that failed."""
         goes_on = command_line("sdnn", "resume", self.folder)
         if n_steps == 0:
-            return f"nothing is saved yet: {goes_on} begins again once the environment is mended"
-        return f"the first {n_steps} steps are saved: {goes_on} goes on there once it is mended"
+            return f"nothing is learned yet: {goes_on} begins again once the environment is mended"
+        return f"the first {n_steps} steps are saved: {goes_on} goes on there with a new episode"
 
     def _tensorboard(self) -> TensorBoard:
         try:

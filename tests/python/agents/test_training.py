@@ -1,5 +1,6 @@
 """The loop over an environment: its rows, its ends, and going on exactly."""
 
+import functools
 import json
 import os
 import re
@@ -231,6 +232,88 @@ def test_what_an_environment_raises_is_raised():
         with pytest.raises(ValueError, match=r"^no current$") as told:
             use(corridor_agent(), Failing())
         assert not isinstance(told.value, UnusableStepError)
+
+
+class FailsOnce(Careless):
+    """Careful, but one of its calls fails: by an error, or by what cannot be learned."""
+
+    def __init__(self, call=("step", None), failure=TimeoutError):
+        super().__init__(is_careful=True)
+        self._left = {"step": None, "reset": None} | dict([call])
+        self._failure = failure
+
+    def reset(self, **options):
+        self._fail("reset")
+        return super().reset(**options)
+
+    def step(self, action):
+        seen, reward, *ends = super().step(action)
+        return seen, self._fail("step") or float(reward[0]), *ends
+
+    def _fail(self, name):
+        if self._left[name] is None:
+            return None
+        self._left[name] -= 1
+        if self._left[name] == 0:
+            if self._failure is TimeoutError:
+                raise TimeoutError("no answer")
+            return np.nan
+        return None
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("call", "failure", "n_learned"),
+    [
+        (("step", 1), TimeoutError, 0),
+        (("step", 33), TimeoutError, 32),
+        (("step", 33), UnusableStepError, 32),
+        (("reset", 1), TimeoutError, 0),
+        (("reset", 3), TimeoutError, 40),
+    ],
+)
+def test_what_was_learned_before_an_environment_failed_is_kept(
+    kind, call, failure, n_learned, tmp_path
+):
+    make, options = KINDS[kind]
+    env = FailsOnce(call, failure)
+    agent = make(env.observation_space, env.action_space, seed=3, **options)
+    path, rows = tmp_path / "checkpoint", JSONLines(tmp_path / "rows.jsonl")
+    training = Training(agent, env, steps=100, callbacks=[rows, Checkpoints(path, every=1000)])
+    with pytest.raises(failure):
+        training.run()
+    assert not training.is_within_step
+    loaded = Training.load(path, FailsOnce())
+    assert loaded.n_steps == training.n_steps == n_learned
+    assert states_equal(loaded.agent, agent)
+    for one in (loaded, training):
+        one.run()
+        assert (one.n_steps, one.n_episodes) == (100, 4 if n_learned == 32 else 5)
+    assert states_equal(loaded.agent, agent)
+    told = [json.loads(line) for line in rows.path.read_text().splitlines()]
+    assert [row["episode"] for row in told] == list(range(training.n_episodes))
+    assert {row["length"] for row in told} == {20}
+
+
+@pytest.mark.parametrize("has_own_resets", [False, True])
+def test_what_several_learned_before_one_failed_is_kept(has_own_resets, tmp_path):
+    env = gym.vector.SyncVectorEnv([FailsOnce, functools.partial(FailsOnce, ("step", 33))])
+    if has_own_resets:
+        env = gym.wrappers.vector.NormalizeObservation(env)
+    make, options = KINDS["sdnn"]
+    agent = make(env.single_observation_space, env.single_action_space, seed=3, **options)
+    path = tmp_path / "checkpoint"
+    training = Training(agent, env, steps=200, callbacks=[Checkpoints(path, every=1000)])
+    with pytest.raises(TimeoutError):
+        training.run()
+    careful = gym.vector.SyncVectorEnv([FailsOnce] * 2)
+    loaded = Training.load(path, careful, repeat_episodes=not has_own_resets)
+    assert loaded.n_steps == training.n_steps == 64
+    training.run()
+    loaded.run()
+    assert training.n_steps == loaded.n_steps == 200
+    assert training.n_episodes == loaded.n_episodes == 8, "two, and then six"
+    assert states_equal(loaded.agent, agent) != has_own_resets
 
 
 class Killed(Checkpoints):

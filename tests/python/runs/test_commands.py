@@ -17,7 +17,15 @@ from safetensors import safe_open
 from safetensors.numpy import load_file, save_file
 
 import drifting_env
-from sdnn.agents import PRESETS, RBFQLearning, SDNNQLearning, c_header, evaluate, load_agent
+from sdnn.agents import (
+    PRESETS,
+    RBFQLearning,
+    SDNNQLearning,
+    Training,
+    c_header,
+    evaluate,
+    load_agent,
+)
 from sdnn.cli import main
 from sdnn.cli.run_options import option_of, value_of
 from sdnn.cli.train import AGENTS as AGENT_WORDS
@@ -545,16 +553,17 @@ BROKEN = "drifting_env:tests/Broken-v0"
 
 
 def test_a_reward_that_is_none_is_told_with_its_step_and_what_is_saved(invoke):
-    often = ("--steps", 400, "--evaluate-every", 0, "--checkpoint-every", 100, *SMALL)
+    often = ("--steps", 400, "--evaluate-every", 0, *SMALL)
     result = invoke("train", BROKEN, *often, "--out", "one run")
     assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
     assert f"{BROKEN}: env gave what cannot be learned, in step 250 (step " in result.stderr
-    assert "reward must be finite, got nan; the first 200 steps are saved" in result.stderr
-    assert "sdnn resume 'one run' goes on there" in result.stderr
-    assert invoke("resume", "one run").exit_code == 0  # its life is another one
-    result = invoke("train", BROKEN, *often, "--env-arg", "at=50", "--out", "two")
+    assert "reward must be finite, got nan; the first 249 steps are saved" in result.stderr
+    assert "sdnn resume 'one run' goes on there with a new episode" in result.stderr
+    done = invoke("resume", "one run", "--json")  # the environment's life is another one
+    assert (done.exit_code, json.loads(done.stdout)["n_steps"]) == (0, 400)
+    result = invoke("train", BROKEN, *often, "--env-arg", "at=1", "--out", "two")
     assert result.exit_code == 1
-    assert "nothing is saved yet: sdnn resume two begins again" in result.stderr
+    assert "nothing is learned yet: sdnn resume two begins again" in result.stderr
 
 
 def test_a_broken_evaluation_is_one_line(invoke, monkeypatch):
@@ -614,6 +623,9 @@ def test_an_environment_that_raises_is_told_as_it_is(invoke, kind):
     error = result.exception.__cause__ or result.exception
     assert type(error).__name__ == kind
     assert traceback.extract_tb(error.__traceback__)[-1].filename.endswith("drifting_env.py")
+    run = Run.open("one run")
+    env = run.config.make_training_env()
+    assert Training.load(run.folder / "checkpoint.safetensors", env).n_steps == 249
 
 
 def test_what_cannot_be_printed_is_one_line(invoke, tmp_path):
