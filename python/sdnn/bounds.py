@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import gymnasium as gym
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 __all__ = ["flat_bounds", "with_infinities"]
 
 _MOST_VARIABLES = 2**20
+_LEAST_INTEGER_BYTES = 4
+"""Of whole numbers whose limits are those of their type rather than of what is observed."""
 
 
 def with_infinities(ends: NDArray[Any]) -> NDArray[np.float64]:
@@ -41,10 +44,28 @@ def flat_bounds(space: gym.Space[Any]) -> tuple[NDArray[np.float64], NDArray[np.
         raise ValueError(
             f"observation_space must have at most {_MOST_VARIABLES} variables, got {n_variables}"
         )
-    flat = gym.spaces.flatten_space(space)
-    if not isinstance(flat, gym.spaces.Box):
+    if not isinstance(gym.spaces.flatten_space(space), gym.spaces.Box):
         raise TypeError(_no_vector(space))
-    return with_infinities(flat.low), with_infinities(flat.high)
+    low, high = (np.concatenate(ends) for ends in zip(*_ends_of_parts(space), strict=True))
+    return low, high
+
+
+def _ends_of_parts(space: gym.Space[Any]) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
+    """Give the bounds of the parts in the order in which Gymnasium flattens them."""
+    if isinstance(space, gym.spaces.Dict | gym.spaces.Tuple):
+        parts = space.spaces.values() if isinstance(space, gym.spaces.Dict) else space.spaces
+        for part in parts:
+            yield from _ends_of_parts(part)
+        return
+    flat: Any = gym.spaces.flatten_space(space)
+    low, high = with_infinities(flat.low), with_infinities(flat.high)
+    if flat.dtype.kind in "iu" and flat.dtype.itemsize >= _LEAST_INTEGER_BYTES:
+        # For infinity Gymnasium writes the last whole numbers, or those two before them.
+        limits = np.iinfo(flat.dtype)
+        high[flat.high >= limits.max - 2] = np.inf
+        if limits.min < 0:
+            low[flat.low <= limits.min + 2] = -np.inf
+    yield low, high
 
 
 def _n_variables(space: gym.Space[Any]) -> int:

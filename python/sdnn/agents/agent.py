@@ -114,6 +114,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     learning: Learning
     _actions: Actions
     _scaling: Scaling | None = None
+    _next_episode: int = 0
+    """Of a `train` without a seed of its own."""
     _tables: list[NDArray[np.int8]] | None = None
     _rates: dict[str, float]
     """That were set during the warm-up: by name."""
@@ -486,7 +488,10 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     ) -> TrainingResult:
         """Learn in an environment, or in all of a vector; see `sdnn.agents.Training`.
 
-        With ``progress`` a line on a terminal says how far it is.
+        With ``progress`` a line on a terminal says how far it is. Without ``seed``, episodes follow
+        from the agent's, and those of a second call are others than those of the first. But what
+        falls over a training, such as ``final_learning_rate``, falls in each: where a training is
+        to be looked at in between, callbacks and ``evaluate_every`` do that within one.
 
         Examples
         --------
@@ -505,17 +510,23 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             from sdnn.agents.progress import ProgressLine
 
             own = [*callbacks, ProgressLine(Console(stderr=True), "learning")]
-        return Training(
+        training = Training(
             self,
             env,
             steps=steps,
             episodes=episodes,
             seed=self.seed if seed is None else seed,
+            first_episode=self._next_episode if seed is None else 0,
             callbacks=own,
             evaluate_every=evaluate_every,
             evaluation_env=evaluation_env,
             evaluation_episodes=evaluation_episodes,
-        ).run()
+        )
+        try:
+            return training.run()
+        finally:
+            if seed is None:
+                self._next_episode = training.next_episode
 
     # Files.
 
@@ -565,7 +576,9 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         else:
             action = {"kind": "discrete", "start": actions.start.tolist()}
         observations = self._observations
-        scaling = {} if self.scaling is None else {"scaling": self.scaling.values()}
+        more: Description = {} if self.scaling is None else {"scaling": self.scaling.values()}
+        if self._next_episode:
+            more["next_episode"] = self._next_episode
         return {
             "class": type(self).__name__,
             "seed": self.seed,
@@ -580,7 +593,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             "asked": observations.asked(),
             "observation": observations.description() if observations.is_settled else None,
             "n_tables": len(self._tables or ()),
-            **scaling,
+            **more,
         }
 
     def state(self) -> Arrays:
@@ -636,6 +649,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         if "scaling" in description:
             n_variables = agent._observations.n_variables
             agent.scaling = Scaling.of_values(description["scaling"], n_variables)
+        agent._next_episode = whole("next_episode", description.get("next_episode", 0), 0, 2**53)
         agent._actions = agent._make_actions(agent.action_space)
         agent._compiled, agent._warm_up, agent._rates = None, None, {}
         agent.progress = float(description["progress"])

@@ -218,8 +218,8 @@ class _Writer:
         return np.stack([np.ravel(actions.element([i] * len(self.networks))) for i in n_actions])
 
     def _checked_fraction_bits(self, asked: int | None) -> int:
-        plain = [one["variable"] for one in self.inputs if "variable" in one]
-        numbers = [abs(end[i]) for i in plain for end in (self.low, self.high)]
+        told = [one.get("variable", one.get("circular")) for one in self.inputs]
+        numbers = [abs(end[i]) for i in told if i is not None for end in (self.low, self.high)]
         if self.box is not None:
             numbers += np.abs(self.box.astype(np.float64)).reshape(-1).tolist()
         largest = max(numbers, default=0.0)

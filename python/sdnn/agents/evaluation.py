@@ -12,7 +12,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents.spaces import require_same_kind
+from sdnn.agents.spaces import require_same_kind, require_single
 from sdnn.agents.transition import UnusableStepError, reward_of
 from sdnn.arguments import has_methods, seed_of, whole
 
@@ -98,7 +98,7 @@ def evaluate(
         not add up to a finite number: a `ValueError` that names step and episode.
     """
     has_methods("agent", agent, "an agent", "act")
-    has_methods("env", env, "a Gymnasium environment", "reset", "step")
+    require_single("env", env)
     require_same_kind(agent, env)
     seed = seed_of(seed)
     n_episodes = whole("episodes", episodes, 1, 10**9)

@@ -182,6 +182,7 @@ class UnitObservations:
     def _vector(self, name: str, observation: Any) -> NDArray[np.float64]:
         if self._shape is None:
             try:
+                _check_parts(self._space, observation)
                 values = np.asarray(gym.spaces.flatten(self._space, observation), np.float64)
             except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
                 raise ValueError(f"{name} must be of {self._space}, got {observation!r}") from error
@@ -411,6 +412,28 @@ def _widened(
     low, high = np.maximum(low, -_LARGEST), np.minimum(high, _LARGEST)
     width = np.where(high > low, high - low, np.maximum(np.abs(high), 1.0))
     return low - _HEADROOM * width, high + _HEADROOM * width
+
+
+def _check_parts(space: gym.Space[Any], observation: Any) -> None:
+    """Refuse what Gymnasium flattens to something else: ValueError, or what looking raises."""
+    if isinstance(space, gym.spaces.Dict):
+        for key, part in space.spaces.items():
+            _check_parts(part, observation[key])
+    elif isinstance(space, gym.spaces.Tuple):
+        for part, one in zip(space.spaces, observation, strict=True):
+            _check_parts(part, one)
+    elif isinstance(space, gym.spaces.Discrete):
+        if not 0 <= observation - space.start < space.n:
+            raise ValueError(f"must be in {space}")
+    elif isinstance(space, gym.spaces.MultiDiscrete):
+        steps = np.asarray(observation) - space.start
+        if steps.shape != space.shape or not ((steps >= 0) & (steps < space.nvec)).all():
+            raise ValueError(f"must be in {space}")
+    elif (
+        isinstance(space, gym.spaces.Box | gym.spaces.MultiBinary)
+        and np.shape(observation) != space.shape
+    ):
+        raise ValueError(f"must have shape {space.shape}")
 
 
 def _symbols_of(space: gym.Space[Any], first: int = 0) -> Iterator[tuple[int, int]]:

@@ -24,6 +24,7 @@ _LIMITS = {
     "n_steps": (0, 2**53),
     "n_episodes": (0, 2**53),
     "n_rows": (0, 2**53),
+    "n_skipped": (0, 2**53),
     "evaluate_every": (1, 2**53),
     "evaluation_episodes": (1, 10**9),
 }
@@ -70,7 +71,7 @@ class SavedTraining:
     """What `sdnn.agents.Training` goes on from.
 
     ``evaluations`` has steps and mean returns, shape (n, 2); ``present`` an entry for each
-    environment.
+    environment; ``n_skipped`` numbers of episodes belong to none that was learned to its end.
     """
 
     steps: int | None
@@ -79,6 +80,7 @@ class SavedTraining:
     n_steps: int
     n_episodes: int
     n_rows: int
+    n_skipped: int
     evaluate_every: int | None
     evaluation_episodes: int
     evaluations: NDArray[np.float64]
@@ -95,6 +97,8 @@ def write_training(path: Path, agent: Saved, training: SavedTraining) -> None:
             arrays[_prefix(i) + "observation"] = episode.observation
     first = training.present[0]
     told: dict[str, Any] = {name: getattr(training, name) for name in _LIMITS}
+    if training.n_skipped == 0:  # as in older files
+        del told["n_skipped"]
     told["return"] = 0.0 if first is None else first.sum_of_rewards
     if len(training.present) > 1:
         told["environments"] = [
@@ -131,7 +135,8 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
     told = _checked(path, description["training"])
     environments: Iterable[Any] | None = told.get("environments")
     if environments is None:
-        only = {"episode": told["n_episodes"], "return": told["return"], "waits": False}
+        number = told["n_skipped"] + told["n_episodes"]
+        only = {"episode": number, "return": told["return"], "waits": False}
         environments = [only if _prefix(0) + "actions" in arrays else None]
     present = [
         None
@@ -158,6 +163,7 @@ def _checked(path: Path, told: Any) -> Mapping[str, Any]:
     try:
         if not isinstance(told, dict):
             raise TypeError(f"training must be a table, got {told!r}")
+        told = {"n_skipped": 0, **told}  # most files have none
         for name, (low, high) in _LIMITS.items():
             if told[name] is not None or name not in _MAY_BE_NONE:
                 whole(name, told[name], low, high)
@@ -173,7 +179,8 @@ def _checked(path: Path, told: Any) -> Mapping[str, Any]:
         raise ValueError(f"{path} is damaged: training has no {error}") from None
     except (OverflowError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is damaged: {error}") from error
-    return told
+    checked: Mapping[str, Any] = told
+    return checked
 
 
 def _array(path: Path, arrays: Arrays, name: str) -> NDArray[Any]:

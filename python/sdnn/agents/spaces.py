@@ -9,7 +9,18 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["require_same_kind", "space_data", "space_of"]
+from sdnn.arguments import has_methods
+
+__all__ = ["require_same_kind", "require_single", "space_data", "space_of"]
+
+
+def require_single(name: str, env: Any) -> None:
+    """Check that a value is one environment; TypeError that names the argument."""
+    has_methods(name, env, "a Gymnasium environment", "reset", "step")
+    if isinstance(env, gym.vector.VectorEnv):
+        raise TypeError(
+            f"{name} must be a single environment, got a vector of them, {type(env).__name__}"
+        )
 
 
 def require_same_kind(agent: Any, env: Any) -> None:

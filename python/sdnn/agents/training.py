@@ -23,7 +23,7 @@ from sdnn.agents.saved_training import (
     read_training,
     write_training,
 )
-from sdnn.agents.spaces import require_same_kind
+from sdnn.agents.spaces import require_same_kind, require_single
 from sdnn.agents.transition import Transition, UnusableStepError, reward_of
 from sdnn.arguments import flag, has_methods, path_of, whole
 from sdnn.interrupts import Interrupts
@@ -152,7 +152,10 @@ class Training:
     steps, episodes
         How long: one of them. Steps are transitions learned, over all environments.
     seed
-        Root of the episodes' seeds.
+        Root of the episodes' seeds: every episode has one of its own.
+    first_episode
+        The number of the first episode: a second training with the same seed should begin where the
+        first one ended (its ``next_episode``), so as not to meet the same episodes again.
     callbacks
         Are told what happens; see `sdnn.agents.callbacks`.
     evaluate_every
@@ -164,9 +167,9 @@ class Training:
 
     Raises
     ------
-    ValueError
-        If not one of steps and episodes is given, something is out of range, or the environments'
-        spaces are not the agent's.
+    TypeError, ValueError
+        If not one of steps and episodes is given, something is out of range, the environments'
+        spaces are not the agent's, or ``evaluation_env`` is a vector.
 
     Examples
     --------
@@ -191,6 +194,7 @@ class Training:
         steps: int | None = None,
         episodes: int | None = None,
         seed: int = 0,
+        first_episode: int = 0,
         callbacks: Iterable[Callback] = (),
         evaluate_every: int | None = None,
         evaluation_env: gym.Env[Any, Any] | None = None,
@@ -199,9 +203,7 @@ class Training:
         has_methods("agent", agent, "an agent", "act", "learn", "begin_episode")
         has_methods("env", env, "a Gymnasium environment", "reset", "step")
         if evaluation_env is not None:
-            has_methods(
-                "evaluation_env", evaluation_env, "a Gymnasium environment", "reset", "step"
-            )
+            require_single("evaluation_env", evaluation_env)
             if evaluation_env is env:
                 raise ValueError(
                     "evaluation_env must be another environment than env: an evaluation would end"
@@ -218,6 +220,7 @@ class Training:
         self.steps = None if steps is None else whole("steps", steps, 1, 2**53)
         self.episodes = None if episodes is None else whole("episodes", episodes, 1, 2**53)
         self.seed = whole("seed", seed, 0, 2**64 - 1)
+        self._n_skipped = whole("first_episode", first_episode, 0, 2**53)  # numbers of episodes
         self.callbacks = _listed(callbacks)
         self.evaluate_every = (
             None if evaluate_every is None else whole("evaluate_every", evaluate_every, 1, 2**53)
@@ -255,6 +258,12 @@ class Training:
         return self._is_within_step
 
     @property
+    def next_episode(self) -> int:
+        """The number of an episode that has not begun, nor any after it."""
+        n_present = sum(episode is not None for episode in self._present)
+        return self._n_skipped + self.n_episodes + n_present
+
+    @property
     def is_finished(self) -> bool:
         """Whether all that was asked for is done."""
         if self.steps is not None:
@@ -269,9 +278,9 @@ class Training:
     def run(self) -> TrainingResult:
         """Learn until all is done, a callback stops, or the user interrupts.
 
-        What the environment raises is raised, after the callbacks' ``on_end``, and so is
-        `UnusableStepError`. What has been learned stays; the episodes in which it happened are
-        left, and new ones begin with the next ``run``.
+        What an environment raises is raised, after the callbacks' ``on_end``, and so is
+        `UnusableStepError`. What has been learned stays. The next ``run`` begins new episodes, or
+        first evaluates where that failed.
 
         Raises
         ------
@@ -292,6 +301,8 @@ class Training:
             for callback in self.callbacks:
                 callback.on_start(self)
                 stack.callback(callback.on_end, self)
+            if self._lacks_evaluation:
+                self._tell(self._evaluation())
             while not (self.is_finished or self._stops):
                 self._is_within_step = True
                 if self.agent.n_environments != self.n_environments:
@@ -302,8 +313,10 @@ class Training:
                     self._leave_episodes()
                     self._is_within_step = False
                     raise
-                self._note_step(*learned)
+                failure = self._note_step(*learned)
                 self._is_within_step = False
+                if failure is not None:
+                    raise failure
         if interrupts.received is not None:
             raise KeyboardInterrupt
         return TrainingResult(
@@ -339,6 +352,7 @@ class Training:
             n_steps=self.n_steps,
             n_episodes=self.n_episodes,
             n_rows=self.n_rows,
+            n_skipped=self._n_skipped,
             evaluate_every=self.evaluate_every,
             evaluation_episodes=self.evaluation_episodes,
             evaluations=np.array(self.evaluations, np.float64).reshape(-1, 2),
@@ -405,6 +419,7 @@ class Training:
             steps=steps if has_goal else saved.steps,
             episodes=episodes if has_goal else saved.episodes,
             seed=saved.seed,
+            first_episode=saved.n_skipped,
             callbacks=callbacks,
             evaluate_every=saved.evaluate_every,
             evaluation_env=evaluation_env,
@@ -414,6 +429,7 @@ class Training:
         training.n_rows = saved.n_rows
         training.evaluations = [(int(step), mean) for step, mean in saved.evaluations.tolist()]
         if not does_repeat:
+            training._n_skipped += sum(episode is not None for episode in saved.present)
             return training
         if len(saved.present) != training.n_environments:
             raise ValueError(
@@ -478,7 +494,12 @@ class Training:
         return episode_seed(self.seed, _LEARNING, episode)
 
     def _leave_episodes(self) -> None:
-        """Begin anew in every environment with the next step; what has been learned stays."""
+        """Begin anew in every environment with the next step; what has been learned stays.
+
+        With other seeds, as what failed may do so again: none of the numbers is given again that
+        might have been.
+        """
+        self._n_skipped += self.n_environments
         self._rounds = rounds_in(self.env)
         self._present = [None] * self.n_environments
 
@@ -489,8 +510,7 @@ class Training:
     def _begin_round(self) -> None:
         """Take a step in every environment, and begin an episode where the last one is over."""
         over = [i for i, episode in enumerate(self._present) if episode is None]
-        n_begun = self.n_episodes + self.n_environments - len(over)
-        numbers = {i: n_begun + k for k, i in enumerate(over)}
+        numbers = {i: self.next_episode + k for k, i in enumerate(over)}
         first = self._rounds.reset({i: self._seed_of(number) for i, number in numbers.items()})
         for i, observation in first.items():
             self._begin_episode(i, numbers[i], observation)
@@ -549,10 +569,14 @@ class Training:
         self.n_steps += 1
         return i, episode, outcome
 
-    def _note_step(self, i: int, episode: Episode, outcome: Outcome) -> None:
-        """Count what ends with the step, evaluate where it is due, and tell the callbacks."""
+    def _note_step(self, i: int, episode: Episode, outcome: Outcome) -> Exception | None:
+        """Count what ends with the step, evaluate where it is due, and tell the callbacks.
+
+        Gives the error of an evaluation, without which the step is whole.
+        """
         agent = self.agent
         rows: list[Row] = []
+        failure: Exception | None = None
         if outcome.ends:
             where = {"environment": i} if self.n_environments > 1 else {}
             rows.append(
@@ -571,13 +595,28 @@ class Training:
             agent.progress = self.n_steps / max(self.steps, self.n_steps)
         elif outcome.ends and self.episodes is not None:
             agent.progress = self.n_episodes / max(self.episodes, self.n_episodes)
-        if self.evaluate_every is not None and self.n_steps % self.evaluate_every == 0:
-            rows.append(self._evaluation())
+        if self._lacks_evaluation:
+            try:
+                rows.append(self._evaluation())
+            except Exception as error:
+                failure = error
+        self._tell(*rows, is_step=True)
+        return failure
+
+    def _tell(self, *rows: Row, is_step: bool = False) -> None:
         for callback in self.callbacks:
             for row in rows:
                 callback.on_row(self, row)
-            callback.on_step(self)
+            if is_step:
+                callback.on_step(self)
         self._rows += rows
+
+    @property
+    def _lacks_evaluation(self) -> bool:
+        """Whether one is due after this number of steps, and not made."""
+        if self.evaluate_every is None or self.n_steps == 0 or self.n_steps % self.evaluate_every:
+            return False
+        return not self.evaluations or self.evaluations[-1][0] != self.n_steps
 
     def _evaluation(self) -> Row:
         assert self.evaluation_env is not None

@@ -16,6 +16,7 @@ import click
 from sdnn.cli.output import EXIT_INTERRUPTED, json_text
 
 if TYPE_CHECKING:
+    from sdnn.agents.scaling import Scaling
     from sdnn.runs import ConfigError, Run, RunOutcome
 
 EXIT_TERMINATED = 143
@@ -112,13 +113,18 @@ def words_of_run(folder: Path) -> Callable[[ConfigError], str]:
 
 
 def value_of(text: str) -> Any:
-    """Read a value as TOML has it, such as 0.5, true or [1, 2]; anything else is a text."""
+    """Read a value as TOML has it, such as 0.5, true or [1, 2]; anything else is a text.
+
+    True and False are as Python writes them, too.
+    """
     if sys.version_info >= (3, 11):
         import tomllib
     else:
         import tomli as tomllib
     if "\n" in text:
         return text
+    if text in ("True", "False"):
+        return text == "True"
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
@@ -260,9 +266,8 @@ def _lines_of_ranges(report: Mapping[str, Any]) -> Iterator[str]:
         )
 
 
-def _lines_of_scaling(run: Run) -> Iterator[str]:
+def _lines_of_scaling(run: Run, scaling: Scaling | None) -> Iterator[str]:
     """Say what the agent needs wherever else it acts."""
-    scaling = run.config.environment.scaling()
     words = "" if scaling is None else scaling.words()
     if not words:
         return
@@ -307,7 +312,7 @@ def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
         )
     if report is not None:
         yield from _lines_of_ranges(report)
-    yield from _lines_of_scaling(run)
+    yield from _lines_of_scaling(run, outcome.scaling)
     commands: list[tuple[object, ...]] = [("plot", run.folder), ("evaluate", run.folder)]
     if outcome.has_pictures:
         commands.append(("record", run.folder, "x.gif"))

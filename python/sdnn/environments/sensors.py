@@ -76,14 +76,15 @@ class RedundantSensors(
                 f"bounds must have {len(self._functions)} entries, one per function, "
                 f"got {len(bounds)}"
             )
-        low = np.append(space.low, [low for low, _ in bounds]).astype(space.dtype)
-        high = np.append(space.high, [high for _, high in bounds]).astype(space.dtype)
-        self.observation_space = gym.spaces.Box(low, high, dtype=_float_type(space))
+        low = np.append(space.low, [low for low, _ in bounds])
+        high = np.append(space.high, [high for _, high in bounds])
+        dtype = _float_type(space)
+        self.observation_space = gym.spaces.Box(low.astype(dtype), high.astype(dtype), dtype=dtype)
 
     def observation(self, observation: Observation) -> Observation:
         """Append the functions' values, shape (l + n_functions,)."""
         extra = [function(observation) for function in self._functions]
-        return np.append(observation, extra).astype(observation.dtype)
+        return np.append(observation, extra).astype(_float_of(observation))
 
 
 class _RandomSensors(
@@ -168,7 +169,7 @@ class NoisySensors(_RandomSensors):
     def observation(self, observation: Observation) -> Observation:
         """Add the noise, shape (l,)."""
         noisy: Observation = self._noise.apply(observation)
-        return noisy.astype(observation.dtype)
+        return noisy.astype(_float_of(observation))
 
     def _restart(self, seed: int) -> None:
         self._noise = _core.SensorNoise(self.sigma, self._edges, seed_of(seed), self._stream)
@@ -240,6 +241,12 @@ def _vector_space(env: gym.Env[Observation, Any]) -> gym.spaces.Box:
     if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
         raise ValueError(f"env must have a one-dimensional Box of observations, got {space}")
     return space
+
+
+def _float_of(observation: Observation) -> np.dtype[Any]:
+    """Give the type of an observation with fractions: as it is told, unless in whole numbers."""
+    dtype = np.asarray(observation).dtype
+    return dtype if dtype.kind == "f" else np.dtype(np.float32)
 
 
 def _float_type(space: gym.spaces.Box) -> type[np.floating[Any]]:

@@ -27,6 +27,11 @@ class UnitSensors(
     observation_low, observation_high : array_like, shape (l,), optional
         The ranges; by default the bounds of the observation space.
 
+    Attributes
+    ----------
+    observation_low, observation_high : numpy.ndarray, shape (l,)
+        As used.
+
     Raises
     ------
     ValueError
@@ -54,18 +59,20 @@ class UnitSensors(
         space = env.observation_space
         if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
             raise ValueError(f"env must have a one-dimensional Box of observations, got {space}")
-        self._low = _ends("observation_low", observation_low, space.low)
-        self._high = _ends("observation_high", observation_high, space.high)
-        if not (self._low < self._high).all():
+        self.observation_low = _ends("observation_low", observation_low, space.low)
+        self.observation_high = _ends("observation_high", observation_high, space.high)
+        if not (self.observation_low < self.observation_high).all():
             raise ValueError(
-                f"observation_low must be below observation_high, got {self._low} and {self._high}"
+                "observation_low must be below observation_high,"
+                f" got {self.observation_low} and {self.observation_high}"
             )
         self.observation_space = gym.spaces.Box(0.0, 1.0, space.shape, np.float64)
 
     def observation(self, observation: NDArray[Any]) -> NDArray[np.float64]:
         """Scale an observation, shape (l,)."""
         values = np.asarray(observation, np.float64)
-        return np.clip((values - self._low) / (self._high - self._low), 0.0, 1.0)
+        low, high = self.observation_low, self.observation_high
+        return np.clip((values - low) / (high - low), 0.0, 1.0)
 
 
 def _ends(name: str, given: ArrayLike | None, bounds: NDArray[Any]) -> NDArray[np.float64]:

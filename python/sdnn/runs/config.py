@@ -252,7 +252,7 @@ class RunConfig:
             )
         except (TypeError, ValueError, OverflowError, MemoryError) as error:
             raise ConfigError(self._key_of(str(error)), str(error)) from error
-        agent.scaling = self.environment.scaling()
+        agent.scaling = self.environment.scaling(env)
         return agent
 
     def _key_of(self, message: str) -> str:

@@ -192,15 +192,16 @@ class RunEnvironment:
         with closing(self._bare(None)) as env:
             return self.ends(env)
 
-    def scaling(self) -> Scaling | None:
+    def scaling(self, env: gym.Env[Any, Any] | None = None) -> Scaling | None:
         """Say how what an agent observes is scaled; None: not at all.
 
-        The ranges are not known where the environment cannot be made.
+        Without an environment that `make` gave, one is made. The ranges are not known where it
+        cannot be.
         """
         if not self.changes_observations:
             return None
         try:
-            low, high = self.scaled_ranges()
+            low, high = self.scaled_ranges() if env is None else _scaled_from(env)
         except RunError:
             return Scaling(ranges=None, n_redundant=self.redundant)
         ranges = tuple(zip(low.tolist(), high.tolist(), strict=True))
@@ -255,6 +256,13 @@ class RunEnvironment:
             raise ConfigError(
                 key, f"{self.id} cannot be made: {type(error).__name__}: {error}"
             ) from error
+
+
+def _scaled_from(env: gym.Env[Any, Any]) -> Ends:
+    while not isinstance(env, UnitSensors):
+        assert isinstance(env, gym.Wrapper)  # make puts it there
+        env = env.env
+    return env.observation_low, env.observation_high
 
 
 def render_modes(env: gym.Env[Any, Any]) -> tuple[str, ...]:

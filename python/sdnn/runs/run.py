@@ -29,6 +29,7 @@ from sdnn.agents import (
     evaluate,
     load_agent,
 )
+from sdnn.agents.scaling import Scaling
 from sdnn.agents.spaces import require_same_kind
 from sdnn.agents.training import Row
 from sdnn.arguments import whole
@@ -103,6 +104,8 @@ class RunOutcome:
         Whether the agent has only acted at random so far, to see ranges, and learned nothing.
     has_pictures
         Whether the environment says that it can be rendered as pictures, as `record` needs it.
+    scaling
+        How what the agent observes is scaled; None: not at all.
     """
 
     n_steps: int
@@ -112,6 +115,7 @@ class RunOutcome:
     learning_report: Mapping[str, Any] | None
     is_warming_up: bool
     has_pictures: bool
+    scaling: Scaling | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -291,6 +295,7 @@ class Run:
             learning_report=_report(agent),
             is_warming_up=agent.is_warming_up,
             has_pictures="rgb_array" in render_modes(_one_of(env)),
+            scaling=agent.scaling,
         )
 
     def agent(self) -> Agent[Any, Any]:
@@ -404,6 +409,11 @@ class Run:
     ) -> Training:
         path = self.folder / CHECKPOINT
         if not path.exists():
+            if (self.folder / AGENT).exists():
+                raise RunError(
+                    f"{self.folder} was trained, but has no {CHECKPOINT} to go on from: a new run"
+                    f" needs another folder, {AGENT} would be written over"
+                )
             goal = self.goals[-1] if self.goals else self.config
             return Training(
                 self.config.make_agent(_one_of(env)),

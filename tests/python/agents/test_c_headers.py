@@ -611,6 +611,8 @@ def test_numbers_of_fixed_point_fit_32_bits():
     assert c_header(wide, "policy", fraction_bits=3).fraction_bits == 3
     with pytest.raises(ValueError, match=r"fraction_bits must be at most 14, .* got 15"):
         c_header(wide, "policy", fraction_bits=15)
+    encoder = SDNNQLearning(box(1e5, 1.0), Discrete(2), angles=[0], approximator=SMALL)
+    assert c_header(encoder, "policy").fraction_bits == 14
     strong = SDNNQLearning(box(1.0, 1.0), box(40000.0), approximator=SMALL)
     assert c_header(strong, "policy").fraction_bits == 15
     huge = SDNNQLearning(box(1e10, 1.0), Discrete(2), approximator=SMALL)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from sdnn.agents.observations import UnitObservations
+from sdnn.bounds import flat_bounds
 
 BOX = gym.spaces.Box(np.array([-1.0, 0.0]), np.array([3.0, 10.0]), dtype=np.float64)
 UNBOUNDED = gym.spaces.Box(-np.inf, np.inf, (3,), dtype=np.float64)
@@ -38,6 +39,21 @@ def test_unknown_ranges_are_those_seen_and_a_quarter_more_at_each_end():
 def test_the_largest_float_means_infinity():
     limit = np.finfo(np.float32).max
     assert not UnitObservations(gym.spaces.Box(-limit, limit, (2,))).is_settled
+
+
+@pytest.mark.parametrize("dtype", [np.int32, np.int64])
+def test_infinity_in_whole_numbers_is_infinity(dtype):
+    box = gym.spaces.Box
+    parts = {"up": box(0, np.inf, (1,), dtype), "all": box(-np.inf, np.inf, (2,), dtype)}
+    space = gym.spaces.Dict({**parts, "byte": box(0, 255, (1,), np.uint8)})
+    low, high = flat_bounds(space)  # in the order of their names
+    assert low.tolist() == [-np.inf, -np.inf, 0.0, 0.0]
+    assert high.tolist() == [np.inf, np.inf, 255.0, np.inf]
+    assert not UnitObservations(space).is_settled
+    assert flat_bounds(box(np.int16(-32768), np.int16(32767), (1,), np.int16))[1] == [32767.0]
+    most = np.iinfo(np.uint32).max
+    low, high = flat_bounds(box(0, most, (1,), np.uint32))
+    assert (low, high) == ([0.0], [np.inf])
 
 
 def test_only_unknown_ranges_are_learned():
@@ -307,7 +323,14 @@ def test_an_angle_needs_a_range():
     [
         (gym.spaces.Dict({"a": gym.spaces.Box(0, 1, (1,))}), {"b": [0.5]}),
         (gym.spaces.Dict({"a": gym.spaces.Box(0, 1, (1,))}), 3.0),
+        (gym.spaces.Dict({"a": gym.spaces.Box(0, 1, (3,))}), {"a": 0.5}),
+        (gym.spaces.Tuple([gym.spaces.Box(0, 1, (2,))]), ([0.5, 0.5], 1.0)),
         (gym.spaces.Discrete(3), 7),
+        (gym.spaces.Discrete(3), -1),
+        (gym.spaces.Discrete(3, start=5), 4),
+        (gym.spaces.MultiDiscrete([3, 2]), [0, 2]),
+        (gym.spaces.MultiDiscrete([3, 2]), [-1, 0]),
+        (gym.spaces.MultiBinary(2), [1]),
         (gym.spaces.Discrete(3), "one"),
     ],
 )

@@ -1,5 +1,6 @@
 """The loop over an environment: its rows, its ends, and going on exactly."""
 
+import copy
 import functools
 import json
 import os
@@ -316,6 +317,113 @@ def test_what_several_learned_before_one_failed_is_kept(has_own_resets, tmp_path
     assert states_equal(loaded.agent, agent) != has_own_resets
 
 
+def test_a_start_that_cannot_be_made_does_not_stop_a_training_for_ever(tmp_path):
+    env = Corridor()
+    corridor_agent().train(env, episodes=4, seed=7)
+    bad = env.seeds[2:4]
+
+    class Picky(Corridor):
+        def reset(self, *, seed=None, options=None):
+            if seed in bad:
+                raise RuntimeError("no such start")
+            return super().reset(seed=seed)
+
+    path = tmp_path / "checkpoint"
+    callbacks = [Checkpoints(path)]
+    training = Training(corridor_agent(), Picky(), episodes=4, seed=7, callbacks=callbacks)
+    for _ in bad:
+        with pytest.raises(RuntimeError, match="no such start"):
+            training.run()
+        assert training.n_episodes == 2
+        training = Training.load(path, Picky(), callbacks=callbacks)
+    assert training.run().n_episodes == 4
+    assert training.next_episode == 6
+
+
+@pytest.mark.parametrize("n_envs", [1, 2])
+def test_stopped_after_a_failure_a_training_goes_on_exactly(n_envs, tmp_path):
+    make, options = KINDS["sdnn"]
+    envs = [FailsOnce] * (n_envs - 1) + [functools.partial(FailsOnce, ("step", 33))]
+
+    def finished(stop):
+        env = gym.vector.SyncVectorEnv(envs) if n_envs > 1 else envs[0]()
+        agent = make(FailsOnce.observation_space, FailsOnce.action_space, seed=3, **options)
+        training = Training(agent, env, steps=200, callbacks=[Stop(stop, tmp_path / "t")])
+        with pytest.raises(TimeoutError):
+            training.run()
+        if training.run().is_finished:
+            return training
+        fresh = gym.vector.SyncVectorEnv([FailsOnce] * n_envs) if n_envs > 1 else FailsOnce()
+        loaded = Training.load(tmp_path / "t", fresh)
+        assert loaded.run().is_finished
+        return loaded
+
+    whole, cut = finished(1000), finished(150)
+    assert states_equal(whole.agent, cut.agent)
+    assert whole.next_episode == cut.next_episode
+
+
+def test_where_an_evaluation_fails_it_is_made_first_thereafter(tmp_path):
+    path, rows = tmp_path / "checkpoint", tmp_path / "rows.jsonl"
+    every = {"steps": 100, "evaluate_every": 25, "evaluation_episodes": 2}
+    make, options = KINDS["sdnn"]
+
+    def training(evaluation_env, name):
+        agent = make(FailsOnce.observation_space, FailsOnce.action_space, seed=3, **options)
+        callbacks = [JSONLines(tmp_path / name), Checkpoints(path, every=1000)]
+        evaluations = {"evaluation_env": evaluation_env, **every}
+        return Training(agent, FailsOnce(), callbacks=callbacks, **evaluations)
+
+    whole = training(FailsOnce(), "whole")
+    whole.run()
+    cut = training(FailsOnce(("reset", 3)), "rows.jsonl")  # the second evaluation's first
+    with pytest.raises(TimeoutError):
+        cut.run()
+    assert (cut.n_steps, cut.is_within_step, len(cut.evaluations)) == (50, False, 1)
+    again = FailsOnce(("reset", 1))
+    loaded = Training.load(path, FailsOnce(), evaluation_env=again, callbacks=[JSONLines(rows)])
+    with pytest.raises(TimeoutError):
+        loaded.run()
+    assert loaded.n_steps == 50
+    for one in (loaded, cut):
+        one.run()
+        assert one.evaluations == whole.evaluations
+        assert states_equal(one.agent, whole.agent)
+
+    def told(place):
+        lines = [json.loads(line) for line in place.read_text().splitlines()]
+        return [{k: v for k, v in line.items() if k != "seconds"} for line in lines]
+
+    assert told(rows) == told(tmp_path / "whole")
+
+
+def test_evaluations_are_in_one_environment():
+    several = gym.vector.SyncVectorEnv([Corridor] * 2)
+    with pytest.raises(TypeError, match="env must be a single environment, got a vector"):
+        evaluate(corridor_agent(), several)
+    with pytest.raises(TypeError, match="evaluation_env must be a single environment, got a vec"):
+        corridor_agent().train(Corridor(), steps=9, evaluate_every=3, evaluation_env=several)
+
+
+def test_a_second_training_meets_other_episodes(tmp_path):
+    env, agent = Corridor(), corridor_agent()
+    agent.train(env, episodes=3)
+    agent.save(tmp_path / "agent")
+    for one in (agent, load_agent(tmp_path / "agent"), copy.deepcopy(agent)):
+        one.train(env, steps=20)
+    n = (len(env.seeds) - 3) // 3
+    first = env.seeds[3 : 3 + n]
+    assert env.seeds[3:] == 3 * first
+    assert len({*env.seeds[:3], *first}) == 3 + n
+    one_go = Corridor()
+    corridor_agent().train(one_go, episodes=5)
+    assert one_go.seeds == env.seeds[:5]
+    again = Corridor()
+    for _ in range(2):
+        agent.train(again, episodes=2, seed=4)
+    assert again.seeds[:2] == again.seeds[2:], "as it was asked for"
+
+
 class Killed(Checkpoints):
     """Has no time for a last checkpoint."""
 
@@ -474,7 +582,7 @@ def test_new_episodes_begin_where_none_are_repeated(tmp_path):
     assert states_equal(training.agent, first)
     assert training.n_steps == 20
     assert training.run().n_steps == 200
-    assert new.seeds[0] == env.seeds[-1], "the episode that was left is the next one"
+    assert not set(new.seeds) & set(env.seeds), "the episode that was left is not begun again"
     rows = [json.loads(line) for line in path.read_text().splitlines()]
     assert [row["episode"] for row in rows] == list(range(training.n_episodes))
     assert [row["step"] for row in rows] == sorted(row["step"] for row in rows)

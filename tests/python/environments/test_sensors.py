@@ -67,6 +67,30 @@ def test_own_functions_of_the_base_observation():
         assert observation[6] == 4.0
 
 
+class Switches(gym.Env):
+    """Observes whole numbers."""
+
+    observation_space = gym.spaces.Box(0, 1, (3,), np.int8)
+    action_space = gym.spaces.Discrete(2)
+
+    def reset(self, *, seed=None, options=None):
+        return np.array([0, 1, 1], np.int8), {}
+
+
+def test_whole_numbers_get_fractions():
+    noisy = NoisySensors(Switches(), 0.02, edge="saturate")
+    seen, _ = noisy.reset(seed=1)
+    assert noisy.observation_space.contains(seen)
+    assert seen[0] < 0.1
+    assert (seen[1:] > 0.9).all()
+    assert ((seen > 0.0) & (seen < 1.0)).any()
+    more = RedundantSensors(Switches(), [lambda s: s.mean() / 2], bounds=[(0.0, 0.5)])
+    seen, _ = more.reset()
+    assert more.observation_space.contains(seen)
+    assert more.observation_space.high[3] == 0.5
+    assert seen.tolist() == [0.0, 1.0, 1.0, np.float32(1 / 3)]
+
+
 def test_edges_can_be_chosen():
     env = gym.wrappers.TransformObservation(
         AcrobotSwingUpEnv(), np.ones_like, gym.spaces.Box(0.0, 1.0, (4,), np.float32)

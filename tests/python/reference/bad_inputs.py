@@ -411,6 +411,7 @@ def arguments(agent, parameters):
         "steps": 5,
         "episodes": None,
         "seed": 3,
+        "first_episode": 0,
         "callbacks": (),
         "progress": False,
         "evaluate_every": None,

@@ -577,6 +577,15 @@ def test_a_broken_evaluation_is_one_line(invoke, monkeypatch):
         assert f"Error: {BROKEN}: env gave what cannot be evaluated, in step 3 of" in result.stderr
 
 
+def test_scaled_observations_need_no_second_environment(invoke):
+    only = ("drifting_env:tests/Only-v0", *SHORT, "--redundant", 1, "--range", "all=-2:2")
+    done = invoke("train", *only, "--evaluate-every", 0, "--out", "one")
+    assert done.exit_code == 0
+    assert "scaled to [0, 1], 0 from -2 to 2, 1 from -2 to 2" in done.stdout
+    scaling = load_agent("one/agent.safetensors").scaling
+    assert scaling.ranges == ((-2.0, 2.0), (-2.0, 2.0))
+
+
 def test_without_evaluations_one_environment_is_open_at_a_time(invoke):
     only = ("drifting_env:tests/Only-v0", *SHORT)
     assert invoke("train", *only, "--evaluate-every", 0, "--out", "one").exit_code == 0
@@ -722,7 +731,8 @@ def test_other_failures_are_exit_code_1(invoke, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("0.5", 0.5), ("7", 7), ("true", True), ("[1, 2]", [1, 2]), ("middle", "middle"),
+        ("0.5", 0.5), ("7", 7), ("true", True), ("True", True), ("False", False),
+        ("[1, 2]", [1, 2]), ("middle", "middle"),
         ('"7"', "7"), ("", ""), ("a\nb", "a\nb"), ("1 # one", 1),
     ],
 )  # fmt: skip

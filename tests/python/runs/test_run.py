@@ -206,6 +206,17 @@ def test_what_is_there_is_not_overwritten(whole, tmp_path):
         Run.create(tmp_path / "mine" / "thesis.txt", CONFIG)
 
 
+def test_what_was_learned_is_not_written_over_by_a_new_beginning(tmp_path):
+    run = Run.create(tmp_path / "run", CONFIG)
+    (run.folder / "rows.jsonl").write_text("")  # killed before the first checkpoint
+    run.train()
+    (run.folder / "checkpoint.safetensors").unlink()
+    before = [path.read_bytes() for path in sorted(run.folder.iterdir())]
+    with pytest.raises(RunError, match=r"was trained, but has no checkpoint.safetensors to go on"):
+        Run.open(run.folder).train(steps=1000)
+    assert [path.read_bytes() for path in sorted(run.folder.iterdir())] == before
+
+
 def test_nothing_is_written_for_what_cannot_work(tmp_path):
     wrong = dataclasses.replace(CONFIG, environment=RunEnvironment(id="Nothing-v0"))
     with pytest.raises(ConfigError):
