@@ -84,10 +84,15 @@ class TrialSettings(ABC):
     def canonical_json(self) -> str:
         """All values as one line of JSON: keys sorted, no spaces, 1.0 written as 1.
 
+        With the agent's version, where its entry has one.
+
         Equal settings give equal text, however they were typed.
         """
+        values = plain_values(self)
+        if version := agent_entry(self.agent).version:
+            values["agent_version"] = version
         return json.dumps(
-            _canonical(plain_values(self)), sort_keys=True, separators=(",", ":"), allow_nan=False
+            _canonical(values), sort_keys=True, separators=(",", ":"), allow_nan=False
         )
 
     @property

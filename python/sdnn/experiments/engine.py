@@ -160,7 +160,7 @@ def run_trials(
                     case Lost(trial):
                         watcher.lost(trial)
                     case Finished(trial, record):
-                        store.add(record)
+                        store.add(record, is_exact=trial.config.is_compiled)
                         n_run += 1
                         watcher.finished(trial)
                     case Failed(trial, error):

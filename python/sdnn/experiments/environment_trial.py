@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import gymnasium as gym
@@ -131,7 +131,10 @@ class EnvironmentTrial(EpisodeLoop):
         with ExitStack() as stack:
             env = config.environment.make(seed, "sensor_noise")
             stack.callback(env.close)
-            test_env = config.environment.make(seed, "evaluation_sensor_noise")
+            tested = config.environment
+            if not config.protocol.noisy_tests:
+                tested = replace(tested, noise=0.0)
+            test_env = tested.make(seed, "evaluation_sensor_noise")
             stack.callback(test_env.close)
             agent = self._agent_in(env, test_env, config, seed)
             stack.pop_all()

@@ -122,6 +122,15 @@ def draw_experiment(
             bbox_to_anchor=(0.975, 1 - 0.08 / height), ncols=len(agents),
         )  # fmt: skip
     _label(figure, experiment, results, quick)
+    return as_written(figure)
+
+
+def as_written(figure: Figure) -> Figure:
+    """Leave dollar signs in a figure's words as they are: the user's titles hold no formulas."""
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        text.set_parse_math(False)
     return figure
 
 

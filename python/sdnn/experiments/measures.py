@@ -31,6 +31,9 @@ STEP_MEASURES: tuple[MeasureName, ...] = (
 )  # fmt: skip
 """Of tasks that are to be solved in few steps, as the acrobot's."""
 
+CENSORED_MEASURES: tuple[MeasureName, ...] = ("episodes_to_learn", "episode_of_collapse")
+"""Of which it may only be known that they are beyond the last episode: then they are infinite."""
+
 RETURN_MEASURES: tuple[MeasureName, ...] = ("final_return", "mean_return")
 """Of any task."""
 

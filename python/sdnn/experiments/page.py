@@ -139,7 +139,7 @@ def to_html(report: Report, pictures: Mapping[str, bytes], call: Call) -> str:
         cost_rows=cost_rows(report.costs),
         case_header=CASE_HEADER,
         claim_header=CLAIM_HEADER,
-        claim_rows=claim_rows(report.claims, report.last_episode),
+        claim_rows=claim_rows(report.claims),
         power_header=POWER_HEADER,
         power_rows=power_rows(report),
         power_note=POWER_NOTE,

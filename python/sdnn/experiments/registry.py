@@ -74,6 +74,9 @@ class AgentEntry:
         The word used on the command line and in the result file.
     title
         The word used in figures and tables.
+    version
+        Of the agent's code: another one where it changed, so that trials of before do not count as
+        its own. It is part of what is stored of a trial.
     approximator
         Settings of what the agent learns with: a frozen dataclass of plain values whose defaults
         are those of the experiments; it has a field ``n_inputs``.
@@ -101,6 +104,7 @@ class AgentEntry:
     core_trial: Callable[..., Trial] | None = None
     preset: Preset | None = None
     costs: tuple[CostSeries, ...] = ()
+    version: str = ""
 
     def approximator_settings(self, n_inputs: int) -> Any:
         """Return the approximator's settings in experiments, for so many inputs."""

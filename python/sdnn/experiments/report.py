@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, Experiment
-from sdnn.experiments.claims import Claim, Growth, Quantity, describe
-from sdnn.experiments.measures import DEFAULT_MEASURES, MeasureName
+from sdnn.experiments.claims import Claim, Growth, describe
+from sdnn.experiments.measures import DEFAULT_MEASURES, RETURN_MEASURES, MeasureName
 from sdnn.experiments.power import MULTIPLES, N_DRAWS, Power, powers
 from sdnn.experiments.records import CostRecord
 from sdnn.experiments.registry import agent_entry, cost_series
@@ -140,12 +140,6 @@ class Report:
         found = ((claim, one, powers(one)) for claim, one in checked)
         return tuple(row for row in found if row[2])
 
-    @property
-    def last_episode(self) -> int:
-        """Learning episodes of a trial."""
-        episodes = [s.result.last_episode for e in self.experiments for s in e.summaries]
-        return max(episodes, default=PAPER_EPISODES)
-
     def tables(self) -> list[tuple[str, Sequence[str], Sequence[Sequence[str]]]]:
         """Title, header and rows of every table."""
         tables: list[tuple[str, Sequence[str], Sequence[Sequence[str]]]] = [
@@ -155,7 +149,7 @@ class Report:
         if self.costs:
             tables.append(("Cost of a step", cost_header(), cost_rows(self.costs)))
         if self.claims:
-            claims = claim_rows(self.claims, self.last_episode)
+            claims = claim_rows(self.claims)
             tables.append(("Beside the paper's claims", CLAIM_HEADER, claims))
         if self.powers:
             tables.append(("What is undecided", POWER_HEADER, power_rows(self)))
@@ -188,15 +182,39 @@ def format_estimate(estimate: Estimate, measure: MeasureName, last_episode: int)
     '90 % [80, 100]'
     """
     scale, unit = (100, " %") if measure == "final_share_solved" else (1, "")
+    decimals = decimals_of(estimate, measure)
 
     def number(value: float) -> str:
-        return f">{last_episode}" if math.isinf(value) else f"{round(scale * value, 1):g}"
+        return f">{last_episode}" if math.isinf(value) else plain_number(scale * value, decimals)
 
     if math.isnan(estimate.value):
         return "-"
     if math.isnan(estimate.lower):
         return number(estimate.value) + unit
     return f"{number(estimate.value)}{unit} [{number(estimate.lower)}, {number(estimate.upper)}]"
+
+
+def decimals_of(estimate: Estimate, measure: MeasureName) -> int:
+    """Choose the decimals of an estimate: two digits of a return's interval, else one decimal."""
+    ends = np.array([estimate.value, estimate.lower, estimate.upper])
+    ends = ends[np.isfinite(ends)]
+    if measure not in RETURN_MEASURES or not ends.any():
+        return 1
+    extent = float(np.ptp(ends)) or float(np.abs(ends).max()) / 100
+    return min(max(1, 1 - math.floor(math.log10(extent))), 300)
+
+
+def plain_number(value: float, decimals: int, sign: str = "") -> str:
+    """Write a number with so many decimals at most.
+
+    Examples
+    --------
+    >>> plain_number(2.50, 2), plain_number(-0.01, 1), plain_number(0.25, 2, sign="+")
+    ('2.5', '0', '+0.25')
+    """
+    rounded = round(value, decimals) or 0.0
+    text = f"{rounded:{sign}.{decimals}f}".rstrip("0").rstrip(".")
+    return text if rounded else "0"
 
 
 def case_rows(summaries: Sequence[CaseSummary]) -> list[tuple[str, ...]]:
@@ -220,7 +238,7 @@ def case_rows(summaries: Sequence[CaseSummary]) -> list[tuple[str, ...]]:
     return rows
 
 
-def claim_rows(outcomes: Sequence[ClaimOutcome], last_episode: int) -> list[tuple[str, ...]]:
+def claim_rows(outcomes: Sequence[ClaimOutcome]) -> list[tuple[str, ...]]:
     """Rows of the table of claims, under `CLAIM_HEADER`.
 
     A claim of several checks has a row of its own, with the verdict about all, before theirs.
@@ -233,11 +251,7 @@ def claim_rows(outcomes: Sequence[ClaimOutcome], last_episode: int) -> list[tupl
             start = ("", "")
         for checked in outcome.checks:
             quantity = checked.check.quantity
-            ours = (
-                "-"
-                if checked.estimate is None
-                else _format_quantity(quantity, checked.estimate, last_episode)
-            )
+            ours = _format_quantity(checked)
             rows.append(
                 (*start, describe(quantity), checked.check.paper, ours, checked.verdict.value)
             )
@@ -249,20 +263,22 @@ def power_rows(report: Report) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for claim, checked, found in report.powers:
         quantity = checked.check.quantity
-        assert checked.estimate is not None  # else it is not run
-        ours = _format_quantity(quantity, checked.estimate, report.last_episode)
+        ours = _format_quantity(checked)
         chances = (f"{100 * one.holds:.0f} / {100 * one.fails:.0f} %" for one in found)
         rows.append((str(claim.number), describe(quantity), ours, *chances))
     return rows
 
 
-def _format_quantity(quantity: Quantity, estimate: Estimate, last_episode: int) -> str:
+def _format_quantity(checked: CheckOutcome) -> str:
+    quantity, estimate = checked.check.quantity, checked.estimate
+    if estimate is None:
+        return "-"
     if isinstance(quantity, Growth):
         return _growth(estimate.value) + (
             "" if math.isnan(estimate.lower)
             else f" [{_growth(estimate.lower)}, {_growth(estimate.upper)}]"
         )  # fmt: skip
-    return format_estimate(estimate, quantity.measure, last_episode)
+    return format_estimate(estimate, quantity.measure, checked.last_episode)
 
 
 def _growth(ratio: float) -> str:
@@ -333,7 +349,7 @@ def to_json(report: Report) -> dict[str, Any]:
             for one in report.experiments
         ],
         "costs": [cost.to_json() for cost in report.costs],
-        "claims": [outcome.to_json(report.last_episode) for outcome in report.claims],
+        "claims": [outcome.to_json() for outcome in report.claims],
         "powers": [
             {
                 "claim": claim.number,

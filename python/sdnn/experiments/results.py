@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sdnn.experiments import measures, statistics
 from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, Case, Experiment
 from sdnn.experiments.measures import (
+    CENSORED_MEASURES,
     DEFAULT_MEASURES,
     STEP_MEASURES,
     MeasureConfig,
@@ -125,10 +126,19 @@ class CaseSummary:
     medians: dict[MeasureName, Estimate]
     median_curve_episodes_to_learn: float
 
-    def uncensored(self, measure: MeasureName) -> NDArray[np.float64]:
-        """Return a measure of each trial, (n_trials,), infinite ones as the last episode."""
+    def uncensored(
+        self, measure: MeasureName, last_episode: int | None = None
+    ) -> NDArray[np.float64]:
+        """Return a measure of each trial, (n_trials,), censored ones as the last episode.
+
+        With another last episode it is as if the trials had ended there.
+        """
         values = self.values[measure]
-        return np.where(np.isposinf(values), self.result.last_episode, values)
+        if measure not in CENSORED_MEASURES:
+            return values
+        return np.minimum(
+            values, self.result.last_episode if last_episode is None else last_episode
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Return it as values that JSON can hold."""
@@ -157,6 +167,17 @@ class CaseSummary:
             "n_decisions": result.n_decisions,
             "microseconds_per_decision": json_number(result.microseconds_per_decision, None),
         }
+
+
+def on_equal_terms(
+    measure: MeasureName, *summaries: CaseSummary
+) -> tuple[NDArray[np.float64], ...]:
+    """Return a measure of each trial of several, censored where the shortest trials end.
+
+    Else what only lasts longer would seem to differ.
+    """
+    last_episode = min(summary.result.last_episode for summary in summaries)
+    return tuple(summary.uncensored(measure, last_episode) for summary in summaries)
 
 
 def collect(experiment: Experiment, records: Iterable[TrialRecord]) -> tuple[CaseResult, ...]:

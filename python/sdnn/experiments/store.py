@@ -7,8 +7,10 @@ as a whole or not at all. Trials under different settings live side by side unde
 from __future__ import annotations
 
 import json
+import math
 import os
 import sqlite3
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -33,6 +35,12 @@ APPLICATION_ID = int.from_bytes(b"sdnn", "big")
 """Marks a SQLite file as ours (SQLite's header field of that name)."""
 BUSY_SECONDS = 60.0
 """How long to wait for another process that writes the same file."""
+
+EMPTIED_EVERY = 1.0
+"""Seconds between two times that SQLite's log is emptied, which takes some hundredths of one."""
+
+_LOG_HEAD_BYTES, _FRAME_HEAD_BYTES = 32, 24
+"""Of the log that SQLite keeps beside a file, by its file format."""
 
 _SCHEMA = """
 CREATE TABLE trials (
@@ -83,6 +91,7 @@ class ResultStore:
     def __init__(self, folder: str | Path, *, read_only: bool = False) -> None:
         folder = Path(folder)
         self.path = folder / STORE_NAME
+        self._emptied_at = -math.inf
         if folder.exists() and not folder.is_dir():
             raise StoreError(f"the output must be a folder, but {folder} is a file")
         with _as_store_error(self.path):
@@ -132,15 +141,23 @@ class ResultStore:
         """Close the file."""
         self._connection.close()
 
-    def add(self, record: TrialRecord) -> None:
+    def add(self, record: TrialRecord, *, is_exact: bool = True) -> None:
         """Store a finished trial, as a whole or not at all.
 
         Storing the same trial again (another process was quicker) changes nothing.
 
+        Parameters
+        ----------
+        record
+            The trial.
+        is_exact
+            Whether it owes the same rows each time, as compiled trials do. The first rows stay
+            where it does not.
+
         Raises
         ------
         StoreError
-            If the file cannot be written, or holds other rows under the same key.
+            If the file cannot be written, or holds other rows of an exact trial.
         """
         rows = record.rows
         digest = rows.digest()
@@ -152,7 +169,7 @@ class ResultStore:
                 record.key,
             ).fetchone()
             if known is not None:
-                if known[0] != digest:
+                if is_exact and known[0] != digest:
                     raise StoreError(
                         f"{self.path} already holds other rows for {record.key}:"
                         " the same trial gave two results"
@@ -178,6 +195,23 @@ class ResultStore:
                 "INSERT INTO rows VALUES (?, ?, ?, ?, ?)",
                 ((trial_id, *row) for row in zip(*(c.tolist() for c in columns), strict=True)),
             )
+        self._empty_log()
+
+    def _empty_log(self) -> None:
+        """Bring what SQLite keeps beside the file into it, so that it is whole if it is copied.
+
+        And so that a killed process leaves nothing that would be taken for part of another file in
+        its place. While others read or write it has to wait for the next time, as it does where
+        trials come quickly.
+        """
+        now = time.monotonic()
+        if now - self._emptied_at < EMPTIED_EVERY:
+            return
+        self._emptied_at = now
+        with _as_store_error(self.path):
+            self._connection.execute("PRAGMA busy_timeout = 0")
+            self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+            self._connection.execute(f"PRAGMA busy_timeout = {int(1000 * BUSY_SECONDS)}")
 
     def keys(self) -> set[TrialKey]:
         """Return the keys of all stored trials."""
@@ -275,6 +309,7 @@ class ResultStore:
                     json.dumps(times.microseconds.tolist()),
                 ),
             )
+        self._empty_log()
 
     def load_costs(self, config_hash: str) -> tuple[CostRecord, ...]:
         """Return the measurements under the given settings, sorted by key."""
@@ -331,6 +366,7 @@ def _inspect(path: Path) -> bool:
             connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
     if not path.exists() or path.stat().st_size == 0:
         return True
+    _refuse_other_log(path)
     with path.open("rb") as file:
         if file.read(16) != b"SQLite format 3\0":
             raise sqlite3.DatabaseError("no SQLite file")
@@ -357,6 +393,34 @@ def _inspect(path: Path) -> bool:
         return False
     finally:
         connection.close()
+
+
+def _refuse_other_log(path: Path) -> None:
+    """Refuse a file beside which lies the log of another one, which SQLite would write into it.
+
+    As where a file was copied to the place of one whose process was killed. Files only grow here,
+    so one that has more pages than its log knows of is not the log's.
+    """
+    log = path.with_name(f"{path.name}-wal")
+    n_bytes = path.stat().st_size  # before the log is read: others may write to both
+    if not log.exists():
+        return
+    with log.open("rb") as file:
+        head = file.read(_LOG_HEAD_BYTES)
+        if len(head) < _LOG_HEAD_BYTES:
+            return
+        page_bytes, salts = int.from_bytes(head[8:12], "big"), head[16:24]
+        n_pages = 0
+        while len(frame := file.read(_FRAME_HEAD_BYTES)) == _FRAME_HEAD_BYTES:
+            if frame[8:16] != salts:
+                break
+            n_pages = int.from_bytes(frame[4:8], "big") or n_pages  # 0 but at a commit
+            file.seek(page_bytes, os.SEEK_CUR)
+    if 0 < n_pages * page_bytes < n_bytes:
+        raise StoreError(
+            f"{log} is the log of another file than {path}, which it would overwrite: if you have"
+            f" copied the file there, remove {log.name} and {path.name}-shm"
+        )
 
 
 def _is_writable(folder: Path) -> bool:

@@ -13,17 +13,18 @@ It was written down before the trials of Experiment B were run:
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.experiments.cases import PAPER_EPISODES
 from sdnn.experiments.claims import CLAIMS, Check, Claim, Difference, Growth, Subject, describe
 from sdnn.experiments.cost import CostConfig
 from sdnn.experiments.records import CostRecord
-from sdnn.experiments.results import CaseSummary
+from sdnn.experiments.results import CaseSummary, on_equal_terms
 from sdnn.experiments.statistics import Estimate, estimate_contrast, json_number
 
 
@@ -51,12 +52,14 @@ class CheckOutcome:
     """A check with what our data give; no estimate where its trials were not run.
 
     ``samples`` are the trials' values that it was judged by: one array, or two of a difference.
+    ``last_episode`` is that of the trials, where what is censored is cut off.
     """
 
     check: Check
     estimate: Estimate | None
     verdict: Verdict
     samples: tuple[NDArray[np.float64], ...] = field(default=(), compare=False, repr=False)
+    last_episode: int = PAPER_EPISODES
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,7 @@ class ClaimOutcome:
                 return decisive
         return Verdict.HOLDS
 
-    def to_json(self, last_episode: int) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """Return it as values that JSON can hold; what is censored becomes ``">last_episode"``."""
         return {
             "number": self.claim.number,
@@ -94,7 +97,7 @@ class ClaimOutcome:
                     "at_most": json_number(checked.check.at_most, None),
                     "ours": None
                     if checked.estimate is None
-                    else checked.estimate.to_json(last_episode),
+                    else checked.estimate.to_json(checked.last_episode),
                     "verdict": checked.verdict.value,
                 }
                 for checked in self.checks
@@ -144,11 +147,11 @@ def _judge(
         samples = (found[0].values[quantity.measure],)
         estimate = found[0].medians[quantity.measure]
     else:
-        values, others = (summary.uncensored(quantity.measure) for summary in found)
-        samples = (values, others)
+        samples = values, others = on_equal_terms(quantity.measure, *found)
         estimate = estimate_contrast(values, others)
     is_full = all(summary.result.is_paper_scale for summary in found)
-    return _outcome(check, estimate, is_full, samples)
+    last_episode = min(summary.result.last_episode for summary in found)
+    return replace(_outcome(check, estimate, is_full, samples), last_episode=last_episode)
 
 
 def _outcome(

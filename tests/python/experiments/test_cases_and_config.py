@@ -130,6 +130,13 @@ def test_a_setting_added_later_counts_where_it_is_not_the_default():
         assert other.config_hash != config.config_hash
 
 
+def test_changed_code_of_an_agent_is_another_version(monkeypatch):
+    config = TrialConfig()
+    monkeypatch.setitem(AGENTS, "sdnn-c", replace(AGENTS["sdnn-c"], version="2"))
+    assert '"agent_version":"2"' in config.canonical_json()
+    assert config.config_hash != "75969d030c881084"
+
+
 def test_config_hash_sees_every_room():
     base = TrialConfig()
     others = [

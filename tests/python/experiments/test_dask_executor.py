@@ -377,7 +377,7 @@ def test_an_unwritable_store_ends_the_run(pair, tmp_path):
     from sdnn.experiments import StoreError
 
     class Full(ResultStore):
-        def add(self, record):
+        def add(self, record, *, is_exact=True):
             raise StoreError("disk full")
 
     with Full(tmp_path) as store, pytest.raises(StoreError, match="disk full"):

@@ -144,7 +144,7 @@ def test_unwritable_store_stops_the_run(tmp_path, fake, use_trial):
     from sdnn.experiments import run_trials
 
     class Full(ResultStore):
-        def add(self, record):
+        def add(self, record, *, is_exact=True):
             raise StoreError("disk full")
 
     made = []
@@ -220,7 +220,7 @@ def test_an_executor_tells_and_the_engine_stores(tmp_path, fake, run, record):
 
 
 def test_an_executor_is_closed_when_the_store_fails(tmp_path, fake, run, record, monkeypatch):
-    def full(store, record):
+    def full(store, record, *, is_exact=True):
         raise StoreError("disk full")
 
     executor = Scripted(lambda a, b: Finished(a, record), lambda a, b: pytest.fail("asked again"))

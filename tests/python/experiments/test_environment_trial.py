@@ -186,6 +186,20 @@ def test_observations_are_scaled_and_noise_is_drawn_for_each(watched):
     assert 0.005 < deviations.std() < 0.02
 
 
+def test_tests_without_noise_have_none(watched):
+    config = watched(noise=0.2)
+    config.make_trial(3).advance(6)
+    quiet = replace(config, protocol=replace(PROTOCOL, noisy_tests=False))
+    quiet.make_trial(3).advance(6)
+    noisy, tested = Watcher.seen
+    assert [seen for seen in noisy if seen[0] == "learning"] == [
+        seen for seen in tested if seen[0] == "learning"
+    ]
+    counted = {seen[1] for seen in tested if seen[0] == "test"}
+    assert counted == {0.0, 0.1, 0.2}
+    assert not counted >= {seen[1] for seen in noisy if seen[0] == "test"}
+
+
 @pytest.mark.parametrize(
     ("agent", "approximator", "learning"),
     [

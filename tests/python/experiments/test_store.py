@@ -4,6 +4,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -104,7 +105,9 @@ with ResultStore(sys.argv[1], read_only=True) as store:
 def test_a_folder_on_a_file_system_that_is_read_only(tmp_path, is_killed):
     path, _ = filled(tmp_path / "out", 2)
     if is_killed:  # what is beside the file is left, and holds the third trial
-        with ResultStore(tmp_path / "out") as store:
+        with ResultStore(tmp_path / "out") as store, closing(sqlite3.connect(path)) as reader:
+            reader.execute("BEGIN")
+            reader.execute("SELECT count(*) FROM trials").fetchone()  # what it sees must stay
             store.add(make_record(2, steps=range(1, 60)))
             shutil.copytree(tmp_path / "out", tmp_path / "killed")
         path = tmp_path / "killed" / path.name
@@ -126,6 +129,41 @@ def test_a_folder_on_a_file_system_that_is_read_only(tmp_path, is_killed):
     assert (done.returncode, done.stdout) == (0, "3 3\n" if is_killed else "2 2\n"), done.stderr
 
 
+def test_after_a_trial_the_file_is_whole_by_itself(tmp_path, monkeypatch):
+    monkeypatch.setattr("sdnn.experiments.store.EMPTIED_EVERY", 0.0)
+    with ResultStore(tmp_path / "out") as store:
+        for trial in range(3):
+            store.add(make_record(trial, steps=range(1, 60)))
+            copied = tmp_path / str(trial)
+            copied.mkdir()
+            shutil.copy(store.path, copied)
+            with ResultStore(copied) as other:
+                assert len(other.load()) == trial + 1
+
+
+def test_a_file_in_the_place_of_one_that_left_its_log_is_not_overwritten(tmp_path):
+    path, _ = filled(tmp_path / "killed", 1)
+    with ResultStore(path.parent) as store, closing(sqlite3.connect(path)) as reader:
+        reader.execute("BEGIN")
+        reader.execute("SELECT count(*) FROM trials").fetchone()
+        store.add(make_record(1))
+        for copied in ("mine", "own"):
+            shutil.copytree(path.parent, tmp_path / copied)
+    other, digest = filled(tmp_path / "other", 20)
+    mine = tmp_path / "mine" / path.name
+    with ResultStore(tmp_path / "own") as store:
+        assert len(store.load()) == 2, "its own log is read"
+    shutil.copy(other, mine)
+    before = mine.read_bytes()
+    for read_only in (True, False):
+        with pytest.raises(StoreError, match=r"-wal is the log of another file than .*: if you"):
+            ResultStore(mine.parent, read_only=read_only)
+    assert mine.read_bytes() == before
+    mine.with_name(f"{mine.name}-wal").unlink()
+    with ResultStore(mine.parent) as store:
+        assert records_digest(store.load()) == digest
+
+
 def test_same_trial_twice_is_one_trial_and_other_rows_are_refused(tmp_path):
     with ResultStore(tmp_path) as store:
         store.add(make_record())
@@ -133,6 +171,7 @@ def test_same_trial_twice_is_one_trial_and_other_rows_are_refused(tmp_path):
         assert len(store.load()) == 1
         with pytest.raises(StoreError, match="gave two results"):
             store.add(make_record(steps=(50, 8)))
+        store.add(make_record(steps=(50, 8)), is_exact=False)
         assert store.load()[0].rows.steps.tolist() == [50, 7]
 
 

@@ -15,7 +15,7 @@ from sdnn.experiments.config import TrialConfig
 from sdnn.experiments.environment_trial import EnvironmentTrialConfig
 from sdnn.experiments.measures import RETURN_MEASURES, STEP_MEASURES, MeasureName
 from sdnn.experiments.records import TrialKey, TrialRecord
-from sdnn.experiments.results import CaseResult, CaseSummary, summarize
+from sdnn.experiments.results import CaseResult, CaseSummary, on_equal_terms, summarize
 from sdnn.experiments.statistics import Estimate, estimate_mean
 from sdnn.experiments.sweep.study import PAPER_CASES, Combination, Study, StudyCase, StudyVariant
 from sdnn.experiments.verdicts import ClaimOutcome, Verdict, judge_claims
@@ -36,7 +36,8 @@ class Measured:
         Its measures over trials.
     differences
         Mean over trials of what a measure is more than in the reference's trial of the same number,
-        censored values as the last episode; empty for the reference itself and without it.
+        censored values as the last episode of the shorter one; empty for the reference itself and
+        without it.
     """
 
     combination: Combination
@@ -222,7 +223,7 @@ def _differences(
     if reference is None:
         return {}
     return {
-        name: estimate_mean(summary.uncensored(name) - reference.uncensored(name))
+        name: estimate_mean(np.subtract(*on_equal_terms(name, summary, reference)))
         for name in summary.values
         if name in reference.values
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from sdnn.experiments.config import TrialSettings
@@ -12,6 +12,7 @@ from sdnn.experiments.errors import ExperimentError
 from sdnn.experiments.progress import describe
 from sdnn.experiments.records import TrialKey, TrialTime
 from sdnn.experiments.trial import opened
+from sdnn.machine import n_cores
 
 PROBE_SECONDS = 0.3
 """Processor time of a probe, about."""
@@ -130,13 +131,14 @@ def wall_seconds(trials: Iterable[tuple[Duration, bool]], jobs: int) -> tuple[fl
         Processor time of each, and whether it is compiled. Others share one core however many jobs
         there are: they hold Python's lock.
     jobs
-        Trials at the same time.
+        Trials at the same time; no more than there are cores are any help.
     """
-    lower, upper, lower_locked, upper_locked = 0.0, 0.0, 0.0, 0.0
-    for duration, is_compiled in trials:
-        lower += duration.lower
-        upper += duration.upper
-        if not is_compiled:
-            lower_locked += duration.lower
-            upper_locked += duration.upper
-    return max(lower / jobs, lower_locked), max(upper / jobs, upper_locked)
+    found = list(trials)
+    n_parallel = max(1, min(jobs, n_cores()))
+
+    def seconds(of_one: Callable[[Duration], float]) -> float:
+        times = [of_one(duration) for duration, _ in found]
+        locked = [of_one(duration) for duration, is_compiled in found if not is_compiled]
+        return max(sum(times) / n_parallel, max(times, default=0.0), sum(locked))
+
+    return seconds(lambda one: one.lower), seconds(lambda one: one.upper)

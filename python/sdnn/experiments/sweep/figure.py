@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.experiments.figures import FAINT, INK, agent_colors, require_matplotlib
-from sdnn.experiments.measures import MeasureName
+from sdnn.experiments.figures import FAINT, INK, agent_colors, as_written, require_matplotlib
+from sdnn.experiments.measures import CENSORED_MEASURES, MeasureName
 from sdnn.experiments.statistics import estimate_mean
 from sdnn.experiments.sweep.comparison import Comparison, Measured
 from sdnn.experiments.sweep.report import end_solved
@@ -92,10 +92,16 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
         "Faint dots: trials. Large dot: their median (of the share solved: mean) with its 95 %"
         " interval; filled: the reference, and what\ndiffers from it trial by trial (the interval"
         " of the mean paired difference leaves 0 out)."
-        " Numbers at the right: trials that end solved.\n" + footer,
+        " Numbers at the right: trials that end solved." + _of_lengths(comparison) + "\n" + footer,
         fontsize=6.5, va="bottom", color=FAINT, linespacing=1.4,
     )  # fmt: skip
-    return figure
+    return as_written(figure)
+
+
+def _of_lengths(comparison: Comparison) -> str:
+    """Say what triangles are, where trials differ in length and so where they are cut off."""
+    ends = {one.summary.result.last_episode for one in comparison.measured.values()}
+    return " Triangles: beyond the last episode." if len(ends) > 1 else ""
 
 
 def _draw_case(
@@ -107,12 +113,16 @@ def _draw_case(
     agents = (one.combination.config.agent for one in comparison.measured.values())
     colors = agent_colors(list(dict.fromkeys(agents)))
     for axes, name in zip(pair, names, strict=True):
+        # Where all trials are of one length, what is censored lies at the end of the axis.
+        ends = {one.summary.result.last_episode for one in measured}
+        marks_censored = name in CENSORED_MEASURES and len(ends) > 1
         for one in measured:
             variant = one.combination.variant.id
             color = colors[one.combination.config.agent]
             _draw_variant(
-                axes, one, name, ids.index(variant), color, variant == comparison.study.reference
-            )
+                axes, one, name, ids.index(variant), color, variant == comparison.study.reference,
+                marks_censored,
+            )  # fmt: skip
         _style(axes, measured, name, len(ids))
         titles = [variant.title for variant in comparison.variants] if with_names else []
         axes.set_yticks(range(len(ids)), titles or [""] * len(ids))
@@ -123,8 +133,9 @@ def _draw_case(
 
 
 def _draw_variant(
-    axes: Axes, measured: Measured, name: MeasureName, line: int, color: str, is_reference: bool
-) -> None:
+    axes: Axes, measured: Measured, name: MeasureName, line: int, color: str, is_reference: bool,
+    marks_censored: bool,
+) -> None:  # fmt: skip
     summary = measured.summary
     if name not in summary.values:
         return
@@ -133,8 +144,15 @@ def _draw_variant(
     values = scale * summary.uncensored(name)
     # By rank, so that equal values lie side by side and the picture is the same each time.
     order = np.argsort(np.argsort(values, kind="stable"))
-    offsets = np.linspace(-_SPREAD, _SPREAD, values.size)[order] if values.size > 1 else 0.0
-    axes.scatter(values, line + offsets, s=9, color=color, alpha=0.28, linewidths=0, zorder=2)
+    offsets = np.linspace(-_SPREAD, _SPREAD, values.size)[order] if values.size > 1 else np.zeros(1)
+    is_beyond = marks_censored & np.isinf(summary.values[name])
+    for mark, shown in (("o", ~is_beyond), (">", is_beyond)):
+        if not shown.any():
+            continue
+        axes.scatter(
+            values[shown], (line + offsets)[shown], s=9, color=color, alpha=0.28, linewidths=0,
+            zorder=2, marker=mark,
+        )  # fmt: skip
     estimate = summary.medians[name]
     if name == "final_share_solved":
         # Most trials end near 0 or 1: their median would jump from one to the other.
@@ -145,9 +163,10 @@ def _draw_variant(
     )
     axes.plot([lower, upper], [line, line], color=color, linewidth=1.6, zorder=3)
     is_filled = is_reference or measured.differs(name)
+    is_mark_beyond = marks_censored and np.isinf(estimate.value)
     axes.plot(
-        value, line, "o", markersize=5.5, color=color, zorder=4, clip_on=False,
-        markerfacecolor=color if is_filled else "white", markeredgewidth=1.3,
+        value, line, ">" if is_mark_beyond else "o", markersize=5.5, color=color, zorder=4,
+        clip_on=False, markerfacecolor=color if is_filled else "white", markeredgewidth=1.3,
     )  # fmt: skip
     if is_reference:
         axes.axvline(value, color=color, linewidth=0.9, linestyle=":", zorder=1)

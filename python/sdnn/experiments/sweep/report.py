@@ -15,7 +15,9 @@ from sdnn.experiments.report import (
     MEASURES,
     NOTE,
     RULE_NOTE,
+    decimals_of,
     format_estimate,
+    plain_number,
 )
 from sdnn.experiments.statistics import DEFAULT_BOOTSTRAP, Estimate
 from sdnn.experiments.sweep.comparison import (
@@ -24,6 +26,7 @@ from sdnn.experiments.sweep.comparison import (
     Measured,
     VariantClaim,
 )
+from sdnn.experiments.verdicts import CheckOutcome
 
 RETURN_MEASURE_TEXTS: dict[MeasureName, str] = {
     "final_return": "mean return of the last tenth of the tests",
@@ -139,20 +142,9 @@ class StudyReport:
             found = self.comparison.claims[variant.id].get(claim.number)
             if found is None:
                 continue
-            cells = [
-                _claim_cell(found, number, self.last_episode(variant.id))
-                for number in range(len(claim.checks))
-            ]
+            cells = [_claim_cell(checked) for checked in found.outcome.checks]
             rows.append((variant.title, *cells, _verdict(found)))
         return header, rows
-
-    def last_episode(self, variant_id: str) -> int:
-        """Learning episodes of a variant's trials."""
-        return max(
-            m.summary.result.last_episode
-            for (_, variant), m in self.comparison.measured.items()
-            if variant == variant_id
-        )
 
     def case_tables(self) -> Iterator[tuple[str, Table, Table | None]]:
         """For each case its id, the table of measures, and that of differences if there are any."""
@@ -230,12 +222,11 @@ def _verdict(claim: VariantClaim | None) -> str:
     return claim.outcome.verdict.value + (" (moved)" if claim.moved else "")
 
 
-def _claim_cell(claim: VariantClaim, number: int, last_episode: int) -> str:
-    checked = claim.outcome.checks[number]
+def _claim_cell(checked: CheckOutcome) -> str:
     quantity = checked.check.quantity
     if checked.estimate is None or not hasattr(quantity, "measure"):
         return "-"
-    estimate = format_estimate(checked.estimate, quantity.measure, last_episode)
+    estimate = format_estimate(checked.estimate, quantity.measure, checked.last_episode)
     return f"{estimate}: {checked.verdict.value}"
 
 
@@ -285,9 +276,10 @@ def format_difference(difference: Estimate, measure: MeasureName) -> str:
     """
     scale, unit = (100, " %") if measure == "final_share_solved" else (1, "")
 
+    decimals = decimals_of(difference, measure)
+
     def number(value: float) -> str:
-        rounded = round(scale * value, 1)
-        return f"{rounded:+.6g}" if rounded else "0"
+        return plain_number(scale * value, decimals, sign="+")
 
     if math.isnan(difference.value):
         return "-"
@@ -322,7 +314,7 @@ def to_json(report: StudyReport) -> dict[str, Any]:
             {
                 "variant": variant,
                 "moved": claim.moved,
-                **claim.outcome.to_json(report.last_episode(variant)),
+                **claim.outcome.to_json(),
             }
             for variant, claims in comparison.claims.items()
             for claim in claims.values()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from collections.abc import Collection, Iterable, Mapping
@@ -151,6 +152,9 @@ class StudyFile:
             if isinstance(value, dict) and len(name) < _depth(name):
                 self._collect(place, value, name, found)
                 continue
+            if len(name) > _depth(name):
+                words = "SECTION.NAME, or environment.kwargs.NAME"
+                raise self.error(place, f"must be {words}, got {'.'.join(name)}")
             if name == ("environment",):
                 name = ("environment", "id")
             if name in found:
@@ -249,9 +253,24 @@ def build(
                 f"{kind.__name__} has no such setting; {possible_words(key, possible)}{hint}",
             )
         if len(name) > 2:
+            try:
+                json.dumps(setting.value, allow_nan=False)
+            except (TypeError, ValueError):
+                raise file.error(
+                    setting.where,
+                    f"must be data that JSON has, numbers finite, got {setting.value!r}",
+                ) from None
             values.setdefault(key, {})[name[2]] = setting.value
         else:
             values[key] = file.value(setting.where, hints.get(key, Any), setting.value)
-    if isinstance(defaults, type):
-        return defaults(**values)
-    return replace(defaults, **values)  # type: ignore[type-var]
+    try:
+        if isinstance(defaults, type):
+            return defaults(**values)
+        return replace(defaults, **values)  # type: ignore[type-var]
+    except Exception as error:  # of whatever settings an agent has
+        of_section = {name: one for name, one in settings.items() if name[0] == section}
+        text = str(error) or type(error).__name__
+        where = blamed(of_section, text)
+        if where is None and of_section:
+            where = next(iter(of_section.values())).where
+        raise file.error(() if where is None else where, text) from error

@@ -9,10 +9,12 @@ import pytest
 from sdnn.experiments.figures import figure_bytes
 from sdnn.experiments.page import Call
 from sdnn.experiments.records import TrialRecord, TrialRows
+from sdnn.experiments.report import format_estimate
+from sdnn.experiments.statistics import Estimate
 from sdnn.experiments.sweep.comparison import compare
 from sdnn.experiments.sweep.figure import draw_study
 from sdnn.experiments.sweep.page import to_html, to_markdown
-from sdnn.experiments.sweep.report import StudyReport, to_json
+from sdnn.experiments.sweep.report import StudyReport, format_difference, to_json
 from sdnn.experiments.verdicts import Verdict
 
 
@@ -82,6 +84,83 @@ def test_differences_are_paired_by_trial(study):
     assert new.summary.values["episode_of_collapse"].tolist() == 4 * [math.inf]
     # Censored: as the last episode, 1000.
     assert new.differences["episode_of_collapse"].value == (0 + 0 + 160 + 1000) / 4
+
+
+LENGTHS = """
+[study]
+trials = 6
+cases = ["s4", "s4-noise"]
+reference = "short"
+[base]
+protocol.n_learning_episodes = 1000
+[variants.short]
+[variants.long]
+protocol.n_learning_episodes = 3000
+"""
+
+
+def test_what_only_lasts_longer_does_not_differ(study):
+    mine = study(LENGTHS)
+    runs = {
+        ("s4", "short"): ((100, 4),), ("s4", "long"): ((300, 4),),
+        ("s4-noise", "short"): ((100, 50),), ("s4-noise", "long"): ((200, 50), (100, 4)),
+    }  # fmt: skip
+    records = [
+        record(mine, *pair, number, steps_of(*of_pair))
+        for pair, of_pair in runs.items()
+        for number in range(6)
+    ]
+    found = compare(mine, records)
+    for case, name in (("s4", "episode_of_collapse"), ("s4-noise", "episodes_to_learn")):
+        longer = found.measured[case, "long"]
+        assert longer.differences[name].value == 0.0
+        assert not longer.differs(name)
+    tables = {
+        title: rows
+        for title, _, rows in StudyReport(comparison=found, version="1", digest="0").tables()
+    }
+    rows = tables["Case I: 4 inputs, no noise"]
+    assert [row[6] for row in rows] == [">1000 [>1000, >1000]", ">3000 [>3000, >3000]"]
+    (row,) = tables["Case I: 4 inputs, no noise: less short, trial by trial"]
+    assert not any("*" in cell for cell in row)
+    png, _ = figure_bytes(draw_study(found, "footer"))
+    assert png.startswith(b"\x89PNG")
+
+
+def test_claims_are_censored_where_their_own_trials_end(study):
+    text = LENGTHS.replace('"s4", "s4-noise"', '"s4", "s4-noise", "s6"')
+    mine = study(text + "[variants.long.cases.s6]\nprotocol.n_learning_episodes = 5000\n")
+    n_tests = {"s4": 300, "s4-noise": 300, "s6": 500}
+    records = [
+        record(mine, case, "long", number, steps_of((n, 50)))
+        for case, n in n_tests.items()
+        for number in range(6)
+    ]
+    found = compare(mine, records)
+    claim = found.claims["long"][1]  # of the episodes to learn in both
+    assert [checked.last_episode for checked in claim.outcome.checks] == [3000, 5000]
+    told = to_json(StudyReport(comparison=found, version="1", digest="0"))["claims"][0]
+    assert [one["ours"]["value"] for one in told["checks"]] == [">3000", ">5000"]
+
+
+def test_returns_have_the_digits_that_tell_them_apart():
+    small = Estimate(0.00498, 0.0049, 0.0051)
+    assert format_estimate(small, "final_return", 9) == "0.00498 [0.0049, 0.0051]"
+    assert format_difference(Estimate(0.01, 0.01, 0.01), "mean_return") == "+0.01 [+0.01, +0.01]"
+    assert format_difference(Estimate(-0.01, -0.02, 0.01), "mean_return") == "-0.01 [-0.02, +0.01]"
+    assert format_estimate(Estimate(-0.04, -0.1, 3.0), "final_return", 9) == "0 [-0.1, 3]"
+    large = Estimate(1234567.8, 1230000.0, 1240000.0)
+    assert format_estimate(large, "final_return", 9) == "1234567.8 [1230000, 1240000]"
+    assert format_estimate(Estimate(0.0, 0.0, 0.0), "final_return", 9) == "0 [0, 0]"
+    assert format_estimate(Estimate(-159.44, -173.9, -149.8), "final_return", 9) == (
+        "-159.4 [-173.9, -149.8]"
+    )
+
+
+def test_dollar_signs_of_titles_are_dollar_signs(study):
+    mine = study(TWO.replace('title = "the new one"', 'title = "a$_$"'))
+    png, _ = figure_bytes(draw_study(compare(mine, records_of_two(mine)), "at $1 or $_$"))
+    assert png.startswith(b"\x89PNG")
 
 
 def test_few_trials_are_never_called_different(study):

@@ -72,9 +72,12 @@ def test_a_probe_is_made_once_for_a_case_and_agent(fake, monkeypatch):
     assert made == [1]
 
 
-def test_python_trials_share_a_core():
+def test_python_trials_share_a_core(monkeypatch):
+    monkeypatch.setattr(duration, "n_cores", lambda: 16)
     compiled, locked = (Duration(8.0, 16.0, ""), True), (Duration(4.0, math.inf, ""), False)
-    assert wall_seconds([compiled, compiled], 4) == (4.0, 8.0)
-    assert wall_seconds([compiled, locked], 2) == (6.0, math.inf)
-    assert wall_seconds([compiled, locked], 8) == (4.0, math.inf)
+    assert wall_seconds(4 * [compiled], 2) == (16.0, 32.0)
+    assert wall_seconds(2 * [compiled], 4) == (8.0, 16.0), "no trial is cut in parts"
+    assert wall_seconds([compiled, *4 * [locked]], 8) == (16.0, math.inf)
     assert wall_seconds([], 2) == (0.0, 0.0)
+    monkeypatch.setattr(duration, "n_cores", lambda: 2)
+    assert wall_seconds(4 * [compiled], 64) == (16.0, 32.0), "no more at once than there are cores"

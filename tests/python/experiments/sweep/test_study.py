@@ -266,6 +266,36 @@ def test_modules_beside_the_file_may_register_agents(study, tmp_path):
         sys.modules.pop("my_plugged_agents", None)
 
 
+STRICT = """
+from dataclasses import dataclass
+
+from sdnn.agents import QLearningConfig, RBFQLearning
+from sdnn.experiments import AgentEntry, register
+
+@dataclass(frozen=True, kw_only=True)
+class Strict:
+    n_inputs: int = 4
+    size: int = 3
+    def __post_init__(self):
+        if self.size < 1:
+            raise ERROR
+register(AgentEntry(id="strict", title="Strict", approximator=Strict,
+                    learning=QLearningConfig, agent=RBFQLearning))
+"""
+
+
+@pytest.mark.parametrize("error", ["ValueError('size is small')", "AssertionError", "TypeError"])
+def test_what_own_settings_refuse_is_told_with_its_place(study, tmp_path, error):
+    (tmp_path / "strict_agents.py").write_text(STRICT.replace("ERROR", error))
+    text = "[study]\nimports = ['strict_agents']\ncases = ['s4']\n[base]\nagent = 'strict'\n"
+    try:
+        with pytest.raises(StudyError, match=r"mine\.toml:6: base\.approximator\.size: \w+"):
+            study(text + "approximator.size = 0\n")
+    finally:
+        AGENTS.pop("strict", None)
+        sys.modules.pop("strict_agents", None)
+
+
 WRONG = {
     "toml": ("[base]\nlearning.discount 2\n", 2, "must be TOML"),
     "table": ("base = 2\n", 1, "base: must be a table, got 2"),
@@ -355,6 +385,14 @@ WRONG = {
     "derived": (
         "[cases.s4]\n[base]\napproximator.n_inputs = 4\n", 3,
         "base.approximator.n_inputs: follows from the observations (4): omit it",
+    ),
+    "too deep": (
+        "[cases.s4]\n[base]\nlearning.discount = 0.5\n'learning.discount.x' = 0.6\n", 4,
+        'base."learning.discount.x": must be SECTION.NAME, or environment.kwargs.NAME, got learn',
+    ),
+    "infinite argument": (
+        "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.kwargs.g = inf\n", 3,
+        "base.environment.kwargs.g: must be data that JSON has, numbers finite, got inf",
     ),
     "twice": (
         "[cases.s4]\n[base]\nlearning.discount = 0.5\n'learning.discount' = 0.6\n", 4,
