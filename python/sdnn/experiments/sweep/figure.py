@@ -92,7 +92,7 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
         "Faint dots: trials. Large dot: their median (of the share solved: mean) with its 95 %"
         " interval; filled: the reference, and what\ndiffers from it trial by trial (the interval"
         " of the mean paired difference leaves 0 out)."
-        " Numbers at the right: trials that end solved." + _of_lengths(comparison) + "\n" + footer,
+        " Numbers at the right: trials that end solved.\n" + _of_lengths(comparison) + footer,
         fontsize=6.5, va="bottom", color=FAINT, linespacing=1.4,
     )  # fmt: skip
     return as_written(figure)
@@ -101,7 +101,7 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
 def _of_lengths(comparison: Comparison) -> str:
     """Say what triangles are, where trials differ in length and so where they are cut off."""
     ends = {one.summary.result.last_episode for one in comparison.measured.values()}
-    return " Triangles: beyond the last episode." if len(ends) > 1 else ""
+    return "Triangles: beyond the last episode. " if len(ends) > 1 else ""
 
 
 def _draw_case(
