@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import json
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -20,6 +21,7 @@ from sdnn.experiments.report import (
     CLAIM_HEADER,
     COST_NOTE,
     MEASURES,
+    MORE_HEADER,
     NOTE,
     POWER_HEADER,
     POWER_NOTE,
@@ -30,6 +32,8 @@ from sdnn.experiments.report import (
     claim_rows,
     cost_header,
     cost_rows,
+    more_note,
+    more_rows,
     power_rows,
 )
 from sdnn.experiments.results import CaseResult
@@ -40,11 +44,22 @@ _TEMPLATE = "report.html.jinja"
 VERDICT_KINDS = {
     Verdict.HOLDS: "good",
     Verdict.FAILS: "bad",
+    Verdict.CHANCE: "open",
     Verdict.UNDECIDED: "open",
     Verdict.NOT_JUDGED: "none",
     Verdict.NOT_RUN: "none",
 }
 """How the page shows a verdict."""
+
+TALLY_WORDS = {
+    Verdict.HOLDS: "hold",
+    Verdict.FAILS: "do not hold",
+    Verdict.CHANCE: "are a matter of chance with ten trials",
+    Verdict.UNDECIDED: "undecided",
+    Verdict.NOT_JUDGED: "not judged",
+    Verdict.NOT_RUN: "not judged",
+}
+"""What so many claims do."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,12 +135,9 @@ def to_html(report: Report, pictures: Mapping[str, bytes], call: Call) -> str:
         report=report,
         call=call,
         warning=QUICK_WARNING,
-        is_paper_scale=all(summary.result.is_paper_scale for summary in summaries),
+        is_paper_scale=all(summary.is_paper_scale for summary in summaries),
         paper_scale=f"{PAPER_TRIALS} trials x {PAPER_EPISODES:,} episodes",
-        n_claims={
-            kind: sum(VERDICT_KINDS[outcome.verdict] == kind for outcome in report.claims)
-            for kind in ("good", "bad", "open", "none")
-        },
+        tally=tally(one.verdict for one in report.settled),
         sections=[
             {
                 "title": one.experiment.title,
@@ -140,6 +152,9 @@ def to_html(report: Report, pictures: Mapping[str, bytes], call: Call) -> str:
         case_header=CASE_HEADER,
         claim_header=CLAIM_HEADER,
         claim_rows=claim_rows(report.claims),
+        more_header=MORE_HEADER,
+        more_rows=more_rows(report),
+        more_note=more_note(report),
         power_header=POWER_HEADER,
         power_rows=power_rows(report),
         power_note=POWER_NOTE,
@@ -152,6 +167,21 @@ def to_html(report: Report, pictures: Mapping[str, bytes], call: Call) -> str:
             settings_of(f"{agent_entry(s.result.agent).title}, {s.result.case.title}", s.result)
             for s in summaries
         ],
+    )
+
+
+def tally(verdicts: Iterable[Verdict]) -> list[tuple[str, int, str]]:
+    """Count verdicts: how the page shows each kind, how many there are, and what they do.
+
+    Examples
+    --------
+    >>> tally([Verdict.HOLDS, Verdict.NOT_RUN, Verdict.HOLDS, Verdict.NOT_JUDGED])
+    [('good', 2, 'hold'), ('none', 2, 'not judged')]
+    """
+    counts = Counter((VERDICT_KINDS[verdict], TALLY_WORDS[verdict]) for verdict in verdicts)
+    order = {word: place for place, word in enumerate(TALLY_WORDS.values())}
+    return sorted(
+        ((kind, n, word) for (kind, word), n in counts.items()), key=lambda one: order[one[2]]
     )
 
 

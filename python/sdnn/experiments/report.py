@@ -12,13 +12,22 @@ import numpy as np
 
 from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.experiments.claims import Claim, Growth, describe
+from sdnn.experiments.kept_trials import KeptTrials
 from sdnn.experiments.measures import DEFAULT_MEASURES, RETURN_MEASURES, MeasureName
 from sdnn.experiments.power import MULTIPLES, N_DRAWS, Power, powers
 from sdnn.experiments.records import CostRecord
 from sdnn.experiments.registry import agent_entry, cost_series
 from sdnn.experiments.results import CaseSummary
 from sdnn.experiments.statistics import DEFAULT_BOOTSTRAP, Estimate
-from sdnn.experiments.verdicts import CheckOutcome, ClaimOutcome, judge_claims
+from sdnn.experiments.verdicts import (
+    ALWAYS,
+    NEVER,
+    CheckOutcome,
+    ClaimOutcome,
+    SettledClaim,
+    judge_claims,
+    settle,
+)
 
 QUICK_WARNING = "A quick look at a fraction of the experiments, not their result."
 
@@ -35,6 +44,15 @@ CASE_HEADER = (
     "us/decision",
 )
 CLAIM_HEADER = ("claim", "the paper says", "measured", "paper", "ours", "verdict")
+MORE_HEADER = (
+    "claim",
+    "the paper says",
+    "measured",
+    "trials",
+    "ours",
+    "verdict",
+    "ten trials show it",
+)
 POWER_HEADER = ("claim", "measured", "ours", *(f"{n} x the trials" for n in MULTIPLES))
 
 MEASURES: dict[MeasureName, str] = {
@@ -69,6 +87,14 @@ RULE_NOTE = (
     " before the trials were run, does not hold if the whole interval lies outside on one side, and"
     " is undecided otherwise. Runs smaller than"
     f" {PAPER_TRIALS} trials x {PAPER_EPISODES:,} episodes are not judged."
+)
+
+CHANCE_NOTE = (
+    "Ten trials show it: in how many draws of ten of these trials, as the paper's ten were one, the"
+    " medians lie in all ranges of the claim. What these trials leave undecided holds if"
+    f" {100 * ALWAYS:.0f} % of the draws or more show it, does not hold if {100 * NEVER:.0f} % or"
+    " fewer do, and is a matter of chance in between: what ten trials then show says nothing for or"
+    " against the paper."
 )
 
 POWER_NOTE = (
@@ -118,6 +144,8 @@ class Report:
         Digest of the experiments' rows.
     agents
         Ids of the agents that were run instead of those of the cases; none if those were.
+    kept
+        More trials of the same settings than were run, kept with the library.
     """
 
     experiments: tuple[ExperimentReport, ...]
@@ -127,6 +155,7 @@ class Report:
     version: str
     digest: str
     agents: tuple[str, ...] = ()
+    kept: tuple[KeptTrials, ...] = ()
 
     @cached_property
     def claims(self) -> tuple[ClaimOutcome, ...]:
@@ -134,9 +163,14 @@ class Report:
         return judge_claims([s for e in self.experiments for s in e.summaries], self.costs)
 
     @cached_property
+    def settled(self) -> tuple[SettledClaim, ...]:
+        """The claims with all that speaks about them, also trials that are kept."""
+        return settle(self.claims, self.kept)
+
+    @cached_property
     def powers(self) -> tuple[tuple[Claim, CheckOutcome, tuple[Power, ...]], ...]:
-        """What more trials would say of the checks that are undecided."""
-        checked = ((outcome.claim, one) for outcome in self.claims for one in outcome.checks)
+        """What more trials would say of the checks that the most trials leave undecided."""
+        checked = ((one.claim, check) for one in self.settled for check in one.best.checks)
         found = ((claim, one, powers(one)) for claim, one in checked)
         return tuple(row for row in found if row[2])
 
@@ -151,6 +185,8 @@ class Report:
         if self.claims:
             claims = claim_rows(self.claims)
             tables.append(("Beside the paper's claims", CLAIM_HEADER, claims))
+        if more := more_rows(self):
+            tables.append(("With more trials", MORE_HEADER, more))
         if self.powers:
             tables.append(("What is undecided", POWER_HEADER, power_rows(self)))
         return tables
@@ -158,6 +194,7 @@ class Report:
     def notes(self) -> list[str]:
         """Say what the tables mean."""
         notes = [RULE_NOTE] if self.claims else []
+        notes += [more_note(self)] if more_rows(self) else []
         notes += [POWER_NOTE] if self.powers else []
         if self.experiments:
             notes += [NOTE, *(f"{n.replace('_', ' ')}: {text}." for n, text in MEASURES.items())]
@@ -258,6 +295,38 @@ def claim_rows(outcomes: Sequence[ClaimOutcome]) -> list[tuple[str, ...]]:
     return rows
 
 
+def more_rows(report: Report) -> list[tuple[str, ...]]:
+    """Rows of the table of claims judged by kept trials, under `MORE_HEADER`.
+
+    Each claim has a row with the verdict by the whole rule, then one for each check.
+    """
+    rows: list[tuple[str, ...]] = []
+    for one in report.settled:
+        if one.more is None or one.chance is None:
+            continue
+        shown = format_estimate(one.chance, "final_share_solved", PAPER_EPISODES)
+        head = (str(one.claim.number), one.claim.text)
+        rows.append((*head, "", "", "", one.verdict.value, shown))
+        for checked in one.more.checks:
+            quantity = checked.check.quantity
+            n_trials = str(min(sample.size for sample in checked.samples))
+            ours = _format_quantity(checked)
+            word = checked.verdict.value
+            rows.append(("", "", describe(quantity), n_trials, ours, word, ""))
+    return rows
+
+
+def more_note(report: Report) -> str:
+    """Say which trials these are, and what their table means."""
+    seeds = sorted({one.root_seed for one in report.kept})
+    words = " and ".join(map(str, seeds))
+    return (
+        "The same settings with more trials on other seeds"
+        f" (root seed{'s' if len(seeds) > 1 else ''} {words}), whose measures are kept with the"
+        f" library. {CHANCE_NOTE}"
+    )
+
+
 def power_rows(report: Report) -> list[tuple[str, ...]]:
     """Rows of the table of what is undecided, under `POWER_HEADER`."""
     rows: list[tuple[str, ...]] = []
@@ -349,7 +418,7 @@ def to_json(report: Report) -> dict[str, Any]:
             for one in report.experiments
         ],
         "costs": [cost.to_json() for cost in report.costs],
-        "claims": [outcome.to_json() for outcome in report.claims],
+        "claims": [_claim_json(one) for one in report.settled],
         "powers": [
             {
                 "claim": claim.number,
@@ -358,4 +427,14 @@ def to_json(report: Report) -> dict[str, Any]:
             }
             for claim, checked, found in report.powers
         ],
+    }
+
+
+def _claim_json(one: SettledClaim) -> dict[str, Any]:
+    chance = None if one.chance is None else one.chance.to_json(PAPER_EPISODES)
+    return {
+        **one.own.to_json(),
+        "with_more_trials": None if one.more is None else one.more.to_json(),
+        "ten_trials_show_it": chance,
+        "settled": one.verdict.value,
     }

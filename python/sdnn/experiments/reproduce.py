@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -22,6 +24,7 @@ from sdnn.experiments.config import PlannedTrial, plan_trials
 from sdnn.experiments.cost import QUICK_COST, CostConfig, cost_keys, measure_costs
 from sdnn.experiments.engine import Observer, RunOutcome, run_trials
 from sdnn.experiments.executor import Executor
+from sdnn.experiments.kept_trials import KeptTrials, kept_trials
 from sdnn.experiments.records import (
     COST_ROW_HEADER,
     ROW_HEADER,
@@ -34,7 +37,7 @@ from sdnn.experiments.records import (
 )
 from sdnn.experiments.registry import cost_series
 from sdnn.experiments.report import ExperimentReport, Report, to_json
-from sdnn.experiments.results import collect, summarize
+from sdnn.experiments.results import CaseSummary, collect, summarize
 from sdnn.experiments.store import STORE_NAME, ResultStore
 from sdnn.experiments.trial import ProtocolConfig
 from sdnn.whole_files import csv_bytes, remove_abandoned_files, write_whole
@@ -313,11 +316,12 @@ def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[
     complete = [(e, keys) for e, keys in request.plan.experiments if stored.issuperset(keys)]
     records = store.load(key for _, keys in complete for key in keys)
     shown = {series.id for _, series in cost_series(request.agents or None)}
+    experiments = tuple(
+        ExperimentReport(experiment, tuple(map(summarize, collect(experiment, records))))
+        for experiment, _ in complete
+    )
     report = Report(
-        experiments=tuple(
-            ExperimentReport(experiment, tuple(map(summarize, collect(experiment, records))))
-            for experiment, _ in complete
-        ),
+        experiments=experiments,
         costs=tuple(
             cost
             for cost in store.load_costs(request.cost_config.config_hash)
@@ -328,8 +332,19 @@ def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[
         version=_core.__version__,
         digest=records_digest(records),
         agents=request.agents,
+        kept=_more_than(s for one in experiments for s in one.summaries),
     )
     return report, records
+
+
+def _more_than(summaries: Iterable[CaseSummary]) -> tuple[KeptTrials, ...]:
+    """Give the kept trials that are of these settings and more."""
+    n_run = {(s.case_id, s.agent, s.result.config_hash): s.n_trials for s in summaries}
+    return tuple(
+        kept
+        for kept in kept_trials()
+        if kept.n_trials > n_run.get((kept.case_id, kept.agent, kept.config_hash), math.inf)
+    )
 
 
 def _write(

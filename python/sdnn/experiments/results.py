@@ -75,11 +75,6 @@ class CaseResult:
         """Learning episodes of a trial."""
         return int(self.episode[-1])
 
-    @property
-    def is_paper_scale(self) -> bool:
-        """Whether there are as many trials and episodes as in the paper: else nothing is judged."""
-        return self.n_trials >= PAPER_TRIALS and self.last_episode >= PAPER_EPISODES
-
     @cached_property
     def steps(self) -> NDArray[np.int32]:
         """Steps of the test episodes, (n_trials, n_tests)."""
@@ -106,25 +101,38 @@ class CaseResult:
 
 
 @dataclass(frozen=True)
-class CaseSummary:
-    """The measures of a case and agent, each over trials.
+class TrialMeasures:
+    """What was measured on the trials of an agent in a case, however they are kept.
 
     Parameters
     ----------
-    result
-        The trials measured.
+    case_id, agent
+        Ids of both.
+    last_episode
+        Learning episodes of a trial.
     values
         Measures of each trial, arrays (n_trials,).
-    medians
-        Their medians over trials.
-    median_curve_episodes_to_learn
-        `episodes_to_learn` of the median curve: what a reader sees in the paper's figure.
     """
 
-    result: CaseResult
+    case_id: str
+    agent: str
+    last_episode: int
     values: dict[MeasureName, NDArray[np.float64]]
-    medians: dict[MeasureName, Estimate]
-    median_curve_episodes_to_learn: float
+
+    @property
+    def n_trials(self) -> int:
+        """Number of trials."""
+        return len(next(iter(self.values.values())))
+
+    @property
+    def is_paper_scale(self) -> bool:
+        """Whether there are as many trials and episodes as in the paper: else nothing is judged."""
+        return self.n_trials >= PAPER_TRIALS and self.last_episode >= PAPER_EPISODES
+
+    @cached_property
+    def medians(self) -> dict[MeasureName, Estimate]:
+        """Medians over trials, with intervals."""
+        return {name: statistics.estimate_median(values) for name, values in self.values.items()}
 
     def uncensored(
         self, measure: MeasureName, last_episode: int | None = None
@@ -136,9 +144,23 @@ class CaseSummary:
         values = self.values[measure]
         if measure not in CENSORED_MEASURES:
             return values
-        return np.minimum(
-            values, self.result.last_episode if last_episode is None else last_episode
-        )
+        return np.minimum(values, self.last_episode if last_episode is None else last_episode)
+
+
+@dataclass(frozen=True)
+class CaseSummary(TrialMeasures):
+    """The measures of a case and agent, with the trials that were measured.
+
+    Parameters
+    ----------
+    result
+        The trials.
+    median_curve_episodes_to_learn
+        `episodes_to_learn` of the median curve: what a reader sees in the paper's figure.
+    """
+
+    result: CaseResult
+    median_curve_episodes_to_learn: float
 
     def to_json(self) -> dict[str, Any]:
         """Return it as values that JSON can hold."""
@@ -170,14 +192,14 @@ class CaseSummary:
 
 
 def on_equal_terms(
-    measure: MeasureName, *summaries: CaseSummary
+    measure: MeasureName, *measured: TrialMeasures
 ) -> tuple[NDArray[np.float64], ...]:
     """Return a measure of each trial of several, censored where the shortest trials end.
 
     Else what only lasts longer would seem to differ.
     """
-    last_episode = min(summary.result.last_episode for summary in summaries)
-    return tuple(summary.uncensored(measure, last_episode) for summary in summaries)
+    last_episode = min(one.last_episode for one in measured)
+    return tuple(one.uncensored(measure, last_episode) for one in measured)
 
 
 def collect(experiment: Experiment, records: Iterable[TrialRecord]) -> tuple[CaseResult, ...]:
@@ -217,14 +239,15 @@ def summarize(
     names
         Which measures.
     """
-    values: dict[MeasureName, NDArray[np.float64]] = {
-        name: np.array([_MEASURE[name](record.rows, config) for record in result.records])
-        for name in names
-    }
     return CaseSummary(
+        case_id=result.case.id,
+        agent=result.agent,
+        last_episode=result.last_episode,
+        values={
+            name: np.array([_MEASURE[name](record.rows, config) for record in result.records])
+            for name in names
+        },
         result=result,
-        values=values,
-        medians={name: statistics.estimate_median(v) for name, v in values.items()},
         median_curve_episodes_to_learn=measures.episodes_to_learn(
             result.episode, result.curve.median, config
         ),

@@ -8,6 +8,14 @@ It was written down before the trials of Experiment B were run:
   otherwise;
 - runs smaller than the paper's (10 trials x 15,000 episodes) are not judged, nor are costs measured
   with other settings than `CostConfig()`.
+
+What follows was added after the first 200 trials of each case had been seen, since ten trials, and
+a hundred, leave three claims undecided:
+
+- more trials of the same settings overrule fewer;
+- a claim that these leave undecided, too, is judged by how often ten of them show it, as the
+  paper's ten did (`chances`): it holds if 95 % of the draws or more show it, does not hold if 5 %
+  or fewer do, and is a matter of *chance* in between.
 """
 
 from __future__ import annotations
@@ -21,10 +29,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.experiments.cases import PAPER_EPISODES
+from sdnn.experiments.chances import TenTrials
 from sdnn.experiments.claims import CLAIMS, Check, Claim, Difference, Growth, Subject, describe
 from sdnn.experiments.cost import CostConfig
 from sdnn.experiments.records import CostRecord
-from sdnn.experiments.results import CaseSummary, on_equal_terms
+from sdnn.experiments.results import TrialMeasures, on_equal_terms
 from sdnn.experiments.statistics import Estimate, estimate_contrast, json_number
 
 
@@ -33,9 +42,14 @@ class Verdict(Enum):
 
     HOLDS = "holds"
     FAILS = "does not hold"
+    CHANCE = "a matter of chance"
     UNDECIDED = "undecided"
     NOT_JUDGED = "not judged"
     NOT_RUN = "not run"
+
+
+ALWAYS, NEVER = 0.95, 0.05
+"""Shares of draws of ten trials from which on, and up to which, a claim holds, and does not."""
 
 
 def verdict_of(check: Check, estimate: Estimate) -> Verdict:
@@ -105,19 +119,85 @@ class ClaimOutcome:
         }
 
 
+@dataclass(frozen=True)
+class SettledClaim:
+    """A claim with all that speaks about it.
+
+    Parameters
+    ----------
+    own
+        What the trials that were run give.
+    more
+        What more trials of the same settings give; None where there are none.
+    chance
+        In which share of draws of ten of these it is shown.
+    """
+
+    own: ClaimOutcome
+    more: ClaimOutcome | None = None
+    chance: Estimate | None = None
+
+    @property
+    def claim(self) -> Claim:
+        """The claim."""
+        return self.own.claim
+
+    @property
+    def best(self) -> ClaimOutcome:
+        """What the most trials give."""
+        return self.own if self.more is None else self.more
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict about the claim, by the whole rule of this module."""
+        if self.own.verdict in (Verdict.NOT_JUDGED, Verdict.NOT_RUN):
+            return self.own.verdict
+        if self.best.verdict is not Verdict.UNDECIDED or self.chance is None:
+            return self.best.verdict
+        if self.chance.value >= ALWAYS:
+            return Verdict.HOLDS
+        return Verdict.FAILS if self.chance.value <= NEVER else Verdict.CHANCE
+
+
+def settle(
+    outcomes: Iterable[ClaimOutcome], more: Iterable[TrialMeasures]
+) -> tuple[SettledClaim, ...]:
+    """Put beside each claim what more trials of the same settings say of it.
+
+    Parameters
+    ----------
+    outcomes
+        Claims judged by the trials that were run.
+    more
+        Other trials, one for each case and agent. A claim is judged by them if all cases and agents
+        that it speaks of are among them.
+    """
+    trials = tuple(more)
+    judged = {o.claim.number: o for o in judge_claims(trials, ())}
+    draws = TenTrials(trials)
+    settled = []
+    for own in outcomes:
+        found = judged.get(own.claim.number)
+        if found is None or found.verdict is Verdict.NOT_RUN:
+            settled.append(SettledClaim(own))
+        else:
+            settled.append(SettledClaim(own, found, draws.chance(own.claim)))
+    return tuple(settled)
+
+
 def judge_claims(
-    summaries: Iterable[CaseSummary], costs: Sequence[CostRecord]
+    measured: Iterable[TrialMeasures], costs: Sequence[CostRecord]
 ) -> tuple[ClaimOutcome, ...]:
     """Judge the claims that the given results speak about, at least in part.
 
     Parameters
     ----------
-    summaries
+    measured
         One for each case and agent; a case that experiments share may come more than once.
     costs
-        Measured costs.
+        TrialMeasures costs.
     """
-    by_subject = {Subject(s.result.case.id, s.result.agent): s for s in summaries}
+    by_subject = {Subject(one.case_id, one.agent): one for one in measured}
     outcomes = (
         ClaimOutcome(claim, tuple(_judge(check, by_subject, costs) for check in claim.checks))
         for claim in CLAIMS
@@ -126,7 +206,7 @@ def judge_claims(
 
 
 def _judge(
-    check: Check, summaries: Mapping[Subject, CaseSummary], costs: Sequence[CostRecord]
+    check: Check, measured: Mapping[Subject, TrialMeasures], costs: Sequence[CostRecord]
 ) -> CheckOutcome:
     quantity = check.quantity
     if isinstance(quantity, Growth):
@@ -139,9 +219,9 @@ def _judge(
     subjects = [quantity.subject]
     if isinstance(quantity, Difference):
         subjects.append(quantity.other)
-    if not summaries.keys() >= set(subjects):
+    if not measured.keys() >= set(subjects):
         return CheckOutcome(check, None, Verdict.NOT_RUN)
-    found = [summaries[subject] for subject in subjects]
+    found = [measured[subject] for subject in subjects]
     samples: tuple[NDArray[np.float64], ...]
     if len(found) == 1:
         samples = (found[0].values[quantity.measure],)
@@ -149,8 +229,8 @@ def _judge(
     else:
         samples = values, others = on_equal_terms(quantity.measure, *found)
         estimate = estimate_contrast(values, others)
-    is_full = all(summary.result.is_paper_scale for summary in found)
-    last_episode = min(summary.result.last_episode for summary in found)
+    is_full = all(one.is_paper_scale for one in found)
+    last_episode = min(one.last_episode for one in found)
     return replace(_outcome(check, estimate, is_full, samples), last_episode=last_episode)
 
 

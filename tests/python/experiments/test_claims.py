@@ -267,4 +267,4 @@ def test_summaries_do_not_mix_measures():
     summary = result("s4", "sdnn-c", [3] * 5 + [50] * 5)
     np.testing.assert_array_equal(summary.uncensored("episode_of_collapse"), [15000] * 5 + [0] * 5)
     assert summary.medians["final_share_solved"].value == 0.5
-    assert replace(summary, values=summary.values).result.is_paper_scale
+    assert replace(summary, values=summary.values).is_paper_scale

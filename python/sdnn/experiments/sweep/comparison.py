@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.experiments.cases import Case
+from sdnn.experiments.cases import PAPER_TRIALS, Case
+from sdnn.experiments.chances import TenTrials
 from sdnn.experiments.claims import SHARE_STABLE, Claim
 from sdnn.experiments.config import TrialConfig
 from sdnn.experiments.environment_trial import EnvironmentTrialConfig
@@ -22,6 +23,9 @@ from sdnn.experiments.verdicts import ClaimOutcome, Verdict, judge_claims
 
 MIN_TRIALS_TO_DIFFER = 6
 """Fewer paired trials are all on one side by chance more often than once in twenty times."""
+
+MIN_TRIALS_TO_DRAW = 2 * PAPER_TRIALS
+"""Fewer trials are too few to draw ten from."""
 
 
 @dataclass(frozen=True)
@@ -77,10 +81,14 @@ class VariantClaim:
         The verdict and the quantities behind it.
     moved
         Whether the verdict about the reference is another one; None where there is none.
+    chance
+        In which share of draws of ten of its trials the claim is shown; None where there are fewer
+        than `MIN_TRIALS_TO_DRAW`.
     """
 
     outcome: ClaimOutcome
     moved: bool | None
+    chance: Estimate | None = None
 
 
 @dataclass(frozen=True)
@@ -134,6 +142,7 @@ class Comparison:
                     _moved(outcome, reference.get(number))
                     if variant != self.study.reference
                     else None,
+                    self._chance(variant, outcome.claim),
                 )
                 for number, outcome in of_variant.items()
             }
@@ -146,17 +155,37 @@ class Comparison:
         found = {n: c.outcome.claim for of in self.claims.values() for n, c in of.items()}
         return tuple(found[number] for number in sorted(found))
 
-    def _outcomes(self, variant_id: str) -> dict[int, ClaimOutcome]:
-        summaries = [
+    def chance_of_all(self, variant_id: str) -> Estimate | None:
+        """In which share of draws of ten trials a variant shows all claims about it together.
+
+        None where there are none, or fewer than `MIN_TRIALS_TO_DRAW` trials.
+        """
+        claims = [one.outcome.claim for one in self.claims[variant_id].values()]
+        return self._chance(variant_id, *claims) if claims else None
+
+    def _chance(self, variant_id: str, *claims: Claim) -> Estimate | None:
+        if self.study.n_trials < MIN_TRIALS_TO_DRAW:
+            return None
+        return self._ten_trials[variant_id].chance(*claims)
+
+    @cached_property
+    def _ten_trials(self) -> dict[str, TenTrials]:
+        return {variant.id: TenTrials(self._papers(variant.id)) for variant in self.variants}
+
+    def _papers(self, variant_id: str) -> list[CaseSummary]:
+        """Give what is measured of a variant in the paper's cases."""
+        return [
             measured.summary
             for (_, variant), measured in self.measured.items()
             if variant == variant_id
             and measured.combination.case.id in PAPER_CASES
             and isinstance(measured.combination.config, TrialConfig)
         ]
+
+    def _outcomes(self, variant_id: str) -> dict[int, ClaimOutcome]:
         return {
             outcome.claim.number: outcome
-            for outcome in judge_claims(summaries, ())
+            for outcome in judge_claims(self._papers(variant_id), ())
             if outcome.verdict is not Verdict.NOT_RUN
             and all(checked.estimate is not None for checked in outcome.checks)
         }

@@ -12,7 +12,7 @@ from sdnn.experiments.page import (
 )
 from sdnn.experiments.registry import agent_entry
 from sdnn.experiments.report import NOTE, RULE_NOTE
-from sdnn.experiments.sweep.report import CLAIMS_NOTE, StudyReport
+from sdnn.experiments.sweep.report import CHANCES_NOTE, CLAIMS_NOTE, StudyReport
 
 _TEMPLATE = "sweep/study.html.jinja"
 
@@ -42,6 +42,8 @@ def to_html(report: StudyReport, picture: bytes, call: Call) -> str:
         call=call,
         picture=data_url(picture),
         overview=report.claim_overview(),
+        chances=report.chance_table(),
+        chances_note=CHANCES_NOTE,
         claim_tables=list(report.claim_tables()),
         case_tables=list(report.case_tables()),
         kind_of={verdict.value: kind for verdict, kind in VERDICT_KINDS.items()},

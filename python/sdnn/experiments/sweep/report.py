@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sdnn.experiments.cases import PAPER_EPISODES, PAPER_TRIALS
 from sdnn.experiments.claims import SHARE_STABLE, Claim, describe
 from sdnn.experiments.measures import DEFAULT_MEASURES, MeasureName
 from sdnn.experiments.registry import agent_entry
@@ -22,6 +23,7 @@ from sdnn.experiments.report import (
 from sdnn.experiments.statistics import DEFAULT_BOOTSTRAP, Estimate
 from sdnn.experiments.sweep.comparison import (
     MIN_TRIALS_TO_DIFFER,
+    MIN_TRIALS_TO_DRAW,
     Comparison,
     Measured,
     VariantClaim,
@@ -51,6 +53,12 @@ SOLVED_NOTE = (
 CLAIMS_NOTE = (
     "A claim is shown where the study has every case and agent that it speaks of. (moved): the"
     " verdict about the reference is another one."
+)
+
+CHANCES_NOTE = (
+    f"In how many draws of {PAPER_TRIALS} of a variant's trials, as the paper's ten were one, the"
+    " medians lie in all ranges of a claim, and of all claims together; with intervals over the"
+    f" trials that are drawn from. Shown from {MIN_TRIALS_TO_DRAW} trials on."
 )
 
 Table = tuple[str, Sequence[str], Sequence[Sequence[str]]]
@@ -126,6 +134,22 @@ class StudyReport:
         header = ("variant", *(f"claim {claim.number}" for claim in claims))
         return "The paper's claims", header, rows
 
+    def chance_table(self) -> Table | None:
+        """How often ten trials show the claims, a row for each variant; None if none can be."""
+        claims = self.comparison.claims_shown
+        rows = []
+        for variant in self.comparison.variants:
+            together = self.comparison.chance_of_all(variant.id)
+            if together is None:
+                continue
+            found = self.comparison.claims[variant.id]
+            ones = (found[c.number].chance if c.number in found else None for c in claims)
+            rows.append((variant.title, *map(_share, ones), _share(together)))
+        if not rows:
+            return None
+        header = ("variant", *(f"claim {claim.number}" for claim in claims), "all of these")
+        return "How often ten trials show the claims", header, rows
+
     def claim_tables(self) -> Iterator[Table]:
         """For each claim its quantities, a row for each variant."""
         for claim in self.comparison.claims_shown:
@@ -172,6 +196,8 @@ class StudyReport:
         tables: list[Table] = []
         if overview := self.claim_overview():
             tables.append(overview)
+        if chances := self.chance_table():
+            tables.append(chances)
         for _, table, differences in self.case_tables():
             tables += [table] if differences is None else [table, differences]
         return [*tables, *self.claim_tables()]
@@ -191,6 +217,7 @@ class StudyReport:
             NOTE,
             *self.table_notes(),
             *([CLAIMS_NOTE, RULE_NOTE] if self.comparison.claims_shown else []),
+            *([CHANCES_NOTE] if self.chance_table() else []),
             *(f"{name.replace('_', ' ')}: {text}." for name, text in self.measures().items()),
         ]
 
@@ -220,6 +247,12 @@ def _verdict(claim: VariantClaim | None) -> str:
     if claim is None:
         return "-"
     return claim.outcome.verdict.value + (" (moved)" if claim.moved else "")
+
+
+def _share(estimate: Estimate | None) -> str:
+    if estimate is None:
+        return "-"
+    return format_estimate(estimate, "final_share_solved", PAPER_EPISODES)
 
 
 def _claim_cell(checked: CheckOutcome) -> str:
@@ -314,6 +347,9 @@ def to_json(report: StudyReport) -> dict[str, Any]:
             {
                 "variant": variant,
                 "moved": claim.moved,
+                "ten_trials_show_it": None
+                if claim.chance is None
+                else claim.chance.to_json(PAPER_EPISODES),
                 **claim.outcome.to_json(),
             }
             for variant, claims in comparison.claims.items()

@@ -201,13 +201,13 @@ agent = "fql"
 """
 
 
-def claimed_records(study):
+def claimed_records(study, n_trials=10):
     """As the paper's curves: Case II collapses at about 7,500; but not with `new`."""
     good, lost = steps_of((1500, 4)), steps_of((750, 4), (750, 50))
     for variant in ("old", "new", "fql"):
         for case in ("s4", "s4-noise", "s5-noise", "s6-noise"):
             steps = lost if case == "s4-noise" and variant == "old" else good
-            for number in range(10):
+            for number in range(n_trials):
                 yield record(study, case, variant, number, steps)
 
 
@@ -243,6 +243,29 @@ def test_claims_are_judged_for_each_variant(study):
     assert {(c["variant"], c["number"], c["moved"]) for c in table["claims"]} >= {
         ("new", 5, True), ("new", 7, False), ("old", 5, None),
     }  # fmt: skip
+
+
+def test_chances_are_shown_from_twice_the_papers_trials_on(study):
+    def chances(n_trials):
+        mine = study(CLAIMED, n_trials=n_trials)
+        found = compare(mine, claimed_records(mine, n_trials))
+        return StudyReport(comparison=found, version="1", digest="0")
+
+    assert chances(19).chance_table() is None
+    report = chances(20)
+    title, header, rows = report.chance_table()
+    assert title in [table[0] for table in report.tables()]
+    assert header[1:] == (*(f"claim {n}" for n in (3, 4, 5, 6, 7)), "all of these")
+    always, never = "100 % [100, 100]", "0 % [0, 0]"
+    assert rows == [
+        ("old", "-", "-", always, always, always, always),
+        ("new", "-", "-", never, never, always, never),
+        ("fql", always, never, "-", "-", "-", never),
+    ]
+    told = {(c["variant"], c["number"]): c["ten_trials_show_it"] for c in to_json(report)["claims"]}
+    assert told["new", 6] == {"value": 0.0, "lower": 0.0, "upper": 0.0}
+    call = Call(machine="", seconds=1.0, n_run=0, n_planned=0, processor_seconds=1.0)
+    assert title in to_html(report, b"<svg/>", call)
 
 
 def test_small_runs_are_not_judged_and_claims_without_their_cases_not_shown(study):
