@@ -265,7 +265,6 @@ CONTENDERS = {
         title="stream AC",
         learn=_learn_stream_ac,
         tasks=stream_ac.TASKS,
-        steps=dict.fromkeys(stream_ac.TASKS, 50_000),  # it takes milliseconds for each
         make=Task.make_unscaled,
     ),
     "sac": _stable("SAC"),
