@@ -6,7 +6,7 @@
 A trial is a training that is looked at 20 times: 20 greedy episodes each time, 100 at the end. They
 take no part in its processor time. Its rows go to docs/other-tasks.csv when it is done, and it is
 not run again. At the end the tables are printed and docs/other-tasks.png is drawn from the rows.
-Rivals need `pip install stable-baselines3 streaming-deep-rl`, LunarLanderContinuous `box2d`.
+SAC, TD3 and PPO need `pip install stable-baselines3`, LunarLanderContinuous `box2d`.
 """
 
 from __future__ import annotations

@@ -161,15 +161,16 @@ def test_the_kept_trials_are_of_the_papers_settings():
         assert one.root_seed != 0  # what `sdnn reproduce` runs as it comes is not among them
 
 
-def test_a_kept_trial_is_what_running_it_gives(tmp_path):
-    kept = next(one for one in kept_trials() if (one.case_id, one.agent) == ("s4", "fql"))
+@pytest.mark.parametrize("agent", ["sdnn-c", "fql"])
+def test_a_kept_trial_is_what_running_it_gives(tmp_path, agent):
+    kept = next(one for one in kept_trials() if (one.case_id, one.agent) == ("s4", agent))
     plan = plan_trials([CASES["s4"]], 1, kept.root_seed, ProtocolConfig())
-    own = [planned for planned in plan if planned.key.agent == "fql"]
+    own = [planned for planned in plan if planned.key.agent == agent]
     with ResultStore(tmp_path) as store:
         run_trials(own, store)
         (record,) = store.load()
     assert record.rows.digest()[:16] == kept.rows_digests[0]
-    summary = summarize(CaseResult(CASES["s4"], "fql", (record,)))
+    summary = summarize(CaseResult(CASES["s4"], agent, (record,)))
     for name in STEP_MEASURES:
         assert summary.values[name][0] == kept.values[name][0]
 
