@@ -162,7 +162,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     handles = {}
     for panel in grid.ravel():
         handles.update(zip(*reversed(panel.get_legend_handles_labels()), strict=True))
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=6, fontsize=9)
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5, fontsize=9)
     write_whole(path, figure_bytes(figure)[0])
 
 
