@@ -157,8 +157,7 @@ class Normal:
 
     def sample(self, outputs, generator):
         """Draw an action."""
-        self._raw = outputs[self._n :]
-        self._deviation = np.logaddexp(0.0, self._raw)
+        self._deviation = np.logaddexp(0.0, outputs[self._n :])
         self._off = self._deviation * generator.standard_normal(self._n)
         return self._of_space(outputs[: self._n] + self._off)
 

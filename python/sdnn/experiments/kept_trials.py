@@ -14,6 +14,7 @@ from importlib.resources import files
 
 import numpy as np
 
+from sdnn.experiments.cases import PAPER_EPISODES
 from sdnn.experiments.measures import STEP_MEASURES
 from sdnn.experiments.results import CaseSummary, TrialMeasures
 from sdnn.whole_files import csv_bytes
@@ -21,9 +22,6 @@ from sdnn.whole_files import csv_bytes
 FILE_NAME = "kept-trials.csv"
 HEADER = ("case", "agent", "config_hash", "root_seed", "trial", "rows_digest", *STEP_MEASURES)
 """Columns of the file: a row for each trial."""
-
-LAST_EPISODE = 15_000
-"""Learning episodes of every kept trial."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ def kept_trials() -> tuple[KeptTrials, ...]:
         KeptTrials(
             case_id=case_id,
             agent=agent,
-            last_episode=LAST_EPISODE,
+            last_episode=PAPER_EPISODES,
             values={name: np.array([float(row[name]) for row in own]) for name in STEP_MEASURES},
             config_hash=config_hash,
             root_seed=int(root_seed),
@@ -85,9 +83,9 @@ def kept_csv(summaries: Iterable[CaseSummary], root_seed: int) -> bytes:
     """
     rows = []
     for summary in summaries:
-        if summary.last_episode != LAST_EPISODE:
+        if summary.last_episode != PAPER_EPISODES:
             raise ValueError(
-                f"kept trials have {LAST_EPISODE} learning episodes, those of {summary.agent} in"
+                f"kept trials have {PAPER_EPISODES} learning episodes, those of {summary.agent} in"
                 f" {summary.case_id} have {summary.last_episode}"
             )
         for number, record in enumerate(summary.result.records):

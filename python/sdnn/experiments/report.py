@@ -231,6 +231,17 @@ def format_estimate(estimate: Estimate, measure: MeasureName, last_episode: int)
     return f"{number(estimate.value)}{unit} [{number(estimate.lower)}, {number(estimate.upper)}]"
 
 
+def format_share(estimate: Estimate) -> str:
+    """Write a share with its interval.
+
+    Examples
+    --------
+    >>> format_share(Estimate(0.479, 0.26, 0.712))
+    '47.9 % [26, 71.2]'
+    """
+    return format_estimate(estimate, "final_share_solved", PAPER_EPISODES)
+
+
 def decimals_of(estimate: Estimate, measure: MeasureName) -> int:
     """Choose the decimals of an estimate: two digits of a return's interval, else one decimal."""
     ends = np.array([estimate.value, estimate.lower, estimate.upper])
@@ -304,7 +315,7 @@ def more_rows(report: Report) -> list[tuple[str, ...]]:
     for one in report.settled:
         if one.more is None or one.chance is None:
             continue
-        shown = format_estimate(one.chance, "final_share_solved", PAPER_EPISODES)
+        shown = format_share(one.chance)
         head = (str(one.claim.number), one.claim.text)
         rows.append((*head, "", "", "", one.verdict.value, shown))
         for checked in one.more.checks:

@@ -18,11 +18,11 @@ from sdnn.experiments import (
     select_experiments,
     summarize,
 )
+from sdnn.experiments.cases import PAPER_EPISODES
 from sdnn.experiments.chances import TenTrials
 from sdnn.experiments.claims import CLAIMS, Check, Claim, Difference, Growth, Median, Subject
 from sdnn.experiments.kept_trials import (
     HEADER,
-    LAST_EPISODE,
     KeptTrials,
     kept_csv,
     kept_trials,
@@ -55,7 +55,7 @@ def measured(case_id, values, agent="sdnn-c", **more):
         "final_share_solved": np.ones(n),
     }
     own |= {name: np.array(found, float) for name, found in more.items()}
-    return TrialMeasures(case_id, agent, LAST_EPISODE, own)
+    return TrialMeasures(case_id, agent, PAPER_EPISODES, own)
 
 
 def final_steps(case, **limits):

@@ -18,6 +18,7 @@ from sdnn.experiments.report import (
     RULE_NOTE,
     decimals_of,
     format_estimate,
+    format_share,
     plain_number,
 )
 from sdnn.experiments.statistics import DEFAULT_BOOTSTRAP, Estimate
@@ -250,9 +251,7 @@ def _verdict(claim: VariantClaim | None) -> str:
 
 
 def _share(estimate: Estimate | None) -> str:
-    if estimate is None:
-        return "-"
-    return format_estimate(estimate, "final_share_solved", PAPER_EPISODES)
+    return "-" if estimate is None else format_share(estimate)
 
 
 def _claim_cell(checked: CheckOutcome) -> str:
