@@ -195,7 +195,7 @@ def judge_claims(
     measured
         One for each case and agent; a case that experiments share may come more than once.
     costs
-        TrialMeasures costs.
+        Measured costs.
     """
     by_subject = {Subject(one.case_id, one.agent): one for one in measured}
     outcomes = (
