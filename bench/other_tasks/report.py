@@ -1,31 +1,36 @@
-"""Tables and a figure from the stored rows."""
+"""Tables from the stored rows."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from agents import CONTENDERS
 from numpy.typing import NDArray
+from page import interval, markdown
 from rows import Row
 from scipy.stats import trim_mean
 from tasks import CONDITIONS, TASKS
 
-from sdnn.experiments.figures import figure_bytes, require_matplotlib
 from sdnn.experiments.statistics import Estimate, estimate_median
-from sdnn.whole_files import write_whole
+
+Trials = Mapping[tuple[str, str, str], Sequence[Sequence[Row]]]
+"""Looks of each trial, in their order, by task, condition and agent, then by seed."""
 
 CONFIDENCE, N_RESAMPLES = 0.95, 2000
+OURS = "sdnn"
 
 
-def trials(rows: Iterable[Row], name: str, condition: str, kind: str) -> list[list[Row]]:
-    """The looks of each trial, in their order, by seed."""
-    by_seed: dict[int, list[Row]] = {}
+def by_trial(rows: Iterable[Row]) -> Trials:
+    """Sort looks into trials, and those by seed."""
+    looks: dict[tuple[str, str, str, int], list[Row]] = {}
     for row in rows:
-        if (row["task"], row["condition"], row["agent"]) == (name, condition, kind):
-            by_seed.setdefault(int(row["seed"]), []).append(row)
-    return [by_seed[seed] for seed in sorted(by_seed)]
+        key = (row["task"], row["condition"], row["agent"], int(row["seed"]))
+        looks.setdefault(key, []).append(row)
+    trials: dict[tuple[str, str, str], list[list[Row]]] = {}
+    for key in sorted(looks):
+        trials.setdefault(key[:3], []).append(looks[key])
+    return trials
 
 
 def last_returns(looks: Iterable[Sequence[Row]]) -> NDArray[np.float64]:
@@ -58,27 +63,57 @@ def interquartile_mean(scores: Sequence[NDArray[np.float64]]) -> Estimate:
         Of each task, shape (n_seeds,).
     """
     rng = np.random.default_rng(2015)
-    drawn = [trim_mean(np.concatenate([rng.choice(s, s.size) for s in scores]), 0.25)
-             for _ in range(N_RESAMPLES)]  # fmt: skip
+    draws = [np.concatenate([rng.choice(s, s.size) for s in scores]) for _ in range(N_RESAMPLES)]
+    drawn = trim_mean(draws, 0.25, axis=1)
     lower, upper = np.quantile(drawn, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
     return Estimate(float(trim_mean(np.concatenate(scores), 0.25)), float(lower), float(upper))
 
 
-def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Give a table."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "".join("| " + " | ".join(cells) + " |\n" for cells in lines)
+Middle = Callable[..., NDArray[np.float64]]
+"""A function like `numpy.median`."""
+MIDDLES: Mapping[str, Middle] = {"median seeds": np.median, "means of seeds": np.mean}
 
 
-def _interval(estimate: Estimate, digits: int) -> str:
-    return f"{estimate.value:.{digits}f} [{estimate.lower:.{digits}f}, {estimate.upper:.{digits}f}]"
+def shares(
+    clean: Sequence[NDArray[np.float64]],
+    other: Sequence[NDArray[np.float64]],
+    middle: Middle,
+    rng: np.random.Generator,
+) -> NDArray[np.float64]:
+    """Share of the clean score that is kept, the mean over tasks, and bootstrap draws of it.
+
+    Parameters
+    ----------
+    clean, other
+        Scores of each task, shape (n_seeds,), as it comes and with noise or redundant sensors.
+    middle
+        Of a task's seeds.
+    rng
+        Draws the seeds.
+
+    Returns
+    -------
+    Shape (1 + N_RESAMPLES,): of all seeds, then of seeds drawn for each task and sensors.
+    """
+
+    def drawn(scores):
+        samples = rng.choice(scores, (N_RESAMPLES, scores.size))
+        return middle(np.concatenate([scores[None], samples]), axis=1)
+
+    return np.mean([drawn(o) / drawn(c) for c, o in zip(clean, other, strict=True)], axis=0)
 
 
-def _task_rows(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
+def interval_of(draws: NDArray[np.float64]) -> Estimate:
+    """Give the first of ``draws``, with the interval that the others span."""
+    lower, upper = np.quantile(draws[1:], [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    return Estimate(float(draws[0]), float(lower), float(upper))
+
+
+def _task_rows(trials: Trials) -> Iterator[Sequence[str]]:
     for name, task in TASKS.items():
         for condition in CONDITIONS:
             for kind, contender in CONTENDERS.items():
-                looks = trials(rows, name, condition, kind)
+                looks = trials.get((name, condition, kind))
                 if not looks:
                     continue
                 returns = last_returns(looks)
@@ -90,7 +125,7 @@ def _task_rows(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
                     contender.title,
                     str(len(looks)),
                     f"{int(looks[0][-1]['steps']):,}",
-                    _interval(estimate_median(returns), 1),
+                    interval(estimate_median(returns), 1),
                     str(int((returns >= task.solved).sum())),
                     f"{np.median([float(trial[-1]['cpu_seconds']) for trial in looks]):.1f} s",
                     f"{seconds:.1f} s" if np.isfinite(seconds) else "not reached",
@@ -98,101 +133,73 @@ def _task_rows(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
                 )
 
 
-def _overall_rows(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
+def _overall_rows(trials: Trials) -> Iterator[Sequence[str]]:
     for kind, contender in CONTENDERS.items():
-        clean = {n for n in TASKS if trials(rows, n, "clean", kind)}
         for condition in CONDITIONS:
-            names = [n for n in TASKS if trials(rows, n, condition, kind) and n in clean]
+            names = [n for n in TASKS if (n, condition, kind) in trials]
             if not names:
                 continue
-            scores, shares = [], []
-            for name in names:
-                score = np.vectorize(TASKS[name].score)
-                own = score(last_returns(trials(rows, name, condition, kind)))
-                scores.append(own)
-                base = float(np.median(score(last_returns(trials(rows, name, "clean", kind)))))
-                shares.append(float(np.median(own)) / base if base > 0 else np.nan)
+            scores = [_scores(trials, name, condition, kind) for name in names]
             yield (
                 contender.title,
                 condition,
                 ", ".join(names),
-                _interval(interquartile_mean(scores), 2),
-                "" if condition == "clean" else f"{100 * np.median(shares):.0f} %",
+                interval(interquartile_mean(scores), 2),
             )
 
 
-def tables(rows: Sequence[Row]) -> str:
-    """Task by task, and over tasks."""
-    each = markdown(
-        (
-            "task", "sensors", "agent", "seeds", "steps", "return at the end", "seeds that solve",
-            "processor time", "of which until solved", "memory",
-        ),
-        _task_rows(rows),
+def _scores(trials: Trials, name: str, condition: str, kind: str) -> NDArray[np.float64]:
+    return np.vectorize(TASKS[name].score)(last_returns(trials[name, condition, kind]))
+
+
+def _kept_rows(trials: Trials) -> Iterator[Sequence[str]]:
+    """Tell what a rival and ours keep of their clean scores, task by task and in all of them."""
+    for condition in list(CONDITIONS)[1:]:
+        for kind, contender in CONTENDERS.items():
+            if kind == OURS:
+                continue
+            common = [name for name in TASKS if _can_compare(trials, name, condition, kind)]
+            groups = {name: [name] for name in common}
+            if len(common) > 1:
+                groups[f"mean of {len(common)}"] = common
+            for label, names in groups.items():
+                cells = _kept_cells(trials, names, condition, kind)
+                yield (condition, contender.title, label, *cells)
+
+
+def _can_compare(trials: Trials, name: str, condition: str, kind: str) -> bool:
+    return all((name, c, who) in trials for c in ("clean", condition) for who in (OURS, kind))
+
+
+def _kept_cells(trials: Trials, names: Sequence[str], condition: str, kind: str) -> Iterator[str]:
+    rng = np.random.default_rng(2015)
+    for middle in MIDDLES.values():
+        ours, rivals = (
+            100
+            * shares(
+                [_scores(trials, name, "clean", who) for name in names],
+                [_scores(trials, name, condition, who) for name in names],
+                middle,
+                rng,
+            )
+            for who in (OURS, kind)
+        )
+        yield from (f"{rivals[0]:.1f} %", f"{ours[0]:.1f} %")
+        yield interval(interval_of(ours - rivals), 1)
+
+
+def tables(trials: Trials) -> dict[str, str]:
+    """Give each table by its name in the page."""
+    each = (
+        "task", "sensors", "agent", "seeds", "steps", "return at the end", "seeds that solve",
+        "processor time", "of which until solved", "memory",
     )  # fmt: skip
-    overall = markdown(
-        ("agent", "sensors", "tasks", "score (IQM)", "share of the clean score"),
-        _overall_rows(rows),
-    )
-    return f"{each}\n{overall}"
-
-
-def draw(rows: Sequence[Row], path: Path) -> None:
-    """Draw return against steps and against processor time, a column for each task."""
-    require_matplotlib()
-    from matplotlib.figure import Figure
-
-    names = [n for n in TASKS if any(trials(rows, n, "clean", kind) for kind in CONTENDERS)]
-    if not names:
-        return
-    n_columns = min(len(names), 4)
-    n_blocks = -(-len(names) // n_columns)
-    figure = Figure(figsize=(3.4 * n_columns, 5.2 * n_blocks), layout="constrained")
-    grid = figure.subplots(2 * n_blocks, n_columns, squeeze=False)
-    for number, name in enumerate(names):
-        block, column = divmod(number, n_columns)
-        panels = grid[2 * block : 2 * block + 2, column]
-        _draw_task(panels, rows, name)
-        if column == 0:
-            for panel in panels:
-                panel.set_ylabel("mean return, greedy")
-    for panel in grid.ravel():
-        if not panel.has_data():
-            panel.set_axis_off()
-    handles = {}
-    for panel in grid.ravel():
-        handles.update(zip(*reversed(panel.get_legend_handles_labels()), strict=True))
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5, fontsize=9)
-    write_whole(path, figure_bytes(figure)[0])
-
-
-def _draw_task(panels, rows: Sequence[Row], name: str) -> None:
-    """Draw a task's curves into two panels."""
-    from matplotlib import colormaps
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    shades = colormaps["tab20"].colors  # each colour dark and light
-    for (kind, contender), color in zip(
-        CONTENDERS.items(), [*shades[::2], *shades[1::2]], strict=False
-    ):
-        looks = trials(rows, name, "clean", kind)
-        if not looks:
-            continue
-        returns = np.array([[float(r["mean_return"]) for r in trial] for trial in looks])
-        lower, median, upper = np.percentile(returns, (25, 50, 75), axis=0)
-        for panel, field in zip(panels, ("steps", "cpu_seconds"), strict=True):
-            x = np.median([[float(r[field]) for r in trial] for trial in looks], axis=0)
-            (line,) = panel.plot(
-                x, median, "-" if x.size > 1 else "o", color=color,
-                label=contender.title, lw=1.6,
-            )  # fmt: skip
-            panel.fill_between(x, lower, upper, color=line.get_color(), alpha=0.2, lw=0)
-    for panel in panels:
-        panel.axhline(TASKS[name].solved, color="0.4", lw=0.8, ls=":")
-        panel.set_xscale("log")
-        panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
-        panel.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,g}"))
-        panel.xaxis.set_minor_formatter(NullFormatter())
-    panels[0].set_title(name, loc="left", fontsize=10.5)
-    panels[0].set_xlabel("steps")
-    panels[1].set_xlabel("processor seconds")
+    kept = (
+        "sensors", "rival", "task",
+        *(f"{what}, {m}" for m in MIDDLES for what in ("rival", "SDNN-C", "points more")),
+    )  # fmt: skip
+    return {
+        "task by task": markdown(each, _task_rows(trials)),
+        "over tasks": markdown(("agent", "sensors", "tasks", "score (IQM)"), _overall_rows(trials)),
+        "share kept": markdown(kept, _kept_rows(trials)),
+    }

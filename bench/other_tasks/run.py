@@ -1,11 +1,12 @@
 """How the agents and their rivals do on Gymnasium's tasks: clean, with noise, with more sensors.
 
     python bench/other_tasks/run.py [--seeds 10] [--tasks CartPole,...] [--agents sdnn,...]
-        [--conditions clean,...] [--jobs 2] [--only-table]
+        [--conditions clean,...] [--jobs 2] [--folder docs] [--only-table]
 
 A trial is a training that is looked at 20 times: 20 greedy episodes each time, 100 at the end. They
 take no part in its processor time. Its rows go to docs/other-tasks.csv when it is done, and it is
-not run again. At the end the tables are printed and docs/other-tasks.png is drawn from the rows.
+not run again. At the end the tables are printed and put into docs/benchmarks.md, and
+docs/other-tasks.png is drawn, all from the rows. In another --folder nothing of docs/ changes.
 SAC, TD3 and PPO need `pip install stable-baselines3`, LunarLanderContinuous `box2d`.
 """
 
@@ -16,8 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from agents import CONTENDERS, train, work_for
+from figure import draw
 from looks import Looks
-from report import draw, tables
+from page import show
+from report import by_trial, tables
 from rows import Work, read_rows, run_missing
 from tasks import CONDITIONS, TASKS
 
@@ -53,9 +56,9 @@ def main() -> None:
             options.agents.split(","),
         )
         run_missing(trial, asked, path, FIELDS, options.jobs)
-    rows = read_rows(path)
-    print(tables(rows))
-    draw(rows, options.folder / "other-tasks.png")
+    trials = by_trial(read_rows(path))
+    show(tables(trials), options.folder)
+    draw(trials, options.folder / "other-tasks.png")
 
 
 if __name__ == "__main__":

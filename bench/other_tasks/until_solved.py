@@ -6,7 +6,7 @@
 Every 1,000 steps a training is looked at; when 100 greedy episodes have the mean return that solves
 the task, it ends. Looks take no part in its processor time. One trial at a time, the agents of a
 seed one after the other, so that what else the machine does meets all alike. Rows go to
-docs/until-solved.csv, and what is there is not run again.
+docs/until-solved.csv, what is there is not run again, and the table is put into docs/benchmarks.md.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 from agents import CONTENDERS, train, work_for
 from looks import SolvedError, UntilSolved
-from report import markdown
+from page import interval, markdown, show
 from rows import Row, Work, read_rows, run_missing
 
-from sdnn.experiments.statistics import Estimate, estimate_median
+from sdnn.experiments.statistics import estimate_median
 
 DOCS = Path(__file__).parents[2] / "docs"
 FIELDS = ("task", "condition", "agent", "seed", "steps", "cpu_seconds", "mean_return", "solved")
@@ -50,14 +50,6 @@ def _until_solved(rows: Sequence[Row], name: str, kind: str, field: str) -> np.n
     )
 
 
-def _interval(estimate: Estimate, digits: int = 0) -> str:
-    value, lower, upper = (
-        f"{x:,.{digits}f}" if np.isfinite(x) else "never"
-        for x in (estimate.value, estimate.lower, estimate.upper)
-    )
-    return f"{value} [{lower}, {upper}]"
-
-
 def _times(ratio: float) -> str:
     return f"{ratio:,.{0 if ratio >= 10 else 1}f}x" if np.isfinite(ratio) else ""
 
@@ -76,9 +68,9 @@ def _table_rows(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
                 name,
                 contender.title,
                 f"{np.isfinite(steps).sum()} of {steps.size}",
-                _interval(estimate_median(steps)),
+                interval(estimate_median(steps), 0),
                 f"{1000 * np.median(spent):.3g} ms",
-                _interval(estimate_median(seconds), 1) + " s",
+                interval(estimate_median(seconds), 1) + " s",
                 _times(float(np.median(seconds) / ours)),
             )
 
@@ -93,7 +85,7 @@ def table(rows: Sequence[Row]) -> str:
 
 
 def main() -> None:
-    """Run what is missing, then print the table."""
+    """Run what is missing, then show the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--tasks", default="CartPole,Pendulum,MountainCarContinuous")
@@ -107,7 +99,7 @@ def main() -> None:
             options.seeds, ["clean"], options.tasks.split(","), options.agents.split(",")
         )
         run_missing(trial, asked, path, FIELDS, 1)
-    print(table(read_rows(path)))
+    show({"until solved": table(read_rows(path))}, options.folder)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,74 @@
+"""The figure of the stored rows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from agents import CONTENDERS
+from report import Trials
+from tasks import TASKS
+
+from sdnn.experiments.figures import figure_bytes, require_matplotlib
+from sdnn.whole_files import write_whole
+
+
+def draw(trials: Trials, path: Path) -> None:
+    """Draw return against steps and against processor time, a column for each task."""
+    require_matplotlib()
+    from matplotlib.figure import Figure
+
+    names = [n for n in TASKS if any((n, "clean", kind) in trials for kind in CONTENDERS)]
+    if not names:
+        return
+    n_columns = min(len(names), 4)
+    n_blocks = -(-len(names) // n_columns)
+    figure = Figure(figsize=(3.4 * n_columns, 5.2 * n_blocks), layout="constrained")
+    grid = figure.subplots(2 * n_blocks, n_columns, squeeze=False)
+    for number, name in enumerate(names):
+        block, column = divmod(number, n_columns)
+        panels = grid[2 * block : 2 * block + 2, column]
+        _draw_task(panels, trials, name)
+        if column == 0:
+            for panel in panels:
+                panel.set_ylabel("mean return, greedy")
+    for panel in grid.ravel():
+        if not panel.has_data():
+            panel.set_axis_off()
+    handles = {}
+    for panel in grid.ravel():
+        handles.update(zip(*reversed(panel.get_legend_handles_labels()), strict=True))
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5, fontsize=9)
+    write_whole(path, figure_bytes(figure)[0])
+
+
+def _draw_task(panels, trials: Trials, name: str) -> None:
+    """Draw a task's curves into two panels."""
+    from matplotlib import colormaps
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    shades = colormaps["tab20"].colors  # each colour dark and light
+    for (kind, contender), color in zip(
+        CONTENDERS.items(), [*shades[::2], *shades[1::2]], strict=False
+    ):
+        looks = trials.get((name, "clean", kind))
+        if not looks:
+            continue
+        returns = np.array([[float(r["mean_return"]) for r in trial] for trial in looks])
+        lower, median, upper = np.percentile(returns, (25, 50, 75), axis=0)
+        for panel, field in zip(panels, ("steps", "cpu_seconds"), strict=True):
+            x = np.median([[float(r[field]) for r in trial] for trial in looks], axis=0)
+            (line,) = panel.plot(
+                x, median, "-" if x.size > 1 else "o", color=color,
+                label=contender.title, lw=1.6,
+            )  # fmt: skip
+            panel.fill_between(x, lower, upper, color=line.get_color(), alpha=0.2, lw=0)
+    for panel in panels:
+        panel.axhline(TASKS[name].solved, color="0.4", lw=0.8, ls=":")
+        panel.set_xscale("log")
+        panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+        panel.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,g}"))
+        panel.xaxis.set_minor_formatter(NullFormatter())
+    panels[0].set_title(name, loc="left", fontsize=10.5)
+    panels[0].set_xlabel("steps")
+    panels[1].set_xlabel("processor seconds")
