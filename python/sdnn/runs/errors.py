@@ -30,6 +30,10 @@ class ConfigError(RunError):
         self.place = place
         super().__init__(": ".join(part for part in (place, key, problem) if part))
 
+    def __reduce__(self) -> tuple[type[ConfigError], tuple[str, str, str]]:
+        """Be pickled as it was made: exceptions come back from other processes so."""
+        return type(self), (self.key, self.problem, self.place)
+
 
 class RunTerminatedError(RunError):
     """SIGTERM came; the run was saved after the present step."""

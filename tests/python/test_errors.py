@@ -1,0 +1,46 @@
+"""The library's own exceptions, wherever they are defined."""
+
+import contextlib
+import copy
+import importlib
+import inspect
+import pickle
+import pkgutil
+
+import pytest
+
+import sdnn
+
+
+def modules():
+    for info in pkgutil.walk_packages(sdnn.__path__, "sdnn."):
+        if not info.name.rpartition(".")[2].startswith("_"):
+            with contextlib.suppress(ModuleNotFoundError):  # an extra that is not installed
+                yield importlib.import_module(info.name)
+
+
+def error_classes():
+    return {
+        value
+        for module in modules()
+        for name, value in vars(module).items()
+        if inspect.isclass(value)
+        and issubclass(value, Exception)
+        and value.__module__.startswith("sdnn.")
+        and not name.startswith("_")
+    }
+
+
+@pytest.mark.parametrize("copied", [copy.copy, lambda error: pickle.loads(pickle.dumps(error))])
+def test_errors_come_back_from_other_processes(copied):
+    """One that cannot be unpickled would end a pool of processes, and its message be lost."""
+    kinds = error_classes()
+    assert {"ConfigError", "StoreError", "UnusableStepError"} <= {kind.__name__ for kind in kinds}
+    for kind in kinds:
+        has_own = inspect.isfunction(kind.__init__)
+        words = list(inspect.signature(kind).parameters) if has_own else ["message"]
+        error = kind(*(f"{word} of it" for word in words))
+        again = copied(error)
+        assert type(again) is kind
+        assert str(again) == str(error), kind
+        assert vars(again) == vars(error), kind
