@@ -196,8 +196,8 @@ TILINGS = {
     "MountainCarContinuous": {"n_bins": 8, "n_tilings": 8},
     "Acrobot": {"n_bins": 4, "n_tilings": 16, "discount": 1.0, "epsilon": 0.0},
     "LunarLanderContinuous": {"n_bins": 3, "n_tilings": 16},
-    "Reaching": {"n_bins": 4, "n_tilings": 16},
-    "Wheels": {"n_bins": 4, "n_tilings": 16},
+    "Reaching": {"n_bins": 2, "n_tilings": 16, "discount": 0.9},
+    "Wheels": {"n_bins": 3, "n_tilings": 16},
 }
 """Finer grids for fewer variables; tasks of -1 a step need no chance, as in the book."""
 
