@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <span>
 
 #include "sdnn/core/detail/aligned_buffer.hpp"
@@ -26,12 +25,14 @@ using experiments::keep, experiments::time_each, experiments::Times;
 
 namespace detail {
 
-SDNN_INLINE std::uint64_t sum_of_words_body(const std::byte* bytes, std::size_t size) noexcept {
-  std::array<std::uint64_t, 8> sums{};
-  for (std::size_t i = 0; i < size; i += core::kCacheLine) {
-    std::array<std::uint64_t, 8> words;
-    std::memcpy(words.data(), bytes + i, core::kCacheLine);
-    for (std::size_t k = 0; k < words.size(); ++k) sums[k] += words[k];
+inline constexpr std::size_t kWordsOfLine = core::kCacheLine / sizeof(std::uint64_t);
+
+// The words are added where they are: copied first, they are stored in halves and loaded whole, and
+// the processor waits for that, not for the memory.
+SDNN_INLINE std::uint64_t sum_of_words_body(const std::uint64_t* words, std::size_t n) noexcept {
+  std::array<std::uint64_t, kWordsOfLine> sums{};
+  for (std::size_t i = 0; i < n; i += kWordsOfLine) {
+    for (std::size_t k = 0; k < kWordsOfLine; ++k) sums[k] += words[i + k];
   }
   std::uint64_t total = 0;
   for (const std::uint64_t sum : sums) total += sum;
@@ -150,8 +151,8 @@ inline void multiply_neon(const float* weights, std::size_t n_rows, std::size_t 
 
 }  // namespace detail
 
-/// The sum of 64-bit words, modulo 2^64. Shape: whole cache lines.
-SDNN_KERNEL(std::uint64_t, sum_of_words, (const std::byte* bytes, std::size_t size), (bytes, size))
+/// The sum of n words, modulo 2^64; n makes whole cache lines.
+SDNN_KERNEL(std::uint64_t, sum_of_words, (const std::uint64_t* words, std::size_t n), (words, n))
 
 /// out = weights . input, in 32-bit floats; the only kernel whose bits depend on the level. Shapes:
 /// weights (n_rows, n_columns), input (n_columns,), out (n_rows,).
@@ -167,16 +168,17 @@ class BufferRead {
   /// `n_bytes` is rounded up to whole cache lines; the buffer is written, so its pages exist.
   /// Throws std::invalid_argument, std::bad_alloc.
   explicit BufferRead(std::size_t n_bytes)
-      : buffer_(core::round_up(
-            (core::require_in_range("n_bytes", n_bytes, std::size_t{1}, std::size_t{1} << 34),
-             n_bytes),
-            core::kCacheLine)) {
+      : buffer_(core::round_up((core::require_in_range("n_bytes", n_bytes, std::size_t{1},
+                                                       std::size_t{1} << 34),
+                                n_bytes),
+                               core::kCacheLine) /
+                sizeof(std::uint64_t)) {
     for (std::size_t i = 0; i < buffer_.size(); ++i) {
-      buffer_[i] = static_cast<std::byte>(i * 31 % 251);
+      buffer_[i] = i * kOddFactor;
     }
   }
 
-  std::size_t n_bytes() const noexcept { return buffer_.size(); }
+  std::size_t n_bytes() const noexcept { return buffer_.size() * sizeof(std::uint64_t); }
 
   /// The sum of the buffer's 64-bit words, modulo 2^64.
   std::uint64_t sum() const { return sum_of_words(buffer_.data(), buffer_.size()); }
@@ -187,7 +189,9 @@ class BufferRead {
   }
 
  private:
-  core::AlignedBuffer<std::byte> buffer_;
+  static constexpr std::uint64_t kOddFactor = 0x9E3779B97F4A7C15;  ///< spreads over all bits
+
+  core::AlignedBuffer<std::uint64_t> buffer_;
 };
 
 /// A dense float32 matrix-vector product, as quick as the processor makes it: what a hidden layer
