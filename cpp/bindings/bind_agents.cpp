@@ -3,7 +3,9 @@
 #include <pybind11/stl.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -11,6 +13,7 @@
 #include "bind_config.hpp"
 #include "bindings.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/observation_scale.hpp"
 #include "sdnn/agents/presets.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/agents/vector_fuzzy_q_learning.hpp"
@@ -131,9 +134,39 @@ void bind_decoupled_q_learning(py::module_& module, const char* name, const char
   def_q_learning(agent);
 }
 
+void bind_observation_scale(py::module_& module) {
+  using agents::ObservationScale;
+  using Input = std::tuple<std::string, std::size_t, std::size_t>;
+  py::class_<ObservationScale>(module, "ObservationScale", "From what is observed to [0, 1]")
+      .def(py::init([](std::vector<double> low, std::vector<double> high,
+                       const std::vector<Input>& inputs) {
+             std::vector<agents::ObservedInput> observed;
+             for (const auto& [name, first, second] : inputs) {
+               const auto kind = agents::observed_kind(name);
+               core::require(kind.has_value(), "inputs", "of kinds that there are", name);
+               observed.push_back({*kind, first, second});
+             }
+             return ObservationScale(std::move(low), std::move(high), std::move(observed));
+           }),
+           py::arg("low"), py::arg("high"), py::arg("inputs"))
+      .def_property_readonly("n_inputs", &ObservationScale::n_inputs)
+      .def(
+          "__call__",
+          [](const ObservationScale& self,
+             const ArrayArgument<double>& observation) -> std::optional<py::array_t<double>> {
+            const auto observed = bindings::vector(observation, "observation");
+            if (!self.has_state_of(observed)) return std::nullopt;
+            py::array_t<double> state(static_cast<py::ssize_t>(self.n_inputs()));
+            self(observed, {state.mutable_data(), self.n_inputs()});
+            return state;
+          },
+          py::arg("observation"), "The state, shape (n_inputs,); None where there is none");
+}
+
 }  // namespace
 
 void bind_agents(py::module_& module) {
+  bind_observation_scale(module);
   py::native_enum<agents::TieRule>(module, "TieRule", "enum.Enum",
                                    "Which of several best actions is taken")
       .value("uniform", agents::TieRule::uniform)

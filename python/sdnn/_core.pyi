@@ -639,6 +639,19 @@ class PerceptronTrainer:
         """
         Bytes beside the layer
         """
+class ObservationScale:
+    """
+    From what is observed to [0, 1]
+    """
+    def __call__(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        The state, shape (n_inputs,); None where there is none
+        """
+    def __init__(self, low: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], high: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], inputs: collections.abc.Sequence[tuple[str, typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]]) -> None:
+        ...
+    @property
+    def n_inputs(self) -> int:
+        ...
 class TieRule(enum.Enum):
     """
     Which of several best actions is taken

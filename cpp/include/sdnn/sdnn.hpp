@@ -6,6 +6,7 @@
 #include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/agents/fixed_rate.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/observation_scale.hpp"
 #include "sdnn/agents/presets.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/agents/return_range.hpp"

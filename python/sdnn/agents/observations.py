@@ -175,8 +175,7 @@ class UnitObservations:
     def flat(self, name: str, observation: Any) -> NDArray[np.float64]:
         """Flatten an observation, shape (n_variables,); ValueError if it is none, or has NaN."""
         values = self._vector(name, observation)
-        if np.isnan(values).any():
-            raise ValueError(f"{name} must not hold NaN, got {values}")
+        _check_no_nan(name, values)
         return values
 
     def _vector(self, name: str, observation: Any) -> NDArray[np.float64]:
@@ -201,8 +200,8 @@ class UnitObservations:
         for known, state in self._converted:  # a step asks for each one three times
             if key == known:
                 return state
-        flat = self.flat(name, observation)
-        state = self.unit(flat)
+        flat = self._vector(name, observation)
+        state = self.unit(flat, name)
         self._converted = (self._converted[1], (key, state))
         self._n_until_noted -= 1
         if not self._n_until_noted:
@@ -233,29 +232,12 @@ class UnitObservations:
             )
         return use
 
-    def unit(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Convert what `flat` gave, shape (n_inputs,)."""
-        scaled = (values - self.low) / self._width
-        scaled = np.minimum(np.maximum(scaled, 0.0), 1.0)
-        if self._plain:
-            return scaled
-        if self._has_angles and not np.isfinite(values).all():
-            raise ValueError(f"observation must be finite where it has angles, got {values}")
-        state = np.empty(len(self.inputs))
-        for place, one in enumerate(self.inputs):
-            if "variable" in one:
-                state[place] = scaled[one["variable"]]
-            elif "angle" in one:
-                cosine, sine = one["angle"]
-                angle = _core.atan2(values[sine], values[cosine])
-                state[place] = (angle + np.pi) / (2.0 * np.pi)
-            elif "symbol" in one:
-                first, n = one["symbol"]
-                state[place] = (np.argmax(values[first : first + n]) + 0.5) / n
-            else:
-                at = one["circular"]
-                turns = (values[at] - self.low[at]) / (self.high[at] - self.low[at])
-                state[place] = turns - np.floor(turns)
+    def unit(self, values: NDArray[np.float64], name: str = "observation") -> NDArray[np.float64]:
+        """Convert what `flat` gave, shape (n_inputs,); ValueError if it is no state."""
+        state = self._scale(values)
+        if state is None:
+            _check_no_nan(name, values)
+            raise ValueError(f"{name} must be finite where it has angles, got {values}")
         return state
 
     def settle(self, seen: NDArray[np.float64]) -> None:
@@ -351,8 +333,7 @@ class UnitObservations:
         self._converted = ((None, np.empty(0)),) * 2
         self._width = self.high - self.low
         self.inputs = inputs
-        self._has_angles = any(self.circular)
-        self._plain = inputs == [{"variable": i} for i in range(self.n_variables)]
+        self._scale = _core.ObservationScale(self.low.tolist(), self.high.tolist(), _kinds(inputs))
         self._is_settled = True
 
     def _unknown(self) -> NDArray[np.bool_]:
@@ -401,6 +382,21 @@ class UnitObservations:
                 variable += 1
             variable += 1
         return tuple(pairs)
+
+
+def _kinds(inputs: list[dict[str, Any]]) -> list[tuple[str, int, int]]:
+    """Give each input as the core takes it: its kind, and one or two numbers."""
+    kinds = []
+    for one in inputs:
+        ((kind, made_of),) = one.items()
+        first, second = made_of if isinstance(made_of, list) else (made_of, 0)
+        kinds.append((kind, first, second))
+    return kinds
+
+
+def _check_no_nan(name: str, values: NDArray[np.float64]) -> None:
+    if np.isnan(values).any():
+        raise ValueError(f"{name} must not hold NaN, got {values}")
 
 
 _LARGEST = 1e300

@@ -98,6 +98,9 @@ GOOD = {
         "approximator": core.FuzzyRulesConfig(), "n_dimensions": 2,
         "learning": learning(core.FuzzyQLearningConfig), "seed": 1,
     },
+    "ObservationScale": lambda: {
+        "low": [0.0, -1.0], "high": [1.0, 1.0], "inputs": [("variable", 0, 0), ("angle", 0, 1)]
+    },
     "AcrobotTrial": lambda: {"approximator": network_config(n_inputs=4), **trial_settings()},
     "FuzzyAcrobotTrial": lambda: {
         "approximator": core.FuzzyRulesConfig(), **trial_settings(),

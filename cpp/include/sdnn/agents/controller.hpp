@@ -18,115 +18,51 @@
 #include <vector>
 
 #include "sdnn/agents/agent_file.hpp"
+#include "sdnn/agents/observation_scale.hpp"
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/elementary.hpp"
 
 namespace sdnn::agents {
 
-/// From what is observed to what an agent sees: numbers in [0, 1].
-///
-/// As the file's "observation" says it: {"low": [..], "high": [..], "inputs": [..]}, with a range
-/// per observed variable and a list of what each input of the network is:
-///
-/// | input               | value                                                               |
-/// |---------------------|---------------------------------------------------------------------|
-/// | {"variable": i}     | (x_i - low_i) / (high_i - low_i), clipped to [0, 1]                 |
-/// | {"angle": [i, j]}   | (atan2(x_j, x_i) + pi) / (2 pi): x_i is the cosine, x_j the sine    |
-/// | {"circular": i}     | u - floor(u) with u = (x_i - low_i) / (high_i - low_i)              |
-/// | {"symbol": [i, n]}  | (k + 1/2) / n, where x_{i+k} is the first largest of x_i..x_{i+n-1} |
-class ObservationScale {
- public:
-  /// Throws std::invalid_argument naming the member that does not fit.
-  explicit ObservationScale(const nlohmann::json& observation) {
-    const auto numbers = [&observation](const char* key) {
-      return detail::value_from<std::vector<double>>(
-          detail::member(observation, key, "observation"), std::string("observation.") + key);
-    };
-    low_ = numbers("low");
-    high_ = numbers("high");
-    core::require(low_.size() == high_.size(), "observation.high", "as long as observation.low",
-                  high_.size());
-    for (std::size_t i = 0; i < low_.size(); ++i) {
-      core::require(std::isfinite(high_[i] - low_[i]) && low_[i] < high_[i],
-                    "observation.high[" + std::to_string(i) + "]",
-                    "finite and greater than observation.low", high_[i]);
-    }
-    const auto& inputs = detail::member(observation, "inputs", "observation");
-    if (!inputs.is_array()) detail::refuse("observation.inputs", "a list", inputs);
-    for (const auto& input : inputs) inputs_.push_back(read_input(input));
-  }
+namespace detail {
 
-  std::size_t n_observed() const noexcept { return low_.size(); }
-  std::size_t n_inputs() const noexcept { return inputs_.size(); }
-
-  /// Shapes: observation (n_observed,), state (n_inputs,). Throws std::invalid_argument naming a
-  /// number that is not finite.
-  void operator()(std::span<const double> observation, std::span<double> state) const {
-    if (observation.size() != n_observed()) {
-      core::require(false, "observation", std::to_string(n_observed()) + " numbers",
-                    observation.size());
-    }
-    for (std::size_t i = 0; i < observation.size(); ++i) {
-      if (std::isfinite(observation[i])) continue;
-      core::require_finite("observation[" + std::to_string(i) + "]", observation[i]);
-    }
-    for (std::size_t i = 0; i < inputs_.size(); ++i) state[i] = value(inputs_[i], observation);
-  }
-
- private:
-  enum class Kind { variable, angle, circular, symbol };
-  struct Input {
-    Kind kind;
-    std::size_t first;
-    std::size_t second;  ///< of an angle; how many variables tell a symbol
+/// What an input of the agent is, as the file's "observation" says it.
+inline ObservedInput observed_input(const nlohmann::json& input, const std::string& name) {
+  const auto number = [&name](const nlohmann::json& value) {
+    return static_cast<std::size_t>(value_from<std::uint64_t>(value, name));
   };
-
-  Input read_input(const nlohmann::json& input) const {
-    const std::string name = "observation.inputs[" + std::to_string(inputs_.size()) + "]";
-    const auto index = [&](const nlohmann::json& number) {
-      const auto i = detail::value_from<std::uint64_t>(number, name);
-      core::require(i < n_observed(), name, "of a variable below " + std::to_string(n_observed()),
-                    i);
-      return static_cast<std::size_t>(i);
-    };
-    if (input.is_object() && input.size() == 1) {
-      const std::string& key = input.begin().key();
-      const nlohmann::json& value = input.begin().value();
-      if (key == "variable") return {Kind::variable, index(value), 0};
-      if (key == "circular") return {Kind::circular, index(value), 0};
-      if (key == "angle" && value.is_array() && value.size() == 2) {
-        return {Kind::angle, index(value[0]), index(value[1])};
-      }
-      if (key == "symbol" && value.is_array() && value.size() == 2) {
-        const std::size_t first = index(value[0]);
-        const auto n = detail::value_from<std::uint64_t>(value[1], name);
-        core::require(n >= 1 && n <= n_observed() - first, name,
-                      "of 1 to " + std::to_string(n_observed() - first) + " variables", n);
-        return {Kind::symbol, first, static_cast<std::size_t>(n)};
-      }
+  if (input.is_object() && input.size() == 1) {
+    const auto kind = observed_kind(input.begin().key());
+    const nlohmann::json& value = input.begin().value();
+    const bool has_two = kind == ObservedKind::angle || kind == ObservedKind::symbol;
+    if (kind && !has_two) return {*kind, number(value), 0};
+    if (kind && value.is_array() && value.size() == 2) {
+      return {*kind, number(value[0]), number(value[1])};
     }
-    detail::refuse(name, "a variable, an angle of two, circular, or a symbol of some", input);
   }
+  refuse(name, "a variable, an angle of two, circular, or a symbol of some", input);
+}
 
-  double value(const Input& input, std::span<const double> observation) const noexcept {
-    const std::size_t i = input.first;
-    if (input.kind == Kind::angle) {
-      return (core::atan2(observation[input.second], observation[i]) + core::kPi) / core::kTwoPi;
-    }
-    if (input.kind == Kind::symbol) {
-      const auto told = observation.subspan(i, input.second);
-      const auto k = std::ranges::max_element(told) - told.begin();
-      return (static_cast<double>(k) + 0.5) / static_cast<double>(input.second);
-    }
-    const double u = (observation[i] - low_[i]) / (high_[i] - low_[i]);
-    if (input.kind == Kind::variable) return std::clamp(u, 0.0, 1.0);
-    return std::isfinite(u) ? u - std::floor(u) : 0.0;  // beyond the range of numbers
+}  // namespace detail
+
+/// The scale of a file's "observation": {"low": [..], "high": [..], "inputs": [..]}, where an input
+/// is {"variable": i}, {"angle": [i, j]}, {"circular": i} or {"symbol": [i, n]}. Throws
+/// std::invalid_argument naming the member that does not fit.
+inline ObservationScale observation_scale(const nlohmann::json& observation) {
+  const auto numbers = [&observation](const char* key) {
+    return detail::value_from<std::vector<double>>(detail::member(observation, key, "observation"),
+                                                   std::string("observation.") + key);
+  };
+  auto low = numbers("low"), high = numbers("high");
+  const auto& listed = detail::member(observation, "inputs", "observation");
+  if (!listed.is_array()) detail::refuse("observation.inputs", "a list", listed);
+  std::vector<ObservedInput> inputs;
+  for (const auto& input : listed) {
+    inputs.push_back(
+        detail::observed_input(input, "observation.inputs[" + std::to_string(inputs.size()) + "]"));
   }
-
-  std::vector<double> low_, high_;
-  std::vector<Input> inputs_;
-};
+  return {std::move(low), std::move(high), std::move(inputs)};
+}
 
 /// From an agent's actions to those of the task, and back.
 ///
@@ -269,8 +205,8 @@ class Controller {
 
   /// The action to take, in the units of the task; without `explore` a best one. The span is valid
   /// until the next act. Shapes: observation (n_observed,), the action (n_dimensions,). Throws
-  /// std::invalid_argument naming a number that is not finite, or if there is no such environment;
-  /// then nothing has changed.
+  /// std::invalid_argument naming a number that has no state (see ObservationScale), or if there is
+  /// no such environment; then nothing has changed.
   std::span<const double> act(std::span<const double> observation, bool explore = true,
                               std::size_t environment = 0) {
     parts_.observation(observation, state_);
@@ -303,7 +239,7 @@ class Controller {
 
   /// Learns a transition. The action is one that act gave; of fuzzy Q-learning, the last one with
   /// `explore` in the environment. Shapes as in act. Throws std::invalid_argument for others and
-  /// for numbers that are not finite, and then nothing has changed; as the agent does.
+  /// for numbers that have no state, and then nothing has changed; as the agent does.
   void learn(std::span<const double> observation, std::span<const double> action, double reward,
              std::span<const double> next_observation, bool terminated,
              std::size_t environment = 0) {
@@ -428,7 +364,8 @@ class Controller {
   static Parts parts_of(const AgentFile& file, const std::string& name) {
     try {
       AnyAgent agent = make_agent(file);
-      ObservationScale observation(detail::member(file.settings, "observation", "sdnn"));
+      ObservationScale observation =
+          observation_scale(detail::member(file.settings, "observation", "sdnn"));
       std::vector<std::size_t> n_actions;
       std::visit(
           [&](const auto& known) {

@@ -1,0 +1,128 @@
+#include "sdnn/agents/observation_scale.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sdnn/core/random.hpp"
+#include "states.hpp"
+
+namespace sdnn::agents {
+namespace {
+
+using Numbers = std::vector<double>;
+
+// A pendulum's: cosine, sine, speed, and a circular one.
+ObservationScale with_angles() {
+  return {{-1.0, -1.0, -8.0, 10.0},
+          {1.0, 1.0, 8.0, 14.0},
+          {{ObservedKind::angle, 0, 1},
+           {ObservedKind::variable, 2, 0},
+           {ObservedKind::circular, 3, 0}}};
+}
+
+// A number between a Discrete(2) and a Discrete(3), as Gymnasium flattens them.
+ObservationScale with_symbols() {
+  return {
+      {0.0, 0.0, -1.0, 0.0, 0.0, 0.0},
+      {1.0, 1.0, 1.0, 1.0, 1.0, 1.0},
+      {{ObservedKind::symbol, 0, 2}, {ObservedKind::variable, 2, 0}, {ObservedKind::symbol, 3, 3}}};
+}
+
+Numbers scaled(const ObservationScale& scale, const Numbers& observed) {
+  Numbers state(scale.n_inputs());
+  scale(observed, state);
+  return state;
+}
+
+TEST(ObservationScale, ByHand) {
+  const ObservationScale scale = with_angles();
+  EXPECT_EQ(scale.n_observed(), 4U);
+  EXPECT_EQ(scale.n_inputs(), 3U);
+  EXPECT_EQ(scaled(scale, {1.0, 0.0, 4.0, 11.0}), (Numbers{0.5, 0.75, 0.25}));
+  EXPECT_EQ(scaled(scale, {0.0, 1.0, 80.0, 15.0}), (Numbers{0.75, 1.0, 0.25}));
+  EXPECT_EQ(scaled(scale, {0.0, -0.5, -9.0, 9.0}), (Numbers{0.25, 0.0, 0.75}));
+  EXPECT_EQ(scaled(scale, {-1.0, 0.0, 8.0, 14.0}), (Numbers{1.0, 1.0, 0.0}));
+  EXPECT_EQ(scaled(scale, {-1.0, -0.0, 8.0, 14.0}), (Numbers{0.0, 1.0, 0.0}));
+  EXPECT_EQ(scaled(scale, {0.0, 0.0, 1e308, -1e308})[1], 1.0);
+}
+
+TEST(ObservationScale, SymbolsByHand) {
+  const ObservationScale scale = with_symbols();
+  EXPECT_EQ(scale.n_inputs(), 3U);
+  EXPECT_EQ(scaled(scale, {1.0, 0.0, 0.0, 0.0, 0.0, 1.0}), (Numbers{0.25, 0.5, 2.5 / 3.0}));
+  EXPECT_EQ(scaled(scale, {0.0, 1.0, 1.0, 0.0, 1.0, 0.0}), (Numbers{0.75, 1.0, 0.5}));
+  EXPECT_EQ(scaled(scale, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0})[2], 0.5 / 3.0);  // the first of equals
+}
+
+TEST(ObservationScale, GivesStatesWhateverIsObserved) {
+  const ObservationScale scale = with_angles();
+  core::Random random(1, core::Stream::weights);
+  for (int i = 0; i < 5000; ++i) {
+    Numbers observed(4);
+    for (double& x : observed) {
+      x = std::ldexp(random.normal(), static_cast<int>(random.below(2000)) - 1000);
+      x = std::clamp(x, -1.7e308, 1.7e308);
+    }
+    for (const double x : scaled(scale, observed)) {
+      ASSERT_GE(x, 0.0);
+      ASSERT_LE(x, 1.0);
+    }
+  }
+}
+
+TEST(ObservationScale, InfinityIsAnEndOfARangeButNoAngle) {
+  const ObservationScale plain({0.0, -1.0}, {1.0, 1.0},
+                               {{ObservedKind::variable, 1, 0}, {ObservedKind::variable, 0, 0}});
+  EXPECT_EQ(scaled(plain, {testing::kInfinity, -testing::kInfinity}), (Numbers{0.0, 1.0}));
+  EXPECT_FALSE(std::signbit(scaled(plain, {-0.0, 0.0})[1]));
+  EXPECT_FALSE(plain.has_state_of(Numbers{0.0, testing::kNaN}));
+  const ObservationScale angles = with_angles();
+  for (const double bad : {testing::kNaN, testing::kInfinity}) {
+    const Numbers observed{1.0, 2.0, bad, 3.0};
+    EXPECT_FALSE(angles.has_state_of(observed));
+    Numbers state(3, 7.0);
+    EXPECT_THROW(angles(observed, state), std::invalid_argument);
+    EXPECT_EQ(state, Numbers(3, 7.0));
+  }
+  EXPECT_THROW(scaled(plain, {0.0, testing::kNaN}), std::invalid_argument);
+  EXPECT_THROW(scaled(angles, {1.0, 2.0, 3.0}), std::invalid_argument);
+}
+
+TEST(ObservationScale, NamesWhatDoesNotFit) {
+  const auto error_of = [](Numbers low, Numbers high, ObservedInput input) -> std::string {
+    try {
+      const ObservationScale scale(std::move(low), std::move(high), {input});
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  const ObservedInput first{ObservedKind::variable, 0, 0};
+  EXPECT_EQ(error_of({0.0}, {1.0, 1.0}, first),
+            "observation.high must be as long as observation.low, got 2");
+  EXPECT_EQ(error_of({0.0, 1.0}, {1.0, 1.0}, first),
+            "observation.high[1] must be finite and greater than observation.low, got 1");
+  EXPECT_EQ(error_of({0.0}, {1.0}, {ObservedKind::circular, 1, 0}),
+            "observation.inputs[0] must be of a variable below 1, got 1");
+  EXPECT_EQ(error_of({0.0}, {1.0}, {ObservedKind::angle, 0, 3}),
+            "observation.inputs[0] must be of a variable below 1, got 3");
+  EXPECT_EQ(error_of({0.0, 0.0}, {1.0, 1.0}, {ObservedKind::symbol, 1, 2}),
+            "observation.inputs[0] must be of 1 to 1 variables, got 2");
+  EXPECT_EQ(error_of({0.0}, {1.0}, first), "no error");
+}
+
+TEST(ObservedKind, ByName) {
+  EXPECT_EQ(observed_kind("symbol"), ObservedKind::symbol);
+  EXPECT_EQ(observed_kind("variable"), ObservedKind::variable);
+  EXPECT_EQ(observed_kind("circle"), std::nullopt);
+}
+
+}  // namespace
+}  // namespace sdnn::agents
