@@ -19,7 +19,7 @@ namespace {
 using Numbers = std::vector<double>;
 
 // A pendulum's: cosine, sine, speed, and a circular one.
-ObservationScale with_angles() {
+ObservationScale scale_of_angles() {
   return {{-1.0, -1.0, -8.0, 10.0},
           {1.0, 1.0, 8.0, 14.0},
           {{ObservedKind::angle, 0, 1},
@@ -28,7 +28,7 @@ ObservationScale with_angles() {
 }
 
 // A number between a Discrete(2) and a Discrete(3), as Gymnasium flattens them.
-ObservationScale with_symbols() {
+ObservationScale scale_of_symbols() {
   return {
       {0.0, 0.0, -1.0, 0.0, 0.0, 0.0},
       {1.0, 1.0, 1.0, 1.0, 1.0, 1.0},
@@ -42,7 +42,7 @@ Numbers scaled(const ObservationScale& scale, const Numbers& observed) {
 }
 
 TEST(ObservationScale, ByHand) {
-  const ObservationScale scale = with_angles();
+  const ObservationScale scale = scale_of_angles();
   EXPECT_EQ(scale.n_observed(), 4U);
   EXPECT_EQ(scale.n_inputs(), 3U);
   EXPECT_EQ(scaled(scale, {1.0, 0.0, 4.0, 11.0}), (Numbers{0.5, 0.75, 0.25}));
@@ -54,7 +54,7 @@ TEST(ObservationScale, ByHand) {
 }
 
 TEST(ObservationScale, SymbolsByHand) {
-  const ObservationScale scale = with_symbols();
+  const ObservationScale scale = scale_of_symbols();
   EXPECT_EQ(scale.n_inputs(), 3U);
   EXPECT_EQ(scaled(scale, {1.0, 0.0, 0.0, 0.0, 0.0, 1.0}), (Numbers{0.25, 0.5, 2.5 / 3.0}));
   EXPECT_EQ(scaled(scale, {0.0, 1.0, 1.0, 0.0, 1.0, 0.0}), (Numbers{0.75, 1.0, 0.5}));
@@ -62,7 +62,7 @@ TEST(ObservationScale, SymbolsByHand) {
 }
 
 TEST(ObservationScale, GivesStatesWhateverIsObserved) {
-  const ObservationScale scale = with_angles();
+  const ObservationScale scale = scale_of_angles();
   core::Random random(1, core::Stream::weights);
   for (int i = 0; i < 5000; ++i) {
     Numbers observed(4);
@@ -83,7 +83,7 @@ TEST(ObservationScale, InfinityIsAnEndOfARangeButNoAngle) {
   EXPECT_EQ(scaled(plain, {testing::kInfinity, -testing::kInfinity}), (Numbers{0.0, 1.0}));
   EXPECT_FALSE(std::signbit(scaled(plain, {-0.0, 0.0})[1]));
   EXPECT_FALSE(plain.has_state_of(Numbers{0.0, testing::kNaN}));
-  const ObservationScale angles = with_angles();
+  const ObservationScale angles = scale_of_angles();
   for (const double bad : {testing::kNaN, testing::kInfinity}) {
     const Numbers observed{1.0, 2.0, bad, 3.0};
     EXPECT_FALSE(angles.has_state_of(observed));
