@@ -42,7 +42,7 @@ json with_symbols() {
           {"inputs", {{{"symbol", {0, 2}}}, {{"variable", 2}}, {{"symbol", {3, 3}}}}}};
 }
 
-TEST(ObservationScale, IsAsTheFileSays) {
+TEST(ObservationScaleOfAFile, IsAsTheFileSays) {
   const ObservationScale angles = observation_scale(observation());
   Numbers state(angles.n_inputs());
   angles(Numbers{0.0, 1.0, 4.0, 11.0}, state);
@@ -52,7 +52,7 @@ TEST(ObservationScale, IsAsTheFileSays) {
   EXPECT_EQ(state, (Numbers{0.25, 0.5, 2.5 / 3.0}));
 }
 
-TEST(ObservationScale, NamesASymbolThatDoesNotFit) {
+TEST(ObservationScaleOfAFile, NamesASymbolThatDoesNotFit) {
   for (const json& bad : {json{0, 0}, json{4, 3}, json{6, 1}, json{-1, 2}, json{0}, json{0.5, 1}}) {
     json observation = with_symbols();
     observation["inputs"][0]["symbol"] = bad;
@@ -60,7 +60,7 @@ TEST(ObservationScale, NamesASymbolThatDoesNotFit) {
   }
 }
 
-TEST(ObservationScale, NamesWhatDoesNotFit) {
+TEST(ObservationScaleOfAFile, NamesWhatDoesNotFit) {
   const auto error_of = [](const char* pointer, const json& value) -> std::string {
     json bad = observation();
     bad[json::json_pointer(pointer)] = value;
