@@ -149,7 +149,6 @@ void bind_observation_scale(py::module_& module) {
              return ObservationScale(std::move(low), std::move(high), std::move(observed));
            }),
            py::arg("low"), py::arg("high"), py::arg("inputs"))
-      .def_property_readonly("n_inputs", &ObservationScale::n_inputs)
       .def(
           "__call__",
           [](const ObservationScale& self,

@@ -649,9 +649,6 @@ class ObservationScale:
         """
     def __init__(self, low: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], high: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], inputs: collections.abc.Sequence[tuple[str, typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]]) -> None:
         ...
-    @property
-    def n_inputs(self) -> int:
-        ...
 class TieRule(enum.Enum):
     """
     Which of several best actions is taken
