@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from sdnn.experiments import (
+from sdnn.reproduction import (
     AGENTS,
     EXPERIMENTS,
     DaskExecutor,

@@ -19,7 +19,7 @@ import gymnasium as gym
 import numpy as np
 
 from sdnn.agents import Callback, SDNNQLearning, Training, evaluate
-from sdnn.experiments.statistics import estimate_median
+from sdnn.runs.statistics import estimate_median
 
 DOCS = Path(__file__).parents[1] / "docs"
 FIELDS = ("task", "n_environments", "seed", "step", "mean_return", "us_per_step")

@@ -18,7 +18,7 @@ import numpy as np
 from sdnn import _core
 from sdnn.approximators import SDNNCConfig
 from sdnn.environments import SensorConfig
-from sdnn.experiments.config import TrialConfig, trial_seed
+from sdnn.runs.trial_config import TrialConfig, trial_seed
 
 CASES = (("s4", 4, 0.0), ("s6", 6, 0.0), ("s4-noise", 4, 0.02), ("s6-noise", 6, 0.02))
 ROWS = Path(__file__).parents[1] / "docs" / "whole-trials.csv"

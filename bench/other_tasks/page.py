@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sdnn.experiments.statistics import Estimate
+from sdnn.runs.statistics import Estimate
 from sdnn.whole_files import write_whole
 
 PAGE = "benchmarks.md"

@@ -12,7 +12,7 @@ from rows import Row
 from scipy.stats import trim_mean
 from tasks import CONDITIONS, TASKS
 
-from sdnn.experiments.statistics import Estimate, estimate_median
+from sdnn.runs.statistics import Estimate, estimate_median
 
 Trials = Mapping[tuple[str, str, str], Sequence[Sequence[Row]]]
 """Looks of each trial, in their order, by task, condition and agent, then by seed."""

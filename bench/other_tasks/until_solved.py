@@ -23,7 +23,7 @@ from looks import SolvedError, UntilSolved
 from page import interval, markdown, show
 from rows import Row, Work, read_rows, run_missing
 
-from sdnn.experiments.statistics import estimate_median
+from sdnn.runs.statistics import estimate_median
 
 DOCS = Path(__file__).parents[2] / "docs"
 FIELDS = ("task", "condition", "agent", "seed", "steps", "cpu_seconds", "mean_return", "solved")

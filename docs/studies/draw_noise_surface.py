@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from sdnn.experiments.figures import figure_bytes, require_matplotlib
-from sdnn.experiments.measures import final_share_solved
-from sdnn.experiments.registry import agent_entry
-from sdnn.experiments.store import ResultStore
-from sdnn.experiments.sweep.reading import read_study
-from sdnn.experiments.sweep.study import Study
+from sdnn.reproduction.figures import figure_bytes, require_matplotlib
+from sdnn.reproduction.sweep.reading import read_study
+from sdnn.reproduction.sweep.study import Study
+from sdnn.runs.measures import final_share_solved
+from sdnn.runs.registry import agent_entry
+from sdnn.runs.store import ResultStore
 from sdnn.whole_files import write_whole
 
 STUDY = Path(__file__).with_name("noise-surface.toml")

@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from sdnn.experiments import (
+from sdnn.reproduction import (
     EXPERIMENTS,
     CaseResult,
     ProtocolConfig,
@@ -19,9 +19,9 @@ from sdnn.experiments import (
     plan_trials,
     summarize,
 )
-from sdnn.experiments.kept_trials import FILE_NAME, kept_csv
+from sdnn.reproduction.kept_trials import FILE_NAME, kept_csv
 
-KEPT = Path(__file__).parents[2] / "python" / "sdnn" / "experiments" / FILE_NAME
+KEPT = Path(__file__).parents[2] / "python" / "sdnn" / "reproduction" / FILE_NAME
 
 
 def main() -> None:

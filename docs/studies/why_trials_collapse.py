@@ -20,9 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.experiments.cases import EXPERIMENTS
-from sdnn.experiments.config import TrialConfig, case_config, trial_seed
-from sdnn.experiments.measures import MeasureConfig, episode_of_collapse
+from sdnn.reproduction.cases import EXPERIMENTS
+from sdnn.reproduction.plan import case_config
+from sdnn.runs.measures import MeasureConfig, episode_of_collapse
+from sdnn.runs.trial_config import TrialConfig, trial_seed
 from sdnn.whole_files import write_whole
 
 CASE = next(case for case in EXPERIMENTS[1].cases if case.id == "s4-noise")
@@ -380,7 +381,7 @@ def table(kept: Kept, n_trials: int) -> Iterator[str]:
 
 def main() -> None:
     """Measure and draw."""
-    from sdnn.experiments.figures import figure_bytes
+    from sdnn.reproduction.figures import figure_bytes
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of the figures")

@@ -8,7 +8,7 @@ Rooms, from the network up (each is imported when first used):
   (room ``sdnn.estimators``, needs ``sdnn[sklearn]``); ``sdnn.coding``: how inputs become patterns;
   ``sdnn.kernel``: what generalizes to what
 - ``sdnn.environments``: the acrobot swing-up, redundant and noisy sensors
-- ``sdnn.experiments``: the paper's experiments, also as the command ``sdnn reproduce``
+- ``sdnn.reproduction``: the paper's experiments, also as the command ``sdnn reproduce``
 - ``sdnn.runs``: agents that learn in folders of their own, also as the command ``sdnn train``
 - ``sdnn.benchmarks``: how quick all this is here, also as the command ``sdnn bench``
 
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
         coding,
         environments,
         estimators,
-        experiments,
         kernel,
+        reproduction,
         runs,
     )
     from sdnn.estimators import SDNNClassifier, SDNNKernelRidge, SDNNRegressor
@@ -50,9 +50,9 @@ __all__ = [
     "coding",
     "environments",
     "estimators",
-    "experiments",
     "instruction_set",
     "kernel",
+    "reproduction",
     "runs",
     "set_instruction_set",
 ]

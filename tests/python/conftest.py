@@ -1,3 +1,4 @@
+import importlib.util
 import os
 import shutil
 import signal
@@ -63,3 +64,41 @@ def configure(cmake):
         return cmake("-S", source, "-B", build, *generator, *options)
 
     return _configure
+
+
+@pytest.fixture(scope="session")
+def fake():
+    """The module of the fake trial, which is also a script."""
+    path = Path(__file__).parent / "runs" / "fake_trial.py"
+    spec = importlib.util.spec_from_file_location("fake_trial", path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["fake_trial"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def use_trial(monkeypatch, fake):
+    """Let every agent run in trials of another kind."""
+    from sdnn.reproduction import AGENTS
+
+    def _use(core_trial):
+        for name, entry in fake.agents_with(core_trial).items():
+            monkeypatch.setitem(AGENTS, name, entry)
+
+    return _use
+
+
+@pytest.fixture
+def run(fake, use_trial):
+    """Run a plan into the store of a folder, with fake trials; returns outcome and digest."""
+    from sdnn.reproduction import ResultStore, run_trials
+    from sdnn.runs.records import records_digest
+
+    def _run(folder, plan=None, trial=fake.FakeTrial, **options):
+        use_trial(trial)
+        with ResultStore(folder) as store:
+            outcome = run_trials(fake.make_plan() if plan is None else plan, store, **options)
+            return outcome, records_digest(store.load())
+
+    return _run

@@ -17,14 +17,14 @@ from click.testing import CliRunner
 
 import sdnn
 from sdnn.cli import main
-from sdnn.experiments import AGENTS, AgentEntry, register
-from sdnn.experiments.cases import MOST_EPISODES, select_experiments
-from sdnn.experiments.reproduce import ReproduceRequest
+from sdnn.reproduction import AGENTS, AgentEntry, register
+from sdnn.reproduction.cases import MOST_EPISODES, select_experiments
+from sdnn.reproduction.reproduce import ReproduceRequest
 
 
 @pytest.fixture(scope="module")
 def fake():
-    path = Path(__file__).parent / "experiments" / "fake_trial.py"
+    path = Path(__file__).parent / "runs" / "fake_trial.py"
     spec = importlib.util.spec_from_file_location("fake_trial_of_cli", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -157,8 +157,8 @@ def test_the_most_episodes_make_a_trial(tmp_path):
 @pytest.fixture
 def no_costs(monkeypatch):
     """Costs that take no time, and a list of what was asked."""
-    from sdnn.experiments import cost
-    from sdnn.experiments.records import StepTimes
+    from sdnn.reproduction import cost
+    from sdnn.runs.records import StepTimes
 
     asked = []
 
@@ -239,8 +239,8 @@ def test_dry_run_looks_at_a_folder_that_cannot_be_written(invoke, tmp_path, monk
         return real_connect(place, **options)
 
     real_connect = sqlite3.connect
-    monkeypatch.setattr("sdnn.experiments.store.sqlite3.connect", connect)
-    monkeypatch.setattr("sdnn.experiments.store._is_writable", lambda _: False)
+    monkeypatch.setattr("sdnn.runs.store.sqlite3.connect", connect)
+    monkeypatch.setattr("sdnn.runs.store._is_writable", lambda _: False)
     result = invoke("reproduce", "a", "--quick", "--dry-run")
     assert result.stdout.count("2 trials x 300 episodes, 2 of them stored in results") == 2
     assert opened
@@ -413,7 +413,7 @@ def test_damaged_result_file_is_one_clear_line(invoke, tmp_path, options):
 
 
 def test_missing_matplotlib_is_one_clear_line(invoke, tmp_path, monkeypatch):
-    monkeypatch.setattr("sdnn.experiments.figures.find_spec", lambda name: None)
+    monkeypatch.setattr("sdnn.reproduction.figures.find_spec", lambda name: None)
     result = invoke("reproduce", "a", "--quick")
     assert result.exit_code == 1
     assert 'pip install "sdnn[reproduce]"' in result.stderr
@@ -480,7 +480,7 @@ def test_command_line_starts_without_heavy_imports(arguments):
         f"try: main({arguments})\n"
         "except SystemExit: pass\n"
         "heavy = {'numpy', 'gymnasium', 'matplotlib', 'rich', 'PIL', 'sqlite3', 'safetensors'}\n"
-        "heavy |= {'sdnn.agents', 'sdnn.runs', 'sdnn.experiments.engine'}\n"
+        "heavy |= {'sdnn.agents', 'sdnn.runs.run', 'sdnn.runs.engine'}\n"
         "print('loaded:', sorted(heavy & set(sys.modules)))"
     )
     assert python("-c", code).stdout.splitlines()[-1] == "loaded: []"

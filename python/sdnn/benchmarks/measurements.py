@@ -21,14 +21,14 @@ from sdnn import _core
 from sdnn.approximators import SDNNCConfig
 from sdnn.benchmarks.machine import describe_machine
 from sdnn.environments import AcrobotConfig, SensorConfig
-from sdnn.experiments.config import TrialConfig
-from sdnn.experiments.trial import ProtocolConfig
 from sdnn.instruction_sets import (
     available_instruction_sets,
     best_instruction_set,
     instruction_set,
     set_instruction_set,
 )
+from sdnn.runs.trial import ProtocolConfig
+from sdnn.runs.trial_config import TrialConfig
 
 if TYPE_CHECKING:
     from sdnn.benchmarks.results import (
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         Spread,
         ThreadsResult,
     )
-    from sdnn.experiments.trial import Trial
+    from sdnn.runs.trial import Trial
 
 Nanoseconds = NDArray[np.int64]
 Run = Callable[[int], Nanoseconds]

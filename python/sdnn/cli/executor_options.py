@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from sdnn.experiments.dask_executor import DaskExecutor
+    from sdnn.runs.dask_executor import DaskExecutor
 
 EXECUTORS = ("threads", "dask")
 
@@ -58,7 +58,7 @@ _OF_DASK = ("scheduler", "scheduler_timeout", "worker_timeout", "attempts")
 def executor_options(command: Function) -> Function:
     """Add the options to a command, which is given `jobs` and `executor`.
 
-    They are what `sdnn.experiments.run_trials` takes: without an executor, threads of this process.
+    They are what `run_trials` takes: without an executor, threads of this process.
     """
 
     @functools.wraps(command)
@@ -83,8 +83,8 @@ def _make_executor(where: str, jobs: int | None, of_dask: dict[str, Any]) -> Das
         raise click.UsageError("--jobs is for threads; a cluster runs one trial a worker thread")
     if "scheduler" not in of_dask:
         raise click.UsageError("--executor dask needs --scheduler ADDRESS")
-    from sdnn.experiments.dask_executor import DaskExecutor
-    from sdnn.experiments.errors import ClusterError
+    from sdnn.runs.dask_executor import DaskExecutor
+    from sdnn.runs.trial_errors import ClusterError
 
     try:
         return DaskExecutor(of_dask.pop("scheduler"), **of_dask)

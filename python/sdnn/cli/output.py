@@ -15,7 +15,7 @@ import click
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sdnn.experiments.engine import RunOutcome
+    from sdnn.runs.engine import RunOutcome
 
 Done = TypeVar("Done")
 
@@ -40,7 +40,7 @@ def _finite(value: Any) -> Any:
 
 def report_outcome(context: click.Context, outcome: RunOutcome, out: Path) -> str:
     """Tell what failed, exit if interrupted, and say how much is stored."""
-    from sdnn.experiments.progress import describe
+    from sdnn.runs.progress import describe
 
     n_stored = outcome.n_reused + outcome.n_run
     stored = f"{n_stored} of {outcome.n_planned} trials are stored in {out}"
@@ -91,7 +91,7 @@ def make_console() -> Console:
 @contextmanager
 def experiment_command(context: click.Context) -> Iterator[None]:
     """Make a line and an exit code of what can end a run of trials."""
-    from sdnn.experiments.errors import ExperimentError, StudyError
+    from sdnn.runs.trial_errors import ExperimentError, StudyError
 
     try:
         yield
@@ -107,7 +107,7 @@ def with_progress(run: Callable[..., Done], request: Any) -> Done:
     """Run what was asked for, with a line of progress."""
     from rich.console import Console
 
-    from sdnn.experiments.progress import ProgressObserver
+    from sdnn.runs.progress import ProgressObserver
 
     with ProgressObserver(Console(stderr=True)) as observer:
         return run(request, observer=observer)

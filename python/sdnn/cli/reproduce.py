@@ -18,18 +18,18 @@ from sdnn.cli.output import (
     report_outcome,
     with_progress,
 )
-from sdnn.experiments.cases import (
+from sdnn.reproduction.cases import (
     MOST_EPISODES,
-    PRESET_AGENTS,
     WORDS,
     includes_cost,
     select_experiments,
 )
+from sdnn.runs.preset_agents import PRESET_AGENTS
 
 if TYPE_CHECKING:
-    from sdnn.experiments.executor import Executor
-    from sdnn.experiments.report import Report
-    from sdnn.experiments.reproduce import ReproduceRequest, Reproduction
+    from sdnn.reproduction.report import Report
+    from sdnn.reproduction.reproduce import ReproduceRequest, Reproduction
+    from sdnn.runs.executor import Executor
 
 
 @click.command(short_help="Run the paper's experiments and write a report.")
@@ -100,8 +100,8 @@ def reproduce(
     Finished trials are kept in OUT/results.sqlite; the same command goes on where it stopped. Files
     of other agents, trials, episodes or seeds than the paper's have these in their names.
     """
-    from sdnn.experiments.reproduce import ReproduceRequest
-    from sdnn.experiments.reproduce import reproduce as run
+    from sdnn.reproduction.reproduce import ReproduceRequest
+    from sdnn.reproduction.reproduce import reproduce as run
 
     request = ReproduceRequest(
         experiments=select_experiments(experiment),
@@ -128,7 +128,7 @@ def reproduce(
 
 
 def _print_plan(request: ReproduceRequest, as_json: bool) -> None:
-    from sdnn.experiments.reproduce import count_stored
+    from sdnn.reproduction.reproduce import count_stored
 
     counts = count_stored(request)
     n_episodes = request.protocol.n_learning_episodes

@@ -20,9 +20,9 @@ from sdnn.cli.output import (
 )
 
 if TYPE_CHECKING:
-    from sdnn.experiments.executor import Executor
-    from sdnn.experiments.sweep.report import StudyReport
-    from sdnn.experiments.sweep.run import Sweep, SweepRequest
+    from sdnn.reproduction.sweep.report import StudyReport
+    from sdnn.reproduction.sweep.run import Sweep, SweepRequest
+    from sdnn.runs.executor import Executor
 
 
 @click.command(short_help="Run a study: variants of any setting, trial by trial.")
@@ -69,9 +69,9 @@ def sweep(
     Finished trials are kept in OUT/results.sqlite, which `reproduce` may share; the same command
     goes on where it stopped.
     """
-    from sdnn.experiments.errors import StudyError
-    from sdnn.experiments.sweep.run import SweepRequest
-    from sdnn.experiments.sweep.run import sweep as run
+    from sdnn.reproduction.sweep.run import SweepRequest
+    from sdnn.reproduction.sweep.run import sweep as run
+    from sdnn.runs.trial_errors import StudyError
 
     request = SweepRequest(
         file=file,
@@ -94,7 +94,7 @@ def sweep(
 
 
 def _print_forecast(request: SweepRequest, as_json: bool) -> None:
-    from sdnn.experiments.sweep.forecast import forecast, forecast_json, forecast_lines
+    from sdnn.reproduction.sweep.forecast import forecast, forecast_json, forecast_lines
 
     found = forecast(request)
     if as_json:

@@ -6,10 +6,25 @@ evaluations), ``checkpoint.safetensors`` (where it goes on) and, once it is fini
 ``record`` work on such folders.
 """
 
-from sdnn.runs.config import AGENTS, RunConfig
-from sdnn.runs.environment import RunEnvironment
-from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
-from sdnn.runs.run import Goal, Run, RunEvaluation, RunOutcome
+from typing import TYPE_CHECKING
+
+from sdnn.lazy import attach
+
+if TYPE_CHECKING:
+    from sdnn.runs.config import AGENTS, RunConfig
+    from sdnn.runs.environment import RunEnvironment
+    from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
+    from sdnn.runs.run import Goal, Run, RunEvaluation, RunOutcome
+
+__getattr__, __dir__ = attach(
+    __name__,
+    {
+        "config": ("AGENTS", "RunConfig"),
+        "environment": ("RunEnvironment",),
+        "errors": ("ConfigError", "RunError", "RunTerminatedError"),
+        "run": ("Goal", "Run", "RunEvaluation", "RunOutcome"),
+    },
+)
 
 __all__ = [
     "AGENTS",

@@ -6,7 +6,7 @@ import pytest
 
 from sdnn import _core, agents, approximators, environments
 from sdnn.config import to_core
-from sdnn.experiments import ProtocolConfig
+from sdnn.reproduction import ProtocolConfig
 
 CONFIGS = (
     agents.FuzzyQLearningConfig,

@@ -17,11 +17,11 @@ from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.agents.agent import load_agent
 from sdnn.coding import Symbolic, WithMissing
 from sdnn.estimators import libsdnn
-from sdnn.experiments import ResultStore, StoreError
-from sdnn.experiments.errors import ExperimentError
-from sdnn.experiments.sweep.reading import read_study
+from sdnn.reproduction import ResultStore, StoreError
+from sdnn.reproduction.sweep.reading import read_study
 from sdnn.runs.config import RunConfig
 from sdnn.runs.errors import RunError
+from sdnn.runs.trial_errors import ExperimentError
 
 ROOT = Path(__file__).parents[3]
 X = np.random.RandomState(0).uniform(size=(40, 2))

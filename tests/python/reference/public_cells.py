@@ -19,7 +19,7 @@ from sdnn.environments import (
     SensorConfig,
 )
 from sdnn.estimators import SDNNClassifier, SDNNRegressor
-from sdnn.experiments import (
+from sdnn.reproduction import (
     EnvironmentConfig,
     MeasureConfig,
     ProtocolConfig,
@@ -27,7 +27,7 @@ from sdnn.experiments import (
     measures,
 )
 
-ROOMS = ("agents", "approximators", "coding", "environments", "estimators", "experiments", "runs")
+ROOMS = ("agents", "approximators", "coding", "environments", "estimators", "reproduction", "runs")
 
 SAMPLES = np.random.default_rng(1).uniform(0, 1, (12, 2))
 TARGETS = {SDNNRegressor: SAMPLES.sum(axis=1), SDNNClassifier: np.arange(12) % 3}

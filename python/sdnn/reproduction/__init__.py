@@ -1,0 +1,186 @@
+"""The paper: its experiments, their statistics, claims and figures.
+
+Names are loaded when they are first used, so that the command line starts quickly.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sdnn.reproduction.cases import EXPERIMENTS, Case, Experiment, select_experiments
+    from sdnn.reproduction.claims import CLAIMS, Claim
+    from sdnn.reproduction.cost import CostConfig
+    from sdnn.reproduction.figures import draw_cost, draw_experiment
+    from sdnn.reproduction.plan import case_config, plan_trials
+    from sdnn.reproduction.reproduce import ReproduceRequest, Reproduction
+    from sdnn.reproduction.results import CaseResult, CaseSummary, collect, summarize
+    from sdnn.reproduction.verdicts import judge_claims
+    from sdnn.runs.dask_executor import DaskExecutor
+    from sdnn.runs.engine import Observer, run_trials
+    from sdnn.runs.environment_trial import EnvironmentConfig, EnvironmentTrialConfig
+    from sdnn.runs.executor import Executor
+    from sdnn.runs.measures import MeasureConfig
+    from sdnn.runs.records import CostRecord, TrialKey, TrialRecord, TrialRows
+    from sdnn.runs.registry import AGENTS, AgentEntry, CostSeries, agent_entry, register
+    from sdnn.runs.statistics import Estimate
+    from sdnn.runs.store import ResultStore
+    from sdnn.runs.thread_executor import ThreadExecutor
+    from sdnn.runs.trial import LearningAgent, ProtocolConfig, PythonTrial, Trial
+    from sdnn.runs.trial_config import (
+        PlannedTrial,
+        TrialConfig,
+        TrialSettings,
+        trial_seed,
+    )
+    from sdnn.runs.trial_errors import (
+        ClusterError,
+        ExperimentError,
+        PlotUnavailableError,
+        StoreError,
+        StudyError,
+        WorkerLostError,
+    )
+
+_HOMES = {
+    "reproduction.plan": ("case_config", "plan_trials"),
+    "reproduction.cases": (
+        "EXPERIMENTS",
+        "Case",
+        "Experiment",
+        "select_experiments",
+    ),
+    "reproduction.claims": (
+        "CLAIMS",
+        "Claim",
+    ),
+    "runs.trial_config": (
+        "PlannedTrial",
+        "TrialConfig",
+        "TrialSettings",
+        "trial_seed",
+    ),
+    "reproduction.cost": ("CostConfig",),
+    "runs.dask_executor": ("DaskExecutor",),
+    "runs.engine": (
+        "Observer",
+        "run_trials",
+    ),
+    "runs.environment_trial": (
+        "EnvironmentConfig",
+        "EnvironmentTrialConfig",
+    ),
+    "runs.trial_errors": (
+        "ClusterError",
+        "ExperimentError",
+        "PlotUnavailableError",
+        "StoreError",
+        "StudyError",
+        "WorkerLostError",
+    ),
+    "runs.executor": ("Executor",),
+    "reproduction.figures": (
+        "draw_cost",
+        "draw_experiment",
+    ),
+    "runs.measures": ("MeasureConfig",),
+    "runs.records": (
+        "CostRecord",
+        "TrialKey",
+        "TrialRecord",
+        "TrialRows",
+    ),
+    "runs.registry": (
+        "AGENTS",
+        "AgentEntry",
+        "CostSeries",
+        "agent_entry",
+        "register",
+    ),
+    "reproduction.reproduce": (
+        "ReproduceRequest",
+        "Reproduction",
+    ),
+    "reproduction.results": (
+        "CaseResult",
+        "CaseSummary",
+        "collect",
+        "summarize",
+    ),
+    "runs.statistics": ("Estimate",),
+    "runs.store": ("ResultStore",),
+    "runs.thread_executor": ("ThreadExecutor",),
+    "runs.trial": (
+        "LearningAgent",
+        "ProtocolConfig",
+        "PythonTrial",
+        "Trial",
+    ),
+    "reproduction.verdicts": ("judge_claims",),
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "AGENTS",
+    "CLAIMS",
+    "EXPERIMENTS",
+    "AgentEntry",
+    "Case",
+    "CaseResult",
+    "CaseSummary",
+    "Claim",
+    "ClusterError",
+    "CostConfig",
+    "CostRecord",
+    "CostSeries",
+    "DaskExecutor",
+    "EnvironmentConfig",
+    "EnvironmentTrialConfig",
+    "Estimate",
+    "Executor",
+    "Experiment",
+    "ExperimentError",
+    "LearningAgent",
+    "MeasureConfig",
+    "Observer",
+    "PlannedTrial",
+    "PlotUnavailableError",
+    "ProtocolConfig",
+    "PythonTrial",
+    "ReproduceRequest",
+    "Reproduction",
+    "ResultStore",
+    "StoreError",
+    "StudyError",
+    "ThreadExecutor",
+    "Trial",
+    "TrialConfig",
+    "TrialKey",
+    "TrialRecord",
+    "TrialRows",
+    "TrialSettings",
+    "WorkerLostError",
+    "agent_entry",
+    "case_config",
+    "collect",
+    "draw_cost",
+    "draw_experiment",
+    "judge_claims",
+    "plan_trials",
+    "register",
+    "run_trials",
+    "select_experiments",
+    "summarize",
+    "trial_seed",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"sdnn.{_HOME_OF[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,148 @@
+"""The paper's experiments as data: which case, which agents, which figure.
+
+Source: spec section 5 (the table of experiments); the paper's sections 4.2 and 4.3. This module
+imports nothing heavy, so that the command line may read it at start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from sdnn.runs.preset_agents import PRESET_AGENTS
+
+PAPER_TRIALS = 10
+"""Trials per case in the paper; fewer support no conclusion."""
+
+PAPER_EPISODES = 15_000
+"""Learning episodes per trial in the paper."""
+
+MOST_EPISODES = 10**8
+"""Learning episodes per trial at most: the rows of more test episodes fill the memory."""
+
+SENSOR_NOISE = 0.02
+"""Standard deviation of the noise in the paper's Cases II to IV."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What the agents observe in one panel of a figure.
+
+    Rows with the same `id` observe the same thing, so their trials are shared by experiments.
+
+    Parameters
+    ----------
+    id
+        The word used in the result file; seeds are derived from it.
+    title
+        Title of the panel.
+    n_sensors
+        Number of observed variables: 4, 5 (with s5) or 6 (with s5 and s6).
+    noise
+        Standard deviation of the sensor noise, in units of the normalized variables.
+    agents
+        Ids of the agents compared, as in `sdnn.runs.registry`.
+    paper_figure
+        Where the paper shows this case.
+    """
+
+    id: str
+    title: str
+    n_sensors: int
+    noise: float
+    agents: tuple[str, ...]
+    paper_figure: str
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One figure: its cases side by side.
+
+    Parameters
+    ----------
+    id
+        The word used on the command line.
+    title
+        Title of the figure.
+    cases
+        One panel each, in order.
+    start_panels
+        Whether a small panel below each case shows its first episodes again.
+    """
+
+    id: str
+    title: str
+    cases: tuple[Case, ...]
+    start_panels: bool = False
+
+    @property
+    def pairs(self) -> frozenset[tuple[str, str]]:
+        """Ids of case and agent whose trials it needs."""
+        return frozenset((case.id, agent) for case in self.cases for agent in case.agents)
+
+    def with_agents(self, agents: Iterable[str]) -> Experiment:
+        """Return the experiment with other agents in all its cases; with none: as it is."""
+        others = tuple(dict.fromkeys(agents))
+        if not others:
+            return self
+        return replace(self, cases=tuple(replace(case, agents=others) for case in self.cases))
+
+    def with_presets(self, presets: Iterable[str]) -> Experiment:
+        """Return the experiment with SDNN-C under some of `PRESET_AGENTS` beside its agents."""
+        added = tuple(PRESET_AGENTS[name] for name in presets)
+        cases = tuple(
+            replace(case, agents=tuple(dict.fromkeys((*case.agents, *added))))
+            for case in self.cases
+        )
+        return replace(self, cases=cases)
+
+
+BOTH = ("sdnn-c", "fql")
+
+EXPERIMENTS = (
+    Experiment(
+        id="a",
+        title="Experiment A: redundant inputs without noise",
+        cases=(
+            Case("s4", "4 inputs", 4, 0.0, ("sdnn-c",), "Fig. 4a"),
+            Case("s6", "6 inputs, 2 of them redundant", 6, 0.0, ("sdnn-c",), "Fig. 4b"),
+        ),
+        start_panels=True,
+    ),
+    Experiment(
+        id="b",
+        title="Experiment B: noisy and redundant inputs",
+        cases=(
+            Case("s4", "Case I: 4 inputs, no noise", 4, 0.0, BOTH, "Fig. 5"),
+            Case("s4-noise", "Case II: 4 noisy inputs", 4, SENSOR_NOISE, BOTH, "Fig. 6a"),
+            Case("s5-noise", "Case III: 5 noisy inputs", 5, SENSOR_NOISE, BOTH, "Fig. 6b"),
+            Case("s6-noise", "Case IV: 6 noisy inputs", 6, SENSOR_NOISE, BOTH, "Fig. 6c"),
+        ),
+        start_panels=True,
+    ),
+)
+"""The paper's experiments, A and B."""
+
+COST = "cost"
+"""The word on the command line for the measurement of costs, which has no trials."""
+
+WORDS = (*(experiment.id for experiment in EXPERIMENTS), COST, "all")
+"""What may be reproduced."""
+
+
+def select_experiments(word: str) -> tuple[Experiment, ...]:
+    """Experiments that one of `WORDS` stands for; none for ``"cost"``.
+
+    Raises
+    ------
+    ValueError
+        If it is another word.
+    """
+    if word not in WORDS:
+        raise ValueError(f"experiment must be one of {list(WORDS)}, got {word!r}")
+    return tuple(e for e in EXPERIMENTS if word in (e.id, "all"))
+
+
+def includes_cost(word: str) -> bool:
+    """Whether one of `WORDS` asks for the measurement of costs."""
+    return word in (COST, "all")

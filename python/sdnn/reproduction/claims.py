@@ -1,0 +1,250 @@
+"""The paper's claims as data: quantities that our data give, and the ranges they must lie in.
+
+Source: spec section 5 (the list of claims); the paper's sections 4.2.2 and 4.3.3. Ranges and
+margins were written down before the trials of Experiment B were run; `sdnn.reproduction.verdicts`
+says by which rule they are judged.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from sdnn.reproduction.cases import EXPERIMENTS
+from sdnn.runs.measures import MeasureName
+from sdnn.runs.registry import agent_entry, cost_series
+
+EQUAL_STEPS = 2.0
+"""Steps by which two agents that do "almost the same" may differ."""
+
+SHARE_STABLE = 0.9
+"""Share of test episodes that an agent must solve at the end to be called stable."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """An agent in a case.
+
+    Parameters
+    ----------
+    case_id
+        Id of the case.
+    agent
+        Id of the agent.
+    """
+
+    case_id: str
+    agent: str = "sdnn-c"
+
+    def __str__(self) -> str:
+        """Name of both for a reader."""
+        case = next(c for e in EXPERIMENTS for c in e.cases if c.id == self.case_id)
+        noisy = "noisy " if case.noise else ""
+        return f"{agent_entry(self.agent).title}, {case.n_sensors} {noisy}inputs"
+
+
+@dataclass(frozen=True)
+class Median:
+    """The median of a measure over the trials of a subject."""
+
+    measure: MeasureName
+    subject: Subject
+
+
+@dataclass(frozen=True)
+class Difference:
+    """The median of a measure of one subject less that of another.
+
+    Censored values count as the last episode of their trial, so a difference between late collapses
+    is rather too small than too large.
+    """
+
+    measure: MeasureName
+    subject: Subject
+    other: Subject
+
+
+@dataclass(frozen=True)
+class Growth:
+    """How often longer a step takes with `n_inputs` than with `n_fewer`: a ratio of medians."""
+
+    series: str
+    n_inputs: int
+    n_fewer: int
+
+
+Quantity: TypeAlias = Median | Difference | Growth
+
+
+@dataclass(frozen=True)
+class Check:
+    """A quantity and the range in which it must lie, ends included.
+
+    Parameters
+    ----------
+    quantity
+        What is measured.
+    paper
+        What the paper says of it, for a reader.
+    at_least, at_most
+        The range.
+    """
+
+    quantity: Quantity
+    paper: str
+    at_least: float = -math.inf
+    at_most: float = math.inf
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper.
+
+    Parameters
+    ----------
+    number
+        Number in the spec's list of claims.
+    text
+        What the paper says.
+    checks
+        What has to be so for the claim to hold.
+    """
+
+    number: int
+    text: str
+    checks: tuple[Check, ...]
+
+
+_NOISY = ("s4-noise", "s5-noise", "s6-noise")
+_BELOW_STABLE = SHARE_STABLE - 0.02  # the step of a share of 50 tests
+
+CLAIMS = (
+    Claim(
+        1,
+        "SDNN-C learns the swing-up within about 150 learning episodes, with 4 and 6 inputs",
+        tuple(
+            Check(Median("episodes_to_learn", Subject(case)), "about 150", at_most=150)
+            for case in ("s4", "s6")
+        ),
+    ),
+    Claim(
+        2,
+        "At the end SDNN-C reaches the goal within 10 steps in both",
+        tuple(
+            Check(Median("final_steps", Subject(case)), "within 10", at_most=10)
+            for case in ("s4", "s6")
+        ),
+    ),
+    Claim(
+        3,
+        "FQL learns within about 100 episodes without noise",
+        (Check(Median("episodes_to_learn", Subject("s4", "fql")), "about 100", at_most=100),),
+    ),
+    Claim(
+        4,
+        "FQL never learns a stable swing-up with noise",
+        tuple(
+            Check(
+                Median("final_share_solved", Subject(case, "fql")),
+                "unstable",
+                at_most=_BELOW_STABLE,
+            )
+            for case in _NOISY
+        ),
+    ),
+    Claim(
+        5,
+        "SDNN-C in Case II does as well as in Case I in early episodes, worsens from about episode"
+        " 7,500 and ends not stably solving",
+        (
+            Check(
+                Difference("early_steps", Subject("s4-noise"), Subject("s4")),
+                "almost equal",
+                at_most=EQUAL_STEPS,
+            ),
+            Check(
+                Median("episode_of_collapse", Subject("s4-noise")),
+                "about 7,500",
+                at_least=5_000,
+                at_most=10_000,
+            ),
+            Check(
+                Median("final_share_solved", Subject("s4-noise")),
+                "not stable",
+                at_most=_BELOW_STABLE,
+            ),
+        ),
+    ),
+    Claim(
+        6,
+        "SDNN-C in Case III keeps solving until later than in Case II",
+        (
+            Check(
+                Difference("episode_of_collapse", Subject("s5-noise"), Subject("s4-noise")),
+                "later",
+                at_least=10,
+            ),
+        ),
+    ),
+    Claim(
+        7,
+        "SDNN-C in Case IV ends at about 4 steps, about as in Case I",
+        (
+            Check(Median("final_steps", Subject("s6-noise")), "about 4", at_most=4 + EQUAL_STEPS),
+            Check(
+                Difference("final_steps", Subject("s6-noise"), Subject("s4")),
+                "almost the same",
+                at_least=-EQUAL_STEPS,
+                at_most=EQUAL_STEPS,
+            ),
+        ),
+    ),
+    Claim(
+        8,
+        "The time SDNN-C needs to learn does not grow with redundant inputs",
+        tuple(
+            Check(
+                Difference("episodes_to_learn", Subject(more), Subject(fewer)),
+                "does not grow",
+                at_most=15,
+            )
+            for more, fewer in (("s6", "s4"), ("s5-noise", "s4-noise"), ("s6-noise", "s4-noise"))
+        ),
+    ),
+    Claim(
+        9,
+        "Cost per step grows quadratically with the number of inputs for SDNN-C, exponentially for"
+        " RBFN",
+        (
+            # l (l - 1) groups of columns: 56 / 12 = 4.7 times as many; half and twice that.
+            Check(Growth("sdnn-c", 8, 4), "4.7 times", at_least=2.3, at_most=9.4),
+            # At least twice with each input: 16 times with four more.
+            Check(Growth("rbfn", 8, 4), "exponential", at_least=16),
+            Check(Growth("rbfn-plain", 8, 4), "exponential", at_least=16),
+        ),
+    ),
+)
+"""The paper's nine claims, by their numbers in the spec's list."""
+
+
+def describe(quantity: Quantity) -> str:
+    """Say for a reader what is measured on whom.
+
+    Examples
+    --------
+    >>> describe(Growth("rbfn", 8, 4))
+    'time per step, 8 inputs / 4 inputs: RBFN, factored'
+    """
+    if isinstance(quantity, Growth):
+        titles = {series.id: series.title for _, series in cost_series()}
+        return (
+            f"time per step, {quantity.n_inputs} inputs / {quantity.n_fewer} inputs:"
+            f" {titles[quantity.series]}"
+        )
+    words = quantity.measure.replace("_", " ")
+    if isinstance(quantity, Difference):
+        title = agent_entry(quantity.subject.agent).title
+        fewer = str(quantity.other).removeprefix(f"{title}, ")
+        return f"{words}: {quantity.subject} less {fewer}"
+    return f"{words}: {quantity.subject}"

@@ -1,0 +1,184 @@
+"""How the cost of a step grows with the number of inputs: what is measured, and how.
+
+Source: spec section 5, claim 9. A step is one whole decision of a learning agent without its
+environment: acting in a new random state and learning the transition to it. Times are the only
+results that no seed fixes; they are stored like trials, and figures are drawn from what is stored.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from datetime import datetime, timezone
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box
+
+from sdnn import _core, machine
+from sdnn.runs.engine import Observer
+from sdnn.runs.records import CostKey, CostRecord, StepTimes
+from sdnn.runs.registry import AgentEntry, CostSeries, cost_series
+from sdnn.runs.store import ResultStore
+
+SEED = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class CostConfig:
+    """How thoroughly costs are measured.
+
+    Parameters
+    ----------
+    n_inputs
+        Numbers of inputs d.
+    n_rounds
+        Rounds; each gives the median over its steps, and rounds are what intervals are drawn from.
+    round_seconds
+        Time of a round, as far as steps allow: every round has at least `min_steps`.
+    min_steps
+        Fewest steps in a round.
+    n_learned
+        Steps of learning before the first round: an agent at work has no fresh weights.
+    most_plain_inputs
+        Largest number of inputs of what is evaluated plainly: seconds a step with 8.
+    """
+
+    n_inputs: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 8)
+    n_rounds: int = 5
+    round_seconds: float = 0.1
+    min_steps: int = 1
+    n_learned: int = 500
+    most_plain_inputs: int = 8
+
+    @property
+    def config_hash(self) -> str:
+        """First 16 hexadecimal digits of the SHA-256 of the values, the version and the machine.
+
+        Times of another machine or version are no part of one comparison.
+        """
+        told = {**asdict(self), "version": _core.__version__, "machine": machine.description()}
+        text = json.dumps(told, sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+QUICK_COST = CostConfig(n_rounds=3, round_seconds=0.01, min_steps=1, most_plain_inputs=5)
+
+
+def cost_keys(config: CostConfig, agents: Iterable[str] | None = None) -> tuple[CostKey, ...]:
+    """Keys of all measurements of some agents (default: all), inputs ascending in each series.
+
+    Raises
+    ------
+    ValueError
+        If no agent has one of the ids.
+    """
+    return tuple(
+        CostKey(series.id, n_inputs, config.config_hash)
+        for _, series in cost_series(agents)
+        for n_inputs in sorted(config.n_inputs)
+        if not series.is_plain or n_inputs <= config.most_plain_inputs
+    )
+
+
+def measure_costs(
+    keys: Sequence[CostKey],
+    config: CostConfig,
+    store: ResultStore,
+    observer: Observer,
+) -> None:
+    """Measure what is not stored yet, one after another, and store each at once.
+
+    Parameters
+    ----------
+    keys
+        What is wanted.
+    config
+        How thoroughly.
+    store
+        Where the records go.
+    observer
+        Told what happens.
+
+    Raises
+    ------
+    StoreError
+        If the store cannot be read or written.
+    """
+    stored = {record.key for record in store.load_costs(config.config_hash)}
+    missing = [key for key in keys if key not in stored]
+    observer.costs_begun(len(missing))
+    by_id = {series.id: (entry, series) for entry, series in cost_series()}
+    for key in missing:
+        entry, series = by_id[key.series]
+        times = measure_steps(entry, series, key.n_inputs, config)
+        if times is not None:
+            record = CostRecord(
+                key=key,
+                version=_core.__version__,
+                machine=machine.description(),
+                finished_at=datetime.now(timezone.utc).isoformat(timespec="seconds"),
+                times=times,
+            )
+            store.add_cost(record)
+        observer.cost_measured(f"{series.title}, {key.n_inputs} inputs")
+
+
+def measure_steps(
+    entry: AgentEntry, series: CostSeries, n_inputs: int, config: CostConfig
+) -> StepTimes | None:
+    """Measure a step of an agent of the paper's sizes: acting in a new state and learning.
+
+    Parameters
+    ----------
+    entry
+        Which agent.
+    series
+        Evaluated how.
+    n_inputs
+        Number of inputs d.
+    config
+        How thoroughly.
+
+    Returns
+    -------
+    StepTimes or None
+        None where there is no memory for the agent.
+    """
+    approximator = entry.approximator(**(dict(series.settings) | {"n_inputs": n_inputs}))
+    try:
+        agent = _core_agent(entry, series, approximator)
+    except MemoryError:
+        return None
+    step_seconds = float(_core.time_agent_steps(agent, 1, SEED)[0]) / 1e9
+    in_a_round = int(config.round_seconds / step_seconds)
+    n_learned = min(config.n_learned, in_a_round)
+    learning = _core.time_agent_steps(agent, n_learned, SEED + 1)
+    if n_learned:
+        in_a_round = int(config.round_seconds * 1e9 / float(np.median(learning)))
+    n_steps = max(config.min_steps, in_a_round)
+    medians = [
+        float(np.median(_core.time_agent_steps(agent, n_steps, SEED + 2 + number))) / 1e3
+        for number in range(config.n_rounds)
+    ]
+    return StepTimes(
+        microseconds=np.array(medians, np.float64),
+        n_steps=n_steps,
+        table_bytes=series.learned_bytes(approximator),
+    )
+
+
+def _core_agent(entry: AgentEntry, series: CostSeries, approximator: Any) -> Any:
+    learning = entry.learning()
+    if series.core_agent is not None:
+        return series.core_agent(
+            approximator=approximator.to_core(), learning=learning.to_core(), seed=SEED
+        )
+    states = Box(0.0, 1.0, (approximator.n_inputs,), np.float64)
+    actions = Box(-1.0, 1.0, (1,), np.float64)
+    agent: Any = entry.make_agent(
+        states, actions, approximator=approximator, learning=learning, seed=SEED
+    )
+    return agent.core

@@ -1,0 +1,244 @@
+"""The rule by which our data speak about the paper's claims.
+
+It was written down before the trials of Experiment B were run:
+
+- a check *holds* if the whole 95 % interval of the quantity lies in the range, *does not hold* if
+  the whole interval lies outside on one side, and is *undecided* otherwise;
+- a claim holds if all its checks hold, does not hold if one of them does not, and is undecided
+  otherwise;
+- runs smaller than the paper's (10 trials x 15,000 episodes) are not judged, nor are costs measured
+  with other settings than `CostConfig()`.
+
+What follows was added after the first 200 trials of each case had been seen, since ten trials, and
+a hundred, leave three claims undecided:
+
+- more trials of the same settings overrule fewer;
+- a claim that these leave undecided, too, is judged by how often ten of them show it, as the
+  paper's ten did (`chances`): it holds if 95 % of the draws or more show it, does not hold if 5 %
+  or fewer do, and is a matter of *chance* in between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.reproduction.cases import PAPER_EPISODES
+from sdnn.reproduction.chances import TenTrials
+from sdnn.reproduction.claims import CLAIMS, Check, Claim, Difference, Growth, Subject, describe
+from sdnn.reproduction.cost import CostConfig
+from sdnn.reproduction.results import TrialMeasures, on_equal_terms
+from sdnn.runs.records import CostRecord
+from sdnn.runs.statistics import Estimate, estimate_contrast, json_number
+
+
+class Verdict(Enum):
+    """What our data say about a claim; the value is the word for a reader."""
+
+    HOLDS = "holds"
+    FAILS = "does not hold"
+    CHANCE = "a matter of chance"
+    UNDECIDED = "undecided"
+    NOT_JUDGED = "not judged"
+    NOT_RUN = "not run"
+
+
+ALWAYS, NEVER = 0.95, 0.05
+"""Shares of draws of ten trials from which on, and up to which, a claim holds, and does not."""
+
+
+def verdict_of(check: Check, estimate: Estimate) -> Verdict:
+    """Judge one check by the rule of this module."""
+    if check.at_least <= estimate.lower and estimate.upper <= check.at_most:
+        return Verdict.HOLDS
+    if estimate.upper < check.at_least or estimate.lower > check.at_most:
+        return Verdict.FAILS
+    return Verdict.UNDECIDED
+
+
+@dataclass(frozen=True)
+class CheckOutcome:
+    """A check with what our data give; no estimate where its trials were not run.
+
+    ``samples`` are the trials' values that it was judged by: one array, or two of a difference.
+    ``last_episode`` is that of the trials, where what is censored is cut off.
+    """
+
+    check: Check
+    estimate: Estimate | None
+    verdict: Verdict
+    samples: tuple[NDArray[np.float64], ...] = field(default=(), compare=False, repr=False)
+    last_episode: int = PAPER_EPISODES
+
+
+@dataclass(frozen=True)
+class ClaimOutcome:
+    """A claim with its checks' outcomes."""
+
+    claim: Claim
+    checks: tuple[CheckOutcome, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict about the whole claim, by the rule of this module."""
+        verdicts = {outcome.verdict for outcome in self.checks}
+        for decisive in (
+            Verdict.FAILS,
+            Verdict.NOT_RUN,
+            Verdict.NOT_JUDGED,
+            Verdict.UNDECIDED,
+        ):
+            if decisive in verdicts:
+                return decisive
+        return Verdict.HOLDS
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as values that JSON can hold; what is censored becomes ``">last_episode"``."""
+        return {
+            "number": self.claim.number,
+            "text": self.claim.text,
+            "verdict": self.verdict.value,
+            "checks": [
+                {
+                    "measured": describe(checked.check.quantity),
+                    "paper": checked.check.paper,
+                    "at_least": json_number(checked.check.at_least, None),
+                    "at_most": json_number(checked.check.at_most, None),
+                    "ours": None
+                    if checked.estimate is None
+                    else checked.estimate.to_json(checked.last_episode),
+                    "verdict": checked.verdict.value,
+                }
+                for checked in self.checks
+            ],
+        }
+
+
+@dataclass(frozen=True)
+class SettledClaim:
+    """A claim with all that speaks about it.
+
+    Parameters
+    ----------
+    own
+        What the trials that were run give.
+    more
+        What more trials of the same settings give; None where there are none.
+    chance
+        In which share of draws of ten of these it is shown.
+    """
+
+    own: ClaimOutcome
+    more: ClaimOutcome | None = None
+    chance: Estimate | None = None
+
+    @property
+    def claim(self) -> Claim:
+        """The claim."""
+        return self.own.claim
+
+    @property
+    def best(self) -> ClaimOutcome:
+        """What the most trials give."""
+        return self.own if self.more is None else self.more
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict about the claim, by the whole rule of this module."""
+        if self.own.verdict in (Verdict.NOT_JUDGED, Verdict.NOT_RUN):
+            return self.own.verdict
+        if self.best.verdict is not Verdict.UNDECIDED or self.chance is None:
+            return self.best.verdict
+        if self.chance.value >= ALWAYS:
+            return Verdict.HOLDS
+        return Verdict.FAILS if self.chance.value <= NEVER else Verdict.CHANCE
+
+
+def settle(
+    outcomes: Iterable[ClaimOutcome], more: Iterable[TrialMeasures]
+) -> tuple[SettledClaim, ...]:
+    """Put beside each claim what more trials of the same settings say of it.
+
+    Parameters
+    ----------
+    outcomes
+        Claims judged by the trials that were run.
+    more
+        Other trials, one for each case and agent. A claim is judged by them if all cases and agents
+        that it speaks of are among them.
+    """
+    trials = tuple(more)
+    judged = {o.claim.number: o for o in judge_claims(trials, ())}
+    draws = TenTrials(trials)
+    settled = []
+    for own in outcomes:
+        found = judged.get(own.claim.number)
+        if found is None or found.verdict is Verdict.NOT_RUN:
+            settled.append(SettledClaim(own))
+        else:
+            settled.append(SettledClaim(own, found, draws.chance(own.claim)))
+    return tuple(settled)
+
+
+def judge_claims(
+    measured: Iterable[TrialMeasures], costs: Sequence[CostRecord]
+) -> tuple[ClaimOutcome, ...]:
+    """Judge the claims that the given results speak about, at least in part.
+
+    Parameters
+    ----------
+    measured
+        One for each case and agent; a case that experiments share may come more than once.
+    costs
+        Measured costs.
+    """
+    by_subject = {Subject(one.case_id, one.agent): one for one in measured}
+    outcomes = (
+        ClaimOutcome(claim, tuple(_judge(check, by_subject, costs) for check in claim.checks))
+        for claim in CLAIMS
+    )
+    return tuple(o for o in outcomes if any(check.estimate is not None for check in o.checks))
+
+
+def _judge(
+    check: Check, measured: Mapping[Subject, TrialMeasures], costs: Sequence[CostRecord]
+) -> CheckOutcome:
+    quantity = check.quantity
+    if isinstance(quantity, Growth):
+        times = {c.key.n_inputs: c.microseconds for c in costs if c.key.series == quantity.series}
+        if not {quantity.n_inputs, quantity.n_fewer} <= times.keys():
+            return CheckOutcome(check, None, Verdict.NOT_RUN)
+        growth = estimate_contrast(times[quantity.n_inputs], times[quantity.n_fewer], np.divide)
+        wanted = CostConfig().config_hash
+        return _outcome(check, growth, all(c.key.config_hash == wanted for c in costs))
+    subjects = [quantity.subject]
+    if isinstance(quantity, Difference):
+        subjects.append(quantity.other)
+    if not measured.keys() >= set(subjects):
+        return CheckOutcome(check, None, Verdict.NOT_RUN)
+    found = [measured[subject] for subject in subjects]
+    samples: tuple[NDArray[np.float64], ...]
+    if len(found) == 1:
+        samples = (found[0].values[quantity.measure],)
+        estimate = found[0].medians[quantity.measure]
+    else:
+        samples = values, others = on_equal_terms(quantity.measure, *found)
+        estimate = estimate_contrast(values, others)
+    is_full = all(one.is_paper_scale for one in found)
+    last_episode = min(one.last_episode for one in found)
+    return replace(_outcome(check, estimate, is_full, samples), last_episode=last_episode)
+
+
+def _outcome(
+    check: Check,
+    estimate: Estimate,
+    is_full: bool,
+    samples: tuple[NDArray[np.float64], ...] = (),
+) -> CheckOutcome:
+    verdict = verdict_of(check, estimate) if is_full else Verdict.NOT_JUDGED
+    return CheckOutcome(check, estimate, verdict, samples)

@@ -1,0 +1,144 @@
+"""Where trials are run: what the engine asks of an executor, and what it is told.
+
+An executor runs trials and tells about them; it knows no store. The engine stores a finished trial
+before it asks for the next message, so what an executor has not told as finished is not stored.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from typing import Protocol
+
+from sdnn import _core
+from sdnn.runs.records import TrialRecord, TrialRows
+from sdnn.runs.trial import opened
+from sdnn.runs.trial_config import PlannedTrial
+
+CHUNK_SECONDS = 0.1
+"""A trial reports about this often; it is also how long an interruption waits."""
+
+POLL_SECONDS = 0.1
+"""How often the calling thread looks up while no message comes."""
+
+
+@dataclass(frozen=True)
+class Started:
+    """A trial starts."""
+
+    planned: PlannedTrial
+
+
+@dataclass(frozen=True)
+class Advanced:
+    """A trial has done so many learning episodes."""
+
+    planned: PlannedTrial
+    episode: int
+
+
+@dataclass(frozen=True)
+class Lost:
+    """A trial was lost with what ran it; it starts again later, or fails."""
+
+    planned: PlannedTrial
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A trial is done."""
+
+    planned: PlannedTrial
+    record: TrialRecord
+
+
+@dataclass(frozen=True)
+class Failed:
+    """A trial raised, or was lost too often."""
+
+    planned: PlannedTrial
+    error: Exception
+
+
+@dataclass(frozen=True)
+class Noted:
+    """Something that a person should know."""
+
+    text: str
+
+
+Message = Started | Advanced | Lost | Finished | Failed | Noted
+
+
+class Executor(Protocol):
+    """Runs trials somewhere."""
+
+    def run(
+        self, planned: Sequence[PlannedTrial], stop: threading.Event
+    ) -> Generator[Message, None, None]:
+        """Run the trials and yield what happens, until each is finished or failed or `stop` is set.
+
+        The generator runs in the calling thread. Closing it gives up what is running.
+
+        Parameters
+        ----------
+        planned
+            Trials to run, in this order as far as possible.
+        stop
+            Once it is set, running trials are given up and no further one starts.
+
+        Raises
+        ------
+        ExperimentError
+            If no trial can be run any more.
+        """
+
+
+def run_to_end(
+    planned: PlannedTrial,
+    *,
+    wanted: Callable[[], bool],
+    advanced: Callable[[int], None],
+) -> TrialRecord | None:
+    """Run one trial, in pieces of about `CHUNK_SECONDS`.
+
+    Parameters
+    ----------
+    planned
+        The trial.
+    wanted
+        Asked before every piece; if it says no, the trial is given up and there is no record.
+    advanced
+        Told the number of learning episodes done, after every piece.
+    """
+    begin = time.thread_time()
+    with opened(planned.config.make_trial(planned.key.seed)) as trial:
+        chunk = 1
+        while not trial.finished:
+            if not wanted():
+                return None
+            chunk_begin = time.monotonic()
+            trial.advance(chunk)
+            chunk = _next_chunk(chunk, time.monotonic() - chunk_begin)
+            advanced(int(trial.episode))
+    return TrialRecord(
+        key=planned.key,
+        config=planned.config.canonical_json(),
+        version=_core.__version__,
+        n_decisions=int(trial.n_decisions),
+        seconds=time.thread_time() - begin,
+        finished_at=datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        rows=TrialRows.from_arrays(trial.test_rows()),
+    )
+
+
+def _next_chunk(chunk: int, seconds: float) -> int:
+    """Episodes of the next chunk, so that it lasts about `CHUNK_SECONDS`."""
+    if seconds < CHUNK_SECONDS / 2:
+        return 2 * chunk
+    if seconds > 2 * CHUNK_SECONDS:
+        return max(1, chunk // 2)
+    return chunk

@@ -1,0 +1,280 @@
+"""The agents that take part in experiments: one entry for each, and nothing about them elsewhere.
+
+A new agent is one class and one entry. An agent of one's own takes part after it is registered::
+
+    register(AgentEntry(id="mine", title="Mine", approximator=MyTable, learning=MyRule, agent=Mine))
+    sdnn.cli.main(["reproduce", "b", "--agent", "mine", "--agent", "sdnn-c"])
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import gymnasium as gym
+
+from sdnn import _core
+from sdnn.agents import (
+    PRESETS,
+    FuzzyQLearning,
+    FuzzyQLearningConfig,
+    Preset,
+    QLearningConfig,
+    RBFQLearning,
+    SDNNQLearning,
+)
+from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.runs.preset_agents import PRESET_AGENTS
+from sdnn.runs.trial import LearningAgent, Trial
+
+_BYTES_OF_FLOAT, _BYTES_OF_DOUBLE = 4, 8
+
+
+@dataclass(frozen=True, kw_only=True)
+class CostSeries:
+    """A curve in the figure of costs: an agent, evaluated in one way.
+
+    Parameters
+    ----------
+    id
+        The word used in the result file.
+    title
+        The word used in figures and tables.
+    growth
+        What the number of operations is proportional to, for a reader (mathtext).
+    learned_bytes
+        Gives the memory of what the agent learns, from its approximator's settings.
+    settings
+        Settings of the approximator that are not the default.
+    core_agent
+        Makes the compiled agent from the core's ``approximator=``, ``learning=`` and ``seed=``;
+        default the one inside the Python agent (its ``core``).
+    is_plain
+        Whether its product structure is left unused: seconds a step with many inputs.
+    """
+
+    id: str
+    title: str
+    growth: str
+    learned_bytes: Callable[[Any], int]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    core_agent: Callable[..., Any] | None = None
+    is_plain: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class AgentEntry:
+    """Everything that experiments have to know about an agent.
+
+    Parameters
+    ----------
+    id
+        The word used on the command line and in the result file.
+    title
+        The word used in figures and tables.
+    version
+        Of the agent's code: another one where it changed, so that trials of before do not count as
+        its own. It is part of what is stored of a trial.
+    approximator
+        Settings of what the agent learns with: a frozen dataclass of plain values whose defaults
+        are those of the experiments; it has a field ``n_inputs``.
+    learning
+        Settings of how the agent learns and explores: another such dataclass.
+    preset
+        Settings of both that are not their defaults: an object with ``approximator`` and
+        ``learning``.
+    agent
+        The agent in Python, a `LearningAgent`: made from an observation space, an action space and
+        ``approximator=``, ``learning=``, ``seed=``.
+    core_trial
+        The trial in C++, made from the core's structs of the settings; an agent without one runs in
+        a `PythonTrial`.
+    costs
+        Its curves in the figure of costs, for agents of the core: the time of a Python agent would
+        be the interpreter's.
+    """
+
+    id: str
+    title: str
+    approximator: type[Any]
+    learning: type[Any]
+    agent: Callable[..., LearningAgent]
+    core_trial: Callable[..., Trial] | None = None
+    preset: Preset | None = None
+    costs: tuple[CostSeries, ...] = ()
+    version: str = ""
+
+    def approximator_settings(self, n_inputs: int) -> Any:
+        """Return the approximator's settings in experiments, for so many inputs."""
+        if self.preset is None:
+            return self.approximator(n_inputs=n_inputs)
+        return replace(self.preset.approximator, n_inputs=n_inputs)
+
+    def learning_settings(self) -> Any:
+        """Return the agent's settings in experiments."""
+        return self.learning() if self.preset is None else self.preset.learning
+
+    def make_agent(
+        self,
+        observation_space: gym.Space[Any],
+        action_space: gym.Space[Any],
+        *,
+        approximator: Any,
+        learning: Any,
+        seed: int,
+    ) -> LearningAgent:
+        """Make the agent in Python."""
+        return self.agent(
+            observation_space,
+            action_space,
+            approximator=approximator,
+            learning=learning,
+            seed=seed,
+        )
+
+
+AGENTS: dict[str, AgentEntry] = {}
+"""All agents by id, in the order in which they were registered."""
+
+
+def register(entry: AgentEntry) -> None:
+    """Let an agent take part.
+
+    Raises
+    ------
+    ValueError
+        If the id is no word for file names, or an agent or series of that id is there already.
+    """
+    if not re.fullmatch(r"\w[\w.-]*", entry.id):
+        raise ValueError(f"id must be of letters, digits, '_', '.' and '-', got {entry.id!r}")
+    if entry.id in AGENTS:
+        raise ValueError(f"an agent {entry.id!r} is already registered")
+    known = {series.id for _, series in cost_series()}
+    for series in entry.costs:
+        if series.id in known:
+            raise ValueError(f"a series {series.id!r} is already registered")
+        known.add(series.id)
+    AGENTS[entry.id] = entry
+
+
+def agent_entry(agent_id: str) -> AgentEntry:
+    """Look up an agent.
+
+    Raises
+    ------
+    ValueError
+        If no agent has that id.
+
+    Examples
+    --------
+    >>> agent_entry("sdnn-c").title
+    'SDNN-C'
+    """
+    if agent_id not in AGENTS:
+        raise ValueError(f"agent must be one of {', '.join(AGENTS)}, got {agent_id!r}")
+    return AGENTS[agent_id]
+
+
+def cost_series(agents: Iterable[str] | None = None) -> tuple[tuple[AgentEntry, CostSeries], ...]:
+    """List the curves of some agents (default: all) in the figure of costs, each with its agent.
+
+    Raises
+    ------
+    ValueError
+        If no agent has one of the ids.
+    """
+    entries = AGENTS.values() if agents is None else map(agent_entry, agents)
+    return tuple((entry, series) for entry in entries for series in entry.costs)
+
+
+def _sdnn_c_bytes(network: SDNNCConfig) -> int:
+    return network.n_pattern_units * network.n_pairs * network.n_hidden_units
+
+
+def _rules_bytes(rules: FuzzyRulesConfig) -> int:
+    return int(rules.n_sets**rules.n_inputs) * rules.n_actions * _BYTES_OF_FLOAT
+
+
+def _rbf_bytes(network: RBFNetworkConfig) -> int:
+    return int(network.n_bases ** (network.n_inputs + 1)) * _BYTES_OF_DOUBLE
+
+
+register(
+    AgentEntry(
+        id="sdnn-c",
+        title="SDNN-C",
+        approximator=SDNNCConfig,
+        learning=QLearningConfig,
+        agent=SDNNQLearning,
+        core_trial=_core.AcrobotTrial,
+        costs=(
+            CostSeries(
+                id="sdnn-c",
+                title="SDNN-C",
+                growth="$d(d-1)$ groups of columns",
+                learned_bytes=_sdnn_c_bytes,
+            ),
+        ),
+    )
+)
+register(
+    AgentEntry(
+        id="fql",
+        title="FQL",
+        approximator=FuzzyRulesConfig,
+        learning=FuzzyQLearningConfig,
+        agent=FuzzyQLearning,
+        core_trial=_core.FuzzyAcrobotTrial,
+        costs=(
+            CostSeries(
+                id="fql",
+                title="FQL",
+                growth="$2^d$ fired rules of $9^d$",
+                learned_bytes=_rules_bytes,
+                # With 8 inputs it has 3.6 GB, nearly all untouched.
+                settings={"max_table_bytes": 2**32},
+            ),
+        ),
+    )
+)
+register(
+    AgentEntry(
+        id="rbfn",
+        title="RBFN",
+        approximator=RBFNetworkConfig,
+        learning=QLearningConfig,
+        agent=RBFQLearning,
+        core_trial=_core.RBFAcrobotTrial,
+        costs=(
+            CostSeries(
+                id="rbfn",
+                title="RBFN, factored",
+                growth="$4^{d+1}$ weights",
+                learned_bytes=_rbf_bytes,
+            ),
+            CostSeries(
+                id="rbfn-plain",
+                title="RBFN, plain",
+                growth="$601 \\cdot 4^{d+1}$ basis values",
+                learned_bytes=_rbf_bytes,
+                core_agent=_core.PlainRBFQLearning,
+                is_plain=True,
+            ),
+        ),
+    )
+)
+for _name, _id in PRESET_AGENTS.items():
+    if _id not in AGENTS:
+        register(
+            AgentEntry(
+                id=_id,
+                title=f"SDNN-C, {_name}",
+                approximator=SDNNCConfig,
+                learning=QLearningConfig,
+                agent=SDNNQLearning,
+                core_trial=_core.AcrobotTrial,
+                preset=PRESETS[_name],
+            )
+        )

@@ -1,0 +1,380 @@
+"""What hand-made trials say: measures, paired differences, ends solved, claims, tables, figure."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from sdnn.reproduction.figures import figure_bytes
+from sdnn.reproduction.page import Call
+from sdnn.reproduction.report import format_estimate
+from sdnn.reproduction.sweep.comparison import compare
+from sdnn.reproduction.sweep.figure import draw_study
+from sdnn.reproduction.sweep.page import to_html, to_markdown
+from sdnn.reproduction.sweep.report import StudyReport, format_difference, to_json
+from sdnn.reproduction.verdicts import Verdict
+from sdnn.runs.records import TrialRecord, TrialRows
+from sdnn.runs.statistics import Estimate
+
+
+def record(study, case, variant, number, steps, returns=None, interval=10):
+    """A trial whose tests took so many steps; 50 is not solved."""
+    steps = np.asarray(steps, np.int32)
+    rows = TrialRows(
+        episode=interval * np.arange(1, steps.size + 1, dtype=np.int32),
+        steps=steps,
+        episode_return=np.zeros(steps.size) if returns is None else np.asarray(returns, float),
+        solved=steps < 50,
+    )
+    key = study.keys(case, variant)[number]
+    return TrialRecord(
+        key=key,
+        config=study.combinations[case, variant].config.canonical_json(),
+        version="1",
+        n_decisions=100,
+        seconds=1.0,
+        finished_at="",
+        rows=rows,
+    )
+
+
+def steps_of(*runs):
+    """Steps of tests, from pairs of a number of tests and their steps."""
+    return np.concatenate([np.full(n, steps) for n, steps in runs])
+
+
+TWO = """
+[study]
+trials = 4
+cases = ["s4-noise"]
+reference = "old"
+[variants.old]
+[variants.new]
+title = "the new one"
+learning.discount = 0.8
+"""
+OLD = [((100, 4),), ((100, 4),), ((60, 4), (40, 50)), ((100, 50),)]
+NEW = [((100, 4),), ((50, 50), (50, 4)), ((100, 4),), ((95, 4), (5, 50))]
+
+
+def records_of_two(study):
+    return [
+        record(study, "s4-noise", variant, number, steps_of(*runs))
+        for variant, trials in (("old", OLD), ("new", NEW))
+        for number, runs in enumerate(trials)
+    ]
+
+
+def test_differences_are_paired_by_trial(study):
+    found = compare(mine := study(TWO), records_of_two(mine))
+    old, new = (found.measured["s4-noise", name] for name in ("old", "new"))
+    assert old.summary.values["final_share_solved"].tolist() == [1.0, 1.0, 0.2, 0.0]
+    assert new.summary.values["final_share_solved"].tolist() == [1.0, 1.0, 1.0, 0.9]
+    assert old.solved_at_end.tolist() == [True, True, False, False]
+    assert new.solved_at_end.tolist() == [True, True, True, True]
+    assert old.differences == {}
+    share = new.differences["final_share_solved"]
+    assert share.value == pytest.approx((0 + 0 + 0.8 + 0.9) / 4)
+    # Means of four draws out of 0, 0, 0.8, 0.9: all of them 0 or 0.9 with probability 1/256.
+    assert share.lower == 0.0
+    assert 0.8 <= share.upper <= 0.9
+    # 26 of 50 tests in a row must be good: for the last time those that end with test 84.
+    assert old.summary.values["episode_of_collapse"].tolist() == [math.inf, math.inf, 840.0, 0.0]
+    assert new.summary.values["episode_of_collapse"].tolist() == 4 * [math.inf]
+    # Censored: as the last episode, 1000.
+    assert new.differences["episode_of_collapse"].value == (0 + 0 + 160 + 1000) / 4
+
+
+LENGTHS = """
+[study]
+trials = 6
+cases = ["s4", "s4-noise"]
+reference = "short"
+[base]
+protocol.n_learning_episodes = 1000
+[variants.short]
+[variants.long]
+protocol.n_learning_episodes = 3000
+"""
+
+
+def test_what_only_lasts_longer_does_not_differ(study):
+    mine = study(LENGTHS)
+    runs = {
+        ("s4", "short"): ((100, 4),), ("s4", "long"): ((300, 4),),
+        ("s4-noise", "short"): ((100, 50),), ("s4-noise", "long"): ((200, 50), (100, 4)),
+    }  # fmt: skip
+    records = [
+        record(mine, *pair, number, steps_of(*of_pair))
+        for pair, of_pair in runs.items()
+        for number in range(6)
+    ]
+    found = compare(mine, records)
+    for case, name in (("s4", "episode_of_collapse"), ("s4-noise", "episodes_to_learn")):
+        longer = found.measured[case, "long"]
+        assert longer.differences[name].value == 0.0
+        assert not longer.differs(name)
+    tables = {
+        title: rows
+        for title, _, rows in StudyReport(comparison=found, version="1", digest="0").tables()
+    }
+    rows = tables["Case I: 4 inputs, no noise"]
+    assert [row[6] for row in rows] == [">1000 [>1000, >1000]", ">3000 [>3000, >3000]"]
+    (row,) = tables["Case I: 4 inputs, no noise: less short, trial by trial"]
+    assert not any("*" in cell for cell in row)
+    png, _ = figure_bytes(draw_study(found, "footer"))
+    assert png.startswith(b"\x89PNG")
+
+
+def test_claims_are_censored_where_their_own_trials_end(study):
+    text = LENGTHS.replace('"s4", "s4-noise"', '"s4", "s4-noise", "s6"')
+    mine = study(text + "[variants.long.cases.s6]\nprotocol.n_learning_episodes = 5000\n")
+    n_tests = {"s4": 300, "s4-noise": 300, "s6": 500}
+    records = [
+        record(mine, case, "long", number, steps_of((n, 50)))
+        for case, n in n_tests.items()
+        for number in range(6)
+    ]
+    found = compare(mine, records)
+    claim = found.claims["long"][1]  # of the episodes to learn in both
+    assert [checked.last_episode for checked in claim.outcome.checks] == [3000, 5000]
+    told = to_json(StudyReport(comparison=found, version="1", digest="0"))["claims"][0]
+    assert [one["ours"]["value"] for one in told["checks"]] == [">3000", ">5000"]
+
+
+def test_returns_have_the_digits_that_tell_them_apart():
+    small = Estimate(0.00498, 0.0049, 0.0051)
+    assert format_estimate(small, "final_return", 9) == "0.00498 [0.0049, 0.0051]"
+    assert format_difference(Estimate(0.01, 0.01, 0.01), "mean_return") == "+0.01 [+0.01, +0.01]"
+    assert format_difference(Estimate(-0.01, -0.02, 0.01), "mean_return") == "-0.01 [-0.02, +0.01]"
+    assert format_estimate(Estimate(-0.04, -0.1, 3.0), "final_return", 9) == "0 [-0.1, 3]"
+    large = Estimate(1234567.8, 1230000.0, 1240000.0)
+    assert format_estimate(large, "final_return", 9) == "1234567.8 [1230000, 1240000]"
+    assert format_estimate(Estimate(0.0, 0.0, 0.0), "final_return", 9) == "0 [0, 0]"
+    assert format_estimate(Estimate(-159.44, -173.9, -149.8), "final_return", 9) == (
+        "-159.4 [-173.9, -149.8]"
+    )
+
+
+def test_dollar_signs_of_titles_are_dollar_signs(study):
+    mine = study(TWO.replace('title = "the new one"', 'title = "a$_$"'))
+    png, _ = figure_bytes(draw_study(compare(mine, records_of_two(mine)), "at $1 or $_$"))
+    assert png.startswith(b"\x89PNG")
+
+
+def test_few_trials_are_never_called_different(study):
+    for n_trials, differs in ((5, False), (6, True)):
+        mine = study(TWO, n_trials=n_trials)
+        records = [
+            record(mine, "s4-noise", variant, n, steps_of((60, steps)))
+            for variant, steps in (("old", 50), ("new", 4))
+            for n in range(n_trials)
+        ]
+        found = compare(mine, records).measured["s4-noise", "new"]
+        assert found.differences["final_steps"].upper == -46.0
+        assert found.differs("final_steps") is differs
+        assert not found.differs("mean_return")
+
+
+def test_what_is_not_complete_is_left_out_and_said_so(study):
+    mine = study(TWO)
+    records = records_of_two(mine)
+    found = compare(mine, records[:-1])
+    assert list(found.measured) == [("s4-noise", "old")]
+    report = StudyReport(comparison=found, version="1", digest="0")
+    assert report.missing().startswith("Not complete: 1 of 2 combinations")
+    found = compare(mine, records[4:])
+    assert found.measured["s4-noise", "new"].differences == {}
+    assert compare(mine, ()).measured == {}
+
+
+CLAIMED = """
+[study]
+trials = 10
+cases = ["s4", "s4-noise", "s5-noise", "s6-noise"]
+[variants.old]
+[variants.new]
+learning.discount = 0.8
+[variants.fql]
+agent = "fql"
+"""
+
+
+def claimed_records(study, n_trials=10):
+    """As the paper's curves: Case II collapses at about 7,500; but not with `new`."""
+    good, lost = steps_of((1500, 4)), steps_of((750, 4), (750, 50))
+    for variant in ("old", "new", "fql"):
+        for case in ("s4", "s4-noise", "s5-noise", "s6-noise"):
+            steps = lost if case == "s4-noise" and variant == "old" else good
+            for number in range(n_trials):
+                yield record(study, case, variant, number, steps)
+
+
+def test_claims_are_judged_for_each_variant(study):
+    mine = study(CLAIMED)
+    found = compare(mine, claimed_records(mine))
+    verdicts = {
+        variant: {n: (c.outcome.verdict, c.moved) for n, c in claims.items()}
+        for variant, claims in found.claims.items()
+    }
+    assert verdicts == {
+        "old": {
+            5: (Verdict.HOLDS, None), 6: (Verdict.HOLDS, None), 7: (Verdict.HOLDS, None),
+        },
+        "new": {
+            5: (Verdict.FAILS, True), 6: (Verdict.FAILS, True), 7: (Verdict.HOLDS, False),
+        },
+        "fql": {3: (Verdict.HOLDS, None), 4: (Verdict.FAILS, None)},
+    }  # fmt: skip
+    assert [claim.number for claim in found.claims_shown] == [3, 4, 5, 6, 7]
+    report = StudyReport(comparison=found, version="1", digest="0")
+    _, header, rows = report.claim_overview()
+    assert header == ("variant", "claim 3", "claim 4", "claim 5", "claim 6", "claim 7")
+    assert rows[1] == (
+        "new", "-", "-", "does not hold (moved)", "does not hold (moved)", "holds",
+    )  # fmt: skip
+    call = Call(machine="a machine", seconds=1.0, n_run=120, n_planned=120, processor_seconds=2.0)
+    page = to_html(report, b"<svg/>", call)
+    assert page.count('<td class="verdict bad">does not hold (moved)</td>') == 2
+    assert page.count('<td class="verdict good">holds</td>') == 5
+    assert "<summary>Claim 6: SDNN-C in Case III keeps solving until later" in page
+    table = to_json(report)
+    assert {(c["variant"], c["number"], c["moved"]) for c in table["claims"]} >= {
+        ("new", 5, True), ("new", 7, False), ("old", 5, None),
+    }  # fmt: skip
+
+
+def test_chances_are_shown_from_twice_the_papers_trials_on(study):
+    def chances(n_trials):
+        mine = study(CLAIMED, n_trials=n_trials)
+        found = compare(mine, claimed_records(mine, n_trials))
+        return StudyReport(comparison=found, version="1", digest="0")
+
+    assert chances(19).chance_table() is None
+    report = chances(20)
+    title, header, rows = report.chance_table()
+    assert title in [table[0] for table in report.tables()]
+    assert header[1:] == (*(f"claim {n}" for n in (3, 4, 5, 6, 7)), "all of these")
+    always, never = "100 % [100, 100]", "0 % [0, 0]"
+    assert rows == [
+        ("old", "-", "-", always, always, always, always),
+        ("new", "-", "-", never, never, always, never),
+        ("fql", always, never, "-", "-", "-", never),
+    ]
+    told = {(c["variant"], c["number"]): c["ten_trials_show_it"] for c in to_json(report)["claims"]}
+    assert told["new", 6] == {"value": 0.0, "lower": 0.0, "upper": 0.0}
+    call = Call(machine="", seconds=1.0, n_run=0, n_planned=0, processor_seconds=1.0)
+    assert title in to_html(report, b"<svg/>", call)
+
+
+def test_small_runs_are_not_judged_and_claims_without_their_cases_not_shown(study):
+    mine = study(CLAIMED, n_trials=2)
+    records = [r for r in claimed_records_of(mine, 2) if r.key.case_id != "s5-noise"]
+    found = compare(mine, records)
+    assert [claim.number for claim in found.claims_shown] == [3, 5, 7]
+    outcomes = [c for claims in found.claims.values() for c in claims.values()]
+    assert {c.outcome.verdict for c in outcomes} == {Verdict.NOT_JUDGED}
+    assert {c.moved for c in outcomes} == {None}
+
+
+def claimed_records_of(study, n_trials):
+    for case, variant in study.combinations:
+        for number in range(n_trials):
+            yield record(study, case, variant, number, steps_of((60, 4)))
+
+
+def test_a_case_that_is_not_the_papers_has_no_claims(study):
+    mine = study("[study]\ntrials = 10\n[cases.mine]\n[variants.a]\n")
+    records = [record(mine, "mine", "a", n, steps_of((1500, 4))) for n in range(10)]
+    assert compare(mine, records).claims_shown == ()
+
+
+MIXED = """
+[study]
+title = "Both | kinds"
+trials = 2
+[cases.s4]
+[cases.swing]
+title = "A pendulum"
+environment.id = "Pendulum-v1"
+[variants.a]
+[variants.b]
+learning.discount = 0.5
+[variants.c]
+learning.tie_rule = "uniform"
+"""
+
+
+@pytest.fixture
+def mixed(study):
+    mine = study(MIXED)
+    records = [
+        record(mine, case, variant, number, steps_of((20, 4 + number)), shift + np.arange(20.0))
+        for case in ("s4", "swing")
+        for variant, shift in (("a", 0.0), ("b", 10.0))
+        for number in range(2)
+    ]
+    return StudyReport(comparison=compare(mine, records), version="1", digest="abc")
+
+
+def test_environments_are_judged_by_their_return(mixed):
+    swing = mixed.comparison.measured["swing", "b"]
+    assert swing.measures == ("final_return", "mean_return")
+    assert swing.summary.values["final_return"].tolist() == [28.5, 28.5]  # the last 2 of 20
+    assert swing.summary.values["mean_return"].tolist() == [19.5, 19.5]
+    assert swing.differences["mean_return"].value == 10.0
+    assert swing.solved_at_end is None
+
+
+def test_tables_have_a_row_for_each_variant_in_each_case(mixed):
+    tables = {title: (header, rows) for title, header, rows in mixed.tables()}
+    header, rows = tables["Case I: 4 inputs, no noise"]
+    assert header[:5] == ("variant", "agent", "trials", "end solved", "episodes to learn")
+    # The tie rule of c is that of a: the same trials.
+    assert [row[0] for row in rows] == ["a", "b", "c"]
+    assert rows[0][:5] == ("a", "SDNN-C", "2", "2 of 2", "10 [10, 10]")
+    header, rows = tables["A pendulum: less a, trial by trial"]
+    assert header == ("variant", "final return", "mean return")
+    assert rows == [
+        ("b", "+10 [+10, +10]", "+10 [+10, +10]"), ("c", "0 [0, 0]", "0 [0, 0]"),
+    ]  # fmt: skip
+    assert "c is the same as a." in mixed.notes()
+    assert mixed.missing() is None
+    text = to_markdown(mixed)
+    assert text.startswith("# Both | kinds\n\n3 variants in 2 cases, 2 trials each; reference: a.")
+    assert "| b | +10 [+10, +10] | +10 [+10, +10] |" in text
+
+
+def test_the_table_is_json(mixed):
+    table = json.loads(json.dumps(to_json(mixed), allow_nan=False))
+    assert [(r["case"], r["variant"], r["n_end_solved"]) for r in table["results"]] == [
+        ("s4", "a", 2), ("s4", "b", 2), ("s4", "c", 2),
+        ("swing", "a", None), ("swing", "b", None), ("swing", "c", None),
+    ]  # fmt: skip
+    assert table["variants"][2] == {"id": "c", "title": "c", "same_as": "a"}
+    swing = table["results"][4]
+    assert swing["measures"]["mean_return"]["trials"] == [19.5, 19.5]
+    assert swing["differences"]["mean_return"] == {"value": 10.0, "lower": 10.0, "upper": 10.0}
+
+
+def test_the_figure_is_the_same_each_time_and_shows_every_trial(mixed):
+    figure = draw_study(mixed.comparison, "footer")
+    assert figure_bytes(figure) == figure_bytes(draw_study(mixed.comparison, "footer"))
+    assert "filled: the reference, and what" in figure.texts[-1].get_text()
+    assert len(figure.axes) == 4
+    assert [axes.get_title("left") for axes in figure.axes] == [
+        "Case I: 4 inputs, no noise", "A pendulum", "", "",
+    ]  # fmt: skip
+    for axes in figure.axes:
+        assert len(axes.collections) == 3
+        assert all(dots.get_offsets().shape == (2, 2) for dots in axes.collections)
+    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["a", "b", "c"]
+
+
+def test_many_cases_go_on_below(study):
+    mine = study("[study]\ntrials = 1\n" + "".join(f"[cases.c{i}]\n" for i in range(7)))
+    records = [record(mine, f"c{i}", "base", 0, steps_of((60, 4))) for i in range(7)]
+    figure = draw_study(compare(mine, records), "")
+    assert len(figure.axes) == 4 * 5
+    assert sum(axes.get_visible() for axes in figure.axes) == 2 * 7

@@ -1,0 +1,83 @@
+"""Estimates of time, from made-up stored trials and from a probe of a trial of known speed."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from sdnn.reproduction import AGENTS, ProtocolConfig, TrialConfig, TrialKey
+from sdnn.reproduction.sweep import duration
+from sdnn.reproduction.sweep.duration import Duration, Durations, wall_seconds
+from sdnn.runs.records import TrialTime
+
+CONFIG = TrialConfig(protocol=ProtocolConfig(n_learning_episodes=1005, test_interval=10))
+KEY = TrialKey("s4", "sdnn-c", 0, 1, "mine")
+
+
+def stored(seconds, n_episodes=1000, n_decisions=10_000, **changes):
+    return TrialTime(
+        key=KEY._replace(**changes), seconds=seconds, n_episodes=n_episodes, n_decisions=n_decisions
+    )
+
+
+def test_trials_of_the_same_configuration_count_first():
+    times = [stored(2.0), stored(4.0), stored(50.0, config_hash="other"), stored(9.0, case_id="x")]
+    found = Durations(times).of_trial(KEY, CONFIG)
+    assert found.lower == found.upper == pytest.approx(3.0 * 1.005)
+    assert found.source == "2 stored trials of this configuration"
+
+
+def test_then_those_of_the_same_case_and_agent():
+    times = [stored(50.0, config_hash="other"), stored(9.0, agent="fql")]
+    found = Durations(times).of_trial(KEY, CONFIG)
+    assert found.lower == found.upper == pytest.approx(50.25)
+    assert found.source == "1 stored trial of this case and agent"
+
+
+def test_shorter_trials_give_a_range_and_count_only_without_whole_ones():
+    # 100 episodes of 10 decisions, 1 ms each; 50 decisions are allowed in 1005 + 100 episodes.
+    short = stored(1.0, n_episodes=100, n_decisions=1000)
+    found = Durations([short]).of_trial(KEY, CONFIG)
+    assert (found.lower, found.upper) == pytest.approx((10.05, 1105 * 50 * 0.001))
+    assert "as short as the first 100, to as long as allowed" in found.source
+    with_whole = Durations([short, stored(3.0)]).of_trial(KEY, CONFIG)
+    assert with_whole.upper == pytest.approx(3.0 * 1.005)
+
+
+def test_a_probe_is_made_once_for_a_case_and_agent(fake, monkeypatch):
+    made = []
+
+    class Probed(fake.FakeTrial):
+        def __init__(self, **options):
+            made.append(options["seed"])
+            super().__init__(**options)
+
+        def advance(self, n):
+            clock[0] += 0.1
+            super().advance(n)
+
+    clock = [0.0]
+    monkeypatch.setattr(duration.time, "thread_time", lambda: clock[0])
+    monkeypatch.setitem(AGENTS, "sdnn-c", replace(AGENTS["sdnn-c"], core_trial=Probed))
+    durations = Durations([stored(1.0, n_episodes=0)])
+    found = durations.of_trial(KEY, CONFIG)
+    # 10 episodes in 0.1 s, and 7 decisions in each: 0.3 s are reached after 30 or 40.
+    assert found.lower == pytest.approx(10.05)
+    assert found.upper == pytest.approx(1105 * 50 * 0.1 / 70)
+    assert found.source.startswith("a probe: episodes as short as the first ")
+    whole = replace(CONFIG, protocol=ProtocolConfig(n_learning_episodes=20, test_interval=10))
+    assert durations.of_trial(KEY._replace(config_hash="other"), whole) == Duration(
+        pytest.approx(0.2), pytest.approx(0.2), "a probe"
+    )
+    assert made == [1]
+
+
+def test_python_trials_share_a_core(monkeypatch):
+    monkeypatch.setattr(duration, "n_cores", lambda: 16)
+    compiled, locked = (Duration(8.0, 16.0, ""), True), (Duration(4.0, math.inf, ""), False)
+    assert wall_seconds(4 * [compiled], 2) == (16.0, 32.0)
+    assert wall_seconds(2 * [compiled], 4) == (8.0, 16.0), "no trial is cut in parts"
+    assert wall_seconds([compiled, *4 * [locked]], 8) == (16.0, math.inf)
+    assert wall_seconds([], 2) == (0.0, 0.0)
+    monkeypatch.setattr(duration, "n_cores", lambda: 2)
+    assert wall_seconds(4 * [compiled], 64) == (16.0, 32.0), "no more at once than there are cores"

@@ -1,0 +1,491 @@
+"""From a study file to configurations and trials, and what is said about wrong files."""
+
+import sys
+from dataclasses import replace
+
+import pytest
+
+from sdnn.reproduction import (
+    AGENTS,
+    EXPERIMENTS,
+    ProtocolConfig,
+    TrialConfig,
+    case_config,
+    plan_trials,
+)
+from sdnn.runs.environment_trial import EnvironmentTrialConfig
+from sdnn.runs.trial_errors import StudyError
+
+PAPER = """
+[study]
+cases = ["s4", "s4-noise", "s6"]
+trials = 2
+seed = 3
+"""
+
+
+def configs(study):
+    return {pair: combination.config for pair, combination in study.combinations.items()}
+
+
+def test_a_study_of_nothing_is_the_paper_and_shares_its_trials(study):
+    found = study(PAPER)
+    cases = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
+    assert configs(found) == {
+        (case_id, "base"): case_config(cases[case_id], "sdnn-c")
+        for case_id in ("s4", "s4-noise", "s6")
+    }
+    paper = {p.key for p in plan_trials(cases.values(), 2, 3, ProtocolConfig())}
+    assert {p.key for p in found.plan()} < paper
+    assert found.title == "mine"
+    assert found.reference == "base"
+
+
+def test_the_first_trials_of_all_come_first(study):
+    found = study(PAPER + '[axes]\n"learning.discount" = [0.5, 0.7]\n')
+    plan = found.plan()
+    assert [p.key.trial for p in plan] == 9 * [0] + 9 * [1]
+    assert [p.key.case_id for p in plan[:9]] == 3 * ["s4"] + 3 * ["s4-noise"] + 3 * ["s6"]
+    seeds = {(p.key.case_id, p.key.trial): p.key.seed for p in plan}
+    assert all(p.key.seed == seeds[p.key.case_id, p.key.trial] for p in plan)
+    assert len(set(seeds.values())) == 6
+
+
+def test_later_layers_override_earlier_ones(study):
+    found = study(
+        """
+        [study]
+        reference = "b"
+        cases = ["s4", "own"]
+        [base]
+        learning.discount = 0.1
+        learning.epsilon = 0.11
+        "acrobot.max_torque" = 5
+        [agents.sdnn-c]
+        learning.discount = 0.2
+        learning.learning_rate = 0.22
+        [agents.rbfn]
+        learning.discount = 0.25
+        [cases.own]
+        title = "my own"
+        sensors = { n_sensors = 5, noise = 0.1 }
+        learning = { discount = 0.3, n_greedy_steps = 3 }
+        [variants.a]
+        [variants.b]
+        title = "the b"
+        learning.discount = 0.4
+        [variants.b.cases.own]
+        learning.discount = 0.5
+        [variants.c]
+        agent = "rbfn"
+        """
+    )
+    values = {
+        pair: (c.learning.discount, c.learning.learning_rate, c.learning.n_greedy_steps)
+        for pair, c in configs(found).items()
+    }
+    assert values == {
+        ("s4", "b"): (0.4, 0.22, 10),
+        ("s4", "a"): (0.2, 0.22, 10),
+        ("s4", "c"): (0.25, 0.5, 10),
+        ("own", "b"): (0.5, 0.22, 3),
+        ("own", "a"): (0.3, 0.22, 3),
+        ("own", "c"): (0.3, 0.5, 3),
+    }
+    assert {c.learning.epsilon for c in configs(found).values()} == {0.11}
+    assert {c.acrobot.max_torque for c in configs(found).values()} == {5.0}
+    assert {p[0]: c.approximator.n_inputs for p, c in configs(found).items()} == {
+        "s4": 4, "own": 5,
+    }  # fmt: skip
+    assert [case.title for case in found.cases] == ["Case I: 4 inputs, no noise", "my own"]
+    assert [variant.title for variant in found.variants] == ["the b", "a", "c"]  # reference first
+
+
+def test_arrays_words_and_numbers_reach_the_configuration(study):
+    found = study(
+        PAPER
+        + """
+        [variants.x]
+        approximator.initial_threshold = 10
+        approximator.u_low = 7
+        goal.kind = "inverse_sqrt"
+        [variants.x.cases.s4]
+        approximator.circular = [true, true, false, false]
+        """
+    )
+    config = configs(found)["s4", "x"]
+    expected = TrialConfig(
+        approximator=replace(
+            TrialConfig().approximator,
+            circular=(True, True, False, False),
+            initial_threshold=10.0,
+            u_low=7,
+        ),
+        goal=replace(TrialConfig().goal, kind="inverse_sqrt"),
+    )
+    assert config == expected
+    assert config.config_hash == expected.config_hash
+    assert configs(found)["s6", "x"].approximator.circular == ()
+
+
+def test_axes_vary_one_key_at_a_time(study):
+    found = study(
+        PAPER
+        + """
+        [axes]
+        learning.tie_rule = ["uniform", "middle"]
+        approximator.circular = [[true, true, false, false, false, false]]
+        sensors.noise = [0.01]
+        goal.scale = [50]
+        """
+    )
+    assert [variant.id for variant in found.variants] == [
+        "base", "tie_rule=uniform", "tie_rule=middle",
+        "circular=[true, true, false, false, false, false]", "noise=0.01", "scale=50",
+    ]  # fmt: skip
+    of_s6 = {variant: c for (case, variant), c in configs(found).items() if case == "s6"}
+    assert of_s6["tie_rule=middle"].learning.tie_rule == "middle"
+    assert of_s6["noise=0.01"].sensors.noise == 0.01
+    assert of_s6["scale=50"] == replace(of_s6["base"], goal=replace(of_s6["base"].goal, scale=50.0))
+    assert found.same_as("tie_rule=uniform") == "base"
+    assert found.same_as("tie_rule=middle") is None
+    assert found.same_as("base") is None
+    assert len(found.plan()) == 2 * 3 * 5  # what is the same is run once
+
+
+def test_axes_combine_to_a_product(study):
+    found = study(
+        PAPER
+        + """
+        [axes]
+        combine = "product"
+        agent = ["sdnn-c", "fql"]
+        goal.scale = [50, 100]
+        acrobot.integration_step = [0.02]
+        [variants.paper]
+        """
+    )
+    assert [variant.id for variant in found.variants] == [
+        "paper",
+        "agent=sdnn-c, scale=50, integration_step=0.02",
+        "agent=sdnn-c, scale=100, integration_step=0.02",
+        "agent=fql, scale=50, integration_step=0.02",
+        "agent=fql, scale=100, integration_step=0.02",
+    ]
+    assert found.reference == "paper"
+    last = configs(found)["s4", "agent=fql, scale=100, integration_step=0.02"]
+    assert (last.agent, last.goal.scale) == ("fql", 100.0)
+
+
+def test_axes_of_the_same_last_word_have_whole_names(study):
+    text = PAPER + "[axes]\nlearning.epsilon = [0.2]\nsensors.noise = [0.1]\n"
+    text += "[variants.other]\nagent = 'fql'\n"
+    found = study(text.replace("sensors.noise", "goal.floor").replace("[0.1]", "[0.02]"))
+    assert [v.id for v in found.variants] == ["base", "other", "epsilon=0.2", "floor=0.02"]
+    text = "[base]\nenvironment.id = 'Pendulum-v1'\n[axes]\n"
+    text += "environment.noise = [0.1]\nenvironment.kwargs.g = [5.0]\n"
+    found = study(text)
+    assert [v.id for v in found.variants] == ["base", "noise=0.1", "g=5.0"]
+    assert configs(found)["Pendulum-v1", "g=5.0"].environment.kwargs == {"g": 5.0}
+
+
+def test_an_environment_is_a_case_of_its_own(study):
+    found = study(
+        """
+        [base]
+        environment = "Pendulum-v1"
+        protocol = { n_learning_episodes = 20, test_interval = 10 }
+        """
+    )
+    config = configs(found)["Pendulum-v1", "base"]
+    assert isinstance(config, EnvironmentTrialConfig)
+    assert config.approximator.n_inputs == 3
+    assert config.environment.id == "Pendulum-v1"
+
+
+def test_both_kinds_of_tasks_fit_into_one_study(study):
+    found = study(
+        """
+        [cases.s4]
+        [cases.cart]
+        environment.id = "CartPole-v1"
+        environment.observation_low = [-4.8, -4, -0.42, -4]
+        environment.observation_high = [4.8, 4, 0.42, 4]
+        """
+    )
+    assert isinstance(configs(found)["s4", "base"], TrialConfig)
+    cart = configs(found)["cart", "base"]
+    assert cart.environment.observation_low == (-4.8, -4.0, -0.42, -4.0)
+    assert cart.approximator.n_inputs == 4
+    found.check()
+
+
+def test_options_override_the_file(study):
+    found = study(PAPER, n_trials=1, seed=9)
+    assert (found.n_trials, found.seed) == (1, 9)
+    assert len(found.plan()) == 3
+
+
+def test_some_variants_only(study):
+    found = study(PAPER + "[axes]\nlearning.discount = [0.5, 0.7]\n")
+    assert {p.config.learning.discount for p in found.plan(["discount=0.5"])} == {0.5}
+    with pytest.raises(ValueError, match=r"no variant 'discount=0.6'; possible: discount=0.[57]"):
+        found.plan(["discount=0.6"])
+
+
+PLUGIN = """
+from dataclasses import dataclass
+from sdnn.agents import QLearningConfig, RBFQLearning
+from sdnn.approximators import RBFNetworkConfig
+from sdnn.reproduction import AGENTS, AgentEntry, register
+
+register(AgentEntry(id="plugged", title="Plugged", approximator=RBFNetworkConfig,
+                    learning=QLearningConfig, agent=RBFQLearning))
+"""
+
+
+def test_modules_beside_the_file_may_register_agents(study, tmp_path):
+    (tmp_path / "my_plugged_agents.py").write_text(PLUGIN)
+    try:
+        found = study(
+            """
+            [study]
+            imports = ["my_plugged_agents"]
+            cases = ["s4"]
+            [base]
+            agent = "plugged"
+            approximator.n_bases = 3
+            protocol = { n_learning_episodes = 2, test_interval = 2 }
+            """
+        )
+        config = configs(found)["s4", "base"]
+        assert (config.agent, config.approximator.n_bases) == ("plugged", 3)
+        found.check()
+    finally:
+        AGENTS.pop("plugged", None)
+        sys.modules.pop("my_plugged_agents", None)
+
+
+STRICT = """
+from dataclasses import dataclass
+
+from sdnn.agents import QLearningConfig, RBFQLearning
+from sdnn.reproduction import AgentEntry, register
+
+@dataclass(frozen=True, kw_only=True)
+class Strict:
+    n_inputs: int = 4
+    size: int = 3
+    def __post_init__(self):
+        if self.size < 1:
+            raise ERROR
+register(AgentEntry(id="strict", title="Strict", approximator=Strict,
+                    learning=QLearningConfig, agent=RBFQLearning))
+"""
+
+
+@pytest.mark.parametrize("error", ["ValueError('size is small')", "AssertionError", "TypeError"])
+def test_what_own_settings_refuse_is_told_with_its_place(study, tmp_path, error):
+    (tmp_path / "strict_agents.py").write_text(STRICT.replace("ERROR", error))
+    text = "[study]\nimports = ['strict_agents']\ncases = ['s4']\n[base]\nagent = 'strict'\n"
+    try:
+        with pytest.raises(StudyError, match=r"mine\.toml:6: base\.approximator\.size: \w+"):
+            study(text + "approximator.size = 0\n")
+    finally:
+        AGENTS.pop("strict", None)
+        sys.modules.pop("strict_agents", None)
+
+
+WRONG = {
+    "toml": ("[base]\nlearning.discount 2\n", 2, "must be TOML"),
+    "table": ("base = 2\n", 1, "base: must be a table, got 2"),
+    "top": ("[base]\n\n[axis]\n", 3, "axis: unknown key; possible: axes,"),
+    "study key": ("[study]\nseeds = 3\n", 2, "study.seeds: unknown key; possible: seed,"),
+    "study value": ("[study]\ntrials = 'x'\n", 2, "study.trials: must be a whole number, got 'x'"),
+    "trials": ("[study]\ntrials = 0\n", 2, "study.trials: must be at least 1, got 0"),
+    "seed": ("[study]\nseed = -1\n", 2, "study.seed: must be at least 0, got -1"),
+    "no cases": ("[base]\nagent = 'fql'\n", None, "no cases: give some of the paper's"),
+    "case": (
+        "[study]\ncases = [\n 's4',\n 's5-nois',\n]\n", 4,
+        "study.cases[1]: no case 's5-nois': neither a table [cases.s5-nois] nor a case of the"
+        " paper; possible: s5-noise,",
+    ),
+    "unlisted case": (
+        "[study]\ncases = ['s4']\n[cases.x]\n", 3,
+        "cases.x: is not among the cases that [study] lists",
+    ),
+    "paper's case": (
+        "[cases.s4-noise]\n[cases.s4]\nsensors.noise = 0.1\n", 3,
+        "cases.s4.sensors.noise: s4 is the paper's case of 4 sensors with noise 0:",
+    ),
+    "no table of sensors": ("[cases.s4]\nsensors = 3\n", 2, "cases.s4.sensors: must be a table of"),
+    "paper's case elsewhere": (
+        "[cases.s4]\nenvironment = 'Pendulum-v1'\n", 2,
+        "cases.s4.environment: s4 is the paper's case",
+    ),
+    "reference": (
+        "[study]\nreference = 'slo'\n[cases.s4]\n[variants.slow]\n[variants.b]\n", 2,
+        "study.reference: no variant 'slo'; possible: slow, b",
+    ),
+    "import": (
+        "[study]\nimports = ['json',\n'not_there_at_all']\n", 3,
+        "study.imports[1]: importing not_there_at_all failed: ModuleNotFoundError",
+    ),
+    "agent": (
+        "[cases.s4]\n[variants.a]\nagent = 'fqll'\n", 3,
+        "variants.a.agent: no agent 'fqll'; possible: fql, sdnn-c",
+    ),
+    "agents": ("[agents.dqn]\n[cases.s4]\n", 1, "agents.dqn: no such agent; possible: sdnn-c"),
+    "agent of agents": (
+        "[agents.fql]\nagent = 'rbfn'\n[cases.s4]\n", 2,
+        "agents.fql.agent: settings of an agent cannot choose another one",
+    ),
+    "section": (
+        "[cases.s4]\n[base]\n\nlerning.discount = 0.5\n", 4,
+        "base.lerning.discount: no such setting; possible: learning,",
+    ),
+    "setting": (
+        "[cases.s4]\n[base]\nlearning = { epsilon = 0.1, discont = 2 }\n", 3,
+        "base.learning.discont: QLearningConfig has no such setting; possible: discount,",
+    ),
+    "setting of another agent": (
+        "[cases.s4]\n[base]\nlearning.learning_rate = 0.1\n[variants.f]\nagent = 'fql'\n", 3,
+        "base.learning.learning_rate: FuzzyQLearningConfig has no such setting; possible:"
+        " learning_coefficient,",
+    ),
+    "no table": ("[cases.s4]\n[base]\nlearning = 3\n", 3, "base.learning: must be a table of"),
+    "float": (
+        "[cases.s4]\n[base.learning]\ndiscount = '0.5'\n", 3,
+        "base.learning.discount: must be a number, got '0.5'",
+    ),
+    "infinite": (
+        "[cases.s4]\n[base.acrobot]\ngravity = inf\n", 3,
+        "base.acrobot.gravity: must be a finite number, got inf",
+    ),
+    "int": (
+        "[cases.s4]\n[base.protocol]\ntest_interval = 10.0\n", 3,
+        "base.protocol.test_interval: must be a whole number, got 10.0",
+    ),
+    "bool": (
+        "[cases.s4]\n[base.approximator]\nbalanced_anchors = 1\n", 3,
+        "base.approximator.balanced_anchors: must be true or false, got 1",
+    ),
+    "word": (
+        "[cases.s4]\n[axes]\n'learning.tie_rule' = ['uniform',\n'upper']\n", 4,
+        "axes.\"learning.tie_rule\"[1]: must be one of 'uniform', 'lowest', 'middle', got 'upper'",
+    ),
+    "array": (
+        "[cases.s4]\n[base]\napproximator.circular = [true, 1]\n", 3,
+        "base.approximator.circular: number 2 of the array must be true or false, got 1",
+    ),
+    "optional": (
+        "[cases.s4]\n[base]\napproximator.u_low = 'x'\n", 3,
+        "base.approximator.u_low: must be a whole number, got 'x'",
+    ),
+    "derived": (
+        "[cases.s4]\n[base]\napproximator.n_inputs = 4\n", 3,
+        "base.approximator.n_inputs: follows from the observations (4): omit it",
+    ),
+    "too deep": (
+        "[cases.s4]\n[base]\nlearning.discount = 0.5\n'learning.discount.x' = 0.6\n", 4,
+        'base."learning.discount.x": must be SECTION.NAME, or environment.kwargs.NAME, got learn',
+    ),
+    "infinite argument": (
+        "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.kwargs.g = inf\n", 3,
+        "base.environment.kwargs.g: must be data that JSON has, numbers finite, got inf",
+    ),
+    "twice": (
+        "[cases.s4]\n[base]\nlearning.discount = 0.5\n'learning.discount' = 0.6\n", 4,
+        'base."learning.discount": learning.discount is set twice',
+    ),
+    "short trials": (
+        "[cases.s4]\n[base]\nprotocol.n_learning_episodes = 9\n", 3,
+        "base.protocol.n_learning_episodes: n_learning_episodes must be at least test_interval",
+    ),
+    "axis": ("[cases.s4]\n[axes]\ngoal.scale = 5\n", 3, "axes.goal.scale: must be an array"),
+    "axis twice": (
+        "[cases.s4]\n[axes]\ngoal.scale = [5, 5]\n", 3, "axes.goal.scale: must be different values"
+    ),
+    "combine": (
+        "[cases.s4]\n[axes]\ncombine = 'all'\n", 3,
+        "axes.combine: must be one of 'one_at_a_time', 'product', got 'all'",
+    ),
+    "name taken": (
+        "[cases.s4]\n[axes]\ngoal.scale = [5]\n[variants.'scale=5']\n", 3,
+        "axes.goal.scale[0]: there is a variant 'scale=5' already",
+    ),
+    "case of a variant": (
+        "[cases.s4]\n[variants.a.cases.s6]\n", 2,
+        "variants.a.cases.s6: unknown key; possible: s4",
+    ),
+    "environment and acrobot": (
+        "[base]\nenvironment = 'Pendulum-v1'\ngoal.scale = 3\n", 3,
+        "base.goal.scale: goal is the acrobot's: it does not go with an environment",
+    ),
+    "environment without id": (
+        "[cases.x]\nenvironment.noise = 0.1\n", 2,
+        "cases.x.environment.noise: an environment needs an id",
+    ),
+    "unknown environment": (
+        "[base]\nenvironment = 'Pendulm-v1'\n", 2, "base.environment: Environment `Pendulm`"
+    ),
+    "environment's argument": (
+        "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.kwargs = { gg = 3 }\n", 3,
+        "base.environment.kwargs.gg:",
+    ),
+    "unbounded": (
+        "[base]\nenvironment.id = 'CartPole-v1'\n", 2,
+        "base.environment.id: observation_low must be given where observations are unbounded",
+    ),
+    "ranges": (
+        "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.observation_low = [1]\n", 3,
+        "base.environment.observation_low: observation_low must have 3 numbers",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_errors_name_file_line_and_key(study, name, tmp_path):
+    text, line, message = WRONG[name]
+    with pytest.raises(StudyError) as caught:
+        study(text)
+    place = str(tmp_path / "mine.toml") + ("" if line is None else f":{line}")
+    assert str(caught.value).startswith(f"{place}: {message}")
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "message"),
+    [
+        (
+            "[cases.s4]\n[variants.ok]\n[variants.bad]\nlearning.discount = 2\n", 4,
+            "variants.bad.learning.discount: discount must be in [0, 1], got 2"
+            " (case s4, variant bad, agent sdnn-c)",
+        ),
+        (
+            "[cases.s4]\n[axes]\nacrobot.integration_step = [\n0.02,\n0.3]\n", 5,
+            "axes.acrobot.integration_step[1]: integration_step",
+        ),
+        ("[cases.x]\nsensors.n_sensors = 9\n", 2, "cases.x.sensors.n_sensors: n_sensors"),
+        (
+            "[base]\nenvironment = 'MountainCar-v0'\n[variants.f]\nagent = 'fql'\n", 3,
+            "variants.f: action_space must be a Box, got Discrete (case MountainCar-v0,",
+        ),
+        (
+            "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.noise = -1\n", 3,
+            "base.environment.noise: ",
+        ),
+    ],
+)  # fmt: skip
+def test_what_the_core_refuses_is_refused_before_anything_runs(
+    study, tmp_path, text, line, message
+):
+    with pytest.raises(StudyError) as caught:
+        study(text).check()
+    assert str(caught.value).startswith(f"{tmp_path / 'mine.toml'}:{line}: {message}")
+
+
+def test_what_is_stored_is_not_tried_again(study, monkeypatch):
+    found = study("[cases.s4]\n[variants.a]\nlearning.discount = 2\n", n_trials=2)
+    found.check(stored=found.keys("s4", "a"))
+    with pytest.raises(StudyError):
+        found.check(stored=found.keys("s4", "a")[:1])

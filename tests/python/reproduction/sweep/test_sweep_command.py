@@ -1,0 +1,254 @@
+"""``sdnn sweep``: files, resuming, sharing with ``reproduce``, forecasts and exit codes."""
+
+import csv
+import gzip
+import json
+import sys
+
+import pytest
+from click.testing import CliRunner
+
+from sdnn.cli import main
+from sdnn.reproduction import AGENTS
+
+STUDY = """
+[study]
+title = "Mine"
+trials = 2
+cases = ["s4", "s6"]
+[base]
+protocol.n_learning_episodes = 300
+[axes]
+learning.discount = [0.8, 0.9]
+"""
+FILES = ["figure.png", "figure.svg", "report.html", "results.csv.gz", "results.md", "table.json"]
+
+
+@pytest.fixture
+def invoke(monkeypatch, tmp_path, fake):
+    """Call the command in an empty folder, with fake trials unless told otherwise."""
+    monkeypatch.chdir(tmp_path)
+
+    def _invoke(*arguments, trial=fake.FakeTrial, study=STUDY):
+        for name, entry in fake.agents_with(trial).items():
+            monkeypatch.setitem(AGENTS, name, entry)
+        (tmp_path / "mine.toml").write_text(study)
+        return CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
+
+    return _invoke
+
+
+def test_a_run_writes_its_files_and_goes_on_where_it_was(invoke, tmp_path):
+    result = invoke("sweep", "mine.toml", "--out", "out")
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    names = sorted(p.name for p in (tmp_path / "out").iterdir())
+    assert names == sorted([*(f"mine-{name}" for name in [*FILES, "trials.csv"]), "results.sqlite"])
+    last = result.stdout.splitlines()[-1]
+    # The discount 0.9 is the base's.
+    assert last.startswith("8 of 8 trials are stored in out (8 run now); wrote 7 files: see")
+    assert "not judged" in result.stdout
+    again = invoke("sweep", "mine.toml", "--out", "out")
+    assert "8 of 8 trials are stored in out (0 run now)" in again.stdout
+    more = invoke("sweep", "mine.toml", "--out", "out", "--trials", 3)
+    assert "12 of 12 trials are stored in out (4 run now)" in more.stdout
+
+
+def test_rows_of_all_variants_are_written(invoke, tmp_path):
+    invoke("sweep", "mine.toml", "--out", "out")
+    with gzip.open(tmp_path / "out" / "mine-results.csv.gz", "rt") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * 3 * 2 * 30
+    assert {row["variant"] for row in rows} == {"base", "discount=0.8", "discount=0.9"}
+    with (tmp_path / "out" / "mine-trials.csv").open() as file:
+        trials = list(csv.DictReader(file))
+    assert [(t["case"], t["variant"], t["trial"]) for t in trials[:3]] == [
+        ("s4", "base", "0"), ("s4", "base", "1"), ("s4", "discount=0.8", "0"),
+    ]  # fmt: skip
+    assert len(trials) == 12
+    table = json.loads((tmp_path / "out" / "mine-table.json").read_text())
+    shares = table["results"][0]["measures"]["final_share_solved"]["trials"]
+    assert [float(t["final_share_solved"]) for t in trials[:2]] == shares
+
+
+def test_trials_are_shared_with_reproduce(invoke):
+    invoke("reproduce", "a", "--trials", 2, "--episodes", 300)
+    result = invoke("sweep", "mine.toml")
+    assert "8 of 8 trials are stored in results (4 run now)" in result.stdout
+    again = invoke("reproduce", "a", "--trials", 2, "--episodes", 300)
+    assert "(0 run now)" in again.stdout
+
+
+def test_json_is_the_file_and_does_not_depend_on_jobs(invoke, tmp_path):
+    one = invoke("sweep", "mine.toml", "--json", "--jobs", 1, "--out", "one", "--seed", 4)
+    two = invoke("sweep", "mine.toml", "--json", "--jobs", 2, "--out", "two", "--seed", 4)
+    table = json.loads(one.stdout)
+    assert json.loads(two.stdout)["digest"] == table["digest"]
+    assert table == json.loads((tmp_path / "one" / "mine-table.json").read_text())
+    assert table["seed"] == 4
+    assert table["reference"] == "base"
+    other = invoke("sweep", "mine.toml", "--json", "--out", "one")
+    assert json.loads(other.stdout)["digest"] != table["digest"]
+
+
+def test_the_page_holds_the_study_and_its_settings(invoke, tmp_path):
+    invoke("sweep", "mine.toml", study=STUDY.replace("Mine", "Mine & <others>"))
+    page = (tmp_path / "results" / "mine-report.html").read_text()
+    assert "<h1>Mine &amp; &lt;others&gt;</h1>" in page
+    assert "discount=0.9 is the same as base." in page
+    assert "learning.discount = [0.8, 0.9]" in page
+    assert "Settings and seeds" in page
+    assert page.count("<img") == 1
+
+
+def test_only_some_variants(invoke):
+    result = invoke("sweep", "mine.toml", "--only", "discount=0.8", "--only", "discount=0.8")
+    assert "4 of 4 trials are stored in results (4 run now)" in result.stdout
+    assert "Not complete: 4 of 6 combinations" in result.stdout
+    rest = invoke("sweep", "mine.toml", "--only", "base")
+    assert "(4 run now)" in rest.stdout
+    assert "Not complete" not in rest.stdout
+    wrong = invoke("sweep", "mine.toml", "--only", "discount=0.7")
+    assert wrong.exit_code == 2
+    assert "no variant 'discount=0.7'; possible: discount=0.9, discount=0.8, base" in wrong.stderr
+
+
+@pytest.mark.parametrize(
+    ("study", "words"),
+    [
+        (STUDY.replace("trials", "trails"), "mine.toml:4: study.trails: unknown key"),
+        (STUDY.replace("0.8", "1.8"), "mine.toml:9: axes.learning.discount[0]: discount must be"),
+    ],
+)
+def test_wrong_files_are_exit_code_2_and_leave_nothing(invoke, tmp_path, study, words):
+    from sdnn import _core
+
+    for options in ([], ["--dry-run"]):
+        result = invoke("sweep", "mine.toml", *options, study=study, trial=_core.AcrobotTrial)
+        assert result.exit_code == 2
+        assert words in result.stderr
+        assert [p.name for p in tmp_path.iterdir()] == ["mine.toml"]
+
+
+def test_a_file_that_is_not_there(invoke):
+    result = invoke("sweep", "nowhere.toml")
+    assert result.exit_code == 2
+    assert "nowhere.toml" in result.stderr
+
+
+def test_a_trial_that_raises_leaves_out_its_variant_only(invoke, fake, tmp_path):
+    class Raising(fake.FakeTrial):
+        def __init__(self, *, learning, sensors, **others):
+            super().__init__(**others)
+            self._fails = learning.discount == 0.8 and sensors.n_sensors == 6
+
+        def advance(self, n):
+            if self._fails:
+                raise OverflowError("a weight would leave its range")
+            super().advance(n)
+
+    result = invoke("sweep", "mine.toml", trial=Raising)
+    assert result.exit_code == 1
+    assert result.stderr.count("failed: OverflowError: a weight would leave its range") == 2
+    assert "6 of 8 trials are stored" in result.stdout
+    assert "Not complete: 1 of 6 combinations" in result.stdout
+    table = json.loads((tmp_path / "results" / "mine-table.json").read_text())
+    assert [(r["case"], r["variant"]) for r in table["results"]] == [
+        ("s4", "base"), ("s4", "discount=0.8"), ("s4", "discount=0.9"),
+        ("s6", "base"), ("s6", "discount=0.9"),
+    ]  # fmt: skip
+    only_s6 = STUDY.replace('"s4", ', "")
+    options = ("--only", "discount=0.8", "--out", "new")
+    result = invoke("sweep", "mine.toml", *options, trial=Raising, study=only_s6)
+    assert result.exit_code == 1
+    assert "nothing is complete" in result.stderr
+
+
+def test_dry_run_counts_and_estimates_without_making_a_file(invoke, tmp_path):
+    result = invoke("sweep", "mine.toml", "--dry-run")
+    assert result.exit_code == 0
+    assert [p.name for p in tmp_path.iterdir()] == ["mine.toml"]
+    lines = result.stdout.splitlines()
+    assert len(lines) == 7
+    assert lines[0].startswith(
+        "s4 base: 2 trials x 300 episodes of sdnn-c, 0 of them stored in results; a trial takes"
+    )
+    assert "(by a probe)" in lines[0]
+    assert lines[-1].startswith("in all 8 trials, 0 of them stored; the rest takes about")
+    invoke("sweep", "mine.toml", "--trials", 1)
+    lines = invoke("sweep", "mine.toml", "--dry-run").stdout.splitlines()
+    assert "1 of them stored in results" in lines[0]
+    assert "(by 1 stored trial of this configuration)" in lines[0]
+    found = json.loads(invoke("sweep", "mine.toml", "--dry-run", "--json", "--jobs", 3).stdout)
+    assert (found["planned"], found["stored"], found["jobs"]) == (8, 4, 3)
+    assert len(found["trials"]) == 6
+    invoke("sweep", "mine.toml")
+    done = json.loads(invoke("sweep", "mine.toml", "--dry-run", "--json").stdout)
+    assert done["seconds"] == {"lower": 0.0, "upper": 0.0}
+    assert {t["seconds_of_a_trial"] for t in done["trials"]} == {None}
+
+
+def test_a_trial_that_raises_is_told_by_a_dry_run(invoke, fake):
+    class Raising(fake.FakeTrial):
+        def advance(self, n):
+            raise OverflowError("a weight would leave its range")
+
+    result = invoke("sweep", "mine.toml", "--dry-run", trial=Raising)
+    message = "Error: SDNN-C s4, trial 1 fails: OverflowError: a weight would leave its range\n"
+    assert (result.exit_code, result.stdout, result.stderr) == (1, "", message)
+
+
+def test_an_own_environment_from_a_module_beside_the_file(invoke, tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    (tmp_path / "my_line_world.py").write_text(
+        """
+import gymnasium as gym
+import numpy as np
+
+
+class Line(gym.Env):
+    n_open = n_made = 0
+    observation_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
+    action_space = gym.spaces.Discrete(2)
+
+    def __init__(self):
+        Line.n_open += 1
+        Line.n_made += 1
+
+    def close(self):
+        Line.n_open -= 1
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self._state = self.np_random.uniform(-0.5, 0.5, 2)
+        return self._state, {}
+
+    def step(self, action):
+        self._state = self._state + [0.2 * action - 0.1, 0.0]
+        position = self._state[0]
+        return self._state, float(position > 0.9), bool(abs(position) > 0.9), False, {}
+
+
+gym.register("mine/Line-v0", entry_point=Line, max_episode_steps=30)
+"""
+    )
+    study = """
+        [study]
+        trials = 2
+        [base]
+        environment = "my_line_world:mine/Line-v0"
+        protocol = { n_learning_episodes = 40, test_interval = 4 }
+        [variants.exact]
+        [variants.noisy]
+        environment.noise = 0.05
+        """
+    result = invoke("sweep", "mine.toml", "--json", study=study)
+    assert result.exit_code == 0
+    results = json.loads(result.stdout)["results"]
+    assert [(r["case"], r["variant"]) for r in results] == [
+        ("my_line_world:mine/Line-v0", "exact"), ("my_line_world:mine/Line-v0", "noisy"),
+    ]  # fmt: skip
+    line = sys.modules["my_line_world"].Line
+    # Two variants: each is looked at and tried once, and then its two trials are run.
+    assert (line.n_made, line.n_open) == (2 * (1 + 2 + 2 * 2), 0)
+    assert results[0]["measures"]["mean_return"]["median"]["value"] > 0.2

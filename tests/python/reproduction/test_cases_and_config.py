@@ -1,0 +1,207 @@
+import json
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from sdnn.agents import PRESETS, FuzzyQLearningConfig
+from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig
+from sdnn.environments import SensorConfig
+from sdnn.reproduction import (
+    AGENTS,
+    EXPERIMENTS,
+    ProtocolConfig,
+    TrialConfig,
+    case_config,
+    plan_trials,
+    select_experiments,
+    trial_seed,
+)
+from sdnn.runs.preset_agents import PRESET_AGENTS
+
+
+def test_experiment_a_is_the_one_of_the_paper():
+    (experiment,) = select_experiments("a")
+    assert [(c.id, c.n_sensors, c.noise) for c in experiment.cases] == [
+        ("s4", 4, 0.0),
+        ("s6", 6, 0.0),
+    ]
+    assert all(case.agents == ("sdnn-c",) for case in experiment.cases)
+
+
+def test_experiment_b_is_the_one_of_the_paper():
+    (experiment,) = select_experiments("b")
+    assert [(c.id, c.n_sensors, c.noise, c.paper_figure) for c in experiment.cases] == [
+        ("s4", 4, 0.0, "Fig. 5"),
+        ("s4-noise", 4, 0.02, "Fig. 6a"),
+        ("s5-noise", 5, 0.02, "Fig. 6b"),
+        ("s6-noise", 6, 0.02, "Fig. 6c"),
+    ]
+    assert all(case.agents == ("sdnn-c", "fql") for case in experiment.cases)
+    assert [e.id for e in select_experiments("all")] == ["a", "b"]
+    assert select_experiments("cost") == ()
+
+
+def test_all_of_the_paper_is_ninety_trials():
+    cases = [case for experiment in EXPERIMENTS for case in experiment.cases]
+    plan = plan_trials(cases, 10, 0)
+    # 20 of Experiment A and 80 of Experiment B, which share the 10 of SDNN-C in Case I.
+    assert len(plan) == 20 + 80 - 10
+
+
+def test_agents_of_a_case_meet_the_same_seeds():
+    (experiment,) = select_experiments("b")
+    seeds = {}
+    for planned in plan_trials(experiment.cases, 3, 0):
+        seeds.setdefault((planned.key.case_id, planned.key.trial), set()).add(planned.key.seed)
+    assert {len(found) for found in seeds.values()} == {1}
+
+
+def test_rows_that_share_an_id_observe_the_same():
+    seen = {}
+    for experiment in EXPERIMENTS:
+        for case in experiment.cases:
+            assert seen.setdefault(case.id, (case.n_sensors, case.noise)) == (
+                case.n_sensors,
+                case.noise,
+            )
+            assert set(case.agents) <= set(AGENTS)
+
+
+def test_unknown_experiment_is_named():
+    with pytest.raises(ValueError, match="got 'z'"):
+        select_experiments("z")
+
+
+def test_every_preset_has_an_agent_of_its_settings():
+    assert PRESET_AGENTS.keys() == PRESETS.keys()
+    for name, agent in PRESET_AGENTS.items():
+        entry = AGENTS[agent]
+        settings = PRESETS[name]
+        assert entry.learning_settings() == settings.learning
+        assert entry.approximator_settings(6) == replace(settings.approximator, n_inputs=6)
+
+
+def test_presets_run_beside_the_agents_of_a_case():
+    experiment = EXPERIMENTS[0]
+    both = experiment.with_presets(["robust", "paper", "robust"])
+    assert [case.agents for case in both.cases] == 2 * [("sdnn-c", "sdnn-c-robust")]
+    assert experiment.with_presets([]) == experiment
+
+
+def test_protocol_defaults_are_the_papers_and_the_cores():
+    from sdnn import _core
+
+    core = _core.ProtocolConfig()
+    assert asdict(ProtocolConfig()) == {
+        "n_learning_episodes": 15000,
+        "test_interval": 10,
+        "limit_bootstraps": True,
+        "noisy_tests": True,
+    }
+    assert core.n_learning_episodes == 15000
+    assert core.test_interval == 10
+    assert ProtocolConfig(n_learning_episodes=20).to_core().n_learning_episodes == 20
+
+
+def test_canonical_json_is_sorted_and_does_not_depend_on_how_numbers_are_typed():
+    config = TrialConfig()
+    text = config.canonical_json()
+    assert text == json.dumps(json.loads(text), sort_keys=True, separators=(",", ":"))
+    noise_typed = [0, 0.0, -0.0, np.float64(0.0)]
+    hashes = {
+        replace(config, sensors=replace(config.sensors, noise=n)).config_hash for n in noise_typed
+    }
+    assert hashes == {config.config_hash}
+
+
+def test_a_setting_added_later_counts_where_it_is_not_the_default():
+    config = TrialConfig()
+    assert config.config_hash == "75969d030c881084"  # as it was before there were such settings
+    for part, name, value in [
+        ("approximator", "rounding", "random"),
+        ("learning", "tie_tolerance", 0.5),
+        ("sensors", "n_random", 1),
+        ("protocol", "noisy_tests", False),
+    ]:
+        assert f'"{name}"' not in config.canonical_json()
+        other = replace(config, **{part: replace(getattr(config, part), **{name: value})})
+        assert f'"{name}"' in other.canonical_json()
+        assert other.config_hash != config.config_hash
+
+
+def test_changed_code_of_an_agent_is_another_version(monkeypatch):
+    config = TrialConfig()
+    monkeypatch.setitem(AGENTS, "sdnn-c", replace(AGENTS["sdnn-c"], version="2"))
+    assert '"agent_version":"2"' in config.canonical_json()
+    assert config.config_hash != "75969d030c881084"
+
+
+def test_config_hash_sees_every_room():
+    base = TrialConfig()
+    others = [
+        TrialConfig(agent="rbfn", approximator=RBFNetworkConfig(), learning=base.learning),
+        replace(base, approximator=replace(base.approximator, n_inputs=5)),
+        replace(base, learning=replace(base.learning, discount=0.8)),
+        replace(base, acrobot=replace(base.acrobot, gravity=9.81)),
+        replace(base, goal=replace(base.goal, scale=50.0)),
+        replace(base, sensors=replace(base.sensors, noise=0.02)),
+        replace(base, protocol=replace(base.protocol, test_interval=5)),
+    ]
+    assert len({config.config_hash for config in [base, *others]}) == 1 + len(others)
+    assert len(base.config_hash) == 16
+
+
+def test_case_config_fits_network_to_sensors():
+    (experiment,) = select_experiments("a")
+    config = case_config(experiment.cases[1], "sdnn-c")
+    assert config.approximator.n_inputs == config.sensors.n_sensors == 6
+    assert config.protocol == ProtocolConfig()
+    with pytest.raises(ValueError, match="'fql'"):
+        case_config(experiment.cases[1], "fql")
+
+
+def test_case_config_gives_every_agent_its_own_settings():
+    (experiment,) = select_experiments("b")
+    config = case_config(experiment.cases[2], "fql")
+    assert config.approximator == FuzzyRulesConfig(n_inputs=5)
+    assert config.learning == FuzzyQLearningConfig()
+    assert config.sensors == SensorConfig(n_sensors=5, noise=0.02)
+
+
+def test_settings_of_another_agent_are_refused():
+    with pytest.raises(ValueError, match="got 'dqn'"):
+        TrialConfig(agent="dqn")
+    with pytest.raises(TypeError, match="approximator of fql must be a FuzzyRulesConfig"):
+        TrialConfig(agent="fql")
+    with pytest.raises(TypeError, match="learning of fql must be a FuzzyQLearningConfig"):
+        TrialConfig(agent="fql", approximator=FuzzyRulesConfig())
+
+
+def test_an_experiment_with_other_agents_differs_in_nothing_else():
+    (experiment,) = select_experiments("b")
+    other = experiment.with_agents(["rbfn", "sdnn-c", "rbfn"])
+    assert {case.agents for case in other.cases} == {("rbfn", "sdnn-c")}
+    assert [replace(case, agents=("sdnn-c", "fql")) for case in other.cases] == list(
+        experiment.cases
+    )
+    assert ("s4", "rbfn") in other.pairs
+    assert experiment.with_agents([]) is experiment
+
+
+def test_trial_seed_follows_its_definition():
+    # zlib.crc32(b"s4") == 0x647FCC7F
+    sequence = np.random.SeedSequence(7, spawn_key=(0x647FCC7F, 3))
+    assert trial_seed(7, "s4", 3) == int(sequence.generate_state(1, np.uint64)[0]) >> 1
+    seeds = {trial_seed(r, c, t) for r in (0, 1) for c in ("s4", "s6") for t in range(10)}
+    assert len(seeds) == 40
+    assert max(seeds) < 2**63
+
+
+def test_plan_lists_shared_trials_once_and_pairs_agents():
+    (experiment,) = select_experiments("a")
+    once = plan_trials(experiment.cases, 3, 0)
+    assert plan_trials([*experiment.cases, *experiment.cases], 3, 0) == once
+    assert [(p.key.trial, p.key.case_id) for p in once] == [
+        (t, c) for t in range(3) for c in ("s4", "s6")
+    ]

@@ -1,0 +1,270 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdnn.reproduction import CaseResult, Estimate, TrialKey, TrialRecord, TrialRows, summarize
+from sdnn.reproduction.cases import EXPERIMENTS
+from sdnn.reproduction.claims import (
+    CLAIMS,
+    Check,
+    Claim,
+    Difference,
+    Growth,
+    Median,
+    Subject,
+    describe,
+)
+from sdnn.reproduction.cost import QUICK_COST, CostConfig
+from sdnn.reproduction.page import Call, to_html
+from sdnn.reproduction.power import MULTIPLES, Power, drawn_medians, powers
+from sdnn.reproduction.report import (
+    POWER_HEADER,
+    POWER_NOTE,
+    ExperimentReport,
+    Report,
+    to_json,
+)
+from sdnn.reproduction.verdicts import (
+    CheckOutcome,
+    ClaimOutcome,
+    Verdict,
+    judge_claims,
+    verdict_of,
+)
+from sdnn.runs.records import CostKey, CostRecord, StepTimes
+from sdnn.runs.registry import cost_series
+from sdnn.runs.statistics import estimate_contrast, estimate_median
+
+CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
+
+
+def result(case_id, agent, steps, n_trials=10, n_tests=1500):
+    """Trials that take the given steps in every test episode; one value, or one per trial."""
+    per_trial = np.broadcast_to(steps, (n_trials,))
+    records = tuple(
+        TrialRecord(
+            key=TrialKey(case_id, agent, trial, trial, "hash"),
+            config="{}",
+            version="0",
+            n_decisions=1,
+            seconds=1.0,
+            finished_at="",
+            rows=TrialRows(
+                episode=10 * np.arange(1, n_tests + 1, dtype=np.int32),
+                steps=np.full(n_tests, taken, np.int32),
+                episode_return=np.zeros(n_tests),
+                solved=np.full(n_tests, taken < 50),
+            ),
+        )
+        for trial, taken in enumerate(per_trial)
+    )
+    return summarize(CaseResult(CASES[case_id], agent, records))
+
+
+def cost(series, n_inputs, microseconds, config=None):
+    times = StepTimes(microseconds=np.array(microseconds, float), n_steps=1, table_bytes=1)
+    key = CostKey(series, n_inputs, (config or CostConfig()).config_hash)
+    return CostRecord(key=key, version="0", machine="m", finished_at="", times=times)
+
+
+def verdicts(summaries, costs=()):
+    return {o.claim.number: o.verdict for o in judge_claims(summaries, costs)}
+
+
+@pytest.mark.parametrize(
+    ("interval", "verdict"),
+    [
+        ((100, 80, 150), Verdict.HOLDS),
+        ((140, 120, 160), Verdict.UNDECIDED),
+        ((300, 160, math.inf), Verdict.FAILS),
+        ((math.inf, math.inf, math.inf), Verdict.FAILS),
+        ((10, math.nan, math.nan), Verdict.UNDECIDED),
+    ],
+)
+def test_a_check_is_judged_by_the_whole_interval(interval, verdict):
+    check = Check(Median("episodes_to_learn", Subject("s4")), "about 150", at_most=150)
+    assert verdict_of(check, Estimate(*interval)) == verdict
+
+
+def test_a_range_has_two_ends():
+    check = Check(Median("final_steps", Subject("s4")), "", at_least=3, at_most=5)
+    assert verdict_of(check, Estimate(4, 3, 5)) == Verdict.HOLDS
+    assert verdict_of(check, Estimate(2, 1, 2.5)) == Verdict.FAILS
+    assert verdict_of(check, Estimate(7, 6, 8)) == Verdict.FAILS
+    assert verdict_of(check, Estimate(4, 2, 8)) == Verdict.UNDECIDED
+
+
+@pytest.mark.parametrize(
+    ("parts", "whole"),
+    [
+        (("holds", "holds"), "holds"),
+        (("holds", "does not hold", "undecided"), "does not hold"),
+        (("holds", "undecided"), "undecided"),
+        (("holds", "not run", "undecided"), "not run"),
+        (("not judged", "not judged"), "not judged"),
+    ],
+)
+def test_a_claim_is_as_good_as_its_checks(parts, whole):
+    check = CLAIMS[0].checks[0]
+    outcomes = tuple(CheckOutcome(check, None, Verdict(part)) for part in parts)
+    assert ClaimOutcome(Claim(1, "", ()), outcomes).verdict == Verdict(whole)
+
+
+def test_the_claims_are_the_nine_of_the_paper_and_know_their_subjects():
+    assert [claim.number for claim in CLAIMS] == list(range(1, 10))
+    planned = {(case.id, agent) for e in EXPERIMENTS for case in e.cases for agent in case.agents}
+    series = {series.id for _, series in cost_series()}
+    for check in (check for claim in CLAIMS for check in claim.checks):
+        quantity = check.quantity
+        if isinstance(quantity, Growth):
+            assert quantity.series in series
+            continue
+        for name in ("subject", "other"):
+            subject = getattr(quantity, name, None)
+            assert subject is None or (subject.case_id, subject.agent) in planned
+        assert describe(quantity)
+        assert check.at_least > -math.inf or check.at_most < math.inf
+
+
+def test_good_data_support_claims_and_bad_data_do_not():
+    good = verdicts([result("s4", "sdnn-c", 4), result("s6", "sdnn-c", 4)])
+    assert good[1] == good[2] == Verdict.HOLDS
+    assert good[8] == Verdict.NOT_RUN  # the noisy cases are missing
+    assert 3 not in good
+    bad = verdicts([result("s4", "sdnn-c", 50), result("s6", "sdnn-c", 4)])
+    assert bad[1] == bad[2] == Verdict.FAILS
+
+
+def test_fuzzy_q_learning_is_judged_by_the_end():
+    cases = ("s4-noise", "s5-noise", "s6-noise")
+    assert verdicts([result(case, "fql", 50) for case in cases])[4] == Verdict.HOLDS
+    assert verdicts([result(case, "fql", 7) for case in cases])[4] == Verdict.FAILS
+
+
+def test_differences_count_censored_values_as_the_last_episode():
+    late, early = result("s5-noise", "sdnn-c", 4), result("s4-noise", "sdnn-c", 50)
+    (outcome,) = (o for o in judge_claims([late, early], ()) if o.claim.number == 6)
+    assert outcome.checks[0].estimate == Estimate(15000.0, 15000.0, 15000.0)
+    assert outcome.verdict == Verdict.HOLDS
+    same = judge_claims([late, result("s4-noise", "sdnn-c", 4)], ())
+    assert next(o for o in same if o.claim.number == 6).verdict == Verdict.FAILS
+
+
+def test_trials_that_disagree_leave_a_claim_undecided():
+    split = [4] * 5 + [50] * 5
+    found = verdicts([result("s4", "sdnn-c", split), result("s6", "sdnn-c", 4)])
+    assert found[2] == Verdict.UNDECIDED
+
+
+def test_reports_tell_what_more_trials_would_say():
+    split = [4] * 7 + [50] * 3
+    summaries = (result("s4", "sdnn-c", split), result("s6", "sdnn-c", 4))
+    report = Report(
+        experiments=(ExperimentReport(EXPERIMENTS[0], summaries),), costs=(), quick=False, seed=0,
+        version="0", digest="d" * 64,
+    )  # fmt: skip
+    *_, (title, header, rows) = report.tables()
+    assert (title, header) == ("What is undecided", POWER_HEADER)
+    assert POWER_NOTE in report.notes()
+    row = next(row for row in rows if row[:2] == ("2", "final steps: SDNN-C, 4 inputs"))
+    assert row[-1] == "100 / 0 %"
+    told = to_json(report)["powers"]
+    assert [one["claim"] for one in told] == [int(row[0]) for row in rows]
+    one = next(one for one in told if one["measured"] == row[1])
+    assert one["with"][-1] == {"n_trials": 320, "holds": 1.0, "fails": 0.0}
+    picture = b"<svg xmlns='http://www.w3.org/2000/svg'/>"
+    call = Call(machine="", seconds=1, n_run=0, n_planned=0, processor_seconds=0)
+    assert "What is undecided" in to_html(report, {"experiment-a": picture}, call)
+    decided = replace(report, experiments=(ExperimentReport(EXPERIMENTS[0], summaries[1:]),))
+    assert decided.tables()[-1][0] == "Beside the paper's claims"
+    assert "What is undecided" not in to_html(decided, {"experiment-a": picture}, call)
+
+
+@pytest.mark.parametrize("size", [{"n_trials": 9}, {"n_tests": 1499}])
+def test_less_than_the_papers_scale_is_not_judged(size):
+    found = verdicts([result("s4", "sdnn-c", 4, **size), result("s6", "sdnn-c", 4)])
+    assert found[1] == found[2] == Verdict.NOT_JUDGED
+
+
+def outcome_of(values, others=None, **limits):
+    samples = tuple(np.array(v, float) for v in (values, others) if v is not None)
+    estimate = estimate_median(values) if others is None else estimate_contrast(values, others)
+    check = Check(Median("final_steps", Subject("s4")), "", **limits)
+    return CheckOutcome(check, estimate, verdict_of(check, estimate), samples)
+
+
+def test_power_is_of_what_is_undecided_only():
+    undecided = outcome_of([3, 4, 5, 9], at_most=5)
+    assert undecided.verdict == Verdict.UNDECIDED
+    assert [one.n_trials for one in powers(undecided)] == [4 * n for n in MULTIPLES]
+    assert powers(undecided) == powers(undecided)
+    assert powers(outcome_of([3, 4, 4, 4], at_most=5)) == ()
+    growth = CheckOutcome(undecided.check, undecided.estimate, Verdict.UNDECIDED)
+    assert powers(growth) == ()
+
+
+def test_power_says_what_more_trials_would_decide():
+    mostly_good = powers(outcome_of([4] * 7 + [math.inf] * 3, at_most=5))
+    assert [one.fails for one in mostly_good] == [0.0] * len(MULTIPLES)
+    assert mostly_good[0].holds < 0.9
+    assert mostly_good[-1].holds == 1.0
+    mostly_bad = powers(outcome_of([4] * 4 + [50] * 8, at_most=5))
+    assert mostly_bad[-1] == Power(12 * MULTIPLES[-1], 0.0, 1.0)
+    for one in powers(outcome_of([4] * 5 + [50] * 5, at_most=5)):  # a coin, however often thrown
+        assert one.holds + one.fails < 0.2
+    apart = powers(outcome_of([9, 10, 11, 30], [5, 8, 9, 10], at_least=1))
+    assert apart[-1].holds > 0.95
+    assert apart[-1].fails == 0.0
+
+
+@pytest.mark.parametrize("multiple", [1, 3, 4])
+def test_power_draws_medians_as_resampling_does(multiple):
+    """Order statistics of uniform numbers against resamples: the same means and spreads."""
+    sample = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
+    drawn = drawn_medians(sample, multiple, np.random.default_rng(1))
+    generator = np.random.default_rng(2)
+    n = multiple * sample.size
+    others = np.empty_like(drawn)
+    for row in others:
+        trials = generator.choice(sample, n)
+        row[:] = np.median(generator.choice(trials, (row.size, n)), axis=1)
+    error = others.mean(axis=1).std() * math.sqrt(2 / len(others))
+    assert drawn.mean() == pytest.approx(others.mean(), abs=4 * error)
+    for quantile in (0.1, 0.5, 0.9):
+        mine, theirs = (np.quantile(d, quantile, axis=1) for d in (drawn, others))
+        error = max(theirs.std(), 0.05) * math.sqrt(2 / len(others))
+        assert mine.mean() == pytest.approx(theirs.mean(), abs=4 * error)
+
+
+def test_growth_is_a_ratio_of_medians():
+    costs = [
+        cost("sdnn-c", 4, [10, 10, 10]), cost("sdnn-c", 8, [50, 50, 50]),
+        cost("rbfn", 4, [1, 1, 1]), cost("rbfn", 8, [200, 220, 210]),
+    ]  # fmt: skip
+    (outcome,) = judge_claims([], costs)
+    assert outcome.claim.number == 9
+    growths = [checked.estimate for checked in outcome.checks]
+    assert growths[0] == Estimate(5.0, 5.0, 5.0)
+    assert (growths[1].value, growths[1].lower, growths[1].upper) == (210.0, 200.0, 220.0)
+    assert growths[2] is None
+    assert [c.verdict for c in outcome.checks] == [Verdict.HOLDS, Verdict.HOLDS, Verdict.NOT_RUN]
+    assert outcome.verdict == Verdict.NOT_RUN
+    quick = [cost("sdnn-c", n, [10.0 * n] * 3, QUICK_COST) for n in (4, 8)]
+    assert judge_claims([], quick)[0].checks[0].verdict == Verdict.NOT_JUDGED
+    polynomial = [*costs[:2], cost("rbfn", 4, [1, 1]), cost("rbfn", 8, [4, 4])]
+    assert judge_claims([], polynomial)[0].verdict == Verdict.FAILS
+
+
+def test_descriptions_name_both_sides():
+    quantity = Difference("final_steps", Subject("s6-noise"), Subject("s4"))
+    assert describe(quantity) == "final steps: SDNN-C, 6 noisy inputs less 4 inputs"
+    assert describe(Median("early_steps", Subject("s4", "fql"))) == "early steps: FQL, 4 inputs"
+
+
+def test_summaries_do_not_mix_measures():
+    summary = result("s4", "sdnn-c", [3] * 5 + [50] * 5)
+    np.testing.assert_array_equal(summary.uncensored("episode_of_collapse"), [15000] * 5 + [0] * 5)
+    assert summary.medians["final_share_solved"].value == 0.5
+    assert replace(summary, values=summary.values).is_paper_scale

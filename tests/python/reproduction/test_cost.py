@@ -1,0 +1,196 @@
+import json
+import math
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from sdnn import _core, machine
+from sdnn.reproduction import AGENTS, CostConfig, Observer, ResultStore, StoreError, draw_cost
+from sdnn.reproduction.cost import QUICK_COST, cost_keys, measure_costs, measure_steps
+from sdnn.reproduction.report import cost_header, cost_rows
+from sdnn.runs.records import StepTimes, records_digest
+from sdnn.runs.registry import cost_series
+
+SERIES = [series for _, series in cost_series()]
+SMALL = CostConfig(n_inputs=(3, 2), n_rounds=3, round_seconds=0.001, min_steps=1)
+
+
+class FakeMeasure:
+    """Times that grow fourfold with each input; notes what it is asked."""
+
+    def __init__(self, ends_after=math.inf):
+        self.asked = []
+        self._last = ends_after
+
+    def __call__(self, entry, series, n_inputs, config):
+        self.asked.append((series.id, n_inputs))
+        if n_inputs > self._last:
+            return None
+        times = 4.0**n_inputs * np.arange(1, config.n_rounds + 1)
+        return StepTimes(microseconds=times, n_steps=5, table_bytes=9**n_inputs)
+
+
+@pytest.fixture
+def measured(monkeypatch):
+    """Measure all costs with another clock; returns what is stored."""
+
+    def _measured(folder, measure, config=SMALL):
+        monkeypatch.setattr("sdnn.reproduction.cost.measure_steps", measure)
+        with ResultStore(folder) as store:
+            keys = cost_keys(config)
+            measure_costs(keys, config, store, Observer())
+            return store.load_costs(config.config_hash)
+
+    return _measured
+
+
+def test_keys_are_all_series_in_ascending_inputs():
+    keys = cost_keys(SMALL)
+    assert [(key.series, key.n_inputs) for key in keys] == [
+        (series.id, n) for series in SERIES for n in (2, 3)
+    ]
+    assert {key.config_hash for key in keys} == {SMALL.config_hash}
+    quick = cost_keys(QUICK_COST)
+    assert max(key.n_inputs for key in quick if key.series == "rbfn-plain") == 5
+    assert len(quick) == 3 * 7 + 4
+    assert replace(SMALL, n_rounds=4).config_hash != SMALL.config_hash
+    assert CostConfig().n_inputs == tuple(range(2, 9))
+    assert asdict(QUICK_COST)["n_inputs"] == asdict(CostConfig())["n_inputs"]
+
+
+def test_what_is_stored_is_not_measured_again(tmp_path, measured):
+    class KilledError(Exception):
+        pass
+
+    class Dies(FakeMeasure):
+        def __call__(self, *arguments):
+            if len(self.asked) == 3:
+                raise KilledError
+            return super().__call__(*arguments)
+
+    with pytest.raises(KilledError):
+        measured(tmp_path, Dies())
+    second = FakeMeasure()
+    costs = measured(tmp_path, second)
+    assert second.asked == [(s.id, n) for s in SERIES for n in (2, 3)][3:]
+    assert len(costs) == 8
+    third = FakeMeasure()
+    again = measured(tmp_path, third)
+    assert third.asked == []
+    assert [cost.key for cost in again] == [cost.key for cost in costs]
+    np.testing.assert_array_equal(costs[0].microseconds, [16.0, 32.0, 48.0])
+    assert (costs[0].times.n_steps, costs[0].times.table_bytes) == (5, 81)
+    assert {cost.machine for cost in costs} == {machine.description()}
+    assert {cost.version for cost in costs} == {_core.__version__}
+
+
+def test_settings_of_costs_live_side_by_side(tmp_path, measured):
+    measured(tmp_path, FakeMeasure())
+    other = replace(SMALL, n_rounds=5)
+    assert [c.microseconds.size for c in measured(tmp_path, FakeMeasure(), other)] == [5] * 8
+    with ResultStore(tmp_path) as store:
+        assert len(store.load_costs(SMALL.config_hash)) == 8
+        assert store.load() == ()
+        assert records_digest(store.load()) == records_digest(())
+
+
+def test_times_of_another_machine_or_version_are_measured_anew(tmp_path, measured, monkeypatch):
+    measured(tmp_path, FakeMeasure())
+    for place, name in ((machine, "description"), (_core, "__version__")):
+        with monkeypatch.context() as patched:
+            patched.setattr(place, name, (lambda: "another") if place is machine else "9.9.9")
+            anew = FakeMeasure()
+            assert len(measured(tmp_path, anew)) == len(anew.asked) == 8
+
+
+def test_damaged_costs_are_named(tmp_path, measured):
+    measured(tmp_path, FakeMeasure())
+    with ResultStore(tmp_path) as store:
+        store._connection.execute("UPDATE costs SET microseconds = 'x'")
+        store._connection.commit()
+        with pytest.raises(StoreError, match=r"results\.sqlite is damaged"):
+            store.load_costs(SMALL.config_hash)
+
+
+def test_table_gives_times_and_growth(tmp_path, measured):
+    rows = cost_rows(measured(tmp_path, FakeMeasure(ends_after=2)))
+    assert [row[0] for row in rows] == ["2"]
+    rows = cost_rows(measured(tmp_path / "all", FakeMeasure()))
+    assert cost_header()[1:] == (*(s.title for s in SERIES), "FQL's table")
+    assert rows[0][1] == "32 us [24 us, 40 us]"
+    assert rows[1][1] == "128 us [96 us, 160 us], 4.0x"
+    assert rows[1][-1] == "729 B"
+
+
+def test_figure_holds_the_stored_rows(tmp_path, measured):
+    costs = measured(tmp_path, FakeMeasure())
+    (axes,) = draw_cost(costs).axes
+    assert axes.get_yscale() == "log"
+    lines = [line for line in axes.get_lines() if len(line.get_xdata()) == 2]
+    np.testing.assert_allclose(lines[0].get_ydata(), [32.0, 128.0])
+    assert "quick" in json.dumps([t.get_text() for t in draw_cost(costs, quick=True).axes[0].texts])
+
+
+@pytest.mark.parametrize(
+    ("entry", "series"), cost_series(), ids=[series.id for _, series in cost_series()]
+)
+def test_real_agents_are_measured(entry, series):
+    times = measure_steps(entry, series, 2, SMALL)
+    assert times.microseconds.shape == (3,)
+    assert (times.microseconds > 0).all()
+    assert times.n_steps >= 1
+    sizes = {"sdnn-c": 2 * 200 * 900, "fql": 9**2 * 21 * 4, "rbfn": 4**3 * 8}
+    assert times.table_bytes == sizes[entry.id]
+
+
+def test_what_there_is_no_memory_for_is_left_out():
+    def refuse(*_arguments, **_options):
+        raise MemoryError
+
+    entry = replace(AGENTS["fql"], agent=refuse)
+    assert measure_steps(entry, entry.costs[0], 2, SMALL) is None
+
+
+def test_costs_of_some_agents():
+    assert {key.series for key in cost_keys(SMALL, ["rbfn"])} == {"rbfn", "rbfn-plain"}
+    with pytest.raises(ValueError, match="got 'tiles'"):
+        cost_keys(SMALL, ["tiles"])
+
+
+def make_agents(n_inputs, seed):
+    """One agent of every bound kind, by name."""
+    learning = _core.QLearningConfig()
+    rbf = _core.RBFNetworkConfig(n_inputs=n_inputs, n_actions=21)
+    rules = _core.FuzzyRulesConfig(n_inputs=n_inputs)
+    fuzzy = _core.FuzzyQLearningConfig()
+    network = _core.SDNNCConfig(n_inputs=n_inputs)
+    return {
+        "sdnn": _core.SDNNQLearning(approximator=network, learning=learning, seed=seed),
+        "fuzzy": _core.FuzzyQLearning(approximator=rules, learning=fuzzy, seed=seed),
+        "rbf": _core.RBFQLearning(approximator=rbf, learning=learning, seed=seed),
+        "plain rbf": _core.PlainRBFQLearning(approximator=rbf, learning=learning, seed=seed),
+    }
+
+
+@pytest.mark.parametrize("kind", ["sdnn", "fuzzy", "rbf", "plain rbf"])
+def test_steps_of_every_agent_are_timed(kind):
+    agent = make_agents(3, 1)[kind]
+    times = _core.time_agent_steps(agent, 12, seed=1)
+    assert times.dtype == np.int64
+    assert times.shape == (12,)
+    assert (times > 0).all()
+    assert _core.time_agent_steps(agent, 0, seed=1).size == 0
+    with pytest.raises(ValueError, match="n_repetitions"):
+        _core.time_agent_steps(agent, -1, seed=1)
+
+
+def test_the_seed_decides_what_the_timed_agent_learns():
+    def weights(kind, seed):
+        agent = make_agents(2, 5)[kind]
+        _core.time_agent_steps(agent, 40, seed)
+        return agent.action_value.weights()
+
+    np.testing.assert_array_equal(weights("rbf", 1), weights("rbf", 1))
+    assert (weights("rbf", 1) != weights("rbf", 2)).any()
+    np.testing.assert_allclose(weights("plain rbf", 1), weights("rbf", 1), rtol=0, atol=1e-10)

@@ -1,0 +1,288 @@
+import base64
+import itertools
+import json
+import math
+import re
+from dataclasses import replace
+from html import escape
+
+import numpy as np
+import pytest
+
+import sdnn.reproduction.reproduce as reproduce_module
+from sdnn.palette import COLORS, colors_of
+from sdnn.reproduction import (
+    AGENTS,
+    CaseResult,
+    PlotUnavailableError,
+    ProtocolConfig,
+    ResultStore,
+    collect,
+    draw_experiment,
+    plan_trials,
+    select_experiments,
+    summarize,
+)
+from sdnn.reproduction.figures import SMOOTHED_TESTS, agent_colors, figure_bytes
+from sdnn.reproduction.page import Call, to_html, to_markdown
+from sdnn.reproduction.report import ExperimentReport, Report, format_estimate, to_json
+from sdnn.reproduction.reproduce import ReproduceRequest, reproduce
+from sdnn.runs.records import ROW_HEADER, records_digest, trial_rows
+from sdnn.runs.statistics import Estimate, running_median
+
+(EXPERIMENT,) = select_experiments("a")
+
+
+@pytest.fixture
+def results(tmp_path, fake, run):
+    """Three fake trials of 3000 episodes, beside trials of another seed in the same store."""
+    run(tmp_path, fake.make_plan(2, 3000, root_seed=9))
+    plan = fake.make_plan(3, 3000)
+    run(tmp_path, plan)
+    with ResultStore(tmp_path) as store:
+        return collect(EXPERIMENT, store.load(p.key for p in plan))
+
+
+def all_text(figure):
+    texts = [text.get_text() for text in figure.texts]
+    for axes in figure.axes:
+        texts += [text.get_text() for text in axes.texts] + [axes.get_title("left")]
+    return "\n".join(texts)
+
+
+def curves_of(axes):
+    """The lines of a panel as (x, y), the thick one before the thin one."""
+    lines = sorted(axes.get_lines(), key=lambda line: -line.get_linewidth())
+    return [(line.get_xdata(), line.get_ydata()) for line in lines]
+
+
+def test_panels_hold_the_stored_rows(results):
+    figure = draw_experiment(EXPERIMENT, results)
+    for axes, result in zip(figure.axes[:2], results, strict=True):
+        (_, smooth), (x, thin) = curves_of(axes)
+        np.testing.assert_array_equal(x, 10 * np.arange(1, 301))
+        np.testing.assert_array_equal(thin, np.median(result.steps, axis=0))
+        np.testing.assert_array_equal(smooth, running_median(thin, SMOOTHED_TESTS))
+        (band,) = axes.collections
+        (path,) = band.get_paths()
+        drawn = {(float(x), float(y)) for x, y in path.vertices}
+        lower, upper = (
+            running_median(q, SMOOTHED_TESTS) for q in np.percentile(result.steps, (25, 75), axis=0)
+        )
+        for i in (0, 5, 120, 299):
+            assert {(10.0 * (i + 1), lower[i]), (10.0 * (i + 1), upper[i])} <= drawn
+        assert axes.get_ylim() == (0, 50)
+        assert axes.get_xlim() == (0, 3000)
+
+
+def test_short_runs_are_drawn_as_they_are(tmp_path, fake, run):
+    plan = fake.make_plan(2, 300)
+    run(tmp_path, plan)
+    with ResultStore(tmp_path) as store:
+        results = collect(EXPERIMENT, store.load(p.key for p in plan))
+    for axes, result in zip(draw_experiment(EXPERIMENT, results).axes, results, strict=True):
+        ((_, line),) = curves_of(axes)
+        np.testing.assert_array_equal(line, np.median(result.steps, axis=0))
+
+
+def test_start_has_panels_of_its_own_in_long_runs(results):
+    figure = draw_experiment(EXPERIMENT, results)
+    assert len(figure.axes) == 4
+    for axes, start in zip(figure.axes[:2], figure.axes[2:], strict=True):
+        assert start.get_xlim() == (0, 500)
+        np.testing.assert_array_equal(curves_of(start)[0][1], curves_of(axes)[-1][1])
+    without = replace(EXPERIMENT, start_panels=False)
+    assert len(draw_experiment(without, results).axes) == 2
+
+
+def test_only_the_planned_trials_are_drawn(results):
+    assert [result.n_trials for result in results] == [3, 3]
+
+
+def test_figure_says_what_it_is(results):
+    text = all_text(draw_experiment(EXPERIMENT, results))
+    assert "3 trials x 3,000 episodes instead of 10 x 15,000" in text
+    assert "quick" not in text.lower()
+    for result in results:
+        assert result.config_hash[:8] in text
+    quick = all_text(draw_experiment(EXPERIMENT, results, quick=True))
+    assert "QUICK LOOK, not the result" in quick
+    assert quick.count("quick") == 2  # a watermark in each panel
+
+
+def test_figures_are_repeatable_to_the_byte(results):
+    png, svg = figure_bytes(draw_experiment(EXPERIMENT, results))
+    assert png.startswith(b"\x89PNG")
+    assert svg.rstrip().endswith(b"</svg>")
+    assert (png, svg) == figure_bytes(draw_experiment(EXPERIMENT, results))
+
+
+@pytest.mark.parametrize("module", ["figures", "page"])
+def test_missing_extra_is_told_before_any_trial(monkeypatch, tmp_path, module):
+    monkeypatch.setattr(f"sdnn.reproduction.{module}.find_spec", lambda name: None)
+    request = ReproduceRequest(experiments=(EXPERIMENT,), out=tmp_path / "out", quick=True)
+    with pytest.raises(PlotUnavailableError, match=re.escape('pip install "sdnn[reproduce]"')):
+        reproduce(request)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_run_plans_once_and_reads_its_trials_once(monkeypatch, tmp_path, fake, use_trial):
+    use_trial(fake.FakeTrial)
+    calls = []
+
+    def counted(name, function):
+        def call(*arguments, **options):
+            calls.append(name)
+            return function(*arguments, **options)
+
+        return call
+
+    monkeypatch.setattr(reproduce_module, "plan_trials", counted("plan", plan_trials))
+    monkeypatch.setattr(ResultStore, "_load_one", counted("trial", ResultStore._load_one))
+    request = ReproduceRequest(experiments=select_experiments("all"), out=tmp_path, quick=True)
+    done = reproduce(request)
+    # SDNN-C in Case I belongs to both figures.
+    assert [len(one.summaries) for one in done.report.experiments] == [2, 8]
+    assert calls == ["plan"] + ["trial"] * 18
+    with ResultStore(tmp_path) as store:
+        assert done.report.digest == records_digest(store.load())
+
+
+def test_a_colour_stands_for_an_agent_in_every_figure(tmp_path, fake, run):
+    def colors(*agents):
+        other = EXPERIMENT.with_agents(agents)
+        plan = plan_trials(other.cases, 1, 0, ProtocolConfig(n_learning_episodes=100))
+        run(tmp_path, plan)
+        with ResultStore(tmp_path) as store:
+            results = collect(other, store.load(p.key for p in plan))
+        figure = draw_experiment(other, results)
+        (legend,) = figure.legends
+        lines = {line.get_color() for line in figure.axes[0].get_lines()}
+        return [text.get_text() for text in legend.get_texts()], lines
+
+    titles, one = colors("rbfn")
+    assert titles == ["RBFN"]
+    titles, two = colors("rbfn", "sdnn-c")
+    assert titles == ["RBFN", "SDNN-C"]
+    assert one < two
+    assert len(two) == 2
+
+
+def test_any_two_agents_of_a_figure_have_colors_of_their_own():
+    for pair in itertools.combinations(AGENTS, 2):
+        assert len(set(agent_colors(pair).values())) == 2
+    places = range(len(COLORS))
+    assert colors_of([*places, 0]) == [*COLORS, COLORS[0]]
+    assert colors_of([3, 3 + len(COLORS), 4]) == [COLORS[3], COLORS[4], COLORS[5]]
+
+
+def test_mixed_settings_are_refused(results):
+    (first, *others) = results[0].records
+    odd = replace(first, key=first.key._replace(config_hash="other"))
+    with pytest.raises(ValueError, match="share one configuration, got 2"):
+        CaseResult(results[0].case, "sdnn-c", (odd, *others))
+    with pytest.raises(ValueError, match="got 0"):
+        CaseResult(results[0].case, "sdnn-c", ())
+
+
+def test_summary_of_hand_made_trials(results):
+    summary = summarize(results[0])
+    steps = results[0].steps
+    first_good = [10.0 * (1 + int(np.argmax(row < 50))) for row in steps]
+    assert summary.values["episodes_to_learn"].tolist() == first_good
+    assert summary.medians["episodes_to_learn"].value == np.median(first_good)
+    assert summary.medians["final_share_solved"] == Estimate(1.0, 1.0, 1.0)
+    assert summary.medians["episode_of_collapse"] == Estimate(math.inf, math.inf, math.inf)
+    assert summary.uncensored("episode_of_collapse").tolist() == [3000.0] * 3
+    assert summary.median_curve_episodes_to_learn == np.median(first_good)
+    assert results[0].n_decisions == 3 * 7 * 3000
+    assert results[0].microseconds_per_decision == pytest.approx(
+        1e6 * sum(r.seconds for r in results[0].records) / 63000
+    )
+
+
+def test_estimates_as_text():
+    assert format_estimate(Estimate(4.0, 3.5, 5.0), "final_steps", 100) == "4 [3.5, 5]"
+    assert format_estimate(Estimate(0.98, 0.9, 1.0), "final_share_solved", 100) == (
+        "98 % [90, 100]"
+    )
+    assert format_estimate(Estimate(math.inf, 90, math.inf), "episodes_to_learn", 15000) == (
+        ">15000 [90, >15000]"
+    )
+    assert format_estimate(Estimate(4.0, math.nan, math.nan), "final_steps", 100) == "4"
+
+
+@pytest.fixture
+def report(results):
+    summaries = tuple(summarize(result) for result in results)
+    return Report(
+        experiments=(ExperimentReport(EXPERIMENT, summaries),),
+        costs=(),
+        quick=False,
+        seed=0,
+        version="0.0.test",
+        digest="d" * 64,
+    )
+
+
+def test_tables_hold_cases_and_claims(report):
+    (title, header, rows), (_, claim_header, claims) = report.tables()
+    assert title == EXPERIMENT.title
+    assert [row[0] for row in rows] == [case.title for case in EXPERIMENT.cases]
+    assert {len(row) for row in rows} == {len(header)}
+    assert {len(row) for row in claims} == {len(claim_header)}
+    assert [row[0] for row in claims if row[0]] == ["1", "2", "8"]
+    assert {row[-1] for row in claims} == {"not judged", "not run"}
+
+
+def test_json_is_valid_and_marks_what_is_censored(report):
+    (one,) = report.experiments
+    never = replace(
+        one.summaries[0],
+        values=one.summaries[0].values | {"episodes_to_learn": np.array([math.inf])},
+    )
+    table = to_json(replace(report, experiments=(replace(one, summaries=(never,)),)))
+    text = json.dumps(table, allow_nan=False)
+    (case,) = json.loads(text)["experiments"][0]["cases"]
+    assert case["measures"]["episodes_to_learn"]["trials"] == [">3000"]
+    assert json.loads(text)["claims"][0]["checks"][0]["at_most"] == 150
+    assert json.loads(text)["claims"][0]["checks"][0]["at_least"] is None
+
+
+def test_markdown_holds_the_tables(report):
+    markdown = to_markdown(replace(report, quick=True))
+    assert "not their result" in markdown
+    lines = [line for line in markdown.splitlines() if line.startswith("|")]
+    assert len(lines) == sum(2 + len(rows) for _, _, rows in report.tables())
+    assert "digest of the rows dddddddddddddddd" in markdown
+
+
+def test_row_files_hold_every_test_episode_once(report, results):
+    records = [record for result in results for record in result.records]
+    rows = [dict(zip(ROW_HEADER, row, strict=True)) for row in trial_rows(records)]
+    assert len(rows) == 2 * 3 * 300
+    assert len({(row["case"], row["trial"], row["episode"]) for row in rows}) == len(rows)
+    first = records[0].rows
+    assert rows[0]["steps"] == first.steps[0]
+    assert rows[0]["episode_return"] == first.episode_return[0]
+    assert rows[0]["solved"] in (0, 1)
+
+
+def test_page_is_one_file_with_everything(report):
+    picture = b"<svg xmlns='http://www.w3.org/2000/svg'/>"
+    call = Call(machine="a <machine>", seconds=61, n_run=6, n_planned=6, processor_seconds=7)
+    html = to_html(report, {"experiment-a": picture}, call)
+    assert html.startswith("<!doctype html>")
+    assert "data:image/svg+xml;base64," + base64.b64encode(picture).decode() in html
+    assert not re.search(r'(src|href)="(?!data:)', html)
+    assert "a &lt;machine&gt;" in html
+    assert "Everything asked for was run in 1 min 1 s" in html
+    assert "Smaller than the paper" in html
+    for _, header, rows in report.tables():
+        for cell in (*header, *(cell for row in rows for cell in row)):
+            assert escape(cell, quote=False).replace("&gt;", "&gt;") in html
+    for summary in report.experiments[0].summaries:
+        assert summary.result.config_hash in html
+        assert all(str(record.key.seed) in html for record in summary.result.records)
+    later = to_html(report, {"experiment-a": picture}, replace(call, n_run=2))
+    assert "4 of 6 trials were stored before" in later

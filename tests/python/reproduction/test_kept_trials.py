@@ -1,0 +1,257 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import sdnn.reproduction.kept_trials as kept_trials_module
+from sdnn.reproduction import (
+    EXPERIMENTS,
+    CaseResult,
+    Estimate,
+    ProtocolConfig,
+    ReproduceRequest,
+    ResultStore,
+    collect,
+    plan_trials,
+    run_trials,
+    select_experiments,
+    summarize,
+)
+from sdnn.reproduction.cases import PAPER_EPISODES
+from sdnn.reproduction.chances import TenTrials
+from sdnn.reproduction.claims import CLAIMS, Check, Claim, Difference, Growth, Median, Subject
+from sdnn.reproduction.kept_trials import (
+    HEADER,
+    KeptTrials,
+    kept_csv,
+    kept_trials,
+)
+from sdnn.reproduction.page import Call, to_html
+from sdnn.reproduction.report import MORE_HEADER, ExperimentReport, Report, to_json
+from sdnn.reproduction.reproduce import reproduce
+from sdnn.reproduction.results import TrialMeasures
+from sdnn.reproduction.verdicts import (
+    CheckOutcome,
+    ClaimOutcome,
+    SettledClaim,
+    Verdict,
+    judge_claims,
+    settle,
+)
+from sdnn.runs.measures import STEP_MEASURES
+
+CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
+
+
+def measured(case_id, values, agent="sdnn-c", **more):
+    """Trials that have these final steps, and learned at once for ever."""
+    n = len(values)
+    own = {
+        "episodes_to_learn": np.full(n, 10.0),
+        "early_steps": np.full(n, 4.0),
+        "episode_of_collapse": np.full(n, math.inf),
+        "final_steps": np.array(values, float),
+        "final_share_solved": np.ones(n),
+    }
+    own |= {name: np.array(found, float) for name, found in more.items()}
+    return TrialMeasures(case_id, agent, PAPER_EPISODES, own)
+
+
+def final_steps(case, **limits):
+    return Check(Median("final_steps", Subject(case)), "", **limits)
+
+
+@pytest.mark.parametrize("n_good", [3, 5, 8])
+def test_a_chance_is_that_of_six_good_trials_among_ten(n_good):
+    """The median of ten is below a limit if six of them are: a binomial tail."""
+    p = n_good / 10
+    tail = sum(math.comb(10, k) * p**k * (1 - p) ** (10 - k) for k in range(6, 11))
+    values = n_good * [4] + (10 - n_good) * [50]
+    claim = Claim(1, "", (final_steps("s4", at_most=6),))
+    found = TenTrials([measured("s4", values)]).chance(claim)
+    assert found.value == pytest.approx(tail, abs=4 * math.sqrt(tail * (1 - tail) / 10_000))
+    assert found.lower < found.value < found.upper
+    assert found == TenTrials([measured("s4", values)]).chance(claim)
+
+
+def test_checks_of_a_claim_share_their_draws():
+    draws = TenTrials([measured("s4", 5 * [4] + 5 * [50])])
+    once, twice, never = (
+        draws.chance(Claim(1, "", checks))
+        for checks in (
+            (final_steps("s4", at_most=6),),
+            (final_steps("s4", at_most=6), final_steps("s4", at_most=7)),
+            (final_steps("s4", at_most=6), final_steps("s4", at_least=40)),
+        )
+    )
+    assert once == twice
+    both = [Claim(n, "", (final_steps("s4", **limits),)) for n, limits in enumerate(
+        ({"at_most": 6}, {"at_least": 40}))]  # fmt: skip
+    assert draws.chance(*both) == never
+    assert never == Estimate(0.0, 0.0, 0.0)
+
+
+def test_chances_of_differences_count_censored_values_as_the_last_episode():
+    later = Claim(6, "", (next(c for c in CLAIMS if c.number == 6).checks))
+    late, early = measured("s5-noise", [4] * 3), measured("s4-noise", [4] * 3)
+    assert TenTrials([late, early]).chance(later).value == 0.0  # both end with the trials
+    early = measured("s4-noise", [4] * 3, episode_of_collapse=[5000, 6000, 7000])
+    assert TenTrials([late, early]).chance(later).value == 1.0
+
+
+def test_chances_need_trials_of_every_subject():
+    difference = Difference("final_steps", Subject("s6-noise"), Subject("s4"))
+    claim = Claim(7, "", (Check(difference, "", at_most=2),))
+    assert TenTrials([measured("s4", [4, 4])]).chance(claim) is None
+    growth = Claim(9, "", (Check(Growth("rbfn", 8, 4), "", at_least=16),))
+    assert TenTrials([measured("s4", [4, 4])]).chance(growth) is None
+
+
+@pytest.mark.parametrize(
+    ("own", "more", "share", "settled"),
+    [
+        ("holds", None, None, "holds"),
+        ("undecided", None, None, "undecided"),
+        ("undecided", "holds", 0.5, "holds"),
+        ("holds", "does not hold", 0.5, "does not hold"),  # more trials overrule fewer
+        ("undecided", "undecided", 0.95, "holds"),
+        ("undecided", "undecided", 0.94, "a matter of chance"),
+        ("undecided", "undecided", 0.06, "a matter of chance"),
+        ("undecided", "undecided", 0.05, "does not hold"),
+        ("not judged", "holds", 1.0, "not judged"),
+        ("not run", "holds", 1.0, "not run"),
+    ],
+)
+def test_what_settles_a_claim(own, more, share, settled):
+    def outcome(word):
+        checked = CheckOutcome(CLAIMS[0].checks[0], None, Verdict(word))
+        return ClaimOutcome(CLAIMS[0], (checked,))
+
+    claim = SettledClaim(
+        outcome(own),
+        None if more is None else outcome(more),
+        None if share is None else Estimate(share, share, share),
+    )
+    assert claim.verdict == Verdict(settled)
+
+
+def test_claims_are_settled_by_trials_of_all_their_subjects():
+    split = [4] * 5 + [50] * 5
+    ran = [measured("s4", split), measured("s6", [4] * 10)]
+    outcomes = judge_claims(ran, ())
+    assert next(o for o in outcomes if o.claim.number == 2).verdict == Verdict.UNDECIDED
+    kept = [measured("s4", [4] * 15 + [50] * 5), measured("s6", [4] * 20)]
+    settled = {one.claim.number: one for one in settle(outcomes, kept)}
+    assert settled[2].more.checks[0].estimate.value == 4
+    assert settled[2].verdict == Verdict.HOLDS
+    assert settled[8].more is None  # the noisy cases are missing
+    assert [one.more for one in settle(outcomes, kept[:1])] == [None] * len(outcomes)
+
+
+def test_the_kept_trials_are_of_the_papers_settings():
+    kept = kept_trials()
+    plan = plan_trials(CASES.values(), 1, kept[0].root_seed, ProtocolConfig())
+    planned = {(*p.key[:2], p.key.config_hash) for p in plan}
+    assert {(one.case_id, one.agent, one.config_hash) for one in kept} == planned
+    for one in kept:
+        assert one.n_trials >= 100
+        assert len(set(one.rows_digests)) == one.n_trials
+        assert one.is_paper_scale
+        assert one.root_seed != 0  # what `sdnn reproduce` runs as it comes is not among them
+
+
+@pytest.mark.parametrize("agent", ["sdnn-c", "fql"])
+def test_a_kept_trial_is_what_running_it_gives(tmp_path, agent):
+    kept = next(one for one in kept_trials() if (one.case_id, one.agent) == ("s4", agent))
+    plan = plan_trials([CASES["s4"]], 1, kept.root_seed, ProtocolConfig())
+    own = [planned for planned in plan if planned.key.agent == agent]
+    with ResultStore(tmp_path) as store:
+        run_trials(own, store)
+        (record,) = store.load()
+    assert record.rows.digest()[:16] == kept.rows_digests[0]
+    summary = summarize(CaseResult(CASES["s4"], agent, (record,)))
+    for name in STEP_MEASURES:
+        assert summary.values[name][0] == kept.values[name][0]
+
+
+@pytest.fixture
+def fake_summaries(tmp_path, fake, run):
+    """Twelve fake trials of all episodes in each case of Experiment A."""
+    plan = plan_trials(EXPERIMENTS[0].cases, 12, 0, ProtocolConfig())
+    run(tmp_path, plan)
+    with ResultStore(tmp_path) as store:
+        results = collect(EXPERIMENTS[0], store.load(p.key for p in plan))
+    return [summarize(result) for result in results]
+
+
+def test_what_is_written_of_trials_is_read_again(monkeypatch, tmp_path, fake_summaries):
+    content = kept_csv(fake_summaries, 7)
+    (tmp_path / "kept.csv").write_bytes(content)
+    assert tuple(content.decode().splitlines()[0].split(",")) == HEADER
+    monkeypatch.setattr(kept_trials_module, "files", lambda package: tmp_path)
+    monkeypatch.setattr(kept_trials_module, "FILE_NAME", "kept.csv")
+    read = kept_trials_module.kept_trials.__wrapped__()
+    assert [(one.case_id, one.root_seed, one.n_trials) for one in read] == [
+        ("s4", 7, 12), ("s6", 7, 12)
+    ]  # fmt: skip
+    for one, summary in zip(read, fake_summaries, strict=True):
+        assert one.config_hash == summary.result.config_hash
+        for name in STEP_MEASURES:
+            np.testing.assert_array_equal(one.values[name], summary.values[name])
+
+
+def test_short_trials_are_not_kept(fake_summaries):
+    short = replace(fake_summaries[0], last_episode=300)
+    with pytest.raises(ValueError, match=r"15000 learning episodes.* sdnn-c in s4 have 300"):
+        kept_csv([short], 7)
+
+
+def report_of(summaries, kept=()):
+    return Report(
+        experiments=(ExperimentReport(EXPERIMENTS[0], tuple(summaries)),), costs=(), quick=False,
+        seed=0, version="0", digest="d" * 64, kept=tuple(kept),
+    )  # fmt: skip
+
+
+def test_reports_tell_what_kept_trials_say(fake_summaries):
+    picture = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}
+    call = Call(machine="", seconds=1, n_run=0, n_planned=0, processor_seconds=0)
+    alone = report_of(fake_summaries)
+    assert "With more trials" not in [title for title, _, _ in alone.tables()]
+    assert "With more trials" not in to_html(alone, picture, call)
+    assert to_json(alone)["claims"][0]["with_more_trials"] is None
+
+    half = measured("s4", 10 * [4] + 10 * [50])
+    kept = [
+        KeptTrials(**vars(one), config_hash="", root_seed=7, rows_digests=())
+        for one in (half, measured("s6", 20 * [4]))
+    ]
+    report = report_of(fake_summaries, kept)
+    header, rows = next(table[1:] for table in report.tables() if table[0] == "With more trials")
+    assert header == MORE_HEADER
+    ends = next(row for row in rows if row[0] == "2")
+    assert ends[5] == "a matter of chance"
+    assert ends[6].startswith("3")  # 0.377: six good trials among ten
+    checks = rows[rows.index(ends) + 1 : rows.index(ends) + 3]
+    assert [row[3:6] for row in checks] == [
+        ("20", "27 [4, 50]", "undecided"), ("20", "4 [4, 4]", "holds")
+    ]  # fmt: skip
+    told = next(one for one in to_json(report)["claims"] if one["number"] == 2)
+    assert (told["verdict"], told["settled"]) == ("holds", "a matter of chance")
+    page = to_html(report, picture, call)
+    assert "root seed 7" in page
+    assert "<b>1</b>are a matter of chance with ten trials" in page
+
+
+def test_only_more_trials_of_the_same_settings_are_shown(monkeypatch, tmp_path, fake, use_trial):
+    use_trial(fake.FakeTrial)
+    (experiment,) = select_experiments("a")
+
+    def kept_of(**request):
+        done = reproduce(ReproduceRequest(experiments=(experiment,), out=tmp_path, **request))
+        return {(one.case_id, one.n_trials) for one in done.report.kept}
+
+    assert kept_of(n_trials=2) == {("s4", 100), ("s6", 100)}
+    assert kept_of(n_trials=2, n_episodes=100) == set()
+    assert kept_of(n_trials=101) == set()

@@ -1,0 +1,82 @@
+"""A trial without network and acrobot; run as a script, it fills a store until it is killed."""
+
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from sdnn.reproduction import (
+    AGENTS,
+    EXPERIMENTS,
+    Observer,
+    ProtocolConfig,
+    ResultStore,
+    plan_trials,
+    run_trials,
+)
+
+CASES = EXPERIMENTS[0].cases
+
+
+class FakeTrial:
+    """Steps fall from 50 to about 5; every number is fixed by the seed, not by the chunks."""
+
+    def __init__(self, *, protocol, seed, **_others):
+        self._protocol = protocol
+        n_tests = protocol.n_learning_episodes // protocol.test_interval
+        generator = np.random.default_rng(seed)
+        learned = generator.integers(2, 8)
+        self._steps = np.where(
+            np.arange(n_tests) < learned, 50, generator.integers(3, 8, n_tests)
+        ).astype(np.int32)
+        self._returns = generator.normal(size=n_tests)
+        self.episode = 0
+
+    @property
+    def finished(self):
+        return self.episode == self._protocol.n_learning_episodes
+
+    @property
+    def n_decisions(self):
+        return 7 * self.episode
+
+    def advance(self, n):
+        self.episode = min(self.episode + n, self._protocol.n_learning_episodes)
+
+    def test_rows(self):
+        n_tests = self.episode // self._protocol.test_interval
+        steps = self._steps[:n_tests]
+        return {
+            "episode": np.arange(1, n_tests + 1, dtype=np.int32) * self._protocol.test_interval,
+            "steps": steps,
+            "episode_return": self._returns[:n_tests],
+            "solved": steps < 50,
+        }
+
+
+class SlowTrial(FakeTrial):
+    def advance(self, n):
+        time.sleep(0.001)
+        super().advance(1)
+
+
+class _Speaker(Observer):
+    def finished(self, planned):
+        print("stored", flush=True)
+
+
+def make_plan(n_trials=3, n_episodes=300, root_seed=0):
+    return plan_trials(CASES, n_trials, root_seed, ProtocolConfig(n_learning_episodes=n_episodes))
+
+
+def agents_with(core_trial):
+    """All agents as they are, but for their trials."""
+    return {name: replace(entry, core_trial=core_trial) for name, entry in AGENTS.items()}
+
+
+if __name__ == "__main__":
+    AGENTS.update(agents_with(SlowTrial))
+    with ResultStore(Path(sys.argv[1])) as store:
+        run_trials(make_plan(6, 100), store, jobs=2, observer=_Speaker())

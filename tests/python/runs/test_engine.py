@@ -1,0 +1,232 @@
+import io
+import os
+import signal
+import time
+
+import pytest
+from rich.console import Console
+
+from sdnn.reproduction import Observer, ResultStore, StoreError, WorkerLostError
+from sdnn.runs.executor import Advanced, Failed, Finished, Lost, Noted, Started
+from sdnn.runs.progress import ProgressObserver
+from sdnn.runs.thread_executor import ThreadExecutor
+
+
+class Recorder(Observer):
+    def __init__(self):
+        self.events = []
+
+    def begun(self, n_planned, n_reused, n_episodes):
+        self.events.append(("begun", n_planned, n_reused, n_episodes))
+
+    def started(self, planned):
+        self.events.append(("started", planned.key))
+
+    def advanced(self, planned, episode):
+        self.events.append(("advanced", planned.key, episode))
+
+    def finished(self, planned):
+        self.events.append(("finished", planned.key))
+
+    def lost(self, planned):
+        self.events.append(("lost", planned.key))
+
+    def failed(self, planned, error):
+        self.events.append(("failed", planned.key))
+
+    def noted(self, text):
+        self.events.append(("noted", text))
+
+
+def test_jobs_do_not_change_the_content(tmp_path, run):
+    digests = {run(tmp_path / str(jobs), jobs=jobs)[1] for jobs in (1, 2, 5)}
+    assert len(digests) == 1
+
+
+def test_stored_trials_are_not_run_again(tmp_path, fake, run):
+    made = []
+
+    def make(*, seed, **parts):
+        made.append(seed)
+        return fake.FakeTrial(seed=seed, **parts)
+
+    run(tmp_path, fake.make_plan(2), make)
+    assert len(made) == 4
+    outcome, digest = run(tmp_path, fake.make_plan(3), make)
+    assert (outcome.n_planned, outcome.n_reused, outcome.n_run) == (6, 4, 2)
+    assert len(made) == 6
+    assert run(tmp_path, fake.make_plan(3), make) == (
+        type(outcome)(n_planned=6, n_reused=6, n_run=0, failures=(), interrupted=False),
+        digest,
+    )
+    assert len(made) == 6
+
+
+@pytest.mark.parametrize("change", [{"root_seed": 1}, {"n_episodes": 310}])
+def test_other_settings_are_other_trials(tmp_path, fake, run, change):
+    run(tmp_path, fake.make_plan())
+    outcome, _ = run(tmp_path, fake.make_plan(**change))
+    assert outcome.n_run == 6
+
+
+def test_observer_hears_every_trial_from_the_calling_thread(tmp_path, fake, run):
+    recorder = Recorder()
+    run(tmp_path, fake.make_plan(2), observer=recorder)
+    assert recorder.events[0] == ("begun", 4, 0, 1200)
+    for planned in fake.make_plan(2):
+        mine = [event for event in recorder.events[1:] if event[1] == planned.key]
+        assert mine[0][0] == "started"
+        assert mine[-1][0] == "finished"
+        episodes = [event[2] for event in mine if event[0] == "advanced"]
+        assert episodes == sorted(episodes)
+        assert episodes[-1] == 300
+
+
+def test_failing_trial_does_not_stop_the_others(tmp_path, fake, run):
+    plan = fake.make_plan()
+
+    def make(*, seed, **parts):
+        if seed == plan[0].key.seed:
+            raise RuntimeError("broken")
+        return fake.FakeTrial(seed=seed, **parts)
+
+    recorder = Recorder()
+    outcome, _ = run(tmp_path, plan, make, observer=recorder)
+    assert outcome.n_run == 5
+    assert [(f.key, str(f.error)) for f in outcome.failures] == [(plan[0].key, "broken")]
+    assert ("failed", plan[0].key) in recorder.events
+    assert run(tmp_path, plan)[0].n_run == 1
+
+
+@pytest.mark.parametrize("kind", [SystemExit, KeyboardInterrupt, GeneratorExit])
+def test_what_ends_a_thread_without_a_word_is_a_failure(tmp_path, fake, run, kind):
+    class Leaving(fake.FakeTrial):
+        def __init__(self, **_parts):
+            raise kind("left")
+
+    outcome, _ = run(tmp_path, None, Leaving)
+    assert outcome.n_run == 0
+    assert not outcome.interrupted
+    assert {str(f.error) for f in outcome.failures} == {f"the trial raised {kind('left')!r}"}
+
+
+def test_interruption_keeps_what_is_finished(tmp_path, fake, run):
+    """Ctrl-C comes while the second trial runs: it is given up, the first stays stored."""
+    made = []
+    before = signal.getsignal(signal.SIGINT)
+
+    class Interrupting(fake.FakeTrial):
+        def __init__(self, *, seed, **parts):
+            super().__init__(seed=seed, **parts)
+            made.append(seed)
+
+        def advance(self, n):
+            if len(made) < 2:
+                super().advance(n)
+            elif not self.sent:  # from here on it never ends by itself
+                self.sent = True
+                os.kill(os.getpid(), signal.SIGINT)
+            else:
+                time.sleep(0.001)
+
+        sent = False
+
+    outcome, _ = run(tmp_path, None, Interrupting, jobs=1)
+    assert outcome.interrupted
+    assert outcome.n_run == 1
+    assert signal.getsignal(signal.SIGINT) is before
+    resumed, digest = run(tmp_path)
+    assert resumed.n_run == 5
+    assert digest == run(tmp_path / "whole")[1]
+
+
+def test_unwritable_store_stops_the_run(tmp_path, fake, use_trial):
+    from sdnn.reproduction import run_trials
+
+    class Full(ResultStore):
+        def add(self, record, *, is_exact=True):
+            raise StoreError("disk full")
+
+    made = []
+
+    class Counted(fake.SlowTrial):
+        def __init__(self, *, seed, **parts):
+            super().__init__(seed=seed, **parts)
+            made.append(seed)
+
+    use_trial(Counted)
+    with Full(tmp_path) as store, pytest.raises(StoreError, match="disk full"):
+        run_trials(fake.make_plan(10, 50), store, jobs=1)
+    assert len(made) < 20
+
+
+def test_jobs_must_be_positive(tmp_path, run):
+    with pytest.raises(ValueError, match="jobs must be at least 1, got 0"):
+        run(tmp_path, jobs=0)
+    with pytest.raises(ValueError, match="jobs must be left out where an executor is given, got 2"):
+        run(tmp_path, executor=ThreadExecutor(), jobs=2)
+
+
+class Scripted:
+    """Says what it is told to say, about the trials in their order."""
+
+    def __init__(self, *script):
+        self.script = script
+        self.closed = False
+
+    def run(self, planned, stop):
+        try:
+            yield from (message(*planned) for message in self.script)
+        finally:
+            self.closed = True
+
+
+@pytest.fixture
+def record(fake, tmp_path, run):
+    """The first trial's record, as another run gave it."""
+    run(tmp_path / "other", fake.make_plan(1))
+    with ResultStore(tmp_path / "other") as store:
+        return store.load([fake.make_plan(1)[0].key])[0]
+
+
+def test_an_executor_tells_and_the_engine_stores(tmp_path, fake, run, record):
+    plan = fake.make_plan(1)
+    lost = WorkerLostError("gone")
+    script = (
+        lambda a, b: Noted("hear"),
+        lambda a, b: Started(a),
+        lambda a, b: Started(b),
+        lambda a, b: Advanced(a, 100),
+        lambda a, b: Lost(a),
+        lambda a, b: Started(a),
+        lambda a, b: Failed(b, lost),
+        lambda a, b: Finished(a, record),
+    )
+    recorder = Recorder()
+    outcome, _ = run(tmp_path, plan, executor=Scripted(*script), observer=recorder)
+    assert (outcome.n_run, outcome.interrupted) == (1, False)
+    assert [(f.key, f.error) for f in outcome.failures] == [(plan[1].key, lost)]
+    first, second = (planned.key for planned in plan)
+    assert recorder.events[1:] == [
+        ("noted", "hear"), ("started", first), ("started", second), ("advanced", first, 100),
+        ("lost", first), ("started", first), ("failed", second), ("finished", first),
+    ]  # fmt: skip
+    # On a terminal, bars of lost trials go and come again.
+    text = io.StringIO()
+    with ProgressObserver(Console(file=text, force_terminal=True, width=80)) as observer:
+        run(tmp_path / "shown", plan, executor=Scripted(*script), observer=observer)
+    assert "hear" in text.getvalue()
+    assert "all (0 to go)" in text.getvalue()
+
+
+def test_an_executor_is_closed_when_the_store_fails(tmp_path, fake, run, record, monkeypatch):
+    def full(store, record, *, is_exact=True):
+        raise StoreError("disk full")
+
+    executor = Scripted(lambda a, b: Finished(a, record), lambda a, b: pytest.fail("asked again"))
+    monkeypatch.setattr(ResultStore, "add", full)
+    with pytest.raises(StoreError, match="disk full"):
+        run(tmp_path, fake.make_plan(1), executor=executor)
+    assert executor.closed
+    nobody = Scripted(lambda: pytest.fail("asked without need"))
+    assert run(tmp_path, [], executor=nobody)[0].n_planned == 0

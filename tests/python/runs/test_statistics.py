@@ -1,0 +1,117 @@
+import math
+
+import numpy as np
+import pytest
+
+from sdnn.runs.statistics import (
+    BootstrapConfig,
+    Estimate,
+    estimate_contrast,
+    estimate_mean,
+    estimate_median,
+    learning_curve,
+    running_median,
+)
+
+
+def test_learning_curve_by_hand():
+    curve = learning_curve(np.array([10, 20], np.int32), [[1, 50], [2, 50], [3, 10], [4, 50]])
+    np.testing.assert_array_equal(curve.median, [2.5, 50])
+    np.testing.assert_array_equal(curve.lower, [1.75, 40])
+    np.testing.assert_array_equal(curve.upper, [3.25, 50])
+
+
+def test_bootstrap_of_two_values_is_exact():
+    # Resamples of {0, 1}: medians 0, 1/2, 1 with probabilities 1/4, 1/2, 1/4.
+    assert estimate_median([0.0, 1.0]) == Estimate(0.5, 0.0, 1.0)
+    narrow = BootstrapConfig(confidence=0.4)
+    assert estimate_median([0.0, 1.0], narrow) == Estimate(0.5, 0.5, 0.5)
+
+
+def test_bootstrap_of_the_median_agrees_with_the_asymptotic_interval():
+    values = np.random.default_rng(0).normal(size=1000)
+    found = estimate_median(values, BootstrapConfig(n_resamples=2000))
+    # The standard deviation of the median of normal values is sqrt(pi / 2 / n).
+    half = 1.96 * math.sqrt(math.pi / 2 / 1000)
+    assert found.upper - found.lower == pytest.approx(2 * half, rel=0.25)
+    assert found.lower < found.value < found.upper
+
+
+def test_bootstrap_is_its_own_and_repeatable():
+    state = np.random.get_state()[1].copy()  # noqa: NPY002
+    values = [120.0, 90.0, 150.0, math.inf]
+    assert estimate_median(values) == estimate_median(values)
+    np.testing.assert_array_equal(np.random.get_state()[1], state)  # noqa: NPY002
+
+
+def test_censored_trials_stay_censored():
+    assert estimate_median([math.inf] * 10) == Estimate(math.inf, math.inf, math.inf)
+    mostly = estimate_median([100.0] * 7 + [math.inf] * 3)
+    assert mostly.value == 100.0
+    assert mostly.lower == 100.0
+    assert mostly.upper == math.inf
+
+
+def test_one_trial_has_no_interval_and_none_is_an_error():
+    one = estimate_median([4.0])
+    assert one.value == 4.0
+    assert math.isnan(one.lower)
+    with pytest.raises(ValueError, match=r"shape \(0,\)"):
+        estimate_median([])
+
+
+def test_running_median_of_a_curve():
+    curve = np.random.default_rng(3).normal(size=40)
+    found = running_median(curve, 5)
+    for i in range(40):
+        assert found[i] == np.median(curve[max(0, i - 2) : i + 3])
+    np.testing.assert_array_equal(running_median(curve, 1), curve)
+
+
+def test_contrast_of_two_values_each_is_exact():
+    # Differences of the medians 0, 1/2, 1 and 10, 11, 12: the ends have probability 1/16 each.
+    found = estimate_contrast([0.0, 1.0], [10.0, 12.0])
+    assert found == Estimate(-10.5, -12.0, -9.0)
+    assert estimate_contrast([8.0, 8.0], [2.0, 2.0], np.divide) == Estimate(4.0, 4.0, 4.0)
+
+
+def test_contrast_agrees_with_the_normal_interval():
+    rng = np.random.default_rng(1)
+    found = estimate_contrast(rng.normal(1.0, 1.0, 800), rng.normal(0.0, 2.0, 800))
+    half = 1.96 * math.sqrt(math.pi / 2 / 800 * (1 + 4))
+    assert found.value == pytest.approx(1.0, abs=2 * half)
+    assert found.upper - found.lower == pytest.approx(2 * half, rel=0.25)
+
+
+def test_contrast_wants_values_that_are_not_infinite():
+    assert math.isnan(estimate_contrast([1.0], [2.0, 3.0]).lower)
+    assert math.isnan(estimate_contrast([math.nan, 1.0], [2.0, 3.0]).value)
+    with pytest.raises(ValueError, match="infinite"):
+        estimate_contrast([1.0, math.inf], [2.0, 3.0])
+    with pytest.raises(ValueError, match=r"shape \(0,\)"):
+        estimate_contrast([1.0], [])
+
+
+def test_bootstrap_of_the_mean_of_two_values_is_exact():
+    # Resamples of {0, 1}: means 0, 1/2, 1 with probabilities 1/4, 1/2, 1/4.
+    assert estimate_mean([0.0, 1.0]) == Estimate(0.5, 0.0, 1.0)
+    assert estimate_mean([0.0, 1.0], BootstrapConfig(confidence=0.4)) == Estimate(0.5, 0.5, 0.5)
+
+
+def test_bootstrap_of_the_mean_agrees_with_the_normal_interval():
+    values = np.random.default_rng(1).normal(3.0, 2.0, 400)
+    estimate = estimate_mean(values)
+    half = 1.96 * values.std() / np.sqrt(values.size)
+    np.testing.assert_allclose(
+        (estimate.lower, estimate.upper), (values.mean() - half, values.mean() + half), atol=0.02
+    )
+
+
+def test_means_refuse_what_has_none():
+    one = estimate_mean([2.0])
+    assert (one.value, math.isnan(one.lower), math.isnan(one.upper)) == (2.0, True, True)
+    with pytest.raises(ValueError, match="infinite"):
+        estimate_mean([1.0, math.inf])
+    with pytest.raises(ValueError, match="one per trial"):
+        estimate_mean([])
+    assert math.isnan(estimate_mean([1.0, math.nan]).value)

@@ -1,0 +1,325 @@
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from made_records import make_record
+from sdnn.reproduction import ResultStore, StoreError
+from sdnn.runs.records import records_digest
+
+
+def filled(folder, n_trials=20):
+    with ResultStore(folder) as store:
+        for trial in range(n_trials):
+            store.add(make_record(trial, steps=range(1, 60)))
+        return store.path, records_digest(store.load())
+
+
+def test_stored_trial_comes_back_exactly(tmp_path):
+    with ResultStore(tmp_path / "new" / "folder") as store:
+        store.add(make_record())
+    with ResultStore(tmp_path / "new" / "folder") as store:
+        (back,) = store.load()
+    expected = make_record()
+    assert replace(back, rows=expected.rows) == expected
+    for name in ("episode", "steps", "episode_return", "solved"):
+        column = getattr(back.rows, name)
+        np.testing.assert_array_equal(column, getattr(expected.rows, name))
+        assert column.dtype == getattr(expected.rows, name).dtype
+
+
+def test_times_are_read_without_rows(tmp_path):
+    with ResultStore(tmp_path) as store:
+        assert store.times() == ()
+        store.add(make_record(0))
+        store.add(make_record(1, steps=(), seconds=2.0))
+        times = store.times()
+    assert [(t.key.trial, t.seconds, t.n_decisions, t.n_episodes) for t in times] == [
+        (0, 0.5, 57, 20), (1, 2.0, 57, 0),
+    ]  # fmt: skip
+    assert times[0].key == make_record(0).key
+
+
+def test_every_row_reaches_its_labels(tmp_path):
+    path, _ = filled(tmp_path, 2)
+    with sqlite3.connect(path) as connection:
+        row = connection.execute(
+            "SELECT case_id, agent, trial, seed, config_hash, version, episode, steps, solved"
+            " FROM labelled_rows ORDER BY trial, episode"
+        ).fetchone()
+    connection.close()
+    assert row == ("s4", "sdnn-c", 0, 2**63 - 1, "aa", "0.1", 10, 1, 1)
+
+
+def test_settings_live_side_by_side(tmp_path):
+    with ResultStore(tmp_path) as store:
+        store.add(make_record(config_hash="aa", steps=(50, 50)))
+        store.add(make_record(config_hash="bb", steps=(3, 3)))
+        (found,) = store.load([make_record(config_hash="bb").key])
+        assert found.rows.steps.tolist() == [3, 3]
+        assert len(store.keys()) == 2
+
+
+def test_a_folder_that_is_only_looked_at_stays_as_it_is(tmp_path, monkeypatch):
+    path, digest = filled(tmp_path / "full", 3)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "empty" / path.name).touch()
+    for is_writable in (True, False):
+        if not is_writable:
+            monkeypatch.setattr("sdnn.runs.store._is_writable", lambda _: False)
+        content = path.read_bytes()
+        with ResultStore(path.parent, read_only=True) as store:
+            assert records_digest(store.load()) == digest
+            assert len(store.times()) == 3
+            if not is_writable:
+                assert list(path.parent.iterdir()) == [path]
+                with pytest.raises(StoreError, match="readonly"):
+                    store.add(make_record(7))
+        assert list(path.parent.iterdir()) == [path]
+        assert path.read_bytes() == content
+        for folder in (tmp_path / "empty", tmp_path / "none"):
+            with ResultStore(folder, read_only=True) as store:
+                assert store.keys() == set()
+                assert store.times() == store.load_costs("aa") == ()
+        assert (tmp_path / "empty" / path.name).stat().st_size == 0
+        assert not (tmp_path / "none").exists()
+
+
+READING = """
+import sys
+from sdnn.reproduction import ResultStore
+with ResultStore(sys.argv[1], read_only=True) as store:
+    print(len(store.keys()), len(store.load()))
+"""
+
+
+@pytest.mark.parametrize("is_killed", [False, True])
+def test_a_folder_on_a_file_system_that_is_read_only(tmp_path, is_killed):
+    path, _ = filled(tmp_path / "out", 2)
+    if is_killed:  # what is beside the file is left, and holds the third trial
+        with ResultStore(tmp_path / "out") as store, closing(sqlite3.connect(path)) as reader:
+            reader.execute("BEGIN")
+            reader.execute("SELECT count(*) FROM trials").fetchone()  # what it sees must stay
+            store.add(make_record(2, steps=range(1, 60)))
+            shutil.copytree(tmp_path / "out", tmp_path / "killed")
+        path = tmp_path / "killed" / path.name
+        assert path.with_name(f"{path.name}-wal").stat().st_size > 0
+    mount = 'mount --bind "$1" "$1" && mount -o remount,ro,bind "$1" && ! touch "$1/x" && shift'
+    apart = ("unshare", "--map-root-user", "--mount", "sh", "-c")
+    if (
+        shutil.which("unshare") is None
+        or subprocess.run([*apart, mount, "sh", path.parent], capture_output=True).returncode
+    ):
+        pytest.skip("needs the right to mount a folder read-only")
+    done = subprocess.run(
+        [*apart, f'{mount} && exec "$@"', "sh", path.parent, sys.executable, "-c", READING,
+         path.parent],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (0, "3 3\n" if is_killed else "2 2\n"), done.stderr
+
+
+def test_after_a_trial_the_file_is_whole_by_itself(tmp_path, monkeypatch):
+    monkeypatch.setattr("sdnn.runs.store.EMPTIED_EVERY", 0.0)
+    with ResultStore(tmp_path / "out") as store:
+        for trial in range(3):
+            store.add(make_record(trial, steps=range(1, 60)))
+            copied = tmp_path / str(trial)
+            copied.mkdir()
+            shutil.copy(store.path, copied)
+            with ResultStore(copied) as other:
+                assert len(other.load()) == trial + 1
+
+
+def test_a_file_in_the_place_of_one_that_left_its_log_is_not_overwritten(tmp_path):
+    path, _ = filled(tmp_path / "killed", 1)
+    with ResultStore(path.parent) as store, closing(sqlite3.connect(path)) as reader:
+        reader.execute("BEGIN")
+        reader.execute("SELECT count(*) FROM trials").fetchone()
+        store.add(make_record(1))
+        for copied in ("mine", "own"):
+            shutil.copytree(path.parent, tmp_path / copied)
+    other, digest = filled(tmp_path / "other", 20)
+    mine = tmp_path / "mine" / path.name
+    with ResultStore(tmp_path / "own") as store:
+        assert len(store.load()) == 2, "its own log is read"
+    shutil.copy(other, mine)
+    before = mine.read_bytes()
+    for read_only in (True, False):
+        with pytest.raises(StoreError, match=r"-wal is the log of another file than .*: if you"):
+            ResultStore(mine.parent, read_only=read_only)
+    assert mine.read_bytes() == before
+    mine.with_name(f"{mine.name}-wal").unlink()
+    with ResultStore(mine.parent) as store:
+        assert records_digest(store.load()) == digest
+
+
+def test_same_trial_twice_is_one_trial_and_other_rows_are_refused(tmp_path):
+    with ResultStore(tmp_path) as store:
+        store.add(make_record())
+        store.add(make_record(seconds=9.0))
+        assert len(store.load()) == 1
+        with pytest.raises(StoreError, match="gave two results"):
+            store.add(make_record(steps=(50, 8)))
+        store.add(make_record(steps=(50, 8)), is_exact=False)
+        assert store.load()[0].rows.steps.tolist() == [50, 7]
+
+
+def test_digest_sees_rows_and_keys_but_not_times_version_or_order(tmp_path):
+    def digest(name, records):
+        with ResultStore(tmp_path / name) as store:
+            for record in records:
+                store.add(record)
+            return records_digest(store.load())
+
+    base = digest("1", [make_record(0), make_record(1)])
+    other = make_record(1, seconds=3.0, finished_at="later", version="0.2")
+    assert digest("2", [other, make_record(0)]) == base
+    assert digest("3", [make_record(0), make_record(1, steps=(50, 8))]) != base
+    assert digest("4", [make_record(0), make_record(2)]) != base
+
+
+def test_half_written_trial_leaves_nothing(tmp_path):
+    with ResultStore(tmp_path) as store:
+        bad = make_record()
+        bad.rows.episode[:] = 10  # breaks the primary key at the second row
+        with pytest.raises(StoreError):
+            store.add(bad)
+        assert store.load() == ()
+        store.add(make_record())
+
+
+def test_file_writes_through_to_the_disk(tmp_path):
+    with ResultStore(tmp_path) as store:
+        assert store._connection.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+        assert store._connection.execute("PRAGMA synchronous").fetchone() == (2,)
+
+
+def test_folder_that_is_a_file(tmp_path):
+    (tmp_path / "out").write_text("mine")
+    with pytest.raises(StoreError, match=r"must be a folder, but .*out is a file"):
+        ResultStore(tmp_path / "out")
+    assert (tmp_path / "out").read_text() == "mine"
+
+
+@pytest.mark.parametrize("content", [b"my notes", b"SQLite format 3\0" + bytes(200)])
+def test_damaged_or_other_file_is_named_and_kept(tmp_path, content):
+    path = tmp_path / "results.sqlite"
+    path.write_bytes(content)
+    with pytest.raises(StoreError, match=r"results\.sqlite is damaged or not"):
+        ResultStore(tmp_path)
+    assert path.read_bytes() == content
+
+
+def test_foreign_sqlite_file_is_named_and_kept(tmp_path):
+    path = tmp_path / "results.sqlite"
+    with sqlite3.connect(path) as connection:
+        connection.execute("CREATE TABLE trials (recipe TEXT)")
+    connection.close()
+    content = path.read_bytes()
+    with pytest.raises(StoreError, match=r"results\.sqlite is a SQLite file of another program"):
+        ResultStore(tmp_path)
+    assert path.read_bytes() == content
+    assert os.listdir(tmp_path) == ["results.sqlite"]
+
+
+def test_other_schema_is_refused(tmp_path):
+    path, _ = filled(tmp_path, 1)
+    with sqlite3.connect(path) as connection:
+        connection.execute("PRAGMA user_version = 99")
+    connection.close()
+    with pytest.raises(StoreError, match=r"schema version 99"):
+        ResultStore(tmp_path)
+    with sqlite3.connect(path) as connection:
+        connection.execute("PRAGMA user_version = 1")
+    connection.close()
+    with pytest.raises(StoreError, match=r"version 1, written by an older sdnn"):
+        ResultStore(tmp_path)
+
+
+def test_file_of_a_process_killed_before_the_schema_is_used(tmp_path):
+    with sqlite3.connect(tmp_path / "results.sqlite") as connection:
+        connection.execute("PRAGMA journal_mode = WAL")
+    connection.close()
+    assert filled(tmp_path, 1)
+
+
+def test_damaged_bytes_never_give_wrong_rows(tmp_path):
+    path, digest = filled(tmp_path)
+    content = path.read_bytes()
+    expected = make_record(steps=range(1, 60)).rows.digest()
+    generator = np.random.default_rng(1)
+    n_noticed = 0
+    for _ in range(60):
+        damaged = bytearray(content)
+        begin = int(generator.integers(len(content)))
+        damaged[begin : begin + 64] = generator.bytes(len(damaged[begin : begin + 64]))
+        path.write_bytes(damaged)
+        try:
+            with ResultStore(tmp_path) as store:
+                records = store.load()
+        except StoreError as error:
+            message = str(error)
+            n_noticed += 1
+            assert str(path) in message
+            continue
+        # Labels that no figure reads may differ; rows and keys may not.
+        assert len(records) == 20
+        assert {r.rows.digest() for r in records} == {expected}
+    assert n_noticed > 30
+    path.write_bytes(content[: len(content) // 2])
+    with pytest.raises(StoreError, match="damaged"):
+        ResultStore(tmp_path)
+    path.write_bytes(content)
+    with ResultStore(tmp_path) as store:
+        assert records_digest(store.load()) == digest
+
+
+def test_killed_run_resumes_to_the_same_content(tmp_path, fake, run):
+    script = Path(fake.__file__)
+    child = subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path / "killed")],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+    )
+    for _ in range(3):
+        assert child.stdout.readline() == "stored\n"
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    child.stdout.close()
+    plan = fake.make_plan(6, 100)
+    outcome, resumed = run(tmp_path / "killed", plan)
+    assert outcome.n_reused >= 3
+    assert outcome.n_reused + outcome.n_run == len(plan) == 12
+    assert resumed == run(tmp_path / "whole", plan)[1]
+
+
+def test_a_file_whose_making_was_killed_is_made_anew(tmp_path):
+    """A kill inside the very first transaction leaves a journal that has to be rolled back."""
+    path = tmp_path / "results.sqlite"
+    script = (
+        "import os, sqlite3, sys\n"
+        "connection = sqlite3.connect(sys.argv[1], isolation_level=None)\n"
+        "connection.execute('PRAGMA cache_size = 1')\n"
+        "connection.execute('BEGIN IMMEDIATE')\n"
+        "for i in range(500):\n"
+        "    connection.execute(f'CREATE TABLE t{i} (x)')\n"
+        "os._exit(0)\n"
+    )
+    subprocess.run([sys.executable, "-c", script, str(path)], check=True)
+    assert path.with_name("results.sqlite-journal").stat().st_size > 0
+    assert path.stat().st_size > 0
+    with ResultStore(tmp_path) as store:
+        store.add(make_record())
+        assert len(store.keys()) == 1

@@ -1,0 +1,200 @@
+"""The trial in Python against the compiled ones, and the registry that chooses between them."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from sdnn import _core
+from sdnn.agents import PRESETS
+from sdnn.reproduction import (
+    AGENTS,
+    AgentEntry,
+    Case,
+    CostSeries,
+    ProtocolConfig,
+    PythonTrial,
+    agent_entry,
+    case_config,
+    register,
+)
+from sdnn.runs.records import TrialRows
+
+PROTOCOL = ProtocolConfig(n_learning_episodes=60, test_interval=5)
+SEED = 11
+
+
+def config_of(agent, n_sensors=4, noise=0.0, protocol=PROTOCOL):
+    return case_config(Case("case", "", n_sensors, noise, (agent,), ""), agent, protocol)
+
+
+def python_trial(config, monkeypatch):
+    """The trial the same agent has when it has none in C++."""
+    entry = replace(AGENTS[config.agent], core_trial=None)
+    monkeypatch.setitem(AGENTS, config.agent, entry)
+    trial = config.make_trial(SEED)
+    assert type(trial) is PythonTrial
+    return trial
+
+
+@pytest.mark.parametrize(
+    "agent", ["sdnn-c", "sdnn-c-robust", "sdnn-c-general", "sdnn-c-small", "fql", "rbfn"]
+)
+@pytest.mark.parametrize(("n_sensors", "noise"), [(4, 0.0), (4, 0.02), (5, 0.02), (6, 0.02)])
+def test_it_reproduces_the_compiled_trial_bit_for_bit(agent, n_sensors, noise, monkeypatch):
+    config = config_of(agent, n_sensors, noise)
+    core = config.make_trial(SEED)
+    assert type(core).__module__ == _core.__name__
+    core.advance(60)
+    trial = python_trial(config, monkeypatch)
+    for n_episodes in (0, 7, 1, 100):
+        trial.advance(n_episodes)
+    assert trial.finished
+    assert core.finished
+    assert trial.episode == core.episode == 60
+    assert trial.n_decisions == core.n_decisions
+    expected, rows = core.test_rows(), trial.test_rows()
+    assert rows.keys() == expected.keys()
+    for name, column in expected.items():
+        assert rows[name].dtype == column.dtype
+        np.testing.assert_array_equal(rows[name], column)
+    assert TrialRows.from_arrays(rows).digest() == TrialRows.from_arrays(expected).digest()
+
+
+def test_the_settings_of_the_task_reach_it(monkeypatch):
+    config = config_of("fql")
+    config = replace(
+        config,
+        approximator=replace(config.approximator, n_inputs=6),
+        acrobot=replace(config.acrobot, max_decisions=3, penalty=-1.0),
+        goal=replace(config.goal, kind="constant", constant_value=0.1),
+        sensors=replace(
+            config.sensors, noise=0.02, noise_entry="basic_sensors", n_constant=1, n_random=1
+        ),
+        protocol=replace(config.protocol, limit_bootstraps=False, noisy_tests=False),
+    )
+    core, trial = config.make_trial(SEED), python_trial(config, monkeypatch)
+    core.advance(20)
+    trial.advance(20)
+    np.testing.assert_array_equal(
+        trial.test_rows()["episode_return"], core.test_rows()["episode_return"]
+    )
+    assert trial.test_rows()["steps"].max() == 3
+
+
+def test_before_its_first_test_it_has_no_rows(monkeypatch):
+    trial = python_trial(config_of("fql"), monkeypatch)
+    trial.advance(4)
+    assert {name: column.size for name, column in trial.test_rows().items()} == {
+        "episode": 0, "steps": 0, "episode_return": 0, "solved": 0,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"protocol": ProtocolConfig(n_learning_episodes=0)}, "n_learning_episodes"),
+        ({"protocol": ProtocolConfig(test_interval=0)}, "test_interval"),
+        ({"sensors": {"n_sensors": 5}}, "n_inputs must be the number of inputs of the sensors, 5"),
+        ({"sensors": {"n_sensors": 7}, "approximator": {"n_inputs": 7}}, "n_sensors"),
+        ({"sensors": {"n_sensors": 3}, "approximator": {"n_inputs": 3}}, "n_sensors"),
+    ],
+)
+def test_both_refuse_the_same(compiled, change, message, monkeypatch):
+    config = config_of("rbfn")
+    for name, value in change.items():
+        part = replace(getattr(config, name), **value) if isinstance(value, dict) else value
+        config = replace(config, **{name: part})
+    make = config.make_trial if compiled else lambda _: python_trial(config, monkeypatch)
+    with pytest.raises(ValueError, match=message):
+        make(SEED)
+
+
+def test_episodes_cannot_be_taken_back(monkeypatch):
+    config = config_of("rbfn")
+    for trial in (config.make_trial(SEED), python_trial(config, monkeypatch)):
+        with pytest.raises(ValueError, match="n_episodes"):
+            trial.advance(-1)
+
+
+@dataclass(frozen=True)
+class Nothing:
+    n_inputs: int = 4
+
+
+def entry_of(agent_id, *series):
+    costs = tuple(
+        CostSeries(id=name, title=name, growth="", learned_bytes=lambda _: 0) for name in series
+    )
+    return AgentEntry(
+        id=agent_id, title="", approximator=Nothing, learning=Nothing, agent=object, costs=costs
+    )
+
+
+def test_an_agent_may_have_other_settings_than_the_defaults():
+    config = config_of("sdnn-c-robust", n_sensors=5)
+    assert config.approximator == replace(PRESETS["robust"].approximator, n_inputs=5)
+    assert config.learning == PRESETS["robust"].learning
+    assert config_of("sdnn-c").learning == PRESETS["paper"].learning
+
+
+def test_asking_a_trials_agent_for_values_changes_nothing_that_follows():
+    asked, alone = (config_of("sdnn-c", noise=0.02).make_trial(SEED) for _ in range(2))
+    for _ in range(60):
+        asked.advance(1)
+        values = asked.agent.action_value.values([0.5, 0.5, 0.5, 0.5])
+        assert values.shape == (601,)
+    alone.advance(60)
+    for name, column in alone.test_rows().items():
+        np.testing.assert_array_equal(asked.test_rows()[name], column)
+
+
+def test_ids_are_registered_once():
+    before = dict(AGENTS)
+    with pytest.raises(ValueError, match="agent 'fql' is already registered"):
+        register(entry_of("fql"))
+    with pytest.raises(ValueError, match="series 'rbfn-plain' is already registered"):
+        register(entry_of("new", "rbfn-plain"))
+    with pytest.raises(ValueError, match="series 'twice' is already registered"):
+        register(entry_of("new", "twice", "twice"))
+    with pytest.raises(ValueError, match=r"id must be of letters.*got '\.\./x'"):
+        register(entry_of("../x"))
+    assert before == AGENTS
+
+
+def test_agents_are_looked_up_by_id():
+    assert [(entry.id, entry.title) for entry in AGENTS.values()] == [
+        ("sdnn-c", "SDNN-C"), ("fql", "FQL"), ("rbfn", "RBFN"),
+        ("sdnn-c-robust", "SDNN-C, robust"), ("sdnn-c-general", "SDNN-C, general"),
+        ("sdnn-c-small", "SDNN-C, small"),
+    ]  # fmt: skip
+    assert all(agent_entry(name) is entry for name, entry in AGENTS.items())
+    with pytest.raises(
+        ValueError,
+        match="one of sdnn-c, fql, rbfn, sdnn-c-robust, sdnn-c-general, sdnn-c-small, got 'dqn'",
+    ):
+        agent_entry("dqn")
+
+
+def test_a_registered_dataclass_is_the_configuration_of_its_agent(monkeypatch):
+    monkeypatch.setitem(AGENTS, "new", entry_of("new"))
+    config = config_of("new", 5)
+    assert config.approximator == Nothing(5)
+    assert '"approximator":{"n_inputs":5}' in config.canonical_json()
+    assert len(config.config_hash) == 16
+
+
+@pytest.mark.parametrize(
+    ("agent", "n_sensors", "noise", "config_hash"),
+    [
+        ("sdnn-c", 4, 0.0, "75969d030c881084"),
+        ("sdnn-c", 6, 0.02, "7f9e03d9ab939cb7"),
+        ("fql", 4, 0.0, "fac3141ec70d25dd"),
+        ("rbfn", 4, 0.0, "6ccdbbe4ab0ad530"),
+    ],
+)
+def test_the_papers_settings_have_the_hashes_under_which_results_are_stored(
+    agent, n_sensors, noise, config_hash
+):
+    assert config_of(agent, n_sensors, noise, None).config_hash == config_hash
