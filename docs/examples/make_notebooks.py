@@ -10,7 +10,7 @@ import jupytext
 import nbformat
 
 HERE = Path(__file__).resolve().parent
-SCRIPTS = sorted(path for path in HERE.glob("*.py") if path != Path(__file__).resolve())
+SCRIPTS = sorted(path for path in HERE.glob("*.py") if path.read_text("utf-8").startswith("# %%"))
 
 
 def notebook_of(script):

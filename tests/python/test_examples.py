@@ -12,13 +12,14 @@ import pytest
 
 FOLDER = Path(__file__).parents[2] / "docs" / "examples"
 MAKER = FOLDER / "make_notebooks.py"
-SCRIPTS = sorted(path for path in FOLDER.glob("*.py") if path != MAKER)
+PAGE = FOLDER / "sdnn_q_learning.py"
+SCRIPTS = sorted(path for path in FOLDER.glob("*.py") if path not in (MAKER, PAGE))
 
 
-def run(script, folder):
+def run(script, folder, *options):
     """What a script prints."""
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", script],
+        [sys.executable, "-W", "ignore", script, *options],
         cwd=folder,
         env=os.environ | {"MPLBACKEND": "Agg"},
         capture_output=True,
@@ -34,6 +35,24 @@ def numbers(pattern, printed):
     found = re.search(pattern, printed)
     assert found, printed
     return [float(number) for number in found.groups()]
+
+
+def test_the_page_learns_with_the_settings_of_its_options(tmp_path):
+    options = ["--episodes", "3", "--n-inputs", "5", "--noise", "0.02"]
+    lines = run(PAGE, tmp_path, *options).splitlines()
+    assert [line.split(":")[0] for line in lines] == ["episode 1", "episode 2", "episode 3"]
+
+
+def test_cited_sections_of_the_method_are_there():
+    root = FOLDER.parents[1]
+    method = (root / "docs" / "explanation" / "method.md").read_text("utf-8")
+    sections = set(re.findall(r"^#+ ([\d.]*\d)", method, re.MULTILINE))
+    cited = set(re.findall(r"\(([1-9](?:\.\d)?)[,)]", PAGE.read_text("utf-8")))
+    assert len(cited) > 8
+    for path in (*(root / "cpp").rglob("*.hpp"), *(root / "python").rglob("*.py")):
+        for numbers in re.findall(r"method\.md, sections? ([\d. and]+)", path.read_text("utf-8")):
+            cited.update(re.findall(r"\d(?:\.\d)?", numbers))
+    assert cited <= sections
 
 
 def test_the_acrobot_is_solved(tmp_path):
@@ -87,7 +106,7 @@ def test_every_example_is_tested_and_listed():
     tested = re.findall(r'FOLDER / "(\w+\.py)"', Path(__file__).read_text())
     listed = re.findall(r"^\| \[(\w+\.py)\]", (FOLDER / "README.md").read_text(), re.MULTILINE)
     tested.remove(MAKER.name)
-    assert sorted(tested) == sorted(listed) == [script.name for script in SCRIPTS]
+    assert sorted(tested) == sorted(listed) == sorted(path.name for path in (*SCRIPTS, PAGE))
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)

@@ -1,6 +1,6 @@
 """The paper's experiments as data: which case, which agents, which figure.
 
-Source: spec section 5 (the table of experiments); the paper's sections 4.2 and 4.3. This module
+Source: method.md, section 5.3; the paper's sections 4.2 and 4.3. This module
 imports nothing heavy, so that the command line may read it at start.
 """
 

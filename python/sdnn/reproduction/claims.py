@@ -1,6 +1,6 @@
 """The paper's claims as data: quantities that our data give, and the ranges they must lie in.
 
-Source: spec section 5 (the list of claims); the paper's sections 4.2.2 and 4.3.3. Ranges and
+Source: method.md, section 5.4; the paper's sections 4.2.2 and 4.3.3. Ranges and
 margins were written down before the trials of Experiment B were run; `sdnn.reproduction.verdicts`
 says by which rule they are judged.
 """

@@ -1,7 +1,7 @@
 """How the cost of a step grows with the number of inputs: what is measured, and how.
 
-Source: spec section 5, claim 9. A step is one whole decision of a learning agent without its
-environment: acting in a new random state and learning the transition to it. Times are the only
+Source: method.md, section 5.4, claim 9. A step is one whole decision of a learning agent without
+its environment: acting in a new random state and learning the transition to it. Times are the only
 results that no seed fixes; they are stored like trials, and figures are drawn from what is stored.
 """
 

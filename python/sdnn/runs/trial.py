@@ -33,7 +33,7 @@ from sdnn.environments import (
 
 @dataclass(frozen=True, kw_only=True)
 class ProtocolConfig:
-    """Learning protocol of a trial; the defaults are the paper's values (spec section 5).
+    """Learning protocol of a trial; the defaults are the paper's values (method.md, section 5.2).
 
     Parameters
     ----------

@@ -5,8 +5,8 @@ import importlib
 import gymnasium as gym
 import numpy as np
 import pytest
+import sdnn_q_learning as page
 
-import paper_transcription as paper
 from handed_over import transcribe
 from sdnn import _core
 from sdnn.agents import PRESETS, QLearningConfig, SDNNQLearning, Transition
@@ -24,15 +24,42 @@ def small_agent(actions=TORQUES, **options):
     return SDNNQLearning(OBSERVATIONS, actions, approximator=SMALL, **options)
 
 
-# Against the transcription of the paper.
+# Against the page of NumPy.
+
+
+@pytest.mark.parametrize(("n_inputs", "noise"), [(4, 0.0), (4, 0.02), (5, 0.02), (6, 0.02)])
+def test_a_training_of_the_page_is_a_trial_of_the_core(n_inputs, noise):
+    n_episodes = 15 if n_inputs == 4 else 8
+    settings = page.Settings(episodes=n_episodes, seed=7, n_inputs=n_inputs, noise=noise)
+    lines = []
+    network = page.train(settings, lines.append).network
+    trial = _core.AcrobotTrial(
+        approximator=_core.SDNNCConfig(n_inputs=n_inputs),
+        learning=_core.QLearningConfig(),
+        acrobot=_core.AcrobotConfig(),
+        goal=_core.GoalScheduleConfig(),
+        sensors=_core.SensorConfig(n_sensors=n_inputs, noise=noise),
+        protocol=_core.ProtocolConfig(n_learning_episodes=n_episodes, test_interval=n_episodes + 1),
+        seed=7,
+    )
+    steps = []
+    for _ in range(n_episodes):
+        before = trial.n_decisions
+        trial.advance(1)
+        steps.append(trial.n_decisions - before)
+    assert [int(line.split()[2]) for line in lines] == steps
+    core = trial.agent.action_value
+    assert np.array_equal(core.weights(), network.weights)
+    assert np.array_equal(core.thresholds(), network.thresholds)
+    assert np.abs(core.weights()).max() > 5, "something was learned"
 
 
 def learn_side_by_side(network, learning, n_steps, n_sensors=4, noise=0.0):
-    """The core and the transcription live through the same acrobot episodes, as the agent acts."""
+    """The core and the page live through the same acrobot episodes; how often units changed."""
     agent = _core.SDNNQLearning(approximator=network, learning=learning, seed=4)
-    slow = paper.QLearning(
-        transcribe(agent.action_value), alpha=learning.learning_rate, gamma=learning.discount
-    )
+    names = ("learning_rate", "discount", "epsilon", "n_greedy_steps")
+    slow = transcribe(agent.action_value, seed=4, **{n: getattr(learning, n) for n in names})
+    slow = page.QLearning(slow, slow.settings)
     acrobot = _core.Acrobot(_core.AcrobotConfig())
     sensors = _core.AcrobotSensors(
         _core.SensorConfig(n_sensors=n_sensors, noise=noise), 4, _core.Stream.sensor_noise
@@ -48,18 +75,19 @@ def learn_side_by_side(network, learning, n_steps, n_sensors=4, noise=0.0):
         expected = slow.network.values(state)
         assert np.array_equal(agent.action_value.values(state), expected), step
         action = agent.act(state)
+        assert slow.act(state, in_episode) == action
         if expected[action] != expected.max():
             n_random += 1
             assert in_episode >= learning.n_greedy_steps, "the first steps are greedy"
         torque = _core.action_value(action, agent.action_value.n_actions, -10.0, 10.0)
         reward, terminated, truncated = acrobot.step(torque, 0.05)
-        following = sensors.observe(acrobot.state())
-        agent.learn(state, action, reward, following, terminated)
-        n_corrected += slow.learn(state, action, reward, following, terminated)
+        next_state = sensors.observe(acrobot.state())
+        agent.learn(state, action, reward, next_state, terminated)
+        n_corrected += slow.learn(state, action, reward, next_state, terminated)
         if step % 1000 == 0:
             assert np.array_equal(agent.action_value.weights(), slow.network.weights)
         over = terminated or truncated
-        state = following
+        state = next_state
         in_episode += 1
     assert np.array_equal(agent.action_value.weights(), slow.network.weights)
     assert np.array_equal(agent.action_value.thresholds(), slow.network.thresholds)
@@ -68,7 +96,7 @@ def learn_side_by_side(network, learning, n_steps, n_sensors=4, noise=0.0):
 
 
 @pytest.mark.parametrize("n_steps", [1200, pytest.param(5000, marks=pytest.mark.slow)])
-def test_learning_agrees_with_the_paper(n_steps):
+def test_learning_agrees_with_the_page(n_steps):
     n_corrected, n_random = learn_side_by_side(
         _core.SDNNCConfig(), _core.QLearningConfig(), n_steps
     )
@@ -77,13 +105,13 @@ def test_learning_agrees_with_the_paper(n_steps):
 
 
 @pytest.mark.parametrize(("n_sensors", "noise"), [(5, 0.02), (6, 0.0)])
-def test_learning_agrees_with_the_paper_with_more_sensors(n_sensors, noise):
+def test_learning_agrees_with_the_page_with_more_sensors(n_sensors, noise):
     network = _core.SDNNCConfig(n_inputs=n_sensors)
-    learning = _core.QLearningConfig(tie_rule=_core.TieRule.middle)
+    learning = _core.QLearningConfig()
     learn_side_by_side(network, learning, 200, n_sensors=n_sensors, noise=noise)
 
 
-def test_learning_agrees_with_the_paper_at_odd_sizes():
+def test_learning_agrees_with_the_page_at_odd_sizes():
     network = _core.SDNNCConfig(
         n_pattern_units=37,
         n_hidden_units=149,
@@ -105,12 +133,13 @@ def test_one_transition_by_hand():
     for _ in range(200):
         agent.learn(Transition(state, [-1.0], 10.0, following, True))
     # Terminated: Q becomes r = 10, at the nearest count: 15 + 10 * 26 / 40 = 21.5, rounded to 22.
-    assert agent.q_values(state)[0] == paper.g(22, 2, 28, -20.0, 20.0)
+    line = page.Settings(u_low=2, u_high=28)
+    assert agent.q_values(state)[0] == page.g(22, line)
     for _ in range(200):
         agent.learn(Transition(following, [3.0], 1.0, state, False))
     # Otherwise r + 0.9 max Q(s'), whose windows may share units with those just corrected.
     best = agent.q_values(state).max()
-    expected = paper.g(paper.g_inverse(1 + 0.9 * best, 2, 28, -20.0, 20.0), 2, 28, -20.0, 20.0)
+    expected = page.g(page.g_inverse(1 + 0.9 * best, line), line)
     assert agent.q_values(following)[-1] == expected
 
 

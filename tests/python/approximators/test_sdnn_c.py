@@ -4,10 +4,10 @@ import importlib
 
 import numpy as np
 import pytest
+import sdnn_q_learning as page
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import paper_transcription as paper
 from handed_over import transcribe
 from sdnn import _core
 from sdnn.approximators import SDNNC, SDNNCConfig
@@ -82,7 +82,7 @@ def compare_while_learning(config, seed, n_steps, compare_weights_every):
         assert np.array_equal(core.values(state), expected), step
         assert core.value(state, action) == expected[action]
         core.correct(state, action, q_hat)
-        n_active += slow.correct(state, action, q_hat) > 0
+        n_active += slow.update(state, action, q_hat) > 0
         following = next_state(rng, state)
         if step % compare_weights_every == 0:
             assert np.array_equal(core.potentials(state), slow.potentials(state)), step
@@ -94,17 +94,17 @@ def compare_while_learning(config, seed, n_steps, compare_weights_every):
 
 
 @pytest.mark.parametrize("n_steps", [1500, pytest.param(5000, marks=pytest.mark.slow)])
-def test_the_core_agrees_with_the_paper_while_it_learns(n_steps):
+def test_the_core_agrees_with_the_page_while_it_learns(n_steps):
     assert compare_while_learning(_core.SDNNCConfig(), 1, n_steps, 500) > 0.9 * n_steps
 
 
 @pytest.mark.parametrize("n_inputs", [5, 6])
-def test_the_core_agrees_with_the_paper_at_its_larger_sizes(n_inputs):
+def test_the_core_agrees_with_the_page_at_its_larger_sizes(n_inputs):
     assert compare_while_learning(_core.SDNNCConfig(n_inputs=n_inputs), 2, 150, 75) > 100
 
 
 @pytest.mark.parametrize("name", ODD_SIZES)
-def test_the_core_agrees_with_the_paper_at_odd_sizes(name):
+def test_the_core_agrees_with_the_page_at_odd_sizes(name):
     config = _core.SDNNCConfig(**{**ODD_DEFAULTS, **ODD_SIZES[name]})
     assert compare_while_learning(config, 3, 500, 100) > 300
 
@@ -118,7 +118,7 @@ def test_the_core_agrees_with_the_paper_at_odd_sizes(name):
     lattice=st.integers(1, 8),
     seed=st.integers(0, 2**64 - 1),
 )
-def test_the_core_agrees_with_the_paper_at_any_size(n_inputs, m, n, window, lattice, seed):
+def test_the_core_agrees_with_the_page_at_any_size(n_inputs, m, n, window, lattice, seed):
     n_active = 1 + round(window * (n - 1))
     config = _core.SDNNCConfig(
         n_inputs=n_inputs,
@@ -137,18 +137,18 @@ def test_the_core_agrees_with_the_paper_at_any_size(n_inputs, m, n, window, latt
         q_hat = float(rng.uniform(-25, 25))
         assert np.array_equal(core.values(state), slow.values(state))
         core.correct(state, action, q_hat)
-        slow.correct(state, action, q_hat)
+        slow.update(state, action, q_hat)
     assert_equal_parameters(core, slow)
 
 
-def test_the_paper_numbers_of_the_transcription():
-    line = (20, 280, -20.0, 20.0)
-    assert [paper.g(u, *line) for u in (0, 20, 150, 163, 280, 300)] == [-20, -20, 0, 2, 20, 20]
-    assert all(paper.g(u, *line) == (2 * u - 300) / 13 for u in range(20, 281))
-    assert paper.evenly_spread_windows(900, 300, 601) == list(range(601))
-    x_mu = np.array([1, 1, -1, -1], dtype=np.int8)
-    x_nu = np.array([1, -1, 1, -1], dtype=np.int8)
-    assert paper.desensitize(x_mu, x_nu).tolist() == [1, 0, -1, 0]
+def test_the_paper_numbers_of_the_page():
+    settings = page.Settings()
+    counts = np.arange(301)
+    np.testing.assert_array_equal(
+        page.g(counts, settings), np.clip((2 * counts - 300) / 13, -20, 20)
+    )
+    values = {-30.0: 20, -20.0: 20, 0.0: 150, 2.0: 163, 1 / 13: 151, 20.0: 280, 99.0: 280}
+    assert {q: page.g_inverse(q, settings) for q in values} == values
 
 
 # Wiring: what the core draws at random must be what section 3.1 describes.
@@ -258,7 +258,8 @@ states = st.lists(st.floats(0, 1), min_size=3, max_size=3)
 )
 def test_a_correction_never_moves_the_value_away_from_the_target(state, action, target, n):
     network = _core.SDNNC(_core.SDNNCConfig(**SMALL), 1)
-    goal = paper.g(paper.g_inverse(target, 2, 28, -20.0, 20.0), 2, 28, -20.0, 20.0)
+    line = page.Settings(u_low=2, u_high=28)
+    goal = page.g(page.g_inverse(target, line), line)
     before = network.value(state, action)
     assert before == 0.0
     for _ in range(n):

@@ -24,7 +24,7 @@
 
 namespace sdnn::agents {
 
-/// The agent's parameters; the defaults are the paper's (spec sections 3 and 5).
+/// The agent's parameters; the defaults are the paper's (method.md, sections 3 and 5).
 struct FuzzyQLearningConfig {
   double learning_coefficient = 0.5;  ///< c_fql, in (0, 1] (reading)
   double discount = 0.9;              ///< gamma, in [0, 1]
@@ -60,7 +60,7 @@ struct FuzzyQLearningConfig {
 /// (the last exploring act, the traces, the number of steps) is then kept for each.
 ///
 /// Source: Jouffe, L. (1998). Fuzzy inference system learning by reinforcement methods. IEEE
-/// Transactions on Systems, Man, and Cybernetics C 28(3), 338-355; spec section 3.
+/// Transactions on Systems, Man, and Cybernetics C 28(3), 338-355; method.md, section 3.
 class FuzzyQLearning {
  public:
   /// Smaller eligibilities count as 0.

@@ -18,7 +18,7 @@
 
 namespace sdnn::approximators {
 
-/// The sizes of a rule table; the defaults are the paper's (spec section 3).
+/// The sizes of a rule table; the defaults are the paper's (method.md, section 3).
 struct FuzzyRulesConfig {
   int n_inputs = 4;    ///< d
   int n_sets = 9;      ///< triangular sets per input, centres 0, 1 / (n_sets - 1), ..., 1
@@ -48,7 +48,7 @@ struct FiredRules {
 /// triangles overlap by one half, so an input belongs to two sets, or to one at a centre: at most
 /// 2^d rules fire, and only they are ever read or written. All values start at 0; rules that never
 /// fire cost no memory where the operating system hands out zero pages lazily.
-/// Source: spec section 3. The table has 4 n_actions n_sets^d bytes: 45 MB at d = 6.
+/// Source: method.md, section 3. The table has 4 n_actions n_sets^d bytes: 45 MB at d = 6.
 class FuzzyRules {
  public:
   /// v(rule, action), a row per rule.

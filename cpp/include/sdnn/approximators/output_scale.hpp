@@ -12,7 +12,7 @@ namespace sdnn::approximators {
 
 /// g: the straight line that maps [u_low, u_high] onto [q_low, q_high], saturating outside.
 ///
-/// Source: section 4.2 (the paper's g: 20 <= u <= 280 onto [-20, 20]); spec section 1, item 6.
+/// Source: section 4.2 (the paper's g: 20 <= u <= 280 onto [-20, 20]); method.md, section 1.6.
 class OutputScale {
  public:
   /// Throws std::invalid_argument unless u_low < u_high and q_low < q_high, both within +- 1e301:

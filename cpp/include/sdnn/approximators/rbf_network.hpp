@@ -22,7 +22,7 @@
 
 namespace sdnn::approximators {
 
-/// The sizes of an RBF network (spec section 4).
+/// The sizes of an RBF network (method.md, section 4).
 struct RBFNetworkConfig {
   int n_inputs = 4;            ///< d
   int n_bases = 4;             ///< per dimension, of the state and of the action
@@ -51,8 +51,8 @@ struct RBFNetworkConfig {
 /// action has psi(a)^T u. All sums start at 0 and add in the order of the bases: columns of Eigen's
 /// arrays, never its products, whose order depends on the instruction set.
 ///
-/// Source: spec section 4. Cost at d = 6: 16,384 multiply-adds for all actions. An object must not
-/// be used by two threads at once: it holds its workspace.
+/// Source: method.md, section 4. Cost at d = 6: 16,384 multiply-adds for all actions. An object must
+/// not be used by two threads at once: it holds its workspace.
 class RBFNetwork {
  public:
   /// All weights 0. Throws std::invalid_argument naming the field that is impossible;

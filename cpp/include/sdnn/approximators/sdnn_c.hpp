@@ -146,7 +146,7 @@ class SDNNC {
   /// One step of error correction: Q = Q(state, action) moves towards
   /// q_hat = (1 - rate) Q + rate * target.
   ///
-  /// Source: Fig. 2, Eqs. (1) to (3); spec section 1, "Learning". Throws std::invalid_argument for
+  /// Source: Fig. 2, Eqs. (1) to (3); method.md, section 1.8. Throws std::invalid_argument for
   /// a bad state, action or rate or a NaN target, std::overflow_error; then no weight or threshold
   /// has changed and nothing is counted, though a random rounding may have been drawn.
   void correct(std::span<const double> state, std::size_t action, double target,

@@ -13,7 +13,7 @@
 
 namespace sdnn::approximators {
 
-/// How the weights start (spec section 1, "Start").
+/// How the weights start (method.md, section 1.7).
 enum class InitialWeights {
   ternary,  ///< -1, 0 or +1 lattice steps with probabilities 1/4, 1/2, 1/4
   uniform,  ///< uniform within +- initial_weight_limit, rounded to the lattice

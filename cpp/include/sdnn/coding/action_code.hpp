@@ -17,7 +17,7 @@ namespace sdnn::coding {
 /// floor(a * (n_hidden_units - n_active_units) / (n_actions - 1)), so that a task with a few
 /// discrete actions gets windows that overlap little.
 ///
-/// Source: section 3.1 (layer 4, y); spec section 1, item 4. Units are counted from 0.
+/// Source: section 3.1 (layer 4, y); method.md, section 1.4. Units are counted from 0.
 class ActionCode {
  public:
   /// `n_actions` = 0 means all windows.

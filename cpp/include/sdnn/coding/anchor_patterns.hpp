@@ -26,7 +26,7 @@ struct AnchorConfig {
 /// Between neighbouring anchors the units in which they differ flip in a random order; the j-th of
 /// n_interpolated + 1 nearly equal portions ends at floor(j * differing / (n_interpolated + 1)).
 ///
-/// Source: section 3.1 (layer 2); spec section 1, item 2. Throws std::invalid_argument naming the
+/// Source: section 3.1 (layer 2); method.md, section 1.2. Throws std::invalid_argument naming the
 /// impossible field.
 inline PatternTable anchor_patterns(const AnchorConfig& config, core::Random& random) {
   core::require_in_range("n_units", config.n_units, 2, 1 << 24);

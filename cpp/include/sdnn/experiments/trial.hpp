@@ -52,8 +52,8 @@ struct TestRow {
 ///
 /// The agent's action, normalized, is its part of the largest torque. The sensors' noise has
 /// streams of its own, so that the same seed gives every agent the same noise, observation by
-/// observation. Source: spec section 5. A test episode is greedy, learns nothing, uses the current
-/// lambda, and draws from random streams of its own.
+/// observation. Source: method.md, section 5.2. A test episode is greedy, learns nothing, uses the
+/// current lambda, and draws from random streams of its own.
 template <agents::Agent Agent>
 class AcrobotTrial {
  public:
