@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from sdnn.cli import main
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "getting-started.md").read_text()
 
 

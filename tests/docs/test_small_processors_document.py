@@ -10,7 +10,7 @@ import gymnasium as gym
 from sdnn.agents import SDNNQLearning, c_header
 from sdnn.cli import main
 
-TEXT = (Path(__file__).parents[3] / "docs" / "small-processors.md").read_text()
+TEXT = (Path(__file__).parents[2] / "docs" / "small-processors.md").read_text()
 
 
 def block(language):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 EXACT = ("-ffp-contract=off", "-DSDNN_NO_CONTRACTION")
 
 WITHOUT_EXCEPTIONS = """

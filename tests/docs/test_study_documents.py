@@ -13,7 +13,7 @@ from sdnn.cli import main
 from sdnn.reproduction import AGENTS
 from sdnn.reproduction.sweep.reading import read_study
 
-ROOT = Path(__file__).parents[4]
+ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "sweep.md").read_text()
 BLOCKS = re.findall(r"```(toml|python)\n(.*?)```", PAGE, re.DOTALL)
 STUDIES = sorted((ROOT / "docs" / "studies").glob("*.toml"))

@@ -9,7 +9,7 @@ from sdnn.agents import PRESETS
 from sdnn.cli import main
 from sdnn.runs import RunConfig
 
-TEXT = (Path(__file__).parents[3] / "docs" / "agents.md").read_text()
+TEXT = (Path(__file__).parents[2] / "docs" / "agents.md").read_text()
 
 
 def blocks(language):

@@ -69,7 +69,7 @@ def configure(cmake):
 @pytest.fixture(scope="session")
 def fake():
     """The module of the fake trial, which is also a script."""
-    path = Path(__file__).parent / "runs" / "fake_trial.py"
+    path = Path(__file__).parent / "python" / "runs" / "fake_trial.py"
     spec = importlib.util.spec_from_file_location("fake_trial", path)
     module = importlib.util.module_from_spec(spec)
     sys.modules["fake_trial"] = module
@@ -102,3 +102,18 @@ def run(fake, use_trial):
             return outcome, records_digest(store.load())
 
     return _run
+
+
+@pytest.fixture
+def study(tmp_path, monkeypatch):
+    """Write a study file and read it; the folder stays importable for the test only."""
+    from sdnn.reproduction.sweep.reading import read_study
+
+    monkeypatch.setattr(sys, "path", [*sys.path])
+
+    def _study(text, name="mine.toml", **options):
+        path = tmp_path / name
+        path.write_text(text)
+        return read_study(path, **options)
+
+    return _study

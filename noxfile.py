@@ -1,0 +1,152 @@
+"""Checks beyond the tests of the Python package, each a session: ``nox -s style``, ``nox -l``.
+
+Sessions run in the environment that nox itself runs in: ``pip install ".[test]"`` first.
+``nox`` alone runs the quick ones, as continuous integration does; ``nox -t weekly`` the others.
+"""
+
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import nox
+
+nox.options.default_venv_backend = "none"
+nox.options.error_on_missing_interpreters = True
+
+ROOT = Path(__file__).parent
+JOBS = str(os.cpu_count() or 1)
+FUZZ_SEEDS = {"agent_file_fuzz": "tests/data/agents"}
+
+
+def quick(**options):
+    """Mark a session that ``nox`` runs by default."""
+    return nox.session(tags=["quick"], **options)
+
+
+def weekly(**options):
+    """Mark a session that is too long for every change."""
+    return nox.session(tags=["weekly"], default=False, **options)
+
+
+def python(session, *arguments, **options):
+    """Run a module or a script with this Python."""
+    session.run(sys.executable, *arguments, **options)
+
+
+def pytest(session, *arguments):
+    """Run tests with whatever the user adds after ``--``."""
+    python(session, "-m", "pytest", "--durations=20", *arguments, *session.posargs)
+
+
+def cmake_build(session, preset, *targets):
+    """Configure and build a preset of CMakePresets.json, with ccache if it is installed."""
+    launcher = ["-DCMAKE_CXX_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
+    session.run("cmake", "--preset", preset, *launcher, external=True)
+    session.run("cmake", "--build", "--preset", preset, "--parallel", JOBS, *targets, external=True)
+
+
+def cpp_sources():
+    """List all C++ files of our own."""
+    folders = ("cpp", "tests/cpp", "tests/fuzz", "bench", "docs/examples/cpp")
+    return sorted(str(p) for f in folders for p in (ROOT / f).rglob("*.[ch]pp"))
+
+
+@quick()
+def style(session):
+    """Check format, lint and the direction of dependencies."""
+    session.run("ruff", "check", ".")
+    session.run("ruff", "format", "--check", ".")
+    session.run("clang-format", "--dry-run", "-Werror", *cpp_sources(), silent=True)
+    session.run("lint-imports", env={"PYTHONPATH": str(ROOT / "python")})
+
+
+@quick()
+def types(session):
+    """Check types, strictly, and that the stub of the core is up to date."""
+    python(session, "-m", "mypy", "--strict", "-p", "sdnn")
+    stub = python_output(session, "tests/python/reference/core_stub.py")
+    if stub != (ROOT / "python/sdnn/_core.pyi").read_text("utf-8"):
+        session.error("python tests/python/reference/core_stub.py > python/sdnn/_core.pyi")
+
+
+def python_output(session, *arguments):
+    """Return what a Python program prints."""
+    return session.run(sys.executable, *arguments, silent=True, log=False, stderr=None)
+
+
+@quick()
+def cpp(session):
+    """Build and run the C++ tests, little optimized and with assertions."""
+    run_cpp_tests(session, "dev")
+
+
+@weekly(name="cpp-builds")
+@nox.parametrize("preset", ["gcc", "clang", "sanitize", "tsan", "assertions", "aarch64"])
+def cpp_builds(session, preset):
+    """Build and run the C++ tests as users compile them, under sanitizers, and for Arm."""
+    run_cpp_tests(session, preset)
+
+
+def run_cpp_tests(session, preset):
+    """Build a preset's tests and run them."""
+    cmake_build(session, preset)
+    session.run("ctest", "--preset", preset, "--parallel", JOBS, external=True)
+
+
+@quick()
+def docs(session):
+    """Build the site and the C++ reference; run the examples and the documents' code."""
+    pytest(session, "tests/docs")
+
+
+@quick()
+def packaging(session):
+    """Check the source distribution, the wheel and the C++ library as others use it."""
+    pytest(session, "tests/packaging")
+
+
+@quick()
+def fuzz(session):
+    """Run every fuzz target over its corpus and for some seconds beyond it.
+
+    ``nox -s fuzz -- 600`` for ten minutes each.
+    """
+    seconds = session.posargs[0] if session.posargs else "8"
+    cmake_build(session, "fuzz")
+    for target in sorted(p.stem for p in (ROOT / "tests/fuzz").glob("*_fuzz.cpp")):
+        found = Path(session.create_tmp()) / target
+        found.mkdir(parents=True, exist_ok=True)
+        folders = [found, f"tests/fuzz/corpus/{target}"]
+        folders += [FUZZ_SEEDS[target]] if target in FUZZ_SEEDS else []
+        session.run(
+            f"build/fuzz/tests/fuzz/{target}",
+            *("-rss_limit_mb=1024", "-timeout=10", "-max_len=16384", "-len_control=10"),
+            *(f"-max_total_time={seconds}", f"-artifact_prefix={found}/", "-verbosity=0"),
+            *map(str, folders),
+            external=True,
+        )
+
+
+@weekly()
+def tidy(session):
+    """Run clang-tidy over the headers and the C++ tests."""
+    session.run("cmake", "--preset", "tidy", external=True)
+    session.run("run-clang-tidy.py", "-quiet", "-p", "build/tidy", f"-j{JOBS}")
+
+
+@weekly()
+def slow(session):
+    """Run the tests that are marked slow."""
+    pytest(session, "-m", "slow", "tests")
+
+
+@weekly()
+def coverage(session):
+    """Measure which lines the tests reach, in Python and in C++."""
+    report = ROOT / "build" / "coverage"
+    pytest(session, "--cov=sdnn", f"--cov-report=html:{report}", "--cov-report=term")
+    cmake_build(session, "coverage")
+    session.run("ctest", "--preset", "coverage", "--parallel", JOBS, external=True)
+    filters = ["--filter", "cpp/include/", "--root", str(ROOT), "build/coverage"]
+    python(session, "-m", "gcovr", "--print-summary", "--txt", "build/coverage.txt", *filters)
