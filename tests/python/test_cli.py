@@ -71,7 +71,7 @@ def test_help_and_version(invoke):
         (["reproduce", "a", "--fast"], "--fast"),
         (
             ["reproduce", "a", "--agent", "dqn"],
-            "one of sdnn-c, fql, rbfn, sdnn-c-robust, sdnn-c-general, sdnn-c-small, got 'dqn'",
+            "one of sdnn-c, fuzzy, rbf, sdnn-c-robust, sdnn-c-general, sdnn-c-small, got 'dqn'",
         ),
         (["learn"], "learn"),
     ],
@@ -113,7 +113,7 @@ def test_quick_run_writes_marked_files_and_one_summary_line(invoke, tmp_path):
         ({"n_episodes": 100}, "-100-episodes"),
         ({"n_trials": 2, "n_episodes": 15_000, "seed": 7}, "-2-trials-seed-7"),
         ({"quick": True, "n_trials": 10}, "-10-trials-quick"),
-        ({"agents": ("rbfn", "fql")}, "-rbfn-fql"),
+        ({"agents": ("rbf", "fuzzy")}, "-rbf-fuzzy"),
         ({"agents": ("sdnn-c-robust",)}, "-sdnn-c-robust"),
         ({"agents": ("sdnn-c",), "presets": ("robust",)}, "-sdnn-c-with-robust"),
         ({"presets": ("robust", "general"), "quick": True}, "-robust-general-quick"),
@@ -264,24 +264,24 @@ def test_other_agents_have_files_of_their_own(invoke, tmp_path, no_costs):
     invoke("reproduce", "a", "--quick", "--out", "out")
     before = {path.name: path.read_bytes() for path in (tmp_path / "out").glob("*-quick.*")}
     result = invoke(
-        "reproduce", "a", "--quick", "--out", "out", "--agent", "rbfn", "--agent", "fql"
+        "reproduce", "a", "--quick", "--out", "out", "--agent", "rbf", "--agent", "fuzzy"
     )
     assert "8 of 8 trials are stored in out (8 run now)" in result.stdout.splitlines()[-1]
     assert "RBFN, FQL instead of the agents of its cases" in result.stdout
     names = {path.name for path in (tmp_path / "out").iterdir()} - set(before)
     assert names == {
-        "experiment-a-rbfn-fql-quick.png",
-        "experiment-a-rbfn-fql-quick.svg",
-        "report-rbfn-fql-quick.html",
-        "results-rbfn-fql-quick.csv",
-        "results-rbfn-fql-quick.md",
+        "experiment-a-rbf-fuzzy-quick.png",
+        "experiment-a-rbf-fuzzy-quick.svg",
+        "report-rbf-fuzzy-quick.html",
+        "results-rbf-fuzzy-quick.csv",
+        "results-rbf-fuzzy-quick.md",
         "results.sqlite",
-        "table-rbfn-fql-quick.json",
+        "table-rbf-fuzzy-quick.json",
     }
     assert {name: (tmp_path / "out" / name).read_bytes() for name in before} == before
-    table = json.loads((tmp_path / "out" / "table-rbfn-fql-quick.json").read_text())
+    table = json.loads((tmp_path / "out" / "table-rbf-fuzzy-quick.json").read_text())
     assert [(case["case"], case["agent"]) for case in table["experiments"][0]["cases"]] == [
-        ("s4", "rbfn"), ("s4", "fql"), ("s6", "rbfn"), ("s6", "fql"),
+        ("s4", "rbf"), ("s4", "fuzzy"), ("s6", "rbf"), ("s6", "fuzzy"),
     ]  # fmt: skip
     assert [claim["number"] for claim in table["claims"]] == [3]
 
@@ -299,11 +299,11 @@ def test_a_preset_is_drawn_beside_the_papers_agents(invoke, tmp_path, no_costs):
 
 
 def test_costs_of_other_agents(invoke, no_costs):
-    dry = invoke("reproduce", "cost", "--agent", "rbfn", "--dry-run")
+    dry = invoke("reproduce", "cost", "--agent", "rbf", "--dry-run")
     assert dry.stdout == "cost of a step: 14 measurements, 0 of them stored in results\n"
-    table = json.loads(invoke("reproduce", "cost", "--agent", "rbfn", "--quick", "--json").stdout)
-    assert {cost["series"] for cost in table["costs"]} == {"rbfn", "rbfn-plain"}
-    assert {series for series, _ in no_costs} == {"rbfn", "rbfn-plain"}
+    table = json.loads(invoke("reproduce", "cost", "--agent", "rbf", "--quick", "--json").stdout)
+    assert {cost["series"] for cost in table["costs"]} == {"rbf", "rbf-plain"}
+    assert {series for series, _ in no_costs} == {"rbf", "rbf-plain"}
 
 
 @dataclass(frozen=True)
@@ -390,7 +390,7 @@ def test_a_new_agent_is_one_class_and_one_entry(pumping, tmp_path, monkeypatch):
     assert "(0 run now)" in call("b", "--quick", "--agent", "pumping").stdout
     refused = call("cost", "--agent", "pumping")
     assert refused.exit_code == 2
-    assert "agents whose cost is measured are sdnn-c, fql, rbfn, got pumping" in refused.stderr
+    assert "agents whose cost is measured are sdnn-c, fuzzy, rbf, got pumping" in refused.stderr
 
 
 def test_output_that_is_a_file(invoke, tmp_path):

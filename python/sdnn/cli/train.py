@@ -22,17 +22,17 @@ from sdnn.cli.run_options import (
 if TYPE_CHECKING:
     from sdnn.runs import RunConfig
 
-AGENTS = ("sdnn", "rbf", "fuzzy")
+AGENTS = ("sdnn-c", "rbf", "fuzzy")
 PRESETS = ("general", "small", "robust", "paper")
 
 
 @click.command(short_help="Learn in a Gymnasium environment.")
 @click.argument("env_id", metavar="[ENV_ID]", required=False)
-@click.option("--agent", type=click.Choice(AGENTS), help="Who learns.  [default: sdnn]")
+@click.option("--agent", type=click.Choice(AGENTS), help="Who learns.  [default: sdnn-c]")
 @click.option(
     "--preset",
     type=click.Choice(PRESETS),
-    help="Settings of the agent sdnn.  [default: general]",
+    help="Settings of the agent sdnn-c.  [default: general]",
 )
 @click.option("--steps", type=click.IntRange(min=1), help="How long it learns.  [default: 200000]")
 @click.option("--episodes", type=click.IntRange(min=1), help="The same in episodes.")
@@ -209,7 +209,7 @@ def _config(
         values = {name: v for name, v in values.items() if name not in ("steps", "episodes")}
     for name in given:
         origins.add_option(name)
-    if given.get("agent", "sdnn") != "sdnn" and "preset" not in given:
+    if given.get("agent", "sdnn-c") != "sdnn-c" and "preset" not in given:
         values.pop("preset", None)
     return RunConfig.from_values(
         {**values, "environment": environment, "settings": settings, **given}

@@ -97,7 +97,7 @@ class Experiment:
         return replace(self, cases=cases)
 
 
-BOTH = ("sdnn-c", "fql")
+BOTH = ("sdnn-c", "fuzzy")
 
 EXPERIMENTS = (
     Experiment(

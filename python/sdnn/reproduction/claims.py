@@ -139,14 +139,14 @@ CLAIMS = (
     Claim(
         3,
         "FQL learns within about 100 episodes without noise",
-        (Check(Median("episodes_to_learn", Subject("s4", "fql")), "about 100", at_most=100),),
+        (Check(Median("episodes_to_learn", Subject("s4", "fuzzy")), "about 100", at_most=100),),
     ),
     Claim(
         4,
         "FQL never learns a stable swing-up with noise",
         tuple(
             Check(
-                Median("final_share_solved", Subject(case, "fql")),
+                Median("final_share_solved", Subject(case, "fuzzy")),
                 "unstable",
                 at_most=_BELOW_STABLE,
             )
@@ -220,8 +220,8 @@ CLAIMS = (
             # l (l - 1) groups of columns: 56 / 12 = 4.7 times as many; half and twice that.
             Check(Growth("sdnn-c", 8, 4), "4.7 times", at_least=2.3, at_most=9.4),
             # At least twice with each input: 16 times with four more.
-            Check(Growth("rbfn", 8, 4), "exponential", at_least=16),
-            Check(Growth("rbfn-plain", 8, 4), "exponential", at_least=16),
+            Check(Growth("rbf", 8, 4), "exponential", at_least=16),
+            Check(Growth("rbf-plain", 8, 4), "exponential", at_least=16),
         ),
     ),
 )
@@ -233,7 +233,7 @@ def describe(quantity: Quantity) -> str:
 
     Examples
     --------
-    >>> describe(Growth("rbfn", 8, 4))
+    >>> describe(Growth("rbf", 8, 4))
     'time per step, 8 inputs / 4 inputs: RBFN, factored'
     """
     if isinstance(quantity, Growth):

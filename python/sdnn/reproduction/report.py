@@ -381,7 +381,7 @@ def cost_rows(costs: Sequence[CostRecord]) -> list[tuple[str, ...]]:
             cells.append(
                 "-" if cost is None else _cost(cost, by_key.get((series.id, n_inputs - 1)))
             )
-        table = by_key.get(("fql", n_inputs))
+        table = by_key.get(("fuzzy", n_inputs))
         cells.append("-" if table is None else _size(table.times.table_bytes))
         rows.append(tuple(cells))
     return rows

@@ -177,7 +177,7 @@ class ReproduceRequest:
         return QUICK_COST if self.quick else CostConfig()
 
     def file_name(self, name: str) -> str:
-        """Name of a file of this request, such as ``table-rbfn-3-trials-quick.json``.
+        """Name of a file of this request, such as ``table-rbf-3-trials-quick.json``.
 
         Requests that give other results have other names.
         """

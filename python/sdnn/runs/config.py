@@ -45,7 +45,7 @@ FORMAT_VERSION = 1
 DEFAULT_STEPS = 200_000
 
 AGENTS: Mapping[str, tuple[type[Agent[Any, Any]], type[Any], type[Any]]] = {
-    "sdnn": (SDNNQLearning, SDNNCConfig, QLearningConfig),
+    "sdnn-c": (SDNNQLearning, SDNNCConfig, QLearningConfig),
     "rbf": (RBFQLearning, RBFNetworkConfig, QLearningConfig),
     "fuzzy": (FuzzyQLearning, FuzzyRulesConfig, FuzzyQLearningConfig),
 }
@@ -86,7 +86,7 @@ class RunConfig:
     agent
         A key of `AGENTS`.
     preset
-        A key of `sdnn.agents.PRESETS`, for the agent ``"sdnn"`` only; None: ``"general"`` for it.
+        A key of `sdnn.agents.PRESETS`, for the agent ``"sdnn-c"`` only; None: ``"general"`` for it.
     settings
         What differs from the preset, or from the agent's defaults: tables ``"approximator"``,
         ``"learning"`` and ``"agent"`` (``warm_up_steps``, ``angles``, ``observation_range``) of
@@ -125,7 +125,7 @@ class RunConfig:
     """
 
     environment: RunEnvironment
-    agent: str = "sdnn"
+    agent: str = "sdnn-c"
     preset: str | None = None
     settings: Settings = field(default_factory=dict)
     steps: int | None = None
@@ -143,9 +143,9 @@ class RunConfig:
     def __post_init__(self) -> None:
         if self.agent not in AGENTS:
             raise ConfigError("agent", f"must be one of {_listed(AGENTS)}, got {self.agent!r}")
-        if self.agent != "sdnn" and self.preset is not None:
-            raise ConfigError("preset", f"is for the agent 'sdnn' only, got {self.agent!r}")
-        if self.agent == "sdnn" and self.preset is None:
+        if self.agent != "sdnn-c" and self.preset is not None:
+            raise ConfigError("preset", f"is for the agent 'sdnn-c' only, got {self.agent!r}")
+        if self.agent == "sdnn-c" and self.preset is None:
             object.__setattr__(self, "preset", DEFAULT_PRESET)
         if self.preset is not None and self.preset not in PRESETS:
             raise ConfigError("preset", f"must be one of {_listed(PRESETS)}, got {self.preset!r}")

@@ -221,7 +221,7 @@ register(
 )
 register(
     AgentEntry(
-        id="fql",
+        id="fuzzy",
         title="FQL",
         approximator=FuzzyRulesConfig,
         learning=FuzzyQLearningConfig,
@@ -229,7 +229,7 @@ register(
         core_trial=_core.FuzzyAcrobotTrial,
         costs=(
             CostSeries(
-                id="fql",
+                id="fuzzy",
                 title="FQL",
                 growth="$2^d$ fired rules of $9^d$",
                 learned_bytes=_rules_bytes,
@@ -241,7 +241,7 @@ register(
 )
 register(
     AgentEntry(
-        id="rbfn",
+        id="rbf",
         title="RBFN",
         approximator=RBFNetworkConfig,
         learning=QLearningConfig,
@@ -249,13 +249,13 @@ register(
         core_trial=_core.RBFAcrobotTrial,
         costs=(
             CostSeries(
-                id="rbfn",
+                id="rbf",
                 title="RBFN, factored",
                 growth="$4^{d+1}$ weights",
                 learned_bytes=_rbf_bytes,
             ),
             CostSeries(
-                id="rbfn-plain",
+                id="rbf-plain",
                 title="RBFN, plain",
                 growth="$601 \\cdot 4^{d+1}$ basis values",
                 learned_bytes=_rbf_bytes,

@@ -106,7 +106,7 @@ def read_store(path):
 
 RUN = b"""steps = 1000
 seed = 3
-agent = "sdnn"
+agent = "sdnn-c"
 preset = "general"
 [environment]
 id = "Pendulum-v1"

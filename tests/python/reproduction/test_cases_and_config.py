@@ -37,7 +37,7 @@ def test_experiment_b_is_the_one_of_the_paper():
         ("s5-noise", 5, 0.02, "Fig. 6b"),
         ("s6-noise", 6, 0.02, "Fig. 6c"),
     ]
-    assert all(case.agents == ("sdnn-c", "fql") for case in experiment.cases)
+    assert all(case.agents == ("sdnn-c", "fuzzy") for case in experiment.cases)
     assert [e.id for e in select_experiments("all")] == ["a", "b"]
     assert select_experiments("cost") == ()
 
@@ -140,7 +140,7 @@ def test_changed_code_of_an_agent_is_another_version(monkeypatch):
 def test_config_hash_sees_every_room():
     base = TrialConfig()
     others = [
-        TrialConfig(agent="rbfn", approximator=RBFNetworkConfig(), learning=base.learning),
+        TrialConfig(agent="rbf", approximator=RBFNetworkConfig(), learning=base.learning),
         replace(base, approximator=replace(base.approximator, n_inputs=5)),
         replace(base, learning=replace(base.learning, discount=0.8)),
         replace(base, acrobot=replace(base.acrobot, gravity=9.81)),
@@ -157,13 +157,13 @@ def test_case_config_fits_network_to_sensors():
     config = case_config(experiment.cases[1], "sdnn-c")
     assert config.approximator.n_inputs == config.sensors.n_sensors == 6
     assert config.protocol == ProtocolConfig()
-    with pytest.raises(ValueError, match="'fql'"):
-        case_config(experiment.cases[1], "fql")
+    with pytest.raises(ValueError, match="'fuzzy'"):
+        case_config(experiment.cases[1], "fuzzy")
 
 
 def test_case_config_gives_every_agent_its_own_settings():
     (experiment,) = select_experiments("b")
-    config = case_config(experiment.cases[2], "fql")
+    config = case_config(experiment.cases[2], "fuzzy")
     assert config.approximator == FuzzyRulesConfig(n_inputs=5)
     assert config.learning == FuzzyQLearningConfig()
     assert config.sensors == SensorConfig(n_sensors=5, noise=0.02)
@@ -172,20 +172,20 @@ def test_case_config_gives_every_agent_its_own_settings():
 def test_settings_of_another_agent_are_refused():
     with pytest.raises(ValueError, match="got 'dqn'"):
         TrialConfig(agent="dqn")
-    with pytest.raises(TypeError, match="approximator of fql must be a FuzzyRulesConfig"):
-        TrialConfig(agent="fql")
-    with pytest.raises(TypeError, match="learning of fql must be a FuzzyQLearningConfig"):
-        TrialConfig(agent="fql", approximator=FuzzyRulesConfig())
+    with pytest.raises(TypeError, match="approximator of fuzzy must be a FuzzyRulesConfig"):
+        TrialConfig(agent="fuzzy")
+    with pytest.raises(TypeError, match="learning of fuzzy must be a FuzzyQLearningConfig"):
+        TrialConfig(agent="fuzzy", approximator=FuzzyRulesConfig())
 
 
 def test_an_experiment_with_other_agents_differs_in_nothing_else():
     (experiment,) = select_experiments("b")
-    other = experiment.with_agents(["rbfn", "sdnn-c", "rbfn"])
-    assert {case.agents for case in other.cases} == {("rbfn", "sdnn-c")}
-    assert [replace(case, agents=("sdnn-c", "fql")) for case in other.cases] == list(
+    other = experiment.with_agents(["rbf", "sdnn-c", "rbf"])
+    assert {case.agents for case in other.cases} == {("rbf", "sdnn-c")}
+    assert [replace(case, agents=("sdnn-c", "fuzzy")) for case in other.cases] == list(
         experiment.cases
     )
-    assert ("s4", "rbfn") in other.pairs
+    assert ("s4", "rbf") in other.pairs
     assert experiment.with_agents([]) is experiment
 
 

@@ -139,8 +139,8 @@ def test_good_data_support_claims_and_bad_data_do_not():
 
 def test_fuzzy_q_learning_is_judged_by_the_end():
     cases = ("s4-noise", "s5-noise", "s6-noise")
-    assert verdicts([result(case, "fql", 50) for case in cases])[4] == Verdict.HOLDS
-    assert verdicts([result(case, "fql", 7) for case in cases])[4] == Verdict.FAILS
+    assert verdicts([result(case, "fuzzy", 50) for case in cases])[4] == Verdict.HOLDS
+    assert verdicts([result(case, "fuzzy", 7) for case in cases])[4] == Verdict.FAILS
 
 
 def test_differences_count_censored_values_as_the_last_episode():
@@ -241,7 +241,7 @@ def test_power_draws_medians_as_resampling_does(multiple):
 def test_growth_is_a_ratio_of_medians():
     costs = [
         cost("sdnn-c", 4, [10, 10, 10]), cost("sdnn-c", 8, [50, 50, 50]),
-        cost("rbfn", 4, [1, 1, 1]), cost("rbfn", 8, [200, 220, 210]),
+        cost("rbf", 4, [1, 1, 1]), cost("rbf", 8, [200, 220, 210]),
     ]  # fmt: skip
     (outcome,) = judge_claims([], costs)
     assert outcome.claim.number == 9
@@ -253,14 +253,14 @@ def test_growth_is_a_ratio_of_medians():
     assert outcome.verdict == Verdict.NOT_RUN
     quick = [cost("sdnn-c", n, [10.0 * n] * 3, QUICK_COST) for n in (4, 8)]
     assert judge_claims([], quick)[0].checks[0].verdict == Verdict.NOT_JUDGED
-    polynomial = [*costs[:2], cost("rbfn", 4, [1, 1]), cost("rbfn", 8, [4, 4])]
+    polynomial = [*costs[:2], cost("rbf", 4, [1, 1]), cost("rbf", 8, [4, 4])]
     assert judge_claims([], polynomial)[0].verdict == Verdict.FAILS
 
 
 def test_descriptions_name_both_sides():
     quantity = Difference("final_steps", Subject("s6-noise"), Subject("s4"))
     assert describe(quantity) == "final steps: SDNN-C, 6 noisy inputs less 4 inputs"
-    assert describe(Median("early_steps", Subject("s4", "fql"))) == "early steps: FQL, 4 inputs"
+    assert describe(Median("early_steps", Subject("s4", "fuzzy"))) == "early steps: FQL, 4 inputs"
 
 
 def test_summaries_do_not_mix_measures():

@@ -52,7 +52,7 @@ def test_keys_are_all_series_in_ascending_inputs():
     ]
     assert {key.config_hash for key in keys} == {SMALL.config_hash}
     quick = cost_keys(QUICK_COST)
-    assert max(key.n_inputs for key in quick if key.series == "rbfn-plain") == 5
+    assert max(key.n_inputs for key in quick if key.series == "rbf-plain") == 5
     assert len(quick) == 3 * 7 + 4
     assert replace(SMALL, n_rounds=4).config_hash != SMALL.config_hash
     assert CostConfig().n_inputs == tuple(range(2, 9))
@@ -140,7 +140,7 @@ def test_real_agents_are_measured(entry, series):
     assert times.microseconds.shape == (3,)
     assert (times.microseconds > 0).all()
     assert times.n_steps >= 1
-    sizes = {"sdnn-c": 2 * 200 * 900, "fql": 9**2 * 21 * 4, "rbfn": 4**3 * 8}
+    sizes = {"sdnn-c": 2 * 200 * 900, "fuzzy": 9**2 * 21 * 4, "rbf": 4**3 * 8}
     assert times.table_bytes == sizes[entry.id]
 
 
@@ -148,12 +148,12 @@ def test_what_there_is_no_memory_for_is_left_out():
     def refuse(*_arguments, **_options):
         raise MemoryError
 
-    entry = replace(AGENTS["fql"], agent=refuse)
+    entry = replace(AGENTS["fuzzy"], agent=refuse)
     assert measure_steps(entry, entry.costs[0], 2, SMALL) is None
 
 
 def test_costs_of_some_agents():
-    assert {key.series for key in cost_keys(SMALL, ["rbfn"])} == {"rbfn", "rbfn-plain"}
+    assert {key.series for key in cost_keys(SMALL, ["rbf"])} == {"rbf", "rbf-plain"}
     with pytest.raises(ValueError, match="got 'tiles'"):
         cost_keys(SMALL, ["tiles"])
 

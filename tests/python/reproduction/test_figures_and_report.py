@@ -160,9 +160,9 @@ def test_a_colour_stands_for_an_agent_in_every_figure(tmp_path, fake, run):
         lines = {line.get_color() for line in figure.axes[0].get_lines()}
         return [text.get_text() for text in legend.get_texts()], lines
 
-    titles, one = colors("rbfn")
+    titles, one = colors("rbf")
     assert titles == ["RBFN"]
-    titles, two = colors("rbfn", "sdnn-c")
+    titles, two = colors("rbf", "sdnn-c")
     assert titles == ["RBFN", "SDNN-C"]
     assert one < two
     assert len(two) == 2

@@ -104,7 +104,7 @@ def test_chances_need_trials_of_every_subject():
     difference = Difference("final_steps", Subject("s6-noise"), Subject("s4"))
     claim = Claim(7, "", (Check(difference, "", at_most=2),))
     assert TenTrials([measured("s4", [4, 4])]).chance(claim) is None
-    growth = Claim(9, "", (Check(Growth("rbfn", 8, 4), "", at_least=16),))
+    growth = Claim(9, "", (Check(Growth("rbf", 8, 4), "", at_least=16),))
     assert TenTrials([measured("s4", [4, 4])]).chance(growth) is None
 
 
@@ -161,7 +161,7 @@ def test_the_kept_trials_are_of_the_papers_settings():
         assert one.root_seed != 0  # what `sdnn reproduce` runs as it comes is not among them
 
 
-@pytest.mark.parametrize("agent", ["sdnn-c", "fql"])
+@pytest.mark.parametrize("agent", ["sdnn-c", "fuzzy"])
 def test_a_kept_trial_is_what_running_it_gives(tmp_path, agent):
     kept = next(one for one in kept_trials() if (one.case_id, one.agent) == ("s4", agent))
     plan = plan_trials([CASES["s4"]], 1, kept.root_seed, ProtocolConfig())

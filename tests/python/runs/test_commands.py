@@ -61,7 +61,7 @@ def test_train_evaluate_plot_record(invoke, tmp_path):
     done = invoke("train", DRIFTING, *SHORT, "--seed", 3)
     assert done.exit_code == 0, done.output
     assert done.stderr == ""  # no progress where there is no terminal
-    folder = Path("runs/drifting_env-tests-Drifting-v0-sdnn-3")
+    folder = Path("runs/drifting_env-tests-Drifting-v0-sdnn-c-3")
     lines = done.stdout.splitlines()
     assert lines[0].startswith(f"{folder}: 150 steps, ")
     assert lines[1].startswith("last evaluation, after 140 steps: mean return ")
@@ -276,7 +276,7 @@ def test_what_a_figure_leaves_out_is_told(invoke, tmp_path):
 
 def test_dry_run_shows_the_configuration_and_writes_nothing(invoke, tmp_path):
     done = invoke(
-        "train", "CartPole-v1", "--agent", "sdnn", "--preset", "robust", "--episodes", 7,
+        "train", "CartPole-v1", "--agent", "sdnn-c", "--preset", "robust", "--episodes", 7,
         "--noise", 0.1, "--redundant", 2, "--range", "-4:4", "--range", "1=-3:3",
         "--set", "learning.discount=0.5", "--set", "learning.tie_rule=middle",
         "--set", "approximator.circular=[true, false]", "--env-arg", "max_episode_steps=50",
@@ -285,7 +285,7 @@ def test_dry_run_shows_the_configuration_and_writes_nothing(invoke, tmp_path):
     )  # fmt: skip
     assert done.exit_code == 0, done.output
     values = json.loads(done.stdout)
-    assert values.pop("folder") == "runs/CartPole-v1-sdnn-0"
+    assert values.pop("folder") == "runs/CartPole-v1-sdnn-c-0"
     assert values["environment"] == {
         "id": "CartPole-v1",
         "kwargs": {"max_episode_steps": 50},
@@ -327,7 +327,7 @@ def test_options_come_before_a_file(invoke, tmp_path):
     assert (values["agent"], values.get("preset")) == ("rbf", None)
     invoke("train", "--config", "mine.toml", "--out", "one", *SMALL)
     again = json.loads(invoke("train", "--config", "one/config.json", "--dry-run").stdout)
-    assert again.pop("folder") == "runs/CartPole-v1-sdnn-8"
+    assert again.pop("folder") == "runs/CartPole-v1-sdnn-c-8"
     assert RunConfig.from_values(again) == Run.open("one").config
 
 

@@ -204,8 +204,8 @@ def test_tests_without_noise_have_none(watched):
     ("agent", "approximator", "learning"),
     [
         ("sdnn-c", SDNNCConfig(n_inputs=3), None),
-        ("rbfn", RBFNetworkConfig(n_inputs=3), None),
-        ("fql", FuzzyRulesConfig(n_inputs=3), FuzzyQLearningConfig()),
+        ("rbf", RBFNetworkConfig(n_inputs=3), None),
+        ("fuzzy", FuzzyRulesConfig(n_inputs=3), FuzzyQLearningConfig()),
     ],
 )
 def test_every_agent_runs_and_the_seed_fixes_the_rows(agent, approximator, learning):
@@ -272,5 +272,5 @@ def test_agent_and_settings_must_fit():
     environment = EnvironmentConfig(id="Pendulum-v1")
     with pytest.raises(ValueError, match="agent must be one of"):
         EnvironmentTrialConfig(environment=environment, agent="dqn")
-    with pytest.raises(TypeError, match="approximator of fql must be a FuzzyRulesConfig"):
-        EnvironmentTrialConfig(environment=environment, agent="fql")
+    with pytest.raises(TypeError, match="approximator of fuzzy must be a FuzzyRulesConfig"):
+        EnvironmentTrialConfig(environment=environment, agent="fuzzy")

@@ -16,7 +16,7 @@ FULL = RunConfig(
         noise=0.02,
         redundant=2,
     ),
-    agent="sdnn",
+    agent="sdnn-c",
     preset="robust",
     settings={
         "learning": {"discount": 0.95, "tie_rule": "middle"},
@@ -45,7 +45,7 @@ def test_a_configuration_survives_json_and_a_file(tmp_path):
 def test_defaults():
     config = RunConfig(environment=CART_POLE)
     assert (config.agent, config.preset, config.steps, config.episodes) == (
-        "sdnn", "general", 200_000, None,
+        "sdnn-c", "general", 200_000, None,
     )  # fmt: skip
     assert RunConfig(environment=CART_POLE, episodes=5).steps is None
     assert RunConfig(environment=CART_POLE, agent="rbf").preset is None
@@ -90,7 +90,7 @@ def test_toml(tmp_path):
             "settings.approximator.n_inputs",
             "follows from the observations",
         ),
-        ('environment = "A"\nagent = "dqn"\n', ":2", "agent", "one of 'sdnn', 'rbf', 'fuzzy'"),
+        ('environment = "A"\nagent = "dqn"\n', ":2", "agent", "one of 'sdnn-c', 'rbf', 'fuzzy'"),
         ('environment = "A"\npreset = "best"\n', ":2", "preset", "got 'best'"),
         ('environment = "A"\nformat = "sdnn-run-9"\n', ":2", "format", "newer version"),
         ('environment = "A"\nformat = "cake"\n', ":2", "format", "must be sdnn-run-1"),
@@ -168,7 +168,7 @@ def test_ranges_are_given_or_seen():
 
 def test_agents_are_made_with_preset_and_settings():
     env = CART_POLE.make()
-    kinds = {"sdnn": SDNNQLearning, "rbf": RBFQLearning}
+    kinds = {"sdnn-c": SDNNQLearning, "rbf": RBFQLearning}
     for name, kind in kinds.items():
         config = RunConfig(
             environment=CART_POLE,

@@ -38,7 +38,7 @@ def python_trial(config, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "agent", ["sdnn-c", "sdnn-c-robust", "sdnn-c-general", "sdnn-c-small", "fql", "rbfn"]
+    "agent", ["sdnn-c", "sdnn-c-robust", "sdnn-c-general", "sdnn-c-small", "fuzzy", "rbf"]
 )
 @pytest.mark.parametrize(("n_sensors", "noise"), [(4, 0.0), (4, 0.02), (5, 0.02), (6, 0.02)])
 def test_it_reproduces_the_compiled_trial_bit_for_bit(agent, n_sensors, noise, monkeypatch):
@@ -62,7 +62,7 @@ def test_it_reproduces_the_compiled_trial_bit_for_bit(agent, n_sensors, noise, m
 
 
 def test_the_settings_of_the_task_reach_it(monkeypatch):
-    config = config_of("fql")
+    config = config_of("fuzzy")
     config = replace(
         config,
         approximator=replace(config.approximator, n_inputs=6),
@@ -83,7 +83,7 @@ def test_the_settings_of_the_task_reach_it(monkeypatch):
 
 
 def test_before_its_first_test_it_has_no_rows(monkeypatch):
-    trial = python_trial(config_of("fql"), monkeypatch)
+    trial = python_trial(config_of("fuzzy"), monkeypatch)
     trial.advance(4)
     assert {name: column.size for name, column in trial.test_rows().items()} == {
         "episode": 0, "steps": 0, "episode_return": 0, "solved": 0,
@@ -102,7 +102,7 @@ def test_before_its_first_test_it_has_no_rows(monkeypatch):
     ],
 )
 def test_both_refuse_the_same(compiled, change, message, monkeypatch):
-    config = config_of("rbfn")
+    config = config_of("rbf")
     for name, value in change.items():
         part = replace(getattr(config, name), **value) if isinstance(value, dict) else value
         config = replace(config, **{name: part})
@@ -112,7 +112,7 @@ def test_both_refuse_the_same(compiled, change, message, monkeypatch):
 
 
 def test_episodes_cannot_be_taken_back(monkeypatch):
-    config = config_of("rbfn")
+    config = config_of("rbf")
     for trial in (config.make_trial(SEED), python_trial(config, monkeypatch)):
         with pytest.raises(ValueError, match="n_episodes"):
             trial.advance(-1)
@@ -152,10 +152,10 @@ def test_asking_a_trials_agent_for_values_changes_nothing_that_follows():
 
 def test_ids_are_registered_once():
     before = dict(AGENTS)
-    with pytest.raises(ValueError, match="agent 'fql' is already registered"):
-        register(entry_of("fql"))
-    with pytest.raises(ValueError, match="series 'rbfn-plain' is already registered"):
-        register(entry_of("new", "rbfn-plain"))
+    with pytest.raises(ValueError, match="agent 'fuzzy' is already registered"):
+        register(entry_of("fuzzy"))
+    with pytest.raises(ValueError, match="series 'rbf-plain' is already registered"):
+        register(entry_of("new", "rbf-plain"))
     with pytest.raises(ValueError, match="series 'twice' is already registered"):
         register(entry_of("new", "twice", "twice"))
     with pytest.raises(ValueError, match=r"id must be of letters.*got '\.\./x'"):
@@ -165,14 +165,14 @@ def test_ids_are_registered_once():
 
 def test_agents_are_looked_up_by_id():
     assert [(entry.id, entry.title) for entry in AGENTS.values()] == [
-        ("sdnn-c", "SDNN-C"), ("fql", "FQL"), ("rbfn", "RBFN"),
+        ("sdnn-c", "SDNN-C"), ("fuzzy", "FQL"), ("rbf", "RBFN"),
         ("sdnn-c-robust", "SDNN-C, robust"), ("sdnn-c-general", "SDNN-C, general"),
         ("sdnn-c-small", "SDNN-C, small"),
     ]  # fmt: skip
     assert all(agent_entry(name) is entry for name, entry in AGENTS.items())
     with pytest.raises(
         ValueError,
-        match="one of sdnn-c, fql, rbfn, sdnn-c-robust, sdnn-c-general, sdnn-c-small, got 'dqn'",
+        match="one of sdnn-c, fuzzy, rbf, sdnn-c-robust, sdnn-c-general, sdnn-c-small, got 'dqn'",
     ):
         agent_entry("dqn")
 
@@ -190,8 +190,8 @@ def test_a_registered_dataclass_is_the_configuration_of_its_agent(monkeypatch):
     [
         ("sdnn-c", 4, 0.0, "75969d030c881084"),
         ("sdnn-c", 6, 0.02, "7f9e03d9ab939cb7"),
-        ("fql", 4, 0.0, "fac3141ec70d25dd"),
-        ("rbfn", 4, 0.0, "6ccdbbe4ab0ad530"),
+        ("fuzzy", 4, 0.0, "3b9503da80643d76"),
+        ("rbf", 4, 0.0, "bc47a6ff5ba0ce78"),
     ],
 )
 def test_the_papers_settings_have_the_hashes_under_which_results_are_stored(

@@ -196,15 +196,15 @@ cases = ["s4", "s4-noise", "s5-noise", "s6-noise"]
 [variants.old]
 [variants.new]
 learning.discount = 0.8
-[variants.fql]
-agent = "fql"
+[variants.fuzzy]
+agent = "fuzzy"
 """
 
 
 def claimed_records(study, n_trials=10):
     """As the paper's curves: Case II collapses at about 7,500; but not with `new`."""
     good, lost = steps_of((1500, 4)), steps_of((750, 4), (750, 50))
-    for variant in ("old", "new", "fql"):
+    for variant in ("old", "new", "fuzzy"):
         for case in ("s4", "s4-noise", "s5-noise", "s6-noise"):
             steps = lost if case == "s4-noise" and variant == "old" else good
             for number in range(n_trials):
@@ -225,7 +225,7 @@ def test_claims_are_judged_for_each_variant(study):
         "new": {
             5: (Verdict.FAILS, True), 6: (Verdict.FAILS, True), 7: (Verdict.HOLDS, False),
         },
-        "fql": {3: (Verdict.HOLDS, None), 4: (Verdict.FAILS, None)},
+        "fuzzy": {3: (Verdict.HOLDS, None), 4: (Verdict.FAILS, None)},
     }  # fmt: skip
     assert [claim.number for claim in found.claims_shown] == [3, 4, 5, 6, 7]
     report = StudyReport(comparison=found, version="1", digest="0")
@@ -260,7 +260,7 @@ def test_chances_are_shown_from_twice_the_papers_trials_on(study):
     assert rows == [
         ("old", "-", "-", always, always, always, always),
         ("new", "-", "-", never, never, always, never),
-        ("fql", always, never, "-", "-", "-", never),
+        ("fuzzy", always, never, "-", "-", "-", never),
     ]
     told = {(c["variant"], c["number"]): c["ten_trials_show_it"] for c in to_json(report)["claims"]}
     assert told["new", 6] == {"value": 0.0, "lower": 0.0, "upper": 0.0}

@@ -28,7 +28,7 @@ def test_trials_of_the_same_configuration_count_first():
 
 
 def test_then_those_of_the_same_case_and_agent():
-    times = [stored(50.0, config_hash="other"), stored(9.0, agent="fql")]
+    times = [stored(50.0, config_hash="other"), stored(9.0, agent="fuzzy")]
     found = Durations(times).of_trial(KEY, CONFIG)
     assert found.lower == found.upper == pytest.approx(50.25)
     assert found.source == "1 stored trial of this case and agent"

@@ -64,7 +64,7 @@ def test_later_layers_override_earlier_ones(study):
         [agents.sdnn-c]
         learning.discount = 0.2
         learning.learning_rate = 0.22
-        [agents.rbfn]
+        [agents.rbf]
         learning.discount = 0.25
         [cases.own]
         title = "my own"
@@ -77,7 +77,7 @@ def test_later_layers_override_earlier_ones(study):
         [variants.b.cases.own]
         learning.discount = 0.5
         [variants.c]
-        agent = "rbfn"
+        agent = "rbf"
         """
     )
     values = {
@@ -159,7 +159,7 @@ def test_axes_combine_to_a_product(study):
         + """
         [axes]
         combine = "product"
-        agent = ["sdnn-c", "fql"]
+        agent = ["sdnn-c", "fuzzy"]
         goal.scale = [50, 100]
         acrobot.integration_step = [0.02]
         [variants.paper]
@@ -169,17 +169,17 @@ def test_axes_combine_to_a_product(study):
         "paper",
         "agent=sdnn-c, scale=50, integration_step=0.02",
         "agent=sdnn-c, scale=100, integration_step=0.02",
-        "agent=fql, scale=50, integration_step=0.02",
-        "agent=fql, scale=100, integration_step=0.02",
+        "agent=fuzzy, scale=50, integration_step=0.02",
+        "agent=fuzzy, scale=100, integration_step=0.02",
     ]
     assert found.reference == "paper"
-    last = configs(found)["s4", "agent=fql, scale=100, integration_step=0.02"]
-    assert (last.agent, last.goal.scale) == ("fql", 100.0)
+    last = configs(found)["s4", "agent=fuzzy, scale=100, integration_step=0.02"]
+    assert (last.agent, last.goal.scale) == ("fuzzy", 100.0)
 
 
 def test_axes_of_the_same_last_word_have_whole_names(study):
     text = PAPER + "[axes]\nlearning.epsilon = [0.2]\nsensors.noise = [0.1]\n"
-    text += "[variants.other]\nagent = 'fql'\n"
+    text += "[variants.other]\nagent = 'fuzzy'\n"
     found = study(text.replace("sensors.noise", "goal.floor").replace("[0.1]", "[0.02]"))
     assert [v.id for v in found.variants] == ["base", "other", "epsilon=0.2", "floor=0.02"]
     text = "[base]\nenvironment.id = 'Pendulum-v1'\n[axes]\n"
@@ -304,7 +304,7 @@ WRONG = {
     "study value": ("[study]\ntrials = 'x'\n", 2, "study.trials: must be a whole number, got 'x'"),
     "trials": ("[study]\ntrials = 0\n", 2, "study.trials: must be at least 1, got 0"),
     "seed": ("[study]\nseed = -1\n", 2, "study.seed: must be at least 0, got -1"),
-    "no cases": ("[base]\nagent = 'fql'\n", None, "no cases: give some of the paper's"),
+    "no cases": ("[base]\nagent = 'fuzzy'\n", None, "no cases: give some of the paper's"),
     "case": (
         "[study]\ncases = [\n 's4',\n 's5-nois',\n]\n", 4,
         "study.cases[1]: no case 's5-nois': neither a table [cases.s5-nois] nor a case of the"
@@ -332,13 +332,13 @@ WRONG = {
         "study.imports[1]: importing not_there_at_all failed: ModuleNotFoundError",
     ),
     "agent": (
-        "[cases.s4]\n[variants.a]\nagent = 'fqll'\n", 3,
-        "variants.a.agent: no agent 'fqll'; possible: fql, sdnn-c",
+        "[cases.s4]\n[variants.a]\nagent = 'fuzzyy'\n", 3,
+        "variants.a.agent: no agent 'fuzzyy'; possible: fuzzy, sdnn-c",
     ),
     "agents": ("[agents.dqn]\n[cases.s4]\n", 1, "agents.dqn: no such agent; possible: sdnn-c"),
     "agent of agents": (
-        "[agents.fql]\nagent = 'rbfn'\n[cases.s4]\n", 2,
-        "agents.fql.agent: settings of an agent cannot choose another one",
+        "[agents.fuzzy]\nagent = 'rbf'\n[cases.s4]\n", 2,
+        "agents.fuzzy.agent: settings of an agent cannot choose another one",
     ),
     "section": (
         "[cases.s4]\n[base]\n\nlerning.discount = 0.5\n", 4,
@@ -349,7 +349,7 @@ WRONG = {
         "base.learning.discont: QLearningConfig has no such setting; possible: discount,",
     ),
     "setting of another agent": (
-        "[cases.s4]\n[base]\nlearning.learning_rate = 0.1\n[variants.f]\nagent = 'fql'\n", 3,
+        "[cases.s4]\n[base]\nlearning.learning_rate = 0.1\n[variants.f]\nagent = 'fuzzy'\n", 3,
         "base.learning.learning_rate: FuzzyQLearningConfig has no such setting; possible:"
         " learning_coefficient,",
     ),
@@ -467,7 +467,7 @@ def test_errors_name_file_line_and_key(study, name, tmp_path):
         ),
         ("[cases.x]\nsensors.n_sensors = 9\n", 2, "cases.x.sensors.n_sensors: n_sensors"),
         (
-            "[base]\nenvironment = 'MountainCar-v0'\n[variants.f]\nagent = 'fql'\n", 3,
+            "[base]\nenvironment = 'MountainCar-v0'\n[variants.f]\nagent = 'fuzzy'\n", 3,
             "variants.f: action_space must be a Box, got Discrete (case MountainCar-v0,",
         ),
         (
