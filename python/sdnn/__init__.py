@@ -8,6 +8,7 @@ Rooms, from the network up (each is imported when first used):
   (room ``sdnn.estimators``, needs ``sdnn[sklearn]``); ``sdnn.coding``: how inputs become patterns;
   ``sdnn.kernel``: what generalizes to what
 - ``sdnn.environments``: the acrobot swing-up, redundant and noisy sensors
+- ``sdnn.export``: trained agents as C headers, also as the command ``sdnn export``
 - ``sdnn.reproduction``: the paper's experiments, also as the command ``sdnn reproduce``
 - ``sdnn.runs``: agents that learn in folders of their own, also as the command ``sdnn train``
 - ``sdnn.benchmarks``: how quick all this is here, also as the command ``sdnn bench``
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
         coding,
         environments,
         estimators,
+        export,
         kernel,
         reproduction,
         runs,
@@ -50,6 +52,7 @@ __all__ = [
     "coding",
     "environments",
     "estimators",
+    "export",
     "instruction_set",
     "kernel",
     "reproduction",

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import gymnasium as gym
 
-from sdnn.agents import SDNNQLearning, c_header
+from sdnn.agents import SDNNQLearning
 from sdnn.cli import main
+from sdnn.export import c_header
 
 TEXT = (Path(__file__).parents[2] / "docs" / "small-processors.md").read_text()
 

@@ -1,7 +1,6 @@
 """Agents: ``agent.train(env, steps=...)``, or ``act(observation)`` and ``learn(transition)``."""
 
 from sdnn.agents.agent import Agent, load_agent
-from sdnn.agents.c_headers import CHeader, c_header, export_c_header
 from sdnn.agents.callbacks import Checkpoints, EarlyStop, JSONLines, Schedule, TensorBoard
 from sdnn.agents.evaluation import Evaluation, evaluate
 from sdnn.agents.fixed_rate import FixedRate
@@ -16,7 +15,6 @@ from sdnn.agents.transition import Transition, UnusableStepError
 __all__ = [
     "PRESETS",
     "Agent",
-    "CHeader",
     "Callback",
     "Checkpoints",
     "EarlyStop",
@@ -37,8 +35,6 @@ __all__ = [
     "Transition",
     "UnrepeatedEpisodeError",
     "UnusableStepError",
-    "c_header",
     "evaluate",
-    "export_c_header",
     "load_agent",
 ]

@@ -106,14 +106,3 @@ class Scaling:
         if n not in (None, n_variables):
             raise ValueError(f"scaling must be of {n_variables} observed numbers, got {n}")
         return scaling
-
-    def c_comment(self) -> str:
-        """Say it at the top of a C header."""
-        lines = (
-            "What this policy observes is scaled, since its run had noise or redundant variables:",
-            "each variable from its range to [0, 1], (value - low) / (high - low), and what lies",
-            "beyond the range to 0 or 1. Wherever an observation has units below, it is these.",
-            "",
-            *(f"  {line}" for line in self.lines()),
-        )
-        return "\n".join(["/* " + lines[0], *(f" * {one}".rstrip() for one in lines[1:]), " */\n"])

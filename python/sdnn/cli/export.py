@@ -38,7 +38,8 @@ def export(
     The header observes what the agent did: with --noise or --redundant, variables scaled to [0, 1].
     It says from which ranges.
     """
-    from sdnn.agents import c_header, load_agent
+    from sdnn.agents import load_agent
+    from sdnn.export import c_header
     from sdnn.runs import Run
     from sdnn.whole_files import write_whole
 

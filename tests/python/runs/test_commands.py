@@ -22,7 +22,6 @@ from sdnn.agents import (
     RBFQLearning,
     SDNNQLearning,
     Training,
-    c_header,
     evaluate,
     load_agent,
 )
@@ -31,6 +30,7 @@ from sdnn.cli.run_options import option_of, value_of
 from sdnn.cli.train import AGENTS as AGENT_WORDS
 from sdnn.cli.train import PRESETS as PRESET_WORDS
 from sdnn.environments import UnitSensors
+from sdnn.export import c_header
 from sdnn.runs import AGENTS, Run, RunConfig
 
 SMALL = (

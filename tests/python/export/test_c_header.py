@@ -20,11 +20,10 @@ from sdnn.agents import (
     RBFQLearning,
     SDNNQLearning,
     Transition,
-    c_header,
-    export_c_header,
 )
 from sdnn.approximators import SDNNCConfig
 from sdnn.coding import RandomInverse
+from sdnn.export import c_header, export_c_header
 
 Box, Discrete = gym.spaces.Box, gym.spaces.Discrete
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")
@@ -570,7 +569,7 @@ def test_the_example_balances_as_the_agent_does(needs, tmp_path):
 
 
 def test_docstrings():
-    result = doctest.testmod(importlib.import_module("sdnn.agents.c_headers"))
+    result = doctest.testmod(importlib.import_module("sdnn.export.c_header"))
     assert result.failed == 0
     assert result.attempted > 0
 

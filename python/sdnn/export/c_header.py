@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -17,38 +17,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn._core import __version__
-from sdnn.agents.agent import Agent
-from sdnn.agents.c_tables import (
-    Tables,
-    bit_planes,
-    by_dimension,
-    directions,
-    fixed_bounds,
-    joined,
-    table_lines,
-    turns,
-    used_units,
-    wrapped,
-)
-from sdnn.agents.q_learning import SDNNQLearning
+from sdnn.agents import Agent, Scaling, SDNNQLearning
 from sdnn.arguments import path_of, whole
+from sdnn.export.conversions import Input, conversions
+from sdnn.export.tables import Tables, bit_planes, by_dimension, joined, table_lines, wrapped
 from sdnn.whole_files import write_whole
 
 __all__ = ["CHeader", "c_header", "export_c_header"]
 
-_TEMPLATE = "c_header.template"
-
 _LARGEST_NAME = 40
 _DEFAULT_FRACTION_BITS = 16
 _MOST_FRACTION_BITS = 30
-_MOST_UNITS = 65535
-"""Hidden units whose numbers fit 16 bits."""
-_MOST_WEIGHTS = 2**26
-"""Some hundred megabytes of text; no small processor holds as many."""
+_MOST_UNITS = 65535  # whose numbers fit 16 bits
+_MOST_WEIGHTS = 2**26  # some hundred megabytes of text; no small processor holds as many
 
 _BYTES_OF_UNIT = 8
-_BYTES_OF_NETWORK = 28
-"""A struct of five pointers and two sizes where pointers have 32 bits."""
+_BYTES_OF_NETWORK = 28  # a struct of five pointers and two sizes, where pointers have 32 bits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +128,8 @@ def c_header(agent: Agent[Any, Any], name: str, *, fraction_bits: int | None = N
     Examples
     --------
     >>> import gymnasium as gym
-    >>> from sdnn.agents import SDNNQLearning, c_header
+    >>> from sdnn.agents import SDNNQLearning
+    >>> from sdnn.export import c_header
     >>> env = gym.make("MountainCar-v0")
     >>> agent = SDNNQLearning(env.observation_space, env.action_space, preset="small")
     >>> header = c_header(agent, "car")
@@ -158,17 +143,13 @@ def c_header(agent: Agent[Any, Any], name: str, *, fraction_bits: int | None = N
             "agent must be an SDNNQLearning, whose network is integers only,"
             f" got {type(agent).__name__}"
         )
-    return _Writer(agent, _checked_name(name), fraction_bits).header()
-
-
-def _checked_name(name: Any) -> str:
     fits = isinstance(name, str) and re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name)
     if not fits or len(name) > _LARGEST_NAME:
         raise ValueError(
             "name must be a C identifier of letters, digits and single underscores between them,"
             f" at most {_LARGEST_NAME} long, got {name!r}"
         )
-    return str(name)
+    return _Writer(agent, name, fraction_bits).header()
 
 
 class _Writer:
@@ -186,13 +167,22 @@ class _Writer:
         self.sizes, self.learning = agent.approximator, agent.learning
         description = agent.description()
         self.start: list[int] = description["action"].get("start", [])
-        self.low, self.high = (description["observation"][end] for end in ("low", "high"))
-        self.inputs: list[dict[str, Any]] = description["observation"]["inputs"]
-        self.n_bins = [len(self.networks[0].table(i)) for i in range(len(self.inputs))]
+        self.inputs = self._inputs(description["observation"])
+        self.n_observed = len(description["observation"]["low"])
         self.n_columns = self.sizes.n_pairs * self.sizes.n_pattern_units
+        self.index_type = "uint8_t" if self.sizes.n_pattern_units <= 256 else "uint16_t"
         self._check_sizes()
         self.box = self._box()
         self.fraction_bits = self._checked_fraction_bits(fraction_bits)
+
+    def _inputs(self, observation: dict[str, Any]) -> list[Input]:
+        inputs = []
+        for i, one in enumerate(observation["inputs"]):
+            ((kind, at),) = one.items()
+            at = [at] if isinstance(at, int) else at
+            low, high = (observation[end][at[0]] for end in ("low", "high"))
+            inputs.append(Input(kind, at, low, high, len(self.networks[0].table(i))))
+        return inputs
 
     def _check_sizes(self) -> None:
         n_units = self.sizes.n_hidden_units
@@ -217,9 +207,9 @@ class _Writer:
         n_actions = range(self.networks[0].n_actions)
         return np.stack([np.ravel(actions.element([i] * len(self.networks))) for i in n_actions])
 
-    def _checked_fraction_bits(self, asked: int | None) -> int:
-        told = [one.get("variable", one.get("circular")) for one in self.inputs]
-        numbers = [abs(end[i]) for i in told if i is not None for end in (self.low, self.high)]
+    def _checked_fraction_bits(self, given: int | None) -> int:
+        ranges = [one for one in self.inputs if one.kind in ("variable", "circular")]
+        numbers = [abs(end) for one in ranges for end in (one.low, one.high)]
         if self.box is not None:
             numbers += np.abs(self.box.astype(np.float64)).reshape(-1).tolist()
         largest = max(numbers, default=0.0)
@@ -231,9 +221,9 @@ class _Writer:
                 "observation ranges and actions must be below 2^31 in a C header,"
                 f" got {largest:g}: scale them"
             )
-        if asked is None:
+        if given is None:
             return min(most, _DEFAULT_FRACTION_BITS)
-        bits = whole("fraction_bits", asked, 0, _MOST_FRACTION_BITS)
+        bits = whole("fraction_bits", given, 0, _MOST_FRACTION_BITS)
         if bits > most:
             raise ValueError(
                 f"fraction_bits must be at most {most}, so that {largest:g} fits 32 bits,"
@@ -243,61 +233,67 @@ class _Writer:
 
     def header(self) -> CHeader:
         """Make the header."""
-        tables, fixed_tables = self._common_tables(), Tables()
-        networks, n_units, n_words = [], [], 0
+        name, sizes = self.name, self.sizes
+        tables = self._common_tables()
+        units_of, rows, n_units, n_words = list[str](), list[str](), list[int](), 0
         for d, network in enumerate(self.networks):
-            used, first_units = used_units(network, self.sizes.n_active_units)
+            # Only the units that are in a window, and where among them the windows begin.
+            first = network.first_units().astype(np.intp)
+            used = np.unique(first[:, None] + np.arange(sizes.n_active_units))
             weights, n_bits, lowest = bit_planes(network.averaged_weights()[used])
-            units = zip(
-                network.averaged_thresholds()[used].tolist(),
-                lowest.tolist(),
-                n_bits.tolist(),
-                strict=True,
-            )
+            thresholds = network.averaged_thresholds()[used]
+            units = np.stack([thresholds, lowest, n_bits], axis=1).tolist()
             self._add_wiring(tables, d, network)
-            tables.add("uint32_t", f"{self.name}_weights_{d}", weights)
-            tables.add("uint16_t", f"{self.name}_first_units_{d}", first_units)
+            tables.add("uint32_t", f"{name}_weights_{d}", weights)
+            tables.add("uint16_t", f"{name}_first_units_{d}", np.searchsorted(used, first))
             tables.n_bytes += _BYTES_OF_UNIT * used.size + _BYTES_OF_NETWORK
-            networks += [
-                f"static const {self.name}_unit {self.name}_units_{d}[{used.size}] = {{",
+            units_of += [
+                f"static const {name}_unit {name}_units_{d}[{used.size}] = {{",
                 *wrapped(f"{{{h}, {low}, {bits}}}" for h, low, bits in units),
                 "};",
             ]
+            parts = ("patterns", "modifiers", "permutations", "weights", "units", "first_units")
+            names = ", ".join(f"{name}_{part}_{d}" for part in parts)
+            rows.append(f"  {{{names}, {used.size}, {network.n_actions}}},")
             n_units.append(used.size)
             n_words += weights.size
-        networks += self._table_of_networks(n_units)
-        bins_of_fixed, bins_of_double = self._conversions(fixed_tables)
-
+        declaration = f"static const {name}_network {name}_networks[{len(rows)}] = {{"
+        fixed_tables, bins_of_fixed, bins_of_double = conversions(
+            self.inputs, name, self.fraction_bits
+        )
         n_code_words, n_fire_words = -(-self.n_columns // 32), -(-max(n_units) // 32)
         most_actions = max(network.n_actions for network in self.networks)
         ram_bytes = 8 * n_code_words + 4 * n_fire_words + 2 * most_actions + 8 * len(self.inputs)
         flash_bytes = tables.n_bytes + fixed_tables.n_bytes
-        n_weights = sum(n_units) * self.n_columns
         values = {
             "version": __version__,
             "seed": self.agent.seed,
-            "description": self._description(n_units),
+            "description": (
+                f"{len(self.inputs)} inputs, {sizes.n_pattern_units} units per pattern,"
+                f" {' + '.join(map(str, n_units))} hidden units in use,"
+                f" {' x '.join(str(network.n_actions) for network in self.networks)} actions"
+            ),
             "flash_bytes": f"{flash_bytes:,}",
             "weight_bytes": f"{4 * n_words:,}",
-            "weight_bits": f"{32 * n_words / n_weights:.2f}",
+            "weight_bits": f"{32 * n_words / (sum(n_units) * self.n_columns):.2f}",
             "ram_bytes": f"{ram_bytes:,}",
-            "float_ram_bytes": f"{8 * len(self.low):,}",
+            "float_ram_bytes": f"{8 * self.n_observed:,}",
             "n_words": f"{n_words:,}",
             "usage": joined(f" * {line}".rstrip() for line in self._usage()),
-            "n_observed": len(self.low),
+            "n_observed": self.n_observed,
             "n_inputs": len(self.inputs),
             "n_dimensions": len(self.networks),
             "fraction_bits": self.fraction_bits,
             "tables": tables.text(),
-            "permutation_type": self._permutation_type,
-            "networks": joined(networks),
+            "permutation_type": self.index_type,
+            "networks": joined([*units_of, declaration, *rows, "};"]),
             "n_code_words": n_code_words,
             "n_fire_words": n_fire_words,
             "most_actions": most_actions,
-            "n_pattern_units": self.sizes.n_pattern_units,
-            "n_partners": self.sizes.n_pairs // len(self.inputs),
-            "pattern_bytes": -(-self.sizes.n_pattern_units // 8),
-            "n_active_units": self.sizes.n_active_units,
+            "n_pattern_units": sizes.n_pattern_units,
+            "n_partners": sizes.n_pairs // len(self.inputs),
+            "pattern_bytes": -(-sizes.n_pattern_units // 8),
+            "n_active_units": sizes.n_active_units,
             "widen": "  best = ${name}_ties[best];\n" if self.learning.tie_tolerance > 0.0 else "",
             **(_LOWEST if self.learning.tie_rule == "lowest" else _MIDDLE),
             **(_OF_VECTORS if self.is_vector else _OF_NUMBERS),
@@ -306,14 +302,13 @@ class _Writer:
             "float_tables": self._float_tables(),
             "bins_of_double": joined(bins_of_double),
         }
-        scaling = self.agent.scaling
-        comment = "" if scaling is None else scaling.c_comment()
-        text = files("sdnn.agents").joinpath(_TEMPLATE).read_text("utf-8")
-        names = {"name": self.name, "NAME": self.name.upper()}
+        text = files("sdnn.export").joinpath("c_header.template").read_text("utf-8")
+        # What is filled in has names in it too.
+        text = Template(text).safe_substitute(values)
+        text = Template(text).substitute(name=name, NAME=name.upper())
         return CHeader(
-            name=self.name,
-            # What is filled in has names in it too.
-            text=comment + Template(Template(text).safe_substitute(values)).substitute(names),
+            name=name,
+            text=_comment_on(self.agent.scaling) + text,
             fraction_bits=self.fraction_bits,
             flash_bytes=flash_bytes,
             weight_bytes=4 * n_words,
@@ -321,15 +316,18 @@ class _Writer:
             n_words=n_words,
         )
 
-    # The network.
-
     def _common_tables(self) -> Tables:
         tables, name = Tables(), self.name
-        tables.add("uint32_t", f"{name}_n_bins", np.array(self.n_bins), "Bins of each input.")
-        ranks, ties = self._ranks()
+        n_bins = np.array([one.n_bins for one in self.inputs])
+        tables.add("uint32_t", f"{name}_n_bins", n_bins, "Bins of each input.")
+        values = self.networks[0].output_values()
+        if any((network.output_values() != values).any() for network in self.networks):
+            raise ValueError("networks of one agent must have one range of values")
+        distinct = np.unique(values)
         about = "Ranks of the values that counts of active units stand for."
-        tables.add("uint16_t", f"{name}_ranks", ranks, about)
+        tables.add("uint16_t", f"{name}_ranks", np.searchsorted(distinct, values), about)
         if self.learning.tie_tolerance > 0.0:
+            ties = np.searchsorted(distinct, distinct - self.learning.tie_tolerance)
             about = "Of each rank, the lowest that ties with it."
             tables.add("uint16_t", f"{name}_ties", ties, about)
         if self.box is None:
@@ -342,10 +340,6 @@ class _Writer:
             tables.add("int32_t", f"{name}_action_fixed", fixed_actions, about)
         return tables
 
-    @property
-    def _permutation_type(self) -> str:
-        return "uint8_t" if self.sizes.n_pattern_units <= 256 else "uint16_t"
-
     def _add_wiring(self, tables: Tables, d: int, network: Any) -> None:
         inputs = range(len(self.inputs))
         rows = [np.packbits(network.table(i) > 0, axis=1, bitorder="little") for i in inputs]
@@ -353,69 +347,7 @@ class _Writer:
         modifiers = np.array([nu for _, nu in network.pairs])
         tables.add("uint8_t", f"{self.name}_patterns_{d}", np.concatenate(rows).reshape(-1))
         tables.add("uint16_t", f"{self.name}_modifiers_{d}", modifiers)
-        tables.add(self._permutation_type, f"{self.name}_permutations_{d}", np.concatenate(sigma))
-
-    def _table_of_networks(self, n_units: Sequence[int]) -> Iterator[str]:
-        yield f"static const {self.name}_network {self.name}_networks[{len(n_units)}] = {{"
-        for d, (network, n) in enumerate(zip(self.networks, n_units, strict=True)):
-            tables = ("patterns", "modifiers", "permutations", "weights", "units", "first_units")
-            names = ", ".join(f"{self.name}_{table}_{d}" for table in tables)
-            yield f"  {{{names}, {n}, {network.n_actions}}},"
-        yield "};"
-
-    def _ranks(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Rank the values of all counts; find the lowest rank that ties with each."""
-        values = self.networks[0].output_values()
-        for network in self.networks[1:]:
-            if (network.output_values() != values).any():
-                raise ValueError("networks of one agent must have one range of values")
-        distinct = np.unique(values)
-        ties = np.searchsorted(distinct, distinct - self.learning.tie_tolerance)
-        return np.searchsorted(distinct, values), ties
-
-    # From observations to bins.
-
-    def _conversions(self, tables: Tables) -> tuple[list[str], list[str]]:
-        """Give the lines that make bins of readings, in fixed and in floating point."""
-        name, known = self.name, dict[Any, str]()
-        fixed, double = [], []
-
-        def table(key: Any, word: str, values: NDArray[Any], comment: str) -> str:
-            if key not in known:
-                known[key] = f"{name}_{word}_{len(known)}"
-                tables.add("int32_t", known[key], values, comment)
-            return known[key]
-
-        for place, (one, n_bins) in enumerate(zip(self.inputs, self.n_bins, strict=True)):
-            (kind, at), *_ = one.items()
-            if kind == "angle":
-                about = "Cosine and sine of the angles where bins begin, from bin 1 on."
-                bounds = table((kind, n_bins), "directions", directions(n_bins), about)
-                given = f"({bounds}, {n_bins}, observation[{at[0]}], observation[{at[1]}])"
-                fixed.append(f"  bins[{place}] = {name}_bin_of_direction{given};")
-                double.append(f"  bins[{place}] = {name}_bin_of_doubles{given};")
-                continue
-            if kind == "symbol":
-                given = f"(&observation[{at[0]}], {n_bins})"
-                fixed.append(f"  bins[{place}] = {name}_symbol_of_fixed{given};")
-                double.append(f"  bins[{place}] = {name}_symbol_of_double{given};")
-                continue
-            low, high = self.low[at], self.high[at]
-            unit = f"(observation[{at}] - ({low!r})) / {high - low!r}"
-            if kind == "variable":
-                about = f"The least reading in each bin of observation[{at}], from bin 1 on."
-                values = fixed_bounds(low, high, n_bins, self.fraction_bits)
-                bounds = table((at, n_bins), "bounds", values, about)
-                given = f"({bounds}, {n_bins}, observation[{at}])"
-                fixed.append(f"  bins[{place}] = {name}_bin_between{given};")
-            else:
-                rate, offset = turns(low, high, self.fraction_bits)
-                turn = f"UINT64_C({rate}) * (uint64_t)(int64_t)observation[{at}]"
-                turn += f" + UINT64_C({offset})"
-                fixed.append(f"  bins[{place}] = {name}_bin_of_turn({turn}, {n_bins});")
-                unit = f"{name}_part_of_turn({unit})"
-            double.append(f"  bins[{place}] = {name}_bin_of_unit({unit}, {n_bins});")
-        return fixed, double
+        tables.add(self.index_type, f"{self.name}_permutations_{d}", np.concatenate(sigma))
 
     def _float_tables(self) -> str:
         if self.box is None:
@@ -426,17 +358,8 @@ class _Writer:
         lines = table_lines(f"static const {kind} {self.name}_action_float", actions, form)
         return joined(["/* The actions. */", *lines, ""])
 
-    # Words for readers.
-
-    def _description(self, n_units: Sequence[int]) -> str:
-        used = " + ".join(map(str, n_units))
-        actions = " x ".join(str(network.n_actions) for network in self.networks)
-        return (
-            f"{len(self.inputs)} inputs, {self.sizes.n_pattern_units} units per pattern, {used}"
-            f" hidden units in use, {actions} actions"
-        )
-
     def _usage(self) -> Iterator[str]:
+        """Describe how to use the header."""
         name, macro = self.name, self.name.upper()
         dimension, number = ("[d]", "action[d]") if self.is_vector else ("", "action")
         scale = f"2^{self.fraction_bits}"
@@ -460,19 +383,25 @@ class _Writer:
             f"With {macro}_USE_FLOAT defined before the include, {floats}{actions}.", 96
         )
         yield f"{name}_act_bins takes the bins of all inputs:"
-        for place, (one, n_bins) in enumerate(zip(self.inputs, self.n_bins, strict=True)):
-            (kind, at), *_ = one.items()
-            if kind == "angle":
-                yield f"  input {place}: the angle of cosine observation[{at[0]}] and sine"
-                yield f"    observation[{at[1]}], from -pi to pi in {n_bins} bins"
-            elif kind == "symbol":
-                last = at[0] + n_bins - 1
-                yield f"  input {place}: which of observation[{at[0]}] to observation[{last}] is 1"
-            else:
-                ends = f"from {self.low[at]:.6g} to {self.high[at]:.6g} in {n_bins} bins"
-                turn = ", an angle," if kind == "circular" else ""
-                yield f"  input {place}: observation[{at}]{turn} {ends}"
+        for i, one in enumerate(self.inputs):
+            start, *rest = one.usage()
+            yield f"  input {i}: {start}"
+            yield from (f"  {line}" for line in rest)
         yield from wrap(_TIE_RULES[self.learning.tie_rule], 96)
+
+
+def _comment_on(scaling: Scaling | None) -> str:
+    """Describe at the top of the header how its observations are scaled."""
+    if scaling is None:
+        return ""
+    lines = (
+        "What this policy observes is scaled, since its run had noise or redundant variables:",
+        "each variable from its range to [0, 1], (value - low) / (high - low), and what lies",
+        "beyond the range to 0 or 1. Wherever an observation has units below, it is these.",
+        "",
+        *(f"  {line}" for line in scaling.lines()),
+    )
+    return "\n".join(["/* " + lines[0], *(f" * {one}".rstrip() for one in lines[1:]), " */\n"])
 
 
 _TIE_RULES = {
