@@ -24,7 +24,6 @@ from typing import TYPE_CHECKING, Any
 
 from sdnn._core import __version__
 from sdnn.instruction_sets import instruction_set, set_instruction_set
-from sdnn.registration import register_when_gymnasium_is_imported
 
 if TYPE_CHECKING:
     from sdnn import (
@@ -59,8 +58,6 @@ __all__ = [
     "runs",
     "set_instruction_set",
 ]
-
-register_when_gymnasium_is_imported()
 
 
 def __getattr__(name: str) -> Any:

@@ -99,7 +99,7 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     --------
     >>> import gymnasium as gym, sdnn
     >>> from sdnn.agents import FuzzyQLearning, Transition
-    >>> env = gym.make("sdnn/AcrobotSwingUp-v0")
+    >>> env = gym.make("sdnn.environments:sdnn/AcrobotSwingUp-v0")
     >>> agent = FuzzyQLearning(env.observation_space, env.action_space, seed=1)
     >>> observation, _ = env.reset(seed=1)
     >>> agent.begin_episode()

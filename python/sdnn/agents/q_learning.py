@@ -250,7 +250,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
     --------
     >>> import gymnasium as gym, sdnn
     >>> from sdnn.agents import SDNNQLearning, Transition
-    >>> env = gym.make("sdnn/AcrobotSwingUp-v0")
+    >>> env = gym.make("sdnn.environments:sdnn/AcrobotSwingUp-v0")
     >>> agent = SDNNQLearning(env.observation_space, env.action_space, seed=1)
     >>> observation, _ = env.reset(seed=1)
     >>> agent.begin_episode()
@@ -430,7 +430,7 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
     --------
     >>> import gymnasium as gym, sdnn
     >>> from sdnn.agents import RBFQLearning, Transition
-    >>> env = gym.make("sdnn/AcrobotSwingUp-v0")
+    >>> env = gym.make("sdnn.environments:sdnn/AcrobotSwingUp-v0")
     >>> agent = RBFQLearning(env.observation_space, env.action_space, seed=1)
     >>> observation, _ = env.reset(seed=1)
     >>> agent.begin_episode()

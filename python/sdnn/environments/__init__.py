@@ -1,13 +1,12 @@
 """The acrobot swing-up as a Gymnasium environment, redundant and noisy sensors as wrappers.
 
-After ``import sdnn`` Gymnasium knows ``sdnn/AcrobotSwingUp-v0``:
+Gymnasium knows the acrobot once this package is imported. An id can import it:
 
 >>> import gymnasium as gym
->>> import sdnn
->>> gym.make("sdnn/AcrobotSwingUp-v0").observation_space.shape
+>>> gym.make("sdnn.environments:sdnn/AcrobotSwingUp-v0").observation_space.shape
 (4,)
 
-and many of them at once, stepped side by side in vector registers:
+Many of them step side by side in vector registers:
 
 >>> gym.make_vec("sdnn/AcrobotSwingUp-v0", num_envs=16).observation_space.shape
 (16, 4)
@@ -15,6 +14,8 @@ and many of them at once, stepped side by side in vector registers:
 How hard it is, is one number, ``goal_tolerance``; `TighteningGoal` lets it fall while the agent
 learns, as in the paper.
 """
+
+import gymnasium as gym
 
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.config import AcrobotConfig, GoalScheduleConfig, SensorConfig
@@ -37,3 +38,10 @@ __all__ = [
     "TighteningGoal",
     "UnitSensors",
 ]
+
+gym.register(
+    id="sdnn/AcrobotSwingUp-v0",
+    entry_point="sdnn.environments.acrobot:AcrobotSwingUpEnv",
+    vector_entry_point="sdnn.environments.vector_env:AcrobotSwingUpVectorEnv",
+    reward_threshold=10.0,
+)

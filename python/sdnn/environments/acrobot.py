@@ -125,7 +125,7 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
 
     ```python
     >>> import gymnasium as gym
-    >>> import sdnn
+    >>> import sdnn.environments
     >>> env = gym.make("sdnn/AcrobotSwingUp-v0", goal_tolerance=0.5)
     >>> observation, info = env.reset(seed=1)
     >>> observation.tolist(), info["goal_tolerance"], info["tip_height"]

@@ -29,9 +29,9 @@ _AUTORESET = getattr(getattr(gym.vector, "AutoresetMode", None), "NEXT_STEP", "N
 class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDArray[Any]]):
     """N acrobots in step, with the bits of N `AcrobotSwingUpEnv`, much faster.
 
-    ``gymnasium.make_vec("sdnn/AcrobotSwingUp-v0", num_envs=N)`` makes one. Observations, rewards,
-    ends and infos are those of ``gymnasium.vector.SyncVectorEnv`` over N single environments, whose
-    page describes the task. The dynamics run in the lanes of vector
+    ``gymnasium.make_vec("sdnn.environments:sdnn/AcrobotSwingUp-v0", num_envs=N)`` makes one.
+    Observations, rewards, ends and infos are those of ``gymnasium.vector.SyncVectorEnv`` over N
+    single environments, whose page describes the task. The dynamics run in the lanes of vector
     registers, without Python's global lock.
 
     An environment whose episode has ended is reset by the next step (``AutoresetMode.NEXT_STEP``):

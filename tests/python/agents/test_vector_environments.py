@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
-import sdnn  # noqa: F401  (registers its environments)
+import sdnn.environments  # noqa: F401  (registers the acrobot)
 from sdnn.agents import (
     Callback,
     Checkpoints,
