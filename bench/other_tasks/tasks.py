@@ -12,7 +12,7 @@ import numpy as np
 import two_torques
 from numpy.typing import NDArray
 
-from sdnn.runs import RunEnvironment
+from sdnn.runs import EnvironmentSpec
 
 CONDITIONS: dict[str, dict[str, Any]] = {
     "clean": {},
@@ -40,7 +40,7 @@ class Task:
         Arguments of the environment.
     ranges
         Of variables for which the environment gives none, or ends that no policy comes near, as
-        `RunEnvironment` takes them.
+        `EnvironmentSpec` takes them.
     options
         What a user of our agents would say of the task.
     """
@@ -68,8 +68,8 @@ class Task:
         env.close()
         return self._environment("clean").ends(env)
 
-    def _environment(self, condition: str) -> RunEnvironment:
-        return RunEnvironment(
+    def _environment(self, condition: str) -> EnvironmentSpec:
+        return EnvironmentSpec(
             id=self.id, kwargs=self.kwargs, ranges=self.ranges, **CONDITIONS[condition]
         )
 

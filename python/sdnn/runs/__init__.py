@@ -12,29 +12,36 @@ from sdnn.lazy import attach
 
 if TYPE_CHECKING:
     from sdnn.runs.config import AGENTS, RunConfig
-    from sdnn.runs.environment import RunEnvironment
+    from sdnn.runs.environment import EnvironmentSpec
     from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
     from sdnn.runs.run import Goal, Run, RunEvaluation, RunOutcome
+    from sdnn.runs.spec import AgentSpec, BudgetSpec, OutputSpec, ProtocolSpec, RunSpec
 
 __getattr__, __dir__ = attach(
     __name__,
     {
         "config": ("AGENTS", "RunConfig"),
-        "environment": ("RunEnvironment",),
+        "environment": ("EnvironmentSpec",),
         "errors": ("ConfigError", "RunError", "RunTerminatedError"),
         "run": ("Goal", "Run", "RunEvaluation", "RunOutcome"),
+        "spec": ("AgentSpec", "BudgetSpec", "OutputSpec", "ProtocolSpec", "RunSpec"),
     },
 )
 
 __all__ = [
     "AGENTS",
+    "AgentSpec",
+    "BudgetSpec",
     "ConfigError",
+    "EnvironmentSpec",
     "Goal",
+    "OutputSpec",
+    "ProtocolSpec",
     "Run",
     "RunConfig",
-    "RunEnvironment",
     "RunError",
     "RunEvaluation",
     "RunOutcome",
+    "RunSpec",
     "RunTerminatedError",
 ]

@@ -27,8 +27,10 @@ from sdnn.approximators.fuzzy_rules import FuzzyRulesConfig
 from sdnn.approximators.rbf_network import RBFNetworkConfig
 from sdnn.approximators.sdnn_c import SDNNCConfig
 from sdnn.arguments import whole
-from sdnn.runs.environment import RunEnvironment
+from sdnn.runs.environment import EnvironmentSpec
 from sdnn.runs.errors import ConfigError, problem_of
+from sdnn.runs.settings import read as read_settings
+from sdnn.runs.settings import values_of
 from sdnn.toml_lines import key_lines, line_of
 from sdnn.typed_values import convert, hints_of, possible_words, words_of
 
@@ -119,12 +121,12 @@ class RunConfig:
 
     Examples
     --------
-    >>> config = RunConfig(environment=RunEnvironment(id="CartPole-v1"), seed=3)
+    >>> config = RunConfig(environment=EnvironmentSpec(id="CartPole-v1"), seed=3)
     >>> config.steps, config.preset
     (200000, 'general')
     """
 
-    environment: RunEnvironment
+    environment: EnvironmentSpec
     agent: str = "sdnn-c"
     preset: str | None = None
     settings: Settings = field(default_factory=dict)
@@ -210,7 +212,7 @@ class RunConfig:
         Raises
         ------
         ConfigError
-            As `RunEnvironment.make`; or if Gymnasium is too old for a vector.
+            As `EnvironmentSpec.make`; or if Gymnasium is too old for a vector.
         """
         if self.n_envs == 1:
             return self.environment.make()
@@ -270,7 +272,7 @@ class RunConfig:
 
     def values(self) -> dict[str, Any]:
         """Give all values as JSON has them; `from_values` reads them."""
-        values = dataclasses.asdict(self)
+        values = {**dataclasses.asdict(self), "environment": values_of(self.environment)}
         return {
             "format": f"{FORMAT}-{FORMAT_VERSION}",
             **{name: value for name, value in values.items() if value is not None},
@@ -294,16 +296,10 @@ class RunConfig:
             environment = {"id": environment}
         settings = given.pop("settings", {})
         read = _converted(cls, given, "")
-        place = _converted(RunEnvironment, environment, "environment")
-        if "id" not in place:
-            raise ConfigError("environment.id", "must be given: the id of an environment")
-        place["ranges"] = {
-            key: _range(f"environment.ranges.{key}", ends)
-            for key, ends in place.get("ranges", {}).items()
-        }
+        place = read_settings(EnvironmentSpec, environment, "environment")
         if not isinstance(settings, Mapping):
             raise ConfigError("settings", f"must be a table, got {words_of(settings)}")
-        return cls(environment=RunEnvironment(**place), settings=settings, **read)
+        return cls(environment=place, settings=settings, **read)
 
     @classmethod
     def read(cls, path: str | Path, environment_id: str | None = None) -> RunConfig:
@@ -421,14 +417,6 @@ def _converted(kind: type[Any], values: Any, where: str) -> dict[str, Any]:
         except ValueError as error:
             raise ConfigError(key, str(error)) from None
     return converted
-
-
-def _range(key: str, ends: Any) -> tuple[float, float]:
-    try:
-        low, high = convert(tuple[float, float], list(ends) if isinstance(ends, tuple) else ends)
-    except ValueError as error:
-        raise ConfigError(key, str(error)) from None
-    return low, high
 
 
 def _listed(words: Mapping[str, Any]) -> str:

@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from contextlib import closing
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from contextlib import AbstractContextManager, closing
+from typing import Annotated, Any, Literal, TypeAlias
 
 import gymnasium as gym
+import msgspec
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from sdnn.agents.scaling import Scaling, neighbours
-from sdnn.arguments import real, whole
 from sdnn.bounds import flat_bounds
 from sdnn.environments import NoisySensors, RedundantSensors, UnitSensors
-from sdnn.runs.errors import ConfigError, RunError, problem_of
+from sdnn.runs.errors import ConfigError, RunError
+from sdnn.runs.settings import Settings
 
-__all__ = ["ALL", "Ends", "MeanOfNeighbours", "RunEnvironment", "render_modes"]
+__all__ = ["ALL", "Ends", "EnvironmentSpec", "MeanOfNeighbours", "Stream", "render_modes"]
 
 ALL = "all"
 """The key of the range of all variables that have no other."""
 
 Ends = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+Stream: TypeAlias = Literal["sensor_noise", "evaluation_sensor_noise"]
 
 
 class MeanOfNeighbours:
@@ -43,72 +45,65 @@ class MeanOfNeighbours:
         return 0.5 * (float(observation[self.first]) + float(observation[self.second]))
 
 
-@dataclass(frozen=True, kw_only=True)
-class RunEnvironment:
+class EnvironmentSpec(Settings, frozen=True):
     """A Gymnasium environment and what the agent observes of it.
 
     With noise or redundant variables, observations are flattened and scaled to [0, 1]; values
     outside their ranges saturate. Without, the agent gets them as they are.
-
-    Parameters
-    ----------
-    id
-        What `gymnasium.make` is given: ``"Pendulum-v1"``, or ``"module:namespace/Name-v0"``, for
-        which the module is imported first.
-    kwargs
-        Further arguments of `gymnasium.make`, such as ``max_episode_steps``, and of the
-        environment.
-    ranges
-        (low, high) of observed variables by their numbers, as text, from 0; ``"all"``: of all
-        others. By default the bounds of the observation space.
-    noise
-        Standard deviation of Gaussian noise on every variable, in parts of its range, >= 0. Every
-        episode draws it anew from the seed of its reset.
-    redundant
-        How many means of neighbouring variables are appended, before the noise: of 0 and 1, of 1
-        and 2, ..., of the last and 0, and so on in a circle. >= 0.
-
-    Raises
-    ------
-    ConfigError
-        If a value is out of its range.
     """
 
-    id: str
-    kwargs: Mapping[str, Any] = field(default_factory=dict)
-    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    noise: float = 0.0
-    redundant: int = 0
+    id: Annotated[
+        Annotated[str, Meta(min_length=1)],
+        Meta(
+            description="What `gymnasium.make` is given: `Pendulum-v1`, or"
+            " `module:namespace/Name-v0`, for which the module is imported first."
+        ),
+    ]
+    kwargs: Annotated[
+        dict[str, Any],
+        Meta(
+            description="Arguments of the environment, and of `gymnasium.make`, such as"
+            " `max_episode_steps`."
+        ),
+    ] = msgspec.field(default_factory=dict)
+    ranges: Annotated[
+        dict[str, tuple[float, float]],
+        Meta(
+            description="(low, high) of observed variables by their numbers, from 0; `all`: of all"
+            " others. By default the bounds of the observation space."
+        ),
+    ] = msgspec.field(default_factory=dict)
+    noise: Annotated[
+        Annotated[float, Meta(ge=0)],
+        Meta(
+            description="Standard deviation of Gaussian noise on every variable, in parts of its"
+            " range."
+        ),
+    ] = 0.0
+    redundant: Annotated[
+        Annotated[int, Meta(ge=0, le=1000)],
+        Meta(
+            description="Append so many means of neighbouring variables to the observation, before"
+            " the noise: of 0 and 1, of 1 and 2, ..., of the last and 0, and so on in a circle."
+        ),
+    ] = 0
 
     def __post_init__(self) -> None:
-        if not self.id:
-            raise ConfigError("environment.id", "must be the id of an environment, got ''")
+        super().__post_init__()
         try:
-            json.dumps(self.kwargs)
+            json.dumps(self.kwargs, allow_nan=False)
         except (TypeError, ValueError) as error:
-            raise ConfigError(
-                "environment.kwargs", f"must be data that JSON has: {error}"
-            ) from None
-        try:
-            noise = real("noise", self.noise)
-        except ValueError:
-            noise = np.nan
-        if not 0.0 <= noise < np.inf:
-            raise ConfigError("environment.noise", f"must be at least 0, got {self.noise!r}")
-        try:
-            whole("redundant", self.redundant, 0, 1000)
-        except ValueError as error:
-            raise ConfigError("environment.redundant", problem_of(error)) from None
-        for key, ends in self.ranges.items():
+            raise ConfigError("kwargs", f"must be data that JSON has: {error}") from None
+        for key, (low, high) in self.ranges.items():
             if key != ALL and not (key.isascii() and key.isdigit()):
-                raise ConfigError(
-                    f"environment.ranges.{key}", f"must be of 'all' or a number, got {key!r}"
-                )
-            low, high = ends
+                raise ConfigError(f"ranges.{key}", f"must be of 'all' or a number, got {key!r}")
             if not (np.isfinite([low, high]).all() and low < high):
                 raise ConfigError(
-                    f"environment.ranges.{key}", f"must be finite, low < high, got {low} and {high}"
+                    f"ranges.{key}", f"must be finite, low < high, got {low} and {high}"
                 )
+
+    def __hash__(self) -> int:
+        return hash((self.id, self.noise, self.redundant, json.dumps(self.kwargs, sort_keys=True)))
 
     @property
     def changes_observations(self) -> bool:
@@ -117,8 +112,9 @@ class RunEnvironment:
 
     def make(
         self,
-        stream: Literal["sensor_noise", "evaluation_sensor_noise"] = "sensor_noise",
+        stream: Stream = "sensor_noise",
         render_mode: str | None = None,
+        seed: int | None = None,
     ) -> gym.Env[Any, Any]:
         """Make the environment.
 
@@ -128,6 +124,8 @@ class RunEnvironment:
             Where its noise comes from.
         render_mode
             As Gymnasium has it.
+        seed
+            Where the noise starts; by default every reset with a seed starts it.
 
         Raises
         ------
@@ -160,11 +158,21 @@ class RunEnvironment:
                 pairs = neighbours(low.size, self.redundant)
                 env = RedundantSensors(env, [MeanOfNeighbours(*pair) for pair in pairs])
             if self.noise:
-                env = NoisySensors(env, self.noise, edge="saturate", stream=stream)
+                env = NoisySensors(
+                    env,
+                    self.noise,
+                    edge="saturate",
+                    seed=0 if seed is None else seed,
+                    stream=stream,
+                )
             return env
         except BaseException:
             env.close()
             raise
+
+    def opened(self) -> AbstractContextManager[gym.Env[Any, Any]]:
+        """Make the bare environment, for a block that looks at it."""
+        return closing(self._bare(None))
 
     def scaled_ranges(self) -> Ends:
         """Give the lowest and highest values of the variables that are scaled to [0, 1].
@@ -184,12 +192,12 @@ class RunEnvironment:
 
         Examples
         --------
-        >>> RunEnvironment(id="MountainCar-v0", noise=0.1).scaled_ranges()[1].round(2).tolist()
+        >>> EnvironmentSpec(id="MountainCar-v0", noise=0.1).scaled_ranges()[1].round(2).tolist()
         [0.6, 0.07]
         """
         if not self.changes_observations:
             raise ConfigError("environment.ranges", "scale nothing without noise or redundant")
-        with closing(self._bare(None)) as env:
+        with self.opened() as env:
             return self.ends(env)
 
     def scaling(self, env: gym.Env[Any, Any] | None = None) -> Scaling | None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sdnn.agents import Agent, UnusableStepError
 from sdnn.agents.evaluation import greedy_episode
-from sdnn.runs.environment import RunEnvironment, render_modes
+from sdnn.runs.environment import EnvironmentSpec, render_modes
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
 from sdnn.whole_files import whole_file, write_whole
@@ -148,7 +148,7 @@ def record(
     return recording
 
 
-def _filmed(environment: RunEnvironment) -> gym.Env[Any, Any]:
+def _filmed(environment: EnvironmentSpec) -> gym.Env[Any, Any]:
     env = environment.make("evaluation_sensor_noise", render_mode="rgb_array")
     if "rgb_array_list" not in render_modes(env):
         return env

@@ -85,6 +85,8 @@ class AgentEntry:
     preset
         Settings of both that are not their defaults: an object with ``approximator`` and
         ``learning``.
+    presets
+        Such settings by their names, of which a run chooses one.
     agent
         The agent in Python, a `LearningAgent`: made from an observation space, an action space and
         ``approximator=``, ``learning=``, ``seed=``.
@@ -103,8 +105,15 @@ class AgentEntry:
     agent: Callable[..., LearningAgent]
     core_trial: Callable[..., Trial] | None = None
     preset: Preset | None = None
+    presets: Mapping[str, Preset] = field(default_factory=dict)
     costs: tuple[CostSeries, ...] = ()
     version: str = ""
+
+    def parts(self, preset: str | None) -> tuple[Any, Any]:
+        """Return the settings of approximator and learning under a preset; None: the defaults."""
+        if preset is None:
+            return self.approximator(), self.learning()
+        return self.presets[preset].approximator, self.presets[preset].learning
 
     def approximator_settings(self, n_inputs: int) -> Any:
         """Return the approximator's settings in experiments, for so many inputs."""
@@ -209,6 +218,7 @@ register(
         learning=QLearningConfig,
         agent=SDNNQLearning,
         core_trial=_core.AcrobotTrial,
+        presets=PRESETS,
         costs=(
             CostSeries(
                 id="sdnn-c",

@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from sdnn.runs import Goal, Run, RunConfig, RunEnvironment, RunError
+from sdnn.runs import EnvironmentSpec, Goal, Run, RunConfig, RunError
 from sdnn.runs.curves import curves_of, draw_curves, write_curves
 from sdnn.runs.groups import groups_of
 
-CONFIG = RunConfig(environment=RunEnvironment(id="CartPole-v1"))
+CONFIG = RunConfig(environment=EnvironmentSpec(id="CartPole-v1"))
 
 
 def make(folder, config, returns=(), evaluations=(), every=20):
@@ -35,7 +35,7 @@ def make(folder, config, returns=(), evaluations=(), every=20):
 def test_one_run(tmp_path):
     run = make(tmp_path / "run", CONFIG, [1, 5, 3], [[1, 2, 3, 4, 10], [5, 5, 5, 5, 5]])
     returns, medians, evaluations = curves_of([run])[0]
-    assert (returns.task, returns.agent) == ("CartPole-v1", "sdnn general")
+    assert (returns.task, returns.agent) == ("CartPole-v1", "sdnn-c general")
     assert (returns.kind, returns.steps.tolist(), returns.values.tolist()) == (
         "return", [10, 20, 30], [1, 5, 3],
     )  # fmt: skip
@@ -86,7 +86,7 @@ def test_several_runs_without_evaluations_have_the_median_of_running_medians(tmp
 def test_tasks_and_agents_are_parted(tmp_path):
     noisy = dataclasses.replace(
         CONFIG,
-        environment=RunEnvironment(
+        environment=EnvironmentSpec(
             id="CartPole-v1",
             noise=0.02,
             ranges={"all": (-4.0, 4.0)},
@@ -100,9 +100,9 @@ def test_tasks_and_agents_are_parted(tmp_path):
     ]
     curves = curves_of(runs)[0]
     assert {(curve.task, curve.agent) for curve in curves} == {
-        ("CartPole-v1", "sdnn general"),
-        ("CartPole-v1", "sdnn general, discount=0.9"),
-        ("CartPole-v1, max_episode_steps=9, range all: -4.0 to 4.0, noise 0.02", "sdnn general"),
+        ("CartPole-v1", "sdnn-c general"),
+        ("CartPole-v1", "sdnn-c general, discount=0.9"),
+        ("CartPole-v1, max_episode_steps=9, range all: -4.0 to 4.0, noise 0.02", "sdnn-c general"),
     }
     assert len(draw_curves(curves).axes) == 2
 
@@ -120,8 +120,8 @@ def configs_that_differ():
         {"version": "0.0.1"},
         {"angle_pairs": "find"},
         {"settings": {"learning": {"discount": 0.5}}},
-        {"environment": RunEnvironment(id="CartPole-v1", kwargs={"sutton_barto_reward": True})},
-        {"environment": RunEnvironment(id="CartPole-v1", kwargs={"sutton_barto_reward": 1})},
+        {"environment": EnvironmentSpec(id="CartPole-v1", kwargs={"sutton_barto_reward": True})},
+        {"environment": EnvironmentSpec(id="CartPole-v1", kwargs={"sutton_barto_reward": 1})},
     ):
         yield dataclasses.replace(CONFIG, **change)
 
@@ -159,7 +159,7 @@ def test_names_say_in_what_runs_differ(tmp_path):
         "e": (dataclasses.replace(short, n_envs=4), []),
     }
     groups = groups_of([Run(tmp_path / name, *parts) for name, parts in goals.items()])
-    assert [group.agent.removeprefix("sdnn general, ") for group in groups] == [
+    assert [group.agent.removeprefix("sdnn-c general, ") for group in groups] == [
         "600 steps, 1 environment",
         "300 steps, 1 environment",
         "300 steps, then 600 steps, 1 environment",
@@ -194,15 +194,15 @@ def test_runs_that_are_evaluated_at_other_steps_are_both_drawn(tmp_path):
         )
         for every in (500, 700)
     ]
-    third = dataclasses.replace(CONFIG, environment=RunEnvironment(id="Acrobot-v1"))
+    third = dataclasses.replace(CONFIG, environment=EnvironmentSpec(id="Acrobot-v1"))
     runs.append(make(tmp_path / "other", third, [1]))
     curves, notes = curves_of(runs)
     assert notes == []
     assert [
         (curve.agent, curve.steps.tolist()) for curve in curves if curve.kind == "evaluation"
     ] == [
-        ("sdnn general, evaluated every 500 steps", [500]),
-        ("sdnn general, evaluated every 700 steps", [700]),
+        ("sdnn-c general, evaluated every 500 steps", [500]),
+        ("sdnn-c general, evaluated every 700 steps", [700]),
     ]
     assert {curve.run for curve in curves} == {str(run.folder) for run in runs}
 

@@ -14,7 +14,7 @@ from safetensors.numpy import load_file, save_file
 
 import drifting_env  # noqa: F401
 from sdnn.agents import Callback, Training, load_agent
-from sdnn.runs import ConfigError, Run, RunConfig, RunEnvironment, RunError
+from sdnn.runs import ConfigError, EnvironmentSpec, Run, RunConfig, RunError
 
 SMALL = {
     "approximator": {"n_hidden_units": 60, "n_active_units": 20, "n_pattern_units": 20},
@@ -22,7 +22,7 @@ SMALL = {
 }
 
 CONFIG = RunConfig(
-    environment=RunEnvironment(
+    environment=EnvironmentSpec(
         id="tests/Drifting-v0", ranges={"all": (-4.0, 4.0)}, noise=0.02, redundant=1
     ),
     settings=SMALL,
@@ -33,7 +33,7 @@ CONFIG = RunConfig(
     checkpoint_every=70,
 )
 
-WARMING_UP = dataclasses.replace(CONFIG, environment=RunEnvironment(id="tests/Drifting-v0"))
+WARMING_UP = dataclasses.replace(CONFIG, environment=EnvironmentSpec(id="tests/Drifting-v0"))
 
 
 def untimed(rows):
@@ -218,7 +218,7 @@ def test_what_was_learned_is_not_written_over_by_a_new_beginning(tmp_path):
 
 
 def test_nothing_is_written_for_what_cannot_work(tmp_path):
-    wrong = dataclasses.replace(CONFIG, environment=RunEnvironment(id="Nothing-v0"))
+    wrong = dataclasses.replace(CONFIG, environment=EnvironmentSpec(id="Nothing-v0"))
     with pytest.raises(ConfigError):
         Run.create(tmp_path / "run", wrong)
     wrong = dataclasses.replace(CONFIG, settings={"learning": {"discount": 2}})

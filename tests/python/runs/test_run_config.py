@@ -1,15 +1,14 @@
-import dataclasses
 import json
 
 import pytest
 
 from sdnn.agents import PRESETS, FuzzyQLearning, RBFQLearning, SDNNQLearning
-from sdnn.runs import AGENTS, ConfigError, RunConfig, RunEnvironment
+from sdnn.runs import AGENTS, ConfigError, EnvironmentSpec, RunConfig
 
-CART_POLE = RunEnvironment(id="CartPole-v1")
+CART_POLE = EnvironmentSpec(id="CartPole-v1")
 
 FULL = RunConfig(
-    environment=RunEnvironment(
+    environment=EnvironmentSpec(
         id="CartPole-v1",
         kwargs={"max_episode_steps": 100},
         ranges={"all": (-3.0, 3.0), "1": (-4.0, 4.0)},
@@ -146,12 +145,12 @@ def test_values_that_do_not_fit(changes, key):
 
 def test_angle_pairs_are_not_found_in_scaled_observations():
     with pytest.raises(ConfigError, match="not together with noise"):
-        RunConfig(environment=dataclasses.replace(CART_POLE, redundant=1), angle_pairs="find")
+        RunConfig(environment=CART_POLE.replace(redundant=1), angle_pairs="find")
 
 
 def test_ranges_are_given_or_seen():
     settings = {"agent": {"observation_range": "seen", "warm_up_steps": 20}}
-    environment = RunEnvironment(id="MountainCar-v0")
+    environment = EnvironmentSpec(id="MountainCar-v0")
     env = environment.make()
     assert not RunConfig(environment=environment).make_agent(env).is_warming_up
     agent = RunConfig(environment=environment, settings=settings).make_agent(env)
@@ -160,7 +159,7 @@ def test_ranges_are_given_or_seen():
     low, high = agent.observation_range
     assert (low > env.observation_space.low).all()
     assert (high < env.observation_space.high).all()
-    given = dataclasses.replace(environment, ranges={"0": (-1.0, 1.0)})
+    given = environment.replace(ranges={"0": (-1.0, 1.0)})
     with pytest.raises(ConfigError, match="not be given together") as caught:
         RunConfig(environment=given, settings=settings).make_agent(env)
     assert caught.value.key == "environment.ranges"
@@ -183,7 +182,7 @@ def test_agents_are_made_with_preset_and_settings():
         assert agent.is_warming_up
     robust = RunConfig(environment=CART_POLE, preset="robust").make_agent(env)
     assert robust.learning == PRESETS["robust"].learning
-    pendulum = RunEnvironment(id="Pendulum-v1")
+    pendulum = EnvironmentSpec(id="Pendulum-v1")
     fuzzy = RunConfig(environment=pendulum, agent="fuzzy").make_agent(pendulum.make())
     assert type(fuzzy) is FuzzyQLearning
     assert fuzzy.n_rules == 9**3
@@ -191,10 +190,10 @@ def test_agents_are_made_with_preset_and_settings():
 
 
 def test_ranges_end_the_warm_up_before_it_begins():
-    environment = dataclasses.replace(CART_POLE, ranges={"1": (-4, 4), "3": (-4, 4)})
+    environment = CART_POLE.replace(ranges={"1": (-4, 4), "3": (-4, 4)})
     config = RunConfig(environment=environment)
     assert not config.make_agent(environment.make()).is_warming_up
-    half = dataclasses.replace(CART_POLE, ranges={"1": (-4, 4)})
+    half = CART_POLE.replace(ranges={"1": (-4, 4)})
     assert RunConfig(environment=half).make_agent(half.make()).is_warming_up
 
 
@@ -211,7 +210,7 @@ def test_ranges_end_the_warm_up_before_it_begins():
     ],
 )  # fmt: skip
 def test_what_only_the_agent_knows_names_the_setting(environment, changes, key, words):
-    task = RunEnvironment(id=environment)
+    task = EnvironmentSpec(id=environment)
     config = RunConfig(environment=task, **changes)
     with pytest.raises(ConfigError, match=words) as caught:
         config.make_agent(task.make())

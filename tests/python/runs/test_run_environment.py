@@ -6,18 +6,18 @@ import pytest
 
 import drifting_env  # noqa: F401
 from sdnn.environments import NoisySensors, UnitSensors
-from sdnn.runs import ConfigError, RunEnvironment
+from sdnn.runs import ConfigError, EnvironmentSpec
 
 
 def test_without_noise_the_agent_gets_what_there_is():
-    env = RunEnvironment(id="CartPole-v1", kwargs={"max_episode_steps": 7}).make()
+    env = EnvironmentSpec(id="CartPole-v1", kwargs={"max_episode_steps": 7}).make()
     assert env.observation_space == gym.make("CartPole-v1").observation_space
     assert env.spec.max_episode_steps == 7
 
 
 def test_redundant_variables_are_means_of_neighbours_in_a_circle():
     ranges = {"all": (-2.0, 2.0), "1": (-4.0, 4.0)}
-    env = RunEnvironment(id="tests/Drifting-v0", ranges=ranges, redundant=3).make()
+    env = EnvironmentSpec(id="tests/Drifting-v0", ranges=ranges, redundant=3).make()
     observation, _ = env.reset(seed=1)
     position, speed = env.unwrapped.state
     first, second = (position + 2) / 4, (speed + 4) / 8
@@ -28,7 +28,7 @@ def test_redundant_variables_are_means_of_neighbours_in_a_circle():
 
 @pytest.mark.parametrize("redundant", [1, 5])
 def test_the_words_for_what_is_scaled_are_true(redundant):
-    environment = RunEnvironment(
+    environment = EnvironmentSpec(
         id="tests/Drifting-v0", ranges={"all": (-0.3, 0.4), "1": (-4.0, 4.0)}, redundant=redundant
     )
     scaled, bare = environment.make(), gym.make("tests/Drifting-v0")
@@ -54,14 +54,14 @@ def test_the_words_for_what_is_scaled_are_true(redundant):
 
 
 def test_nothing_is_scaled_without_noise_and_redundancy():
-    environment = RunEnvironment(id="tests/Drifting-v0", ranges={"all": (-0.3, 0.4)})
+    environment = EnvironmentSpec(id="tests/Drifting-v0", ranges={"all": (-0.3, 0.4)})
     assert environment.scaling() is None
     with pytest.raises(ConfigError, match="scale nothing without noise or redundant"):
         environment.scaled_ranges()
 
 
 def test_noise_is_in_parts_of_the_range_and_follows_the_reset():
-    environment = RunEnvironment(
+    environment = EnvironmentSpec(
         id="tests/Drifting-v0", ranges={"all": (-50.0, 50.0)}, noise=0.02, redundant=1
     )
     env = environment.make()
@@ -84,7 +84,7 @@ def test_noise_is_in_parts_of_the_range_and_follows_the_reset():
 
 
 def test_observations_of_any_shape_are_flattened():
-    env = RunEnvironment(id="FrozenLake-v1", redundant=1).make()
+    env = EnvironmentSpec(id="FrozenLake-v1", redundant=1).make()
     observation, _ = env.reset(seed=0)
     assert observation.tolist() == [1.0, *[0.0] * 15, 0.5]
 
@@ -106,23 +106,23 @@ def test_observations_of_any_shape_are_flattened():
 )
 def test_environments_that_cannot_be_made(environment, key, words):
     with pytest.raises(ConfigError, match=words) as caught:
-        RunEnvironment(**environment).make()
+        EnvironmentSpec(**environment).make()
     assert caught.value.key == key
 
 
 @pytest.mark.parametrize(
     ("values", "key"),
     [
-        ({"id": ""}, "environment.id"),
-        ({"noise": float("nan")}, "environment.noise"),
-        ({"noise": "much"}, "environment.noise"),
-        ({"redundant": -1}, "environment.redundant"),
-        ({"redundant": 1.5}, "environment.redundant"),
-        ({"ranges": {"0": (0, float("inf"))}}, "environment.ranges.0"),
-        ({"kwargs": {"function": print}}, "environment.kwargs"),
+        ({"id": ""}, "id"),
+        ({"noise": float("nan")}, "noise"),
+        ({"noise": "much"}, "noise"),
+        ({"redundant": -1}, "redundant"),
+        ({"redundant": 1.5}, "redundant"),
+        ({"ranges": {"0": (0, float("inf"))}}, "ranges.0"),
+        ({"kwargs": {"function": print}}, "kwargs"),
     ],
 )
 def test_values_out_of_range(values, key):
     with pytest.raises(ConfigError) as caught:
-        RunEnvironment(**{"id": "CartPole-v1", **values})
+        EnvironmentSpec(**{"id": "CartPole-v1", **values})
     assert caught.value.key == key

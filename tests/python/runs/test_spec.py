@@ -1,0 +1,207 @@
+import json
+import pickle
+
+import pytest
+
+from sdnn.agents import PRESETS, FuzzyQLearning, RBFQLearning, SDNNQLearning
+from sdnn.approximators import RBFNetworkConfig, SDNNCConfig
+from sdnn.runs import (
+    AgentSpec,
+    BudgetSpec,
+    ConfigError,
+    EnvironmentSpec,
+    OutputSpec,
+    ProtocolSpec,
+    RunSpec,
+)
+
+CART_POLE = EnvironmentSpec(id="CartPole-v1")
+
+FULL = RunSpec(
+    environment=EnvironmentSpec(
+        id="CartPole-v1",
+        kwargs={"max_episode_steps": 100},
+        ranges={"all": (-3.0, 3.0), "1": (-4.0, 4.0)},
+        noise=0.02,
+        redundant=2,
+    ),
+    agent=AgentSpec(preset="robust", warm_up_steps=50),
+    learning={"discount": 0.95, "tie_rule": "middle"},
+    approximator={"circular": (True, False, False, False, False, False)},
+    protocol=ProtocolSpec(evaluate_every=100, evaluation_episodes=3, n_envs=2),
+    budget=BudgetSpec(episodes=30, target_return=450.0),
+    seed=2**64 - 1,
+    output=OutputSpec(checkpoint_every=70, tensorboard=True),
+)
+
+
+@pytest.mark.parametrize(
+    "spec", [FULL, RunSpec(), RunSpec(environment=CART_POLE), RunSpec(agent=AgentSpec(name="rbf"))]
+)
+def test_a_specification_survives_json_and_pickle(spec):
+    again = RunSpec.from_values(json.loads(json.dumps(spec.values())))
+    assert again == spec
+    assert hash(again) == hash(spec)
+    assert pickle.loads(pickle.dumps(spec)) == spec
+
+
+def test_defaults_follow_from_the_task():
+    acrobot, environment = RunSpec(), RunSpec(environment=CART_POLE)
+    assert (acrobot.agent.preset, environment.agent.preset) == ("paper", "general")
+    assert (acrobot.label, environment.label) == ("sdnn-c", "sdnn-c-general")
+    assert (acrobot.budget.episodes, acrobot.budget.steps) == (15_000, None)
+    assert (environment.budget.episodes, environment.budget.steps) == (None, 200_000)
+    assert acrobot.protocol.evaluate_every_episodes == 10
+    assert environment.protocol.evaluate_every == 10_000
+    assert environment.learning == PRESETS["general"].learning
+    assert RunSpec(sensors={"n_sensors": 6}).approximator == SDNNCConfig(n_inputs=6)
+    assert RunSpec.from_values({"environment": "CartPole-v1", "agent": "sdnn-c"}) == environment
+
+
+def test_the_hash_is_that_of_what_fixes_the_rows():
+    spec = RunSpec(environment=CART_POLE)
+    assert spec.replace(seed=5).config_hash == spec.config_hash
+    assert spec.replace(output=OutputSpec(tensorboard=True)).config_hash == spec.config_hash
+    assert FULL.config_hash != spec.config_hash
+    robust = RunSpec(agent=AgentSpec(preset="robust"))
+    typed = RunSpec(approximator={"n_actions": 61}, learning={"n_steps": 5})
+    assert robust.config_hash == typed.config_hash
+    assert RunSpec(learning={"discount": 1}) == RunSpec(learning={"discount": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("values", "key", "words"),
+    [
+        ({"sed": 1}, "sed", "unknown key; possible: seed"),
+        ({"seed": -1}, "seed", "at least 0, got -1"),
+        ({"seed": 2**64}, "seed", "at most"),
+        ({"environment": {"noise": 1}}, "environment.id", "must be given"),
+        ({"environment": {"id": "A", "noise": -1}}, "environment.noise", "at least 0"),
+        ({"environment": {"id": "A", "ranges": {"0": [1, 1]}}}, "environment.ranges.0", "low <"),
+        ({"environment": {"id": "A", "ranges": {"x": [0, 1]}}}, "environment.ranges.x", "a number"),
+        ({"environment": 5}, "environment", "must be a table, got 5"),
+        ({"environment": "A", "sensors": {}}, "sensors", "does not go with an environment"),
+        ({"agent": "dqn"}, "agent.name", "one of sdnn-c, "),
+        ({"agent": {"preset": "best"}}, "agent.preset", "got 'best'"),
+        ({"agent": {"name": "rbf", "preset": "paper"}}, "agent.preset", "omitted"),
+        ({"agent": {"angles": [-1]}}, "agent.angles[0]", "at least 0"),
+        ({"learning": 5}, "learning", "must be a table"),
+        ({"learning": {"discont": 1}}, "learning.discont", "unknown key; possible: discount"),
+        ({"learning": {"discount": "x"}}, "learning.discount", "a number, got 'x'"),
+        ({"learning": {"tie_rule": "x"}}, "learning.tie_rule", "one of 'uniform', 'lowest'"),
+        ({"lerning": {"discount": 1}}, "lerning", "possible: learning"),
+        ({"approximator": {"n_inputs": 3}}, "approximator.n_inputs", "follows from the obs"),
+        ({"sensors": {"noise": True}}, "sensors.noise", "a number, got True"),
+        ({"budget": {"steps": "x"}}, "budget.steps", "whole number, got 'x'"),
+        ({"budget": {"steps": 5, "episodes": 5}}, "budget.episodes", "together with steps"),
+        ({"budget": {"episodes": 5}}, "budget.episodes", "at least evaluate_every_episodes (10)"),
+        (
+            {"protocol": {"evaluate_every": 0}, "budget": {"target_return": 1}},
+            "budget.target_return",
+            "needs evaluations",
+        ),
+        ({"output": {"checkpoint_every": 0}}, "output.checkpoint_every", "at least 1, got 0"),
+    ],
+)
+def test_errors_name_the_key(values, key, words):
+    with pytest.raises(ConfigError) as caught:
+        RunSpec.from_values(values)
+    assert caught.value.key == key
+    assert words in caught.value.problem
+
+
+def test_parts_of_another_agent_are_refused():
+    with pytest.raises(ConfigError) as caught:
+        RunSpec(approximator=RBFNetworkConfig())
+    assert caught.value.key == "approximator"
+
+
+def test_angle_pairs_are_not_found_in_scaled_observations():
+    with pytest.raises(ConfigError, match="not together with noise"):
+        RunSpec(environment=CART_POLE.replace(noise=0.1), agent=AgentSpec(angle_pairs="find"))
+
+
+def test_ranges_are_given_or_seen():
+    seen = AgentSpec(observation_range="seen", warm_up_steps=20)
+    environment = EnvironmentSpec(id="MountainCar-v0")
+    env = environment.make()
+    assert not RunSpec(environment=environment).make_agent(env).is_warming_up
+    agent = RunSpec(environment=environment, agent=seen).make_agent(env)
+    assert agent.is_warming_up
+    agent.train(env, steps=20)
+    low, high = agent.observation_range
+    assert (low > env.observation_space.low).all()
+    assert (high < env.observation_space.high).all()
+    given = environment.replace(ranges={"0": (-1.0, 1.0)})
+    with pytest.raises(ConfigError, match="not be given together") as caught:
+        RunSpec(environment=given, agent=seen).make_agent(env)
+    assert caught.value.key == "environment.ranges"
+
+
+def test_agents_are_made_with_preset_and_settings():
+    env = CART_POLE.make()
+    for name, kind in {"sdnn-c": SDNNQLearning, "rbf": RBFQLearning}.items():
+        spec = RunSpec(
+            environment=CART_POLE,
+            agent=AgentSpec(name=name, warm_up_steps=20),
+            seed=7,
+            learning={"discount": 0.5},
+        )
+        agent = spec.make_agent(env)
+        assert type(agent) is kind
+        assert agent.seed == 7
+        assert agent.learning.discount == 0.5
+        assert agent.is_warming_up
+    pendulum = EnvironmentSpec(id="Pendulum-v1")
+    spec = RunSpec(environment=pendulum, agent=AgentSpec(name="fuzzy"))
+    fuzzy = spec.make_agent(pendulum.make())
+    assert type(fuzzy) is FuzzyQLearning
+    assert fuzzy.n_rules == 9**3
+
+
+@pytest.mark.parametrize(
+    ("values", "key", "words"),
+    [
+        ({"learning": {"discount": 2.0}}, "learning.discount", "in [0, 1]"),
+        ({"agent": {"angles": [9]}}, "agent.angles", "angles must be variables"),
+        (
+            {"approximator": {"n_hidden_units": 10}},
+            "approximator.n_active_units",
+            "n_active_units must be in",
+        ),
+        ({"agent": "fuzzy"}, "environment.id", "action_space must be a Box"),
+    ],
+)
+def test_what_only_the_agent_knows_names_the_setting(values, key, words):
+    with pytest.raises(ConfigError) as caught:
+        RunSpec.from_values({"environment": "CartPole-v1", **values}).make_agent(CART_POLE.make())
+    assert caught.value.key == key
+    assert words in caught.value.problem
+
+
+def test_the_papers_acrobot_is_compiled_under_the_papers_protocol():
+    spec = RunSpec(budget=BudgetSpec(episodes=20), seed=3)
+    assert spec.is_compiled
+    trial = spec.core_trial()
+    trial.advance(20)
+    assert trial.test_rows()["episode"].tolist() == [10, 20]
+    for other in (
+        spec.replace(protocol=ProtocolSpec(evaluate_every=100)),
+        spec.replace(protocol=ProtocolSpec(evaluation_episodes=2)),
+        spec.replace(budget=BudgetSpec(steps=20)),
+        RunSpec(environment=CART_POLE, budget=BudgetSpec(episodes=20)),
+    ):
+        assert not other.is_compiled
+        with pytest.raises(ValueError, match="no trial in C"):
+            other.core_trial()
+
+
+def test_sensors_of_evaluations_are_quiet_if_wanted():
+    protocol = ProtocolSpec(noisy_evaluations=False)
+    for spec in (
+        RunSpec(sensors={"noise": 0.1}, protocol=protocol),
+        RunSpec(environment=EnvironmentSpec(id="MountainCar-v0", noise=0.1), protocol=protocol),
+    ):
+        noisy, quiet = spec.make_env(), spec.make_env("evaluation_sensor_noise")
+        first = [env.reset(seed=1)[0].tolist() for env in (noisy, quiet)]
+        assert first[0] != first[1]
