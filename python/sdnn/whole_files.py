@@ -5,13 +5,15 @@ from __future__ import annotations
 import csv
 import os
 import re
+import secrets
+import stat
 import time
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from io import StringIO
-from itertools import count
 from pathlib import Path
+from typing import BinaryIO
 
 try:
     import fcntl
@@ -20,10 +22,9 @@ except ImportError:  # not on this system
 
 PARTIAL_SUFFIX = ".partial"
 """Of a file under way."""
-
+_NAME_OF_PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial$")
 _ABANDONED_SECONDS = 60
 """After which a file under way is nobody's, where files cannot be locked."""
-_numbers = count()
 
 _PIECE_CHARACTERS = 2**20
 _GZIP = 31
@@ -31,16 +32,11 @@ _GZIP = 31
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """Give another name in the same folder to write to; at the end the file gets its own.
+def whole_file(path: Path) -> Iterator[BinaryIO]:
+    """Open a new file in the same folder; at the end it takes the place of ``path``.
 
-    Each call gives a name that no other process or thread has. A link stays one, to the new file.
-    What is no file but a device or a pipe is written to, under its own name.
-
-    Parameters
-    ----------
-    path
-        Its own name.
+    Its name is one that nobody can foresee. A link stays one, to the new file. A device or a pipe
+    is written to, under its own name.
 
     Raises
     ------
@@ -48,23 +44,27 @@ def whole_file(path: Path) -> Iterator[Path]:
         If the file cannot be written; one that was there before stays as it was.
     """
     if path.exists() and not (path.is_file() or path.is_dir()):
-        yield path
+        with path.open("wb") as device:
+            yield device
         return
     path = Path(os.path.realpath(path)) if path.is_symlink() else path
-    partial = path.with_name(f"{path.name}.{os.getpid()}.{next(_numbers)}{PARTIAL_SUFFIX}")
+    file = _new_file(path)
+    partial = Path(file.name)
     try:
-        with _held(partial):
-            yield partial
-            with partial.open("rb+") as file:
-                os.fsync(file.fileno())
+        with file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+            if fcntl is None:  # where an open file cannot be given another name
+                file.close()
             partial.replace(path)
         _sync_folder(path.parent)
     finally:
         partial.unlink(missing_ok=True)
 
 
-def write_whole(path: Path, content: bytes | Iterable[bytes]) -> None:
-    """Write a file under another name, then give it its own.
+def write_whole(path: Path, content: bytes | Iterable[bytes | memoryview]) -> None:
+    """Write a file as a whole or not at all.
 
     Parameters
     ----------
@@ -78,8 +78,30 @@ def write_whole(path: Path, content: bytes | Iterable[bytes]) -> None:
     OSError
         If the file cannot be written; one that was there before stays as it was.
     """
-    with whole_file(path) as partial, partial.open("wb") as file:
+    with whole_file(path) as file:
         file.writelines([content] if isinstance(content, bytes) else content)
+
+
+def open_regular(path: Path, max_bytes: int) -> BinaryIO:
+    """Open a regular file for reading; never wait for the writer of a pipe.
+
+    Raises
+    ------
+    OSError
+        If it cannot be opened, or is a folder, a device, a pipe or larger than ``max_bytes``.
+    """
+    file: BinaryIO = open(path, "rb", opener=_open_at_once)  # noqa: SIM115
+    status = os.fstat(file.fileno())
+    if stat.S_ISREG(status.st_mode) and status.st_size <= max_bytes:
+        return file
+    file.close()
+    if stat.S_ISREG(status.st_mode):
+        raise OSError(f"{path} has {status.st_size} bytes, expected at most {max_bytes}")
+    raise OSError(f"{path} is not a regular file")
+
+
+def _open_at_once(name: str, flags: int) -> int:
+    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def lock(descriptor: int) -> bool | None:
@@ -102,22 +124,15 @@ def lock(descriptor: int) -> bool | None:
     return True
 
 
-@contextmanager
-def _held(partial: Path) -> Iterator[None]:
-    """Make a file under way and keep it locked, so that nobody takes it for an abandoned one."""
-    if fcntl is None:  # where, too, an open file cannot be given another name
-        yield
-        return
+def _new_file(path: Path) -> BinaryIO:
+    """Create the file under way, locked while it is open, so that nobody thinks it abandoned."""
     while True:
-        descriptor = os.open(partial, os.O_RDWR | os.O_CREAT, 0o666)
-        # Between these two lines another process may have removed it.
-        if lock(descriptor) is not False and partial.exists():
-            break
-        os.close(descriptor)
-    try:
-        yield
-    finally:
-        os.close(descriptor)
+        name = f"{path.name}.{secrets.token_hex(8)}{PARTIAL_SUFFIX}"
+        file = path.with_name(name).open("xb")  # O_EXCL, which follows no link either
+        # Another process may have removed it before it was locked.
+        if lock(file.fileno()) is not False and os.path.exists(file.name):
+            return file
+        file.close()
 
 
 def _sync_folder(folder: Path) -> None:
@@ -130,11 +145,6 @@ def _sync_folder(folder: Path) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
-
-
-def _is_partial(path: Path) -> bool:
-    """Whether `whole_file` gave the name."""
-    return re.search(r"\.\d+\.\d+$", path.name.removesuffix(PARTIAL_SUFFIX)) is not None
 
 
 def csv_bytes(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
@@ -166,7 +176,9 @@ def gzip_pieces(pieces: Iterable[bytes]) -> Iterator[bytes]:
 
 def remove_abandoned_files(folder: Path) -> None:
     """Remove what killed processes left under way in a folder."""
-    for path in filter(_is_partial, folder.glob(f"*{PARTIAL_SUFFIX}")):
+    for path in folder.glob(f"*{PARTIAL_SUFFIX}"):
+        if not _NAME_OF_PARTIAL.search(path.name):
+            continue
         with suppress(OSError):  # another process may have removed it, or given it its own name
             with path.open("rb+") as file:
                 is_abandoned = lock(file.fileno())

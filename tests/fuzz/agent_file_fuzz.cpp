@@ -1,13 +1,27 @@
 // Any bytes as a saved agent: where it loads it acts, learns and can be saved.
+#include <algorithm>
 #include <cmath>
 
 #include "input.hpp"
 #include "sdnn/agents/controller.hpp"
 
+namespace {
+
+/// The bytes as a file whose checksum is right, so that the reader reads on.
+std::vector<std::uint8_t> with_checksum(std::vector<std::uint8_t> file) {
+  using namespace sdnn::core::detail;
+  if (file.size() < kChecksumEnd) return file;
+  std::ranges::copy(kBeginning, file.begin() + sizeof(std::uint64_t));
+  std::ranges::copy(checksum_of(std::as_bytes(std::span(file))), file.begin() + kChecksumBegin);
+  return file;
+}
+
+}  // namespace
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sdnn;
   fuzz::accepted([&] {
-    const fuzz::MemoryFile file({data, size});
+    const fuzz::MemoryFile file(with_checksum({data, data + size}));
     agents::Controller controller(file.path());
     const std::vector<double> observation(controller.n_observed(), 0.25);
     controller.begin_episode();

@@ -14,15 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.actions import Actions
-from sdnn.agents.files import (
-    Arrays,
-    Description,
-    completed,
-    from_file,
-    read,
-    register,
-    write,
-)
+from sdnn.agents.files import completed, read_agent, register
 from sdnn.agents.observations import AnglePairs, Ranges, UnitObservations, without_repeats
 from sdnn.agents.scaling import Scaling
 from sdnn.agents.spaces import space_data, space_of
@@ -30,6 +22,7 @@ from sdnn.agents.training import Callback, Training, TrainingResult
 from sdnn.agents.transition import Transition, reward_of
 from sdnn.agents.warm_up import MOST_ENVIRONMENTS, WarmUp
 from sdnn.arguments import flag, path_of, real, seed_of, whole
+from sdnn.files import Arrays, Description, write_file
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -540,7 +533,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         OSError
             If the file cannot be written.
         """
-        write(path_of("path", path), self.description(), self.state())
+        write_file(path_of("path", path), "agent", self.state(), self.description())
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -694,6 +687,5 @@ def check_shape(state: Mapping[str, NDArray[Any]], name: str, shape: tuple[int, 
 
 def load_agent(path: str | Path) -> Agent[Any, Any]:
     """Read an agent of any kind that `Agent.save` wrote; see `Agent.load`."""
-    place = path_of("path", path)
-    agent: Agent[Any, Any] = from_file(place, *read(place))
+    agent: Agent[Any, Any] = read_agent(path_of("path", path), "agent", "training")[0]
     return agent

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -10,8 +10,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents.files import Arrays, Description, from_file, read, write
+from sdnn.agents.files import read_agent
 from sdnn.arguments import flag, real, whole
+from sdnn.files import Arrays, Description, write_file
 
 __all__ = ["SavedEpisode", "SavedTraining", "read_training", "write_training"]
 
@@ -95,22 +96,13 @@ def write_training(path: Path, agent: Saved, training: SavedTraining) -> None:
         if episode is not None:
             arrays[_prefix(i) + "actions"] = episode.actions
             arrays[_prefix(i) + "observation"] = episode.observation
-    first = training.present[0]
     told: dict[str, Any] = {name: getattr(training, name) for name in _LIMITS}
-    if training.n_skipped == 0:  # as in older files
-        del told["n_skipped"]
-    told["return"] = 0.0 if first is None else first.sum_of_rewards
-    if len(training.present) > 1:
-        told["environments"] = [
-            episode
-            and {
-                "episode": episode.number,
-                "return": episode.sum_of_rewards,
-                "waits": episode.waits,
-            }
-            for episode in training.present
-        ]
-    write(path, {**agent.description(), "training": told}, arrays)
+    told["environments"] = [
+        episode
+        and {"episode": episode.number, "return": episode.sum_of_rewards, "waits": episode.waits}
+        for episode in training.present
+    ]
+    write_file(path, "training", arrays, {**agent.description(), "training": told})
 
 
 def read_training(path: Path) -> tuple[Any, SavedTraining]:
@@ -123,21 +115,11 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
     ValueError
         If it is damaged or holds no training.
     """
-    description, arrays = read(path)
-    if "training" not in description:
-        raise ValueError(f"{path} holds an agent and no training: Agent.load reads it")
-    agent = from_file(path, description, arrays)
-    evaluations = np.empty((0, 2))
-    if _EVALUATIONS in arrays:  # older files have none
-        evaluations = _array(path, arrays, _EVALUATIONS)
-        if evaluations.ndim != 2 or evaluations.shape[1] != 2:
-            raise ValueError(f"{path} is damaged: {_EVALUATIONS} must have shape (n, 2)")
-    told = _checked(path, description["training"])
-    environments: Iterable[Any] | None = told.get("environments")
-    if environments is None:
-        number = told["n_skipped"] + told["n_episodes"]
-        only = {"episode": number, "return": told["return"], "waits": False}
-        environments = [only if _prefix(0) + "actions" in arrays else None]
+    agent, description, arrays = read_agent(path, "training")
+    told = _checked(path, description.get("training"))
+    evaluations = _array(path, arrays, _EVALUATIONS)
+    if evaluations.ndim != 2 or evaluations.shape[1] != 2:
+        raise ValueError(f"{path} is damaged: {_EVALUATIONS} must have shape (n, 2)")
     present = [
         None
         if one is None
@@ -148,29 +130,27 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
             observation=_array(path, arrays, _prefix(i) + "observation"),
             waits=one["waits"],
         )
-        for i, one in enumerate(environments)
+        for i, one in enumerate(told["environments"])
     ]
     limited = {name: told[name] for name in _LIMITS}
     return agent, SavedTraining(**limited, evaluations=evaluations, present=present)
 
 
 def _prefix(environment: int) -> str:
-    """Of the names of an environment's arrays: the first one's as if there were no others."""
-    return f"{_ARRAYS}{environment}." if environment else _ARRAYS
+    """Of the names of an environment's arrays."""
+    return f"{_ARRAYS}{environment}."
 
 
 def _checked(path: Path, told: Any) -> Mapping[str, Any]:
     try:
         if not isinstance(told, dict):
             raise TypeError(f"training must be a table, got {told!r}")
-        told = {"n_skipped": 0, **told}  # most files have none
         for name, (low, high) in _LIMITS.items():
             if told[name] is not None or name not in _MAY_BE_NONE:
                 whole(name, told[name], low, high)
         if (told["steps"] is None) == (told["episodes"] is None):
             raise ValueError("one of steps and episodes must be given")
-        real("return", told["return"])
-        for one in told.get("environments", ()):
+        for one in told["environments"]:
             if one is not None:
                 whole("episode", one["episode"], 0, 2**53)
                 real("return", one["return"])

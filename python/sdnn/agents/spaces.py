@@ -174,7 +174,7 @@ def space_of(data: Mapping[str, Any]) -> gym.Space[Any]:
         low, high = low.reshape(data["shape"]), high.reshape(data["shape"])
         return gym.spaces.Box(low, high, dtype=dtype.type)
     if "discrete" in data:
-        dtype = np.dtype(data.get("dtype", np.int64))  # older files do not say it
+        dtype = np.dtype(data.get("dtype", np.int64))  # C++ does not say it
         if dtype == np.int64:
             return gym.spaces.Discrete(data["discrete"], start=data["start"])
         return gym.spaces.Discrete(data["discrete"], start=data["start"], dtype=dtype.type)

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from sdnn.agents.episode import Actions, Episode
 from sdnn.agents.evaluation import episode_seed, evaluate
-from sdnn.agents.files import Arrays, Description
 from sdnn.agents.rounds import Outcome, rounds_in
 from sdnn.agents.saved_training import (
     SavedEpisode,
@@ -26,6 +25,7 @@ from sdnn.agents.saved_training import (
 from sdnn.agents.spaces import require_same_kind, require_single
 from sdnn.agents.transition import Transition, UnusableStepError, reward_of
 from sdnn.arguments import flag, has_methods, path_of, whole
+from sdnn.files import Arrays, Description
 from sdnn.interrupts import Interrupts
 
 if TYPE_CHECKING:

@@ -45,11 +45,7 @@ def export(
 
     with run_command(words_of_run(source)):
         try:
-            run = Run.open(source) if source.is_dir() else Run.of_agent_file(source)
-            if run is None:
-                agent = load_agent(source)
-            else:
-                agent = run.agent() if source.is_dir() else run.agent_in(source)
+            agent = Run.open(source).agent() if source.is_dir() else load_agent(source)
         except ValueError as error:
             raise click.ClickException(str(error)) from error
         try:

@@ -1,30 +1,22 @@
-"""A fitted estimator in one safetensors file: arrays, and JSON metadata that says the rest."""
+"""A fitted estimator in a file: arrays, and a description of all else."""
 
 from __future__ import annotations
 
-import hashlib
-import json
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save as to_bytes
 
 from sdnn import _core
 from sdnn.coding import Coding, from_dict, to_dict
 from sdnn.estimators.input_code import InputCode
 from sdnn.estimators.network import Network
-from sdnn.whole_files import write_whole
+from sdnn.files import Arrays, Description, read_file, write_file
 
 __all__ = ["Saved", "load", "save"]
 
-FORMAT = "sdnn-estimator-2"
-"""Files of format 1 had no checksum; they are read too."""
-FORMAT_NUMBER = re.compile(r"sdnn-estimator-(\d{1,9})")
 PLAIN = (
     "n_features_in_",
     "n_inputs_out_of_range_",
@@ -113,23 +105,21 @@ def save(estimator: Saved, path: str | Path) -> None:
     code = network.input_code
     unique = {id(table): table for table in (*code.modified, *code.modifiers)}
     number_of = {key: number for number, key in enumerate(unique)}
-    tensors: dict[str, NDArray[Any]] = {
+    arrays: Arrays = {
         "weights": narrowed(network.weights),
         "thresholds": narrowed(network.thresholds),
     }
     earlier = vars(estimator).get("_earlier", ())
     for number, one in enumerate(earlier):
-        tensors[f"weights.{number}"] = narrowed(one.weights)
-        tensors[f"thresholds.{number}"] = narrowed(one.thresholds)
+        arrays[f"weights.{number}"] = narrowed(one.weights)
+        arrays[f"thresholds.{number}"] = narrowed(one.thresholds)
     for number, table in enumerate(unique.values()):
-        tensors[f"table.{number}"] = np.packbits(table > 0, axis=1)
+        arrays[f"table.{number}"] = np.packbits(table > 0, axis=1)
     for name in ARRAYS:
         if hasattr(estimator, name):
-            tensors[name] = np.ascontiguousarray(getattr(estimator, name))
+            arrays[name] = np.ascontiguousarray(getattr(estimator, name))
     held = vars(estimator)
-    metadata = {
-        "format": FORMAT,
-        "version": _core.__version__,
+    description = {
         "class": type(estimator).__name__,
         "parameters": {
             name: plain(value) for name, value in estimator.get_params(deep=False).items()
@@ -144,95 +134,46 @@ def save(estimator: Saved, path: str | Path) -> None:
         "modified": [number_of[id(table)] for table in code.modified],
         "modifiers": [number_of[id(table)] for table in code.modifiers],
     }
-    text = json.dumps(metadata)
-    stored = {"sdnn": text, "checksum": checksum(text, tensors)}
-    write_whole(Path(path), to_bytes(tensors, metadata=stored))
-
-
-def checksum(text: str, tensors: dict[str, NDArray[Any]]) -> str:
-    """Return the SHA-256 of the description and all tensors, in the order of their names."""
-    digest = hashlib.sha256(text.encode())
-    for name in sorted(tensors):
-        tensor = np.ascontiguousarray(tensors[name])
-        digest.update(f"{name} {tensor.dtype.str} {tensor.shape}".encode())
-        digest.update(tensor.data)
-    return digest.hexdigest()
+    write_file(Path(path), "estimator", arrays, description)
 
 
 def load(path: str | Path, kind: type[Estimator]) -> Estimator:
     """Read an estimator; see `BaseSDNN.load`."""
-    if Path(path).is_dir():
-        raise IsADirectoryError(f"{path} is a folder, not a file")
+    path = Path(path)
+    description, arrays = read_file(path, "estimator")
+    if description.get("class") != kind.__name__:
+        raise ValueError(f"{path} holds an {description.get('class')}, not an {kind.__name__}")
     try:
-        with safe_open(path, framework="numpy") as file:
-            stored = file.metadata() or {}
-            metadata = described(stored.get("sdnn", "{}"))
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    except SafetensorError as error:
-        raise ValueError(f"{path} is not a safetensors file: {error}") from None
-    found = FORMAT_NUMBER.fullmatch(str(metadata.get("format")))
-    if found is None:
-        raise ValueError(f"{path} does not hold an estimator of this package ({FORMAT})")
-    if int(found[1]) > 2:
-        raise ValueError(
-            f"{path} was written by a newer version, {metadata.get('version')}, than this one, "
-            f"{_core.__version__}"
-        )
-    if int(found[1]) == 2 and stored.get("checksum") != checksum(stored["sdnn"], tensors):
-        raise ValueError(f"{path} is damaged: its checksum is another")
-    if metadata.get("class") != kind.__name__:
-        raise ValueError(f"{path} holds an {metadata.get('class')}, not an {kind.__name__}")
-    try:
-        return read_estimator(metadata, tensors, kind)
+        return read_estimator(description, arrays, kind)
     except (
         AttributeError, IndexError, KeyError, RecursionError, TypeError, ValueError,
     ) as error:  # fmt: skip
         raise ValueError(f"{path} is damaged: {error!r}") from error
 
 
-def described(text: str) -> dict[str, Any]:
-    """Return the metadata that a text holds; none if it is something else."""
-    try:
-        metadata = json.loads(text)
-    except (ValueError, RecursionError):
-        return {}
-    return metadata if isinstance(metadata, dict) else {}
-
-
-def read_estimator(
-    metadata: dict[str, Any], tensors: dict[str, NDArray[Any]], kind: type[Estimator]
-) -> Estimator:
+def read_estimator(description: Description, arrays: Arrays, kind: type[Estimator]) -> Estimator:
     """Make the estimator with its parameters and all it has learned."""
-    estimator = kind(**{name: restored(value) for name, value in metadata["parameters"].items()})
-    # Earlier versions did not count.
-    counts = {"n_inputs_out_of_range_": 0}
-    if "n_outputs_" in metadata["plain"]:
-        counts["n_outputs_out_of_range_"] = 0
-    for name, value in {**counts, **metadata["plain"]}.items():
+    estimator = kind(**{name: restored(value) for name, value in description["parameters"].items()})
+    for name, value in description["plain"].items():
         if name in (*PLAIN, *PRIVATE):
             setattr(estimator, name, value)
-    for name, value in metadata["names"].items():
+    for name, value in description["names"].items():
         if name in NAMES:
             setattr(estimator, name, np.array(value["values"], dtype=value["type"]))
     for name in ARRAYS:
-        if name in tensors:
-            setattr(estimator, name, tensors[name])
-    estimator.network_ = read_network(metadata, tensors)
+        if name in arrays:
+            setattr(estimator, name, arrays[name])
+    estimator.network_ = read_network(description, arrays)
     if "n_outputs_" in vars(estimator):
         vars(estimator)["_earlier"] = tuple(
             Network(
                 estimator.network_.input_code,
-                metadata["n_units"],
-                weights=tensors[f"weights.{number}"].astype(np.int32),
-                thresholds=tensors[f"thresholds.{number}"].astype(np.int32),
+                description["n_units"],
+                weights=arrays[f"weights.{number}"].astype(np.int32),
+                thresholds=arrays[f"thresholds.{number}"].astype(np.int32),
             )
-            for number in range(metadata.get("n_earlier", 0))
+            for number in range(description["n_earlier"])
         )
-    if "classes_" in vars(estimator):
-        # Files of earlier versions: one unit per class or pair of classes.
-        vars(estimator).setdefault("_n_units_each", 1)
-        if "n_units_per_class" not in metadata["parameters"]:
-            vars(estimator)["n_units_per_class"] = 1
     require_consistent(estimator)
     return estimator
 
@@ -259,26 +200,26 @@ def require_consistent(estimator: Saved) -> None:
         raise ValueError("its parts do not fit together")
 
 
-def read_network(metadata: dict[str, Any], tensors: dict[str, NDArray[Any]]) -> Network:
+def read_network(description: Description, arrays: Arrays) -> Network:
     """Build the code and the layer; equal tables are shared again."""
-    n_units = metadata["n_pattern_units"]
+    n_units = description["n_pattern_units"]
 
     def unpacked(number: int) -> NDArray[np.int8]:
-        bits = np.unpackbits(tensors[f"table.{number}"], axis=1, count=n_units)
+        bits = np.unpackbits(arrays[f"table.{number}"], axis=1, count=n_units)
         return (2 * bits.astype(np.int8) - 1).astype(np.int8)
 
     tables = {
-        number: unpacked(number) for number in {*metadata["modified"], *metadata["modifiers"]}
+        number: unpacked(number) for number in {*description["modified"], *description["modifiers"]}
     }
     code = InputCode(
-        [from_dict(coding) for coding in metadata["codings"]],
-        [(mu, nu) for mu, nu in metadata["pairs"]],
-        [tables[number] for number in metadata["modified"]],
-        [tables[number] for number in metadata["modifiers"]],
+        [from_dict(coding) for coding in description["codings"]],
+        [(mu, nu) for mu, nu in description["pairs"]],
+        [tables[number] for number in description["modified"]],
+        [tables[number] for number in description["modifiers"]],
     )
     return Network(
         code,
-        metadata["n_units"],
-        weights=tensors["weights"].astype(np.int32),
-        thresholds=tensors["thresholds"].astype(np.int32),
+        description["n_units"],
+        weights=arrays["weights"].astype(np.int32),
+        thresholds=arrays["thresholds"].astype(np.int32),
     )

@@ -185,7 +185,7 @@ def _write_gif(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> 
 def _write_mp4(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> None:
     import imageio_ffmpeg
 
-    with whole_file(path) as partial, ExitStack() as stack:
+    with whole_file(path) as file, ExitStack() as stack:
         writer = None
         for frame in frames:
             # The video's pictures have even sides.
@@ -193,7 +193,7 @@ def _write_mp4(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> 
             if writer is None:
                 size = (even.shape[1], even.shape[0])
                 writer = imageio_ffmpeg.write_frames(
-                    str(partial), size, fps=rate, macro_block_size=2, quality=7,
+                    file.name, size, fps=rate, macro_block_size=2, quality=7,
                     output_params=["-f", "mp4"],
                 )  # fmt: skip
                 stack.enter_context(closing(writer))

@@ -206,17 +206,6 @@ class Run:
             raise ConfigError("goals", f"must be a list of goals: {error}", str(path)) from error
         return cls(place, RunConfig.read(path), read)
 
-    @classmethod
-    def of_agent_file(cls, path: str | Path) -> Self | None:
-        """Find the run whose agent or checkpoint a file is; None if it is of none."""
-        file = Path(path)
-        if file.name not in (AGENT, CHECKPOINT) or not (file.parent / CONFIG).exists():
-            return None
-        try:
-            return cls.open(file.parent)
-        except RunError:  # a file of that name that is something else
-            return None
-
     def check(self) -> None:
         """Make all that is needed once, to see that it works; ConfigError if not."""
         with closing(self.config.environment.make()) as env, self._evaluation_env():
@@ -310,26 +299,10 @@ class Run:
         if path is None:
             begins = command_line("sdnn", "resume", self.folder)
             raise RunError(f"{self.folder} has no checkpoint yet: {begins} begins it")
-        return self.agent_in(path)
-
-    def agent_in(self, path: str | Path) -> Agent[Any, Any]:
-        """Load an agent of the run from one of its files.
-
-        Raises
-        ------
-        RunError
-            If the file is damaged.
-        """
         try:
-            return self._with_scaling(load_agent(path))
+            return load_agent(path)
         except ValueError as error:
             raise RunError(str(error)) from error
-
-    def _with_scaling(self, agent: Agent[Any, Any]) -> Agent[Any, Any]:
-        """Let the agent of an older file know how the run scales what it observes."""
-        if agent.scaling is None:
-            agent.scaling = self.config.environment.scaling()
-        return agent
 
     def evaluate(self, episodes: int = 10, seed: int | None = None) -> RunEvaluation:
         """Run greedy episodes with the agent as it is now.
@@ -437,14 +410,7 @@ class Run:
         except ValueError as error:
             raise RunError(str(error)) from error
         assert isinstance(training.agent, Agent)  # what load gives
-        self._with_scaling(training.agent)
         rows = _read_rows(self.folder / ROWS)
-        if not training.evaluations:  # older checkpoints do not have them
-            training.evaluations = [
-                (row["step"], row["mean_return"])
-                for row in rows[: training.n_rows]
-                if row["kind"] == "evaluation"
-            ]
         if len(rows) < training.n_rows:
             raise RunError(
                 f"{self.folder / ROWS} must have the {training.n_rows} rows that were written"

@@ -83,8 +83,7 @@ void expect_that_a_file_goes_on(Agent agent, const char* name) {
   const AgentFile file = read_agent_file(folder / "agent");
   EXPECT_EQ(file.settings["class"], name);
   EXPECT_EQ(file.settings["seed"], kSeed);
-  EXPECT_EQ(file.settings["format"], "sdnn-agent-1");
-  EXPECT_EQ(file.settings["version"], core::kVersion);
+  EXPECT_EQ(file.kind, "agent");
   AnyAgent any = read_agent(folder / "agent");
   ASSERT_TRUE(std::holds_alternative<Agent>(any));
   Agent& read = std::get<Agent>(any);
@@ -163,12 +162,12 @@ TEST(AgentFile, WhatTheLibraryDoesNotKnowIsKept) {
   const testing::Folder folder;
   AgentFile file = agent_file_of(small_rbf(), 7);
   file.settings["observation"] = {{"low", {-1.5}}, {"note", "für später"}};
-  file.metadata["format"] = "np";
+  file.kind = "training";
   file.tensors["ranges.low"] = testing::tensor_of<double>({-1.5});
   write_agent_file(folder / "agent", file);
   AgentFile read = read_agent_file(folder / "agent");
   EXPECT_EQ(read.settings, file.settings);
-  EXPECT_EQ(read.metadata, file.metadata);
+  EXPECT_EQ(read.kind, file.kind);
   EXPECT_EQ(read.tensors, file.tensors);
   QLearning<RBFNetwork> agent = small_rbf();
   agent.learn(std::vector<double>{0.1, 0.2}, 3, 1.0, std::vector<double>{0.1, 0.2}, true);
@@ -194,11 +193,6 @@ TEST(AgentFile, SaysWhatDoesNotFit) {
     file.settings[json::json_pointer(pointer)] = value;
     return error_of(file);
   };
-  EXPECT_EQ(
-      with("/format", "sdnn-agent-2"),
-      "its format is \"sdnn-agent-2\", this library (0.1.0) reads \"sdnn-agent-1\": it may be "
-      "of a newer library");
-  EXPECT_EQ(with("/format", 1), "sdnn.format must be a text, got 1");
   EXPECT_EQ(with("/class", "Sarsa"),
             "class must be SDNNQLearning, RBFQLearning or FuzzyQLearning, got \"Sarsa\"");
   EXPECT_EQ(with("/seed", -1), "seed must be a whole number of 0 or more, got -1");
@@ -237,8 +231,6 @@ TEST(AgentFile, SaysWhatDoesNotFit) {
   file.tensors.erase("agent.step");
   EXPECT_EQ(error_of(file), "state: step must be there");
   file = good;
-  file.settings = {1, 2};
-  EXPECT_EQ(error_of(file), "sdnn must be an object, got [1,2]");
   file = agent_file_of(fuzzy_agent(), 1);
   file.settings["approximator"]["n_inputs"] = 40;
   file.settings["approximator"]["max_table_bytes"] = kSeed;
@@ -254,17 +246,12 @@ TEST(AgentFile, SaysWhatDoesNotFit) {
   EXPECT_EQ(error_of(file), "n_actions must be [7], as the approximator's, got [8]");
 }
 
-TEST(AgentFile, SaysWhereThereIsNoAgent) {
+TEST(AgentFile, AFileOfAnotherKindIsRefused) {
   const testing::Folder folder;
   const auto path = folder / "other";
-  const auto error_of = [&path] {
-    return testing::runtime_error_of([&path] { (void)read_agent(path); });
-  };
-  EXPECT_EQ(error_of(), path.string() + ": is not there");
-  core::write_safetensors(path, {{{"format", "pt"}}, {}});
-  EXPECT_EQ(error_of(), path.string() + ": holds no agent: its metadata have no \"sdnn\"");
-  core::write_safetensors(path, {{{"sdnn", "{\"seed\": NaN}"}}, {}});
-  EXPECT_EQ(error_of().rfind(path.string() + ": metadata \"sdnn\": its JSON is damaged", 0), 0U);
+  core::write_file(path, {"estimator", json::object(), {}});
+  EXPECT_EQ(testing::runtime_error_of([&path] { (void)read_agent(path); }),
+            path.string() + ": is a file of kind 'estimator', expected agent or training");
 }
 
 }  // namespace

@@ -412,7 +412,7 @@ TEST(Controller, SaysWhatItsFileLacks) {
   file.settings["observation"]["inputs"].erase(1);
   EXPECT_EQ(error_of(file), "observation.inputs must be 3, as the agent's, got 2");
   EXPECT_EQ(testing::runtime_error_of([] { const Controller controller(AgentFile{}); }),
-            "sdnn.format must be there");
+            "sdnn.seed must be there");
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,17 +24,21 @@ std::string file_of(const std::string& header, const std::string& data) {
   return length + header + data;
 }
 
+/// The header of a file without checksum, and its data.
 const std::string kHeader =
-    R"({"__metadata__":{"key":"text \"é\""},"b":{"dtype":"F64","shape":[1],"data_offsets":[0,8]},)"
+    R"({"__metadata__":{"sdnn":"text"},"b":{"dtype":"F64","shape":[1],"data_offsets":[0,8]},)"
     R"("a":{"dtype":"I16","shape":[2,1],"data_offsets":[8,12]},)"
     R"("c":{"dtype":"U8","shape":[],"data_offsets":[12,13]},)"
     R"("d":{"dtype":"U8","shape":[0,3],"data_offsets":[13,13]}})";
 const std::string kData =
     std::string("\0\0\0\0\0\0\xf8\x3f", 8) + std::string("\x01\0\xff\xff\x07", 5);
 
-Safetensors example() {
-  Safetensors content;
-  content.metadata["key"] = "text \"é\"";
+detail::Safetensors parsed(const std::string& file) {
+  return detail::parse_safetensors(std::as_bytes(std::span(file)));
+}
+
+FileContent example() {
+  FileContent content{.kind = "agent", .description = {{"key", "text \"é\""}}, .tensors = {}};
   content.tensors["a"] = testing::tensor_of<std::int16_t>({1, -1});
   content.tensors["a"].shape = {2, 1};
   content.tensors["b"] = testing::tensor_of<double>({1.5});
@@ -44,34 +50,110 @@ Safetensors example() {
 }
 
 // Byte by byte as the format's own library writes it: larger types first, then by name.
-TEST(Safetensors, AreWrittenAsByTheirOwnLibrary) {
+TEST(Files, AreWrittenAsByTheLibraryOfSafetensors) {
   const testing::Folder folder;
-  write_safetensors(folder / "file", example());
+  write_file(folder / "file", example());
+  const std::string file = testing::content_of(folder / "file");
+  const std::string digits = file.substr(detail::kChecksumBegin, 8);
   std::string header = kHeader;
+  header.replace(header.find("text"), 4,
+                 R"({\"checksum\":\")" + digits +
+                     R"(\",\"description\":{\"key\":\"text \\\"\\u00e9\\\"\"},\"format\":1,)"
+                     R"(\"kind\":\"agent\",\"version\":\")" +
+                     kVersion + R"(\"})");
   header.append((8 - header.size() % 8) % 8, ' ');
-  EXPECT_EQ(testing::content_of(folder / "file"), file_of(header, kData));
+  EXPECT_EQ(file, file_of(header, kData));
+  EXPECT_EQ(digits, detail::checksum_of(std::as_bytes(std::span(file))));
   EXPECT_EQ(folder.n_files(), 1U);
 }
 
-TEST(Safetensors, AreReadAsTheyWereWritten) {
+TEST(Files, AreReadAsTheyWereWritten) {
   const testing::Folder folder;
-  for (const Safetensors& content : {example(), Safetensors{}}) {
-    write_safetensors(folder / "file", content);
-    const Safetensors read = read_safetensors(folder / "file");
-    EXPECT_EQ(read.metadata, content.metadata);
+  for (const FileContent& content : {example(), FileContent{.kind = "estimator", .tensors = {}}}) {
+    write_file(folder / "file", content);
+    const FileContent read = read_file(folder / "file", {"agent", "estimator"});
+    EXPECT_EQ(read.kind, content.kind);
+    EXPECT_EQ(read.description, content.description);
     EXPECT_EQ(read.tensors, content.tensors);
   }
 }
 
-TEST(Safetensors, SayWhatIsWrongWithAFile) {
+// Files that Python wrote: see tests/python/reference/agent_files.py.
+TEST(Files, OfPythonAreWrittenAgainByteByByte) {
+  const testing::Folder folder;
+  for (const std::string name : {"agents/sdnn", "agents/sdnn-symbols", "agents/fuzzy-vector",
+                                 "files/training", "files/estimator"}) {
+    const std::filesystem::path path(SDNN_TEST_DATA "/" + name + ".safetensors");
+    const FileContent content = read_file(path, {"agent", "training", "estimator"});
+    write_file(folder / "again", content);
+    EXPECT_EQ(testing::content_of(folder / "again"), testing::content_of(path)) << name;
+  }
+}
+
+TEST(Files, EveryFlippedBitAndEveryCutIsNoticed) {
+  const testing::Folder folder;
+  Random random(1, Stream::weights);
+  for (const std::string name : {"agents/sdnn", "files/training", "files/estimator"}) {
+    const std::string good = testing::content_of(SDNN_TEST_DATA "/" + name + ".safetensors");
+    const auto path = folder / "file";
+    const auto is_noticed = [&](const std::string& bad) {
+      testing::write_content(path, bad);
+      const std::string error = testing::runtime_error_of(
+          [&] { (void)read_file(path, {"agent", "training", "estimator"}); });
+      return error.rfind(path.string() + ": ", 0) == 0;
+    };
+    EXPECT_FALSE(is_noticed(good)) << name;
+    for (int i = 0; i < 300; ++i) {
+      std::string bad = good;
+      const std::size_t place = i < 150 ? random.below(200) : random.below(good.size());
+      bad[place] = static_cast<char>(bad[place] ^ 1 << random.below(8));
+      EXPECT_TRUE(is_noticed(bad)) << name << " byte " << place;
+      EXPECT_TRUE(is_noticed(good.substr(0, random.below(good.size())))) << name;
+    }
+    EXPECT_TRUE(is_noticed(good + '\0')) << name;
+  }
+}
+
+TEST(Files, OfAnotherKindFormatOrProgramAreRefused) {
   const testing::Folder folder;
   const auto path = folder / "file";
-  const auto error_of = [&path](const std::string& content) {
-    testing::write_content(path, content);
-    const std::string error = testing::runtime_error_of([&] { (void)read_safetensors(path); });
+  const auto error_of = [&path] {
+    const std::string error = testing::runtime_error_of([&] { (void)read_file(path, {"agent"}); });
     EXPECT_EQ(error.rfind(path.string() + ": ", 0), 0U) << error;
     return error.substr(path.string().size() + 2);
   };
+  EXPECT_EQ(error_of(), "No such file or directory");
+  write_file(path, {"estimator", nlohmann::json::object(), {}});
+  EXPECT_EQ(error_of(), "is a file of kind 'estimator', expected agent");
+  write_file(path, {"agent", nlohmann::json::array(), {}});
+  EXPECT_EQ(error_of(), "is damaged: it has no description");
+  const std::string unknown =
+      "is not a file of sdnn, is damaged, or was written before files of sdnn had a checksum";
+  testing::write_content(path, file_of(kHeader, kData));
+  EXPECT_EQ(error_of(), unknown);
+  testing::write_content(path, "short");
+  EXPECT_EQ(error_of(), unknown);
+  std::string newer = file_of(
+      std::string(detail::kBeginning) + R"(00000000\",\"format\":2,\"version\":\"9.9\"}"}})", "");
+  newer.replace(detail::kChecksumBegin, 8, detail::checksum_of(std::as_bytes(std::span(newer))));
+  testing::write_content(path, newer);
+  EXPECT_EQ(error_of(), "has format 2, written by sdnn 9.9; this is sdnn " + std::string(kVersion) +
+                            ", which reads format 1");
+  std::filesystem::remove(path);
+  std::filesystem::create_directory(path);
+  EXPECT_EQ(error_of(), "is not a regular file");
+#if SDNN_HAS_POSIX_FILES
+  std::filesystem::remove(path);
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);  // without a writer, for which reading would wait
+  EXPECT_EQ(error_of(), "is not a regular file");
+#endif
+}
+
+TEST(Safetensors, SayWhatIsWrongWithThem) {
+  const auto error_of = [](const std::string& file) {
+    return testing::runtime_error_of([&] { (void)parsed(file); });
+  };
+  EXPECT_EQ(error_of(file_of(kHeader, kData)), "no error");
   const auto with = [&](const std::string& part, const std::string& other) {
     std::string header = kHeader;
     EXPECT_NE(header.find(part), std::string::npos) << part;
@@ -109,23 +191,12 @@ TEST(Safetensors, SayWhatIsWrongWithAFile) {
   EXPECT_EQ(with("[2,1]", "[4294967296,4294967296,4294967296,4]"),
             "tensor a is not as large as its shape");
   EXPECT_EQ(with("\"shape\":[1],", ""), "tensor b needs dtype, shape and data_offsets");
-  EXPECT_EQ(with("{\"key\":\"text \\\"é\\\"\"}", "[]"), "has __metadata__ that are no JSON object");
-  EXPECT_EQ(with("\"text \\\"é\\\"\"", "3"), "has __metadata__ that are no text: key");
-}
-
-TEST(Safetensors, SayWhatIsNoFile) {
-  const testing::Folder folder;
-  const auto error_of = [](const std::filesystem::path& path) {
-    return testing::runtime_error_of([&] { (void)read_safetensors(path); });
-  };
-  EXPECT_EQ(error_of(folder / "nothing"), (folder / "nothing").string() + ": is not there");
-  std::filesystem::create_directory(folder / "inside");
-  EXPECT_EQ(error_of(folder / "inside"), (folder / "inside").string() + ": is no file");
+  EXPECT_EQ(with("{\"sdnn\":\"text\"}", "[]"), "has no text \"sdnn\" in its __metadata__");
+  EXPECT_EQ(with("\"text\"", "3"), "has no text \"sdnn\" in its __metadata__");
 }
 
 // Nothing but a content or std::runtime_error comes of any damage.
 TEST(Safetensors, NoDamageGivesAnythingElse) {
-  const testing::Folder folder;
   const std::string good = file_of(kHeader, kData);
   Random random(1, Stream::weights);
   int n_refused = 0;
@@ -136,9 +207,7 @@ TEST(Safetensors, NoDamageGivesAnythingElse) {
     } else {
       bad[random.below(bad.size())] = static_cast<char>(random.below(256));
     }
-    testing::write_content(folder / "file", bad);
-    n_refused +=
-        testing::runtime_error_of([&] { (void)read_safetensors(folder / "file"); }) != "no error";
+    n_refused += testing::runtime_error_of([&] { (void)parsed(bad); }) != "no error";
   }
   EXPECT_GT(n_refused, static_cast<int>(good.size()) + 1000);
 }

@@ -23,8 +23,9 @@ import sys, time
 from pathlib import Path
 from sdnn.whole_files import whole_file
 
-with whole_file(Path(sys.argv[1])) as partial:
-    partial.write_bytes(b"half")
+with whole_file(Path(sys.argv[1])) as file:
+    file.write(b"half")
+    file.flush()
     print("half", flush=True)
     time.sleep(600)
 """
@@ -74,7 +75,7 @@ def test_only_what_a_killed_process_left_is_removed(tmp_path):
 @pytest.mark.parametrize(("seconds", "stays"), [(0, True), (3600, False)])
 def test_where_files_cannot_be_locked_their_age_counts(tmp_path, monkeypatch, seconds, stays):
     monkeypatch.setattr(whole_files, "fcntl", None)
-    left = tmp_path / f"rows.csv.1.0{PARTIAL_SUFFIX}"
+    left = tmp_path / f"rows.csv.0123456789abcdef{PARTIAL_SUFFIX}"
     mine = [tmp_path / "mine.txt", tmp_path / f"mine{PARTIAL_SUFFIX}"]
     for path in (left, *mine):
         path.write_bytes(b"half")

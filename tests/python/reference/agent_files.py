@@ -1,7 +1,7 @@
-"""Writes the files that both languages must read alike: call it to renew tests/data/agents.
+"""Writes the files that both languages must read alike: call it to renew tests/data.
 
 For each agent: a file, a life of some steps (observations, actions and so on), and the file that
-the agent leaves after it.
+the agent leaves after it. Of the other kinds of files: a small one.
 """
 
 import json
@@ -12,6 +12,7 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 
+from sdnn import SDNNRegressor
 from sdnn.agents import (
     FuzzyQLearning,
     FuzzyQLearningConfig,
@@ -19,11 +20,12 @@ from sdnn.agents import (
     RBFQLearning,
     Scaling,
     SDNNQLearning,
+    Training,
     Transition,
 )
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
 
-FOLDER = Path(__file__).parents[2] / "data" / "agents"
+FOLDER = Path(__file__).parents[2] / "data"
 OBSERVATIONS = gym.spaces.Box(
     np.array([-1.0, -1.0, -8.0, -np.inf]), np.array([1.0, 1.0, 8.0, np.inf]), dtype=np.float64
 )
@@ -129,6 +131,22 @@ def life(agent, rng, n_steps):
 
 def write(folder):
     """Write all files to a folder."""
+    write_agents(folder / "agents")
+    (folder / "files").mkdir(parents=True, exist_ok=True)
+    env = gym.make("Pendulum-v1")
+    agent = SDNNQLearning(
+        env.observation_space, env.action_space, approximator=SMALL, learning=LEARNING, seed=3
+    )
+    training = Training(agent, env, steps=30, seed=1)
+    training.run()
+    training.save(folder / "files" / "training.safetensors")
+    samples = np.random.default_rng(2).uniform(size=(20, 2))
+    model = SDNNRegressor(n_pattern_units=40, n_output_units=9, max_iter=2, random_state=0)
+    model.fit(samples, samples[:, 0]).save(folder / "files" / "estimator.safetensors")
+
+
+def write_agents(folder):
+    """Write those of agents."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, agent in agents():
         rng = np.random.default_rng(5)

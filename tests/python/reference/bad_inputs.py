@@ -6,14 +6,12 @@ error that names the parameter, and leave the agent as it was; or take it and wo
 
 import dataclasses
 import inspect
-import json
 import re
 import tempfile
 from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
-from safetensors.numpy import load_file, save_file
 
 import sdnn.agents as agents
 from sdnn.agents import (
@@ -26,8 +24,8 @@ from sdnn.agents import (
     Transition,
     load_agent,
 )
-from sdnn.agents.files import read
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.files import read_file, write_file
 
 TYPED = (TypeError, ValueError, OverflowError, OSError)
 
@@ -506,8 +504,7 @@ def file_cells(kind):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "checkpoint"
         training.save(path)
-        description, _ = read(path)
-        arrays = load_file(path)
+        description, arrays = read_file(path, "training")
     for place in leaves(description):
         for word, value in {"nothing": ..., **JSON}.items():
             changed = replaced(description, place, value)
@@ -551,7 +548,7 @@ def replaced(data, place, value):
 def _file_cell(description, arrays, kind):
     def run():
         path = Path("damaged").absolute()
-        save_file(arrays, path, metadata={"sdnn": json.dumps(description)})
+        write_file(path, "training", arrays, description)
         for load in (load_agent, lambda path: _trained(path, kind)):
             try:
                 fault = insanity(load(path))

@@ -12,6 +12,7 @@ import gymnasium as gym
 import numpy as np
 from safetensors.numpy import load, save
 
+from checksums import with_checksum
 from made_records import make_record
 from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.agents.agent import load_agent
@@ -170,12 +171,9 @@ def with_other_bytes(data, random):
 
 
 def with_other_contents(data, random):
-    """A safetensors file whose metadata or arrays are others, but which is whole.
-
-    Of an estimator it says that it has no checksum, so that the reader reads on.
-    """
+    """A file whose description or arrays are others, but whose checksum is right."""
     header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
-    metadata = header["__metadata__"]["sdnn"].replace("sdnn-estimator-2", "sdnn-estimator-1")
+    metadata = header["__metadata__"]["sdnn"]
     tensors = load(data)
     name = sorted(tensors)[random.randint(len(tensors))]
     kind = random.randint(5)
@@ -191,8 +189,10 @@ def with_other_contents(data, random):
         array[random.randint(array.size)] = np.iinfo(array.dtype).max if is_whole else np.nan
         tensors[name] = array.reshape(tensors[name].shape)
     else:
-        metadata = with_other_bytes(metadata.encode(), random).decode("utf-8", "replace")
-    return save(tensors, metadata={"sdnn": metadata})
+        start = len('{"checksum":"00000000"')
+        changed = with_other_bytes(metadata[start:].encode(), random).decode("utf-8", "replace")
+        metadata = metadata[:start] + changed
+    return with_checksum(save(tensors, metadata={"sdnn": metadata}))
 
 
 @functools.cache

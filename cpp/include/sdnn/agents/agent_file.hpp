@@ -9,7 +9,6 @@
 #include <exception>
 #include <filesystem>
 #include <limits>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
@@ -32,17 +31,16 @@
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/safetensors.hpp"
 #include "sdnn/core/state.hpp"
-#include "sdnn/core/version.hpp"
 
 namespace sdnn::agents {
 
 /// An agent's file: what is in it of an agent, and of what this library does not know.
 struct AgentFile {
-  /// The JSON text of the metadata "sdnn": format, version, class, seed, approximator, learning,
-  /// n_actions; all else is its writer's (observation and action are the controller's).
+  /// Its description: class, seed, approximator, learning, n_actions; all else is its writer's
+  /// (observation and action are the controller's).
   nlohmann::json settings = nlohmann::json::object();
-  core::State tensors;                          ///< the agent's state with "agent." before, others
-  std::map<std::string, std::string> metadata;  ///< all but "sdnn"
+  core::State tensors;         ///< the agent's state with "agent." before, others
+  std::string kind = "agent";  ///< or "training", which holds an agent too
 };
 
 /// Any agent that a file may hold.
@@ -56,9 +54,6 @@ using AnyAgent = std::variant<QLearning<approximators::SDNNC>,
 template <class Agent>
 inline constexpr bool kIsFuzzy =
     std::is_same_v<Agent, FuzzyQLearning> || std::is_same_v<Agent, VectorFuzzyQLearning>;
-
-/// The format that is written, and the only one that is read.
-inline constexpr std::string_view kAgentFormat = "sdnn-agent-1";
 
 namespace detail {
 
@@ -267,8 +262,6 @@ AgentFile agent_file_of(const Agent& agent, std::uint64_t seed) {
     }
     for (std::size_t d = 0; d < agent.n_dimensions(); ++d) n_actions.push_back(agent.n_actions(d));
   }
-  file.settings["format"] = kAgentFormat;
-  file.settings["version"] = core::kVersion;
   file.settings["class"] = detail::class_of<Agent>();
   file.settings["seed"] = seed;
   file.settings["learning"] = config_to_json(agent.config());
@@ -295,12 +288,6 @@ namespace detail {
 class AgentMaker {
  public:
   explicit AgentMaker(const AgentFile& file) : settings_(file.settings) {
-    const auto text = value_from<std::string>(member(settings_, "format", "sdnn"), "sdnn.format");
-    if (text != kAgentFormat) {
-      throw std::invalid_argument("its format is \"" + text + "\", this library (" +
-                                  core::kVersion + ") reads \"" + std::string(kAgentFormat) +
-                                  "\": it may be of a newer library");
-    }
     for (const auto& [name, tensor] : file.tensors) {
       if (!name.starts_with(kStatePrefix)) continue;
       state_.emplace(name.substr(kStatePrefix.size()), tensor);
@@ -442,21 +429,8 @@ inline AnyAgent make_agent(const AgentFile& file) { return detail::AgentMaker(fi
 
 /// Reads a file. Throws std::runtime_error naming the file and what is wrong with it.
 inline AgentFile read_agent_file(const std::filesystem::path& path) {
-  core::Safetensors content = core::read_safetensors(path);
-  const auto text = content.metadata.find("sdnn");
-  if (text == content.metadata.end()) {
-    throw std::runtime_error(path.string() + ": holds no agent: its metadata have no \"sdnn\"");
-  }
-  AgentFile file;
-  try {
-    file.settings = core::parse_json(text->second);
-  } catch (const std::exception& error) {
-    throw std::runtime_error(path.string() + ": metadata \"sdnn\": " + error.what());
-  }
-  content.metadata.erase(text);
-  file.tensors = std::move(content.tensors);
-  file.metadata = std::move(content.metadata);
-  return file;
+  core::FileContent content = core::read_file(path, {"agent", "training"});
+  return {std::move(content.description), std::move(content.tensors), std::move(content.kind)};
 }
 
 /// Reads an agent. Throws std::runtime_error naming the file and what is wrong with it.
@@ -471,13 +445,7 @@ inline AnyAgent read_agent(const std::filesystem::path& path) {
 
 /// Writes a file, whole or not at all. Throws std::runtime_error naming the file.
 inline void write_agent_file(const std::filesystem::path& path, const AgentFile& file) {
-  core::Safetensors content{file.metadata, file.tensors};
-  try {
-    content.metadata["sdnn"] = file.settings.dump();
-  } catch (const nlohmann::json::exception& error) {  // no UTF-8
-    throw std::runtime_error(path.string() + ": cannot be written: " + error.what());
-  }
-  core::write_safetensors(path, content);
+  core::write_file(path, {file.kind, file.settings, file.tensors});
 }
 
 }  // namespace sdnn::agents

@@ -1,4 +1,5 @@
-/// Files of tensors in the safetensors format. Needs the library nlohmann/json.
+/// The one file format of agents, trainings and estimators, which Python reads and writes too
+/// (python/sdnn/files.py says how it is made). Needs the library nlohmann/json.
 #pragma once
 
 #include <algorithm>
@@ -9,8 +10,7 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
-#include <fstream>
-#include <map>
+#include <initializer_list>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -18,23 +18,27 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
+#include "sdnn/core/detail/crc32.hpp"
 #include "sdnn/core/detail/whole_file.hpp"
 #include "sdnn/core/state.hpp"
+#include "sdnn/core/version.hpp"
 
 namespace sdnn::core {
 
 static_assert(std::endian::native == std::endian::little, "tensors are stored as they lie there");
 
-/// What such a file holds. Source: https://huggingface.co/docs/safetensors, "Format": 8 bytes with
-/// the header's length, a header in JSON, the bytes of the tensors.
-struct Safetensors {
-  std::map<std::string, std::string> metadata;
+/// What a file holds.
+struct FileContent {
+  std::string kind;                                       ///< "agent", "training" or "estimator"
+  nlohmann::json description = nlohmann::json::object();  ///< all but the tensors
   State tensors;
 };
+
+/// The number of the format, the only one that is read.
+inline constexpr int kFileFormat = 1;
 
 /// The JSON value in `text`. Throws std::runtime_error where it is none, names a member of the
 /// outermost object twice, or is larger or deeper than a header has reason to be; what is refused
@@ -63,6 +67,7 @@ inline nlohmann::json parse_json(std::string_view text) {
 namespace detail {
 
 inline constexpr std::uint64_t kLongestHeader = 100'000'000;
+inline constexpr std::uint64_t kLargestFile = std::uint64_t{1} << 34;
 
 /// Where a tensor's bytes are among those of all.
 struct TensorPlace {
@@ -110,60 +115,91 @@ inline TensorPlace tensor_place(const std::string& name, const nlohmann::json& e
   return place;
 }
 
-inline Safetensors read_safetensors_of(const std::filesystem::path& path) {
-  std::error_code error;
-  expect_of_file(std::filesystem::exists(path, error), "is not there");
-  expect_of_file(std::filesystem::is_regular_file(path, error), "is no file");
-  const std::uint64_t file_size = std::filesystem::file_size(path, error);
-  std::ifstream file(path, std::ios::binary);
-  expect_of_file(!error && file.is_open(), "cannot be read");
-  const auto read = [&file](void* into, std::uint64_t n) {
-    file.read(static_cast<char*>(into), static_cast<std::streamsize>(n));
-    expect_of_file(static_cast<bool>(file), "cannot be read to its end");
-  };
+/// What the format of safetensors has: 8 bytes with the header's length, a header in JSON, tensors.
+struct Safetensors {
+  std::string about;  ///< the metadata "sdnn"
+  State tensors;
+};
 
+/// Source: https://huggingface.co/docs/safetensors, "Format". All sizes are checked before any
+/// memory is asked for.
+inline Safetensors parse_safetensors(std::span<const std::byte> bytes) {
   std::uint64_t header_size = 0;
-  expect_of_file(file_size >= sizeof(header_size), "is too short to be a safetensors file");
-  read(&header_size, sizeof(header_size));
-  expect_of_file(header_size <= kLongestHeader && header_size <= file_size - sizeof(header_size),
+  expect_of_file(bytes.size() >= sizeof(header_size), "is too short to be a safetensors file");
+  std::memcpy(&header_size, bytes.data(), sizeof(header_size));
+  bytes = bytes.subspan(sizeof(header_size));
+  expect_of_file(header_size <= kLongestHeader && header_size <= bytes.size(),
                  "is no safetensors file, or was cut: its header would have " +
                      std::to_string(header_size) + " bytes");
-  std::string text(static_cast<std::size_t>(header_size), ' ');
-  read(text.data(), header_size);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()),
+                              static_cast<std::size_t>(header_size));
+  const std::span<const std::byte> data = bytes.subspan(text.size());
   expect_of_file(text.starts_with('{'), "is no safetensors file: its header is no JSON object");
   const nlohmann::json header = parse_json(text);
-  expect_of_file(header.is_object(), "is no safetensors file: its header is no JSON object");
-
-  const std::uint64_t n_bytes = file_size - sizeof(header_size) - header_size;
   Safetensors content;
   std::vector<std::pair<TensorPlace, std::string>> places;
   for (const auto& [name, entry] : header.items()) {
     if (name != "__metadata__") {
-      places.emplace_back(tensor_place(name, entry, n_bytes), name);
+      places.emplace_back(tensor_place(name, entry, data.size()), name);
       continue;
     }
-    expect_of_file(entry.is_object(), "has __metadata__ that are no JSON object");
-    for (const auto& [key, value] : entry.items()) {
-      expect_of_file(value.is_string(), "has __metadata__ that are no text: " + key);
-      content.metadata.emplace(key, value.template get<std::string>());
-    }
+    expect_of_file(entry.is_object() && entry.contains("sdnn") && entry["sdnn"].is_string(),
+                   "has no text \"sdnn\" in its __metadata__");
+    content.about = entry["sdnn"].template get<std::string>();
   }
   std::ranges::sort(places, {},
                     [](const auto& item) { return std::pair(item.first.begin, item.first.end); });
   std::uint64_t reached = 0;
-  for (const auto& [place, name] : places) {
+  for (auto& [place, name] : places) {
     expect_of_file(place.begin == reached, "tensor " + name + " leaves a gap or overlaps another");
     reached = place.end;
+    const auto part = data.subspan(static_cast<std::size_t>(place.begin),
+                                   static_cast<std::size_t>(place.end - place.begin));
+    content.tensors.emplace(name,
+                            Tensor{place.type, std::move(place.shape), {part.begin(), part.end()}});
   }
-  expect_of_file(reached == n_bytes, "has " + std::to_string(n_bytes - reached) +
-                                         " bytes after its last tensor, or lost one");
-  for (auto& [place, name] : places) {
-    Tensor tensor{place.type, std::move(place.shape), {}};
-    tensor.bytes.resize(static_cast<std::size_t>(place.end - place.begin));
-    read(tensor.bytes.data(), tensor.bytes.size());
-    content.tensors.emplace(name, std::move(tensor));
-  }
+  expect_of_file(reached == data.size(), "has " + std::to_string(data.size() - reached) +
+                                             " bytes after its last tensor, or lost one");
   return content;
+}
+
+/// Where the checksum stands: a file begins with the header's length, this, and 8 digits.
+inline constexpr std::string_view kBeginning = R"({"__metadata__":{"sdnn":"{\"checksum\":\")";
+inline constexpr std::size_t kChecksumBegin = sizeof(std::uint64_t) + kBeginning.size();
+inline constexpr std::size_t kChecksumEnd = kChecksumBegin + 8;
+
+inline std::string digits_of(std::uint32_t crc) {
+  std::string digits;
+  for (int shift = 28; shift >= 0; shift -= 4) digits += "0123456789abcdef"[(crc >> shift) & 15U];
+  return digits;
+}
+
+/// The checksum of a file: of all bytes but its own.
+inline std::string checksum_of(std::span<const std::byte> file) {
+  return digits_of(crc32(file.subspan(kChecksumEnd), crc32(file.first(kChecksumBegin))));
+}
+
+/// What a file holds, as text of `n` bytes from `begin`.
+inline std::string_view text_in(std::span<const std::byte> file, std::size_t begin, std::size_t n) {
+  return {reinterpret_cast<const char*>(file.data()) + begin, n};
+}
+
+inline std::vector<std::byte> read_checked(const std::filesystem::path& path) {
+  RegularFile file(path);
+  expect_of_file(file.size() <= kLargestFile,
+                 "has more than " + std::to_string(kLargestFile) + " bytes");
+  std::vector<std::byte> bytes(
+      static_cast<std::size_t>(std::min<std::uint64_t>(file.size(), kChecksumEnd)));
+  file.read(bytes);
+  expect_of_file(bytes.size() == kChecksumEnd &&
+                     text_in(bytes, sizeof(std::uint64_t), kBeginning.size()) == kBeginning,
+                 "is not a file of sdnn, is damaged, or was written before files of sdnn had a "
+                 "checksum");
+  bytes.resize(static_cast<std::size_t>(file.size()));
+  file.read(std::span(bytes).subspan(kChecksumEnd));
+  expect_of_file(text_in(bytes, kChecksumBegin, 8) == checksum_of(bytes),
+                 "is damaged: its checksum does not fit its content");
+  return bytes;
 }
 
 /// The place of a type in the order in which the format's own library stores tensors.
@@ -191,11 +227,26 @@ constexpr int storage_rank(TensorType type) noexcept {
 
 }  // namespace detail
 
-/// Reads a file. All sizes are checked before any memory is asked for. Throws std::runtime_error
-/// naming the file and what is wrong with it.
-inline Safetensors read_safetensors(const std::filesystem::path& path) {
+/// Reads a file of one of these kinds. Its checksum is compared before anything else is used.
+/// Throws std::runtime_error naming the file and what is wrong with it.
+inline FileContent read_file(const std::filesystem::path& path,
+                             std::initializer_list<std::string_view> kinds) {
   try {
-    return detail::read_safetensors_of(path);
+    detail::Safetensors parsed = detail::parse_safetensors(detail::read_checked(path));
+    nlohmann::json about = parse_json(parsed.about);
+    const auto text_of = [&about](const char* key) { return about.value(key, std::string()); };
+    const auto number = about.value("format", nlohmann::json());
+    detail::expect_of_file(number == kFileFormat,
+                           "has format " + number.dump() + ", written by sdnn " +
+                               text_of("version") + "; this is sdnn " + kVersion +
+                               ", which reads format " + std::to_string(kFileFormat));
+    FileContent content{text_of("kind"), about["description"], std::move(parsed.tensors)};
+    std::string expected;
+    for (const auto kind : kinds) expected.append(expected.empty() ? "" : " or ").append(kind);
+    detail::expect_of_file(std::ranges::find(kinds, content.kind) != kinds.end(),
+                           "is a file of kind '" + content.kind + "', expected " + expected);
+    detail::expect_of_file(content.description.is_object(), "is damaged: it has no description");
+    return content;
   } catch (const std::bad_alloc&) {
     throw std::runtime_error(path.string() + ": does not fit into the memory");
   } catch (const std::exception& error) {
@@ -203,35 +254,46 @@ inline Safetensors read_safetensors(const std::filesystem::path& path) {
   }
 }
 
-/// Writes a file, whole or not at all: the same bytes as the format's own library. Throws
-/// std::runtime_error naming the file, and then what was there before stays.
-inline void write_safetensors(const std::filesystem::path& path, const Safetensors& content) {
+/// Writes a file, whole or not at all: the same bytes as in Python, but for rare numbers whose
+/// shortest text is not the only one. Throws std::runtime_error naming the file, and then what was
+/// there before stays.
+inline void write_file(const std::filesystem::path& path, const FileContent& content) {
   std::vector<const State::value_type*> order;
   for (const auto& named : content.tensors) order.push_back(&named);
   std::ranges::stable_sort(order, {}, [](const State::value_type* named) {
     return detail::storage_rank(named->second.type);  // so that numbers are aligned; then by name
   });
-  nlohmann::ordered_json header = nlohmann::ordered_json::object();
-  if (!content.metadata.empty()) header["__metadata__"] = content.metadata;
-  std::uint64_t begin = 0;
-  for (const State::value_type* named : order) {
-    const auto& [name, tensor] = *named;
-    const std::uint64_t end = begin + tensor.bytes.size();
-    header[name]["dtype"] = facts_of(tensor.type).name;
-    header[name]["shape"] = tensor.shape;
-    header[name]["data_offsets"] = {begin, end};
-    begin = end;
-  }
+  const nlohmann::json about = {{"checksum", "00000000"},
+                                {"description", content.description},
+                                {"format", kFileFormat},
+                                {"kind", content.kind},
+                                {"version", kVersion}};
+  nlohmann::ordered_json header;
   std::string text;
   try {
+    header["__metadata__"]["sdnn"] = about.dump(-1, ' ', true);
+    std::uint64_t begin = 0;
+    for (const State::value_type* named : order) {
+      const auto& [name, tensor] = *named;
+      const std::uint64_t end = begin + tensor.bytes.size();
+      header[name]["dtype"] = facts_of(tensor.type).name;
+      header[name]["shape"] = tensor.shape;
+      header[name]["data_offsets"] = {begin, end};
+      begin = end;
+    }
     text = header.dump();
   } catch (const nlohmann::json::exception& error) {  // no UTF-8
     throw std::runtime_error(path.string() + ": cannot be written: " + error.what());
   }
   text.append((8 - text.size() % 8) % 8, ' ');
   const std::uint64_t header_size = text.size();
+  text.insert(0, reinterpret_cast<const char*>(&header_size), sizeof(header_size));
+  const auto head = std::as_bytes(std::span(text));
+  std::uint32_t crc = detail::crc32(head.first(detail::kChecksumBegin));
+  crc = detail::crc32(head.subspan(detail::kChecksumEnd), crc);
+  for (const State::value_type* named : order) crc = detail::crc32(named->second.bytes, crc);
+  text.replace(detail::kChecksumBegin, 8, detail::digits_of(crc));
   WholeFile file(path);
-  file.write(std::as_bytes(std::span(&header_size, 1)));
   file.write(std::as_bytes(std::span(text)));
   for (const State::value_type* named : order) file.write(named->second.bytes);
   file.finish();

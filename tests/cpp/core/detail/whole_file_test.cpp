@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <regex>
+#include <set>
 #include <span>
 #include <string>
 
@@ -62,6 +64,21 @@ TEST(WholeFile, LeavesNothingWhereItIsNotFinished) {
   EXPECT_EQ(folder.n_files(), 1U);
 }
 
+// Each has the same beginning, and 16 digits that nobody can foresee.
+TEST(WholeFile, IsWrittenUnderAnotherNameEachTime) {
+  const testing::Folder folder;
+  std::set<std::string> names;
+  for (int i = 0; i < 20; ++i) {
+    const WholeFile file(folder / "file");
+    for (const auto& entry : std::filesystem::directory_iterator(folder / "")) {
+      const std::string name = entry.path().filename().string();
+      EXPECT_TRUE(std::regex_match(name, std::regex("file\\.[0-9a-f]{16}\\.partial"))) << name;
+      names.insert(name);
+    }
+  }
+  EXPECT_EQ(names.size(), 20U);
+}
+
 TEST(WholeFile, SaysWhatCannotBeWritten) {
   const testing::Folder folder;
   const auto missing = folder / "missing";
@@ -76,6 +93,31 @@ TEST(WholeFile, SaysWhatCannotBeWritten) {
             }).rfind(missing.string() + ": cannot be written: ", 0),
             0U);
   EXPECT_EQ(folder.n_files(), 1U);
+}
+
+TEST(RegularFile, IsReadInParts) {
+  const testing::Folder folder;
+  testing::write_content(folder / "file", "one, two");
+  RegularFile file(folder / "file");
+  EXPECT_EQ(file.size(), 8U);
+  std::string first(5, ' '), second(3, ' ');
+  file.read(std::as_writable_bytes(std::span(first)));
+  file.read(std::as_writable_bytes(std::span(second)));
+  EXPECT_EQ(first + second, "one, two");
+  EXPECT_EQ(testing::runtime_error_of([&] { file.read(std::as_writable_bytes(std::span(first))); }),
+            "cannot be read to its end");
+}
+
+TEST(RegularFile, DevicesAndFoldersAreRefused) {
+  const testing::Folder folder;
+  const auto error_of = [](const std::filesystem::path& path) {
+    return testing::runtime_error_of([&] { const RegularFile file(path); });
+  };
+  EXPECT_EQ(error_of(folder / ""), "is not a regular file");
+  EXPECT_EQ(error_of(folder / "nothing"), "No such file or directory");
+  if (std::filesystem::exists("/dev/zero")) {
+    EXPECT_EQ(error_of("/dev/zero"), "is not a regular file");
+  }
 }
 
 }  // namespace

@@ -1,11 +1,13 @@
-/// Files that are there as a whole or not at all, also after a kill.
+/// Files that are written as a whole or not at all, also after a kill, and read if they are
+/// regular.
 #pragma once
 
-#include <atomic>
 #include <cerrno>
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <random>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -16,6 +18,8 @@
 #if defined(__unix__) || defined(__APPLE__)
 #define SDNN_HAS_POSIX_FILES 1
 #include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #else
 #define SDNN_HAS_POSIX_FILES 0
@@ -38,8 +42,11 @@ class WholeFile {
       : path_(target_of(path)), partial_(path_), is_special_(is_special(path_)) {
     if (!is_special_) partial_ += partial_suffix();
 #if SDNN_HAS_POSIX_FILES
-    file_ = ::open(partial_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    const int how = is_special_ ? O_TRUNC : O_CREAT | O_EXCL | O_NOFOLLOW;
+    file_ = ::open(partial_.c_str(), O_WRONLY | O_CLOEXEC | how, 0666);
     if (file_ < 0) fail("cannot be written");
+    if (!is_special_)
+      (void)::flock(file_, LOCK_EX | LOCK_NB);  // so that nobody thinks it abandoned
 #else
     file_.open(partial_, std::ios::binary | std::ios::trunc);
     if (!file_) fail("cannot be written");
@@ -75,25 +82,18 @@ class WholeFile {
   void finish() {
 #if SDNN_HAS_POSIX_FILES
     if (!is_special_ && ::fsync(file_) != 0) fail("cannot be written");
-#else
-    file_.flush();
-    if (!file_) fail("cannot be written");
-#endif
+    if (!is_special_) rename();  // while it is locked
     if (!close()) fail("cannot be written");
     if (is_special_) return;
-    std::error_code error;
-    std::filesystem::rename(partial_, path_, error);
-    if (error) {
-      errno = error.value();
-      fail("cannot be written");
-    }
-    is_under_way_ = false;
-#if SDNN_HAS_POSIX_FILES
     const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
     const int descriptor = ::open(folder.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0) return;  // a folder that may not be read: the name is there all the same
     (void)::fsync(descriptor);
     (void)::close(descriptor);
+#else
+    file_.flush();
+    if (!file_ || !close()) fail("cannot be written");
+    if (!is_special_) rename();
 #endif
   }
 
@@ -115,15 +115,22 @@ class WholeFile {
            kind == file_type::socket;
   }
 
-  /// One that no other process or thread has.
+  /// One that nobody can foresee.
   static std::string partial_suffix() {
-    static std::atomic<unsigned> counter{0};
-    std::string suffix;
-#if SDNN_HAS_POSIX_FILES
-    (suffix += '.') += std::to_string(::getpid());
-#endif
-    (suffix += '.') += std::to_string(counter++);
+    std::random_device random;
+    std::string suffix = ".";
+    for (int digit = 0; digit < 16; ++digit) suffix += "0123456789abcdef"[random() % 16];
     return suffix += ".partial";
+  }
+
+  void rename() {
+    std::error_code error;
+    std::filesystem::rename(partial_, path_, error);
+    if (error) {
+      errno = error.value();
+      fail("cannot be written");
+    }
+    is_under_way_ = false;
   }
 
   [[noreturn]] void fail(const char* what) const {
@@ -150,6 +157,63 @@ class WholeFile {
   int file_ = -1;
 #else
   std::ofstream file_;
+#endif
+};
+
+/// A regular file, open for reading. Folders, devices and pipes are refused, without waiting for
+/// the writer of a pipe. Throws std::runtime_error that says what is wrong, but not with which
+/// file.
+class RegularFile {
+ public:
+  explicit RegularFile(const std::filesystem::path& path) {
+#if SDNN_HAS_POSIX_FILES
+    file_ = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    if (file_ < 0) refuse(std::generic_category().message(errno));
+    struct stat status{};
+    if (::fstat(file_, &status) != 0 || !S_ISREG(status.st_mode)) {
+      (void)::close(file_);
+      refuse("is not a regular file");
+    }
+    size_ = static_cast<std::uint64_t>(status.st_size);
+#else
+    if (!std::filesystem::exists(path)) refuse("is not there");
+    if (!std::filesystem::is_regular_file(path)) refuse("is not a regular file");
+    size_ = std::filesystem::file_size(path);
+    file_.open(path, std::ios::binary);
+    if (!file_) refuse("cannot be read");
+#endif
+  }
+  RegularFile(const RegularFile&) = delete;
+  RegularFile& operator=(const RegularFile&) = delete;
+#if SDNN_HAS_POSIX_FILES
+  ~RegularFile() { (void)::close(file_); }
+#endif
+
+  std::uint64_t size() const noexcept { return size_; }
+
+  /// Fills `into` with the bytes that follow.
+  void read(std::span<std::byte> into) {
+#if SDNN_HAS_POSIX_FILES
+    while (!into.empty()) {
+      const auto n = ::read(file_, into.data(), into.size());
+      if (n < 0 && errno == EINTR) continue;
+      if (n <= 0) refuse("cannot be read to its end");
+      into = into.subspan(static_cast<std::size_t>(n));
+    }
+#else
+    file_.read(reinterpret_cast<char*>(into.data()), static_cast<std::streamsize>(into.size()));
+    if (!file_) refuse("cannot be read to its end");
+#endif
+  }
+
+ private:
+  [[noreturn]] static void refuse(const std::string& what) { core::fail(std::runtime_error(what)); }
+
+  std::uint64_t size_ = 0;
+#if SDNN_HAS_POSIX_FILES
+  int file_ = -1;
+#else
+  std::ifstream file_;
 #endif
 };
 

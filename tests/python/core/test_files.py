@@ -1,0 +1,163 @@
+"""One format for every kind of file: what is read is what was written, and no damage is missed."""
+
+import json
+import os
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from safetensors import safe_open
+from safetensors.numpy import save_file
+
+import agent_files
+import sdnn
+from checksums import with_checksum
+from sdnn import SDNNRegressor, files
+from sdnn.agents import SDNNQLearning, Training, load_agent
+from sdnn.files import read_file, write_file
+
+KINDS = ("agent", "training", "estimator")
+ARRAYS = {
+    "b": np.array([[1, -1]], np.int16),
+    "a": np.array(2.5),
+    "none": np.zeros((0, 3), np.uint8),
+    "turned": np.arange(6, dtype=np.int32).reshape(2, 3).T,
+}
+DESCRIPTION = {"words": "é \ud800", "b": {"z": 1, "a": [None, True, 0.1, float("inf")]}}
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    """A file of each kind, as users save it, and a function that reads it."""
+    folder = tmp_path_factory.mktemp("saved")
+    env = gym.make("Pendulum-v1")
+    agent = SDNNQLearning(env.observation_space, env.action_space, approximator=agent_files.SMALL)
+    agent.save(folder / "agent")
+    Training(agent, env, steps=5).save(folder / "training")
+    samples = np.random.default_rng(0).uniform(size=(20, 2))
+    SDNNRegressor(n_pattern_units=30, max_iter=2).fit(samples, samples[:, 0]).save(
+        folder / "estimator"
+    )
+    read = {
+        "agent": load_agent,
+        "training": lambda path: Training.load(path, env),
+        "estimator": SDNNRegressor.load,
+    }
+    return {kind: ((folder / kind).read_bytes(), read[kind]) for kind in KINDS}
+
+
+def test_what_is_read_is_what_was_written(tmp_path):
+    path = tmp_path / "file"
+    write_file(path, "agent", ARRAYS, DESCRIPTION)
+    description, arrays = read_file(path, "training", "agent")
+    assert description == DESCRIPTION
+    assert arrays.keys() == ARRAYS.keys()
+    for name, array in ARRAYS.items():
+        np.testing.assert_array_equal(arrays[name], array, strict=True)
+        arrays[name][...] = 7  # they belong to the reader
+    before = path.read_bytes()
+    write_file(path, "agent", *reversed(read_file(path, "agent")))
+    assert path.read_bytes() == before == with_checksum(before)
+
+
+def test_the_file_is_one_of_safetensors(tmp_path):
+    write_file(tmp_path / "file", "estimator", ARRAYS, DESCRIPTION)
+    with safe_open(tmp_path / "file", framework="numpy") as file:
+        about = json.loads(file.metadata()["sdnn"])
+        np.testing.assert_array_equal(file.get_tensor("turned"), ARRAYS["turned"])
+    assert len(about.pop("checksum")) == 8
+    assert about == {
+        "kind": "estimator",
+        "format": files.FORMAT,
+        "version": sdnn.__version__,
+        "description": DESCRIPTION,
+    }
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_flipped_bit_and_every_cut_is_noticed(saved, kind, tmp_path):
+    content, read = saved[kind]
+    path = tmp_path / "damaged"
+    path.write_bytes(content)
+    read(path)
+    rng = np.random.default_rng(3)
+    header = 8 + int.from_bytes(content[:8], "little")
+    for place in np.concatenate([rng.integers(0, end, 100) for end in (60, header, len(content))]):
+        flipped = bytearray(content)
+        flipped[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(flipped)
+        with pytest.raises(ValueError, match="damaged"):
+            read(path)
+    for length in [0, 7, 60, *rng.integers(0, len(content), 100)]:
+        path.write_bytes(content[:length])
+        with pytest.raises(ValueError, match="damaged"):
+            read(path)
+    path.write_bytes(content + b"\0")
+    with pytest.raises(ValueError, match="damaged"):
+        read(path)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_file_of_another_kind_is_refused(saved, kind, tmp_path):
+    path = tmp_path / "other"
+    path.write_bytes(saved[kind][0])
+    for other, (_, read) in saved.items():
+        if (other, kind) in {(kind, kind), ("agent", "training")}:
+            read(path)  # a training holds an agent
+        else:
+            with pytest.raises(ValueError, match=f"other is a file of kind '{kind}', expected"):
+                read(path)
+
+
+def test_files_of_other_programs_and_versions_are_refused(tmp_path):
+    path = tmp_path / "other"
+    for metadata in (None, {"sdnn": '{"format": "sdnn-agent-1", "class": "SDNNQLearning"}'}):
+        save_file(ARRAYS, path, metadata)
+        with pytest.raises(ValueError, match=r"other is not a file of sdnn, .* before files"):
+            read_file(path, *KINDS)
+    write_file(path, "agent", ARRAYS, {})
+    content = path.read_bytes()
+    newer = content.replace(rb"\"format\":1,", rb"\"format\":2,").replace(
+        sdnn.__version__.encode(), b"9.9.9"
+    )
+    assert len(newer) == len(content)
+    path.write_bytes(with_checksum(newer))
+    with pytest.raises(ValueError, match=r"has format 2, written by sdnn 9\.9\.9; this is sdnn"):
+        read_file(path, "agent")
+
+
+@pytest.mark.parametrize(
+    ("part", "other"),
+    [
+        (rb"\"kind\":", rb"\"king\":"),
+        (rb"\"description\":{}", rb"\"description\":77"),
+        (rb"\"format\":1", rb"\"format\":,"),
+        (b'"I16"', b'"I17"'),
+        (b"[1,2]", b"[1,3]"),
+    ],
+)
+def test_what_is_wrong_under_the_right_checksum_is_damage_too(part, other, tmp_path):
+    path = tmp_path / "crafted"
+    write_file(path, "agent", ARRAYS, {})
+    content = path.read_bytes()
+    assert part in content
+    path.write_bytes(with_checksum(content.replace(part, other)))
+    with pytest.raises(ValueError, match="crafted is damaged: "):
+        read_file(path, "agent")
+
+
+def test_only_regular_files_are_read(tmp_path, monkeypatch):
+    with pytest.raises(FileNotFoundError, match="nothing"):
+        read_file(tmp_path / "nothing", "agent")
+    with pytest.raises(IsADirectoryError, match=tmp_path.name):
+        read_file(tmp_path, "agent")
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(tmp_path / "pipe")  # without a writer, for which reading would wait
+        (tmp_path / "link").symlink_to(tmp_path / "pipe")
+        for name in (tmp_path / "pipe", tmp_path / "link", "/dev/zero"):
+            with pytest.raises(OSError, match=f"{name} is not a regular file"):
+                read_file(name, "agent")
+    write_file(tmp_path / "file", "agent", ARRAYS, {})
+    monkeypatch.setattr(files, "MAX_BYTES", 100)
+    with pytest.raises(OSError, match=r"file has .* bytes, expected at most 100"):
+        read_file(tmp_path / "file", "agent")
