@@ -7,32 +7,9 @@ from typing import Any, TypeVar
 
 from sdnn.arguments import choice
 
-__all__ = ["added_later", "plain_values", "to_core"]
-
-ADDED_LATER = "added later"
+__all__ = ["to_core"]
 
 CoreConfig = TypeVar("CoreConfig")
-
-
-def added_later(default: Any) -> Any:
-    """Make a dataclass field that earlier versions did not have.
-
-    `plain_values` leaves it out while it has its default, so that what was stored under the
-    settings of an earlier version is still what it was.
-    """
-    return dataclasses.field(default=default, metadata={ADDED_LATER: True})
-
-
-def plain_values(config: Any) -> Any:
-    """Turn a dataclass into a dictionary, its parts too; see `added_later` for what is left out."""
-    if not dataclasses.is_dataclass(config):
-        return config
-    values = {field: getattr(config, field.name) for field in dataclasses.fields(config)}
-    return {
-        field.name: plain_values(value)
-        for field, value in values.items()
-        if not (field.metadata.get(ADDED_LATER) and value == field.default)
-    }
 
 
 def to_core(config: Any, core_type: type[CoreConfig]) -> CoreConfig:

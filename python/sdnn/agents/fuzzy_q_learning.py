@@ -16,7 +16,7 @@ from sdnn.agents.agent import Agent, check_shape
 from sdnn.agents.observations import AnglePairs, Ranges
 from sdnn.approximators.fuzzy_rules import FuzzyRulesConfig
 from sdnn.arguments import whole
-from sdnn.config import added_later, to_core
+from sdnn.config import to_core
 
 __all__ = ["FuzzyQLearning", "FuzzyQLearningConfig"]
 
@@ -49,7 +49,7 @@ class FuzzyQLearningConfig:
     epsilon: float = 0.1
     n_greedy_steps: int = 10
     tie_rule: Literal["uniform", "lowest", "middle"] = "uniform"
-    tie_tolerance: float = added_later(0.0)
+    tie_tolerance: float = 0.0
 
     def to_core(self) -> _core.FuzzyQLearningConfig:
         """Make the core's struct of the same values; see `sdnn.config.to_core`."""

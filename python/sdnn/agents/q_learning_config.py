@@ -6,7 +6,7 @@ import dataclasses
 from typing import Literal
 
 from sdnn import _core
-from sdnn.config import added_later, to_core
+from sdnn.config import to_core
 
 __all__ = ["QLearningConfig"]
 
@@ -63,15 +63,15 @@ class QLearningConfig:
     epsilon: float = 0.1
     n_greedy_steps: int = 10
     tie_rule: Literal["uniform", "lowest", "middle"] = "uniform"
-    tie_tolerance: float = added_later(0.0)
-    n_steps: int = added_later(1)
-    max_repetitions: int = added_later(1)
-    final_learning_rate: float | None = added_later(None)
-    final_epsilon: float | None = added_later(None)
-    value_range: Literal["given", "seen"] = added_later("given")
-    schedule: Literal["linear", "exponential"] = added_later("linear")
-    exploration_fraction: float = added_later(1.0)
-    n_random_steps: int = added_later(0)
+    tie_tolerance: float = 0.0
+    n_steps: int = 1
+    max_repetitions: int = 1
+    final_learning_rate: float | None = None
+    final_epsilon: float | None = None
+    value_range: Literal["given", "seen"] = "given"
+    schedule: Literal["linear", "exponential"] = "linear"
+    exploration_fraction: float = 1.0
+    n_random_steps: int = 0
 
     def to_core(self) -> _core.QLearningConfig:
         """Make the core's struct of the same values; see `sdnn.config.to_core`."""

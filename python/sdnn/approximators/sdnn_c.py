@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.arguments import seed_of
-from sdnn.config import added_later, to_core
+from sdnn.config import to_core
 
 __all__ = ["SDNNC", "SDNNCConfig"]
 
@@ -84,13 +84,13 @@ class SDNNCConfig:
     """
 
     n_inputs: int = 4
-    max_pairs: int = added_later(0)
+    max_pairs: int = 0
     n_pattern_units: int = 200
     n_anchor_patterns: int = 9
     n_interpolated: int = 44
     balanced_anchors: bool = True
     circular: tuple[bool, ...] = ()
-    n_symbols: tuple[int, ...] = added_later(())
+    n_symbols: tuple[int, ...] = ()
     n_hidden_units: int = 900
     n_active_units: int = 300
     n_actions: int = 0
@@ -103,9 +103,9 @@ class SDNNCConfig:
     initial_threshold: float = 200.0
     initial_weights: Literal["ternary", "uniform"] = "ternary"
     initial_weight_limit: float = 0.1
-    rounding: Literal["half_up", "random", "away"] = added_later("half_up")
-    averaging_interval: int = added_later(0)
-    max_table_bytes: int = added_later(2**30)
+    rounding: Literal["half_up", "random", "away"] = "half_up"
+    averaging_interval: int = 0
+    max_table_bytes: int = 2**30
 
     @property
     def n_pairs(self) -> int:

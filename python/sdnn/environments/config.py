@@ -7,7 +7,7 @@ import math
 from typing import Literal
 
 from sdnn import _core
-from sdnn.config import added_later, to_core
+from sdnn.config import to_core
 
 __all__ = ["AcrobotConfig", "GoalScheduleConfig", "SensorConfig"]
 
@@ -133,9 +133,9 @@ class SensorConfig:
 
     n_sensors: int = 4
     noise: float = 0.0
-    noise_entry: Literal["every_sensor", "basic_sensors"] = added_later("every_sensor")
-    n_constant: int = added_later(0)
-    n_random: int = added_later(0)
+    noise_entry: Literal["every_sensor", "basic_sensors"] = "every_sensor"
+    n_constant: int = 0
+    n_random: int = 0
 
     @property
     def n_inputs(self) -> int:

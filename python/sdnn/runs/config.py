@@ -41,8 +41,7 @@ else:
 
 __all__ = ["AGENTS", "DEFAULT_STEPS", "RunConfig", "places_in", "read_json", "read_values"]
 
-FORMAT = "sdnn-run"
-FORMAT_VERSION = 1
+FORMAT = "sdnn-run-2"
 
 DEFAULT_STEPS = 200_000
 
@@ -274,7 +273,7 @@ class RunConfig:
         """Give all values as JSON has them; `from_values` reads them."""
         values = {**dataclasses.asdict(self), "environment": values_of(self.environment)}
         return {
-            "format": f"{FORMAT}-{FORMAT_VERSION}",
+            "format": FORMAT,
             **{name: value for name, value in values.items() if value is not None},
         }
 
@@ -288,7 +287,7 @@ class RunConfig:
             If a key is unknown or missing, or a value cannot be used.
         """
         given = {name: value for name, value in values.items() if value is not None}
-        _check_format(given.pop("format", f"{FORMAT}-{FORMAT_VERSION}"))
+        _check_format(given.pop("format", FORMAT))
         environment = given.pop("environment", None)
         if environment is None:
             raise ConfigError("environment", "must be given: the id of an environment")
@@ -392,12 +391,9 @@ def place_of(path: str | Path, lines: dict[Any, int], key: str) -> str:
 
 
 def _check_format(name: Any) -> None:
-    family, _, number = str(name).rpartition("-")
-    if family != FORMAT or not number.isdigit():
-        raise ConfigError("format", f"must be {FORMAT}-{FORMAT_VERSION}, got {name!r}")
-    if int(number) > FORMAT_VERSION:
+    if name != FORMAT:
         raise ConfigError(
-            "format", f"is of a newer version of sdnn than {__version__}: {name}; update sdnn"
+            "format", f"must be {FORMAT}, got {name!r}: the run is of another version of sdnn"
         )
 
 

@@ -30,7 +30,7 @@ from sdnn.runs.records import (
 from sdnn.runs.trial_errors import StoreError
 
 STORE_NAME = "results.sqlite"
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 APPLICATION_ID = int.from_bytes(b"sdnn", "big")
 """Marks a SQLite file as ours (SQLite's header field of that name)."""
 BUSY_SECONDS = 60.0
@@ -382,10 +382,9 @@ def _inspect(path: Path) -> bool:
                 f"{path} is a SQLite file of another program; choose another output folder"
             )
         if version != SCHEMA_VERSION:
-            age = "a newer" if version > SCHEMA_VERSION else "an older"
             raise StoreError(
-                f"{path} has schema version {version}, written by {age} sdnn;"
-                f" this one reads {SCHEMA_VERSION}: choose another output folder"
+                f"{path} has schema version {version}, and this version of sdnn reads"
+                f" {SCHEMA_VERSION}: choose another output folder"
             )
         findings = connection.execute("PRAGMA integrity_check").fetchall()
         if findings != [("ok",)]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.agents import Transition
-from sdnn.config import added_later, to_core
+from sdnn.config import to_core
 from sdnn.environments import (
     AcrobotConfig,
     AcrobotSensors,
@@ -50,8 +50,8 @@ class ProtocolConfig:
 
     n_learning_episodes: int = 15_000
     test_interval: int = 10
-    limit_bootstraps: bool = added_later(True)
-    noisy_tests: bool = added_later(True)
+    limit_bootstraps: bool = True
+    noisy_tests: bool = True
 
     def to_core(self) -> _core.ProtocolConfig:
         """Make the core's struct of the same values; see `sdnn.config.to_core`."""

@@ -7,14 +7,13 @@ import json
 import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
 from sdnn.agents import QLearningConfig
 from sdnn.approximators import SDNNCConfig
-from sdnn.config import plain_values
 from sdnn.environments import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.runs.records import TrialKey
 from sdnn.runs.registry import agent_entry
@@ -87,7 +86,7 @@ class TrialSettings(ABC):
 
         Equal settings give equal text, however they were typed.
         """
-        values = plain_values(self)
+        values = asdict(self)
         if version := agent_entry(self.agent).version:
             values["agent_version"] = version
         return json.dumps(

@@ -91,8 +91,8 @@ def test_toml(tmp_path):
         ),
         ('environment = "A"\nagent = "dqn"\n', ":2", "agent", "one of 'sdnn-c', 'rbf', 'fuzzy'"),
         ('environment = "A"\npreset = "best"\n', ":2", "preset", "got 'best'"),
-        ('environment = "A"\nformat = "sdnn-run-9"\n', ":2", "format", "newer version"),
-        ('environment = "A"\nformat = "cake"\n', ":2", "format", "must be sdnn-run-1"),
+        ('environment = "A"\nformat = "sdnn-run-9"\n', ":2", "format", "another version"),
+        ('environment = "A"\nformat = "cake"\n', ":2", "format", "must be sdnn-run-2"),
     ],
 )  # fmt: skip
 def test_errors_name_file_line_and_key(tmp_path, text, place, key, words):
