@@ -1,12 +1,14 @@
-"""What the regressor and the classifier share."""
+"""What the regressor and the classifier share: parameters, fitting, learning online, files."""
 
 from __future__ import annotations
 
 import abc
-import contextlib
+import dataclasses
+import inspect
+import sys
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
+from numbers import Integral, Real
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -14,105 +16,324 @@ from joblib import effective_n_jobs
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import clone
 from sklearn.utils import check_random_state
-from sklearn.utils.validation import check_is_fitted
+from sklearn.utils._param_validation import Interval, StrOptions
 
 from sdnn import _core
-from sdnn.arguments import flag, one_of, real, whole
-from sdnn.coding import Coding, WithMissing
-from sdnn.estimators import files
-from sdnn.estimators.coded_inputs import CodedInputs
-from sdnn.estimators.columns import input_pairs, share_of_pairs
-from sdnn.estimators.input_code import (
-    PAIR_BUDGET,
+from sdnn.coding import Coding
+from sdnn.estimators.fitted import Fitted
+from sdnn.estimators.inputs import CodedInputs, Pairs, input_pairs
+from sdnn.estimators.network import (
+    FEW_SAMPLES,
+    Network,
     code_bytes,
     draw_input_code,
-    pattern_units_for,
+    units_for_pairs,
 )
-from sdnn.estimators.network import FEW_SAMPLES, Network
 from sdnn.estimators.pair_selection import select_pairs, with_categories
-from sdnn.estimators.training import History, Trainer, run_epochs
+from sdnn.estimators.training import Trainer, run_epochs, sample_weights
 
 __all__ = ["BaseSDNN", "OutOfRangeWarning"]
 
 Self = TypeVar("Self", bound="BaseSDNN")
-MOST_EPOCHS = 10**9
 
 
 class OutOfRangeWarning(UserWarning):
-    """Values to learn lie beyond a range that was given or learned; warned of once a model."""
+    """Values to learn lie beyond a range that was given or learned; issued once per model."""
 
 
-class BaseSDNN(CodedInputs):
-    """The code of the inputs, the loop over epochs, files."""
+@dataclasses.dataclass(kw_only=True, eq=False, repr=False)
+class BaseSDNN(Fitted, CodedInputs):
+    """Base class of `SDNNRegressor` and `SDNNClassifier`, with the parameters of both.
 
-    n_pattern_units: int | None
-    pairs: Any
-    tables: str
-    out_of_range: str
-    max_iter: int
-    shuffle: bool
-    early_stopping: bool
-    validation_fraction: float
-    n_iter_no_change: int
-    training: str
-    memory_limit: int
-    warm_start: bool
-    random_state: Any
-    n_jobs: int | None
-    verbose: int
+    Parameters
+    ----------
+    coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
+        How inputs become patterns: "random-inverse", "anchor", "circular", "symbolic", or an
+        object of `sdnn.coding`; for all inputs, or for columns given as to scikit-learn's
+        ColumnTransformer (inputs left out have "random-inverse").
+    n_pattern_units : int, optional
+        Units per pattern, even. None divides about 16,000 columns among the pairs.
+    pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"
+        Pairs of features, by number or name. A modifier of None leaves a pattern plain, which is
+        also what a single feature gets. "budget" means all pairs up to 22 features, and beyond an
+        even share of them drawn at random: 500 pairs, or one per feature. "auto" lets `fit` leave
+        out those that do not matter, as far as cross-validation is clearly better without them;
+        it takes some forty times as long.
+    tables : {"shared", "separate"}, default="shared"
+        One table of patterns per input, permuted anew for each pair, or two tables per pair.
+    shuffle : bool, default=True
+        Whether each epoch has a new random order; otherwise it is the order of the sample.
+    early_stopping : bool, default=False
+        Whether to hold out a fraction of the sample, stop when the validation score no longer
+        rises, and keep the best weights.
+    validation_fraction : float, default=0.1
+        Fraction of the sample that early stopping holds out.
+    n_iter_no_change : int, default=10
+        Epochs without improvement before early stopping.
+    training : {"auto", "dual", "block", "plain"}, default="auto"
+        Form of training; the result is the same to the last bit, time and memory differ.
+    memory_limit : int, default=2**30
+        Bytes that weights and patterns may use, and that training may use beside them. Networks
+        that are averaged count, and with early stopping those of the best epochs too.
+    warm_start : bool, default=False
+        Whether `fit` resumes with the existing network, its ranges, categories and sizes, instead
+        of drawing a new one.
+    random_state : int, RandomState or None, default=None
+        Determines patterns, first weights, orders and the validation share.
+    n_jobs : int, optional
+        Threads; the result does not depend on it.
+    verbose : int, default=0
+        Whether to show a progress bar.
 
-    network_: Network
-    n_features_in_: int
-    n_inputs_out_of_range_: int
+    Attributes
+    ----------
+    codings_ : tuple of Coding
+        The fitted coding of each input.
+    pairs_ : tuple of (int, int)
+        The pairs in use.
+    pair_importances_ : ndarray, shape (n_pairs,)
+        How much training has changed the weights of each pair; they sum to 1.
+    weights_ : ndarray of int32, shape (n_units, n_columns)
+    thresholds_ : ndarray of int32, shape (n_units,)
+    n_inputs_out_of_range_ : int
+        Values learned since the last `fit` that lay beyond their range.
+    n_iter_ : int
+        Epochs of the last `fit` and calls of `partial_fit` since.
+    n_corrected_ : ndarray of int64, shape (n_epochs,)
+        Samples corrected in each epoch of the last `fit`.
+    training_form_, training_memory_ : str, int
+        The form of training that the last `fit` chose, and the most bytes it takes beside the
+        weights.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        As everywhere in scikit-learn.
+    """
 
-    # Pairs that `fit` has selected, for the time of fitting.
-    _selected: list[tuple[int, int]] | None = None
+    n_pattern_units: int | None = None
+    pairs: Any = "budget"
+    tables: str = "shared"
+    out_of_range: str = "clip"
+    max_iter: int = 30
+    shuffle: bool = True
+    early_stopping: bool = False
+    validation_fraction: float = 0.1
+    n_iter_no_change: int = 10
+    training: str = "auto"
+    memory_limit: int = 2**30
+    warm_start: bool = False
+    random_state: Any = None
+    n_jobs: int | None = None
+    verbose: int = 0
 
-    OUT_OF_RANGE: ClassVar[tuple[str, ...]] = ("clip", "error")
+    # Only the regressor lets its users choose these.
+    refit = False
+    n_averaged_epochs = 1
 
-    def _check_parameters(self) -> None:
-        """ValueError for an impossible parameter; codings and pairs are checked with the data."""
-        whole("max_iter", self.max_iter, 1, MOST_EPOCHS)
-        whole("n_iter_no_change", self.n_iter_no_change, 1, MOST_EPOCHS)
-        whole("memory_limit", self.memory_limit, 0, 2**62)
-        one_of("training", self.training, _core.TRAINING_FORMS)
-        flag("shuffle", self.shuffle)
-        flag("early_stopping", self.early_stopping)
-        flag("warm_start", self.warm_start)
-        if not isinstance(self.verbose, bool | np.bool_):
-            whole("verbose", self.verbose, 0, 2**62)
-        if self.n_jobs is not None:
-            whole("n_jobs", self.n_jobs, -4096, 4096)
-        if isinstance(self.coding, list | tuple) and not self.coding:
-            raise ValueError(f"coding must name a coding for some columns, got {self.coding!r}")
-        one_of("out_of_range", self.out_of_range, self.OUT_OF_RANGE)
-        if not 0 < real("validation_fraction", self.validation_fraction) < 1:
-            raise ValueError(
-                f"validation_fraction must be between 0 and 1, got {self.validation_fraction!r}"
+    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        **CodedInputs._parameter_constraints,
+        "n_pattern_units": [Interval(Integral, 2, 2**24, closed="both"), None],
+        "pairs": [StrOptions({"budget", "all", "auto"}), "array-like"],
+        "tables": [StrOptions({"shared", "separate"})],
+        "out_of_range": [StrOptions({"clip", "error"})],
+        "max_iter": [Interval(Integral, 1, 10**9, closed="both")],
+        "shuffle": ["boolean"],
+        "early_stopping": ["boolean"],
+        "validation_fraction": [Interval(Real, 0, 1, closed="neither")],
+        "n_iter_no_change": [Interval(Integral, 1, 10**9, closed="both")],
+        "training": [StrOptions(set(_core.TRAINING_FORMS))],
+        "memory_limit": [Interval(Integral, 0, 2**62, closed="both")],
+        "warm_start": ["boolean"],
+        "random_state": ["random_state"],
+        "n_jobs": [Interval(Integral, -4096, 4096, closed="both"), None],
+        "verbose": ["verbose"],
+    }
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Complete the docstring by the parameters and attributes that are documented here."""
+        super().__init_subclass__(**options)
+        if cls.__doc__ and BaseSDNN.__doc__:
+            cls.__doc__ = inspect.cleandoc(cls.__doc__)
+            for section in inspect.cleandoc(BaseSDNN.__doc__).split("\n\n")[1:]:
+                title, rule, shared = section.split("\n", 2)
+                cls.__doc__ = cls.__doc__.replace(
+                    f"{title}\n{rule}\n", f"{title}\n{rule}\n{shared}\n", 1
+                )
+
+    @abc.abstractmethod
+    def _check_samples(
+        self, X: Any, y: Any, reset: bool, in_fit: bool = False
+    ) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return samples and targets, checked by scikit-learn's rules."""
+
+    @abc.abstractmethod
+    def _set_outputs(self, y: NDArray[Any]) -> int:
+        """Learn from targets (or all classes) what the outputs are; returns the number of units."""
+
+    @abc.abstractmethod
+    def _check_outputs(self, y: NDArray[Any], classes: ArrayLike | None) -> None:
+        """ValueError if the outputs are not those of the network."""
+
+    @abc.abstractmethod
+    def _targets(self, y: NDArray[Any], at_once: bool = False) -> NDArray[Any]:
+        """Return targets as they are learned, one row per sample; may widen the output range."""
+
+    @abc.abstractmethod
+    def _rule_arguments(self, targets: NDArray[Any]) -> tuple[Any, ...]:
+        """Return (counts,) for the p-delta rule, or (labels, n_classes, scheme) for perceptrons."""
+
+    @abc.abstractmethod
+    def _validation_score(
+        self, bins: NDArray[np.int32], targets: NDArray[Any], weights: NDArray[np.float64] | None
+    ) -> float:
+        """Return the score of the network as it is; larger is better."""
+
+    def _presentations(
+        self, targets: NDArray[Any], weights: NDArray[np.float64] | None
+    ) -> NDArray[np.float64] | None:
+        """Return how often each sample is presented per epoch, on average; None for once."""
+        return weights
+
+    def fit(self: Self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
+        """Learn ranges and outputs, draw the network and train it.
+
+        Parameters
+        ----------
+        X : array_like, shape (n_samples, n_features)
+        y : array_like, shape (n_samples,) or (n_samples, n_outputs)
+            Several outputs for the regressor only.
+        sample_weight : array_like, shape (n_samples,), optional
+            How often each sample is presented per epoch, on average; 1 by default. What early
+            stopping holds out and "auto" compares is weighted too. Ranges and categories are
+            learned from all samples.
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        ValueError
+            For an impossible parameter, data that cannot be used, or a form of training that needs
+            more than ``memory_limit``.
+        OverflowError
+            Before a weight could leave its range.
+        MemoryError
+            If there is no room for the weights.
+        """
+        work = self._scratch()
+        work._fit(X, y, sample_weight)
+        self.__dict__ = work.__dict__
+        return self
+
+    def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
+        # Not by scikit-learn's _fit_context: an interrupt could leave its global setting changed.
+        self._validate_params()
+        resumes = bool(self.warm_start) and hasattr(self, "network_")
+        table, labels = self._check_samples(X, y, reset=not resumes, in_fit=True)
+        weights = sample_weights(sample_weight, len(table))
+        if resumes:
+            random = self._resume(table, labels)
+        else:
+            pairs = self._select_pairs(X, table, labels, weights)
+            random = self._begin(X, table, labels, pairs, self._n_networks())
+        targets = self._targets(labels, at_once=True)
+        bins = self.network_.input_code.bins(table)
+        held, kept = self._split(random, len(table))
+        held_bins, held_targets = bins[held], targets[held]
+        held_weights = None if weights is None else weights[held]
+
+        def score() -> float:
+            return self._validation_score(held_bins, held_targets, held_weights)
+
+        is_refitted = self.refit and self.early_stopping
+        trainer = self._trainer(bins[kept], targets[kept], self.max_iter)
+        history = run_epochs(
+            self.network_,
+            trainer,
+            len(kept),
+            max_iter=self.max_iter,
+            random=random if self.shuffle else None,
+            score=score if self.early_stopping else None,
+            n_iter_no_change=self.n_iter_no_change,
+            weights=self._presentations(targets[kept], None if weights is None else weights[kept]),
+            n_averaged_epochs=1 if is_refitted else self.n_averaged_epochs,
+            verbose=self.verbose,
+        )
+        self.n_iter_ = len(history.n_corrected)
+        self.n_corrected_ = np.array(history.n_corrected, dtype=np.int64)
+        self.validation_scores_ = np.array(history.scores)
+        self.training_form_ = trainer.form
+        self.training_memory_ = trainer.memory
+        if is_refitted:  # anew on the whole sample, for as many epochs as were best
+            first = self.network_
+            self.network_ = Network(first.input_code, first.n_units, seed=self._weight_seed or 0)
+            history = run_epochs(
+                self.network_,
+                self._trainer(bins, targets, history.n_epochs),
+                len(bins),
+                max_iter=history.n_epochs,
+                random=random if self.shuffle else None,
+                weights=self._presentations(targets, weights),
+                n_averaged_epochs=self.n_averaged_epochs,
+                verbose=self.verbose,
             )
-        if self.n_pattern_units is not None:
-            whole("n_pattern_units", self.n_pattern_units, 2, 2**24)
-            if self.n_pattern_units % 2:
-                raise ValueError(f"n_pattern_units must be even, got {self.n_pattern_units}")
+        self.network_ = history.network
+        if self._earlier or history.earlier:
+            self._earlier = history.earlier
 
-    def _start(
-        self, X: Any, table: NDArray[Any], n_units: int, n_networks: int = 1
+    def _partial_fit(self: Self, X: ArrayLike, y: ArrayLike, classes: ArrayLike | None) -> Self:
+        """Present samples once, in their order; all or nothing."""
+        work = self._scratch()
+        first = not hasattr(self, "network_")
+        if first:
+            self._validate_params()
+        table, labels = work._check_samples(X, y, reset=first)
+        if first:
+            work._begin(X, table, labels if classes is None else classes)
+            work.n_iter_ = 0
+        else:
+            work._check_outputs(labels, classes)
+            work._note_inputs(work._finite(table, work.codings_))
+        work._learn(work.network_.input_code.bins(table), work._targets(labels))
+        self.__dict__ = work.__dict__
+        return self
+
+    def _learn_one(self: Self, x: Any, y: NDArray[Any], classes: ArrayLike | None) -> Self:
+        """Learn one sample, whose target is checked: shape (1,) or (1, n_outputs)."""
+        work = self._scratch()
+        if hasattr(self, "network_"):
+            work._check_outputs(y, classes)
+            code = work.network_.input_code
+            row = work._row(x, code.codings, code.is_numeric)
+            work._note_inputs(row[None])
+            bins = code.bins_of_row(row)
+        else:
+            self._validate_params()
+            table = work._first_row(x)
+            work._begin(x, table, y if classes is None else classes)
+            work.n_iter_ = 0
+            bins = work.network_.input_code.bins(table)
+        work._learn(bins, work._targets(y))
+        self.__dict__ = work.__dict__
+        return self
+
+    def _begin(
+        self,
+        X: Any,
+        table: NDArray[Any],
+        y: Any,
+        pairs: Pairs | None = None,
+        n_networks: int = 1,
     ) -> np.random.RandomState:
         """Fit the codings, draw tables and first weights; returns the generator of orders."""
-        self._check_parameters()
-        listed = self._listed_names()
-        n_inputs = table.shape[1]
+        n_units = self._set_outputs(y)
         codings = self._codings(X, table)
         random: np.random.RandomState = check_random_state(self.random_state)
         code_seed, weight_seed = (int(seed) for seed in random.randint(2**31 - 1, size=2))
-        shared = isinstance(self.pairs, str) and self.pairs in ("budget", "auto")
-        if self._selected is not None:
-            pairs = self._selected
-        elif shared and n_inputs > 1:
-            pairs = share_of_pairs(n_inputs, PAIR_BUDGET, code_seed)
-        else:
-            pairs = input_pairs("all" if shared else self.pairs, listed, n_inputs)
-        n_pattern_units = self.n_pattern_units or pattern_units_for(len(pairs))
+        if pairs is None:
+            pairs = input_pairs(self.pairs, self._feature_names(), table.shape[1], code_seed)
+        n_pattern_units = self.n_pattern_units or units_for_pairs(len(pairs))
+        if n_pattern_units % 2:
+            raise ValueError(f"n_pattern_units must be even, got {n_pattern_units}")
         fitted = [
             coding.fit(table[:, index], n_pattern_units) for index, coding in enumerate(codings)
         ]
@@ -124,38 +345,40 @@ class BaseSDNN(CodedInputs):
         self._note_inputs(table)
         return random
 
-    def _goes_on(self) -> bool:
-        """Whether `fit` is to go on with the network that is there."""
-        return bool(self.warm_start) and hasattr(self, "network_")
-
-    def _go_on(self, table: NDArray[Any], n_networks: int = 1) -> np.random.RandomState:
+    def _resume(self, table: NDArray[Any], y: NDArray[Any]) -> np.random.RandomState:
         """Train a copy of the network from now on; returns the generator of orders."""
-        self._check_parameters()
-        if n_networks > 1:
-            code = self.network_.input_code
-            n_units = self.network_.n_units
-            self._require_memory(n_units, n_networks, code.n_units, code.codings, code.pairs)
-        self._finite(table, self.codings_)
-        self._note_inputs(table)
-        self.network_ = self.network_.copy()
+        self._check_outputs(y, None)
+        network = self.network_
+        if self._n_networks() > 1:
+            code = network.input_code
+            self._require_memory(
+                network.n_units, self._n_networks(), code.n_units, code.codings, code.pairs
+            )
+        self._note_inputs(self._finite(table, self.codings_))
+        self.network_ = network.copy()
         random: np.random.RandomState = check_random_state(self.random_state)
         return random
 
     def _select_pairs(
         self, X: Any, table: NDArray[Any], y: Any, weights: NDArray[np.float64] | None
-    ) -> None:
-        """Let cross-validation select the pairs, if it is to."""
+    ) -> Pairs | None:
+        """Return the pairs that cross-validation selects; None without ``pairs="auto"``."""
         if not (isinstance(self.pairs, str) and self.pairs == "auto") or table.shape[1] < 2:
-            return
-        self._check_parameters()
+            return None
         seed = int(check_random_state(self.random_state).randint(2**31 - 1))
-        every = share_of_pairs(table.shape[1], PAIR_BUDGET, seed)
+        every = input_pairs("auto", None, table.shape[1], seed)
         model = clone(self).set_params(random_state=seed, early_stopping=False, verbose=0)
         codings = self._codings(X, table)
         known = [with_categories(coding, table[:, i]) for i, coding in enumerate(codings)]
         if known != codings:
             model.set_params(coding=[(coding, [index]) for index, coding in enumerate(known)])
-        self._selected = select_pairs(model, X, y, weights, every, seed)
+        return select_pairs(model, X, y, weights, every, seed)
+
+    def _n_networks(self) -> int:
+        """Return the most networks that `fit` has in memory, those that are averaged included."""
+        n_earlier = min(self.n_averaged_epochs, self.max_iter) - 1
+        has_best = self.early_stopping and not self.refit
+        return 1 + (2 if has_best else 1) * n_earlier  # the best ones beside the last ones
 
     def _require_memory(
         self,
@@ -165,7 +388,7 @@ class BaseSDNN(CodedInputs):
         codings: Sequence[Coding],
         pairs: Sequence[tuple[int, int]],
     ) -> None:
-        """ValueError if weights and patterns take more than the limit, before they are there."""
+        """ValueError if weights and patterns would take more than the limit."""
         n_bytes = 4 * n_networks * n_units * len(pairs) * n_pattern_units
         n_bytes += code_bytes(codings, pairs, n_pattern_units)
         if n_bytes > self.memory_limit:
@@ -176,27 +399,10 @@ class BaseSDNN(CodedInputs):
                 f"memory_limit={self.memory_limit}"
             )
 
-    def _table(self, X: Any) -> NDArray[Any]:
-        """Check samples for prediction."""
-        codings = self.codings_
-        table: NDArray[Any] = self._validated(X, reset=False)
-        return self._finite(table, codings)
-
-    def _n_threads(self) -> int:
-        return int(effective_n_jobs(self.n_jobs))
-
-    def _trainer_options(self, n_epochs: int) -> dict[str, Any]:
-        return {
-            "n_epochs": n_epochs,
-            "form": self.training,
-            "memory_limit": self.memory_limit,
-            "n_threads": self._n_threads(),
-        }
-
     def _split(
         self, random: np.random.RandomState, n_samples: int
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Numbers of the held out samples and of the others; none held out by default."""
+        """Return the indices of the held out samples, none by default, and of the others."""
         if not self.early_stopping:
             return np.empty(0, dtype=np.int64), np.arange(n_samples)
         n_held = max(1, round(self.validation_fraction * n_samples))
@@ -205,36 +411,42 @@ class BaseSDNN(CodedInputs):
         order = random.permutation(n_samples)
         return np.sort(order[:n_held]), np.sort(order[n_held:])
 
-    @abc.abstractmethod
-    def _trainer(
-        self, network: Network, bins: NDArray[np.int32], targets: NDArray[Any], n_epochs: int
-    ) -> Trainer:
-        """Return a trainer of the network; targets as `_present_online` has them."""
+    def _n_threads(self) -> int:
+        return int(effective_n_jobs(self.n_jobs))
 
-    @abc.abstractmethod
-    def _present_online(
-        self, online: _core.OnlineLayer, bins: NDArray[np.int32], targets: NDArray[Any]
-    ) -> None:
-        """Present samples once, or raise and change nothing."""
+    def _trainer(self, bins: NDArray[np.int32], targets: NDArray[Any], n_epochs: int) -> Trainer:
+        rule = self._rule_arguments(targets)
+        kind: Any = _core.PDeltaTrainer if len(rule) == 1 else _core.PerceptronTrainer
+        trainer: Trainer = kind(
+            self.network_.layer,
+            bins,
+            *rule,
+            form=self.training,
+            memory_limit=self.memory_limit,
+            n_threads=self._n_threads(),
+            n_epochs=n_epochs,
+        )
+        return trainer
 
-    def _learn_once(self, bins: NDArray[np.int32], targets: NDArray[Any]) -> None:
+    def _learn(self, bins: NDArray[np.int32], targets: NDArray[Any]) -> None:
         """Present every sample in its order; all or nothing.
 
         Single samples are learned in place: nothing that may fail may follow.
         """
+        self.n_iter_ += 1
+        if self._earlier:
+            self._earlier = ()
         if len(bins) <= FEW_SAMPLES and self.training == "auto":
+            rule = self._rule_arguments(targets)
             try:
-                if self.network_.learn_online(
-                    lambda online: self._present_online(online, bins, targets), self.memory_limit
-                ):
+                if self.network_.learn_online(bins, rule, self.memory_limit):
                     return
             except OverflowError:
                 pass  # the other forms of training have room for larger weights
-        network = self.network_.copy()
-        trainer = self._trainer(network, bins, targets, n_epochs=1)
+        self.network_ = self.network_.copy()
+        trainer = self._trainer(bins, targets, n_epochs=1)
         trainer.present(np.arange(len(bins), dtype=np.int32))
         trainer.synchronize()
-        self.network_ = network
 
     def _note_inputs(self, table: NDArray[Any]) -> None:
         """Count values to learn that lie beyond their input's range."""
@@ -249,125 +461,24 @@ class BaseSDNN(CodedInputs):
 
     @staticmethod
     def _warn(message: str) -> None:
-        warnings.warn(message, OutOfRangeWarning, stacklevel=5)
+        """Warn at the line outside this package and scikit-learn that called."""
+        level, frame = 1, sys._getframe()
+        while frame.f_back and frame.f_globals["__name__"].startswith(("sdnn.", "sklearn.")):
+            level, frame = level + 1, frame.f_back
+        warnings.warn(message, OutOfRangeWarning, stacklevel=level)
 
-    def _row(self, x: Any) -> NDArray[Any]:
-        """Return one sample, shape (n_features,), checked; see `learn_one`."""
-        if isinstance(x, Mapping):
-            values: Any = self._values_of(x)
-        else:
-            values = x
-        if self._fitted_network.input_code.is_numeric:
-            try:
-                row = np.asarray(values, dtype=np.float64)
-            except (TypeError, ValueError):
-                raise ValueError(f"x must be numbers, got {x!r}") from None
-            if not np.isfinite(row).all():
-                raise ValueError(f"x must be finite numbers, got {x!r}")
-        else:
-            row = np.array(values, dtype=object)
-        if row.shape != (self.n_features_in_,):
-            raise ValueError(f"x must have {self.n_features_in_} features, got {x!r}")
-        return row if row.dtype == np.float64 else self._finite(row[None], self.codings_)[0]
+    def _bins(self, X: Any) -> NDArray[np.int32]:
+        """Return the bins of samples to predict, checked."""
+        codings = self.codings_
+        table = self._finite(self._validated(X, reset=False), codings)
+        return self.network_.input_code.bins(table)
 
-    def _values_of(self, x: Mapping[Any, Any]) -> list[Any]:
-        """Return a sample's values in the order of the features, None for one that is missing."""
-        names = getattr(self, "feature_names_in_", None)
-        if names is None:
-            raise ValueError("x must be a 1-D array: the features were learned without names")
-        if len(x) == len(names):
-            with contextlib.suppress(KeyError):
-                return [x[name] for name in names]
-        coded = zip(names, self.codings_, strict=True)
-        optional = {name for name, coding in coded if isinstance(coding, WithMissing)}
-        if not set(names) - optional <= set(x) <= set(names):
-            but = f", of which {sorted(optional)} may be missing" if optional else ""
-            raise ValueError(f"x must have the features {names.tolist()}{but}, got {list(x)}")
-        return [x.get(name) for name in names]
-
-    def _table_of_one(self, x: Any) -> NDArray[Any]:
-        """Return the first sample of all as a table; a mapping gives names to the features."""
-        names = list(x) if isinstance(x, Mapping) else None
-        values = list(x.values()) if isinstance(x, Mapping) else x
-        row = np.array(values, dtype=object)
-        if row.ndim != 1 or (names is not None and not all(isinstance(n, str) for n in names)):
-            raise ValueError(f"x must be a 1-D array, or a mapping with words as keys, got {x!r}")
-        table: NDArray[Any] = self._validated(row[None], reset=True)
-        if names is not None:
-            self.feature_names_in_ = np.array(names, dtype=object)
-        return table
-
-    def _run(
-        self,
-        trainer: Trainer,
-        n_samples: int,
-        random: np.random.RandomState,
-        score: Callable[[], float],
-        weights: NDArray[np.float64] | None = None,
-        n_averaged_epochs: int = 1,
-    ) -> History:
-        """Train, and set the attributes that tell how it went."""
-        history = run_epochs(
-            self.network_,
-            trainer,
-            n_samples,
-            max_iter=self.max_iter,
-            random=random if self.shuffle else None,
-            score=score if self.early_stopping else None,
-            n_iter_no_change=self.n_iter_no_change,
-            weights=weights,
-            n_averaged_epochs=n_averaged_epochs,
-            verbose=self.verbose,
-        )
-        self.n_iter_ = len(history.n_corrected)
-        self.n_corrected_ = np.array(history.n_corrected, dtype=np.int64)
-        self.validation_scores_ = np.array(history.scores)
-        self.training_form_ = trainer.form
-        self.training_memory_ = trainer.memory
-        return history
-
-    @property
-    def _fitted_network(self) -> Network:
-        if "network_" not in self.__dict__:  # scikit-learn's check takes as long as small networks
-            check_is_fitted(self, "network_")
-        return self.network_
-
-    @property
-    def codings_(self) -> tuple[Coding, ...]:
-        """The fitted coding of each input."""
-        return self._fitted_network.input_code.codings
-
-    @property
-    def pairs_(self) -> tuple[tuple[int, int], ...]:
-        """The pairs (modified, modifier) of inputs; equal numbers stand for the plain pattern."""
-        return self._fitted_network.input_code.pairs
-
-    @property
-    def weights_(self) -> NDArray[np.int32]:
-        """The integer weights, shape (n_units, n_pairs * n_pattern_units)."""
-        return self._fitted_network.weights
-
-    @property
-    def pair_importances_(self) -> NDArray[np.float64]:
-        """How much training has changed the weights of each of ``pairs_``: squares, of a sum of 1.
-
-        Shape (n_pairs,). Zeros if nothing was learned.
-        """
+    def _bins_of_one(self, x: Any) -> NDArray[np.int32]:
+        """Return the bins of one sample to predict without overhead."""
         network = self._fitted_network
+        network.online(self.memory_limit)
         code = network.input_code
-        seed = vars(self).get("_weight_seed")
-        if seed is None:
-            raise AttributeError("the file that was loaded does not say what the weights began as")
-        begun = _core.ParallelPerceptron(code.core, network.n_units, seed=seed).weights
-        change = (network.weights - begun).reshape(network.n_units, len(code.pairs), code.n_units)
-        squares: NDArray[np.float64] = np.square(change, dtype=np.float64).sum(axis=(0, 2))
-        shares: NDArray[np.float64] = squares / max(squares.sum(), 1.0)
-        return shares
-
-    @property
-    def thresholds_(self) -> NDArray[np.int32]:
-        """The integer thresholds, shape (n_units,)."""
-        return self._fitted_network.thresholds
+        return code.bins_of_row(self._row(x, code.codings, code.is_numeric))
 
     def transform_code(self, X: ArrayLike) -> NDArray[np.int8]:
         """Return the code of samples, entries +1, 0 and -1.
@@ -379,40 +490,6 @@ class BaseSDNN(CodedInputs):
         Returns
         -------
         ndarray, shape (n_samples, n_pairs * n_pattern_units)
-
-        Raises
-        ------
-        NotFittedError, ValueError
-            As of `predict`.
         """
-        table = self._table(X)
-        code = self.network_.input_code
-        return code.core.transform(code.bins(table))
-
-    def save(self, path: str | Path) -> None:
-        """Write the fitted estimator to a safetensors file with JSON metadata, without pickle.
-
-        Raises
-        ------
-        NotFittedError
-            If there is nothing to write yet.
-        TypeError
-            If a parameter cannot be written as JSON, such as a coding of one's own.
-        OSError
-            If the file cannot be written; one that was there before stays as it was.
-        """
-        check_is_fitted(self, "network_")
-        files.save(self, path)
-
-    @classmethod
-    def load(cls: type[Self], path: str | Path) -> Self:
-        """Read an estimator that `save` has written.
-
-        Raises
-        ------
-        ValueError
-            If the file holds something else.
-        OSError
-            If the file cannot be read.
-        """
-        return files.load(path, cls)
+        bins = self._bins(X)
+        return self.network_.input_code.core.transform(bins)

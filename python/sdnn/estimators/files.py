@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.coding import Coding, from_dict, to_dict
-from sdnn.estimators.input_code import InputCode
-from sdnn.estimators.network import Network
+from sdnn.estimators.network import InputCode, Network
 from sdnn.files import Arrays, Description, read_file, write_file
 
 __all__ = ["Saved", "load", "save"]

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from typing import Any, TypeVar
+import dataclasses
+from numbers import Real
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import RegressorMixin
 from sklearn.kernel_ridge import KernelRidge
+from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from sdnn.arguments import real
-from sdnn.estimators.coded_inputs import CodedInputs
-from sdnn.estimators.columns import input_pairs, kept_pairs
+from sdnn.estimators.inputs import CodedInputs, input_pairs
 from sdnn.kernel import N_UNITS, AnalyticKernel
 
 __all__ = ["SDNNKernelRidge"]
@@ -24,6 +24,7 @@ SAMPLES_AT_ONCE = 4096
 Self = TypeVar("Self", bound="SDNNKernelRidge")
 
 
+@dataclasses.dataclass(eq=False, repr=False)
 class SDNNKernelRidge(RegressorMixin, CodedInputs):
     """Kernel ridge regression with the network's kernel, as of codes of infinitely many units.
 
@@ -37,7 +38,7 @@ class SDNNKernelRidge(RegressorMixin, CodedInputs):
         As of `SDNNRegressor`.
     alpha : float, default=0.1
         Strength of the penalty, above 0; noisy targets want more.
-    pairs : "all" or iterable of (modified, modifier), default="all"
+    pairs : "all" or list of (modified, modifier), default="all"
         Pairs of features, by number or name; a modifier of None leaves a pattern plain, which is
         also what a single feature gets. All pairs take no more time than one per feature, so
         there is no "budget" of them as of `SDNNRegressor`, nor "auto".
@@ -70,12 +71,14 @@ class SDNNKernelRidge(RegressorMixin, CodedInputs):
     True
     """
 
-    def __init__(
-        self, coding: Any = "random-inverse", *, alpha: float = 0.1, pairs: Any = "all"
-    ) -> None:
-        self.coding = coding
-        self.alpha = alpha
-        self.pairs = kept_pairs(pairs)
+    alpha: float = dataclasses.field(default=0.1, kw_only=True)
+    pairs: Any = dataclasses.field(default="all", kw_only=True)
+
+    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        **CodedInputs._parameter_constraints,
+        "alpha": [Interval(Real, 0, np.inf, closed="neither")],
+        "pairs": [StrOptions({"all"}), "array-like"],
+    }
 
     def __sklearn_tags__(self) -> Any:
         """Say that several outputs can be learned at once."""
@@ -93,8 +96,7 @@ class SDNNKernelRidge(RegressorMixin, CodedInputs):
 
         Returns
         -------
-        SDNNKernelRidge
-            Itself.
+        self
 
         Raises
         ------
@@ -107,8 +109,7 @@ class SDNNKernelRidge(RegressorMixin, CodedInputs):
         return self
 
     def _fit(self, X: ArrayLike, y: ArrayLike) -> None:
-        if not 0 < real("alpha", self.alpha) < math.inf:
-            raise ValueError(f"alpha must be above 0 and finite, got {self.alpha!r}")
+        self._validate_params()
         if y is None:
             raise ValueError("SDNNKernelRidge requires y to be passed, but the target y is None")
         table, targets = self._validated(X, y, multi_output=True, y_numeric=True)
@@ -117,7 +118,7 @@ class SDNNKernelRidge(RegressorMixin, CodedInputs):
             coding.fit(table[:, index], N_UNITS)
             for index, coding in enumerate(self._codings(X, table))
         ]
-        pairs = input_pairs(self.pairs, self._listed_names(), table.shape[1], words=("all",))
+        pairs = input_pairs(self.pairs, self._feature_names(), table.shape[1])
         every = isinstance(self.pairs, str)
         self.kernel_ = AnalyticKernel(codings, pairs=None if every else pairs)
         self.X_fit_ = table

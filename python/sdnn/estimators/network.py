@@ -1,22 +1,192 @@
-"""The code and the layer together: what a fitted estimator predicts with, and pickles."""
+"""The code of whole samples and the units over it: what a fitted estimator predicts with."""
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import threading
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.estimators.input_code import InputCode
+from sdnn.coding import Coding
+from sdnn.coding.missing import missing_as_nan
+from sdnn.estimators.inputs import PAIR_BUDGET, Pairs
 
-__all__ = ["FEW_SAMPLES", "Network"]
+__all__ = ["InputCode", "Network", "code_bytes", "draw_input_code", "units_for_pairs"]
+
+COLUMN_BUDGET = 16000
+"""Columns of the code that are divided among the pairs where the user names no size."""
 
 FEW_SAMPLES = 32
 """Samples up to which weights in bytes are the quicker way to learn and answer them."""
+
+
+def units_for_pairs(n_pairs: int) -> int:
+    """Units per pattern so that the whole code is about `COLUMN_BUDGET` wide.
+
+    At least 32 up to `PAIR_BUDGET` pairs, and 8 beyond.
+
+    >>> [units_for_pairs(n) for n in (2, 90, 500, 870, 4032)]
+    [2000, 178, 32, 18, 8]
+    """
+    least = 32 if n_pairs <= PAIR_BUDGET else 8
+    return min(2000, max(least, 2 * round(COLUMN_BUDGET / n_pairs / 2)))
+
+
+def code_bytes(codings: Sequence[Coding], pairs: Sequence[tuple[int, int]], n_units: int) -> int:
+    """Return the bytes that drawing and keeping the patterns of fitted codings takes, about."""
+    of_pairs = sum(codings[mu].size + codings[nu].size for mu, nu in pairs)
+    return int(of_pairs * n_units * 9 / 8)  # a byte a unit, and a bit in the core
+
+
+class InputCode:
+    """Turns samples into bins, and bins into the code that the network reads.
+
+    Parameters
+    ----------
+    codings : sequence of Coding
+        One per input, fitted.
+    pairs : sequence of (int, int)
+        Ordered pairs (modified, modifier); equal ones stand for the plain pattern.
+    modified, modifiers : list of ndarray, shape (n_bins, n_units)
+        Per pair, the patterns of the modified input and of the modifier.
+    """
+
+    def __init__(
+        self,
+        codings: Sequence[Coding],
+        pairs: Sequence[tuple[int, int]],
+        modified: list[NDArray[np.int8]],
+        modifiers: list[NDArray[np.int8]],
+    ) -> None:
+        self.codings = tuple(codings)
+        self.pairs = tuple(pairs)
+        self.modified = modified
+        self.modifiers = modifiers
+        # Inputs that no pair mentions are validated and then ignored.
+        self.used = sorted({index for pair in self.pairs for index in pair})
+        place = {index: number for number, index in enumerate(self.used)}
+        self.core_pairs = np.array([(place[mu], place[nu]) for mu, nu in self.pairs], np.int32)
+        self.is_numeric = all(coding.is_numeric for coding in self.codings)
+        self.core = _core.SelectiveDesensitization(modified, modifiers, self.core_pairs)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle everything but the core's object, which follows from it."""
+        return InputCode, (self.codings, self.pairs, self.modified, self.modifiers)
+
+    @property
+    def n_units(self) -> int:
+        """Units per pattern."""
+        return self.core.n_units
+
+    def bins(self, table: NDArray[Any]) -> NDArray[np.int32]:
+        """Return the bins of samples, (n_samples, n_inputs) to (n_samples, n inputs in pairs).
+
+        Raises
+        ------
+        ValueError
+            For a category that was not there in training; the message names the input.
+        """
+        bins = np.empty((len(table), len(self.used)), dtype=np.int32)
+        for number, index in enumerate(self.used):
+            try:
+                bins[:, number] = self.codings[index].bins(table[:, index])
+            except ValueError as error:
+                raise ValueError(f"{error} in column {index}") from None
+        return bins
+
+    @functools.cached_property
+    def _even(self) -> tuple[Any, ...] | None:
+        """Inputs in pairs, their ranges and numbers of bins, if all have bins of equal width."""
+        ranges = [self.codings[index].even_range() for index in self.used]
+        if any(ends is None or not ends[0] < ends[1] for ends in ranges):
+            return None
+        every = self.used == list(range(len(self.codings)))
+        low, high = np.array(ranges, dtype=np.float64).T
+        sizes = np.array([self.codings[index].size for index in self.used], dtype=np.int32)
+        return slice(None) if every else np.array(self.used), low, high, sizes
+
+    def bins_of_row(self, row: NDArray[Any]) -> NDArray[np.int32]:
+        """Return the bins of one sample, (n_inputs,) to (1, n inputs in pairs); as of `bins`.
+
+        Where all inputs have bins of equal width, they are found together: inputs one by one
+        would cost more than the network.
+        """
+        if self._even is None or row.dtype != np.float64:
+            return self.bins(row[None])
+        used, low, high, sizes = self._even
+        inside = np.minimum(np.maximum(row[used], low), high)
+        where = (inside / 2 - low / 2) / (high / 2 - low / 2)  # as in `sdnn.coding.numeric`
+        bins: NDArray[np.int32] = np.minimum((where * sizes).astype(np.int32), sizes - 1)
+        return bins[None]
+
+    @functools.cached_property
+    def _ends(self) -> tuple[list[int], NDArray[np.float64], NDArray[np.float64]]:
+        """Which inputs have a range, and their ranges."""
+        ends = {index: self.codings[index].ends() for index in self.used}
+        ranges = {index: pair for index, pair in ends.items() if pair is not None}
+        low, high = np.array(list(ranges.values()), dtype=np.float64).reshape(-1, 2).T
+        return list(ranges), low, high
+
+    def outside(self, table: NDArray[Any]) -> tuple[int, str]:
+        """Return how many values lie beyond their input's range, and what the first of them is.
+
+        Shapes: table (n_samples, n_inputs).
+        """
+        indices, low, high = self._ends
+        values = table if len(indices) == table.shape[1] else table[:, indices]
+        if values.dtype != np.float64:
+            values = missing_as_nan(values)
+        beyond = (values < low) | (values > high)
+        n_beyond = int(np.count_nonzero(beyond))
+        if n_beyond == 0:
+            return 0, ""
+        row, place = np.argwhere(beyond)[0]
+        return n_beyond, (
+            f"{values[row, place]} in column {indices[place]}, whose range is "
+            f"[{low[place]}, {high[place]}]"
+        )
+
+
+def draw_input_code(
+    codings: Sequence[Coding], pairs: Pairs, n_units: int, tables: str, seed: int
+) -> InputCode:
+    """Draw the patterns of fitted codings.
+
+    Parameters
+    ----------
+    codings, pairs
+        As of `InputCode`.
+    n_units : int
+        Units per pattern.
+    tables : {"shared", "separate"}
+        One table per input, its units permuted anew as modifier in each pair; or two fresh tables
+        per pair.
+    seed : int
+        Equal seeds give equal tables.
+    """
+    n_seeds = 2 * (len(codings) + len(pairs))
+    seeds = iter(np.random.SeedSequence(seed).generate_state(n_seeds, np.uint64).tolist())
+    used = sorted({index for pair in pairs for index in pair})
+    plain = {mu: np.ones((codings[mu].size, n_units), np.int8) for mu, nu in pairs if mu == nu}
+    if tables == "separate":
+        modified = [codings[mu].patterns(n_units, next(seeds)) for mu, _ in pairs]
+        modifiers = [
+            plain[nu] if mu == nu else codings[nu].patterns(n_units, next(seeds))
+            for mu, nu in pairs
+        ]
+        return InputCode(codings, pairs, modified, modifiers)
+    shared = {index: codings[index].patterns(n_units, next(seeds)) for index in used}
+    orders = [np.random.RandomState(next(seeds) % 2**32).permutation(n_units) for _ in pairs]
+    modifiers = [
+        plain[nu] if mu == nu else np.ascontiguousarray(shared[nu][:, order])
+        for (mu, nu), order in zip(pairs, orders, strict=True)
+    ]
+    return InputCode(codings, pairs, [shared[mu] for mu, _ in pairs], modifiers)
 
 
 class Network:
@@ -34,6 +204,8 @@ class Network:
         First weights follow from it where none are given.
     weights, thresholds : ndarray, shapes (n_units, n_columns) and (n_units,), optional
         Both or neither.
+    layer : ParallelPerceptron, optional
+        The core's layer, where there is one already.
     """
 
     def __init__(
@@ -43,12 +215,17 @@ class Network:
         seed: int = 0,
         weights: NDArray[np.int32] | None = None,
         thresholds: NDArray[np.int32] | None = None,
+        layer: _core.ParallelPerceptron | None = None,
     ) -> None:
         self.input_code = input_code
         self.n_units = n_units
-        self._forget_online()
+        self._online: _core.OnlineLayer | None = None
+        # Marks of what the online layer learned last, and of what the other one has of it.
+        self._learned: object = None
+        self._synchronized: object = None
+        self._lock = threading.RLock()
         try:
-            self._layer = _core.ParallelPerceptron(
+            self._layer = layer or _core.ParallelPerceptron(
                 input_code.core, n_units, seed=seed, weights=weights, thresholds=thresholds
             )
         except MemoryError:
@@ -58,51 +235,26 @@ class Network:
                 "their weights"
             ) from None
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Keep the weights instead of the core's object."""
-        return {
-            "input_code": self.input_code,
-            "n_units": self.n_units,
-            "weights": self.weights,
-            "thresholds": self.thresholds,
-        }
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Build the core's object again."""
-        self.__init__(**state)  # type: ignore[misc]
-
-    def _forget_online(self) -> None:
-        """Have no layer for single samples."""
-        self._online: _core.OnlineLayer | None = None
-        # Marks of what the online layer learned last, and of what the other one has of it.
-        self._learned: object = None
-        self._synchronized: object = None
-        self._lock = threading.RLock()
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the weights instead of the core's object."""
+        return Network, (self.input_code, self.n_units, 0, self.weights, self.thresholds)
 
     @property
     def layer(self) -> _core.ParallelPerceptron:
         """The core's layer as it is now; who trains it trains a `copy`, or a fresh network."""
-        # Only then: the core refuses to synchronize what another thread reads.
         if self._synchronized is not self._learned:
-            self._synchronize()
+            # Only then, and one thread while others wait: the core refuses to synchronize what
+            # another thread reads.
+            with self._lock:
+                learned = self._learned
+                if self._online is not None and self._synchronized is not learned:
+                    self._online.synchronize()
+                    self._synchronized = learned
         return self._layer
-
-    def _synchronize(self) -> None:
-        """Bring the layer up to date; one thread does, the others wait."""
-        with self._lock:
-            learned = self._learned
-            if self._online is not None and self._synchronized is not learned:
-                self._online.synchronize()
-                self._synchronized = learned
 
     def copy(self) -> Network:
         """Return a network with the same code and weights of its own."""
-        other = object.__new__(Network)
-        other.input_code = self.input_code
-        other.n_units = self.n_units
-        other._forget_online()
-        other._layer = self.layer.copy()
-        return other
+        return Network(self.input_code, self.n_units, layer=self.layer.copy())
 
     def online(self, memory_limit: int) -> _core.OnlineLayer | None:
         """Return the layer for samples one at a time; None if its weights do not fit into bytes.
@@ -118,18 +270,20 @@ class Network:
         return self._online
 
     def learn_online(
-        self, present: Callable[[_core.OnlineLayer], object], memory_limit: int
+        self, bins: NDArray[np.int32], rule: tuple[Any, ...], memory_limit: int
     ) -> bool:
-        """Let the layer of `online` learn what ``present`` presents to it; False if there is none.
+        """Learn samples in place, in their order; False if there is no layer of `online`.
 
-        Samples are learned in place: nothing that may fail follows.
+        ``rule`` is (counts,) for the p-delta rule, or (labels, n_classes, scheme). Nothing that
+        may fail follows.
         """
         online = self.online(memory_limit)
         if online is None:
             return False
+        learn = online.learn_counts if len(rule) == 1 else online.learn_labels
         begun, ended = object(), object()
         self._learned = begun  # an interrupt may come between learning and the other mark
-        present(online)
+        learn(bins, *rule)
         self._learned = ended
         return True
 
@@ -143,40 +297,19 @@ class Network:
         """Copy the thresholds, shape (n_units,)."""
         return self.layer.thresholds
 
-    def restore(self, weights: NDArray[np.int32], thresholds: NDArray[np.int32]) -> None:
-        """Go back to earlier weights and thresholds."""
-        self._forget_online()
-        self._layer = _core.ParallelPerceptron(
-            self.input_code.core, self.n_units, weights=weights, thresholds=thresholds
-        )
-
-    def potentials(self, table: NDArray[Any], n_threads: int) -> NDArray[np.int32]:
-        """Potentials, (n_samples, n_inputs) to (n_samples, n_units)."""
-        return self.potentials_of_bins(self.input_code.bins(table), n_threads)
-
-    def potentials_of_bins(self, bins: NDArray[np.int32], n_threads: int) -> NDArray[np.int32]:
+    def potentials(self, bins: NDArray[np.int32], n_threads: int) -> NDArray[np.int32]:
         """Potentials, (n_samples, n inputs in pairs) to (n_samples, n_units)."""
         if self._online is not None and len(bins) <= FEW_SAMPLES:
-            return self._online_potentials(self._online, bins)
+            with self._lock:  # the core refuses to read what another thread synchronizes
+                return self._online.potentials(bins)
         return self.layer.potentials(bins, n_threads=n_threads)
 
-    def counts(self, table: NDArray[Any], n_groups: int, n_threads: int) -> NDArray[np.int32]:
-        """How many units fire, (n_samples, n_inputs) to (n_samples, n_groups)."""
-        return self.counts_of_bins(self.input_code.bins(table), n_groups, n_threads)
-
-    def counts_of_bins(
-        self, bins: NDArray[np.int32], n_groups: int, n_threads: int
-    ) -> NDArray[np.int32]:
+    def counts(self, bins: NDArray[np.int32], n_groups: int, n_threads: int) -> NDArray[np.int32]:
         """How many units fire, (n_samples, n inputs in pairs) to (n_samples, n_groups)."""
         if self._online is not None and len(bins) <= FEW_SAMPLES:
-            potentials = self._online_potentials(self._online, bins)
-            firing = (potentials > 0).reshape(len(bins), n_groups, -1)
-            counts: NDArray[np.int32] = firing.sum(axis=2, dtype=np.int32)
+            firing = self.potentials(bins, n_threads) > 0
+            counts: NDArray[np.int32] = firing.reshape(len(bins), n_groups, -1).sum(
+                axis=2, dtype=np.int32
+            )
             return counts
         return self.layer.counts(bins, n_groups=n_groups, n_threads=n_threads)
-
-    def _online_potentials(
-        self, online: _core.OnlineLayer, bins: NDArray[np.int32]
-    ) -> NDArray[np.int32]:
-        with self._lock:  # the core refuses to read what another thread synchronizes
-            return online.potentials(bins)

@@ -17,7 +17,7 @@ __all__ = ["History", "Trainer", "run_epochs", "sample_weights", "weighted_mean"
 
 LARGEST_WEIGHT = 10**6
 MOST_PRESENTED = 2**28
-"""Samples presented in an epoch: their numbers are a GiB."""
+"""Samples presented in an epoch: their indices are a GiB."""
 
 
 class Trainer(Protocol):
@@ -44,6 +44,8 @@ class History:
 
     Attributes
     ----------
+    network : Network
+        With the weights of the last epoch, or with a validation score of the best one.
     n_corrected : list of int
         Samples that were corrected.
     scores : list of float
@@ -54,6 +56,7 @@ class History:
         The network after each of the epochs before the last of these.
     """
 
+    network: Network
     n_corrected: list[int] = dataclasses.field(default_factory=list)
     scores: list[float] = dataclasses.field(default_factory=list)
     n_epochs: int = 0
@@ -70,11 +73,9 @@ def progress_bar(verbose: int, n_epochs: int) -> Iterator[Callable[[int], None]]
 
     with Progress(*Progress.get_default_columns(), MofNCompleteColumn()) as progress:
         task = progress.add_task("training", total=n_epochs)
-
-        def _advance(n_corrected: int) -> None:
-            progress.update(task, advance=1, description=f"training, {n_corrected} corrected")
-
-        yield _advance
+        yield lambda n_corrected: progress.update(
+            task, advance=1, description=f"training, {n_corrected} corrected"
+        )
 
 
 def sample_weights(
@@ -131,8 +132,10 @@ def presented(n_samples: int, weights: NDArray[np.float64] | None, epoch: int) -
     return np.repeat(in_order, times.astype(np.int64))
 
 
-def epochs_to_present_all(weights: NDArray[np.float64]) -> int:
+def epochs_to_present_all(weights: NDArray[np.float64] | None) -> int:
     """Return how many epochs it takes until each sample of a weight above 0 has come."""
+    if weights is None:
+        return 1
     least = float(np.min(weights, where=weights > 0, initial=1.0))
     return int(min(np.ceil(1 / least), 2**62))
 
@@ -155,13 +158,11 @@ def run_epochs(
     Parameters
     ----------
     network : Network
-        What is trained; at the end it has the last weights, or with ``score`` the best ones.
+        What the trainer trains.
     trainer : Trainer
         Of the network's layer.
-    n_samples : int
-        Size of the training sample.
-    max_iter : int
-        Largest number of epochs.
+    n_samples, max_iter : int
+        Size of the training sample, and the largest number of epochs.
     random : RandomState, optional
         Draws a new order for every epoch; without it the order is that of the sample.
     score : callable, optional
@@ -171,16 +172,15 @@ def run_epochs(
     weights : ndarray, shape (n_samples,), optional
         How often each sample is presented per epoch, on average; once by default.
     n_averaged_epochs : int
-        How many epochs' networks are kept, the last among them.
+        How many epochs' networks are kept, the last included.
     verbose : int
         Whether to show a progress bar.
     """
-    history = History()
-    quiet, n_quiet = 0, 1 if weights is None else epochs_to_present_all(weights)
-    best: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None
+    history = History(network)
+    quiet, n_quiet = 0, epochs_to_present_all(weights)
+    best, best_epoch = network, -1
     best_earlier: tuple[Network, ...] = ()
     kept: deque[Network] = deque(maxlen=n_averaged_epochs - 1)
-    best_score, best_epoch = -np.inf, 0
     with progress_bar(verbose, max_iter) as advance:
         for epoch in range(max_iter):
             order = presented(n_samples, weights, epoch)
@@ -193,10 +193,8 @@ def run_epochs(
                 trainer.synchronize()
             if score is not None:
                 history.scores.append(score())
-                if best is None or history.scores[-1] > best_score:
-                    best_score, best_epoch = history.scores[-1], epoch
-                    best = network.weights, network.thresholds
-                    best_earlier = tuple(kept)
+                if best_epoch < 0 or history.scores[-1] > history.scores[best_epoch]:
+                    best, best_epoch, best_earlier = network.copy(), epoch, tuple(kept)
                 elif epoch - best_epoch >= n_iter_no_change:
                     break
             quiet = quiet + 1 if n_corrected == 0 else 0
@@ -206,7 +204,6 @@ def run_epochs(
                 kept.append(network.copy())
     trainer.synchronize()
     history.n_epochs, history.earlier = len(history.n_corrected), tuple(kept)
-    if best is not None:
-        network.restore(*best)
-        history.n_epochs, history.earlier = best_epoch + 1, best_earlier
+    if score is not None:
+        history.network, history.n_epochs, history.earlier = best, best_epoch + 1, best_earlier
     return history

@@ -99,9 +99,10 @@ DOCUMENTED = (
     "sdnn.coding.ranges",
     "sdnn.coding.symbols",
     "sdnn.estimators.classifier",
-    "sdnn.estimators.columns",
-    "sdnn.estimators.input_code",
+    "sdnn.estimators.inputs",
+    "sdnn.estimators.network",
     "sdnn.estimators.regressor",
+    "sdnn.estimators.training",
     "sdnn.kernel",
 )
 

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 import estimator_transcription
 from sdnn import SDNNClassifier, SDNNRegressor, _core
 from sdnn.coding import RandomInverse
-from sdnn.estimators.classifier import numbers_of
 
 
 def transcribed(model):
@@ -24,13 +23,9 @@ def transcribed(model):
 
 def untrained(model, X, y):
     """The model before its first sample, and its targets as the trainer has them."""
-    if isinstance(model, SDNNRegressor):
-        table, targets = model._checked(X, y, reset=True)
-        model._begin(X, table, targets)
-        return model, model._in_counts(targets)
-    table, labels = model._checked(X, y, reset=True)
-    model._begin(X, table, np.unique(labels))
-    return model, numbers_of(labels, model.classes_)
+    table, targets = model._check_samples(X, y, reset=True)
+    model._begin(X, table, targets)
+    return model, model._targets(targets)
 
 
 @st.composite
@@ -64,7 +59,7 @@ def agree(model, layer, X):
     np.testing.assert_array_equal(model.weights_, layer.weights)
     np.testing.assert_array_equal(model.thresholds_, layer.thresholds)
     bins = model.network_.input_code.bins(X)
-    np.testing.assert_array_equal(model.network_.potentials(X, 1), layer.potentials(bins))
+    np.testing.assert_array_equal(model.network_.potentials(bins, 1), layer.potentials(bins))
     np.testing.assert_array_equal(model.transform_code(X), layer.code.transform(bins))
 
 
@@ -77,7 +72,7 @@ def test_regression(problem, n_outputs, n_output_units):
     layer = transcribed(model)
     bins = model.network_.input_code.bins(X)
     slow = estimator_transcription.PDeltaTrainer(layer, bins, counts)
-    fast = model._trainer(model.network_, bins, counts, 3)
+    fast = model._trainer(bins, counts, 3)
     for order in orders:
         assert tuple(fast.present(np.array(order, dtype=np.int32))) == slow.present(order)
     fast.synchronize()
@@ -96,7 +91,7 @@ def test_classification(problem, scheme):
     slow = estimator_transcription.PerceptronTrainer(
         layer, model.network_.input_code.bins(X), labels, len(model.classes_), scheme
     )
-    fast = model._trainer(model.network_, model.network_.input_code.bins(X), labels, 3)
+    fast = model._trainer(model.network_.input_code.bins(X), labels, 3)
     for order in orders:
         assert tuple(fast.present(np.array(order, dtype=np.int32))) == slow.present(order)
     fast.synchronize()

@@ -7,8 +7,8 @@ import pytest
 from sdnn import SDNNClassifier, SDNNKernelRidge, SDNNRegressor
 from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic, WithMissing
 from sdnn.estimators import OutOfRangeWarning
-from sdnn.estimators.columns import codings_of_columns, column_indices, input_pairs
-from sdnn.estimators.input_code import draw_input_code
+from sdnn.estimators.inputs import codings_of_columns, column_indices, input_pairs
+from sdnn.estimators.network import draw_input_code
 
 RANDOM = np.random.RandomState(0)
 HOURS = RANDOM.uniform(0, 24, 200)
@@ -42,10 +42,10 @@ def test_columns_are_given_as_to_a_column_transformer():
 
 
 def test_inputs_left_out_have_the_usual_coding():
-    codings = codings_of_columns([("anchor", [1])], RandomInverse(), None, 3)
+    codings = codings_of_columns([("anchor", [1])], None, 3)
     assert [coding.name for coding in codings] == ["random-inverse", "anchor", "random-inverse"]
     with pytest.raises(ValueError, match=r"list of \(coding, columns\)"):
-        codings_of_columns([("anchor",)], RandomInverse(), None, 3)
+        codings_of_columns([("anchor",)], None, 3)
 
 
 def test_pairs_are_ordered_and_named():

@@ -1,0 +1,289 @@
+"""Samples whose inputs have codings: which column is coded how, and scikit-learn's checks."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator
+from sklearn.utils import assert_all_finite
+from sklearn.utils.validation import validate_data
+
+from sdnn.coding import Coding, RandomInverse, WithMissing, coding_named
+
+__all__ = ["PAIR_BUDGET", "CodedInputs", "Pairs", "column_indices", "input_pairs"]
+
+Columns = int | str | slice | Sequence[int] | Sequence[str] | Sequence[bool] | Callable[[Any], Any]
+Pairs = list[tuple[int, int]]
+Self = TypeVar("Self", bound="CodedInputs")
+PAIR_BUDGET = 500
+"""Pairs that are formed where the user names none."""
+WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
+
+
+def one_index(column: Any, names: Sequence[str] | None, n_inputs: int) -> int:
+    """Return the index of a feature given by name or number; negative numbers count from the end.
+
+    >>> one_index("y", ["x", "y"], 2), one_index(-1, None, 3)
+    (1, 2)
+    """
+    if isinstance(column, str):
+        if names is None:
+            raise ValueError(f"feature {column!r} is given by name, but X has no feature names")
+        if column not in names:
+            raise ValueError(f"X has no feature named {column!r}")
+        return list(names).index(column)
+    if isinstance(column, bool | np.bool_) or not isinstance(column, int | np.integer):
+        raise ValueError(f"a feature is given by its name or number, got {column!r}")
+    if not -n_inputs <= column < n_inputs:
+        raise ValueError(f"X has {n_inputs} features, there is no number {column}")
+    return int(column) % n_inputs
+
+
+def column_indices(
+    columns: Columns, names: Sequence[str] | None, n_inputs: int, table: Any = None
+) -> list[int]:
+    """Return the indices of features given as to scikit-learn's ColumnTransformer.
+
+    Slices are of numbers only; a callable is called with ``table``.
+
+    >>> column_indices(slice(1, None), None, 3), column_indices([True, False, True], None, 3)
+    ([1, 2], [0, 2])
+    """
+    if callable(columns):
+        columns = columns(table)
+    if isinstance(columns, slice):
+        return list(range(n_inputs))[columns]
+    if isinstance(columns, str) or not isinstance(columns, Iterable):
+        return [one_index(columns, names, n_inputs)]
+    listed: list[Any] = list(columns)
+    if listed and all(isinstance(column, bool | np.bool_) for column in listed):
+        if len(listed) != n_inputs:
+            raise ValueError(f"a mask must have {n_inputs} entries, got {len(listed)}")
+        return np.flatnonzero(listed).tolist()
+    return [one_index(column, names, n_inputs) for column in listed]
+
+
+def coding_entries(coding: Any) -> list[tuple[Coding, Columns]]:
+    """Return the entries (coding, columns) of a coding or of a list of them, names replaced.
+
+    >>> [coding.name for coding, _ in coding_entries([("anchor", [0, 1]), ("circular", "hour")])]
+    ['anchor', 'circular']
+    """
+    if not isinstance(coding, list | tuple):
+        return [(coding_named(coding), slice(None))]
+    if not coding:
+        raise ValueError(f"coding must name a coding for some columns, got {coding!r}")
+    entries = []
+    for entry in coding:
+        if not isinstance(entry, list | tuple) or len(entry) != 2:
+            raise ValueError(f"coding must be a list of (coding, columns), got {entry!r} in it")
+        entries.append((coding_named(entry[0]), entry[1]))
+    return entries
+
+
+def codings_of_columns(
+    coding: Any, names: Sequence[str] | None, n_inputs: int, table: Any = None
+) -> list[Coding]:
+    """Return the coding of each feature; those that a list leaves out have random-inverse.
+
+    >>> [coding.name for coding in codings_of_columns([("anchor", [1])], None, 2)]
+    ['random-inverse', 'anchor']
+    """
+    found: dict[int, Coding] = {}
+    for one, columns in coding_entries(coding):
+        for index in column_indices(columns, names, n_inputs, table):
+            if index in found:
+                raise ValueError(f"feature {index} has more than one coding")
+            found[index] = one
+    return [found.get(index) or RandomInverse() for index in range(n_inputs)]
+
+
+def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int, seed: int = 0) -> Pairs:
+    """Return the ordered pairs (modified, modifier) of features; (mu, mu) is mu's plain pattern.
+
+    Parameters
+    ----------
+    pairs : str or list of (modified, modifier)
+        By number or name; a modifier of None leaves the pattern plain. "all" means every ordered
+        pair of different features, and the plain pattern where there is one feature only. Any
+        other word means up to `PAIR_BUDGET` of these: beyond it an even share drawn at random, in
+        which every input is modified as often as any other, and modifies as often, at least once.
+    names, n_inputs
+        As of `column_indices`.
+    seed : int
+        Of the share.
+
+    Examples
+    --------
+    >>> input_pairs("all", None, 3)
+    [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)]
+    >>> input_pairs([("a", "b"), ("a", None)], ["a", "b"], 2)
+    [(0, 1), (0, 0)]
+    >>> len(input_pairs("budget", None, 100))
+    500
+    """
+    if isinstance(pairs, str):
+        away: NDArray[np.int64] = np.arange(1, n_inputs)
+        if pairs != "all" and n_inputs * len(away) > PAIR_BUDGET:
+            random = np.random.RandomState(seed)
+            away = random.permutation(away)[: max(1, PAIR_BUDGET // n_inputs)]
+        inputs = range(n_inputs)
+        return sorted((mu, int(mu + step) % n_inputs) for mu in inputs for step in away) or [(0, 0)]
+    if isinstance(pairs, Iterator) or not isinstance(pairs, Iterable):
+        raise ValueError(f"pairs must be a list of (modified, modifier), got {pairs!r}")
+    found = []
+    for pair in pairs:
+        if not isinstance(pair, list | tuple | np.ndarray) or len(pair) != 2:
+            raise ValueError(f"a pair is (modified, modifier), got {pair!r}")
+        mu = one_index(pair[0], names, n_inputs)
+        found.append((mu, mu if pair[1] is None else one_index(pair[1], names, n_inputs)))
+        if pair[1] is not None and found[-1][0] == found[-1][1]:
+            raise ValueError(f"a feature cannot modify itself, got {pair!r}; use None")
+    if not found:
+        raise ValueError("pairs must not be empty")
+    return found
+
+
+def as_it_came(X: Any) -> Any:
+    """Return samples with words as they are to be checked: every value of its own type."""
+    if hasattr(X, "columns") and hasattr(X, "astype"):
+        return X.astype(object)  # pandas has no common type of categories and its own numbers
+    if hasattr(X, "dtype"):
+        return X
+    try:
+        is_of_words = np.asarray(X).dtype.kind in "SU"
+    except ValueError:  # rows of different lengths
+        return X
+    return np.array(X, dtype=object) if is_of_words else X  # else numbers and NaN become words
+
+
+@dataclasses.dataclass(eq=False, repr=False)
+class CodedInputs(BaseEstimator):
+    """Validation of samples for estimators with a parameter ``coding``."""
+
+    coding: Any = "random-inverse"
+
+    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {"coding": [str, Coding, list, tuple]}
+
+    def set_params(self: Self, **params: Any) -> Self:
+        """Set parameters; ``coding__length_scale`` and the like replace a field of the coding.
+
+        Raises
+        ------
+        ValueError
+            For an unknown parameter or field, or a field where columns have codings of their own.
+        """
+        fields = {name[8:]: params.pop(name) for name in list(params) if name[:8] == "coding__"}
+        super().set_params(**params)
+        if fields:
+            if isinstance(self.coding, list | tuple):
+                raise ValueError(
+                    f"coding__{next(iter(fields))} needs one coding for all inputs, got a list"
+                )
+            coding = coding_named(self.coding)
+            try:
+                self.coding = dataclasses.replace(coding, **fields)  # type: ignore[type-var]
+            except TypeError:
+                raise ValueError(f"{coding!r} must have the fields {sorted(fields)}") from None
+        return self
+
+    def _scratch(self: Self) -> Self:
+        """Return an estimator to be trained instead of this one, which takes its attributes over.
+
+        So whatever fails leaves this one as it was. They share what they have until then: nothing
+        of it may be changed in place.
+        """
+        work = object.__new__(type(self))
+        work.__dict__.update(self.__dict__)
+        return work
+
+    def _validated(self, X: Any, y: Any = "no_validation", **options: Any) -> Any:
+        """Check data by scikit-learn's rules; words are let through where a coding takes them."""
+        numeric = all(coding.is_numeric for coding, _ in coding_entries(self.coding))
+        checks: dict[str, Any] = (
+            {"dtype": np.float64} if numeric else {"dtype": None, "ensure_all_finite": False}
+        )
+        try:
+            return validate_data(self, X if numeric else as_it_came(X), y, **checks, **options)
+        except ValueError as error:
+            if "could not convert string" in str(error) and np.asarray(X).dtype.kind in "OSU":
+                raise ValueError(f"{error}; {WORDS_HINT}") from None
+            raise
+
+    def _finite(self, table: NDArray[Any], codings: Sequence[Coding]) -> NDArray[Any]:
+        """Check the numbers of a table that also holds words."""
+        for index, coding in enumerate(codings):
+            if table.dtype != np.float64 and coding.is_numeric:
+                try:
+                    numbers = np.asarray(table[:, index], dtype=np.float64)
+                except (TypeError, ValueError) as error:  # pandas.NA is of no type
+                    raise ValueError(f"{error} in column {index}; {WORDS_HINT}") from None
+                assert_all_finite(numbers, input_name="X")
+        return table
+
+    def _feature_names(self) -> list[str] | None:
+        names = getattr(self, "feature_names_in_", None)
+        return None if names is None else names.tolist()
+
+    def _codings(self, X: Any, table: NDArray[Any]) -> list[Coding]:
+        """Return the coding of each input, not fitted yet, and check the table's numbers."""
+        codings = codings_of_columns(self.coding, self._feature_names(), table.shape[1], X)
+        if any(coding.learns for coding in codings):
+            self._need_two(table, "ranges and categories that are not given")
+        self._finite(table, codings)
+        return codings
+
+    def _need_two(self, samples: NDArray[Any], what: str) -> None:
+        """ValueError, in scikit-learn's words, if one sample has to teach what it cannot."""
+        if len(samples) < 2:
+            raise ValueError(
+                f"Found array with {len(samples)} sample(s) while a minimum of 2 is required by "
+                f"{type(self).__name__} to learn {what}"
+            )
+
+    def _row(self, x: Any, codings: tuple[Coding, ...], is_numeric: bool) -> NDArray[Any]:
+        """Return one sample, shape (n_features,), checked: a row, or a mapping from names."""
+        values: Any = self._values_of(x, codings) if isinstance(x, Mapping) else x
+        if is_numeric:
+            try:
+                row = np.asarray(values, dtype=np.float64)
+            except (TypeError, ValueError):
+                raise ValueError(f"x must be numbers, got {x!r}") from None
+            if not np.isfinite(row).all():
+                raise ValueError(f"x must be finite numbers, got {x!r}")
+        else:
+            row = np.array(values, dtype=object)
+        if row.shape != (len(codings),):
+            raise ValueError(f"x must have {len(codings)} features, got {x!r}")
+        return row if row.dtype == np.float64 else self._finite(row[None], codings)[0]
+
+    def _values_of(self, x: Mapping[Any, Any], codings: tuple[Coding, ...]) -> list[Any]:
+        """Return a sample's values in the order of the features, None for one that is missing."""
+        names = getattr(self, "feature_names_in_", None)
+        if names is None:
+            raise ValueError("x must be a 1-D array: the features were learned without names")
+        if len(x) == len(names):
+            with contextlib.suppress(KeyError):
+                return [x[name] for name in names]
+        coded = zip(names, codings, strict=True)
+        optional = {name for name, coding in coded if isinstance(coding, WithMissing)}
+        if not set(names) - optional <= set(x) <= set(names):
+            but = f", of which {sorted(optional)} may be missing" if optional else ""
+            raise ValueError(f"x must have the features {names.tolist()}{but}, got {list(x)}")
+        return [x.get(name) for name in names]
+
+    def _first_row(self, x: Any) -> NDArray[Any]:
+        """Return the first sample of all as a table; a mapping gives names to the features."""
+        names = list(x) if isinstance(x, Mapping) else None
+        row = np.array(list(x.values()) if isinstance(x, Mapping) else x, dtype=object)
+        if row.ndim != 1 or (names is not None and not all(isinstance(n, str) for n in names)):
+            raise ValueError(f"x must be a 1-D array, or a mapping with words as keys, got {x!r}")
+        table: NDArray[Any] = self._validated(row[None], reset=True)
+        if names is not None:
+            self.feature_names_in_ = np.array(names, dtype=object)
+        return table
