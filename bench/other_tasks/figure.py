@@ -9,7 +9,7 @@ from agents import CONTENDERS
 from report import Trials
 from tasks import TASKS
 
-from sdnn.reproduction.figures import figure_bytes, require_matplotlib
+from sdnn.runs.figures import figure_bytes, require_matplotlib
 from sdnn.whole_files import write_whole
 
 

@@ -14,16 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
-from sdnn.reproduction.figures import figure_bytes, require_matplotlib
 from sdnn.reproduction.sweep.reading import read_study
 from sdnn.reproduction.sweep.study import Study
-from sdnn.runs.measures import final_share_solved
+from sdnn.runs.figures import figure_bytes, require_matplotlib
+from sdnn.runs.measures import SHARE_STABLE, final_share_solved
 from sdnn.runs.registry import agent_entry
 from sdnn.runs.store import ResultStore
 from sdnn.whole_files import write_whole
 
 STUDY = Path(__file__).with_name("noise-surface.toml")
-SOLVED = 0.9
 
 
 def shares(study: Study, store: ResultStore) -> dict[tuple[str, str, float], list[float]]:
@@ -61,7 +60,7 @@ def main() -> None:
         for y, row in enumerate(cells):
             for x, trials in enumerate(row):
                 if trials:
-                    n_solved = sum(share >= SOLVED for share in trials)
+                    n_solved = sum(share >= SHARE_STABLE for share in trials)
                     text = f"{np.median(trials):.2f}\n{n_solved}/{len(trials)}"
                     shade = "white" if np.median(trials) < 0.6 else "black"
                     axes.text(x, y, text, ha="center", va="center", fontsize=7, color=shade)

@@ -381,7 +381,7 @@ def table(kept: Kept, n_trials: int) -> Iterator[str]:
 
 def main() -> None:
     """Measure and draw."""
-    from sdnn.reproduction.figures import figure_bytes
+    from sdnn.runs.figures import figure_bytes
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of the figures")

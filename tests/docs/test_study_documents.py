@@ -58,7 +58,7 @@ def test_the_agent_of_the_page_runs(tmp_path, monkeypatch):
     "name",
     [
         "environments.unit_sensors", "runs.environment_trial", "runs.measures",
-        "reproduction.page", "runs.statistics", "reproduction.sweep.report",
+        "runs.report", "runs.statistics", "reproduction.report",
         "reproduction.sweep.settings", "toml_lines", "typed_values",
     ],
 )  # fmt: skip

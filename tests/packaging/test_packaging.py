@@ -182,7 +182,7 @@ SHIPPED = (
     r"cpp/include/sdnn/([a-z_]+/){0,2}[a-z0-9_]+\.hpp",
     r"cpp/bindings/([a-z_]+\.[ch]pp|CMakeLists\.txt)",
     r"python/sdnn/([a-z_]+/){0,2}[a-z_]+\.pyi?|python/sdnn/py\.typed",
-    r"python/sdnn/reproduction/((sweep/)?[a-z]+\.html\.jinja|kept-trials\.csv)",
+    r"python/sdnn/(runs/page\.html\.jinja|reproduction/reference-results\.csv)",
     r"python/sdnn/export/c_header\.template",
     r"(tests|bench|docs)/.*\.(py|c|cpp|hpp|txt|md|json|csv|png|gif|svg|toml|ipynb|bin|safetensors)",
 )

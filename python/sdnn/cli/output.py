@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
@@ -57,28 +57,6 @@ def print_files(outcome: RunOutcome, files: tuple[Path, ...], stored: str) -> No
     page = next(str(file) for file in files if file.suffix == ".html")
     done_now = f"{stored} ({outcome.n_run} run now); " if outcome.n_planned else ""
     click.echo(f"{done_now}wrote {len(files)} files: see {page}")
-
-
-def print_tables(
-    console: Console,
-    tables: Iterable[tuple[str, Sequence[str], Sequence[Sequence[str]]]],
-    notes: Iterable[str],
-    mark: str = "",
-) -> None:
-    """Print tables of a title, a header and rows, then notes."""
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    for title, header, rows in tables:
-        table = Table(title=Text(title + mark), title_justify="left", box=box.SIMPLE_HEAD)
-        for column in header:
-            table.add_column(Text(column), overflow="fold")
-        for row in rows:
-            table.add_row(*map(Text, row))
-        console.print(table)
-    for note in notes:
-        console.print(note, style="dim", highlight=False, markup=False)
 
 
 def make_console() -> Console:

@@ -14,7 +14,6 @@ from sdnn.cli.output import (
     experiment_command,
     make_console,
     print_files,
-    print_tables,
     report_outcome,
     with_progress,
 )
@@ -168,8 +167,10 @@ def _finish(context: click.Context, done: Reproduction, out: Path, as_json: bool
 
 
 def _print_report(report: Report) -> None:
-    mark = " (QUICK LOOK, not the result)" if report.quick else ""
+    from sdnn.runs.report import print_tables
+
     console = make_console()
-    if note := report.agents_note():
-        console.print(note, highlight=False)
+    if report.agents_note:
+        console.print(report.agents_note, highlight=False)
+    mark = " (QUICK LOOK, not the result)" if report.quick else ""
     print_tables(console, report.tables(), report.notes(), mark)

@@ -14,15 +14,14 @@ from sdnn.cli.output import (
     experiment_command,
     make_console,
     print_files,
-    print_tables,
     report_outcome,
     with_progress,
 )
 
 if TYPE_CHECKING:
-    from sdnn.reproduction.sweep.report import StudyReport
-    from sdnn.reproduction.sweep.run import Sweep, SweepRequest
     from sdnn.runs.executor import Executor
+    from sdnn.runs.study_report import StudyReport
+    from sdnn.runs.sweep import Sweep, SweepRequest
 
 
 @click.command(short_help="Run a study: variants of any setting, trial by trial.")
@@ -69,20 +68,21 @@ def sweep(
     Finished trials are kept in OUT/results.sqlite, which `reproduce` may share; the same command
     goes on where it stopped.
     """
-    from sdnn.reproduction.sweep.run import SweepRequest
-    from sdnn.reproduction.sweep.run import sweep as run
+    from sdnn.reproduction.study_claims import add_claims
+    from sdnn.reproduction.sweep.reading import read_study
+    from sdnn.runs.sweep import SweepRequest
+    from sdnn.runs.sweep import sweep as run
     from sdnn.runs.trial_errors import StudyError
 
-    request = SweepRequest(
-        file=file,
-        out=out,
-        n_trials=trials,
-        seed=seed,
-        jobs=jobs,
-        executor=executor,
-        only=tuple(dict.fromkeys(only)),
-    )
     try:
+        request = SweepRequest(
+            study=read_study(file, n_trials=trials, seed=seed),
+            out=out,
+            jobs=jobs,
+            executor=executor,
+            only=tuple(dict.fromkeys(only)),
+            addition=add_claims,
+        )
         _ = request.plan
     except (StudyError, ValueError) as error:
         raise click.UsageError(str(error)) from error
@@ -94,13 +94,13 @@ def sweep(
 
 
 def _print_forecast(request: SweepRequest, as_json: bool) -> None:
-    from sdnn.reproduction.sweep.forecast import forecast, forecast_json, forecast_lines
+    from sdnn.runs.forecast import forecast
 
     found = forecast(request)
     if as_json:
-        click.echo(json.dumps(forecast_json(found), indent=2))
+        click.echo(json.dumps(found.to_json(), indent=2))
         return
-    for line in forecast_lines(found, request.out):
+    for line in found.lines(request.out):
         click.echo(line)
 
 
@@ -119,7 +119,9 @@ def _finish_sweep(context: click.Context, done: Sweep, out: Path, as_json: bool)
 
 
 def _print_study(report: StudyReport) -> None:
+    from sdnn.runs.report import print_tables
+
     console = make_console()
-    lines = [report.title, report.scope(), *filter(None, [report.missing()])]
+    lines = [report.title, report.scope, *filter(None, [report.missing])]
     console.print("\n".join(lines), highlight=False, markup=False)
     print_tables(console, report.tables(), report.notes())

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from sdnn.reproduction.cost import CostConfig
     from sdnn.reproduction.figures import draw_cost, draw_experiment
     from sdnn.reproduction.plan import case_config, plan_trials
-    from sdnn.reproduction.reproduce import ReproduceRequest, Reproduction
-    from sdnn.reproduction.results import CaseResult, CaseSummary, collect, summarize
+    from sdnn.reproduction.reproduce import ReproduceRequest, Reproduction, collect
     from sdnn.reproduction.verdicts import judge_claims
     from sdnn.runs.dask_executor import DaskExecutor
     from sdnn.runs.engine import Observer, run_trials
@@ -24,16 +23,12 @@ if TYPE_CHECKING:
     from sdnn.runs.measures import MeasureConfig
     from sdnn.runs.records import CostRecord, TrialKey, TrialRecord, TrialRows
     from sdnn.runs.registry import AGENTS, AgentEntry, CostSeries, agent_entry, register
+    from sdnn.runs.results import CaseResult, measure
     from sdnn.runs.statistics import Estimate
     from sdnn.runs.store import ResultStore
     from sdnn.runs.thread_executor import ThreadExecutor
     from sdnn.runs.trial import LearningAgent, ProtocolConfig, PythonTrial, Trial
-    from sdnn.runs.trial_config import (
-        PlannedTrial,
-        TrialConfig,
-        TrialSettings,
-        trial_seed,
-    )
+    from sdnn.runs.trial_config import PlannedTrial, TrialConfig, TrialSettings, trial_seed
     from sdnn.runs.trial_errors import (
         ClusterError,
         ExperimentError,
@@ -44,82 +39,30 @@ if TYPE_CHECKING:
     )
 
 _HOMES = {
-    "reproduction.plan": ("case_config", "plan_trials"),
-    "reproduction.cases": (
-        "EXPERIMENTS",
-        "Case",
-        "Experiment",
-        "select_experiments",
-    ),
-    "reproduction.claims": (
-        "CLAIMS",
-        "Claim",
-    ),
-    "runs.trial_config": (
-        "PlannedTrial",
-        "TrialConfig",
-        "TrialSettings",
-        "trial_seed",
-    ),
-    "reproduction.cost": ("CostConfig",),
-    "runs.dask_executor": ("DaskExecutor",),
-    "runs.engine": (
-        "Observer",
-        "run_trials",
-    ),
-    "runs.environment_trial": (
-        "EnvironmentConfig",
-        "EnvironmentTrialConfig",
-    ),
-    "runs.trial_errors": (
-        "ClusterError",
-        "ExperimentError",
-        "PlotUnavailableError",
-        "StoreError",
-        "StudyError",
-        "WorkerLostError",
-    ),
-    "runs.executor": ("Executor",),
-    "reproduction.figures": (
-        "draw_cost",
-        "draw_experiment",
-    ),
-    "runs.measures": ("MeasureConfig",),
-    "runs.records": (
-        "CostRecord",
-        "TrialKey",
-        "TrialRecord",
-        "TrialRows",
-    ),
-    "runs.registry": (
-        "AGENTS",
-        "AgentEntry",
-        "CostSeries",
-        "agent_entry",
-        "register",
-    ),
-    "reproduction.reproduce": (
-        "ReproduceRequest",
-        "Reproduction",
-    ),
-    "reproduction.results": (
-        "CaseResult",
-        "CaseSummary",
-        "collect",
-        "summarize",
-    ),
-    "runs.statistics": ("Estimate",),
-    "runs.store": ("ResultStore",),
-    "runs.thread_executor": ("ThreadExecutor",),
-    "runs.trial": (
-        "LearningAgent",
-        "ProtocolConfig",
-        "PythonTrial",
-        "Trial",
-    ),
-    "reproduction.verdicts": ("judge_claims",),
+    "reproduction.cases": "Case EXPERIMENTS Experiment select_experiments",
+    "reproduction.claims": "CLAIMS Claim",
+    "reproduction.cost": "CostConfig",
+    "reproduction.figures": "draw_cost draw_experiment",
+    "reproduction.plan": "case_config plan_trials",
+    "reproduction.reproduce": "ReproduceRequest Reproduction collect",
+    "reproduction.verdicts": "judge_claims",
+    "runs.dask_executor": "DaskExecutor",
+    "runs.engine": "Observer run_trials",
+    "runs.environment_trial": "EnvironmentConfig EnvironmentTrialConfig",
+    "runs.executor": "Executor",
+    "runs.measures": "MeasureConfig",
+    "runs.records": "CostRecord TrialKey TrialRecord TrialRows",
+    "runs.registry": "AGENTS AgentEntry CostSeries agent_entry register",
+    "runs.results": "CaseResult measure",
+    "runs.statistics": "Estimate",
+    "runs.store": "ResultStore",
+    "runs.thread_executor": "ThreadExecutor",
+    "runs.trial": "LearningAgent ProtocolConfig PythonTrial Trial",
+    "runs.trial_config": "PlannedTrial TrialConfig TrialSettings trial_seed",
+    "runs.trial_errors": "ClusterError ExperimentError PlotUnavailableError StoreError StudyError"
+    " WorkerLostError",
 }
-_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
 
 __all__ = [
     "AGENTS",
@@ -128,7 +71,6 @@ __all__ = [
     "AgentEntry",
     "Case",
     "CaseResult",
-    "CaseSummary",
     "Claim",
     "ClusterError",
     "CostConfig",
@@ -167,11 +109,11 @@ __all__ = [
     "draw_cost",
     "draw_experiment",
     "judge_claims",
+    "measure",
     "plan_trials",
     "register",
     "run_trials",
     "select_experiments",
-    "summarize",
     "trial_seed",
 ]
 

@@ -123,6 +123,9 @@ EXPERIMENTS = (
 )
 """The paper's experiments, A and B."""
 
+PAPER_CASES: dict[str, Case] = {case.id: case for e in EXPERIMENTS for case in e.cases}
+"""The paper's cases by their ids; a case of two figures has the title of the later one."""
+
 COST = "cost"
 """The word on the command line for the measurement of costs, which has no trials."""
 

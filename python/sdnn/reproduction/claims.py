@@ -12,27 +12,16 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from sdnn.reproduction.cases import EXPERIMENTS
-from sdnn.runs.measures import MeasureName
+from sdnn.runs.measures import SHARE_STABLE, MeasureName
 from sdnn.runs.registry import agent_entry, cost_series
 
 EQUAL_STEPS = 2.0
 """Steps by which two agents that do "almost the same" may differ."""
 
-SHARE_STABLE = 0.9
-"""Share of test episodes that an agent must solve at the end to be called stable."""
-
 
 @dataclass(frozen=True)
 class Subject:
-    """An agent in a case.
-
-    Parameters
-    ----------
-    case_id
-        Id of the case.
-    agent
-        Id of the agent.
-    """
+    """An agent in a case, by their ids."""
 
     case_id: str
     agent: str = "sdnn-c"
@@ -51,10 +40,15 @@ class Median:
     measure: MeasureName
     subject: Subject
 
+    @property
+    def subjects(self) -> tuple[Subject, ...]:
+        """Whose trials are compared."""
+        return (self.subject,)
+
 
 @dataclass(frozen=True)
 class Difference:
-    """The median of a measure of one subject less that of another.
+    """The median of a measure of one subject minus that of another.
 
     Censored values count as the last episode of their trial, so a difference between late collapses
     is rather too small than too large.
@@ -64,10 +58,15 @@ class Difference:
     subject: Subject
     other: Subject
 
+    @property
+    def subjects(self) -> tuple[Subject, ...]:
+        """Whose trials are compared."""
+        return self.subject, self.other
+
 
 @dataclass(frozen=True)
 class Growth:
-    """How often longer a step takes with `n_inputs` than with `n_fewer`: a ratio of medians."""
+    """The time of a step with `n_inputs` over that with `n_fewer`: a ratio of medians."""
 
     series: str
     n_inputs: int
@@ -79,17 +78,7 @@ Quantity: TypeAlias = Median | Difference | Growth
 
 @dataclass(frozen=True)
 class Check:
-    """A quantity and the range in which it must lie, ends included.
-
-    Parameters
-    ----------
-    quantity
-        What is measured.
-    paper
-        What the paper says of it, for a reader.
-    at_least, at_most
-        The range.
-    """
+    """A quantity, what the paper says of it, and the range in which it must lie, ends included."""
 
     quantity: Quantity
     paper: str
@@ -99,17 +88,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the paper.
-
-    Parameters
-    ----------
-    number
-        Number in the spec's list of claims.
-    text
-        What the paper says.
-    checks
-        What has to be so for the claim to hold.
-    """
+    """A claim of the paper: its number in the spec's list, its text, and what has to hold."""
 
     number: int
     text: str

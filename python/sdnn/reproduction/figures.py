@@ -1,26 +1,28 @@
-"""Figures like the paper's, and that of costs, drawn from stored rows only.
-
-matplotlib is an extra and is imported when it is needed. Figures are made without pyplot, so no
-window, backend or style of the user's session is touched.
-"""
+"""The paper's figures, and that of costs, drawn from stored rows only."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.util import find_spec
-from io import BytesIO
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sdnn.interrupts import stay_interrupts
-from sdnn.palette import colors_of
 from sdnn.reproduction.cases import EXPERIMENTS, PAPER_EPISODES, PAPER_TRIALS, Experiment
-from sdnn.reproduction.results import CaseResult
+from sdnn.runs.figures import (
+    FAINT,
+    INK,
+    SMOOTHED_TESTS,
+    agent_colors,
+    as_written,
+    colors_of,
+    draw_steps,
+    require_matplotlib,
+    style,
+    write_footer,
+)
 from sdnn.runs.records import CostRecord
-from sdnn.runs.registry import AGENTS, agent_entry, cost_series
-from sdnn.runs.statistics import running_median
-from sdnn.runs.trial_errors import PlotUnavailableError
+from sdnn.runs.registry import cost_series
+from sdnn.runs.results import CaseResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,30 +34,10 @@ MAX_STEPS = 50
 START_EPISODES = 500
 """Learning episodes shown in the panels of the start."""
 
-SMOOTHED_TESTS = 25
-"""Test episodes in the running median of a long run, which lies over the thin median curve."""
-
 _PANEL_HEIGHT = 3.3
 _START_HEIGHT = 1.9
-
-WARNING_COLOR = "#a31515"
-INK = "#2b2b2b"
-FAINT = "#6f6f6f"
+_WARNING_COLOR = "#a31515"
 _MARKERS = ("o", "s", "^", "v")
-
-
-def require_matplotlib() -> None:
-    """Check that figures can be drawn.
-
-    Raises
-    ------
-    PlotUnavailableError
-        If matplotlib is not installed.
-    """
-    if find_spec("matplotlib") is None:
-        raise PlotUnavailableError(
-            'figures need matplotlib, which is not installed: pip install "sdnn[reproduce]"'
-        )
 
 
 def draw_experiment(
@@ -71,18 +53,14 @@ def draw_experiment(
         One for each case and agent.
     quick
         Whether to mark the figure as a quick look, which is no result.
-
-    Raises
-    ------
-    PlotUnavailableError
-        If matplotlib is not installed.
     """
     require_matplotlib()
     from matplotlib.figure import Figure
 
     n_columns = min(2, len(experiment.cases))
     n_rows = -(-len(experiment.cases) // n_columns)
-    smooth = _is_long(results)
+    # The start is too small a part of the panels to be seen in those of a long run.
+    smooth = max(result.last_episode for result in results) >= 4 * START_EPISODES
     with_start = experiment.start_panels and smooth
     heights = (_PANEL_HEIGHT, _START_HEIGHT) if with_start else (_PANEL_HEIGHT,)
     height = 1.1 + n_rows * sum(heights)
@@ -96,42 +74,37 @@ def draw_experiment(
         gridspec_kw={"height_ratios": heights * n_rows},
     )  # fmt: skip
     panels = grid[:: len(heights)].ravel()
-    starts = grid[1::2].ravel() if with_start else None
-    agents = list(dict.fromkeys(result.agent for result in results))
-    colors = agent_colors(agents)
+    starts = grid[1::2].ravel() if with_start else ()
+    colors = agent_colors(result.agent for result in results)
     for number, (case, axes) in enumerate(zip(experiment.cases, panels, strict=False)):
-        shown = [result for result in results if result.case == case]
+        shown = [result for result in results if result.case_id == case.id]
         axes.set_title(case.title, fontsize=10.5, loc="left", color=INK)
         axes.set_title(f"paper: {case.paper_figure}", fontsize=8, loc="right", color=FAINT)
-        _draw_case(axes, shown, colors, smooth)
+        draw_steps(axes, shown, colors, smooth=smooth)
+        axes.set_ylim(0, MAX_STEPS)
         if number % n_columns == 0:
             axes.set_ylabel("steps per test episode")
         if with_start or number >= len(experiment.cases) - n_columns:
             axes.set_xlabel("learning episodes")
         if quick:
             _watermark(axes)
-        if starts is not None:
-            _draw_start(starts[number], shown, colors)
-    for row in (panels, starts if starts is not None else ()):
-        for axes in row[len(experiment.cases) :]:
-            axes.set_visible(False)
-    if len(agents) > 1 or experiment not in EXPERIMENTS:
+        if with_start:
+            draw_steps(starts[number], shown, colors, smooth=False)
+            starts[number].set(xlim=(0, START_EPISODES), ylim=(0, MAX_STEPS))
+            starts[number].set_title(
+                f"the first {START_EPISODES} learning episodes", fontsize=8.5, loc="left",
+                color=FAINT,
+            )  # fmt: skip
+    for axes in (*panels[len(experiment.cases) :], *starts[len(experiment.cases) :]):
+        axes.set_visible(False)
+    if len(colors) > 1 or experiment not in EXPERIMENTS:
         lines, titles = panels[0].get_legend_handles_labels()
         figure.legend(
             lines[::-1], titles[::-1], frameon=False, fontsize=9.5, loc="upper right",
-            bbox_to_anchor=(0.975, 1 - 0.08 / height), ncols=len(agents),
+            bbox_to_anchor=(0.975, 1 - 0.08 / height), ncols=len(colors),
         )  # fmt: skip
-    _label(figure, experiment, results, quick)
+    _label(figure, experiment.title, results, smooth=smooth, quick=quick)
     return as_written(figure)
-
-
-def as_written(figure: Figure) -> Figure:
-    """Leave dollar signs in a figure's words as they are: the user's titles hold no formulas."""
-    from matplotlib.text import Text
-
-    for text in figure.findobj(Text):
-        text.set_parse_math(False)
-    return figure
 
 
 def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
@@ -146,11 +119,6 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
         Measured costs, at least one.
     quick
         Whether to mark the figure as a quick look, which is no result.
-
-    Raises
-    ------
-    PlotUnavailableError
-        If matplotlib is not installed.
     """
     require_matplotlib()
     from matplotlib.figure import Figure
@@ -183,7 +151,7 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
     axes.set_xticks(sorted({cost.key.n_inputs for cost in costs}))
     axes.set_xlabel("number of inputs d")
     axes.set_ylabel("time of a step [µs]")
-    _style(axes)
+    style(axes)
     axes.legend(
         frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.01, 1.02), labelspacing=1.0
     )  # fmt: skip
@@ -191,125 +159,50 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
     if quick:
         _watermark(axes)
     machines = ", ".join(sorted({cost.machine for cost in costs}))
-    figure.text(
-        0.012, 0.02,
+    write_footer(
+        figure,
         "Medians, bars: quartiles of rounds. A step: acting in a new random state and learning the"
         f" transition to it.\nsdnn {costs[0].version}; {machines}; one thread.",
-        fontsize=6.5, va="bottom", color=FAINT, linespacing=1.4,
-    )  # fmt: skip
-    return figure
-
-
-def figure_bytes(figure: Figure) -> tuple[bytes, bytes]:
-    """Return a figure as PNG and as SVG; the same rows give the same bytes."""
-    from matplotlib import rc_context
-
-    png, svg = BytesIO(), BytesIO()
-    with stay_interrupts(), rc_context({"svg.hashsalt": "sdnn"}):
-        figure.savefig(png, format="png", dpi=200, metadata={"Software": None})
-        figure.savefig(svg, format="svg", metadata={"Date": None})
-    return png.getvalue(), svg.getvalue()
-
-
-def _draw_curves(
-    axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str], smooth: bool
-) -> None:
-    """Draw the curves, the first agent on top; `smooth` puts running medians over them."""
-    for depth, result in enumerate(reversed(shown)):
-        curve, color = result.curve, colors[result.agent]
-        lower, upper = curve.lower, curve.upper
-        title = agent_entry(result.agent).title
-        if smooth:
-            lower, middle, upper = (
-                running_median(values, SMOOTHED_TESTS) for values in (lower, curve.median, upper)
-            )
-            axes.plot(
-                curve.episode, middle, color=color, linewidth=1.6, zorder=4 + depth, label=title
-            )
-        axes.plot(
-            curve.episode, curve.median, color=color, zorder=2 + depth,
-            linewidth=0.4 if smooth else 0.9, alpha=0.45 if smooth else 1.0,
-            label=None if smooth else title,
-        )  # fmt: skip
-        axes.fill_between(curve.episode, lower, upper, color=color, alpha=0.2, linewidth=0)
-
-
-def _draw_case(
-    axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str], smooth: bool
-) -> None:
-    from matplotlib.ticker import FuncFormatter, MaxNLocator
-
-    _draw_curves(axes, shown, colors, smooth)
-    axes.set_xlim(0, max(int(result.episode[-1]) for result in shown))
-    axes.set_ylim(0, MAX_STEPS)
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
-    _style(axes)
-
-
-def _draw_start(axes: Axes, shown: Sequence[CaseResult], colors: dict[str, str]) -> None:
-    _draw_case(axes, shown, colors, smooth=False)
-    axes.set_xlim(0, START_EPISODES)
-    axes.set_title(
-        f"the first {START_EPISODES} learning episodes", fontsize=8.5, loc="left", color=FAINT
     )
-
-
-def _is_long(results: Sequence[CaseResult]) -> bool:
-    """Whether the start is too small a part of the panels to be seen in them."""
-    return max(int(result.episode[-1]) for result in results) >= 4 * START_EPISODES
-
-
-def agent_colors(agents: Sequence[str]) -> dict[str, str]:
-    """Give agents the colors of their places in the registry."""
-    places = list(AGENTS)
-    return dict(zip(agents, colors_of([places.index(agent) for agent in agents]), strict=True))
-
-
-def _style(axes: Axes) -> None:
-    axes.grid(axis="y", color="#e4e4e4", linewidth=0.7)
-    axes.set_axisbelow(True)
-    axes.tick_params(colors=INK, labelsize=8.5)
-    axes.spines[["top", "right"]].set_visible(False)
+    return figure
 
 
 def _watermark(axes: Axes) -> None:
     """Write across a panel that it is a quick look."""
     axes.text(
         0.5, 0.6, "quick", transform=axes.transAxes, ha="center", va="center",
-        fontsize=44, color=WARNING_COLOR, alpha=0.13, weight="bold", zorder=0,
+        fontsize=44, color=_WARNING_COLOR, alpha=0.13, weight="bold", zorder=0,
     )  # fmt: skip
 
 
 def _label(
-    figure: Figure, experiment: Experiment, results: Sequence[CaseResult], quick: bool
+    figure: Figure, title: str, results: Sequence[CaseResult], *, smooth: bool, quick: bool
 ) -> None:
     """Write title, what kind of run it is, and where the rows come from."""
     height = figure.get_figheight()
     counts = sorted({result.n_trials for result in results})
     trials = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-    n_episodes = max(int(result.episode[-1]) for result in results)
+    n_episodes = max(result.last_episode for result in results)
     scale = f"{trials} {'trial' if trials == '1' else 'trials'} x {n_episodes:,} episodes"
-    paper_scale = f"{PAPER_TRIALS} x {PAPER_EPISODES:,}"
-    figure.text(0.012, 1 - 0.13 / height, experiment.title, fontsize=12, va="top", color=INK)
+    figure.text(0.012, 1 - 0.13 / height, title, fontsize=12, va="top", color=INK)
     if quick or counts[0] < PAPER_TRIALS or n_episodes < PAPER_EPISODES:
         what = "QUICK LOOK, not the result" if quick else "smaller than the paper's experiment"
         figure.text(
-            0.012, 1 - 0.36 / height, f"{what}: {scale} instead of {paper_scale}",
-            fontsize=9, va="top", color=WARNING_COLOR,
+            0.012, 1 - 0.36 / height,
+            f"{what}: {scale} instead of {PAPER_TRIALS} x {PAPER_EPISODES:,}",
+            fontsize=9, va="top", color=_WARNING_COLOR,
         )  # fmt: skip
-    hashes = [f"{r.case.id}/{r.agent} {r.config_hash[:8]}" for r in results]
+    hashes = [f"{r.case_id}/{r.agent} {r.config_hash[:8]}" for r in results]
     lines = [", ".join(hashes[i : i + 4]) for i in range(0, len(hashes), 4)]
-    lines_are = "Line: median over trials; band: quartiles."
-    if _is_long(results):
-        lines_are = (
-            "Thin line: median over trials; thick line and band: its running median and that of the"
-            f" quartiles over {SMOOTHED_TESTS} tests."
-        )
-    versions = ", ".join(sorted({rec.version for res in results for rec in res.records}))
-    figure.text(
-        0.012, 0.07 / height,
-        f"{lines_are} {scale} per case and agent."
-        f"\nsdnn {versions}; configuration " + ",\n".join(lines),
-        fontsize=6.5, va="bottom", color=FAINT, linespacing=1.4,
-    )  # fmt: skip
+    lines_are = (
+        "Thin line: median over trials; thick line and band: its running median and that of the"
+        f" quartiles over {SMOOTHED_TESTS} tests."
+        if smooth
+        else "Line: median over trials; band: quartiles."
+    )
+    versions = ", ".join(sorted({one.version for result in results for one in result.records}))
+    write_footer(
+        figure,
+        f"{lines_are} {scale} per case and agent.\nsdnn {versions}; configuration "
+        + ",\n".join(lines),
+    )

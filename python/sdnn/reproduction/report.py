@@ -1,9 +1,10 @@
-"""What a run gave, as tables of texts and as JSON: the same cells for screen, Markdown and HTML."""
+"""The results of a run as tables, as a page and as JSON."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
@@ -11,84 +12,48 @@ from typing import Any
 import numpy as np
 
 from sdnn.reproduction.cases import PAPER_EPISODES, PAPER_TRIALS, Experiment
+from sdnn.reproduction.chances import MULTIPLES, N_POWER_DRAWS, Power, powers
 from sdnn.reproduction.claims import Claim, Growth, describe
-from sdnn.reproduction.kept_trials import KeptTrials
-from sdnn.reproduction.power import MULTIPLES, N_DRAWS, Power, powers
-from sdnn.reproduction.results import CaseSummary
+from sdnn.reproduction.reference_results import ReferenceResult
 from sdnn.reproduction.verdicts import (
     ALWAYS,
     NEVER,
     CheckOutcome,
     ClaimOutcome,
     SettledClaim,
+    Verdict,
+    is_paper_scale,
     judge_claims,
     settle,
 )
-from sdnn.runs.measures import DEFAULT_MEASURES, RETURN_MEASURES, MeasureName
+from sdnn.runs.measures import STEP_MEASURES
 from sdnn.runs.records import CostRecord
 from sdnn.runs.registry import agent_entry, cost_series
-from sdnn.runs.statistics import DEFAULT_BOOTSTRAP, Estimate
+from sdnn.runs.report import (
+    COST_CELLS,
+    NOTE,
+    Call,
+    Section,
+    Table,
+    format_estimate,
+    format_share,
+    measure_cells,
+    measure_terms,
+    measures_section,
+    settings_section,
+    to_html,
+    to_markdown,
+)
+from sdnn.runs.results import CaseResult
+from sdnn.runs.statistics import Estimate
 
 QUICK_WARNING = "A quick look at a fraction of the experiments, not their result."
-
-CASE_HEADER = (
-    "case",
-    "agent",
-    "trials",
-    "episodes to learn",
-    "early steps",
-    "episode of collapse",
-    "final steps",
-    "final share solved",
-    "decisions",
-    "us/decision",
-)
-CLAIM_HEADER = ("claim", "the paper says", "measured", "paper", "ours", "verdict")
-MORE_HEADER = (
-    "claim",
-    "the paper says",
-    "measured",
-    "trials",
-    "ours",
-    "verdict",
-    "ten trials show it",
-)
-POWER_HEADER = ("claim", "measured", "ours", *(f"{n} x the trials" for n in MULTIPLES))
-
-MEASURES: dict[MeasureName, str] = {
-    "episodes_to_learn": (
-        f"learning episodes before the first test of at most {DEFAULT_MEASURES.good_steps:g} steps"
-        f" that begins {DEFAULT_MEASURES.learned_window} tests in a row with a median of at most"
-        f" {DEFAULT_MEASURES.good_steps:g}"
-    ),
-    "early_steps": (
-        "median steps of the tests in the first"
-        f" {DEFAULT_MEASURES.early_episodes:,} learning episodes"
-    ),
-    "episode_of_collapse": (
-        f"learning episodes before the end of the last {DEFAULT_MEASURES.stable_window} tests in a"
-        f" row with a median of at most {DEFAULT_MEASURES.good_steps:g} steps: until then the agent"
-        " can do the task; censored (> the last episode) if it still can at the end"
-    ),
-    "final_steps": f"median steps of the last {DEFAULT_MEASURES.final_window} tests",
-    "final_share_solved": (
-        f"share of the last {DEFAULT_MEASURES.final_window} tests that reach the goal"
-    ),
-}
-"""What the measures mean, for a reader."""
-
-NOTE = (
-    f"Medians over trials with {100 * DEFAULT_BOOTSTRAP.confidence:.0f} % bootstrap intervals over"
-    " trials. us/decision: processor time of sensing, choosing, physics and learning."
-)
-
 RULE_NOTE = (
     "A line about a claim holds if the whole interval lies in the range that was written down"
     " before the trials were run, does not hold if the whole interval lies outside on one side, and"
     " is undecided otherwise. Runs smaller than"
     f" {PAPER_TRIALS} trials x {PAPER_EPISODES:,} episodes are not judged."
 )
-
 CHANCE_NOTE = (
     "Ten trials show it: in how many draws of ten of these trials, as the paper's ten were one, the"
     " medians lie in all ranges of the claim. What these trials leave undecided holds if"
@@ -96,32 +61,33 @@ CHANCE_NOTE = (
     " fewer do, and is a matter of chance in between: what ten trials then show says nothing for or"
     " against the paper."
 )
-
 POWER_NOTE = (
     "What more trials would say, by drawing so many from those that are there,"
-    f" {N_DRAWS} times: in how many of these draws the line would hold / would not."
+    f" {N_POWER_DRAWS} times: in how many of these draws the line would hold / would not."
 )
-
 COST_NOTE = (
     "Median time of a step (acting in a new random state and learning the transition to it, without"
     " the environment) with the quartiles of rounds, and how often longer than with one input less."
 )
 
+_SHOWN = {
+    Verdict.HOLDS: ("good", "hold"),
+    Verdict.FAILS: ("bad", "do not hold"),
+    Verdict.CHANCE: ("open", "are a matter of chance with ten trials"),
+    Verdict.UNDECIDED: ("open", "undecided"),
+    Verdict.NOT_JUDGED: ("none", "not judged"),
+    Verdict.NOT_RUN: ("none", "not judged"),
+}
+VERDICT_KINDS = {verdict.value: kind for verdict, (kind, _) in _SHOWN.items()}
+"""How a page colors the word of a verdict."""
+
 
 @dataclass(frozen=True)
 class ExperimentReport:
-    """An experiment and the summaries of its cases.
-
-    Parameters
-    ----------
-    experiment
-        Which one.
-    summaries
-        One for each case and agent.
-    """
+    """An experiment and the results of its cases, one for each case and agent."""
 
     experiment: Experiment
-    summaries: tuple[CaseSummary, ...]
+    results: tuple[CaseResult, ...]
 
 
 @dataclass(frozen=True)
@@ -144,8 +110,8 @@ class Report:
         Digest of the experiments' rows.
     agents
         Ids of the agents that were run instead of those of the cases; none if those were.
-    kept
-        More trials of the same settings than were run, kept with the library.
+    reference
+        Reference results: more trials of the same settings than were run.
     """
 
     experiments: tuple[ExperimentReport, ...]
@@ -155,297 +121,335 @@ class Report:
     version: str
     digest: str
     agents: tuple[str, ...] = ()
-    kept: tuple[KeptTrials, ...] = ()
+    reference: tuple[ReferenceResult, ...] = ()
+
+    @property
+    def results(self) -> list[CaseResult]:
+        """The results of all experiments."""
+        return [result for one in self.experiments for result in one.results]
 
     @cached_property
     def claims(self) -> tuple[ClaimOutcome, ...]:
         """The claims that these results speak about."""
-        return judge_claims([s for e in self.experiments for s in e.summaries], self.costs)
+        return judge_claims(self.results, self.costs)
 
     @cached_property
     def settled(self) -> tuple[SettledClaim, ...]:
-        """The claims with all that speaks about them, also trials that are kept."""
-        return settle(self.claims, self.kept)
+        """The claims with all that speaks about them, also reference results."""
+        return settle(self.claims, self.reference)
 
     @cached_property
     def powers(self) -> tuple[tuple[Claim, CheckOutcome, tuple[Power, ...]], ...]:
         """What more trials would say of the checks that the most trials leave undecided."""
-        checked = ((one.claim, check) for one in self.settled for check in one.best.checks)
-        found = ((claim, one, powers(one)) for claim, one in checked)
-        return tuple(row for row in found if row[2])
+        return tuple(
+            (one.claim, checked, powers(checked.check, checked.samples))
+            for one in self.settled
+            for checked in one.best.checks
+            if checked.verdict is Verdict.UNDECIDED and checked.samples
+        )
 
-    def tables(self) -> list[tuple[str, Sequence[str], Sequence[Sequence[str]]]]:
-        """Title, header and rows of every table."""
-        tables: list[tuple[str, Sequence[str], Sequence[Sequence[str]]]] = [
-            (report.experiment.title, CASE_HEADER, case_rows(report.summaries))
-            for report in self.experiments
-        ]
-        if self.costs:
-            tables.append(("Cost of a step", cost_header(), cost_rows(self.costs)))
-        if self.claims:
-            claims = claim_rows(self.claims)
-            tables.append(("Beside the paper's claims", CLAIM_HEADER, claims))
-        if more := more_rows(self):
-            tables.append(("With more trials", MORE_HEADER, more))
-        if self.powers:
-            tables.append(("What is undecided", POWER_HEADER, power_rows(self)))
-        return tables
-
-    def notes(self) -> list[str]:
-        """Say what the tables mean."""
-        notes = [RULE_NOTE] if self.claims else []
-        notes += [more_note(self)] if more_rows(self) else []
-        notes += [POWER_NOTE] if self.powers else []
-        if self.experiments:
-            notes += [NOTE, *(f"{n.replace('_', ' ')}: {text}." for n, text in MEASURES.items())]
-        return [*notes, COST_NOTE] if self.costs else notes
-
+    @property
     def agents_note(self) -> str | None:
-        """Say which agents were run instead of the paper's; None if those were."""
+        """Which agents were run instead of the paper's; None if those were."""
         if not self.agents:
             return None
         titles = ", ".join(agent_entry(agent).title for agent in self.agents)
         return f"Not the paper's comparison: {titles} instead of the agents of its cases."
 
-
-def format_estimate(estimate: Estimate, measure: MeasureName, last_episode: int) -> str:
-    """Write an estimate with its interval; what is censored becomes ``>last_episode``.
-
-    Examples
-    --------
-    >>> format_estimate(Estimate(120.0, 90.0, math.inf), "episodes_to_learn", 15000)
-    '120 [90, >15000]'
-    >>> format_estimate(Estimate(0.9, 0.8, 1.0), "final_share_solved", 15000)
-    '90 % [80, 100]'
-    """
-    scale, unit = (100, " %") if measure == "final_share_solved" else (1, "")
-    decimals = decimals_of(estimate, measure)
-
-    def number(value: float) -> str:
-        return f">{last_episode}" if math.isinf(value) else plain_number(scale * value, decimals)
-
-    if math.isnan(estimate.value):
-        return "-"
-    if math.isnan(estimate.lower):
-        return number(estimate.value) + unit
-    return f"{number(estimate.value)}{unit} [{number(estimate.lower)}, {number(estimate.upper)}]"
-
-
-def format_share(estimate: Estimate) -> str:
-    """Write a share with its interval.
-
-    Examples
-    --------
-    >>> format_share(Estimate(0.479, 0.26, 0.712))
-    '47.9 % [26, 71.2]'
-    """
-    return format_estimate(estimate, "final_share_solved", PAPER_EPISODES)
-
-
-def decimals_of(estimate: Estimate, measure: MeasureName) -> int:
-    """Choose the decimals of an estimate: two digits of a return's interval, else one decimal."""
-    ends = np.array([estimate.value, estimate.lower, estimate.upper])
-    ends = ends[np.isfinite(ends)]
-    if measure not in RETURN_MEASURES or not ends.any():
-        return 1
-    extent = float(np.ptp(ends)) or float(np.abs(ends).max()) / 100
-    return min(max(1, 1 - math.floor(math.log10(extent))), 300)
-
-
-def plain_number(value: float, decimals: int, sign: str = "") -> str:
-    """Write a number with so many decimals at most.
-
-    Examples
-    --------
-    >>> plain_number(2.50, 2), plain_number(-0.01, 1), plain_number(0.25, 2, sign="+")
-    ('2.5', '0', '+0.25')
-    """
-    rounded = round(value, decimals) or 0.0
-    text = f"{rounded:{sign}.{decimals}f}".rstrip("0").rstrip(".")
-    return text if rounded else "0"
-
-
-def case_rows(summaries: Sequence[CaseSummary]) -> list[tuple[str, ...]]:
-    """Rows of the table of measures, under `CASE_HEADER`."""
-    rows: list[tuple[str, ...]] = []
-    for summary in summaries:
-        result = summary.result
-        measured = (
-            format_estimate(summary.medians[name], name, result.last_episode) for name in MEASURES
-        )
-        rows.append(
-            (
-                result.case.title,
-                agent_entry(result.agent).title,
-                str(result.n_trials),
-                *measured,
-                f"{result.n_decisions:,}",
-                f"{result.microseconds_per_decision:.1f}",
+    @cached_property
+    def case_tables(self) -> list[Table]:
+        """The measures of each experiment's cases and agents."""
+        words = (name.replace("_", " ") for name in STEP_MEASURES)
+        header = ("case", "agent", "trials", *words, *COST_CELLS)
+        return [
+            Table(
+                one.experiment.title,
+                header,
+                [
+                    (
+                        result.title,
+                        agent_entry(result.agent).title,
+                        str(result.n_trials),
+                        *measure_cells(result, STEP_MEASURES),
+                    )
+                    for result in one.results
+                ],
             )
+            for one in self.experiments
+        ]
+
+    @cached_property
+    def claim_table(self) -> Table:
+        """The verdicts about the claims.
+
+        A claim of several checks has a row of its own, with the verdict about all, before theirs.
+        """
+        rows: list[tuple[str, ...]] = []
+        for outcome in self.claims:
+            start: tuple[str, str] = (str(outcome.claim.number), outcome.claim.text)
+            if len(outcome.checks) > 1:
+                rows.append((*start, "", "", "", outcome.verdict.value))
+                start = ("", "")
+            rows += (
+                (*start, describe(checked.check.quantity), checked.check.paper,
+                 format_quantity(checked), checked.verdict.value)
+                for checked in outcome.checks
+            )  # fmt: skip
+        header = ("claim", "the paper says", "measured", "paper", "ours", "verdict")
+        return Table("Beside the paper's claims", header, rows, VERDICT_KINDS)
+
+    @cached_property
+    def more_table(self) -> Table:
+        """The verdicts by reference results: of each claim by the whole rule, then its checks'."""
+        rows: list[tuple[str, ...]] = []
+        for one in self.settled:
+            if one.more is None or one.chance is None:
+                continue
+            start = (str(one.claim.number), one.claim.text, "", "", "")
+            rows.append((*start, one.verdict.value, format_share(one.chance)))
+            rows += (
+                ("", "", describe(checked.check.quantity),
+                 str(min(sample.size for sample in checked.samples)), format_quantity(checked),
+                 checked.verdict.value, "")
+                for checked in one.more.checks
+            )  # fmt: skip
+        header = (
+            "claim", "the paper says", "measured", "trials", "ours", "verdict",
+            "ten trials show it",
+        )  # fmt: skip
+        return Table("With more trials", header, rows, VERDICT_KINDS)
+
+    @property
+    def more_note(self) -> str:
+        """Which trials the reference results are, and what their table means."""
+        seeds = sorted({one.root_seed for one in self.reference})
+        return (
+            "The same settings with more trials on other seeds"
+            f" (root seed{'s' if len(seeds) > 1 else ''} {' and '.join(map(str, seeds))}), whose"
+            f" measures are kept with the library. {CHANCE_NOTE}"
         )
-    return rows
 
+    @cached_property
+    def power_table(self) -> Table:
+        """What more trials would say of what is undecided."""
+        rows = [
+            (str(claim.number), describe(checked.check.quantity), format_quantity(checked),
+             *(f"{100 * one.holds:.0f} / {100 * one.fails:.0f} %" for one in found))
+            for claim, checked, found in self.powers
+        ]  # fmt: skip
+        header = ("claim", "measured", "ours", *(f"{n} x the trials" for n in MULTIPLES))
+        return Table("What is undecided", header, rows)
 
-def claim_rows(outcomes: Sequence[ClaimOutcome]) -> list[tuple[str, ...]]:
-    """Rows of the table of claims, under `CLAIM_HEADER`.
+    @cached_property
+    def cost_table(self) -> Table:
+        """The costs of a step: a row for each number of inputs, a column for each series."""
+        return cost_table(self.costs)
 
-    A claim of several checks has a row of its own, with the verdict about all, before theirs.
-    """
-    rows: list[tuple[str, ...]] = []
-    for outcome in outcomes:
-        start: tuple[str, str] = (str(outcome.claim.number), outcome.claim.text)
-        if len(outcome.checks) > 1:
-            rows.append((*start, "", "", "", outcome.verdict.value))
-            start = ("", "")
-        for checked in outcome.checks:
-            quantity = checked.check.quantity
-            ours = _format_quantity(checked)
-            rows.append(
-                (*start, describe(quantity), checked.check.paper, ours, checked.verdict.value)
+    def tables(self) -> list[Table]:
+        """Every table that has rows."""
+        last = (self.cost_table, self.claim_table, self.more_table, self.power_table)
+        return [*self.case_tables, *(table for table in last if table.rows)]
+
+    def notes(self) -> list[str]:
+        """Say what the tables mean."""
+        terms = measure_terms(STEP_MEASURES).items()
+        return [
+            *([RULE_NOTE] if self.claims else []),
+            *([self.more_note] if self.more_table.rows else []),
+            *([POWER_NOTE] if self.powers else []),
+            *([NOTE, *(f"{name}: {text}." for name, text in terms)] if self.experiments else []),
+            *([COST_NOTE] if self.costs else []),
+        ]
+
+    def to_markdown(self) -> str:
+        """Write the tables as Markdown."""
+        warning = f"**{QUICK_WARNING}**" if self.quick else None
+        return to_markdown(
+            "The paper's experiments",
+            filter(None, [warning, self.agents_note]),
+            self.tables(),
+            self.notes(),
+            f"Root seed {self.seed}; digest of the rows {self.digest[:16]}; sdnn {self.version}.",
+        )
+
+    def to_html(self, pictures: Mapping[str, bytes], call: Call) -> str:
+        """Make the page.
+
+        Parameters
+        ----------
+        pictures
+            SVG of each figure, by the name of its file without suffix.
+        call
+            How it came about.
+        """
+        warning = QUICK_WARNING if self.quick else None
+        if not self.quick and not all(map(is_paper_scale, self.results)):
+            warning = (
+                f"Smaller than the paper's experiments ({PAPER_TRIALS} trials x"
+                f" {PAPER_EPISODES:,} episodes): nothing is judged."
             )
-    return rows
+        return to_html(
+            title="Q-learning with SDNN-C: the paper's experiments, reproduced",
+            heading="Q-learning with noisy and redundant inputs by SDNN-C: the paper's experiments,"
+            " run again",
+            intro="Every figure of T. Kobayashi, T. Shibuya and M. Morita (JACIII 19(6), 825-832,"
+            " 2015) redrawn from stored rows, and each of its claims beside what these rows say.",
+            warnings=filter(None, [warning, self.agents_note]),
+            provenance=f"{call.describe()} sdnn {self.version} on {call.machine}. Root seed"
+            f" {self.seed}, digest of the rows",
+            code=self.digest[:16],
+            sections=self._sections(pictures),
+        )
+
+    def _sections(self, pictures: Mapping[str, bytes]) -> Iterator[Section]:
+        if self.claims:
+            yield Section(
+                title="What the paper claims, and what our data say",
+                tally=tally(one.verdict for one in self.settled),
+                table=self.claim_table,
+                notes=[
+                    f"{RULE_NOTE} A claim of several lines holds if all of them do, and does not"
+                    " hold if one of them does not."
+                ],
+            )
+        for table, note in ((self.more_table, self.more_note), (self.power_table, POWER_NOTE)):
+            if table.rows:
+                yield Section(title=table.title, level=3, table=table, notes=[note])
+        for one, table in zip(self.experiments, self.case_tables, strict=True):
+            yield Section(
+                title=table.title,
+                picture=pictures[f"experiment-{one.experiment.id}"],
+                alt=f"{table.title}: steps per test episode against learning episodes",
+                table=table,
+            )
+        if self.experiments:
+            yield measures_section(measure_terms(STEP_MEASURES))
+        if self.costs:
+            yield Section(
+                title=self.cost_table.title,
+                picture=pictures["cost"],
+                alt="Time of a step against the number of inputs, logarithmic",
+                is_narrow=True,
+                table=self.cost_table,
+                notes=[COST_NOTE],
+            )
+        if self.results:
+            yield settings_section(
+                (f"{agent_entry(one.agent).title}, {one.title}", one) for one in self.results
+            )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the tables as values that JSON can hold.
+
+        A censored value is the text ``">n"`` with n the last episode; an interval that one trial
+        cannot give is null.
+        """
+        return {
+            "quick": self.quick,
+            "seed": self.seed,
+            "version": self.version,
+            "digest": self.digest,
+            "experiments": [
+                {
+                    "id": one.experiment.id,
+                    "title": one.experiment.title,
+                    "cases": [_case_json(one.experiment, result) for result in one.results],
+                }
+                for one in self.experiments
+            ],
+            "costs": [cost.to_json() for cost in self.costs],
+            "claims": [
+                {
+                    **one.own.to_json(),
+                    "with_more_trials": None if one.more is None else one.more.to_json(),
+                    "ten_trials_show_it": chance_json(one.chance),
+                    "settled": one.verdict.value,
+                }
+                for one in self.settled
+            ],
+            "powers": [
+                {
+                    "claim": claim.number,
+                    "measured": describe(checked.check.quantity),
+                    "with": [asdict(one) for one in found],
+                }
+                for claim, checked, found in self.powers
+            ],
+        }
 
 
-def more_rows(report: Report) -> list[tuple[str, ...]]:
-    """Rows of the table of claims judged by kept trials, under `MORE_HEADER`.
+def _case_json(experiment: Experiment, result: CaseResult) -> dict[str, Any]:
+    case = next(case for case in experiment.cases if case.id == result.case_id)
+    names = {"case": case.id, "title": case.title, "paper_figure": case.paper_figure}
+    return names | result.to_json()
 
-    Each claim has a row with the verdict by the whole rule, then one for each check.
+
+def chance_json(chance: Estimate | None) -> dict[str, float | str | None] | None:
+    """Return a chance as values that JSON can hold."""
+    return None if chance is None else chance.to_json(PAPER_EPISODES)
+
+
+def tally(verdicts: Iterable[Verdict]) -> list[tuple[str, int, str]]:
+    """Count verdicts: how the page colors each kind, how many there are, and their word.
+
+    Examples
+    --------
+    >>> tally([Verdict.HOLDS, Verdict.NOT_RUN, Verdict.HOLDS, Verdict.NOT_JUDGED])
+    [('good', 2, 'hold'), ('none', 2, 'not judged')]
     """
-    rows: list[tuple[str, ...]] = []
-    for one in report.settled:
-        if one.more is None or one.chance is None:
-            continue
-        shown = format_share(one.chance)
-        head = (str(one.claim.number), one.claim.text)
-        rows.append((*head, "", "", "", one.verdict.value, shown))
-        for checked in one.more.checks:
-            quantity = checked.check.quantity
-            n_trials = str(min(sample.size for sample in checked.samples))
-            ours = _format_quantity(checked)
-            word = checked.verdict.value
-            rows.append(("", "", describe(quantity), n_trials, ours, word, ""))
-    return rows
+    counts = Counter(_SHOWN[verdict] for verdict in verdicts)
+    return [
+        (kind, counts[kind, word], word)
+        for kind, word in dict.fromkeys(_SHOWN.values())
+        if counts[kind, word]
+    ]
 
 
-def more_note(report: Report) -> str:
-    """Say which trials these are, and what their table means."""
-    seeds = sorted({one.root_seed for one in report.kept})
-    words = " and ".join(map(str, seeds))
-    return (
-        "The same settings with more trials on other seeds"
-        f" (root seed{'s' if len(seeds) > 1 else ''} {words}), whose measures are kept with the"
-        f" library. {CHANCE_NOTE}"
-    )
-
-
-def power_rows(report: Report) -> list[tuple[str, ...]]:
-    """Rows of the table of what is undecided, under `POWER_HEADER`."""
-    rows: list[tuple[str, ...]] = []
-    for claim, checked, found in report.powers:
-        quantity = checked.check.quantity
-        ours = _format_quantity(checked)
-        chances = (f"{100 * one.holds:.0f} / {100 * one.fails:.0f} %" for one in found)
-        rows.append((str(claim.number), describe(quantity), ours, *chances))
-    return rows
-
-
-def _format_quantity(checked: CheckOutcome) -> str:
+def format_quantity(checked: CheckOutcome) -> str:
+    """Write what our data give of a check's quantity, with its interval."""
     quantity, estimate = checked.check.quantity, checked.estimate
     if estimate is None:
         return "-"
-    if isinstance(quantity, Growth):
-        return _growth(estimate.value) + (
-            "" if math.isnan(estimate.lower)
-            else f" [{_growth(estimate.lower)}, {_growth(estimate.upper)}]"
-        )  # fmt: skip
-    return format_estimate(estimate, quantity.measure, checked.last_episode)
+    if not isinstance(quantity, Growth):
+        return format_estimate(estimate, quantity.measure, checked.last_episode)
+    value, lower, upper = (_growth(end) for end in vars(estimate).values())
+    return value if math.isnan(estimate.lower) else f"{value} [{lower}, {upper}]"
 
 
-def _growth(ratio: float) -> str:
-    return f"{ratio:.1f}x" if ratio < 100 else f"{ratio:,.0f}x"
-
-
-def cost_header() -> tuple[str, ...]:
-    """Header of the table of costs: a column for each series."""
-    return ("inputs", *(series.title for _, series in cost_series()), "FQL's table")
-
-
-def cost_rows(costs: Sequence[CostRecord]) -> list[tuple[str, ...]]:
-    """Rows of the table of costs, one for each number of inputs, under `cost_header`."""
+def cost_table(costs: Sequence[CostRecord]) -> Table:
+    """Return the table of costs: a row for each number of inputs, a column for each series."""
     by_key = {(cost.key.series, cost.key.n_inputs): cost for cost in costs}
-    rows: list[tuple[str, ...]] = []
+    series = [series for _, series in cost_series()]
+    rows = []
     for n_inputs in sorted({cost.key.n_inputs for cost in costs}):
-        cells = [str(n_inputs)]
-        for _, series in cost_series():
-            cost = by_key.get((series.id, n_inputs))
-            cells.append(
-                "-" if cost is None else _cost(cost, by_key.get((series.id, n_inputs - 1)))
-            )
+        cells = [_cost(by_key, one.id, n_inputs) for one in series]
         table = by_key.get(("fuzzy", n_inputs))
-        cells.append("-" if table is None else _size(table.times.table_bytes))
-        rows.append(tuple(cells))
-    return rows
+        size = "-" if table is None else _scaled(table.times.table_bytes, _BYTES, "B")
+        rows.append((str(n_inputs), *cells, size))
+    return Table("Cost of a step", ("inputs", *(one.title for one in series), "FQL's table"), rows)
 
 
-def _cost(cost: CostRecord, with_one_less: CostRecord | None) -> str:
+def _cost(costs: Mapping[tuple[str, int], CostRecord], series: str, n_inputs: int) -> str:
+    cost, with_one_less = costs.get((series, n_inputs)), costs.get((series, n_inputs - 1))
+    if cost is None:
+        return "-"
     lower, middle, upper = np.percentile(cost.microseconds, (25, 50, 75))
-    text = f"{_time(middle)} [{_time(lower)}, {_time(upper)}]"
+    text, *ends = (_scaled(time, _TIMES, "us") for time in (middle, lower, upper))
+    text = f"{text} [{', '.join(ends)}]"
     if with_one_less is None:
         return text
     return f"{text}, {_growth(middle / float(np.median(with_one_less.microseconds)))}"
 
 
-def _time(microseconds: float) -> str:
-    for unit, size in (("s", 1e6), ("ms", 1e3)):
-        if microseconds >= size:
-            return f"{microseconds / size:.3g} {unit}"
-    return f"{microseconds:.3g} us"
+_TIMES = (("s", 1e6), ("ms", 1e3))
+_BYTES = (("GB", 1e9), ("MB", 1e6), ("kB", 1e3))
 
 
-def _size(n_bytes: int) -> str:
-    for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
-        if n_bytes >= size:
-            return f"{n_bytes / size:.3g} {unit}"
-    return f"{n_bytes} B"
+def _scaled(value: float, units: Iterable[tuple[str, float]], unit: str) -> str:
+    """Write a value in the first unit that it reaches, else in another one."""
+    name, size = next(((name, size) for name, size in units if value >= size), (unit, 1))
+    return f"{value / size:.3g} {name}"
 
 
-def to_json(report: Report) -> dict[str, Any]:
-    """Return the tables as values that JSON can hold.
-
-    A censored value is the text ``">n"`` with n the last episode; an interval that one trial
-    cannot give is null.
-    """
-    return {
-        "quick": report.quick,
-        "seed": report.seed,
-        "version": report.version,
-        "digest": report.digest,
-        "experiments": [
-            {
-                "id": one.experiment.id,
-                "title": one.experiment.title,
-                "cases": [summary.to_json() for summary in one.summaries],
-            }
-            for one in report.experiments
-        ],
-        "costs": [cost.to_json() for cost in report.costs],
-        "claims": [_claim_json(one) for one in report.settled],
-        "powers": [
-            {
-                "claim": claim.number,
-                "measured": describe(checked.check.quantity),
-                "with": [asdict(one) for one in found],
-            }
-            for claim, checked, found in report.powers
-        ],
-    }
-
-
-def _claim_json(one: SettledClaim) -> dict[str, Any]:
-    chance = None if one.chance is None else one.chance.to_json(PAPER_EPISODES)
-    return {
-        **one.own.to_json(),
-        "with_more_trials": None if one.more is None else one.more.to_json(),
-        "ten_trials_show_it": chance,
-        "settled": one.verdict.value,
-    }
+def _growth(ratio: float) -> str:
+    return f"{ratio:.1f}x" if ratio < 100 else f"{ratio:,.0f}x"

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from sdnn import _core, machine
-from sdnn.reproduction import figures, page
 from sdnn.reproduction.cases import (
     EXPERIMENTS,
     MOST_EPISODES,
@@ -21,12 +20,13 @@ from sdnn.reproduction.cases import (
     Experiment,
 )
 from sdnn.reproduction.cost import QUICK_COST, CostConfig, cost_keys, measure_costs
-from sdnn.reproduction.kept_trials import KeptTrials, kept_trials
+from sdnn.reproduction.figures import draw_cost, draw_experiment
 from sdnn.reproduction.plan import plan_trials
-from sdnn.reproduction.report import ExperimentReport, Report, to_json
-from sdnn.reproduction.results import CaseSummary, collect, summarize
+from sdnn.reproduction.reference_results import reference_results
+from sdnn.reproduction.report import ExperimentReport, Report
 from sdnn.runs.engine import Observer, RunOutcome, run_trials
 from sdnn.runs.executor import Executor
+from sdnn.runs.figures import figure_bytes, require_matplotlib
 from sdnn.runs.records import (
     COST_ROW_HEADER,
     ROW_HEADER,
@@ -38,6 +38,8 @@ from sdnn.runs.records import (
     trial_rows,
 )
 from sdnn.runs.registry import cost_series
+from sdnn.runs.report import Call, require_jinja
+from sdnn.runs.results import CaseResult, measure
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.trial import ProtocolConfig
 from sdnn.runs.trial_config import PlannedTrial
@@ -287,8 +289,8 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
     ClusterError
         If the cluster cannot run trials any more; what was finished is stored.
     """
-    figures.require_matplotlib()
-    page.require_jinja()
+    require_matplotlib()
+    require_jinja()
     begin = time.monotonic()
     watcher = Observer() if observer is None else observer
     plan = request.plan
@@ -301,7 +303,7 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
             return Reproduction(outcome)
         measure_costs(plan.costs, request.cost_config, store, watcher)
         report, records = _read(request, store)
-    call = page.Call(
+    call = Call(
         machine=machine.description(),
         seconds=time.monotonic() - begin,
         n_run=outcome.n_run,
@@ -317,10 +319,10 @@ def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[
     complete = [(e, keys) for e, keys in request.plan.experiments if stored.issuperset(keys)]
     records = store.load(key for _, keys in complete for key in keys)
     shown = {series.id for _, series in cost_series(request.agents or None)}
-    experiments = tuple(
-        ExperimentReport(experiment, tuple(map(summarize, collect(experiment, records))))
-        for experiment, _ in complete
-    )
+    experiments = tuple(ExperimentReport(e, collect(e, records)) for e, _ in complete)
+    n_run = {
+        (r.case_id, r.agent, r.config_hash): r.n_trials for one in experiments for r in one.results
+    }
     report = Report(
         experiments=experiments,
         costs=tuple(
@@ -333,53 +335,60 @@ def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[
         version=_core.__version__,
         digest=records_digest(records),
         agents=request.agents,
-        kept=_more_than(s for one in experiments for s in one.summaries),
+        reference=tuple(
+            one
+            for one in reference_results()
+            if one.n_trials > n_run.get((one.case_id, one.agent, one.config_hash), math.inf)
+        ),
     )
     return report, records
 
 
-def _more_than(summaries: Iterable[CaseSummary]) -> tuple[KeptTrials, ...]:
-    """Give the kept trials that are of these settings and more."""
-    n_run = {(s.case_id, s.agent, s.result.config_hash): s.n_trials for s in summaries}
+def collect(experiment: Experiment, records: Iterable[TrialRecord]) -> tuple[CaseResult, ...]:
+    """Measure the trials of each case and agent of an experiment.
+
+    Parameters
+    ----------
+    experiment
+        Its cases and agents.
+    records
+        Trials of the plan, in the order in which they are to be shown; those of other experiments
+        are passed over.
+    """
+    by_pair: dict[tuple[str, str], list[TrialRecord]] = {}
+    for record in records:
+        by_pair.setdefault((record.key.case_id, record.key.agent), []).append(record)
     return tuple(
-        kept
-        for kept in kept_trials()
-        if kept.n_trials > n_run.get((kept.case_id, kept.agent, kept.config_hash), math.inf)
+        measure(case.title, by_pair.get((case.id, agent), ()))
+        for case in experiment.cases
+        for agent in case.agents
     )
 
 
 def _write(
-    request: ReproduceRequest,
-    report: Report,
-    records: tuple[TrialRecord, ...],
-    call: page.Call,
+    request: ReproduceRequest, report: Report, records: tuple[TrialRecord, ...], call: Call
 ) -> tuple[tuple[Path, ...], dict[str, Any]]:
     """Draw and write everything; returns the files and the content of the JSON file."""
-    files: list[Path] = []
-    pictures: dict[str, bytes] = {}
-
-    def write(name: str, content: bytes) -> None:
-        path = request.out / request.file_name(name)
-        write_whole(path, content)
-        files.append(path)
-
     drawn = {
-        f"experiment-{one.experiment.id}": figures.draw_experiment(
-            one.experiment, [summary.result for summary in one.summaries], quick=request.quick
+        f"experiment-{one.experiment.id}": draw_experiment(
+            one.experiment, one.results, quick=request.quick
         )
         for one in report.experiments
     }
     if report.costs:
-        drawn["cost"] = figures.draw_cost(report.costs, quick=request.quick)
+        drawn["cost"] = draw_cost(report.costs, quick=request.quick)
+    contents: dict[str, bytes] = {}
     for name, figure in drawn.items():
-        png, pictures[name] = figures.figure_bytes(figure)
-        write(f"{name}.png", png)
-        write(f"{name}.svg", pictures[name])
-    table = to_json(report)
-    write("results.md", page.to_markdown(report).encode())
-    write("table.json", (json.dumps(table, indent=2, allow_nan=False) + "\n").encode())
-    write("results.csv", csv_bytes(ROW_HEADER, trial_rows(records)))
+        contents[f"{name}.png"], contents[f"{name}.svg"] = figure_bytes(figure)
+    pictures = {name: contents[f"{name}.svg"] for name in drawn}
+    table = report.to_json()
+    contents["results.md"] = report.to_markdown().encode()
+    contents["table.json"] = (json.dumps(table, indent=2, allow_nan=False) + "\n").encode()
+    contents["results.csv"] = csv_bytes(ROW_HEADER, trial_rows(records))
     if report.costs:
-        write("cost.csv", csv_bytes(COST_ROW_HEADER, round_rows(report.costs)))
-    write("report.html", page.to_html(report, pictures, call).encode())
+        contents["cost.csv"] = csv_bytes(COST_ROW_HEADER, round_rows(report.costs))
+    contents["report.html"] = report.to_html(pictures, call).encode()
+    files = {request.out / request.file_name(name): text for name, text in contents.items()}
+    for path, content in files.items():
+        write_whole(path, content)
     return tuple(files), table

@@ -21,20 +21,19 @@ a hundred, leave three claims undecided:
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sdnn.reproduction.cases import PAPER_EPISODES
+from sdnn.reproduction.cases import PAPER_EPISODES, PAPER_TRIALS
 from sdnn.reproduction.chances import TenTrials
 from sdnn.reproduction.claims import CLAIMS, Check, Claim, Difference, Growth, Subject, describe
 from sdnn.reproduction.cost import CostConfig
-from sdnn.reproduction.results import TrialMeasures, on_equal_terms
 from sdnn.runs.records import CostRecord
-from sdnn.runs.statistics import Estimate, estimate_contrast, json_number
+from sdnn.runs.results import TrialMeasures, on_equal_terms
+from sdnn.runs.statistics import Estimate, FloatArray, estimate_contrast, json_number
 
 
 class Verdict(Enum):
@@ -51,6 +50,13 @@ class Verdict(Enum):
 ALWAYS, NEVER = 0.95, 0.05
 """Shares of draws of ten trials from which on, and up to which, a claim holds, and does not."""
 
+_DECISIVE = (Verdict.FAILS, Verdict.NOT_RUN, Verdict.NOT_JUDGED, Verdict.UNDECIDED)
+
+
+def is_paper_scale(measured: TrialMeasures) -> bool:
+    """Whether there are as many trials and episodes as in the paper: else nothing is judged."""
+    return measured.n_trials >= PAPER_TRIALS and measured.last_episode >= PAPER_EPISODES
+
 
 def verdict_of(check: Check, estimate: Estimate) -> Verdict:
     """Judge one check by the rule of this module."""
@@ -63,16 +69,26 @@ def verdict_of(check: Check, estimate: Estimate) -> Verdict:
 
 @dataclass(frozen=True)
 class CheckOutcome:
-    """A check with what our data give; no estimate where its trials were not run.
+    """A check with what our data give.
 
-    ``samples`` are the trials' values that it was judged by: one array, or two of a difference.
-    ``last_episode`` is that of the trials, where what is censored is cut off.
+    Parameters
+    ----------
+    check
+        The check.
+    estimate
+        The quantity; None where its trials were not run.
+    verdict
+        The verdict.
+    samples
+        The trials' values that it was judged by: one array, or two of a difference.
+    last_episode
+        That of the trials, where what is censored is cut off.
     """
 
     check: Check
     estimate: Estimate | None
     verdict: Verdict
-    samples: tuple[NDArray[np.float64], ...] = field(default=(), compare=False, repr=False)
+    samples: tuple[FloatArray, ...] = field(default=(), compare=False, repr=False)
     last_episode: int = PAPER_EPISODES
 
 
@@ -87,15 +103,7 @@ class ClaimOutcome:
     def verdict(self) -> Verdict:
         """The verdict about the whole claim, by the rule of this module."""
         verdicts = {outcome.verdict for outcome in self.checks}
-        for decisive in (
-            Verdict.FAILS,
-            Verdict.NOT_RUN,
-            Verdict.NOT_JUDGED,
-            Verdict.UNDECIDED,
-        ):
-            if decisive in verdicts:
-                return decisive
-        return Verdict.HOLDS
+        return next((verdict for verdict in _DECISIVE if verdict in verdicts), Verdict.HOLDS)
 
     def to_json(self) -> dict[str, Any]:
         """Return it as values that JSON can hold; what is censored becomes ``">last_episode"``."""
@@ -173,7 +181,7 @@ def settle(
         that it speaks of are among them.
     """
     trials = tuple(more)
-    judged = {o.claim.number: o for o in judge_claims(trials, ())}
+    judged = {one.claim.number: one for one in judge_claims(trials)}
     draws = TenTrials(trials)
     settled = []
     for own in outcomes:
@@ -186,7 +194,7 @@ def settle(
 
 
 def judge_claims(
-    measured: Iterable[TrialMeasures], costs: Sequence[CostRecord]
+    measured: Iterable[TrialMeasures], costs: Sequence[CostRecord] = ()
 ) -> tuple[ClaimOutcome, ...]:
     """Judge the claims that the given results speak about, at least in part.
 
@@ -209,36 +217,25 @@ def _judge(
     check: Check, measured: Mapping[Subject, TrialMeasures], costs: Sequence[CostRecord]
 ) -> CheckOutcome:
     quantity = check.quantity
+    samples: tuple[FloatArray, ...] = ()
+    last_episode = PAPER_EPISODES
     if isinstance(quantity, Growth):
         times = {c.key.n_inputs: c.microseconds for c in costs if c.key.series == quantity.series}
         if not {quantity.n_inputs, quantity.n_fewer} <= times.keys():
             return CheckOutcome(check, None, Verdict.NOT_RUN)
-        growth = estimate_contrast(times[quantity.n_inputs], times[quantity.n_fewer], np.divide)
-        wanted = CostConfig().config_hash
-        return _outcome(check, growth, all(c.key.config_hash == wanted for c in costs))
-    subjects = [quantity.subject]
-    if isinstance(quantity, Difference):
-        subjects.append(quantity.other)
-    if not measured.keys() >= set(subjects):
-        return CheckOutcome(check, None, Verdict.NOT_RUN)
-    found = [measured[subject] for subject in subjects]
-    samples: tuple[NDArray[np.float64], ...]
-    if len(found) == 1:
-        samples = (found[0].values[quantity.measure],)
-        estimate = found[0].medians[quantity.measure]
+        estimate = estimate_contrast(times[quantity.n_inputs], times[quantity.n_fewer], np.divide)
+        is_full = all(one.key.config_hash == CostConfig().config_hash for one in costs)
     else:
-        samples = values, others = on_equal_terms(quantity.measure, *found)
-        estimate = estimate_contrast(values, others)
-    is_full = all(one.is_paper_scale for one in found)
-    last_episode = min(one.last_episode for one in found)
-    return replace(_outcome(check, estimate, is_full, samples), last_episode=last_episode)
-
-
-def _outcome(
-    check: Check,
-    estimate: Estimate,
-    is_full: bool,
-    samples: tuple[NDArray[np.float64], ...] = (),
-) -> CheckOutcome:
+        if not measured.keys() >= set(quantity.subjects):
+            return CheckOutcome(check, None, Verdict.NOT_RUN)
+        found = [measured[subject] for subject in quantity.subjects]
+        if isinstance(quantity, Difference):
+            samples = values, others = on_equal_terms(quantity.measure, *found)
+            estimate = estimate_contrast(values, others)
+        else:
+            samples = (found[0].values[quantity.measure],)
+            estimate = found[0].medians[quantity.measure]
+        is_full = all(map(is_paper_scale, found))
+        last_episode = min(one.last_episode for one in found)
     verdict = verdict_of(check, estimate) if is_full else Verdict.NOT_JUDGED
-    return CheckOutcome(check, estimate, verdict, samples)
+    return CheckOutcome(check, estimate, verdict, samples, last_episode)

@@ -1,35 +1,20 @@
-"""Learning curves: the numbers of runs' rows, and a figure of them.
-
-matplotlib is an extra and is imported when it is needed, without pyplot.
-"""
+"""Learning curves: the numbers of runs' rows."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
-from io import BytesIO
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.training import Row
-from sdnn.interrupts import stay_interrupts
-from sdnn.palette import colors_of
 from sdnn.runs.errors import RunError
 from sdnn.runs.groups import Group, groups_of
 from sdnn.runs.run import Run
-from sdnn.whole_files import csv_bytes, write_whole
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-__all__ = ["SUFFIXES", "Curve", "curves_of", "draw_curves", "write_curves"]
-
-SUFFIXES = (".png", ".svg", ".pdf")
+__all__ = ["HEADER", "Curve", "csv_rows", "curves_of"]
 
 WINDOW = 20
 """Episodes in the running median of the returns, or all so far where they are fewer."""
@@ -97,73 +82,6 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
     if not curves:
         raise RunError("; ".join(notes) + ": nothing to draw")
     return curves, notes
-
-
-def write_curves(curves: Sequence[Curve], path: Path) -> tuple[Path, Path]:
-    """Draw curves into a file, and write their numbers beside it as CSV; gives both files.
-
-    Raises
-    ------
-    RunError
-        If matplotlib is missing, or the name has another end than those of `SUFFIXES`.
-    OSError
-        If a file cannot be written.
-    """
-    if path.suffix not in SUFFIXES:
-        raise RunError(f"out must end in one of {', '.join(SUFFIXES)}, got {path}")
-    content = BytesIO()
-    figure = draw_curves(curves)
-    with stay_interrupts():
-        figure.savefig(content, format=path.suffix[1:], dpi=150)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, content.getvalue())
-    numbers = path.with_suffix(".csv")
-    write_whole(numbers, csv_bytes(HEADER, _csv_rows(curves)))
-    return path, numbers
-
-
-def draw_curves(curves: Sequence[Curve]) -> Figure:
-    """Draw curves: a panel per task, a color per agent.
-
-    Raises
-    ------
-    RunError
-        If matplotlib is not installed.
-    """
-    if find_spec("matplotlib") is None:
-        raise RunError('figures need matplotlib, which is missing: pip install "sdnn[plot]"')
-    from matplotlib.figure import Figure
-
-    tasks = list(dict.fromkeys(curve.task for curve in curves))
-    agents = list(dict.fromkeys(curve.agent for curve in curves))
-    colors = dict(zip(agents, colors_of(range(len(agents))), strict=True))
-    figure = Figure(figsize=(7.5, 3.6 * len(tasks)), layout="constrained")
-    panels = figure.subplots(len(tasks), squeeze=False)[:, 0]
-    for task, axes in zip(tasks, panels, strict=True):
-        for curve in curves:
-            if curve.task == task:
-                _draw(axes, curve, colors[curve.agent])
-        axes.set_title(task, fontsize=10)
-        axes.set_xlabel("steps")
-        axes.set_ylabel("return")
-        axes.grid(alpha=0.25)
-        axes.legend(fontsize=8, frameon=False)
-    return figure
-
-
-def _draw(axes: Axes, curve: Curve, color: str) -> None:
-    of = f" ({curve.n_runs} runs)" if curve.n_runs > 1 else ""
-    label = f"{curve.agent}: {curve.kind}{of}"
-    if curve.kind == "return":
-        axes.plot(curve.steps, curve.values, ".", ms=2, color=color, alpha=0.25, label=label)
-        return
-    is_main = curve.kind == "evaluation" or curve.n_runs > 1
-    width, dashes, marker = (1.8, "-", "o") if is_main else (1.0, "--", "")
-    axes.plot(
-        curve.steps, curve.values, dashes, lw=width, marker=marker, ms=3, color=color, label=label
-    )
-    if curve.low is not None and curve.high is not None:
-        axes.fill_between(curve.steps, curve.low, curve.high, color=color, alpha=0.2, lw=0)
 
 
 def _curves_of_one(group: Group, run: Run, rows: Sequence[Row]) -> list[Curve]:
@@ -262,7 +180,8 @@ def _running_median(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([np.median(values[max(0, i + 1 - WINDOW) : i + 1]) for i in range(len(values))])
 
 
-def _csv_rows(curves: Sequence[Curve]) -> Iterable[tuple[object, ...]]:
+def csv_rows(curves: Sequence[Curve]) -> Iterable[tuple[object, ...]]:
+    """Numbers of curves under `HEADER`."""
     for curve in curves:
         names = (curve.task, curve.agent, curve.kind, curve.n_runs, curve.run)
         for place, (step, value) in enumerate(zip(curve.steps, curve.values, strict=True)):

@@ -1,12 +1,14 @@
 """Measures of one trial: a number for each, from its test episodes alone.
 
-Arrays hold one value per test episode, (n_tests,). The measures were fixed before the data of the
-noisy cases were seen.
+Arrays hold one value per test episode, (n_tests,): ``episode`` the learning episodes done before
+it, ``steps`` its steps, ``solved`` whether it reached the goal, ``episode_return`` its sum of
+rewards. The measures were fixed before the data of the noisy cases were seen.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,6 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn.arguments import real, whole
+from sdnn.runs.records import TrialRows
 
 MeasureName = Literal[
     "episodes_to_learn",
@@ -26,16 +29,11 @@ MeasureName = Literal[
     "mean_return",
 ]
 
-STEP_MEASURES: tuple[MeasureName, ...] = (
-    "episodes_to_learn", "early_steps", "episode_of_collapse", "final_steps", "final_share_solved"
-)  # fmt: skip
-"""Of tasks that are to be solved in few steps, as the acrobot's."""
+SHARE_STABLE = 0.9
+"""Share of test episodes that an agent must solve at the end to be called stable."""
 
-CENSORED_MEASURES: tuple[MeasureName, ...] = ("episodes_to_learn", "episode_of_collapse")
-"""Of which it may only be known that they are beyond the last episode: then they are infinite."""
-
-RETURN_MEASURES: tuple[MeasureName, ...] = ("final_return", "mean_return")
-"""Of any task."""
+FINAL_PART = 10
+"""The last return is measured over one in so many of the tests, the last ones."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,14 +76,6 @@ class MeasureConfig:
 DEFAULT_MEASURES = MeasureConfig()
 
 
-def _medians_of_windows(steps: ArrayLike, window: int) -> NDArray[np.float64]:
-    """Medians of all runs of `window` tests, (n_tests - window + 1,), or (0,) if there are none."""
-    taken = np.asarray(steps, np.float64)
-    if taken.size < window:
-        return np.empty(0)
-    return np.asarray(np.median(sliding_window_view(taken, window), axis=1))
-
-
 def episodes_to_learn(
     episode: ArrayLike, steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES
 ) -> float:
@@ -97,17 +87,7 @@ def episodes_to_learn(
 
     (1) keeps failed tests just before the first good one from counting as learned already;
     (2) keeps a single lucky test from counting. A later relapse does not undo learning. A window
-    that the trial's end cuts off does not count. The median of an even number of steps is the
-    mean of the middle two.
-
-    Parameters
-    ----------
-    episode : (n_tests,)
-        Learning episodes done before each test.
-    steps : (n_tests,)
-        Steps of each test episode.
-    config
-        Constants.
+    that the trial's end cuts off does not count.
 
     Examples
     --------
@@ -128,15 +108,6 @@ def early_steps(
 ) -> float:
     """Median steps over the test episodes after at most `early_episodes` learning episodes.
 
-    Parameters
-    ----------
-    episode : (n_tests,)
-        Learning episodes done before each test.
-    steps : (n_tests,)
-        Steps of each test episode.
-    config
-        Constants.
-
     Examples
     --------
     >>> early_steps([1000, 2000, 3000], [4, 6, 50])
@@ -155,17 +126,7 @@ def episode_of_collapse(
     at most `good_steps`. The result is the number of learning episodes done before the last test of
     the last such run. It is infinite (censored) if that is the trial's last test: the trial ended
     before a collapse. It is 0 if there is no such run: there was nothing to collapse; NaN if there
-    are fewer tests than in a run. Relapses that are mended later do not count, so the measure is
-    the time until which the agent can do the task.
-
-    Parameters
-    ----------
-    episode : (n_tests,)
-        Learning episodes done before each test.
-    steps : (n_tests,)
-        Steps of each test episode.
-    config
-        Constants.
+    are fewer tests than in a run. Relapses from which the agent recovers do not count.
 
     Examples
     --------
@@ -191,15 +152,6 @@ def episode_of_collapse(
 def final_steps(steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES) -> float:
     """Median steps over the last `final_window` test episodes, or over all if there are fewer.
 
-    Parameters
-    ----------
-    steps : (n_tests,)
-        Steps of each test episode.
-    config
-        Constants.
-
-    Examples
-    --------
     >>> final_steps(100 * [50] + 50 * [4])
     4.0
     """
@@ -209,35 +161,15 @@ def final_steps(steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES) -> f
 def final_share_solved(solved: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES) -> float:
     """Share solved of the last `final_window` test episodes, or of all if there are fewer.
 
-    Parameters
-    ----------
-    solved : (n_tests,)
-        Whether each test episode reached the goal.
-    config
-        Constants.
-
-    Examples
-    --------
     >>> final_share_solved([False, True, True, True])
     0.75
     """
     return float(np.mean(np.asarray(solved, np.float64)[-config.final_window :]))
 
 
-FINAL_PART = 10
-"""The last return is measured over one in so many of the tests, the last ones."""
-
-
 def final_return(episode_return: ArrayLike) -> float:
     """Mean return of the last tenth of the test episodes, at least of one.
 
-    Parameters
-    ----------
-    episode_return : (n_tests,)
-        Sum of rewards of each test episode.
-
-    Examples
-    --------
     >>> final_return(18 * [-20.0] + [8.0, 9.0])
     8.5
     """
@@ -248,14 +180,63 @@ def final_return(episode_return: ArrayLike) -> float:
 def mean_return(episode_return: ArrayLike) -> float:
     """Mean return of all test episodes: the area under the learning curve, per episode.
 
-    Parameters
-    ----------
-    episode_return : (n_tests,)
-        Sum of rewards of each test episode.
-
-    Examples
-    --------
     >>> mean_return([-20.0, 8.0])
     -6.0
     """
     return float(np.mean(np.asarray(episode_return, np.float64)))
+
+
+def _medians_of_windows(steps: ArrayLike, window: int) -> NDArray[np.float64]:
+    """Medians of all runs of `window` tests, (n_tests - window + 1,), or (0,) if there are none."""
+    taken = np.asarray(steps, np.float64)
+    if taken.size < window:
+        return np.empty(0)
+    return np.asarray(np.median(sliding_window_view(taken, window), axis=1))
+
+
+_GOOD = f"{DEFAULT_MEASURES.good_steps:g}"
+
+MEASURES: dict[MeasureName, tuple[str, Callable[[TrialRows, MeasureConfig], float]]] = {
+    "episodes_to_learn": (
+        f"learning episodes before the first test of at most {_GOOD} steps that begins"
+        f" {DEFAULT_MEASURES.learned_window} tests in a row with a median of at most {_GOOD}",
+        lambda rows, config: episodes_to_learn(rows.episode, rows.steps, config),
+    ),
+    "early_steps": (
+        "median steps of the tests in the first"
+        f" {DEFAULT_MEASURES.early_episodes:,} learning episodes",
+        lambda rows, config: early_steps(rows.episode, rows.steps, config),
+    ),
+    "episode_of_collapse": (
+        f"learning episodes before the end of the last {DEFAULT_MEASURES.stable_window} tests in a"
+        f" row with a median of at most {_GOOD} steps: until then the agent can do the task;"
+        " censored (> the last episode) if it still can at the end",
+        lambda rows, config: episode_of_collapse(rows.episode, rows.steps, config),
+    ),
+    "final_steps": (
+        f"median steps of the last {DEFAULT_MEASURES.final_window} tests",
+        lambda rows, config: final_steps(rows.steps, config),
+    ),
+    "final_share_solved": (
+        f"share of the last {DEFAULT_MEASURES.final_window} tests that reach the goal",
+        lambda rows, config: final_share_solved(rows.solved, config),
+    ),
+    "final_return": (
+        "mean return of the last tenth of the tests",
+        lambda rows, _: final_return(rows.episode_return),
+    ),
+    "mean_return": (
+        "mean return of all tests: the area under the learning curve",
+        lambda rows, _: mean_return(rows.episode_return),
+    ),
+}
+"""What each measure means, for a reader, and how it is taken from the rows of a trial."""
+
+RETURN_MEASURES: tuple[MeasureName, ...] = ("final_return", "mean_return")
+"""Of any task."""
+
+STEP_MEASURES: tuple[MeasureName, ...] = tuple(n for n in MEASURES if n not in RETURN_MEASURES)
+"""Of tasks that are to be solved in few steps, as the acrobot's."""
+
+CENSORED_MEASURES: tuple[MeasureName, ...] = ("episodes_to_learn", "episode_of_collapse")
+"""Of which it may only be known that they are beyond the last episode: then they are infinite."""

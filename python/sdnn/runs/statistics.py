@@ -1,7 +1,9 @@
 """Statistics over trials.
 
-The spread that matters is the one between trials, so every interval here is a bootstrap over
-whole trials. Arrays of curves have the shape (n_trials, n_tests).
+The spread that matters is the one between trials, so every interval here is a percentile bootstrap
+over whole trials. Each call draws from a generator of its own with a fixed seed: an interval
+depends on the values alone. Its ends are values of the bootstrap distribution, never interpolated,
+so censored, infinite trials are allowed.
 """
 
 from __future__ import annotations
@@ -19,17 +21,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class BootstrapConfig:
-    """Constants of the intervals.
-
-    Parameters
-    ----------
-    confidence
-        Share of the bootstrap distribution inside an interval.
-    n_resamples
-        Resamples of the bootstrap.
-    seed
-        Seed of the bootstrap's own generator.
-    """
+    """Share of the distribution inside an interval, number of resamples, and their seed."""
 
     confidence: float = 0.95
     n_resamples: int = 10_000
@@ -54,14 +46,9 @@ def json_number(value: float, last_episode: int | None) -> float | str | None:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A statistic over trials with its bootstrap interval.
+    """A statistic over trials, infinite where it is censored, with its interval.
 
-    Parameters
-    ----------
-    value
-        The statistic of the trials; infinite where it is censored.
-    lower, upper
-        Ends of the interval; NaN where there are fewer than two trials.
+    The ends are NaN where there are fewer than two trials.
     """
 
     value: float
@@ -70,58 +57,18 @@ class Estimate:
 
     def to_json(self, last_episode: int) -> dict[str, float | str | None]:
         """Return it as values that JSON can hold; see `json_number`."""
-        ends = {"value": self.value, "lower": self.lower, "upper": self.upper}
-        return {name: json_number(value, last_episode) for name, value in ends.items()}
-
-
-@dataclass(frozen=True)
-class Curve:
-    """Statistics over trials at each test episode.
-
-    Parameters
-    ----------
-    episode : (n_tests,)
-        Learning episodes done before the test.
-    median, lower, upper : (n_tests,)
-        Median and quartiles over trials.
-    """
-
-    episode: NDArray[np.int32]
-    median: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-
-
-def learning_curve(episode: NDArray[np.int32], steps: ArrayLike) -> Curve:
-    """Median and quartiles over trials of the steps at each test episode.
-
-    Quartiles are interpolated linearly between trials, as `numpy.percentile` does.
-
-    Parameters
-    ----------
-    episode : (n_tests,)
-        Learning episodes done before the test.
-    steps : (n_trials, n_tests)
-        Steps of each test episode.
-
-    Examples
-    --------
-    >>> learning_curve(np.array([10], np.int32), [[3], [5], [50]]).median
-    array([5.])
-    """
-    lower, median, upper = np.percentile(np.asarray(steps, np.float64), (25, 50, 75), axis=0)
-    return Curve(episode, median, lower, upper)
+        return {name: json_number(value, last_episode) for name, value in vars(self).items()}
 
 
 def running_median(values: ArrayLike, window: int) -> FloatArray:
-    """Median of each value with its neighbours, `window` of them in all; fewer at both ends.
+    """Return the median of each value with its neighbours, fewer at both ends.
 
     Parameters
     ----------
     values : (n,)
         A curve.
     window
-        Odd number of values.
+        Values in all, an odd number.
 
     Examples
     --------
@@ -134,18 +81,7 @@ def running_median(values: ArrayLike, window: int) -> FloatArray:
 
 
 def estimate_median(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTRAP) -> Estimate:
-    """Return the median over trials with its percentile bootstrap interval.
-
-    Trials are drawn with replacement `n_resamples` times by a generator of its own, seeded anew
-    at each call, so the interval depends on the values and `config` alone. Its ends are values
-    of the bootstrap distribution (never interpolated), so censored, infinite trials are allowed.
-
-    Parameters
-    ----------
-    values : (n_trials,)
-        One value per trial.
-    config
-        Constants.
+    """Return the median of the values of trials, (n_trials,), with its interval.
 
     Raises
     ------
@@ -157,23 +93,11 @@ def estimate_median(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTR
     >>> estimate_median([4.0, 4.0, 4.0])
     Estimate(value=4.0, lower=4.0, upper=4.0)
     """
-    sample = _sample(values)
-    value = float(_median(sample))
-    if sample.size == 1:
-        return Estimate(value, math.nan, math.nan)
-    generator = np.random.default_rng(config.seed)
-    return _with_interval(value, _median(_resampled(sample, generator, config)), config)
+    return _estimate(_median, (values,), config)
 
 
 def estimate_mean(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTRAP) -> Estimate:
-    """Return the mean over trials with its percentile bootstrap interval; as `estimate_median`.
-
-    Parameters
-    ----------
-    values : (n_trials,)
-        One value per trial, none of them infinite; NaN gives NaN.
-    config
-        Constants.
+    """Return the mean of the values of trials, (n_trials,), with its interval; NaN gives NaN.
 
     Raises
     ------
@@ -185,14 +109,8 @@ def estimate_mean(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTRAP
     >>> estimate_mean([3.0, 3.0])
     Estimate(value=3.0, lower=3.0, upper=3.0)
     """
-    sample = _sample(values)
-    if np.isinf(sample).any():
-        raise ValueError("averaged values must not be infinite; cap censored ones first")
-    value = float(np.mean(sample))
-    if sample.size == 1:
-        return Estimate(value, math.nan, math.nan)
-    generator = np.random.default_rng(config.seed)
-    return _with_interval(value, np.mean(_resampled(sample, generator, config), axis=-1), config)
+    _check_finite("averaged", values)
+    return _estimate(lambda sample: np.asarray(np.mean(sample, axis=-1)), (values,), config)
 
 
 def estimate_contrast(
@@ -201,16 +119,14 @@ def estimate_contrast(
     contrast: Callable[[FloatArray, FloatArray], FloatArray] = np.subtract,
     config: BootstrapConfig = DEFAULT_BOOTSTRAP,
 ) -> Estimate:
-    """Compare the medians of two groups of trials; both are resampled, each for itself.
+    """Compare the medians of two groups of trials; each group is resampled by itself.
 
     Parameters
     ----------
-    values : (n_trials,)
-        One value per trial of the first group, none of them infinite; NaN gives NaN.
-    others : (n_other_trials,)
-        One value per trial of the second group, likewise.
+    values, others : (n_trials,)
+        One value per trial of a group; NaN gives NaN.
     contrast
-        What is made of both medians: their difference, or another function of two arrays.
+        Function of both medians: their difference, or another one of two arrays.
     config
         Constants.
 
@@ -224,39 +140,10 @@ def estimate_contrast(
     >>> estimate_contrast([7.0, 7.0], [4.0, 4.0, 4.0])
     Estimate(value=3.0, lower=3.0, upper=3.0)
     """
-    first, second = _sample(values), _sample(others)
-    if np.isinf(first).any() or np.isinf(second).any():
-        raise ValueError("compared values must not be infinite; cap censored ones first")
-    value = float(contrast(_median(first), _median(second)))
-    if min(first.size, second.size) == 1:
-        return Estimate(value, math.nan, math.nan)
-    generator = np.random.default_rng(config.seed)
-    resampled = [_median(_resampled(sample, generator, config)) for sample in (first, second)]
-    return _with_interval(value, contrast(*resampled), config)
-
-
-def _sample(values: ArrayLike) -> FloatArray:
-    sample = np.asarray(values, np.float64)
-    if sample.ndim != 1 or sample.size == 0:
-        raise ValueError(f"values must be one per trial, got shape {sample.shape}")
-    return sample
-
-
-def _median(values: FloatArray) -> FloatArray:
-    """Medians over the last axis, the mean of the middle two for an even number of values."""
-    return np.asarray(np.median(values, axis=-1))
-
-
-def _resampled(
-    sample: FloatArray, generator: np.random.Generator, config: BootstrapConfig
-) -> FloatArray:
-    """Resamples of a group, (n_resamples, n_trials)."""
-    return sample[generator.integers(sample.size, size=(config.n_resamples, sample.size))]
-
-
-def _with_interval(value: float, distribution: FloatArray, config: BootstrapConfig) -> Estimate:
-    lower, upper = tails(distribution, config.confidence)
-    return Estimate(value, float(lower), float(upper))
+    _check_finite("compared", values, others)
+    return _estimate(
+        lambda first, second: contrast(_median(first), _median(second)), (values, others), config
+    )
 
 
 def tails(distribution: FloatArray, confidence: float) -> FloatArray:
@@ -270,3 +157,31 @@ def tails(distribution: FloatArray, confidence: float) -> FloatArray:
     tail = (1 - confidence) / 2
     ends = np.quantile(distribution, (tail, 1 - tail), axis=-1, method="inverted_cdf")
     return np.asarray(ends, np.float64)
+
+
+def _estimate(
+    statistic: Callable[..., FloatArray], groups: tuple[ArrayLike, ...], config: BootstrapConfig
+) -> Estimate:
+    samples = [np.asarray(values, np.float64) for values in groups]
+    for sample in samples:
+        if sample.ndim != 1 or sample.size == 0:
+            raise ValueError(f"values must be one per trial, got shape {sample.shape}")
+    value = float(statistic(*samples))
+    if min(sample.size for sample in samples) == 1:
+        return Estimate(value, math.nan, math.nan)
+    generator = np.random.default_rng(config.seed)
+    drawn = [
+        sample[generator.integers(sample.size, size=(config.n_resamples, sample.size))]
+        for sample in samples
+    ]
+    lower, upper = tails(statistic(*drawn), config.confidence)
+    return Estimate(value, float(lower), float(upper))
+
+
+def _median(values: FloatArray) -> FloatArray:
+    return np.asarray(np.median(values, axis=-1))
+
+
+def _check_finite(done: str, *groups: ArrayLike) -> None:
+    if any(np.isinf(np.asarray(values, np.float64)).any() for values in groups):
+        raise ValueError(f"{done} values must not be infinite; cap censored ones first")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from sdnn.runs.errors import RunError
 
-class ExperimentError(Exception):
+
+class ExperimentError(RunError):
     """Base of the errors whose message alone tells a user what to mend."""
 
 
@@ -12,7 +14,7 @@ class StoreError(ExperimentError):
 
 
 class PlotUnavailableError(ExperimentError):
-    """Figures were asked for, but matplotlib is not installed."""
+    """A figure or page needs a library that is not installed."""
 
 
 class ClusterError(ExperimentError):

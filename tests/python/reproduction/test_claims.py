@@ -4,8 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sdnn.reproduction import CaseResult, Estimate, TrialKey, TrialRecord, TrialRows, summarize
+from sdnn.reproduction import Estimate, TrialKey, TrialRecord, TrialRows, measure
 from sdnn.reproduction.cases import EXPERIMENTS
+from sdnn.reproduction.chances import MULTIPLES, Power, drawn_medians, powers
 from sdnn.reproduction.claims import (
     CLAIMS,
     Check,
@@ -17,24 +18,18 @@ from sdnn.reproduction.claims import (
     describe,
 )
 from sdnn.reproduction.cost import QUICK_COST, CostConfig
-from sdnn.reproduction.page import Call, to_html
-from sdnn.reproduction.power import MULTIPLES, Power, drawn_medians, powers
-from sdnn.reproduction.report import (
-    POWER_HEADER,
-    POWER_NOTE,
-    ExperimentReport,
-    Report,
-    to_json,
-)
+from sdnn.reproduction.report import POWER_NOTE, ExperimentReport, Report
 from sdnn.reproduction.verdicts import (
     CheckOutcome,
     ClaimOutcome,
     Verdict,
+    is_paper_scale,
     judge_claims,
     verdict_of,
 )
 from sdnn.runs.records import CostKey, CostRecord, StepTimes
 from sdnn.runs.registry import cost_series
+from sdnn.runs.report import Call
 from sdnn.runs.statistics import estimate_contrast, estimate_median
 
 CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
@@ -60,7 +55,7 @@ def result(case_id, agent, steps, n_trials=10, n_tests=1500):
         )
         for trial, taken in enumerate(per_trial)
     )
-    return summarize(CaseResult(CASES[case_id], agent, records))
+    return measure(CASES[case_id].title, records)
 
 
 def cost(series, n_inputs, microseconds, config=None):
@@ -165,21 +160,23 @@ def test_reports_tell_what_more_trials_would_say():
         experiments=(ExperimentReport(EXPERIMENTS[0], summaries),), costs=(), quick=False, seed=0,
         version="0", digest="d" * 64,
     )  # fmt: skip
-    *_, (title, header, rows) = report.tables()
-    assert (title, header) == ("What is undecided", POWER_HEADER)
+    table = report.tables()[-1]
+    assert table.title == "What is undecided"
+    assert table.header[-1] == f"{MULTIPLES[-1]} x the trials"
+    rows = table.rows
     assert POWER_NOTE in report.notes()
     row = next(row for row in rows if row[:2] == ("2", "final steps: SDNN-C, 4 inputs"))
     assert row[-1] == "100 / 0 %"
-    told = to_json(report)["powers"]
+    told = report.to_json()["powers"]
     assert [one["claim"] for one in told] == [int(row[0]) for row in rows]
     one = next(one for one in told if one["measured"] == row[1])
     assert one["with"][-1] == {"n_trials": 320, "holds": 1.0, "fails": 0.0}
     picture = b"<svg xmlns='http://www.w3.org/2000/svg'/>"
     call = Call(machine="", seconds=1, n_run=0, n_planned=0, processor_seconds=0)
-    assert "What is undecided" in to_html(report, {"experiment-a": picture}, call)
+    assert "What is undecided" in report.to_html({"experiment-a": picture}, call)
     decided = replace(report, experiments=(ExperimentReport(EXPERIMENTS[0], summaries[1:]),))
-    assert decided.tables()[-1][0] == "Beside the paper's claims"
-    assert "What is undecided" not in to_html(decided, {"experiment-a": picture}, call)
+    assert decided.tables()[-1].title == "Beside the paper's claims"
+    assert "What is undecided" not in decided.to_html({"experiment-a": picture}, call)
 
 
 @pytest.mark.parametrize("size", [{"n_trials": 9}, {"n_tests": 1499}])
@@ -195,26 +192,27 @@ def outcome_of(values, others=None, **limits):
     return CheckOutcome(check, estimate, verdict_of(check, estimate), samples)
 
 
-def test_power_is_of_what_is_undecided_only():
+def powers_of(outcome):
+    return powers(outcome.check, outcome.samples)
+
+
+def test_power_is_repeatable():
     undecided = outcome_of([3, 4, 5, 9], at_most=5)
     assert undecided.verdict == Verdict.UNDECIDED
-    assert [one.n_trials for one in powers(undecided)] == [4 * n for n in MULTIPLES]
-    assert powers(undecided) == powers(undecided)
-    assert powers(outcome_of([3, 4, 4, 4], at_most=5)) == ()
-    growth = CheckOutcome(undecided.check, undecided.estimate, Verdict.UNDECIDED)
-    assert powers(growth) == ()
+    assert [one.n_trials for one in powers_of(undecided)] == [4 * n for n in MULTIPLES]
+    assert powers_of(undecided) == powers_of(undecided)
 
 
 def test_power_says_what_more_trials_would_decide():
-    mostly_good = powers(outcome_of([4] * 7 + [math.inf] * 3, at_most=5))
+    mostly_good = powers_of(outcome_of([4] * 7 + [math.inf] * 3, at_most=5))
     assert [one.fails for one in mostly_good] == [0.0] * len(MULTIPLES)
     assert mostly_good[0].holds < 0.9
     assert mostly_good[-1].holds == 1.0
-    mostly_bad = powers(outcome_of([4] * 4 + [50] * 8, at_most=5))
+    mostly_bad = powers_of(outcome_of([4] * 4 + [50] * 8, at_most=5))
     assert mostly_bad[-1] == Power(12 * MULTIPLES[-1], 0.0, 1.0)
-    for one in powers(outcome_of([4] * 5 + [50] * 5, at_most=5)):  # a coin, however often thrown
+    for one in powers_of(outcome_of([4] * 5 + [50] * 5, at_most=5)):  # a coin, however often thrown
         assert one.holds + one.fails < 0.2
-    apart = powers(outcome_of([9, 10, 11, 30], [5, 8, 9, 10], at_least=1))
+    apart = powers_of(outcome_of([9, 10, 11, 30], [5, 8, 9, 10], at_least=1))
     assert apart[-1].holds > 0.95
     assert apart[-1].fails == 0.0
 
@@ -267,4 +265,4 @@ def test_summaries_do_not_mix_measures():
     summary = result("s4", "sdnn-c", [3] * 5 + [50] * 5)
     np.testing.assert_array_equal(summary.uncensored("episode_of_collapse"), [15000] * 5 + [0] * 5)
     assert summary.medians["final_share_solved"].value == 0.5
-    assert replace(summary, values=summary.values).is_paper_scale
+    assert is_paper_scale(replace(summary, values=summary.values))

@@ -8,7 +8,7 @@ import pytest
 from sdnn import _core, machine
 from sdnn.reproduction import AGENTS, CostConfig, Observer, ResultStore, StoreError, draw_cost
 from sdnn.reproduction.cost import QUICK_COST, cost_keys, measure_costs, measure_steps
-from sdnn.reproduction.report import cost_header, cost_rows
+from sdnn.reproduction.report import cost_table
 from sdnn.runs.records import StepTimes, records_digest
 from sdnn.runs.registry import cost_series
 
@@ -114,10 +114,11 @@ def test_damaged_costs_are_named(tmp_path, measured):
 
 
 def test_table_gives_times_and_growth(tmp_path, measured):
-    rows = cost_rows(measured(tmp_path, FakeMeasure(ends_after=2)))
+    rows = cost_table(measured(tmp_path, FakeMeasure(ends_after=2))).rows
     assert [row[0] for row in rows] == ["2"]
-    rows = cost_rows(measured(tmp_path / "all", FakeMeasure()))
-    assert cost_header()[1:] == (*(s.title for s in SERIES), "FQL's table")
+    table = cost_table(measured(tmp_path / "all", FakeMeasure()))
+    rows = table.rows
+    assert table.header[1:] == (*(s.title for s in SERIES), "FQL's table")
     assert rows[0][1] == "32 us [24 us, 40 us]"
     assert rows[1][1] == "128 us [96 us, 160 us], 4.0x"
     assert rows[1][-1] == "729 B"

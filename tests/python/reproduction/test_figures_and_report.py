@@ -10,24 +10,22 @@ import numpy as np
 import pytest
 
 import sdnn.reproduction.reproduce as reproduce_module
-from sdnn.palette import COLORS, colors_of
 from sdnn.reproduction import (
     AGENTS,
-    CaseResult,
     PlotUnavailableError,
     ProtocolConfig,
     ResultStore,
     collect,
     draw_experiment,
+    measure,
     plan_trials,
     select_experiments,
-    summarize,
 )
-from sdnn.reproduction.figures import SMOOTHED_TESTS, agent_colors, figure_bytes
-from sdnn.reproduction.page import Call, to_html, to_markdown
-from sdnn.reproduction.report import ExperimentReport, Report, format_estimate, to_json
+from sdnn.reproduction.report import ExperimentReport, Report
 from sdnn.reproduction.reproduce import ReproduceRequest, reproduce
+from sdnn.runs.figures import COLORS, SMOOTHED_TESTS, agent_colors, colors_of, figure_bytes
 from sdnn.runs.records import ROW_HEADER, records_digest, trial_rows
+from sdnn.runs.report import Call, format_estimate
 from sdnn.runs.statistics import Estimate, running_median
 
 (EXPERIMENT,) = select_experiments("a")
@@ -117,9 +115,9 @@ def test_figures_are_repeatable_to_the_byte(results):
     assert (png, svg) == figure_bytes(draw_experiment(EXPERIMENT, results))
 
 
-@pytest.mark.parametrize("module", ["figures", "page"])
+@pytest.mark.parametrize("module", ["figures", "report"])
 def test_missing_extra_is_told_before_any_trial(monkeypatch, tmp_path, module):
-    monkeypatch.setattr(f"sdnn.reproduction.{module}.find_spec", lambda name: None)
+    monkeypatch.setattr(f"sdnn.runs.{module}.find_spec", lambda name: None)
     request = ReproduceRequest(experiments=(EXPERIMENT,), out=tmp_path / "out", quick=True)
     with pytest.raises(PlotUnavailableError, match=re.escape('pip install "sdnn[reproduce]"')):
         reproduce(request)
@@ -142,7 +140,7 @@ def test_a_run_plans_once_and_reads_its_trials_once(monkeypatch, tmp_path, fake,
     request = ReproduceRequest(experiments=select_experiments("all"), out=tmp_path, quick=True)
     done = reproduce(request)
     # SDNN-C in Case I belongs to both figures.
-    assert [len(one.summaries) for one in done.report.experiments] == [2, 8]
+    assert [len(one.results) for one in done.report.experiments] == [2, 8]
     assert calls == ["plan"] + ["trial"] * 18
     with ResultStore(tmp_path) as store:
         assert done.report.digest == records_digest(store.load())
@@ -180,13 +178,13 @@ def test_mixed_settings_are_refused(results):
     (first, *others) = results[0].records
     odd = replace(first, key=first.key._replace(config_hash="other"))
     with pytest.raises(ValueError, match="share one configuration, got 2"):
-        CaseResult(results[0].case, "sdnn-c", (odd, *others))
+        measure("", (odd, *others))
     with pytest.raises(ValueError, match="got 0"):
-        CaseResult(results[0].case, "sdnn-c", ())
+        measure("", ())
 
 
 def test_summary_of_hand_made_trials(results):
-    summary = summarize(results[0])
+    summary = results[0]
     steps = results[0].steps
     first_good = [10.0 * (1 + int(np.argmax(row < 50))) for row in steps]
     assert summary.values["episodes_to_learn"].tolist() == first_good
@@ -194,7 +192,7 @@ def test_summary_of_hand_made_trials(results):
     assert summary.medians["final_share_solved"] == Estimate(1.0, 1.0, 1.0)
     assert summary.medians["episode_of_collapse"] == Estimate(math.inf, math.inf, math.inf)
     assert summary.uncensored("episode_of_collapse").tolist() == [3000.0] * 3
-    assert summary.median_curve_episodes_to_learn == np.median(first_good)
+    assert summary.to_json()["median_curve_episodes_to_learn"] == np.median(first_good)
     assert results[0].n_decisions == 3 * 7 * 3000
     assert results[0].microseconds_per_decision == pytest.approx(
         1e6 * sum(r.seconds for r in results[0].records) / 63000
@@ -214,9 +212,8 @@ def test_estimates_as_text():
 
 @pytest.fixture
 def report(results):
-    summaries = tuple(summarize(result) for result in results)
     return Report(
-        experiments=(ExperimentReport(EXPERIMENT, summaries),),
+        experiments=(ExperimentReport(EXPERIMENT, results),),
         costs=(),
         quick=False,
         seed=0,
@@ -226,22 +223,22 @@ def report(results):
 
 
 def test_tables_hold_cases_and_claims(report):
-    (title, header, rows), (_, claim_header, claims) = report.tables()
-    assert title == EXPERIMENT.title
-    assert [row[0] for row in rows] == [case.title for case in EXPERIMENT.cases]
-    assert {len(row) for row in rows} == {len(header)}
-    assert {len(row) for row in claims} == {len(claim_header)}
-    assert [row[0] for row in claims if row[0]] == ["1", "2", "8"]
-    assert {row[-1] for row in claims} == {"not judged", "not run"}
+    cases, claims = report.tables()
+    assert cases.title == EXPERIMENT.title
+    assert [row[0] for row in cases.rows] == [case.title for case in EXPERIMENT.cases]
+    assert {len(row) for row in cases.rows} == {len(cases.header)}
+    assert {len(row) for row in claims.rows} == {len(claims.header)}
+    assert [row[0] for row in claims.rows if row[0]] == ["1", "2", "8"]
+    assert {row[-1] for row in claims.rows} == {"not judged", "not run"}
 
 
 def test_json_is_valid_and_marks_what_is_censored(report):
     (one,) = report.experiments
     never = replace(
-        one.summaries[0],
-        values=one.summaries[0].values | {"episodes_to_learn": np.array([math.inf])},
+        one.results[0],
+        values=one.results[0].values | {"episodes_to_learn": np.array([math.inf])},
     )
-    table = to_json(replace(report, experiments=(replace(one, summaries=(never,)),)))
+    table = replace(report, experiments=(replace(one, results=(never,)),)).to_json()
     text = json.dumps(table, allow_nan=False)
     (case,) = json.loads(text)["experiments"][0]["cases"]
     assert case["measures"]["episodes_to_learn"]["trials"] == [">3000"]
@@ -250,10 +247,10 @@ def test_json_is_valid_and_marks_what_is_censored(report):
 
 
 def test_markdown_holds_the_tables(report):
-    markdown = to_markdown(replace(report, quick=True))
+    markdown = replace(report, quick=True).to_markdown()
     assert "not their result" in markdown
     lines = [line for line in markdown.splitlines() if line.startswith("|")]
-    assert len(lines) == sum(2 + len(rows) for _, _, rows in report.tables())
+    assert len(lines) == sum(2 + len(table.rows) for table in report.tables())
     assert "digest of the rows dddddddddddddddd" in markdown
 
 
@@ -271,18 +268,18 @@ def test_row_files_hold_every_test_episode_once(report, results):
 def test_page_is_one_file_with_everything(report):
     picture = b"<svg xmlns='http://www.w3.org/2000/svg'/>"
     call = Call(machine="a <machine>", seconds=61, n_run=6, n_planned=6, processor_seconds=7)
-    html = to_html(report, {"experiment-a": picture}, call)
+    html = report.to_html({"experiment-a": picture}, call)
     assert html.startswith("<!doctype html>")
     assert "data:image/svg+xml;base64," + base64.b64encode(picture).decode() in html
     assert not re.search(r'(src|href)="(?!data:)', html)
     assert "a &lt;machine&gt;" in html
     assert "Everything asked for was run in 1 min 1 s" in html
     assert "Smaller than the paper" in html
-    for _, header, rows in report.tables():
-        for cell in (*header, *(cell for row in rows for cell in row)):
-            assert escape(cell, quote=False).replace("&gt;", "&gt;") in html
-    for summary in report.experiments[0].summaries:
-        assert summary.result.config_hash in html
-        assert all(str(record.key.seed) in html for record in summary.result.records)
-    later = to_html(report, {"experiment-a": picture}, replace(call, n_run=2))
+    for table in report.tables():
+        for cell in (*table.header, *(cell for row in table.rows for cell in row)):
+            assert escape(cell, quote=False) in html
+    for result in report.results:
+        assert result.config_hash in html
+        assert all(str(record.key.seed) in html for record in result.records)
+    later = report.to_html({"experiment-a": picture}, replace(call, n_run=2))
     assert "4 of 6 trials were stored before" in later

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from sdnn.runs import EnvironmentSpec, Goal, Run, RunConfig, RunError
-from sdnn.runs.curves import curves_of, draw_curves, write_curves
+from sdnn.runs.curves import curves_of
+from sdnn.runs.figures import draw_curves, write_curves
 from sdnn.runs.groups import groups_of
 
 CONFIG = RunConfig(environment=EnvironmentSpec(id="CartPole-v1"))
@@ -261,6 +262,6 @@ def test_what_cannot_be_drawn(tmp_path, monkeypatch):
     run = make(tmp_path / "run", CONFIG)
     with pytest.raises(RunError, match="nothing to draw"):
         curves_of([run])
-    monkeypatch.setattr("sdnn.runs.curves.find_spec", lambda name: None)
+    monkeypatch.setattr("sdnn.runs.figures.find_spec", lambda name: None)
     with pytest.raises(RunError, match=r'pip install "sdnn\[plot\]"'):
         draw_curves([])

@@ -9,16 +9,8 @@ from sdnn.runs.statistics import (
     estimate_contrast,
     estimate_mean,
     estimate_median,
-    learning_curve,
     running_median,
 )
-
-
-def test_learning_curve_by_hand():
-    curve = learning_curve(np.array([10, 20], np.int32), [[1, 50], [2, 50], [3, 10], [4, 50]])
-    np.testing.assert_array_equal(curve.median, [2.5, 50])
-    np.testing.assert_array_equal(curve.lower, [1.75, 40])
-    np.testing.assert_array_equal(curve.upper, [3.25, 50])
 
 
 def test_bootstrap_of_two_values_is_exact():

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from sdnn.environments import AcrobotConfig, GoalScheduleConfig, SensorConfig
-from sdnn.reproduction.cases import PAPER_TRIALS
+from sdnn.reproduction.cases import PAPER_CASES, PAPER_TRIALS
 from sdnn.reproduction.sweep.settings import (
     Setting,
     Settings,
@@ -23,7 +23,6 @@ from sdnn.reproduction.sweep.settings import (
     place_of,
 )
 from sdnn.reproduction.sweep.study import (
-    PAPER_CASES,
     Combination,
     Study,
     StudyCase,

@@ -7,16 +7,12 @@ from dataclasses import dataclass
 
 import gymnasium as gym
 
-from sdnn.reproduction.cases import EXPERIMENTS, Case
 from sdnn.reproduction.sweep.settings import Settings, StudyFile, blamed, place_of
 from sdnn.runs.records import TrialKey
 from sdnn.runs.trial import opened
 from sdnn.runs.trial_config import PlannedTrial, TrialSettings, trial_seed
 from sdnn.toml_lines import KeyPath
 from sdnn.typed_values import possible_words
-
-PAPER_CASES: dict[str, Case] = {case.id: case for e in EXPERIMENTS for case in e.cases}
-"""The paper's cases by their ids; a case of two figures has the title of the later one."""
 
 
 @dataclass(frozen=True)

@@ -6,16 +6,14 @@ import math
 import numpy as np
 import pytest
 
-from sdnn.reproduction.figures import figure_bytes
-from sdnn.reproduction.page import Call
-from sdnn.reproduction.report import format_estimate
-from sdnn.reproduction.sweep.comparison import compare
-from sdnn.reproduction.sweep.figure import draw_study
-from sdnn.reproduction.sweep.page import to_html, to_markdown
-from sdnn.reproduction.sweep.report import StudyReport, format_difference, to_json
+from sdnn.reproduction.study_claims import StudyClaims, add_claims
 from sdnn.reproduction.verdicts import Verdict
+from sdnn.runs.comparison import compare
+from sdnn.runs.figures import draw_study, figure_bytes
 from sdnn.runs.records import TrialRecord, TrialRows
+from sdnn.runs.report import Call, format_estimate
 from sdnn.runs.statistics import Estimate
+from sdnn.runs.study_report import StudyReport
 
 
 def record(study, case, variant, number, steps, returns=None, interval=10):
@@ -36,6 +34,12 @@ def record(study, case, variant, number, steps, returns=None, interval=10):
         seconds=1.0,
         finished_at="",
         rows=rows,
+    )
+
+
+def report_of(comparison):
+    return StudyReport(
+        comparison=comparison, version="1", digest="abc", addition=add_claims(comparison)
     )
 
 
@@ -69,8 +73,8 @@ def records_of_two(study):
 def test_differences_are_paired_by_trial(study):
     found = compare(mine := study(TWO), records_of_two(mine))
     old, new = (found.measured["s4-noise", name] for name in ("old", "new"))
-    assert old.summary.values["final_share_solved"].tolist() == [1.0, 1.0, 0.2, 0.0]
-    assert new.summary.values["final_share_solved"].tolist() == [1.0, 1.0, 1.0, 0.9]
+    assert old.result.values["final_share_solved"].tolist() == [1.0, 1.0, 0.2, 0.0]
+    assert new.result.values["final_share_solved"].tolist() == [1.0, 1.0, 1.0, 0.9]
     assert old.solved_at_end.tolist() == [True, True, False, False]
     assert new.solved_at_end.tolist() == [True, True, True, True]
     assert old.differences == {}
@@ -80,8 +84,8 @@ def test_differences_are_paired_by_trial(study):
     assert share.lower == 0.0
     assert 0.8 <= share.upper <= 0.9
     # 26 of 50 tests in a row must be good: for the last time those that end with test 84.
-    assert old.summary.values["episode_of_collapse"].tolist() == [math.inf, math.inf, 840.0, 0.0]
-    assert new.summary.values["episode_of_collapse"].tolist() == 4 * [math.inf]
+    assert old.result.values["episode_of_collapse"].tolist() == [math.inf, math.inf, 840.0, 0.0]
+    assert new.result.values["episode_of_collapse"].tolist() == 4 * [math.inf]
     # Censored: as the last episode, 1000.
     assert new.differences["episode_of_collapse"].value == (0 + 0 + 160 + 1000) / 4
 
@@ -115,10 +119,7 @@ def test_what_only_lasts_longer_does_not_differ(study):
         longer = found.measured[case, "long"]
         assert longer.differences[name].value == 0.0
         assert not longer.differs(name)
-    tables = {
-        title: rows
-        for title, _, rows in StudyReport(comparison=found, version="1", digest="0").tables()
-    }
+    tables = {table.title: table.rows for table in report_of(found).tables()}
     rows = tables["Case I: 4 inputs, no noise"]
     assert [row[6] for row in rows] == [">1000 [>1000, >1000]", ">3000 [>3000, >3000]"]
     (row,) = tables["Case I: 4 inputs, no noise: less short, trial by trial"]
@@ -137,17 +138,21 @@ def test_claims_are_censored_where_their_own_trials_end(study):
         for number in range(6)
     ]
     found = compare(mine, records)
-    claim = found.claims["long"][1]  # of the episodes to learn in both
+    claim = StudyClaims(found).by_variant["long"][1]  # of the episodes to learn in both
     assert [checked.last_episode for checked in claim.outcome.checks] == [3000, 5000]
-    told = to_json(StudyReport(comparison=found, version="1", digest="0"))["claims"][0]
+    told = report_of(found).to_json()["claims"][0]
     assert [one["ours"]["value"] for one in told["checks"]] == [">3000", ">5000"]
 
 
 def test_returns_have_the_digits_that_tell_them_apart():
     small = Estimate(0.00498, 0.0049, 0.0051)
     assert format_estimate(small, "final_return", 9) == "0.00498 [0.0049, 0.0051]"
-    assert format_difference(Estimate(0.01, 0.01, 0.01), "mean_return") == "+0.01 [+0.01, +0.01]"
-    assert format_difference(Estimate(-0.01, -0.02, 0.01), "mean_return") == "-0.01 [-0.02, +0.01]"
+    assert (
+        format_estimate(Estimate(0.01, 0.01, 0.01), "mean_return", sign="+")
+        == "+0.01 [+0.01, +0.01]"
+    )
+    mixed = Estimate(-0.01, -0.02, 0.01)
+    assert format_estimate(mixed, "mean_return", sign="+") == "-0.01 [-0.02, +0.01]"
     assert format_estimate(Estimate(-0.04, -0.1, 3.0), "final_return", 9) == "0 [-0.1, 3]"
     large = Estimate(1234567.8, 1230000.0, 1240000.0)
     assert format_estimate(large, "final_return", 9) == "1234567.8 [1230000, 1240000]"
@@ -182,8 +187,7 @@ def test_what_is_not_complete_is_left_out_and_said_so(study):
     records = records_of_two(mine)
     found = compare(mine, records[:-1])
     assert list(found.measured) == [("s4-noise", "old")]
-    report = StudyReport(comparison=found, version="1", digest="0")
-    assert report.missing().startswith("Not complete: 1 of 2 combinations")
+    assert report_of(found).missing.startswith("Not complete: 1 of 2 combinations")
     found = compare(mine, records[4:])
     assert found.measured["s4-noise", "new"].differences == {}
     assert compare(mine, ()).measured == {}
@@ -216,7 +220,7 @@ def test_claims_are_judged_for_each_variant(study):
     found = compare(mine, claimed_records(mine))
     verdicts = {
         variant: {n: (c.outcome.verdict, c.moved) for n, c in claims.items()}
-        for variant, claims in found.claims.items()
+        for variant, claims in StudyClaims(found).by_variant.items()
     }
     assert verdicts == {
         "old": {
@@ -227,19 +231,19 @@ def test_claims_are_judged_for_each_variant(study):
         },
         "fuzzy": {3: (Verdict.HOLDS, None), 4: (Verdict.FAILS, None)},
     }  # fmt: skip
-    assert [claim.number for claim in found.claims_shown] == [3, 4, 5, 6, 7]
-    report = StudyReport(comparison=found, version="1", digest="0")
-    _, header, rows = report.claim_overview()
-    assert header == ("variant", "claim 3", "claim 4", "claim 5", "claim 6", "claim 7")
-    assert rows[1] == (
+    assert [claim.number for claim in StudyClaims(found).shown] == [3, 4, 5, 6, 7]
+    report = report_of(found)
+    overview = report.tables()[0]
+    assert overview.header == ("variant", "claim 3", "claim 4", "claim 5", "claim 6", "claim 7")
+    assert overview.rows[1] == (
         "new", "-", "-", "does not hold (moved)", "does not hold (moved)", "holds",
     )  # fmt: skip
     call = Call(machine="a machine", seconds=1.0, n_run=120, n_planned=120, processor_seconds=2.0)
-    page = to_html(report, b"<svg/>", call)
+    page = report.to_html(b"<svg/>", call)
     assert page.count('<td class="verdict bad">does not hold (moved)</td>') == 2
     assert page.count('<td class="verdict good">holds</td>') == 5
     assert "<summary>Claim 6: SDNN-C in Case III keeps solving until later" in page
-    table = to_json(report)
+    table = report.to_json()
     assert {(c["variant"], c["number"], c["moved"]) for c in table["claims"]} >= {
         ("new", 5, True), ("new", 7, False), ("old", 5, None),
     }  # fmt: skip
@@ -248,32 +252,37 @@ def test_claims_are_judged_for_each_variant(study):
 def test_chances_are_shown_from_twice_the_papers_trials_on(study):
     def chances(n_trials):
         mine = study(CLAIMED, n_trials=n_trials)
-        found = compare(mine, claimed_records(mine, n_trials))
-        return StudyReport(comparison=found, version="1", digest="0")
+        return report_of(compare(mine, claimed_records(mine, n_trials)))
 
-    assert chances(19).chance_table() is None
+    def tables(report):
+        return {table.title: table for table in report.tables()}
+
+    title = "How often ten trials show the claims"
+    assert title not in tables(chances(19))
     report = chances(20)
-    title, header, rows = report.chance_table()
-    assert title in [table[0] for table in report.tables()]
-    assert header[1:] == (*(f"claim {n}" for n in (3, 4, 5, 6, 7)), "all of these")
+    table = tables(report)[title]
+    assert table.header[1:] == (*(f"claim {n}" for n in (3, 4, 5, 6, 7)), "all of these")
     always, never = "100 % [100, 100]", "0 % [0, 0]"
-    assert rows == [
+    assert table.rows == [
         ("old", "-", "-", always, always, always, always),
         ("new", "-", "-", never, never, always, never),
         ("fuzzy", always, never, "-", "-", "-", never),
     ]
-    told = {(c["variant"], c["number"]): c["ten_trials_show_it"] for c in to_json(report)["claims"]}
+    told = {
+        (c["variant"], c["number"]): c["ten_trials_show_it"] for c in report.to_json()["claims"]
+    }
     assert told["new", 6] == {"value": 0.0, "lower": 0.0, "upper": 0.0}
     call = Call(machine="", seconds=1.0, n_run=0, n_planned=0, processor_seconds=1.0)
-    assert title in to_html(report, b"<svg/>", call)
+    assert title in report.to_html(b"<svg/>", call)
 
 
 def test_small_runs_are_not_judged_and_claims_without_their_cases_not_shown(study):
     mine = study(CLAIMED, n_trials=2)
     records = [r for r in claimed_records_of(mine, 2) if r.key.case_id != "s5-noise"]
     found = compare(mine, records)
-    assert [claim.number for claim in found.claims_shown] == [3, 5, 7]
-    outcomes = [c for claims in found.claims.values() for c in claims.values()]
+    claims = StudyClaims(found)
+    assert [claim.number for claim in claims.shown] == [3, 5, 7]
+    outcomes = [c for of_variant in claims.by_variant.values() for c in of_variant.values()]
     assert {c.outcome.verdict for c in outcomes} == {Verdict.NOT_JUDGED}
     assert {c.moved for c in outcomes} == {None}
 
@@ -287,7 +296,7 @@ def claimed_records_of(study, n_trials):
 def test_a_case_that_is_not_the_papers_has_no_claims(study):
     mine = study("[study]\ntrials = 10\n[cases.mine]\n[variants.a]\n")
     records = [record(mine, "mine", "a", n, steps_of((1500, 4))) for n in range(10)]
-    assert compare(mine, records).claims_shown == ()
+    assert StudyClaims(compare(mine, records)).shown == ()
 
 
 MIXED = """
@@ -315,20 +324,20 @@ def mixed(study):
         for variant, shift in (("a", 0.0), ("b", 10.0))
         for number in range(2)
     ]
-    return StudyReport(comparison=compare(mine, records), version="1", digest="abc")
+    return report_of(compare(mine, records))
 
 
 def test_environments_are_judged_by_their_return(mixed):
     swing = mixed.comparison.measured["swing", "b"]
-    assert swing.measures == ("final_return", "mean_return")
-    assert swing.summary.values["final_return"].tolist() == [28.5, 28.5]  # the last 2 of 20
-    assert swing.summary.values["mean_return"].tolist() == [19.5, 19.5]
+    assert tuple(swing.result.values) == ("final_return", "mean_return")
+    assert swing.result.values["final_return"].tolist() == [28.5, 28.5]  # the last 2 of 20
+    assert swing.result.values["mean_return"].tolist() == [19.5, 19.5]
     assert swing.differences["mean_return"].value == 10.0
     assert swing.solved_at_end is None
 
 
 def test_tables_have_a_row_for_each_variant_in_each_case(mixed):
-    tables = {title: (header, rows) for title, header, rows in mixed.tables()}
+    tables = {table.title: (table.header, table.rows) for table in mixed.tables()}
     header, rows = tables["Case I: 4 inputs, no noise"]
     assert header[:5] == ("variant", "agent", "trials", "end solved", "episodes to learn")
     # The tie rule of c is that of a: the same trials.
@@ -340,14 +349,14 @@ def test_tables_have_a_row_for_each_variant_in_each_case(mixed):
         ("b", "+10 [+10, +10]", "+10 [+10, +10]"), ("c", "0 [0, 0]", "0 [0, 0]"),
     ]  # fmt: skip
     assert "c is the same as a." in mixed.notes()
-    assert mixed.missing() is None
-    text = to_markdown(mixed)
+    assert mixed.missing is None
+    text = mixed.to_markdown()
     assert text.startswith("# Both | kinds\n\n3 variants in 2 cases, 2 trials each; reference: a.")
     assert "| b | +10 [+10, +10] | +10 [+10, +10] |" in text
 
 
 def test_the_table_is_json(mixed):
-    table = json.loads(json.dumps(to_json(mixed), allow_nan=False))
+    table = json.loads(json.dumps(mixed.to_json(), allow_nan=False))
     assert [(r["case"], r["variant"], r["n_end_solved"]) for r in table["results"]] == [
         ("s4", "a", 2), ("s4", "b", 2), ("s4", "c", 2),
         ("swing", "a", None), ("swing", "b", None), ("swing", "c", None),

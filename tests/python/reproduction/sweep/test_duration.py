@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from sdnn.reproduction import AGENTS, ProtocolConfig, TrialConfig, TrialKey
-from sdnn.reproduction.sweep import duration
-from sdnn.reproduction.sweep.duration import Duration, Durations, wall_seconds
+from sdnn.runs import forecast
+from sdnn.runs.forecast import Duration, Durations, wall_time
 from sdnn.runs.records import TrialTime
 
 CONFIG = TrialConfig(protocol=ProtocolConfig(n_learning_episodes=1005, test_interval=10))
@@ -57,7 +57,7 @@ def test_a_probe_is_made_once_for_a_case_and_agent(fake, monkeypatch):
             super().advance(n)
 
     clock = [0.0]
-    monkeypatch.setattr(duration.time, "thread_time", lambda: clock[0])
+    monkeypatch.setattr(forecast.time, "thread_time", lambda: clock[0])
     monkeypatch.setitem(AGENTS, "sdnn-c", replace(AGENTS["sdnn-c"], core_trial=Probed))
     durations = Durations([stored(1.0, n_episodes=0)])
     found = durations.of_trial(KEY, CONFIG)
@@ -73,11 +73,13 @@ def test_a_probe_is_made_once_for_a_case_and_agent(fake, monkeypatch):
 
 
 def test_python_trials_share_a_core(monkeypatch):
-    monkeypatch.setattr(duration, "n_cores", lambda: 16)
+    monkeypatch.setattr(forecast, "n_cores", lambda: 16)
     compiled, locked = (Duration(8.0, 16.0, ""), True), (Duration(4.0, math.inf, ""), False)
-    assert wall_seconds(4 * [compiled], 2) == (16.0, 32.0)
-    assert wall_seconds(2 * [compiled], 4) == (8.0, 16.0), "no trial is cut in parts"
-    assert wall_seconds([compiled, *4 * [locked]], 8) == (16.0, math.inf)
-    assert wall_seconds([], 2) == (0.0, 0.0)
-    monkeypatch.setattr(duration, "n_cores", lambda: 2)
-    assert wall_seconds(4 * [compiled], 64) == (16.0, 32.0), "no more at once than there are cores"
+    assert wall_time(4 * [compiled], 2) == Duration(16.0, 32.0)
+    assert wall_time(2 * [compiled], 4) == Duration(8.0, 16.0), "no trial is cut in parts"
+    assert wall_time([compiled, *4 * [locked]], 8) == Duration(16.0, math.inf)
+    assert wall_time([], 2) == Duration(0.0, 0.0)
+    monkeypatch.setattr(forecast, "n_cores", lambda: 2)
+    assert wall_time(4 * [compiled], 64) == Duration(16.0, 32.0), (
+        "no more at once than there are cores"
+    )

@@ -4,42 +4,42 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import sdnn.reproduction.kept_trials as kept_trials_module
+import sdnn.reproduction.reference_results as reference_module
 from sdnn.reproduction import (
     EXPERIMENTS,
-    CaseResult,
     Estimate,
     ProtocolConfig,
     ReproduceRequest,
     ResultStore,
     collect,
+    measure,
     plan_trials,
     run_trials,
     select_experiments,
-    summarize,
 )
 from sdnn.reproduction.cases import PAPER_EPISODES
 from sdnn.reproduction.chances import TenTrials
 from sdnn.reproduction.claims import CLAIMS, Check, Claim, Difference, Growth, Median, Subject
-from sdnn.reproduction.kept_trials import (
+from sdnn.reproduction.reference_results import (
     HEADER,
-    KeptTrials,
-    kept_csv,
-    kept_trials,
+    ReferenceResult,
+    reference_csv,
+    reference_results,
 )
-from sdnn.reproduction.page import Call, to_html
-from sdnn.reproduction.report import MORE_HEADER, ExperimentReport, Report, to_json
+from sdnn.reproduction.report import ExperimentReport, Report
 from sdnn.reproduction.reproduce import reproduce
-from sdnn.reproduction.results import TrialMeasures
 from sdnn.reproduction.verdicts import (
     CheckOutcome,
     ClaimOutcome,
     SettledClaim,
     Verdict,
+    is_paper_scale,
     judge_claims,
     settle,
 )
 from sdnn.runs.measures import STEP_MEASURES
+from sdnn.runs.report import Call
+from sdnn.runs.results import TrialMeasures
 
 CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
 
@@ -55,7 +55,7 @@ def measured(case_id, values, agent="sdnn-c", **more):
         "final_share_solved": np.ones(n),
     }
     own |= {name: np.array(found, float) for name, found in more.items()}
-    return TrialMeasures(case_id, agent, PAPER_EPISODES, own)
+    return TrialMeasures(case_id=case_id, agent=agent, last_episode=PAPER_EPISODES, values=own)
 
 
 def final_steps(case, **limits):
@@ -149,87 +149,85 @@ def test_claims_are_settled_by_trials_of_all_their_subjects():
     assert [one.more for one in settle(outcomes, kept[:1])] == [None] * len(outcomes)
 
 
-def test_the_kept_trials_are_of_the_papers_settings():
-    kept = kept_trials()
+def test_the_reference_results_are_of_the_papers_settings():
+    kept = reference_results()
     plan = plan_trials(CASES.values(), 1, kept[0].root_seed, ProtocolConfig())
     planned = {(*p.key[:2], p.key.config_hash) for p in plan}
     assert {(one.case_id, one.agent, one.config_hash) for one in kept} == planned
     for one in kept:
         assert one.n_trials >= 100
         assert len(set(one.rows_digests)) == one.n_trials
-        assert one.is_paper_scale
-        assert one.root_seed != 0  # what `sdnn reproduce` runs as it comes is not among them
+        assert is_paper_scale(one)
+        assert one.root_seed != 0  # what `sdnn reproduce` runs by default is not among them
 
 
 @pytest.mark.parametrize("agent", ["sdnn-c", "fuzzy"])
-def test_a_kept_trial_is_what_running_it_gives(tmp_path, agent):
-    kept = next(one for one in kept_trials() if (one.case_id, one.agent) == ("s4", agent))
+def test_a_reference_result_is_what_running_it_gives(tmp_path, agent):
+    kept = next(one for one in reference_results() if (one.case_id, one.agent) == ("s4", agent))
     plan = plan_trials([CASES["s4"]], 1, kept.root_seed, ProtocolConfig())
     own = [planned for planned in plan if planned.key.agent == agent]
     with ResultStore(tmp_path) as store:
         run_trials(own, store)
         (record,) = store.load()
     assert record.rows.digest()[:16] == kept.rows_digests[0]
-    summary = summarize(CaseResult(CASES["s4"], agent, (record,)))
+    summary = measure("", (record,))
     for name in STEP_MEASURES:
         assert summary.values[name][0] == kept.values[name][0]
 
 
 @pytest.fixture
-def fake_summaries(tmp_path, fake, run):
+def fake_results(tmp_path, fake, run):
     """Twelve fake trials of all episodes in each case of Experiment A."""
     plan = plan_trials(EXPERIMENTS[0].cases, 12, 0, ProtocolConfig())
     run(tmp_path, plan)
     with ResultStore(tmp_path) as store:
-        results = collect(EXPERIMENTS[0], store.load(p.key for p in plan))
-    return [summarize(result) for result in results]
+        return collect(EXPERIMENTS[0], store.load(p.key for p in plan))
 
 
-def test_what_is_written_of_trials_is_read_again(monkeypatch, tmp_path, fake_summaries):
-    content = kept_csv(fake_summaries, 7)
+def test_what_is_written_of_trials_is_read_again(monkeypatch, tmp_path, fake_results):
+    content = reference_csv(fake_results, 7)
     (tmp_path / "kept.csv").write_bytes(content)
     assert tuple(content.decode().splitlines()[0].split(",")) == HEADER
-    monkeypatch.setattr(kept_trials_module, "files", lambda package: tmp_path)
-    monkeypatch.setattr(kept_trials_module, "FILE_NAME", "kept.csv")
-    read = kept_trials_module.kept_trials.__wrapped__()
+    monkeypatch.setattr(reference_module, "files", lambda package: tmp_path)
+    monkeypatch.setattr(reference_module, "FILE_NAME", "kept.csv")
+    read = reference_module.reference_results.__wrapped__()
     assert [(one.case_id, one.root_seed, one.n_trials) for one in read] == [
         ("s4", 7, 12), ("s6", 7, 12)
     ]  # fmt: skip
-    for one, summary in zip(read, fake_summaries, strict=True):
-        assert one.config_hash == summary.result.config_hash
+    for one, summary in zip(read, fake_results, strict=True):
+        assert one.config_hash == summary.config_hash
         for name in STEP_MEASURES:
             np.testing.assert_array_equal(one.values[name], summary.values[name])
 
 
-def test_short_trials_are_not_kept(fake_summaries):
-    short = replace(fake_summaries[0], last_episode=300)
+def test_short_trials_are_not_kept(fake_results):
+    short = replace(fake_results[0], last_episode=300)
     with pytest.raises(ValueError, match=r"15000 learning episodes.* sdnn-c in s4 have 300"):
-        kept_csv([short], 7)
+        reference_csv([short], 7)
 
 
-def report_of(summaries, kept=()):
+def report_of(results, kept=()):
     return Report(
-        experiments=(ExperimentReport(EXPERIMENTS[0], tuple(summaries)),), costs=(), quick=False,
-        seed=0, version="0", digest="d" * 64, kept=tuple(kept),
+        experiments=(ExperimentReport(EXPERIMENTS[0], tuple(results)),), costs=(), quick=False,
+        seed=0, version="0", digest="d" * 64, reference=tuple(kept),
     )  # fmt: skip
 
 
-def test_reports_tell_what_kept_trials_say(fake_summaries):
+def test_reports_tell_what_reference_results_say(fake_results):
     picture = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}
     call = Call(machine="", seconds=1, n_run=0, n_planned=0, processor_seconds=0)
-    alone = report_of(fake_summaries)
-    assert "With more trials" not in [title for title, _, _ in alone.tables()]
-    assert "With more trials" not in to_html(alone, picture, call)
-    assert to_json(alone)["claims"][0]["with_more_trials"] is None
+    alone = report_of(fake_results)
+    assert "With more trials" not in [table.title for table in alone.tables()]
+    assert "With more trials" not in alone.to_html(picture, call)
+    assert alone.to_json()["claims"][0]["with_more_trials"] is None
 
     half = measured("s4", 10 * [4] + 10 * [50])
     kept = [
-        KeptTrials(**vars(one), config_hash="", root_seed=7, rows_digests=())
+        ReferenceResult(**vars(one), config_hash="", root_seed=7, rows_digests=())
         for one in (half, measured("s6", 20 * [4]))
     ]
-    report = report_of(fake_summaries, kept)
-    header, rows = next(table[1:] for table in report.tables() if table[0] == "With more trials")
-    assert header == MORE_HEADER
+    report = report_of(fake_results, kept)
+    rows = next(table.rows for table in report.tables() if table.title == "With more trials")
     ends = next(row for row in rows if row[0] == "2")
     assert ends[5] == "a matter of chance"
     assert ends[6].startswith("3")  # 0.377: six good trials among ten
@@ -237,9 +235,9 @@ def test_reports_tell_what_kept_trials_say(fake_summaries):
     assert [row[3:6] for row in checks] == [
         ("20", "27 [4, 50]", "undecided"), ("20", "4 [4, 4]", "holds")
     ]  # fmt: skip
-    told = next(one for one in to_json(report)["claims"] if one["number"] == 2)
+    told = next(one for one in report.to_json()["claims"] if one["number"] == 2)
     assert (told["verdict"], told["settled"]) == ("holds", "a matter of chance")
-    page = to_html(report, picture, call)
+    page = report.to_html(picture, call)
     assert "root seed 7" in page
     assert "<b>1</b>are a matter of chance with ten trials" in page
 
@@ -248,10 +246,10 @@ def test_only_more_trials_of_the_same_settings_are_shown(monkeypatch, tmp_path, 
     use_trial(fake.FakeTrial)
     (experiment,) = select_experiments("a")
 
-    def kept_of(**request):
+    def shown(**request):
         done = reproduce(ReproduceRequest(experiments=(experiment,), out=tmp_path, **request))
-        return {(one.case_id, one.n_trials) for one in done.report.kept}
+        return {(one.case_id, one.n_trials) for one in done.report.reference}
 
-    assert kept_of(n_trials=2) == {("s4", 100), ("s6", 100)}
-    assert kept_of(n_trials=2, n_episodes=100) == set()
-    assert kept_of(n_trials=101) == set()
+    assert shown(n_trials=2) == {("s4", 100), ("s6", 100)}
+    assert shown(n_trials=2, n_episodes=100) == set()
+    assert shown(n_trials=101) == set()

@@ -1,0 +1,97 @@
+"""Reference results: more trials than a run of the paper's ten, on other seeds.
+
+``reference-results.csv`` beside this file has the measures of each trial and the digest of its
+rows. They were run by ``sdnn reproduce b --trials 100 --seed 1``, and anybody's run of it gives
+them again.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from sdnn.reproduction.cases import PAPER_EPISODES
+from sdnn.runs.measures import STEP_MEASURES
+from sdnn.runs.results import CaseResult, TrialMeasures
+from sdnn.whole_files import csv_bytes
+
+FILE_NAME = "reference-results.csv"
+HEADER = ("case", "agent", "config_hash", "root_seed", "trial", "rows_digest", *STEP_MEASURES)
+"""Columns of the file: a row for each trial."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReferenceResult(TrialMeasures):
+    """The reference results of an agent in a case.
+
+    Parameters
+    ----------
+    config_hash
+        Hash of their settings.
+    root_seed
+        Root of their seeds.
+    rows_digests
+        Digest of the rows of each trial.
+    """
+
+    config_hash: str
+    root_seed: int
+    rows_digests: tuple[str, ...]
+
+
+@cache
+def reference_results() -> tuple[ReferenceResult, ...]:
+    """Read the reference results, those of a case and agent together."""
+    text = files("sdnn.reproduction").joinpath(FILE_NAME).read_text("utf-8")
+    groups: dict[tuple[str, ...], list[dict[str, str]]] = {}
+    for row in csv.DictReader(text.splitlines()):
+        groups.setdefault(tuple(row[name] for name in HEADER[:4]), []).append(row)
+    return tuple(
+        ReferenceResult(
+            case_id=case_id,
+            agent=agent,
+            last_episode=PAPER_EPISODES,
+            values={name: np.array([float(row[name]) for row in own]) for name in STEP_MEASURES},
+            config_hash=config_hash,
+            root_seed=int(root_seed),
+            rows_digests=tuple(row["rows_digest"] for row in own),
+        )
+        for (case_id, agent, config_hash, root_seed), own in groups.items()
+    )
+
+
+def reference_csv(results: Iterable[CaseResult], root_seed: int) -> bytes:
+    """Make the content of the file from trials that were run.
+
+    Parameters
+    ----------
+    results
+        Their measures.
+    root_seed
+        Root of their seeds.
+
+    Raises
+    ------
+    ValueError
+        If the trials have another length than the paper's.
+    """
+    rows = []
+    for result in results:
+        if result.last_episode != PAPER_EPISODES:
+            raise ValueError(
+                f"reference results have {PAPER_EPISODES} learning episodes, those of"
+                f" {result.agent} in {result.case_id} have {result.last_episode}"
+            )
+        for number, (key, digest) in enumerate(
+            (record.key, record.rows.digest()[:16]) for record in result.records
+        ):
+            measures = (f"{result.values[name][number]:g}" for name in STEP_MEASURES)
+            rows.append(
+                (key.case_id, key.agent, key.config_hash, root_seed, key.trial, digest, *measures)
+            )
+    return csv_bytes(HEADER, rows)

@@ -1,0 +1,373 @@
+"""Figures of stored rows: learning curves of runs and of trials, and of studies.
+
+matplotlib is an extra and is imported when it is needed. Figures are made without pyplot, so no
+window, backend or style of the user's session is touched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from importlib.util import find_spec
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.interrupts import stay_interrupts
+from sdnn.runs.comparison import Comparison, Measured
+from sdnn.runs.curves import HEADER, Curve, csv_rows
+from sdnn.runs.errors import RunError
+from sdnn.runs.measures import CENSORED_MEASURES, MeasureName
+from sdnn.runs.registry import AGENTS, agent_entry
+from sdnn.runs.results import CaseResult
+from sdnn.runs.statistics import estimate_mean, running_median
+from sdnn.runs.trial_errors import PlotUnavailableError
+from sdnn.whole_files import csv_bytes, write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLORS = (
+    "#1f5a96", "#c2542d", "#3c7d4b", "#7a5195", "#8a6d1d", "#4a4a4a",
+    "#2a9d9d", "#c65b8e", "#7fa328", "#9b3d3d",
+)  # fmt: skip
+INK = "#2b2b2b"
+FAINT = "#6f6f6f"
+GRID = "#e4e4e4"
+
+SUFFIXES = (".png", ".svg", ".pdf")
+"""Kinds of figures that the curves of runs may be written as."""
+
+SMOOTHED_TESTS = 25
+"""Test episodes in the running median of a long run, which lies over the thin median curve."""
+
+CASES_PER_ROW = 5
+"""More cases of a study continue below."""
+
+_LINE_HEIGHT = 0.27
+_PANEL_WIDTH = 2.9
+_SPREAD = 0.3
+"""Half the height over which the dots of a variant are spread."""
+
+_TITLES: dict[MeasureName, str] = {
+    "final_share_solved": "share solved at the end",
+    "episode_of_collapse": "episode of collapse",
+    "final_return": "mean return at the end",
+    "mean_return": "mean return of all tests",
+}
+_OF_STEPS, _OF_RETURNS = tuple(_TITLES)[:2], tuple(_TITLES)[2:]
+
+
+def require_matplotlib(extra: str = "reproduce") -> None:
+    """Raise a `PlotUnavailableError` that names an extra if matplotlib is not installed."""
+    if find_spec("matplotlib") is None:
+        raise PlotUnavailableError(
+            f'figures need matplotlib, which is not installed: pip install "sdnn[{extra}]"'
+        )
+
+
+def colors_of(places: Sequence[int]) -> list[str]:
+    """Return the colors of things by their places in a list of which they are a part.
+
+    A thing has the same color whatever else is shown. Only where two would have the same, the later
+    one takes the next that is free, while there is any.
+    """
+    taken: list[int] = []
+    for place in places:
+        turns = [(place + turn) % len(COLORS) for turn in range(len(COLORS))]
+        taken.append(next((color for color in turns if color not in taken), turns[0]))
+    return [COLORS[number] for number in taken]
+
+
+def agent_colors(agents: Iterable[str]) -> dict[str, str]:
+    """Return the colors of agents, each once, by their places in the registry."""
+    shown, places = list(dict.fromkeys(agents)), list(AGENTS)
+    return dict(zip(shown, colors_of([places.index(agent) for agent in shown]), strict=True))
+
+
+def figure_bytes(figure: Figure) -> tuple[bytes, bytes]:
+    """Return a figure as PNG and as SVG; the same rows give the same bytes."""
+    from matplotlib import rc_context
+
+    png, svg = BytesIO(), BytesIO()
+    with stay_interrupts(), rc_context({"svg.hashsalt": "sdnn"}):
+        figure.savefig(png, format="png", dpi=200, metadata={"Software": None})
+        figure.savefig(svg, format="svg", metadata={"Date": None})
+    return png.getvalue(), svg.getvalue()
+
+
+def as_written(figure: Figure) -> Figure:
+    """Leave dollar signs in a figure's words as they are: the user's titles hold no formulas."""
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        text.set_parse_math(False)
+    return figure
+
+
+def style(axes: Axes, grid: Literal["x", "y"] = "y") -> None:
+    """Draw a panel in the style of all figures of trials, with grid lines across one axis."""
+    axes.grid(axis=grid, color=GRID, linewidth=0.7)
+    axes.set_axisbelow(True)
+    axes.tick_params(colors=INK, labelsize=8.5)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def write_footer(figure: Figure, text: str) -> None:
+    """Write small lines at the lower left."""
+    figure.text(
+        0.012, 0.07 / figure.get_figheight(), text, fontsize=6.5, va="bottom", color=FAINT,
+        linespacing=1.4,
+    )  # fmt: skip
+
+
+def draw_steps(
+    axes: Axes, results: Sequence[CaseResult], colors: dict[str, str], *, smooth: bool
+) -> None:
+    """Draw steps of test episodes: a median and an interquartile band per agent, the first on top.
+
+    Parameters
+    ----------
+    axes
+        The panel.
+    results
+        One for each agent.
+    colors
+        By agent.
+    smooth
+        Whether to put running medians over the curves.
+    """
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    for depth, result in enumerate(reversed(results)):
+        lower, middle, upper = result.quartiles
+        color, title = colors[result.agent], agent_entry(result.agent).title
+        thin = {"linewidth": 0.4, "alpha": 0.45} if smooth else {"linewidth": 0.9, "label": title}
+        axes.plot(result.episode, middle, color=color, zorder=2 + depth, **thin)
+        if smooth:
+            lower, middle, upper = (running_median(q, SMOOTHED_TESTS) for q in result.quartiles)
+            axes.plot(
+                result.episode, middle, color=color, linewidth=1.6, zorder=4 + depth, label=title
+            )
+        axes.fill_between(result.episode, lower, upper, color=color, alpha=0.2, linewidth=0)
+    axes.set_xlim(0, max(result.last_episode for result in results))
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
+    style(axes)
+
+
+def draw_curves(curves: Sequence[Curve]) -> Figure:
+    """Draw the curves of runs: a panel per task, a color per agent."""
+    require_matplotlib("plot")
+    from matplotlib.figure import Figure
+
+    tasks = list(dict.fromkeys(curve.task for curve in curves))
+    agents = list(dict.fromkeys(curve.agent for curve in curves))
+    colors = dict(zip(agents, colors_of(range(len(agents))), strict=True))
+    figure = Figure(figsize=(7.5, 3.6 * len(tasks)), layout="constrained")
+    panels = figure.subplots(len(tasks), squeeze=False)[:, 0]
+    for task, axes in zip(tasks, panels, strict=True):
+        for curve in curves:
+            if curve.task == task:
+                _draw_curve(axes, curve, colors[curve.agent])
+        axes.set_title(task, fontsize=10)
+        axes.set_xlabel("steps")
+        axes.set_ylabel("return")
+        axes.grid(alpha=0.25)
+        axes.legend(fontsize=8, frameon=False)
+    return figure
+
+
+def write_curves(curves: Sequence[Curve], path: Path) -> tuple[Path, Path]:
+    """Draw the curves of runs into a file, and write their numbers beside it as CSV.
+
+    Returns
+    -------
+    tuple
+        Both files.
+
+    Raises
+    ------
+    RunError
+        If the name has another ending than those of `SUFFIXES`, or matplotlib is not installed.
+    OSError
+        If a file cannot be written.
+    """
+    if path.suffix not in SUFFIXES:
+        raise RunError(f"out must end in one of {', '.join(SUFFIXES)}, got {path}")
+    content = BytesIO()
+    figure = draw_curves(curves)
+    with stay_interrupts():
+        figure.savefig(content, format=path.suffix[1:], dpi=150)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    numbers = path.with_suffix(".csv")
+    write_whole(path, content.getvalue())
+    write_whole(numbers, csv_bytes(HEADER, csv_rows(curves)))
+    return path, numbers
+
+
+def _draw_curve(axes: Axes, curve: Curve, color: str) -> None:
+    of = f" ({curve.n_runs} runs)" if curve.n_runs > 1 else ""
+    label = f"{curve.agent}: {curve.kind}{of}"
+    if curve.kind == "return":
+        axes.plot(curve.steps, curve.values, ".", ms=2, color=color, alpha=0.25, label=label)
+        return
+    is_main = curve.kind == "evaluation" or curve.n_runs > 1
+    width, dashes, marker = (1.8, "-", "o") if is_main else (1.0, "--", "")
+    axes.plot(
+        curve.steps, curve.values, dashes, lw=width, marker=marker, ms=3, color=color, label=label
+    )
+    if curve.low is not None and curve.high is not None:
+        axes.fill_between(curve.steps, curve.low, curve.high, color=color, alpha=0.2, lw=0)
+
+
+def draw_study(comparison: Comparison, footer: str) -> Figure:
+    """Draw a study: for each case two panels, one below the other, with a line for each variant.
+
+    Faint dots are trials, since outcomes often lie in two heaps; a large dot is their median, of
+    shares their mean, and a bar its interval. It is filled for the reference and where a variant
+    differs from it.
+
+    Parameters
+    ----------
+    comparison
+        The results, at least one.
+    footer
+        Where the rows come from.
+    """
+    require_matplotlib()
+    from matplotlib.figure import Figure
+
+    cases = comparison.cases
+    blocks = [cases[i : i + CASES_PER_ROW] for i in range(0, len(cases), CASES_PER_ROW)]
+    n_columns = max(len(block) for block in blocks)
+    n_rows = 2 * len(blocks)
+    panel_height = 0.35 + _LINE_HEIGHT * len(comparison.variants)
+    labels = 0.3 + 0.072 * max(len(variant.title) for variant in comparison.variants)
+    width = max(6.4, labels + n_columns * _PANEL_WIDTH + 0.3)
+    top, bottom, gap = 0.95, 0.95, 0.75
+    height = top + bottom + n_rows * panel_height + (n_rows - 1) * gap
+    figure = Figure(figsize=(width, height))
+    figure.subplots_adjust(
+        left=labels / width, right=1 - 0.3 / width, top=1 - top / height, bottom=bottom / height,
+        hspace=gap / panel_height, wspace=0.14,
+    )  # fmt: skip
+    grid = figure.subplots(n_rows, n_columns, squeeze=False)
+    for number, block in enumerate(blocks):
+        for column in range(n_columns):
+            pair = grid[2 * number : 2 * number + 2, column]
+            if column < len(block):
+                _draw_case(pair, comparison, block[column].id, with_names=column == 0)
+                pair[0].set_title(block[column].title, fontsize=9, loc="left", color=INK)
+                continue
+            for axes in pair:
+                axes.set_visible(False)
+    study = comparison.study
+    figure.text(0.012, 1 - 0.12 / height, study.title, fontsize=12, va="top", color=INK)
+    figure.text(
+        0.012, 1 - 0.36 / height,
+        f"{study.n_trials} trials per case and variant; compared with {study.reference} (dotted)",
+        fontsize=8.5, va="top", color=FAINT,
+    )  # fmt: skip
+    # Triangles are drawn where trials differ in length, and so in where they are cut off.
+    ends = {one.result.last_episode for one in comparison.measured.values()}
+    write_footer(
+        figure,
+        "Faint dots: trials. Large dot: their median (of the share solved: mean) with its 95 %"
+        " interval; filled: the reference, and what\ndiffers from it trial by trial (the interval"
+        " of the mean paired difference leaves 0 out)."
+        " Numbers at the right: trials that end solved.\n"
+        + ("Triangles: beyond the last episode. " if len(ends) > 1 else "")
+        + footer,
+    )
+    return as_written(figure)
+
+
+def _draw_case(
+    pair: NDArray[np.object_], comparison: Comparison, case_id: str, *, with_names: bool
+) -> None:
+    measured = comparison.of_case(case_id)
+    lines = {variant.id: line for line, variant in enumerate(comparison.variants)}
+    reference = comparison.study.reference
+    colors = agent_colors(one.result.agent for one in comparison.measured.values())
+    ends = {one.result.last_episode for one in measured}
+    for axes, name in zip(
+        pair, _OF_STEPS if "final_steps" in measured[0].result.values else _OF_RETURNS, strict=True
+    ):
+        for one in measured:
+            if name in one.result.values:
+                # Where all trials are of one length, what is censored lies at the axis' end.
+                marks_censored = name in CENSORED_MEASURES and len(ends) > 1
+                _draw_variant(
+                    axes, one, name, lines[one.variant.id], colors[one.result.agent],
+                    one.variant.id == reference, marks_censored,
+                )  # fmt: skip
+        _label_case(axes, name, max(ends))
+        axes.set_ylim(len(lines) - 0.4, -0.6)
+        axes.set_yticks(
+            range(len(lines)), [v.title if with_names else "" for v in comparison.variants]
+        )
+        if reference in lines:
+            axes.get_yticklabels()[lines[reference]].set_fontweight("bold")
+
+
+def _draw_variant(
+    axes: Axes, measured: Measured, name: MeasureName, line: int, color: str, is_reference: bool,
+    marks_censored: bool,
+) -> None:  # fmt: skip
+    result = measured.result
+    scale = 100 if name == "final_share_solved" else 1
+    values = scale * result.uncensored(name)
+    # By rank, so that equal values lie side by side and the picture is the same each time.
+    order = np.argsort(np.argsort(values, kind="stable"))
+    offsets = np.linspace(-_SPREAD, _SPREAD, values.size)[order] if values.size > 1 else np.zeros(1)
+    is_beyond = marks_censored & np.isinf(result.values[name])
+    for mark, shown in (("o", ~is_beyond), (">", is_beyond)):
+        if shown.any():
+            axes.scatter(
+                values[shown], (line + offsets)[shown], s=9, color=color, alpha=0.28, linewidths=0,
+                zorder=2, marker=mark,
+            )  # fmt: skip
+    estimate = result.medians[name]
+    if name == "final_share_solved":
+        # Most trials end near 0 or 1: their median would jump from one to the other.
+        estimate = estimate_mean(result.values[name])
+    value, lower, upper = (
+        scale * (result.last_episode if np.isinf(end) else end) for end in vars(estimate).values()
+    )
+    axes.plot([lower, upper], [line, line], color=color, linewidth=1.6, zorder=3)
+    is_filled = is_reference or measured.differs(name)
+    axes.plot(
+        value, line, ">" if marks_censored and np.isinf(estimate.value) else "o", markersize=5.5,
+        color=color, zorder=4, clip_on=False, markeredgewidth=1.3,
+        markerfacecolor=color if is_filled else "white",
+    )  # fmt: skip
+    if is_reference:
+        axes.axvline(value, color=color, linewidth=0.9, linestyle=":", zorder=1)
+    if name == "final_share_solved":
+        axes.text(
+            1.01, line, measured.end_solved.replace(" of ", "/"), fontsize=6.5, color=FAINT,
+            va="center", transform=axes.get_yaxis_transform(),
+        )  # fmt: skip
+
+
+def _label_case(axes: Axes, name: MeasureName, last: int) -> None:
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    axes.set_xlabel(_TITLES[name], fontsize=8, color=INK)
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]))
+    if name == "final_share_solved":
+        axes.set_xlim(-3, 103)
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g} %"))
+    elif name == "episode_of_collapse":
+        axes.set_xlim(-0.03 * last, 1.03 * last)
+        axes.xaxis.set_major_formatter(
+            FuncFormatter(lambda value, _: f">{value:,.0f}" if value >= last else f"{value:,.0f}")
+        )
+    style(axes, grid="x")
+    axes.tick_params(labelsize=8)
+    axes.tick_params(axis="y", length=0)
+    axes.spines["left"].set_visible(False)
