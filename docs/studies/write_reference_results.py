@@ -4,6 +4,8 @@
     python docs/studies/write_reference_results.py --store results --trials 100 --seed 1
 
 `sdnn reproduce` judges the paper's claims by these trials, too, where its ten leave one undecided.
+Where a change gave configurations new hashes and left all rows as they are, ``--rekey`` writes the
+new hashes and leaves the measures as they are.
 """
 
 from __future__ import annotations
@@ -11,33 +13,47 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from sdnn.reproduction import ProtocolConfig, ResultStore, measure, plan_trials
+from sdnn.reproduction import ProtocolConfig, ResultStore, case_config, measure, plan_trials
 from sdnn.reproduction.cases import PAPER_CASES
-from sdnn.reproduction.reference_results import FILE_NAME, reference_csv
+from sdnn.reproduction.reference_results import FILE_NAME, reference_csv, reference_results
 
 FILE = Path(__file__).parents[2] / "python" / "sdnn" / "reproduction" / FILE_NAME
 
 
-def main() -> None:
-    """Read the trials and write their measures."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--store", type=Path, default=Path("results"), help="folder of the store")
-    parser.add_argument("--trials", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
+def rekey() -> None:
+    """Replace the hashes of configurations."""
+    text = FILE.read_text()
+    for one in reference_results():
+        new = case_config(PAPER_CASES[one.case_id], one.agent).config_hash
+        start = f"{one.case_id},{one.agent},"
+        text = text.replace(f"{start}{one.config_hash},", f"{start}{new},")
+    FILE.write_text(text)
+
+
+def write(store_folder: Path, n_trials: int, seed: int) -> None:
+    """Read the trials of a store and write their measures."""
     results = []
-    with ResultStore(options.store, read_only=True) as store:
+    with ResultStore(store_folder, read_only=True) as store:
         stored = store.keys()
-        plan = plan_trials(PAPER_CASES.values(), options.trials, options.seed, ProtocolConfig())
+        plan = plan_trials(PAPER_CASES.values(), n_trials, seed, ProtocolConfig())
         for case in PAPER_CASES.values():
             for agent in case.agents:
                 keys = [p.key for p in plan if p.key[:2] == (case.id, agent) and p.key in stored]
                 if keys:
                     results.append(measure(case.title, store.load(keys)))
-    FILE.write_bytes(reference_csv(results, options.seed))
+    FILE.write_bytes(reference_csv(results, seed))
     for result in results:
         print(f"{result.case_id} {result.agent}: {result.n_trials} trials")
 
 
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--store", type=Path, default=Path("results"), help="folder of the store")
+    parser.add_argument("--trials", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--rekey", action="store_true", help="write hashes only")
+    options = parser.parse_args()
+    if options.rekey:
+        rekey()
+    else:
+        write(options.store, options.trials, options.seed)

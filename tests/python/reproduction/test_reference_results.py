@@ -153,7 +153,9 @@ def test_the_reference_results_are_of_the_papers_settings():
     kept = reference_results()
     plan = plan_trials(CASES.values(), 1, kept[0].root_seed, ProtocolConfig())
     planned = {(*p.key[:2], p.key.config_hash) for p in plan}
-    assert {(one.case_id, one.agent, one.config_hash) for one in kept} == planned
+    assert {(one.case_id, one.agent, one.config_hash) for one in kept} == planned, (
+        "if no row changed, run docs/studies/write_reference_results.py --rekey"
+    )
     for one in kept:
         assert one.n_trials >= 100
         assert len(set(one.rows_digests)) == one.n_trials
