@@ -31,7 +31,7 @@ class Scaling:
     Parameters
     ----------
     ranges
-        Lowest and highest value of each variable, which become 0 and 1; None: they are not known.
+        Lowest and highest value of each variable, which become 0 and 1.
     n_redundant
         How many means of neighbours follow them: of variables 0 and 1, of 1 and 2, ..., of the last
         and 0, and so on in a circle.
@@ -48,13 +48,11 @@ class Scaling:
     '0 from -4 to 4, 1 from 0 to 1, and means of neighbours (1)'
     """
 
-    ranges: tuple[tuple[float, float], ...] | None
+    ranges: tuple[tuple[float, float], ...]
     n_redundant: int = 0
 
     def __post_init__(self) -> None:
         whole("n_redundant", self.n_redundant, 0, 1000)
-        if self.ranges is None:
-            return
         try:
             pairs = tuple((real("ranges", a), real("ranges", b)) for a, b in self.ranges)
         except (OverflowError, TypeError, ValueError):
@@ -64,17 +62,13 @@ class Scaling:
         object.__setattr__(self, "ranges", pairs)
 
     @property
-    def ends(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    def ends(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lowest and highest values, shapes (n,): what `sdnn.environments.UnitSensors` takes."""
-        if self.ranges is None:
-            return None
         low, high = np.array(self.ranges, np.float64).T
         return low, high
 
     def words(self) -> str:
-        """Say it in a line; "" where ranges are not known."""
-        if self.ranges is None:
-            return ""
+        """Say it in a line."""
         most = 8
         ranges = [f"{i} from {low:.6g} to {high:.6g}" for i, (low, high) in enumerate(self.ranges)]
         words = ", ".join(ranges[:most]) + (", ..." if len(ranges) > most else "")
@@ -82,10 +76,6 @@ class Scaling:
 
     def lines(self) -> Iterator[str]:
         """Say of each observed number what it is."""
-        if self.ranges is None:
-            yield "not known here, where the environment cannot be made: the ranges of its space,"
-            yield "or those of config.json"
-            return
         n_variables = len(self.ranges)
         for i, (low, high) in enumerate(self.ranges):
             yield f"observation[{i}]: variable {i}, from {low!r} to {high!r}"
@@ -95,14 +85,13 @@ class Scaling:
 
     def values(self) -> dict[str, Any]:
         """Give it as JSON has it."""
-        ranges = None if self.ranges is None else [list(pair) for pair in self.ranges]
-        return {"ranges": ranges, "redundant": self.n_redundant}
+        return {"ranges": [list(pair) for pair in self.ranges], "redundant": self.n_redundant}
 
     @classmethod
     def of_values(cls, values: Mapping[str, Any], n_variables: int) -> Scaling:
         """Make it of what `values` gave; ValueError if it does not fit so many numbers."""
         scaling = cls(ranges=values["ranges"], n_redundant=values["redundant"])
-        n = None if scaling.ranges is None else len(scaling.ranges) + scaling.n_redundant
-        if n not in (None, n_variables):
+        n = len(scaling.ranges) + scaling.n_redundant
+        if n != n_variables:
             raise ValueError(f"scaling must be of {n_variables} observed numbers, got {n}")
         return scaling

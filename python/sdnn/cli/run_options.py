@@ -268,13 +268,12 @@ def _lines_of_ranges(report: Mapping[str, Any]) -> Iterator[str]:
 
 def _lines_of_scaling(run: Run, scaling: Scaling | None) -> Iterator[str]:
     """Say what the agent needs wherever else it acts."""
-    words = "" if scaling is None else scaling.words()
-    if not words:
-        return
-    yield (
-        f"the agent observes variables scaled to [0, 1], {words}: elsewhere it needs the same, as"
-        f" sdnn.runs.Run.open({str(run.folder)!r}).config.environment.make() gives it"
-    )
+    if scaling is not None:
+        yield (
+            f"the agent observes variables scaled to [0, 1], {scaling.words()}: elsewhere it needs"
+            f" the same, as sdnn.runs.Run.open({str(run.folder)!r}).config.environment.make()"
+            " gives it"
+        )
 
 
 def _listed(words: Sequence[str]) -> str:

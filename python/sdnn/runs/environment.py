@@ -203,15 +203,11 @@ class EnvironmentSpec(Settings, frozen=True):
     def scaling(self, env: gym.Env[Any, Any] | None = None) -> Scaling | None:
         """Say how what an agent observes is scaled; None: not at all.
 
-        Without an environment that `make` gave, one is made. The ranges are not known where it
-        cannot be.
+        Without an environment that `make` gave, one is made.
         """
         if not self.changes_observations:
             return None
-        try:
-            low, high = self.scaled_ranges() if env is None else _scaled_from(env)
-        except RunError:
-            return Scaling(ranges=None, n_redundant=self.redundant)
+        low, high = self.scaled_ranges() if env is None else _scaled_from(env)
         ranges = tuple(zip(low.tolist(), high.tolist(), strict=True))
         return Scaling(ranges=ranges, n_redundant=self.redundant)
 

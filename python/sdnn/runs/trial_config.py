@@ -86,7 +86,7 @@ class TrialSettings(ABC):
 
         Equal settings give equal text, however they were typed.
         """
-        values = asdict(self)
+        values = asdict(self)  # type: ignore[call-overload]
         if version := agent_entry(self.agent).version:
             values["agent_version"] = version
         return json.dumps(
