@@ -57,7 +57,7 @@ def test_the_agent_of_the_page_runs(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "name",
     [
-        "environments.unit_sensors", "runs.environment_trial", "runs.measures",
+        "runs.environment_trial", "runs.measures",
         "runs.report", "runs.statistics", "reproduction.report",
         "reproduction.sweep.settings", "toml_lines", "typed_values",
     ],

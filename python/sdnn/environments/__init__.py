@@ -19,10 +19,8 @@ import gymnasium as gym
 
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.config import AcrobotConfig, GoalScheduleConfig, SensorConfig
-from sdnn.environments.goal_schedule import GoalSchedule
-from sdnn.environments.sensors import AcrobotSensors, NoisySensors, RedundantSensors
-from sdnn.environments.tightening_goal import TighteningGoal
-from sdnn.environments.unit_sensors import UnitSensors
+from sdnn.environments.goal import GoalSchedule, TighteningGoal
+from sdnn.environments.sensors import AcrobotSensors, NoisySensors, RedundantSensors, UnitSensors
 from sdnn.environments.vector_env import AcrobotSwingUpVectorEnv
 
 __all__ = [

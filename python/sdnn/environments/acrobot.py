@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Literal
 
 import gymnasium as gym
@@ -10,13 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.arguments import choice, one_of, real
-from sdnn.environments.acrobot_motion import AcrobotMotion
 from sdnn.environments.config import AcrobotConfig
+from sdnn.environments.picture import AcrobotMotion, AcrobotPicture
 
 if TYPE_CHECKING:
     from gymnasium.core import RenderFrame
-
-    from sdnn.environments.acrobot_picture import AcrobotPicture
 
 __all__ = ["AcrobotSwingUpEnv"]
 
@@ -97,22 +96,10 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
     1 to 0.01 over 10,000 learning episodes: that is the wrapper `TighteningGoal`, which is given
     the episode.
 
-    | `goal_tolerance` | solved by random torques | solved by `SDNNQLearning`, in decisions |
-    |------------------|--------------------------|----------------------------------------|
-    | 1                | 92 %                     | 100 %, 3                               |
-    | 0.3              | 38 %                     | 100 %, 5                               |
-    | 0.1              | 10 %                     | 100 %, 7                               |
-    | 0.03             | 3 %                      | 100 %, 8                               |
-    | 0.01             | 1 %                      | 77 %, 7.5                              |
-
-    Random: 500 episodes. `SDNNQLearning` learns with the tolerance fixed, 10 seeds: test episodes
-    after 300 to 1,000 learning episodes, and the median of the seeds' median decisions. The
-    smallest tolerance is better learned by way of larger ones, and so are the last two with
-    `preset="paper"`: 61 % and 19 %, 5 seeds.
-
     ## Arguments
 
-    - `config`: an `AcrobotConfig`, all the numbers above;
+    - `config`: an `AcrobotConfig`, all the numbers above and the alternatives where the paper is
+      silent;
     - `goal_tolerance`: the factor of the goal's speed limits, >= 0;
     - `render_mode`: `"human"`, a window in real time; `"rgb_array"`, a picture at each decision;
       `"rgb_array_list"`, all pictures since the last `render()`, 25 a second; or None. Pictures
@@ -135,22 +122,6 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
     (0.0, False, False, 0.496)
 
     ```
-
-    ## Open readings
-
-    The paper is silent or garbled in print at some points. The alternatives can be chosen:
-
-    | Point           | Default                  | Alternatives                   |
-    |-----------------|--------------------------|--------------------------------|
-    | goal looked for | `goal_test="every_step"` | `"decision_instant"`           |
-    | idling          | `idle_angle` 5 degrees   | pi / 5; 0 (no such rule)       |
-    | integration     | `integration_step=0.02`  | any whole fraction of a second |
-
-    How the tolerance falls is a reading of `GoalScheduleConfig`.
-
-    ## Version history
-
-    - v0: first version
 
     ## References
 
@@ -184,7 +155,7 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         self.render_mode = render_mode
         self._acrobot = _core.Acrobot(self.config.to_core())
         self._was_reset = False
-        self._tolerance = self._goal_tolerance
+        self._tolerance = self.goal_tolerance
         self._torque = 0.0
         self._success = False
         self._picture: AcrobotPicture | None = None
@@ -203,24 +174,18 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
 
     @goal_tolerance.setter
     def goal_tolerance(self, value: float) -> None:
-        self._goal_tolerance = _tolerance_of(value)
+        tolerance = real("goal_tolerance", value)
+        if not tolerance >= 0.0:
+            raise ValueError(f"goal_tolerance must be at least 0, got {value!r}")
+        self._goal_tolerance = tolerance
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[Any], dict[str, Any]]:
-        """Begin an episode at rest, hanging down.
+        """Begin an episode at rest, hanging down; the seed changes nothing.
 
-        Parameters
-        ----------
-        seed : int, optional
-            Changes nothing: there is no randomness to seed.
-        options : dict, optional
-            ``"goal_tolerance"``: of this episode and those that follow; without it, as before.
-
-        Raises
-        ------
-        ValueError
-            For an unknown option or a tolerance below 0.
+        The option ``"goal_tolerance"`` holds for this episode and later ones. ValueError for an
+        unknown option or a tolerance below 0.
         """
         super().reset(seed=seed)
         options = options or {}
@@ -230,30 +195,20 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
                 f"options may hold 'goal_tolerance', got {', '.join(map(repr, unknown))}"
             )
         self.goal_tolerance = options.get("goal_tolerance", self.goal_tolerance)
-        self._tolerance = self._goal_tolerance
+        self._tolerance = self.goal_tolerance
         self._was_reset = True
         self._torque = 0.0
         self._success = False
         self._acrobot.reset()
         self._pictures.clear()
         if self._motion is not None:
-            self._show(self._draw_present())
+            self._show(())
         return self._observation(), self._info()
 
     def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
-        """Hold a torque for one decision interval.
+        """Hold a torque, a share of ``config.max_torque``, for one decision interval.
 
-        Parameters
-        ----------
-        action : array_like, shape (1,)
-            The torque as a share of ``config.max_torque``, in [-1, 1].
-
-        Raises
-        ------
-        ValueError
-            Unless the action is one number in [-1, 1].
-        RuntimeError
-            If the episode is over.
+        ValueError unless the action is one number in [-1, 1], RuntimeError if the episode is over.
         """
         if not self._was_reset:
             raise gym.error.ResetNeeded("call reset before step")
@@ -261,13 +216,11 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         if share.size != 1 or not abs(share.item()) <= 1.0:
             raise ValueError(f"action must be one number in [-1, 1], got {action!r}")
         self._torque = self.config.max_torque * share.item()
-        before = self._acrobot.state()
+        before = None if self._motion is None else self._acrobot.state()
         reward, terminated, truncated = self._acrobot.step(self._torque, self._tolerance)
         self._success = terminated
-        if self._motion is not None:
-            for state, height in self._motion.between(before, self._torque, self._tolerance):
-                self._show(self._draw(state, height, solved=False))
-            self._show(self._draw_present())
+        if self._motion is not None and before is not None:
+            self._show(self._motion.between(before, self._torque, self._tolerance))
         return self._observation(), reward, terminated, truncated, self._info()
 
     @property
@@ -276,13 +229,10 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         return self._acrobot.state()
 
     def render(self) -> RenderFrame | list[RenderFrame] | None:
-        """Draw the present state.
+        """Return a picture of the present state, shape (500, 500, 3).
 
-        Returns
-        -------
-        ndarray, shape (500, 500, 3), or list of these, or None
-            With ``"rgb_array"`` one, with ``"rgb_array_list"`` those of all states since the last
-            call, a ``"render_fps"``-th second apart, else none.
+        With ``"rgb_array_list"``, those of all states since the last call, a ``"render_fps"``-th
+        second apart; with ``"human"``, None.
         """
         if self.render_mode is None:
             gym.logger.warn("render() needs a render_mode: 'human', 'rgb_array', 'rgb_array_list'")
@@ -290,30 +240,20 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         if self.render_mode == "rgb_array_list":
             pictures, self._pictures = self._pictures, []
             return pictures
-        return self._draw_present()
+        return self._draw(self.state, self._success)
 
-    def _show(self, picture: NDArray[np.uint8] | None) -> None:
-        """Keep a picture for `render`; in a window it is seen already."""
-        if picture is not None:
-            self._pictures.append(picture)
+    def _show(self, states: Iterable[NDArray[np.float64]]) -> None:
+        """Draw states and the present one; keep the pictures for `render`, unless in a window."""
+        pictures = [self._draw(state, solved=False) for state in states]
+        pictures.append(self._draw(self.state, self._success))
+        self._pictures += [picture for picture in pictures if picture is not None]
 
-    def _draw_present(self) -> NDArray[np.uint8] | None:
-        return self._draw(self._acrobot.state(), self._acrobot.tip_height(), self._success)
-
-    def _draw(
-        self, state: NDArray[np.float64], tip_height: float, solved: bool
-    ) -> NDArray[np.uint8] | None:
+    def _draw(self, state: NDArray[np.float64], solved: bool) -> NDArray[np.uint8] | None:
         if self._picture is None:
-            from sdnn.environments.acrobot_picture import AcrobotPicture
-
             window_fps = self.metadata["render_fps"] if self.render_mode == "human" else None
             self._picture = AcrobotPicture(self.config, window_fps)
         return self._picture.draw(
-            state=state,
-            torque=self._torque,
-            decision=self._acrobot.decisions(),
-            tip_height=tip_height,
-            solved=solved,
+            state=state, torque=self._torque, decision=self._acrobot.decisions(), solved=solved
         )
 
     def close(self) -> None:
@@ -332,10 +272,3 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
             "goal_tolerance": self._tolerance,
             "is_success": self._success,
         }
-
-
-def _tolerance_of(value: Any) -> float:
-    tolerance = real("goal_tolerance", value)
-    if not tolerance >= 0.0:
-        raise ValueError(f"goal_tolerance must be at least 0, got {value!r}")
-    return tolerance

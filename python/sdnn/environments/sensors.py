@@ -1,24 +1,25 @@
-"""Redundant and noisy sensors, in the paper's order: redundancy first, then noise on all."""
+"""Other sensors for any environment: scaled, redundant, noisy; and all sensors of the acrobot."""
 
 from __future__ import annotations
 
-import abc
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, cast
 
 import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.arguments import choice, seed_of
+from sdnn.bounds import with_infinities
 from sdnn.environments.config import SensorConfig
 
-__all__ = ["AcrobotSensors", "NoisySensors", "RedundantSensors"]
+__all__ = ["AcrobotSensors", "NoisySensors", "RedundantSensors", "UnitSensors"]
 
 Observation = NDArray[Any]
 SensorFunction = Callable[[Observation], float]
 Edge = Literal["wrap", "saturate"]
+NoiseStream = Literal["sensor_noise", "evaluation_sensor_noise"]
 
 _NAMED: dict[str, SensorFunction] = {
     "energy": lambda s: _core.energy_sensor(s[2], s[3]),
@@ -26,9 +27,70 @@ _NAMED: dict[str, SensorFunction] = {
 }
 
 
-class RedundantSensors(
+class _Sensors(
     gym.ObservationWrapper[Observation, Any, Observation], gym.utils.RecordConstructorArgs
 ):
+    """A wrapper of an environment that observes a vector of numbers."""
+
+    def __init__(self, env: gym.Env[Observation, Any], **arguments: Any) -> None:
+        gym.utils.RecordConstructorArgs.__init__(self, **arguments)
+        super().__init__(env)
+        space = env.observation_space
+        if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
+            raise ValueError(f"env must have a one-dimensional Box of observations, got {space}")
+        self._space = space
+        self._float: Any = np.float64 if space.dtype == np.float64 else np.float32
+
+
+class UnitSensors(_Sensors):
+    """Scales every observed variable to [0, 1]; values outside its range are clipped.
+
+    With it, `NoisySensors` fits any environment: its sigma then is in parts of each range.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        With a one-dimensional ``Box`` of observations, shape (l,).
+    observation_low, observation_high : array_like, shape (l,), optional
+        The ranges, also attributes; by default the bounds of the observation space.
+
+    Raises
+    ------
+    ValueError
+        For observations of another kind, ranges of another length or without an extent, and
+        infinite bounds for which no range is given.
+
+    Examples
+    --------
+    >>> import gymnasium as gym
+    >>> env = UnitSensors(gym.make("Pendulum-v1"))
+    >>> env.observation_space
+    Box(0.0, 1.0, (3,), float64)
+    """
+
+    def __init__(
+        self,
+        env: gym.Env[Observation, Any],
+        observation_low: ArrayLike | None = None,
+        observation_high: ArrayLike | None = None,
+    ) -> None:
+        super().__init__(env, observation_low=observation_low, observation_high=observation_high)
+        self.observation_low = _ends("observation_low", observation_low, self._space.low)
+        self.observation_high = _ends("observation_high", observation_high, self._space.high)
+        if not (self.observation_low < self.observation_high).all():
+            raise ValueError(
+                "observation_low must be below observation_high,"
+                f" got {self.observation_low} and {self.observation_high}"
+            )
+        self.observation_space = gym.spaces.Box(0.0, 1.0, self._space.shape, np.float64)
+
+    def observation(self, observation: Observation) -> NDArray[np.float64]:
+        """Scale an observation, shape (l,)."""
+        low, high = self.observation_low, self.observation_high
+        return np.clip((np.asarray(observation, np.float64) - low) / (high - low), 0.0, 1.0)
+
+
+class RedundantSensors(_Sensors):
     """Appends functions of the observation to it.
 
     Parameters
@@ -37,7 +99,7 @@ class RedundantSensors(
         With a one-dimensional ``Box`` of observations, shape (l,).
     functions : sequence of {"energy", "height"} or callable
         ``"energy"`` is the paper's s5 = 2 ((s3 - 1/2)^2 + (s4 - 1/2)^2); ``"height"`` its s6 =
-        (2 + cos 2 pi s1 - cos 2 pi (s1 + s2)) / 4. A callable is given the wrapped environment's
+        (2 + cos 2 pi s1 - cos 2 pi (s1 + s2)) / 4. A callable receives the wrapped environment's
         observation, shape (l,), and returns a number.
     bounds : sequence of (low, high), optional
         Of each function's values; by default (0, 1).
@@ -61,25 +123,22 @@ class RedundantSensors(
         functions: Sequence[str | SensorFunction] = ("energy", "height"),
         bounds: Sequence[tuple[float, float]] | None = None,
     ) -> None:
-        gym.utils.RecordConstructorArgs.__init__(self, functions=functions, bounds=bounds)
-        super().__init__(env)
-        space = _vector_space(env)
+        super().__init__(env, functions=functions, bounds=bounds)
         self.functions = tuple(functions)
         self._functions = tuple(
             function if callable(function) else choice("functions", function, _NAMED)
             for function in functions
         )
-        if bounds is None:
-            bounds = [(0.0, 1.0)] * len(self._functions)
-        if len(bounds) != len(self._functions):
+        ends = [(0.0, 1.0)] * len(self._functions) if bounds is None else bounds
+        if len(ends) != len(self._functions):
             raise ValueError(
                 f"bounds must have {len(self._functions)} entries, one per function, "
-                f"got {len(bounds)}"
+                f"got {len(ends)}"
             )
-        low = np.append(space.low, [low for low, _ in bounds])
-        high = np.append(space.high, [high for _, high in bounds])
-        dtype = _float_type(space)
-        self.observation_space = gym.spaces.Box(low.astype(dtype), high.astype(dtype), dtype=dtype)
+        low: NDArray[Any] = np.append(self._space.low, [low for low, _ in ends])
+        high: NDArray[Any] = np.append(self._space.high, [high for _, high in ends])
+        low, high = low.astype(self._float), high.astype(self._float)
+        self.observation_space = gym.spaces.Box(low, high, dtype=self._float)
 
     def observation(self, observation: Observation) -> Observation:
         """Append the functions' values, shape (l + n_functions,)."""
@@ -87,22 +146,27 @@ class RedundantSensors(
         return np.append(observation, extra).astype(_float_of(observation))
 
 
-class _RandomSensors(
-    gym.ObservationWrapper[Observation, Any, Observation], gym.utils.RecordConstructorArgs, abc.ABC
-):
-    """Sensors with a random stream of their own."""
+class _RandomSensors(_Sensors):
+    """Sensors with a random stream of their own, which `_restart` starts anew."""
+
+    def __init__(
+        self, env: gym.Env[Observation, Any], *, seed: int, stream: str, **arguments: Any
+    ) -> None:
+        super().__init__(env, seed=seed, stream=stream, **arguments)
+        streams = ("sensor_noise", "evaluation_sensor_noise")
+        known = {name: _core.Stream.__members__[name] for name in streams}
+        self._stream = choice("stream", stream, known)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Reset the environment; a ``seed`` starts what the sensors draw at random anew, too."""
+        """Reset the environment; a ``seed`` also restarts what the sensors draw at random."""
         if seed is not None:
             self._restart(seed)
         return super().reset(seed=seed, options=options)
 
-    @abc.abstractmethod
     def _restart(self, seed: int) -> None:
-        """Start the stream anew."""
+        raise NotImplementedError
 
 
 class NoisySensors(_RandomSensors):
@@ -144,27 +208,21 @@ class NoisySensors(_RandomSensors):
         sigma: float = 0.02,
         edge: Edge | Sequence[Edge] | None = None,
         seed: int = 0,
-        stream: Literal["sensor_noise", "evaluation_sensor_noise"] = "sensor_noise",
+        stream: NoiseStream = "sensor_noise",
     ) -> None:
-        gym.utils.RecordConstructorArgs.__init__(
-            self, sigma=sigma, edge=edge, seed=seed, stream=stream
-        )
-        super().__init__(env)
-        space = _vector_space(env)
-        n_channels = space.shape[0]
-        if not (np.all(space.low >= 0.0) and np.all(space.high <= 1.0)):
+        super().__init__(env, sigma=sigma, edge=edge, seed=seed, stream=stream)
+        (n_channels,) = self._space.shape
+        if not (np.all(self._space.low >= 0.0) and np.all(self._space.high <= 1.0)):
             raise ValueError("the observation space must lie within [0, 1] in every channel")
-        if edge is None:
-            words: list[str] = ["wrap" if i < 2 else "saturate" for i in range(n_channels)]
-        else:
+        words: list[str] = ["wrap" if i < 2 else "saturate" for i in range(n_channels)]
+        if edge is not None:
             words = [edge] * n_channels if isinstance(edge, str) else list(edge)
         if len(words) != n_channels:
             raise ValueError(f"edge must have {n_channels} entries, got {len(words)}")
         self.sigma = sigma
         self._edges = [choice("edge", word, _core.SensorEdge.__members__) for word in words]
-        self._stream = _stream(stream)
         self._restart(seed)
-        self.observation_space = gym.spaces.Box(0.0, 1.0, (n_channels,), _float_type(space))
+        self.observation_space = gym.spaces.Box(0.0, 1.0, (n_channels,), self._float)
 
     def observation(self, observation: Observation) -> Observation:
         """Add the noise, shape (l,)."""
@@ -176,7 +234,7 @@ class NoisySensors(_RandomSensors):
 
 
 class AcrobotSensors(_RandomSensors):
-    """All that a `SensorConfig` can say, over the acrobot: what a compiled trial observes.
+    """The sensors of a `SensorConfig` on the acrobot: what a compiled trial observes.
 
     The same numbers as `NoisySensors` over `RedundantSensors`, and the inputs and the entry of
     noise that these do not know. Observations have the order s1..s6, constant, random.
@@ -186,10 +244,8 @@ class AcrobotSensors(_RandomSensors):
     env : gymnasium.Env
         An `AcrobotSwingUpEnv`, in wrappers or not: the state is read from it.
     config : SensorConfig
-    seed : int
-        Where noise and random inputs start; ``reset(seed=...)`` with a number starts them anew.
-    stream : {"sensor_noise", "evaluation_sensor_noise"}
-        Which of the core's streams: that of a trial's learning episodes or of its test episodes.
+    seed, stream
+        As those of `NoisySensors`, of noise and of random inputs.
 
     Raises
     ------
@@ -209,13 +265,10 @@ class AcrobotSensors(_RandomSensors):
         env: gym.Env[Observation, Any],
         config: SensorConfig,
         seed: int = 0,
-        stream: Literal["sensor_noise", "evaluation_sensor_noise"] = "sensor_noise",
+        stream: NoiseStream = "sensor_noise",
     ) -> None:
-        gym.utils.RecordConstructorArgs.__init__(self, config=config, seed=seed, stream=stream)
-        super().__init__(env)
-        self._float = _float_type(_vector_space(env))
+        super().__init__(env, config=config, seed=seed, stream=stream)
         self._config = config.to_core()
-        self._stream = _stream(stream)
         self._restart(seed)
         self.observation_space = gym.spaces.Box(0.0, 1.0, (config.n_inputs,), self._float)
 
@@ -228,26 +281,24 @@ class AcrobotSensors(_RandomSensors):
         self._sensors = _core.AcrobotSensors(self._config, seed_of(seed), self._stream)
 
 
-_STREAMS = ("sensor_noise", "evaluation_sensor_noise")
-
-
-def _stream(name: str) -> _core.Stream:
-    known = {member: _core.Stream.__members__[member] for member in _STREAMS}
-    return choice("stream", name, known)
-
-
-def _vector_space(env: gym.Env[Observation, Any]) -> gym.spaces.Box:
-    space = env.observation_space
-    if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
-        raise ValueError(f"env must have a one-dimensional Box of observations, got {space}")
-    return space
-
-
 def _float_of(observation: Observation) -> np.dtype[Any]:
-    """Give the type of an observation with fractions: as it is told, unless in whole numbers."""
+    """Return the type of an observation, or that of fractions if it has whole numbers."""
     dtype = np.asarray(observation).dtype
     return dtype if dtype.kind == "f" else np.dtype(np.float32)
 
 
-def _float_type(space: gym.spaces.Box) -> type[np.floating[Any]]:
-    return np.float64 if space.dtype == np.float64 else np.float32
+def _ends(name: str, given: ArrayLike | None, bounds: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the lower or upper ends of all ranges, shape (l,)."""
+    ends = with_infinities(np.asarray(bounds if given is None else given, np.float64))
+    if ends.shape != bounds.shape:
+        raise ValueError(
+            f"{name} must have {bounds.size} numbers, one per observed variable, got {given!r}"
+        )
+    unbounded = np.flatnonzero(~np.isfinite(ends))
+    if unbounded.size:
+        raise ValueError(
+            f"{name} must be given where observations are unbounded (variables"
+            f" {', '.join(map(str, unbounded))} of {bounds.size}, from 0): one finite number per"
+            " variable; values outside saturate"
+        )
+    return ends

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
@@ -14,9 +14,7 @@ from sdnn import _core
 from sdnn.arguments import one_of, whole
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.config import AcrobotConfig
-
-if TYPE_CHECKING:
-    from sdnn.environments.acrobot_picture import AcrobotPicture
+from sdnn.environments.picture import AcrobotPicture
 
 __all__ = ["AcrobotSwingUpVectorEnv"]
 
@@ -125,21 +123,12 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[NDArray[Any], dict[str, Any]]:
-        """Begin an episode in every environment, at rest, hanging down.
+        """Begin an episode in every environment, at rest, hanging down; seeds change nothing.
 
-        Parameters
-        ----------
-        seed : int or sequence of (int or None), shape (num_envs,), optional
-            Changes nothing: there is no randomness to seed.
-        options : dict, optional
-            ``"goal_tolerance"``: of this episode and those that follow, a number or an array of
-            shape (num_envs,); without it, as before. ``"reset_mask"``: bool array, shape
-            (num_envs,): the environments to reset, and the only ones whose tolerance changes.
-
-        Raises
-        ------
-        ValueError
-            For an unknown option, a tolerance below 0 or a wrong number of seeds.
+        The option ``"goal_tolerance"``, a number or an array of shape (num_envs,), holds for this
+        episode and later ones. ``"reset_mask"``, bools of shape (num_envs,), has the environments
+        to reset, the only ones whose tolerance changes. ValueError for an unknown option, a
+        tolerance below 0 or a wrong number of seeds.
         """
         options = dict(options or {})
         mask = self._reset_mask(options.pop("reset_mask", None))
@@ -149,7 +138,9 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
                 "options may hold 'goal_tolerance' and 'reset_mask', "
                 f"got {', '.join(map(repr, sorted(options)))}"
             )
-        self._check_seed(seed)
+        n_seeds = self.num_envs if seed is None or isinstance(seed, int | np.integer) else len(seed)
+        if n_seeds != self.num_envs:
+            raise ValueError(f"seed must have num_envs={self.num_envs} items, got {n_seeds}")
         super().reset(seed=seed if isinstance(seed, int) else None)
         self._goal_tolerance[mask] = tolerances[mask]
         self._begin(mask)
@@ -160,25 +151,11 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
     ) -> tuple[
         NDArray[Any], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
     ]:
-        """Hold a torque for one decision interval in every environment; reset those that ended.
+        """Hold torques for one decision interval in every environment; reset those that ended.
 
-        Parameters
-        ----------
-        actions : array_like, shape (num_envs, 1)
-            The torques as shares of ``config.max_torque``, in [-1, 1].
-
-        Returns
-        -------
-        observations : ndarray, shape (num_envs, 4)
-        rewards : ndarray, shape (num_envs,)
-        terminations, truncations : ndarray of bool, shape (num_envs,)
-        infos : dict
-            Arrays with one item per environment.
-
-        Raises
-        ------
-        ValueError
-            Unless each action is one number in [-1, 1]; then nothing has moved.
+        Actions have the shape (num_envs, 1), shares of ``config.max_torque``; what is returned has
+        an item for each environment. ValueError unless each action is one number in [-1, 1]; then
+        nothing has moved.
         """
         if not self._was_reset.all():
             raise gym.error.ResetNeeded("call reset before step")
@@ -209,22 +186,17 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
             gym.logger.warn("render() needs a render_mode: 'rgb_array'")
             return None
         if self._picture is None:
-            from sdnn.environments.acrobot_picture import AcrobotPicture
-
             self._picture = AcrobotPicture(self.config, None)
-        pictures = []
-        heights = self._batch.tip_heights()
-        for i, state in enumerate(self._batch.states()):
-            picture = self._picture.draw(
+        pictures = (
+            self._picture.draw(
                 state=state,
                 torque=float(self._torques[i]),
                 decision=self._batch.decisions(i),
-                tip_height=float(heights[i]),
                 solved=bool(self._success[i]),
             )
-            assert picture is not None
-            pictures.append(picture)
-        return tuple(pictures)
+            for i, state in enumerate(self._batch.states())
+        )
+        return tuple(picture for picture in pictures if picture is not None)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Let go of the pictures."""
@@ -233,21 +205,13 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
             self._picture = None
 
     def _reset_mask(self, mask: Any) -> NDArray[np.bool_]:
-        if mask is None:
-            return np.ones(self.num_envs, np.bool_)
-        chosen = np.asarray(mask)
+        chosen = np.ones(self.num_envs, np.bool_) if mask is None else np.asarray(mask)
         if chosen.dtype != np.bool_ or chosen.shape != (self.num_envs,) or not chosen.any():
             raise ValueError(
                 f"options['reset_mask'] must be a bool array of shape ({self.num_envs},) with at "
                 f"least one True, got {mask!r}"
             )
         return chosen
-
-    def _check_seed(self, seed: int | Sequence[int | None] | None) -> None:
-        if seed is None or isinstance(seed, int | np.integer):
-            return
-        if len(seed) != self.num_envs:
-            raise ValueError(f"seed must have num_envs={self.num_envs} items, got {len(seed)}")
 
     def _tolerances_of(self, values: ArrayLike) -> NDArray[np.float64]:
         try:
@@ -279,16 +243,14 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         return self._batch.observations().astype(self._dtype)
 
     def _infos(self, mask: NDArray[np.bool_]) -> dict[str, Any]:
-        """Arrays over the environments, 0 where the mask is not set, and the masks."""
-        values = {
+        """Return arrays over the environments, 0 where the mask is not set, and the masks."""
+        infos: dict[str, Any] = {
             "state": self._batch.states(),
             "tip_height": self._batch.tip_heights(),
             "goal_tolerance": self._tolerances.copy(),
             "is_success": self._success.copy(),
         }
-        infos: dict[str, Any] = {}
-        for key, value in values.items():
+        for key, value in list(infos.items()):
             value[~mask] = 0
-            infos[key] = value
             infos[f"_{key}"] = mask.copy()
         return infos

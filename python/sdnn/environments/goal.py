@@ -1,4 +1,4 @@
-"""A goal that tightens while the agent learns."""
+"""The goal tolerance lambda(k), which falls with the learning episode k."""
 
 from __future__ import annotations
 
@@ -9,9 +9,42 @@ from typing import Any
 import gymnasium as gym
 from numpy.typing import NDArray
 
-from sdnn.environments.goal_schedule import GoalSchedule
+from sdnn import _core
+from sdnn.arguments import whole
+from sdnn.environments.config import GoalScheduleConfig
 
-__all__ = ["TighteningGoal"]
+__all__ = ["GoalSchedule", "TighteningGoal"]
+
+
+class GoalSchedule:
+    """The goal tolerance lambda as a function of the number of the learning episode.
+
+    `TighteningGoal` applies it to an environment. ValueError if a number of ``config`` is outside
+    its range.
+
+    Examples
+    --------
+    >>> from sdnn.environments import GoalSchedule, GoalScheduleConfig
+    >>> schedule = GoalSchedule()
+    >>> schedule(100), schedule(300), schedule(10001)
+    (0.5, 0.25, 0.01)
+    >>> GoalSchedule(GoalScheduleConfig(kind="inverse_sqrt"))(99)
+    0.1
+    """
+
+    def __init__(self, config: GoalScheduleConfig | None = None) -> None:
+        self.config = config or GoalScheduleConfig()
+        self._core = _core.GoalSchedule(self.config.to_core())
+
+    def __call__(self, episode: int) -> float:
+        """Return the goal tolerance of the 1-based learning episode; ValueError below 1."""
+        return float(self._core(whole("episode", episode, 1, 2**31 - 1)))
+
+    def __reduce__(self) -> tuple[type[GoalSchedule], tuple[GoalScheduleConfig]]:
+        return GoalSchedule, (self.config,)  # environments are copied with their schedule
+
+    def __repr__(self) -> str:
+        return f"GoalSchedule({self.config})"
 
 
 class TighteningGoal(
@@ -19,11 +52,10 @@ class TighteningGoal(
 ):
     """Gives the environment the goal tolerance of a learning episode.
 
-    The learning episode is the caller's to count: ``reset(options={"episode": k})`` begins episode
-    k. A reset without that option keeps the episode it has, and a seed does not change it either,
-    so evaluation never moves the task. Where a loop in other hands calls ``reset()``, set
-    the attribute ``episode``, which holds from the next reset on. For vector environments with a
-    copy of the wrapper in each: ``envs.set_attr("episode", k)``.
+    The caller counts the learning episodes: ``reset(options={"episode": k})`` begins episode k.
+    A reset without that option keeps the episode, so evaluation never moves the task. Where a loop
+    in other hands calls ``reset()``, set the attribute ``episode``, which holds from the next reset
+    on. In vector environments with a copy of the wrapper in each: ``envs.set_attr("episode", k)``.
 
     Parameters
     ----------
@@ -55,9 +87,7 @@ class TighteningGoal(
     """
 
     def __init__(
-        self,
-        env: gym.Env[NDArray[Any], Any],
-        schedule: Callable[[int], float] | None = None,
+        self, env: gym.Env[NDArray[Any], Any], schedule: Callable[[int], float] | None = None
     ) -> None:
         gym.utils.RecordConstructorArgs.__init__(self, schedule=schedule)
         super().__init__(env)
@@ -78,20 +108,10 @@ class TighteningGoal(
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[Any], dict[str, Any]]:
-        """Begin an episode with the goal tolerance of the learning episode.
+        """Begin an episode with the goal tolerance of the learning episode ``options["episode"]``.
 
-        Parameters
-        ----------
-        seed : int, optional
-            Handed on.
-        options : dict, optional
-            ``"episode"``: the learning episode k >= 1; without it, the one that was. Others are
-            handed on.
-
-        Raises
-        ------
-        ValueError
-            For an episode below 1, or an option ``"goal_tolerance"``: it follows from the episode.
+        Without that option, of the one before. Seed and other options are passed on. ValueError for
+        an episode below 1, or an option ``"goal_tolerance"``, which follows from the episode.
         """
         options = dict(options or {})
         if "goal_tolerance" in options:
