@@ -1,7 +1,15 @@
 """Agents: ``agent.train(env, steps=...)``, or ``act(observation)`` and ``learn(transition)``."""
 
 from sdnn.agents.agent import Agent, load_agent
-from sdnn.agents.callbacks import Checkpoints, EarlyStop, JSONLines, Schedule, TensorBoard
+from sdnn.agents.callbacks import (
+    Callback,
+    Checkpoints,
+    EarlyStop,
+    JSONLines,
+    Schedule,
+    TensorBoard,
+)
+from sdnn.agents.episode import UnrepeatedEpisodeError
 from sdnn.agents.evaluation import Evaluation, evaluate
 from sdnn.agents.fixed_rate import FixedRate
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning, FuzzyQLearningConfig
@@ -9,7 +17,7 @@ from sdnn.agents.presets import PRESETS, Preset
 from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.agents.q_learning_config import QLearningConfig
 from sdnn.agents.scaling import Scaling
-from sdnn.agents.training import Callback, Training, TrainingResult, UnrepeatedEpisodeError
+from sdnn.agents.training import Training, TrainingResult
 from sdnn.agents.transition import Transition, UnusableStepError
 
 __all__ = [

@@ -18,7 +18,7 @@ from sdnn.agents.files import completed, read_agent, register
 from sdnn.agents.observations import AnglePairs, Ranges, UnitObservations, without_repeats
 from sdnn.agents.scaling import Scaling
 from sdnn.agents.spaces import space_data, space_of
-from sdnn.agents.training import Callback, Training, TrainingResult
+from sdnn.agents.training import Training, TrainingResult
 from sdnn.agents.transition import Transition, reward_of
 from sdnn.agents.warm_up import MOST_ENVIRONMENTS, WarmUp
 from sdnn.arguments import flag, path_of, real, seed_of, whole
@@ -26,6 +26,8 @@ from sdnn.files import Arrays, Description, write_file
 
 if TYPE_CHECKING:
     from typing_extensions import Self
+
+    from sdnn.agents.callbacks import Callback
 
 __all__ = ["Agent", "check_shape", "load_agent"]
 

@@ -4,15 +4,42 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from sdnn.agents.training import Callback, Row, Training
 from sdnn.arguments import path_of, real, whole
 from sdnn.whole_files import write_whole
 
-__all__ = ["Checkpoints", "EarlyStop", "JSONLines", "Schedule", "TensorBoard"]
+if TYPE_CHECKING:
+    from sdnn.agents.training import Training
+
+__all__ = ["Callback", "Checkpoints", "EarlyStop", "JSONLines", "Row", "Schedule", "TensorBoard"]
+
+Row: TypeAlias = Mapping[str, Any]
+"""An episode (``kind``, ``step``, ``episode``, ``return``, ``length``, ``terminated``, and with
+several environments ``environment``) or an evaluation (``kind``, ``step``, ``episode``,
+``mean_return``, ``mean_length``, ``share_terminated``, and lists ``returns``, ``lengths``,
+``terminated`` of its episodes). Steps and episodes are those learned until then."""
+
+
+class Callback:
+    """Is told what happens in a training; every method does nothing unless overridden.
+
+    A callback stops the training by ``training.stop()``.
+    """
+
+    def on_start(self, training: Training) -> None:
+        """Before the first step, also of a training that goes on."""
+
+    def on_step(self, training: Training) -> None:
+        """After every learned step."""
+
+    def on_row(self, training: Training, row: Row) -> None:
+        """After an episode (``row["kind"] == "episode"``) and an evaluation (``"evaluation"``)."""
+
+    def on_end(self, training: Training) -> None:
+        """After the last step, also of a training that was interrupted."""
 
 
 class JSONLines(Callback):

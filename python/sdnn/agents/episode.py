@@ -1,16 +1,26 @@
-"""The present episode of a training, in one environment."""
+"""The present episodes of a training, one in each of its environments."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents.rounds import Outcome
+from sdnn.agents.evaluation import episode_seed
+from sdnn.agents.rounds import Outcome, rounds_in
+from sdnn.agents.saved_training import SavedEpisode
 
-__all__ = ["Actions", "Episode"]
+__all__ = ["Actions", "Episode", "Episodes", "UnrepeatedEpisodeError"]
+
+_LEARNING = 0
+
+
+class UnrepeatedEpisodeError(ValueError):
+    """An environment does not repeat the episode in which a training was saved."""
 
 
 class Actions:
@@ -45,9 +55,9 @@ class Actions:
         self._n += 1
 
 
-@dataclass
+@dataclass(slots=True, eq=False)
 class Episode:
-    """How far it is.
+    """The state of an episode.
 
     Parameters
     ----------
@@ -56,7 +66,11 @@ class Episode:
     observation
         What was observed before ``outcome``, if that is still to be learned; else the last one.
     actions
-        Taken in it.
+        Taken in it, where it may have to be repeated.
+    n_steps
+        How many were taken.
+    action
+        The last one.
     sum_of_rewards
         Learned in it.
     outcome
@@ -66,6 +80,8 @@ class Episode:
     number: int
     observation: Any
     actions: Actions = field(default_factory=Actions)
+    n_steps: int = 0
+    action: Any = None
     sum_of_rewards: float = 0.0
     outcome: Outcome | None = None
 
@@ -73,3 +89,201 @@ class Episode:
     def last_observation(self) -> Any:
         """What was observed last, learned or not."""
         return self.observation if self.outcome is None else self.outcome.observation
+
+
+class Episodes:
+    """Begins episodes in all environments of a training, steps them, and can repeat them.
+
+    Parameters
+    ----------
+    env
+        An environment, or a vector of them.
+    seed
+        Root of the episodes' seeds; None: resets have no seeds.
+    first
+        The number of the first episode.
+    options
+        Gives the options of the reset of the single environment from an episode's number.
+
+    Attributes
+    ----------
+    n_environments : int
+    present : list of (Episode or None)
+        In each environment; None: the next one has not begun.
+    next_number : int
+        Of the episode that begins next.
+    """
+
+    def __init__(
+        self,
+        env: gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any],
+        seed: int | None,
+        first: int,
+        options: Callable[[int], dict[str, Any] | None],
+    ) -> None:
+        self._env, self._seed, self._options = env, seed, options
+        self._rounds = rounds_in(env)
+        self.n_environments = self._rounds.n_environments
+        self.next_number = first
+        self.present: list[Episode | None] = [None] * self.n_environments
+        self._first_left = 0  # the environments before it have learned this round's step
+
+    def leave(self) -> None:
+        """Begin anew in every environment with the next round, with other seeds."""
+        self._rounds = rounds_in(self._env)
+        self.present[:] = [None] * self.n_environments
+
+    def outcomes(
+        self, begin: Callable[[int], None], act: Callable[[int, Episode], Any]
+    ) -> Iterator[tuple[int, Episode, Outcome]]:
+        """Give the outcomes of steps, in the order of environments; each is to be learned.
+
+        When those of a round are learned, a step is taken in every environment.
+
+        Parameters
+        ----------
+        begin
+            Called with an environment whose episode has begun.
+        act
+            Gives the action in an environment.
+        """
+        present, has_seeds = self.present, self._seed is not None
+        while True:
+            for i in range(self._first_left, self.n_environments):
+                episode = present[i]
+                if episode is not None and episode.outcome is not None:
+                    self._first_left = i
+                    yield i, episode, episode.outcome
+            self._first_left = 0
+            numbers = {}
+            if None in present:
+                numbers = self._begin_episodes(begin)
+            actions = []
+            for i, episode in enumerate(present):
+                actions.append(None if episode is None else act(i, episode))
+            for i, outcome in enumerate(self._rounds.step(actions)):
+                episode = present[i]
+                if episode is None:
+                    present[i] = Episode(numbers[i], outcome.observation)
+                    begin(i)
+                    continue
+                episode.outcome, episode.action = outcome, actions[i]
+                episode.n_steps += 1
+                if has_seeds:
+                    episode.actions.append(actions[i])
+
+    def _begin_episodes(self, begin: Callable[[int], None]) -> dict[int, int]:
+        """Begin an episode where the last one is over; return their numbers."""
+        over = [i for i, episode in enumerate(self.present) if episode is None]
+        numbers = {i: self.next_number + k for k, i in enumerate(over)}
+        self.next_number += len(over)
+        for i, observation in self._reset(numbers).items():
+            self.present[i] = Episode(numbers[i], observation)
+            begin(i)
+        return numbers
+
+    def _reset(self, numbers: Mapping[int, int]) -> dict[int, Any]:
+        """Begin episodes of these numbers in some environments: their first observations."""
+        seeds = {
+            i: None if self._seed is None else episode_seed(self._seed, _LEARNING, number)
+            for i, number in numbers.items()
+        }
+        return self._rounds.reset(seeds, self._options(1 + max(numbers.values())))
+
+    def saved(
+        self, shape: tuple[int, ...], flat: Callable[[Any], NDArray[np.float64]]
+    ) -> list[SavedEpisode | None]:
+        """Describe the present episodes; ``shape`` is an action's, ``flat`` makes vectors."""
+        return [
+            None
+            if episode is None
+            else SavedEpisode(
+                number=episode.number,
+                sum_of_rewards=episode.sum_of_rewards,
+                actions=episode.actions.taken.reshape((-1, *shape)),
+                observation=np.asarray(flat(episode.last_observation)),
+                waits=episode.outcome is not None,
+            )
+            for episode in self.present
+        ]
+
+    def repeat(
+        self, saved: Sequence[SavedEpisode | None], flat: Callable[[Any], NDArray[np.float64]]
+    ) -> None:
+        """Bring every environment to where its episode was saved.
+
+        Raises
+        ------
+        UnrepeatedEpisodeError
+            If an environment does not repeat its episode.
+        ValueError
+            If the environments are others, or cannot be reset one by one with seeds.
+        """
+        self._require_repeatable(len(saved))
+        for i, one in enumerate(saved):
+            if one is not None:
+                taken = Actions(one.actions)
+                last = one.actions[-1] if len(taken) else None
+                self.present[i] = Episode(
+                    one.number, None, taken, len(taken), last, one.sum_of_rewards
+                )
+        self._replay({i for i, one in enumerate(saved) if one is not None and one.waits})
+        for now, then in zip(self.present, saved, strict=True):
+            if now is not None and then is not None:
+                found = flat(now.last_observation)
+                if not np.array_equal(found, then.observation):
+                    raise UnrepeatedEpisodeError(
+                        "env must repeat the episode in which the training was saved: the same"
+                        f" seed and actions led to {found}, not to {then.observation}"
+                    )
+
+    def _require_repeatable(self, n_saved: int) -> None:
+        if n_saved != self.n_environments:
+            raise ValueError(
+                f"env must have {n_saved} environments, as the training had,"
+                f" got {self.n_environments}"
+            )
+        if self._seed is None:
+            raise ValueError(
+                "episodes without seeds cannot be repeated: repeat_episodes=False begins new ones"
+            )
+        if not self._rounds.can_repeat:
+            raise ValueError(
+                "env must reset each of its environments with a seed of its own where episodes are"
+                f" repeated, got {type(self._env.unwrapped).__name__}: repeat_episodes=False begins"
+                " new ones; or take SyncVectorEnv or AsyncVectorEnv of Gymnasium 1.1 or newer, as"
+                " gymnasium.make_vec(..., vectorization_mode='sync') makes it, with shared memory"
+                " or the autoreset mode DISABLED"
+            )
+
+    def _replay(self, waiting: Iterable[int]) -> None:
+        """Take the actions of all present episodes again, so that all end at the same time.
+
+        Until its own episode begins, an environment does anything.
+        """
+        present = {i: episode for i, episode in enumerate(self.present) if episode is not None}
+        n_rounds = max((len(episode.actions) for episode in present.values()), default=0)
+        longest = next((e for e in present.values() if len(e.actions) == n_rounds), None)
+        every = range(self.n_environments)
+        numbers = {i: present[i].number if i in present else 0 for i in every}
+        ended = set(every)
+        for t in range(n_rounds):
+            assert longest is not None
+            starts = {i for i, e in present.items() if n_rounds - len(e.actions) == t}
+            if starts | ended:
+                seen = self._reset({i: numbers[i] for i in sorted(starts | ended)})
+            for i in starts:
+                present[i].observation = seen[i]
+            actions = [
+                present[i].actions.taken[t - n_rounds]
+                if i in present and t >= n_rounds - len(present[i].actions)
+                else longest.actions.taken[t]
+                for i in every
+            ]
+            outcomes = self._rounds.step(actions)
+            ended = {i for i, outcome in enumerate(outcomes) if outcome.ends}
+            for i, episode in present.items():
+                if t < n_rounds - 1 or i not in waiting:
+                    episode.observation = outcomes[i].observation
+                else:
+                    episode.outcome = outcomes[i]

@@ -69,7 +69,12 @@ def episode_seed(seed: int, kind: int, episode: int) -> int:
 
 
 def evaluate(
-    agent: Acts, env: gym.Env[Any, Any], episodes: int = 10, *, seed: int = 0
+    agent: Acts,
+    env: gym.Env[Any, Any],
+    episodes: int = 10,
+    *,
+    seed: int | None = 0,
+    options: dict[str, Any] | None = None,
 ) -> Evaluation:
     """Run greedy episodes, in which nothing is learned and nothing of the agent's future changes.
 
@@ -86,7 +91,10 @@ def evaluate(
     episodes
         How many.
     seed
-        Root of the episodes' seeds.
+        Root of the episodes' seeds. None: resets have no seeds, so that the environment's random
+        streams run on from call to call.
+    options
+        Of every reset.
 
     Raises
     ------
@@ -100,11 +108,11 @@ def evaluate(
     has_methods("agent", agent, "an agent", "act")
     require_single("env", env)
     require_same_kind(agent, env)
-    seed = seed_of(seed)
+    root = None if seed is None else seed_of(seed)
     n_episodes = whole("episodes", episodes, 1, 10**9)
     returns, lengths, ends = [], [], []
     for episode in range(n_episodes):
-        for now in greedy_episode(agent, env, seed, episode):
+        for now in greedy_episode(agent, env, root, episode, options):
             if now.n_steps == _LONG:
                 warnings.warn(
                     f"an evaluation's episode has had {_LONG:,} steps and goes on; an environment"
@@ -129,7 +137,11 @@ class GreedyEpisode(NamedTuple):
 
 
 def greedy_episode(
-    agent: Acts, env: gym.Env[Any, Any], seed: int, number: int
+    agent: Acts,
+    env: gym.Env[Any, Any],
+    seed: int | None,
+    number: int,
+    options: dict[str, Any] | None = None,
 ) -> Iterator[GreedyEpisode]:
     """Run an episode of an evaluation: give how far it is after the reset and after every step.
 
@@ -138,28 +150,28 @@ def greedy_episode(
     UnusableStepError
         See `evaluate`.
     """
-    observation, _ = env.reset(seed=episode_seed(seed, EVALUATION, number))
-    now, truncated = GreedyEpisode(0, 0.0, False), False
+    own = None if seed is None else episode_seed(seed, EVALUATION, number)
+    observation, _ = env.reset(seed=own, options=options)
+    n_steps, total, terminated, truncated = 0, 0.0, False, False
 
     def unusable(problem: object) -> UnusableStepError:
-        where = f"step {now.n_steps}" if now.n_steps else "the reset"
+        where = f"step {n_steps}" if n_steps else "the reset"
         return UnusableStepError(
             f"env gave what cannot be evaluated, in {where} of greedy episode {number}: {problem}"
         )
 
-    yield now
-    while not (now.terminated or truncated):
+    yield GreedyEpisode(0, 0.0, False)
+    while not (terminated or truncated):
         try:
             action = agent.act(observation, explore=False)
         except ValueError as error:
             raise unusable(error) from error
         observation, reward, terminated, truncated, _ = env.step(action)
-        now = GreedyEpisode(now.n_steps + 1, now.total_reward, terminated)
+        n_steps += 1
         try:
-            total = now.total_reward + reward_of(reward)
+            total += reward_of(reward)
         except ValueError as error:
             raise unusable(error) from error
         if not math.isfinite(total):
             raise unusable(f"rewards of env must add up to a finite number, got {total}")
-        now = now._replace(total_reward=total)
-        yield now
+        yield GreedyEpisode(n_steps, total, bool(terminated))

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from sdnn.agents.training import Callback, Row, Training
+from sdnn.agents.callbacks import Callback, Row
+from sdnn.agents.training import Training
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -32,7 +32,7 @@ class Outcome(NamedTuple):
 
 def own_copy(value: Any) -> Any:
     """Copy what others may write to: environments may keep their state, or change an action."""
-    if isinstance(value, np.ndarray):
+    if type(value) is np.ndarray:
         return value.copy()
     return value if isinstance(value, np.generic | int | float) else copy.deepcopy(value)
 
@@ -52,10 +52,13 @@ class Rounds(abc.ABC):
     can_repeat: bool
 
     @abc.abstractmethod
-    def reset(self, seeds: Mapping[int, int]) -> dict[int, Any]:
+    def reset(
+        self, seeds: Mapping[int, int | None], options: dict[str, Any] | None = None
+    ) -> dict[int, Any]:
         """Begin episodes in some environments, with seeds: their first observations.
 
         One that is missing has none yet: its episode begins with the next `step`, which gives it.
+        Options are those of a single environment.
         """
 
     @abc.abstractmethod
@@ -79,12 +82,19 @@ class _OneEnvironment(Rounds):
     def __init__(self, env: gym.Env[Any, Any]) -> None:
         self._env = env
 
-    def reset(self, seeds: Mapping[int, int]) -> dict[int, Any]:
-        return {i: own_copy(self._env.reset(seed=seed)[0]) for i, seed in seeds.items()}
+    def reset(
+        self, seeds: Mapping[int, int | None], options: dict[str, Any] | None = None
+    ) -> dict[int, Any]:
+        return {
+            i: own_copy(self._env.reset(seed=seed, options=options)[0]) for i, seed in seeds.items()
+        }
 
     def step(self, actions: Sequence[Any]) -> list[Outcome]:
-        observation, reward, terminated, truncated, _ = self._env.step(own_copy(actions[0]))
-        return [Outcome(own_copy(observation), reward, bool(terminated), bool(truncated))]
+        action = actions[0]
+        taken = action.copy() if type(action) is np.ndarray else own_copy(action)
+        seen, reward, terminated, truncated, _ = self._env.step(taken)
+        seen = seen.copy() if type(seen) is np.ndarray else own_copy(seen)
+        return [Outcome(seen, reward, bool(terminated), bool(truncated))]
 
 
 class _Vector(Rounds, abc.ABC):
@@ -136,9 +146,9 @@ class _SeparateResets(_Vector):
 
     can_repeat = True
 
-    def reset(self, seeds: Mapping[int, int]) -> dict[int, Any]:
-        if not seeds:
-            return {}
+    def reset(
+        self, seeds: Mapping[int, int | None], options: dict[str, Any] | None = None
+    ) -> dict[int, Any]:
         mask = np.array([i in seeds for i in range(self.n_environments)])
         # Without the option where it is not needed: some wrappers know complete resets only.
         options = None if mask.all() else {"reset_mask": mask}
@@ -161,7 +171,9 @@ class _OwnResets(_Vector):
         self._seen: list[Any] | None = None
         self._taken: list[Any] = []
 
-    def reset(self, seeds: Mapping[int, int]) -> dict[int, Any]:
+    def reset(
+        self, seeds: Mapping[int, int | None], options: dict[str, Any] | None = None
+    ) -> dict[int, Any]:
         if self._seen is None:
             observations, _ = self._env.reset(seed=seeds[0])
             self._seen = self._listed(observations)

@@ -25,11 +25,12 @@ _LIMITS = {
     "n_steps": (0, 2**53),
     "n_episodes": (0, 2**53),
     "n_rows": (0, 2**53),
-    "n_skipped": (0, 2**53),
+    "next_episode": (0, 2**53),
     "evaluate_every": (1, 2**53),
+    "evaluate_every_episodes": (1, 2**53),
     "evaluation_episodes": (1, 10**9),
 }
-_MAY_BE_NONE = ("steps", "episodes", "evaluate_every")
+_MAY_BE_NONE = ("steps", "episodes", "seed", "evaluate_every", "evaluate_every_episodes")
 
 
 class Saved(Protocol):
@@ -72,18 +73,20 @@ class SavedTraining:
     """What `sdnn.agents.Training` goes on from.
 
     ``evaluations`` has steps and mean returns, shape (n, 2); ``present`` an entry for each
-    environment; ``n_skipped`` numbers of episodes belong to none that was learned to its end.
+    environment; ``next_episode`` is the number of the first that has not begun.
     """
 
     steps: int | None
     episodes: int | None
-    seed: int
+    seed: int | None
     n_steps: int
     n_episodes: int
     n_rows: int
-    n_skipped: int
+    next_episode: int
     evaluate_every: int | None
+    evaluate_every_episodes: int | None
     evaluation_episodes: int
+    limit_bootstraps: bool
     evaluations: NDArray[np.float64]
     present: Sequence[SavedEpisode | None]
 
@@ -97,6 +100,7 @@ def write_training(path: Path, agent: Saved, training: SavedTraining) -> None:
             arrays[_prefix(i) + "actions"] = episode.actions
             arrays[_prefix(i) + "observation"] = episode.observation
     told: dict[str, Any] = {name: getattr(training, name) for name in _LIMITS}
+    told["limit_bootstraps"] = training.limit_bootstraps
     told["environments"] = [
         episode
         and {"episode": episode.number, "return": episode.sum_of_rewards, "waits": episode.waits}
@@ -133,6 +137,7 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
         for i, one in enumerate(told["environments"])
     ]
     limited = {name: told[name] for name in _LIMITS}
+    limited["limit_bootstraps"] = told["limit_bootstraps"]
     return agent, SavedTraining(**limited, evaluations=evaluations, present=present)
 
 
@@ -150,6 +155,7 @@ def _checked(path: Path, told: Any) -> Mapping[str, Any]:
                 whole(name, told[name], low, high)
         if (told["steps"] is None) == (told["episodes"] is None):
             raise ValueError("one of steps and episodes must be given")
+        flag("limit_bootstraps", told["limit_bootstraps"])
         for one in told["environments"]:
             if one is not None:
                 whole("episode", one["episode"], 0, 2**53)

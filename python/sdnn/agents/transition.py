@@ -1,16 +1,16 @@
-"""What an agent learns from."""
+"""What an agent learns from, and what a training needs of it."""
 
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sdnn.arguments import real
 
-__all__ = ["Transition", "UnusableStepError", "reward_of"]
+__all__ = ["Learner", "Transition", "UnusableStepError", "reward_of"]
 
 
 class UnusableStepError(ValueError):
@@ -31,6 +31,23 @@ class Transition(NamedTuple):
     terminated: bool
 
 
+class Learner(Protocol):
+    """What is trained: every `sdnn.agents.Agent`.
+
+    An agent that learns in one environment and is not saved needs only these methods, without the
+    argument ``environment``. Where it has an attribute ``progress``, that is kept up to date.
+    """
+
+    def begin_episode(self) -> None:
+        """Note that an episode begins."""
+
+    def act(self, observation: Any, explore: bool = True) -> Any:
+        """Choose an action; without `explore` nothing may be learned or remembered."""
+
+    def learn(self, transition: Transition) -> None:
+        """Learn a step."""
+
+
 def reward_of(reward: Any) -> float:
     """Read a reward: a number, also of another library, an array of one, or a truth value.
 
@@ -39,8 +56,8 @@ def reward_of(reward: Any) -> float:
     ValueError
         If it is something else.
     """
-    if type(reward) is float:
-        return reward
+    if isinstance(reward, float):  # NumPy's, too
+        return float(reward)
     if isinstance(reward, np.ndarray) and reward.size == 1 and reward.dtype.kind in "fiub":
         reward = reward.item()
     is_real = not isinstance(reward, np.ndarray | np.complexfloating)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from sdnn.runs.statistics import Estimate
     from sdnn.runs.store import ResultStore
     from sdnn.runs.thread_executor import ThreadExecutor
-    from sdnn.runs.trial import LearningAgent, ProtocolConfig, PythonTrial, Trial
+    from sdnn.runs.trial import ProtocolConfig, Trial
     from sdnn.runs.trial_config import PlannedTrial, TrialConfig, TrialSettings, trial_seed
     from sdnn.runs.trial_errors import (
         ClusterError,
@@ -57,7 +57,7 @@ _HOMES = {
     "runs.statistics": "Estimate",
     "runs.store": "ResultStore",
     "runs.thread_executor": "ThreadExecutor",
-    "runs.trial": "LearningAgent ProtocolConfig PythonTrial Trial",
+    "runs.trial": "ProtocolConfig Trial",
     "runs.trial_config": "PlannedTrial TrialConfig TrialSettings trial_seed",
     "runs.trial_errors": "ClusterError ExperimentError PlotUnavailableError StoreError StudyError"
     " WorkerLostError",
@@ -83,13 +83,11 @@ __all__ = [
     "Executor",
     "Experiment",
     "ExperimentError",
-    "LearningAgent",
     "MeasureConfig",
     "Observer",
     "PlannedTrial",
     "PlotUnavailableError",
     "ProtocolConfig",
-    "PythonTrial",
     "ReproduceRequest",
     "Reproduction",
     "ResultStore",

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents.training import Row
+from sdnn.agents.callbacks import Row
 from sdnn.runs.errors import RunError
 from sdnn.runs.groups import Group, groups_of
 from sdnn.runs.run import Run

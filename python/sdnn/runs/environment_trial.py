@@ -17,7 +17,7 @@ from sdnn.approximators import SDNNCConfig
 from sdnn.arguments import real
 from sdnn.environments import NoisySensors, UnitSensors
 from sdnn.runs.registry import agent_entry
-from sdnn.runs.trial import EpisodeLoop, LearningAgent, ProtocolConfig, check_protocol
+from sdnn.runs.trial import ProtocolConfig, TrainingTrial, check_protocol, protocol_trial
 from sdnn.runs.trial_config import TrialSettings
 
 _LEARNING, _TEST = 0, 1
@@ -103,8 +103,8 @@ class EnvironmentConfig:
         return NoisySensors(unit, self.noise, edge="saturate", seed=seed, stream=stream)
 
 
-class EnvironmentTrial(EpisodeLoop):
-    """Learning and test episodes in a Gymnasium environment.
+def environment_trial(config: EnvironmentTrialConfig, seed: int) -> TrainingTrial:
+    """Make a trial in a Gymnasium environment.
 
     Learning and test episodes have an environment each, with own seeds that follow from the
     trial's: all agents meet the same ones. ``solved`` says whether a test episode terminated.
@@ -125,28 +125,15 @@ class EnvironmentTrial(EpisodeLoop):
     ValueError
         If a value is out of its range, or agent and environment do not fit.
     """
-
-    def __init__(self, config: EnvironmentTrialConfig, seed: int) -> None:
-        check_protocol(config.protocol)
-        with ExitStack() as stack:
-            env = config.environment.make(seed, "sensor_noise")
-            stack.callback(env.close)
-            tested = config.environment
-            if not config.protocol.noisy_tests:
-                tested = replace(tested, noise=0.0)
-            test_env = tested.make(seed, "evaluation_sensor_noise")
-            stack.callback(test_env.close)
-            agent = self._agent_in(env, test_env, config, seed)
-            stack.pop_all()
-        super().__init__(agent, env, test_env, config.protocol)
-
-    @staticmethod
-    def _agent_in(
-        env: gym.Env[NDArray[np.float64], Any],
-        test_env: gym.Env[NDArray[np.float64], Any],
-        config: EnvironmentTrialConfig,
-        seed: int,
-    ) -> LearningAgent:
+    check_protocol(config.protocol)
+    with ExitStack() as stack:
+        env = config.environment.make(seed, "sensor_noise")
+        stack.callback(env.close)
+        tested = config.environment
+        if not config.protocol.noisy_tests:
+            tested = replace(tested, noise=0.0)
+        test_env = tested.make(seed, "evaluation_sensor_noise")
+        stack.callback(test_env.close)
         n_observed = env.observation_space.shape[0] if env.observation_space.shape else 0
         if config.approximator.n_inputs != n_observed:
             raise ValueError(
@@ -156,14 +143,16 @@ class EnvironmentTrial(EpisodeLoop):
         for number, one in ((_LEARNING, env), (_TEST, test_env)):
             # Later resets go on from here.
             one.reset(seed=_environment_seed(seed, number))
-        agent: LearningAgent = agent_entry(config.agent).make_agent(
+        agent = agent_entry(config.agent).make_agent(
             env.observation_space,
             env.action_space,
             approximator=config.approximator,
             learning=config.learning,
             seed=seed,
         )
-        return agent
+        trial = protocol_trial(agent, env, test_env, config.protocol)
+        stack.pop_all()
+    return trial
 
 
 def _environment_seed(seed: int, number: int) -> int:
@@ -229,6 +218,6 @@ class EnvironmentTrialConfig(TrialSettings):
         with closing(self.environment.make()) as env:
             return None if env.spec is None else env.spec.max_episode_steps
 
-    def make_trial(self, seed: int) -> EnvironmentTrial:
-        """Make the trial; see `EnvironmentTrial` for the errors it raises."""
-        return EnvironmentTrial(self, seed)
+    def make_trial(self, seed: int) -> TrainingTrial:
+        """Make the trial; see `environment_trial` for the errors it raises."""
+        return environment_trial(self, seed)

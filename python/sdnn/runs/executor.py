@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from typing import Protocol
 
 from sdnn import _core
 from sdnn.runs.records import TrialRecord, TrialRows
-from sdnn.runs.trial import opened
+from sdnn.runs.trial import TrainingTrial, Trial, opened
 from sdnn.runs.trial_config import PlannedTrial
 
 CHUNK_SECONDS = 0.1
@@ -116,14 +116,10 @@ def run_to_end(
     """
     begin = time.thread_time()
     with opened(planned.config.make_trial(planned.key.seed)) as trial:
-        chunk = 1
-        while not trial.finished:
+        for _ in _pieces(trial):
+            advanced(int(trial.episode))
             if not wanted():
                 return None
-            chunk_begin = time.monotonic()
-            trial.advance(chunk)
-            chunk = _next_chunk(chunk, time.monotonic() - chunk_begin)
-            advanced(int(trial.episode))
     return TrialRecord(
         key=planned.key,
         config=planned.config.canonical_json(),
@@ -133,6 +129,20 @@ def run_to_end(
         finished_at=datetime.now(timezone.utc).isoformat(timespec="seconds"),
         rows=TrialRows.from_arrays(trial.test_rows()),
     )
+
+
+def _pieces(trial: Trial | TrainingTrial) -> Iterator[None]:
+    """Run a trial to its end; yield about every `CHUNK_SECONDS`, and first of all."""
+    yield
+    if isinstance(trial, TrainingTrial):  # whose episodes may be long
+        yield from trial.pieces(CHUNK_SECONDS)
+        return
+    chunk = 1
+    while not trial.finished:
+        begin = time.monotonic()
+        trial.advance(chunk)
+        chunk = _next_chunk(chunk, time.monotonic() - begin)
+        yield
 
 
 def _next_chunk(chunk: int, seconds: float) -> int:

@@ -25,9 +25,10 @@ from sdnn.agents import (
     RBFQLearning,
     SDNNQLearning,
 )
+from sdnn.agents.transition import Learner
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.runs.preset_agents import PRESET_AGENTS
-from sdnn.runs.trial import LearningAgent, Trial
+from sdnn.runs.trial import Trial
 
 _BYTES_OF_FLOAT, _BYTES_OF_DOUBLE = 4, 8
 
@@ -88,11 +89,11 @@ class AgentEntry:
     presets
         Such settings by their names, of which a run chooses one.
     agent
-        The agent in Python, a `LearningAgent`: made from an observation space, an action space and
+        The agent in Python, a `Learner`: made from an observation space, an action space and
         ``approximator=``, ``learning=``, ``seed=``.
     core_trial
         The trial in C++, made from the core's structs of the settings; an agent without one runs in
-        a `PythonTrial`.
+        a `Training`.
     costs
         Its curves in the figure of costs, for agents of the core: the time of a Python agent would
         be the interpreter's.
@@ -102,7 +103,7 @@ class AgentEntry:
     title: str
     approximator: type[Any]
     learning: type[Any]
-    agent: Callable[..., LearningAgent]
+    agent: Callable[..., Learner]
     core_trial: Callable[..., Trial] | None = None
     preset: Preset | None = None
     presets: Mapping[str, Preset] = field(default_factory=dict)
@@ -133,7 +134,7 @@ class AgentEntry:
         approximator: Any,
         learning: Any,
         seed: int,
-    ) -> LearningAgent:
+    ) -> Learner:
         """Make the agent in Python."""
         return self.agent(
             observation_space,

@@ -29,9 +29,9 @@ from sdnn.agents import (
     evaluate,
     load_agent,
 )
+from sdnn.agents.callbacks import Row
 from sdnn.agents.scaling import Scaling
 from sdnn.agents.spaces import require_same_kind
-from sdnn.agents.training import Row
 from sdnn.arguments import whole
 from sdnn.interrupts import Interrupts
 from sdnn.runs.config import RunConfig, read_json

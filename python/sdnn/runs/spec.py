@@ -15,6 +15,7 @@ import numpy as np
 from msgspec import Meta
 
 from sdnn.agents import Agent
+from sdnn.agents.transition import Learner
 from sdnn.environments import (
     AcrobotConfig,
     AcrobotSensors,
@@ -28,7 +29,7 @@ from sdnn.runs.environment import EnvironmentSpec, Stream
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.registry import agent_entry
 from sdnn.runs.settings import Settings, argument_of, changed, kinds_of, read, values_of
-from sdnn.runs.trial import LearningAgent, ProtocolConfig, Trial
+from sdnn.runs.trial import ProtocolConfig, Trial
 
 __all__ = [
     "AgentSpec",
@@ -402,7 +403,7 @@ class RunSpec(Settings, frozen=True):
             )
         return gym.vector.SyncVectorEnv([self.make_env] * n_envs)
 
-    def make_agent(self, env: gym.Env[Any, Any]) -> LearningAgent:
+    def make_agent(self, env: gym.Env[Any, Any]) -> Learner:
         """Make the agent for an environment such as `make_env` makes.
 
         Raises

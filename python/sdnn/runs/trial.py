@@ -1,14 +1,12 @@
-"""One trial: what the engine asks of it, its loop over Gymnasium environments, and the acrobot's.
+"""One trial: what the engine needs of it, and trials in Python, which are trainings.
 
-The trials of the core's agents are computed in C++ (``_core.AcrobotTrial`` and its siblings), by
-the same protocol, bit for bit.
+The trials of the core's agents on the acrobot are computed in C++ (``_core.AcrobotTrial`` and its
+siblings), by the same protocol, bit for bit.
 """
 
 from __future__ import annotations
 
-import copy
-import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeVar
@@ -18,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.agents import Transition
+from sdnn.agents import Training
+from sdnn.agents.transition import Learner
+from sdnn.arguments import whole
 from sdnn.config import to_core
 from sdnn.environments import (
     AcrobotConfig,
@@ -59,7 +59,7 @@ class ProtocolConfig:
 
 
 class Trial(Protocol):
-    """One trial that can be advanced in pieces; the pieces' sizes do not change its outcome."""
+    """One trial, as those in C++: advanced in pieces, whose sizes do not change its outcome."""
 
     @property
     def episode(self) -> int:
@@ -93,140 +93,83 @@ def opened(trial: _AnyTrial) -> Iterator[_AnyTrial]:
             trial.close()
 
 
-class LearningAgent(Protocol):
-    """What a trial asks of an agent in Python; actions are elements of its action space."""
-
-    def begin_episode(self) -> None:
-        """Note that an episode begins."""
-
-    def act(self, observation: NDArray[np.float64], explore: bool = True) -> Any:
-        """Choose the action to take; without `explore` nothing may be learned or remembered."""
-
-    def learn(self, transition: Transition) -> None:
-        """Learn one step."""
-
-
-class EpisodeLoop:
-    """A trial over Gymnasium environments: learning episodes, and test episodes between them.
-
-    It holds the GIL, so trials of this kind do not run faster on several threads. At the end of the
-    last episode, and by `close`, both environments are closed.
+class TrainingTrial:
+    """A `sdnn.agents.Training` as a trial; its evaluations are the test episodes.
 
     Parameters
     ----------
-    agent
-        Acts in both environments and learns in the first.
-    env, test_env
-        The task of the learning and of the test episodes; with own random streams, so that tests
-        change nothing that is learned later.
-    protocol
-        Learning and test episodes.
+    training
+        Learns for a number of episodes, or of steps.
+    environments
+        Closed at the end.
     """
 
-    def __init__(
-        self,
-        agent: LearningAgent,
-        env: gym.Env[NDArray[np.float64], Any],
-        test_env: gym.Env[NDArray[np.float64], Any],
-        protocol: ProtocolConfig,
-    ) -> None:
-        self._agent = agent
-        self._env = env
-        self._test_env = test_env
-        self._protocol = protocol
-        self._open: tuple[gym.Env[Any, Any], ...] = (env, test_env)
-        self._rows: list[tuple[int, int, float, bool]] = []
-        self._episode = 0
-        self._n_decisions = 0
+    def __init__(self, training: Training, environments: Iterable[gym.Env[Any, Any]]) -> None:
+        self.training = training
+        self._open = tuple(environments)
 
     @property
     def episode(self) -> int:
         """Learning episodes done."""
-        return self._episode
+        return self.training.n_episodes
 
     @property
     def finished(self) -> bool:
-        """Whether all learning episodes are done."""
-        return self._episode == self._protocol.n_learning_episodes
+        """Whether all that was asked for is learned."""
+        return self.training.is_finished
 
     @property
     def n_decisions(self) -> int:
         """Decisions made so far, in learning and test episodes."""
-        return self._n_decisions
+        return self.training.n_steps + sum(map(int, self._evaluated("lengths")))
 
     def advance(self, n_episodes: int, /) -> None:
-        """Run up to `n_episodes` more learning episodes, with the test episodes that fall due.
+        """Run up to so many more learning episodes and the evaluations due among them."""
+        last = self.episode + whole("n_episodes", n_episodes, 0, 2**53)
+        if n_episodes:
+            for _ in self.training.pieces(0.0):
+                if self.episode >= last:
+                    break
 
-        Raises
-        ------
-        ValueError
-            If `n_episodes` is negative, or the return of a test episode is not finite.
-        """
-        if n_episodes < 0:
-            raise ValueError(f"n_episodes must be at least 0, got {n_episodes}")
-        last = min(self._episode + n_episodes, self._protocol.n_learning_episodes)
-        while self._episode < last:
-            if hasattr(self._agent, "progress"):
-                self._agent.progress = self._episode / self._protocol.n_learning_episodes
-            self._episode += 1
-            self._run_episode(self._env, learning=True)
-            if self._episode % self._protocol.test_interval == 0:
-                self._rows.append(self._run_episode(self._test_env, learning=False))
-        if self.finished:
-            self.close()
+    def pieces(self, seconds: float) -> Generator[None, None, None]:
+        """Learn to the end, in pieces of about so many seconds."""
+        return self.training.pieces(seconds)
+
+    def test_rows(self) -> dict[str, NDArray[Any]]:
+        """Test episodes so far: arrays `episode`, `steps`, `episode_return`, `solved`, (n,)."""
+        evaluations = [row for row in self.training.rows if row["kind"] == "evaluation"]
+        episodes = [row["episode"] for row in evaluations for _ in row["returns"]]
+        return {
+            "episode": np.array(episodes, np.int32),
+            "steps": np.array(self._evaluated("lengths"), np.int32),
+            "episode_return": np.array(self._evaluated("returns"), np.float64),
+            "solved": np.array(self._evaluated("terminated"), np.bool_),
+        }
 
     def close(self) -> None:
-        """Close both environments, if they are open still."""
+        """Close the environments, if they are open still."""
         environments, self._open = self._open, ()
         with ExitStack() as stack:
             for env in environments:
                 stack.callback(env.close)
 
-    def test_rows(self) -> dict[str, NDArray[Any]]:
-        """Test episodes so far: arrays `episode`, `steps`, `episode_return`, `solved`, (n,)."""
-        types = {
-            "episode": np.int32,
-            "steps": np.int32,
-            "episode_return": np.float64,
-            "solved": np.bool_,
-        }
-        return {
-            name: np.array([row[column] for row in self._rows], kind)
-            for column, (name, kind) in enumerate(types.items())
-        }
-
-    def _reset(self, env: gym.Env[NDArray[np.float64], Any]) -> NDArray[np.float64]:
-        """Begin an episode of an environment."""
-        return env.reset()[0]
-
-    def _run_episode(
-        self, env: gym.Env[NDArray[np.float64], Any], *, learning: bool
-    ) -> tuple[int, int, float, bool]:
-        observation = self._reset(env)
-        self._agent.begin_episode()
-        steps, episode_return = 0, 0.0
-        terminated = truncated = False
-        while not (terminated or truncated):
-            action = self._agent.act(observation, explore=learning)
-            # A copy: an environment may change the action, which is to be learned.
-            following, reward, terminated, truncated, _ = env.step(copy.copy(action))
-            if learning:
-                ends = terminated or (truncated and not self._protocol.limit_bootstraps)
-                self._agent.learn(Transition(observation, action, float(reward), following, ends))
-            observation = following
-            steps += 1
-            episode_return += float(reward)
-        self._n_decisions += steps
-        if not (learning or math.isfinite(episode_return)):
-            raise ValueError(
-                "rewards of env must add up to a finite number, got"
-                f" {episode_return} in the test after learning episode {self._episode}"
-            )
-        return self._episode, steps, episode_return, terminated
+    def _evaluated(self, name: str) -> list[Any]:
+        rows = self.training.rows
+        return [one for row in rows if row["kind"] == "evaluation" for one in row[name]]
 
 
-class PythonTrial(EpisodeLoop):
-    """The protocol of the core's `AcrobotTrial` for an agent in Python, on Gymnasium environments.
+def python_trial(
+    make_agent: Callable[..., Learner],
+    *,
+    approximator: Any,
+    learning: Any,
+    acrobot: AcrobotConfig,
+    goal: GoalScheduleConfig,
+    sensors: SensorConfig,
+    protocol: ProtocolConfig,
+    seed: int,
+) -> TrainingTrial:
+    """Make the trial of an agent in Python, on Gymnasium environments.
 
     For the same agent and seed it gives the rows of the compiled trial, bit for bit.
 
@@ -247,39 +190,58 @@ class PythonTrial(EpisodeLoop):
     ValueError
         If a value is out of its range, or agent and sensors do not fit.
     """
-
-    def __init__(
-        self,
-        make_agent: Callable[..., LearningAgent],
-        *,
-        approximator: Any,
-        learning: Any,
-        acrobot: AcrobotConfig,
-        goal: GoalScheduleConfig,
-        sensors: SensorConfig,
-        protocol: ProtocolConfig,
-        seed: int,
-    ) -> None:
-        check_protocol(protocol)
-        if approximator.n_inputs != sensors.n_inputs:
-            raise ValueError(
-                f"n_inputs must be the number of inputs of the sensors, {sensors.n_inputs},"
-                f" got {approximator.n_inputs}"
-            )
-        tested = sensors if protocol.noisy_tests else replace(sensors, noise=0.0)
-        env = _environment(acrobot, goal, sensors, seed, "sensor_noise")
-        test_env = _environment(acrobot, goal, tested, seed, "evaluation_sensor_noise")
-        agent = make_agent(
-            env.observation_space,
-            env.action_space,
-            approximator=approximator,
-            learning=learning,
-            seed=seed,
+    check_protocol(protocol)
+    if approximator.n_inputs != sensors.n_inputs:
+        raise ValueError(
+            f"n_inputs must be the number of inputs of the sensors, {sensors.n_inputs},"
+            f" got {approximator.n_inputs}"
         )
-        super().__init__(agent, env, test_env, protocol)
+    tested = sensors if protocol.noisy_tests else replace(sensors, noise=0.0)
+    env = _environment(acrobot, goal, sensors, seed, "sensor_noise")
+    test_env = _environment(acrobot, goal, tested, seed, "evaluation_sensor_noise")
+    agent = make_agent(
+        env.observation_space,
+        env.action_space,
+        approximator=approximator,
+        learning=learning,
+        seed=seed,
+    )
+    return protocol_trial(agent, env, test_env, protocol, lambda episode: {"episode": episode})
 
-    def _reset(self, env: gym.Env[NDArray[np.float64], Any]) -> NDArray[np.float64]:
-        return env.reset(options={"episode": self._episode})[0]
+
+def protocol_trial(
+    agent: Learner,
+    env: gym.Env[Any, Any],
+    test_env: gym.Env[Any, Any],
+    protocol: ProtocolConfig,
+    reset_options: Callable[[int], dict[str, Any]] | None = None,
+) -> TrainingTrial:
+    """Make a trial by the paper's protocol; the environments' random streams run on.
+
+    Parameters
+    ----------
+    agent
+        Acts in both environments and learns in the first.
+    env, test_env
+        The task of the learning and of the test episodes; with own random streams, so that tests
+        change nothing that is learned later.
+    protocol
+        Learning and test episodes.
+    reset_options
+        See `sdnn.agents.Training`.
+    """
+    training = Training(
+        agent,
+        env,
+        episodes=protocol.n_learning_episodes,
+        seed=None,
+        evaluate_every_episodes=protocol.test_interval,
+        evaluation_env=test_env,
+        evaluation_episodes=1,
+        limit_bootstraps=protocol.limit_bootstraps,
+        reset_options=reset_options,
+    )
+    return TrainingTrial(training, (env, test_env))
 
 
 def check_protocol(protocol: ProtocolConfig) -> None:

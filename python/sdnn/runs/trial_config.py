@@ -17,7 +17,7 @@ from sdnn.approximators import SDNNCConfig
 from sdnn.environments import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.runs.records import TrialKey
 from sdnn.runs.registry import agent_entry
-from sdnn.runs.trial import ProtocolConfig, PythonTrial, Trial
+from sdnn.runs.trial import ProtocolConfig, TrainingTrial, Trial, python_trial
 
 CONFIG_HASH_DIGITS = 16
 """Hexadecimal digits kept of a configuration's SHA-256: 64 bits."""
@@ -35,7 +35,7 @@ class TrialSettings(ABC):
     protocol: ProtocolConfig
 
     @abstractmethod
-    def make_trial(self, seed: int) -> Trial:
+    def make_trial(self, seed: int) -> Trial | TrainingTrial:
         """Make the trial of a seed.
 
         Raises
@@ -161,7 +161,7 @@ class TrialConfig(TrialSettings):
         """Decisions in an episode at most."""
         return self.acrobot.max_decisions
 
-    def make_trial(self, seed: int) -> Trial:
+    def make_trial(self, seed: int) -> Trial | TrainingTrial:
         """Make the trial: in C++ if the agent has one there, else in Python.
 
         A trial in C++ releases the GIL while it advances.
@@ -174,7 +174,7 @@ class TrialConfig(TrialSettings):
         entry = agent_entry(self.agent)
         parts = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "agent"}
         if entry.core_trial is None:
-            return PythonTrial(entry.make_agent, **parts, seed=seed)
+            return python_trial(entry.make_agent, **parts, seed=seed)
         return entry.core_trial(**{n: part.to_core() for n, part in parts.items()}, seed=seed)
 
 

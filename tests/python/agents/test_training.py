@@ -678,6 +678,109 @@ def test_lines_of_a_resumed_training_are_those_of_a_whole_one(tmp_path):
     assert path.read_text() == whole
 
 
+def test_evaluations_may_follow_episodes(tmp_path):
+    def training(callbacks=()):
+        return Training(
+            corridor_agent(), Corridor(), episodes=30, evaluate_every_episodes=5,
+            evaluation_env=Corridor(), evaluation_episodes=2, callbacks=callbacks,
+        )  # fmt: skip
+
+    whole = training()
+    rows = whole.run().rows
+    evaluations = [row for row in rows if row["kind"] == "evaluation"]
+    assert [row["episode"] for row in evaluations] == [5, 10, 15, 20, 25, 30]
+    assert all(len(row["lengths"]) == len(row["terminated"]) == 2 for row in evaluations)
+    ends = {row["step"] for row in rows if row["kind"] == "episode"}
+    assert {row["step"] for row in evaluations} <= ends
+    for cut in (3, 20, 47, evaluations[2]["step"]):
+        first = training([Stop(cut, tmp_path / "t")])
+        before = first.run().rows
+        again = Training.load(tmp_path / "t", Corridor(), evaluation_env=Corridor())
+        assert (*before, *again.run().rows) == rows
+        assert states_equal(whole.agent, again.agent)
+
+
+def test_without_a_seed_the_streams_of_environments_run_on(tmp_path):
+    env, tested = Corridor(), Corridor()
+    training = Training(
+        corridor_agent(), env, episodes=6, seed=None, evaluate_every_episodes=2,
+        evaluation_env=tested, callbacks=[Stop(7, tmp_path / "t")],
+    )  # fmt: skip
+    training.run()
+    training.run()
+    assert (env.seeds, tested.seeds) == ([None] * 6, [None] * 30)
+    with pytest.raises(ValueError, match="repeat_episodes=False"):
+        Training.load(tmp_path / "t", Corridor(), evaluation_env=Corridor())
+    other = Training.load(
+        tmp_path / "t", Corridor(), evaluation_env=Corridor(), repeat_episodes=False
+    )
+    assert other.run().n_episodes == 6
+
+
+def test_options_of_resets_follow_the_episodes():
+    class Told(Corridor):
+        def __init__(self):
+            super().__init__()
+            self.told = []
+
+        def reset(self, *, seed=None, options=None):
+            self.told.append(options["number"])
+            return super().reset(seed=seed)
+
+    env, tested = Told(), Told()
+    training = Training(
+        corridor_agent(), env, episodes=4, evaluate_every_episodes=2, evaluation_env=tested,
+        evaluation_episodes=1, reset_options=lambda episode: {"number": episode},
+    )  # fmt: skip
+    training.run()
+    assert (env.told, tested.told) == ([1, 2, 3, 4], [2, 4])
+    with pytest.raises(ValueError, match="reset_options must be None for a vector"):
+        Training(
+            corridor_agent(), gym.vector.SyncVectorEnv([Corridor] * 2), steps=9,
+            reset_options=dict,
+        )  # fmt: skip
+
+
+def test_a_time_limit_may_count_as_an_end():
+    class Note:
+        def __init__(self):
+            self.ends = []
+
+        def begin_episode(self):
+            pass
+
+        def act(self, observation, explore=True):
+            return 0
+
+        def learn(self, transition):
+            self.ends.append(transition.terminated)
+
+    agents = Note(), Note()
+    for agent, bootstraps in zip(agents, (True, False), strict=True):
+        Training(agent, Corridor(), episodes=1, limit_bootstraps=bootstraps).run()
+    assert agents[0].ends == [False] * 8
+    assert agents[1].ends == [False] * 7 + [True]
+
+
+def test_a_training_in_pieces_is_the_same_and_may_be_left_between_two():
+    whole, pieces = (Training(corridor_agent(), Corridor(), steps=60) for _ in range(2))
+    whole.run()
+    assert sum(1 for _ in pieces.pieces(0.0)) == 60
+    assert states_equal(whole.agent, pieces.agent)
+    ended = []
+
+    class Note(Callback):
+        def on_end(self, training):
+            ended.append(training.n_steps)
+
+    left = Training(corridor_agent(), Corridor(), steps=60, callbacks=[Note()])
+    generator = left.pieces(0.0)
+    next(generator)
+    generator.close()
+    assert (ended, left.n_steps) == ([1], 1)
+    assert left.run().n_steps == 60
+
+
 def test_an_early_stop_waits_for_evaluations_in_a_row():
     stop = EarlyStop(mean_return=0.6, patience=2)
     result = corridor_agent().train(
@@ -748,9 +851,14 @@ def test_an_interrupt_reaches_the_caller_after_the_callbacks(tmp_path):
         ({"steps": 0}, "steps must be a whole number in"),
         ({"episodes": 1.5}, "episodes must be a whole number in"),
         ({"steps": 10, "evaluate_every": 5}, "evaluation_env must be given"),
+        ({"steps": 10, "evaluate_every_episodes": 5}, "evaluation_env must be given"),
+        (
+            {"steps": 10, "evaluate_every": 5, "evaluate_every_episodes": 5},
+            "evaluate_every must not be given with",
+        ),
         ({"steps": 10, "seed": -1}, "seed must be a whole number in"),
     ],
 )
 def test_impossible_trainings_are_named(options, message):
     with pytest.raises(ValueError, match=message):
-        corridor_agent().train(Corridor(), **options)
+        Training(corridor_agent(), Corridor(), **options)

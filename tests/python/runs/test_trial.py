@@ -13,12 +13,12 @@ from sdnn.reproduction import (
     Case,
     CostSeries,
     ProtocolConfig,
-    PythonTrial,
     agent_entry,
     case_config,
     register,
 )
 from sdnn.runs.records import TrialRows
+from sdnn.runs.trial import TrainingTrial
 
 PROTOCOL = ProtocolConfig(n_learning_episodes=60, test_interval=5)
 SEED = 11
@@ -33,7 +33,7 @@ def python_trial(config, monkeypatch):
     entry = replace(AGENTS[config.agent], core_trial=None)
     monkeypatch.setitem(AGENTS, config.agent, entry)
     trial = config.make_trial(SEED)
-    assert type(trial) is PythonTrial
+    assert type(trial) is TrainingTrial
     return trial
 
 
