@@ -45,16 +45,12 @@ def fitted(coding: str | Coding, n_units: int) -> Coding:
     return one.fit(np.array(ends if is_constant else [0.0, 1.0]), n_units)
 
 
-def shared(matrices: Iterable[NDArray[np.float64]]) -> tuple[NDArray[np.float64], ...]:
+def shared(matrices: Iterable[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
     """Return the matrices, equal ones as one in memory."""
-    different: list[NDArray[np.float64]] = []
-    found = []
+    found: list[NDArray[np.float64]] = []
     for matrix in matrices:
-        same = (other for other in different if np.array_equal(other, matrix))
-        found.append(next(same, matrix))
-        if found[-1] is matrix:
-            different.append(matrix)
-    return tuple(found)
+        found.append(next((same for same in found if np.array_equal(same, matrix)), matrix))
+    return found
 
 
 def correlations(coding: str | Coding, n_units: int = N_UNITS) -> NDArray[np.float64]:

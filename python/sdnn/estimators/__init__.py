@@ -5,8 +5,9 @@ Names are loaded when they are first used, so that ``import sdnn`` needs no scik
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from sdnn.lazy import attach
 
 if TYPE_CHECKING:
     from sdnn.estimators.base import OutOfRangeWarning
@@ -15,14 +16,16 @@ if TYPE_CHECKING:
     from sdnn.estimators.libsdnn import read_model_file, read_parameter_file
     from sdnn.estimators.regressor import SDNNRegressor
 
-_HOME_OF = {
-    "OutOfRangeWarning": "base",
-    "SDNNClassifier": "classifier",
-    "SDNNKernelRidge": "kernel_ridge",
-    "SDNNRegressor": "regressor",
-    "read_model_file": "libsdnn",
-    "read_parameter_file": "libsdnn",
-}
+_load, __dir__ = attach(
+    __name__,
+    {
+        "base": ("OutOfRangeWarning",),
+        "classifier": ("SDNNClassifier",),
+        "kernel_ridge": ("SDNNKernelRidge",),
+        "libsdnn": ("read_model_file", "read_parameter_file"),
+        "regressor": ("SDNNRegressor",),
+    },
+)
 
 __all__ = [
     "OutOfRangeWarning",
@@ -35,17 +38,11 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOME_OF:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:
-        return getattr(import_module(f"{__name__}.{_HOME_OF[name]}"), name)
+        return _load(name)
     except ModuleNotFoundError as error:
         if error.name is None or error.name.partition(".")[0] == "sdnn":
             raise
         raise ModuleNotFoundError(
             f'{name} needs {error.name}: pip install "sdnn[sklearn]"', name=error.name
         ) from error
-
-
-def __dir__() -> list[str]:
-    return __all__

@@ -1,9 +1,12 @@
-"""LIBSDNN's parameter and model files: what they say, and the same network from it."""
+"""LIBSDNN's parameter and model files: what they contain, and the same network from it."""
 
 from __future__ import annotations
 
+import ast
+import operator
 import re
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -12,12 +15,120 @@ import numpy as np
 import numpy.typing as npt
 
 from sdnn import _core
-from sdnn.estimators.libsdnn_language import entries_of, items_of, number_of, whole_of
+
+__all__ = [
+    "LibsdnnInput",
+    "LibsdnnModel",
+    "LibsdnnParameters",
+    "read_model_file",
+    "read_parameter_file",
+]
 
 Library = Literal["msvc", "libstdc++"]
 
 MOST_DRAWN = 2**27
 """Flips, and words of 64 units, of the code tables that are drawn: some seconds of them."""
+
+OPERATORS: dict[type, Callable[..., float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.UAdd: operator.pos,
+    ast.USub: operator.neg,
+}
+
+
+def number_of(text: str, what: str) -> float:
+    """Return the value of a formula of numbers, ``+ - * / ^`` and parentheses."""
+
+    def value(node: ast.AST) -> float:
+        if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+            return float(node.value)
+        if isinstance(node, ast.UnaryOp):
+            return OPERATORS[type(node.op)](value(node.operand))
+        if isinstance(node, ast.BinOp):
+            # A power of numbers below 0 may be complex, which float refuses.
+            return float(OPERATORS[type(node.op)](value(node.left), value(node.right)))
+        raise ValueError
+
+    try:
+        result = value(ast.parse(text[:1001].replace("^", "**"), mode="eval").body)
+        if len(text) <= 1000 and np.isfinite(result):
+            return result
+    except (ArithmeticError, LookupError, MemoryError, RecursionError, SyntaxError, TypeError,
+            ValueError):  # fmt: skip
+        pass
+    raise ValueError(f"{what} must be a number, got {text[:80]!r}")
+
+
+def whole_of(text: str, what: str, low: int, high: int = 2**31 - 1) -> int:
+    """Return the value of a formula that must be a whole number within bounds."""
+    value = number_of(text, what)
+    if value != int(value) or not low <= value <= high:
+        raise ValueError(f"{what} must be a whole number in [{low}, {high}], got {text[:80]}")
+    return int(value)
+
+
+def items_of(text: str, what: str) -> list[str]:
+    """Return the items of ``[a, b:3]``, that is ``[a, b, b, b]``; not cut in parentheses."""
+    if not (text.startswith("[") and text.endswith("]")):
+        raise ValueError(f"{what} must be a list in brackets, got {text[:80]!r}")
+    found: list[str] = []
+    for item in re.split(r",(?![^(]*\))", text[1:-1]):
+        content, colon, times = item.partition(":")
+        found += [content] * (whole_of(times, f"repeats of {what}", 1, 100000) if colon else 1)
+    return found
+
+
+class Entries(dict[str, str]):
+    """The entries of a parameter file by their full names, such as ``SDNN/PC/n``."""
+
+    def __init__(self, text: str, path: Path) -> None:
+        self.path = path
+        tags: list[str] = []
+        for number, line in enumerate(text.splitlines(), start=1):
+            stripped = re.sub(r"[\s{\0]", "", line.partition("%")[0])
+            if "<" in stripped:
+                tags.append(stripped.strip("<>"))
+            elif "}" in stripped:
+                if not tags:
+                    raise ValueError(f"{path}, line {number}: }} without a tag")
+                tags.pop()
+            elif "=" in stripped:
+                name, _, value = stripped.partition("=")
+                self["/".join([*tags, name])] = value
+            elif stripped:
+                raise ValueError(
+                    f"{path}, line {number}: must be a tag or name = value, got {line[:80]!r}"
+                )
+
+    def __missing__(self, name: str) -> str:
+        raise ValueError(f"{self.path} must have the entry {name.replace('/', ' / ')}")
+
+    def one_of(self, name: str, default: str, *others: str) -> str:
+        """Return an entry that is one of some words."""
+        word = self.get(name, default)
+        if word not in (default, *others):
+            words = ", ".join((default, *others))
+            raise ValueError(f"{name.replace('/', ' / ')} must be one of {words}, got {word!r}")
+        return word
+
+    def whole(self, name: str, low: int, high: int) -> int:
+        """Return an entry that is a whole number within bounds."""
+        return whole_of(self[name], name.rpartition("/")[2], low, high)
+
+    def items(self, name: str, default: str | None = None) -> list[str]:  # type: ignore[override]
+        """Return the items of an entry that is a list."""
+        text = self[name] if default is None else self.get(name, default)
+        return items_of(text, name.rpartition("/")[2])
+
+    def seed(self, name: str) -> tuple[int, ...] | None:
+        """Return the numbers of a seed; None where it is hardware entropy."""
+        if self.get(name, "hardware_entropy") == "hardware_entropy":
+            return None
+        return tuple(whole_of(item, name, 0, 2**32 - 1) for item in self.items(name))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,13 +171,7 @@ class LibsdnnParameters:
     def bins(self, inputs: npt.ArrayLike) -> npt.NDArray[np.int32]:
         """Return the bins of samples: ``int(n_bins * x)``, or ``int(x)`` of a symbol, clipped.
 
-        Parameters
-        ----------
-        inputs : array of shape (n_samples, n_inputs)
-
-        Returns
-        -------
-        array of int32, shape (n_samples, n_inputs)
+        Shapes: inputs and bins (n_samples, n_inputs).
         """
         values = np.asarray(inputs, dtype=np.float64)
         if values.ndim != 2 or values.shape[1] != len(self.inputs):
@@ -77,10 +182,8 @@ class LibsdnnParameters:
             raise ValueError("inputs must be finite, got NaN or infinity")
         factors = np.array([1 if one.symbolic else one.n_bins for one in self.inputs])
         highest = np.array([one.n_bins - 1 for one in self.inputs])
-        bins: npt.NDArray[np.int32] = np.clip(np.trunc(values * factors), 0, highest).astype(
-            np.int32
-        )
-        return bins
+        bins = np.clip(np.trunc(values * factors), 0, highest)
+        return np.asarray(bins, dtype=np.int32)
 
     def make_code(self, library: Library = "msvc") -> _core.SelectiveDesensitization:
         """Return the code with LIBSDNN's own tables; needs a seed in the file."""
@@ -135,16 +238,9 @@ class LibsdnnModel:
     layer: _core.ParallelPerceptron
 
     def predict(self, inputs: npt.ArrayLike, n_threads: int = 1) -> npt.NDArray[Any]:
-        """LIBSDNN's outputs: numbers, or classes from 0.
+        """Return LIBSDNN's outputs, numbers or classes from 0.
 
-        Parameters
-        ----------
-        inputs : array of shape (n_samples, n_inputs)
-        n_threads : int
-
-        Returns
-        -------
-        array of shape (n_samples,)
+        Shapes: inputs (n_samples, n_inputs), outputs (n_samples,).
         """
         given = self.parameters
         bins = given.bins(inputs)
@@ -157,11 +253,9 @@ class LibsdnnModel:
             classes: npt.NDArray[Any] = np.maximum(potentials, 0).argmax(axis=1)
             return classes
         votes = np.zeros((len(bins), given.n_classes), dtype=np.int64)
-        first, second = np.triu_indices(given.n_classes, 1)
-        for unit, (i, j) in enumerate(zip(first, second, strict=True)):
-            firing = potentials[:, unit] > 0
-            votes[:, i] += firing
-            votes[:, j] += ~firing
+        for unit, (i, j) in enumerate(zip(*np.triu_indices(given.n_classes, 1), strict=True)):
+            votes[:, i] += potentials[:, unit] > 0
+            votes[:, j] += potentials[:, unit] <= 0
         winners: npt.NDArray[Any] = votes.argmax(axis=1)
         return winners
 
@@ -176,7 +270,7 @@ def read_parameter_file(path: str | Path) -> LibsdnnParameters:
         reproduced.
     """
     path = Path(path)
-    return _parameters(entries_of(path.read_text("latin-1"), path), path)
+    return _parameters(path.read_text("latin-1"), path)
 
 
 def read_model_file(path: str | Path, library: Library = "msvc") -> LibsdnnModel:
@@ -201,7 +295,7 @@ def read_model_file(path: str | Path, library: Library = "msvc") -> LibsdnnModel
     length = struct.unpack_from("<i", content)[0] if len(content) >= 4 else -1
     if not 0 < length <= len(content) - 4:
         raise ValueError(f"{path} must begin with the length of its parameters, got {length}")
-    parameters = _parameters(entries_of(content[4 : 4 + length].decode("latin-1"), path), path)
+    parameters = _parameters(content[4 : 4 + length].decode("latin-1"), path)
     n_units = parameters.n_output_units
     n_columns = len(parameters.pairs) * parameters.n_units
     expected = 4 * n_units * (n_columns + 1)
@@ -223,105 +317,81 @@ def read_model_file(path: str | Path, library: Library = "msvc") -> LibsdnnModel
     return LibsdnnModel(parameters=parameters, layer=layer)
 
 
-def _seed(text: str, what: str) -> tuple[int, ...] | None:
-    if text == "hardware_entropy":
-        return None
-    return tuple(whole_of(item, what, 0, 2**32 - 1) for item in items_of(text, what))
-
-
 def _input(text: str, n_units: int) -> LibsdnnInput:
-    found = re.fullmatch(r"(NUMERICAL|SYMBOLIC)\((\w+)\((.*)\)\)", text)
+    found = re.fullmatch(r"(NUMERICAL|SYMBOLIC)\(RANDOM_INVERSE\(([^,]*),([^,]*)\)\)", text)
     if found is None:
-        raise ValueError(f"input_type_and_creation_method must name a method, got {text[:80]!r}")
-    kind, method, arguments = found.groups()
-    if method != "RANDOM_INVERSE":
         raise ValueError(
-            f"input_type_and_creation_method must be RANDOM_INVERSE to be reproduced, got {method}"
+            "input_type_and_creation_method must be NUMERICAL or SYMBOLIC, by RANDOM_INVERSE(q, r) "
+            f"to be reproduced, got {text[:80]!r}"
         )
-    sizes = arguments.split(",")
-    if len(sizes) != 2:
-        raise ValueError(f"RANDOM_INVERSE must have two arguments, got {arguments[:80]!r}")
+    kind, n_bins, n_flipped = found.groups()
     return LibsdnnInput(
         symbolic=kind == "SYMBOLIC",
-        n_bins=whole_of(sizes[0], "q of RANDOM_INVERSE", 1, 2**24),
-        n_flipped=whole_of(sizes[1], "r of RANDOM_INVERSE", 1, n_units // 2 - 1),
+        n_bins=whole_of(n_bins, "q of RANDOM_INVERSE", 1, 2**24),
+        n_flipped=whole_of(n_flipped, "r of RANDOM_INVERSE", 1, n_units // 2 - 1),
     )
 
 
-def _pairs(entries: dict[str, str], n_inputs: int, path: Path) -> tuple[tuple[int, int], ...]:
-    method = entries.get("SDNN/SD/combination_setting", "mutual")
+def _pairs(entries: Entries, n_inputs: int) -> tuple[tuple[int, int], ...]:
+    method = entries.one_of("SDNN/SD/combination_setting", "mutual", "saved", "file")
     if method == "mutual":
         return tuple((i, j) for i in range(n_inputs) for j in range(n_inputs) if i != j)
     if method == "saved":
-        line = entries.get("SDNN/SD/line", "[(0,1),(1,0)]")
-        lines = [item.strip("()") for item in items_of(line, "SDNN/SD/line")]
-    elif method == "file":
-        file = path.parent / entries.get("SDNN/SD/filename", "")
-        if not file.is_file():
-            raise ValueError(f"SDNN/SD/filename must be a file beside {path}, got {file}")
-        lines = [line for line in file.read_text("latin-1").split() if line]
+        lines = [item.strip("()") for item in entries.items("SDNN/SD/line", "[(0,1),(1,0)]")]
     else:
-        raise ValueError(f"combination_setting must be mutual, saved or file, got {method!r}")
+        file = entries.path.parent / entries.get("SDNN/SD/filename", "")
+        if not file.is_file():
+            raise ValueError(f"SDNN/SD/filename must be a file beside {entries.path}, got {file}")
+        lines = file.read_text("latin-1").split()
     pairs = []
-    for one in lines:
-        inputs = one.split(",")
+    for line in lines:
+        inputs = line.split(",")
         if len(inputs) != 2:
-            raise ValueError(f"a combination must be two inputs, got {one[:80]!r}")
+            raise ValueError(f"a combination must be two inputs, got {line[:80]!r}")
         mu, nu = (whole_of(item, "an input of a combination", 0, n_inputs - 1) for item in inputs)
         pairs.append((mu, nu))
     if not pairs:
-        raise ValueError(f"{path} must combine at least one pair of inputs")
+        raise ValueError(f"{entries.path} must combine at least one pair of inputs")
     return tuple(pairs)
 
 
-def _parameters(entries: dict[str, str], path: Path) -> LibsdnnParameters:
-    def entry(name: str, default: str | None = None) -> str:
-        if name in entries:
-            return entries[name]
-        if default is None:
-            raise ValueError(f"{path} must have the entry {name.replace('/', ' / ')}")
-        return default
-
-    task = entry("ISSUE/type", "function_approximation")
-    if task not in ("function_approximation", "pattern_recognition"):
-        raise ValueError(
-            f"ISSUE / type must be function_approximation or pattern_recognition, got {task!r}"
-        )
-    n_inputs = whole_of(entry("ISSUE/input_number"), "input_number", 1, 10000)
-    n_units = whole_of(entry("SDNN/PC/n"), "n", 2, 2**24)
+def _parameters(text: str, path: Path) -> LibsdnnParameters:
+    entries = Entries(text, path)
+    task = entries.one_of("ISSUE/type", "function_approximation", "pattern_recognition")
+    n_inputs = entries.whole("ISSUE/input_number", 1, 10000)
+    n_units = entries.whole("SDNN/PC/n", 2, 2**24)
     if n_units % 2 != 0:
         raise ValueError(f"n must be even, got {n_units}")
     name = "SDNN/PC/input_type_and_creation_method"
-    inputs = tuple(_input(item, n_units) for item in items_of(entry(name), name))
+    inputs = tuple(_input(item, n_units) for item in entries.items(name))
     if len(inputs) != n_inputs:
         raise ValueError(f"{name} must have input_number = {n_inputs} items, got {len(inputs)}")
-    limits = items_of(entry("SDNN/NN/initial_value_range", "[-5,5]"), "initial_value_range")
-    if len(limits) != 2:
-        raise ValueError(f"initial_value_range must be two numbers, got {len(limits)}")
-    low, high = (whole_of(item, "initial_value_range", -(10**6), 10**6) for item in limits)
-    if low > high:
-        raise ValueError(f"initial_value_range must rise, got [{low}, {high}]")
+    name = "initial_value_range"
+    limits = entries.items(f"SDNN/NN/{name}", "[-5,5]")
+    low, high = (whole_of(item, name, -(10**6), 10**6) for item in (limits * 2)[:2])
+    if len(limits) != 2 or low > high:
+        raise ValueError(f"{name} must be two numbers that rise, got [{', '.join(limits)[:80]}]")
     given: dict[str, Any] = {}
     if task == "function_approximation":
-        span = items_of(entry("ISSUE/FA/output_range"), "output_range")
-        step = number_of(entry("ISSUE/FA/required_step_size"), "required_step_size")
+        span = entries.items("ISSUE/FA/output_range")
+        step = number_of(entries["ISSUE/FA/required_step_size"], "required_step_size")
         bounds = tuple(number_of(item, "output_range") for item in span)
         if len(bounds) != 2 or not 1e-6 <= step <= bounds[1] - bounds[0]:
             raise ValueError("output_range must be two numbers, a step size at least apart")
         given |= {"task": "regression", "output_range": bounds, "step_size": step}
     else:
-        schemes = {"1v1": "one_vs_one", "1vR": "one_vs_rest"}
-        scheme = entry("ISSUE/PR/multi_class_recognition", "1v1")
-        if scheme not in schemes:
-            raise ValueError(f"multi_class_recognition must be 1v1 or 1vR, got {scheme!r}")
-        n_classes = whole_of(entry("ISSUE/PR/class_number"), "class_number", 2, 1024)
-        given |= {"task": "classification", "n_classes": n_classes, "scheme": schemes[scheme]}
+        scheme = entries.one_of("ISSUE/PR/multi_class_recognition", "1v1", "1vR")
+        given |= {
+            "task": "classification",
+            "n_classes": entries.whole("ISSUE/PR/class_number", 2, 1024),
+            "scheme": "one_vs_one" if scheme == "1v1" else "one_vs_rest",
+        }
     return LibsdnnParameters(
         n_units=n_units,
         inputs=inputs,
-        pairs=_pairs(entries, n_inputs, path),
-        pattern_seed=_seed(entry("SDNN/PC/random_seed", "hardware_entropy"), "seed of PC"),
-        weight_seed=_seed(entry("SDNN/NN/random_seed", "hardware_entropy"), "seed of NN"),
+        pairs=_pairs(entries, n_inputs),
+        pattern_seed=entries.seed("SDNN/PC/random_seed"),
+        weight_seed=entries.seed("SDNN/NN/random_seed"),
         initial_range=(low, high),
         **given,
     )

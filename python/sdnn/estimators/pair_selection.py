@@ -11,14 +11,13 @@ from sklearn.model_selection import KFold, StratifiedKFold
 from sklearn.utils import _safe_indexing
 
 from sdnn.coding import Coding, CorrelationMatrix, Symbolic, WithMissing
+from sdnn.estimators.inputs import Pairs
 
 __all__ = ["select_pairs", "with_categories"]
 
 N_FOLDS = 5
 STANDARD_ERRORS = 2.0
 """By how many of them fewer pairs must be better than all, in the folds' mean difference."""
-
-Pairs = list[tuple[int, int]]
 
 
 def halved(pairs: Pairs, importances: NDArray[np.float64]) -> Pairs:

@@ -10,11 +10,11 @@ from collections.abc import Hashable, Mapping
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from river import base
 from sklearn.base import clone
 
 from sdnn.estimators.classifier import SDNNClassifier
-from sdnn.estimators.regressor import SDNNRegressor
 
 __all__ = ["RiverClassifier", "RiverRegressor"]
 
@@ -33,7 +33,7 @@ class Waiting:
     least_targets = 1
     """Different ones that have to be among the samples."""
 
-    def __init__(self, model: Any, grace_period: int) -> None:
+    def __init__(self, model: Any, grace_period: int = 100) -> None:
         if grace_period < 2:
             raise ValueError(f"grace_period must be at least 2, got {grace_period!r}")
         self.model = model
@@ -42,7 +42,8 @@ class Waiting:
         self.samples: list[dict[str, Any]] = []
         self.targets: list[Any] = []
 
-    def _learn(self, x: dict[Hashable, Any], y: Any) -> None:
+    def learn_one(self, x: dict[Hashable, Any], y: Any) -> None:
+        """Learn one sample; ValueError if the model refuses it, or one of the first ones."""
         sample = named(x)
         if self.fitted is not None:
             self.fitted.learn_one(sample, y)
@@ -54,21 +55,14 @@ class Waiting:
         # The model cannot say which sample it refuses, and would refuse it for ever.
         samples, self.samples = self.samples, []
         targets, self.targets = self.targets, []
+        is_classifier = isinstance(self.model, SDNNClassifier)
+        options = {"classes": np.unique(targets)} if is_classifier else {}
         try:
-            self.fitted = self._begun(samples, targets)
+            self.fitted = clone(self.model).partial_fit(
+                pd.DataFrame(samples), np.array(targets), **options
+            )
         except ValueError as error:
             raise ValueError(f"the first {len(samples)} samples are dropped: {error}") from error
-
-    def _begun(self, samples: list[dict[str, Any]], targets: list[Any]) -> Any:
-        """Make a model that has learned the samples collected."""
-        import pandas as pd
-
-        model = clone(self.model)
-        options = {}
-        if isinstance(model, SDNNClassifier):
-            options["classes"] = np.unique(targets)
-        model.partial_fit(pd.DataFrame(samples), np.array(targets), **options)
-        return model
 
 
 class RiverRegressor(Waiting, base.Regressor):
@@ -84,13 +78,6 @@ class RiverRegressor(Waiting, base.Regressor):
         Samples from which ranges and categories are learned first. Until then the mean target is
         predicted.
     """
-
-    def __init__(self, model: SDNNRegressor, grace_period: int = 100) -> None:
-        super().__init__(model, grace_period)
-
-    def learn_one(self, x: dict[Hashable, Any], y: float) -> None:
-        """Learn one sample; ValueError if the model refuses it, or one of the first ones."""
-        self._learn(x, y)
 
     def predict_one(self, x: dict[Hashable, Any]) -> float:
         """Predict one target."""
@@ -112,14 +99,7 @@ class RiverClassifier(Waiting, base.Classifier):
         each label so far is its probability. Samples of classes that come later are errors.
     """
 
-    def __init__(self, model: SDNNClassifier, grace_period: int = 100) -> None:
-        super().__init__(model, grace_period)
-
     least_targets = 2
-
-    def learn_one(self, x: dict[Hashable, Any], y: Any) -> None:
-        """Learn one sample; ValueError if the model refuses it, or one of the first ones."""
-        self._learn(x, y)
 
     def predict_one(self, x: dict[Hashable, Any], **_options: Any) -> Any:
         """Predict one label; None before the first sample."""
