@@ -16,18 +16,25 @@ from sdnn.files import Arrays, Description, read_file, write_file
 
 __all__ = ["Saved", "load", "save"]
 
-PLAIN = (
+ATTRIBUTES = (
+    "n_corrected_",
     "n_features_in_",
     "n_inputs_out_of_range_",
     "n_iter_",
     "n_outputs_",
     "n_outputs_out_of_range_",
+    "output_range_",
     "training_form_",
     "training_memory_",
+    "validation_scores_",
+    "_counts_of_range",
+    "_flat",
+    "_n_units_each",
+    "_scheme",
+    "_weight_seed",
 )
-PRIVATE = ("_flat", "_counts_of_range", "_scheme", "_n_units_each", "_weight_seed")
-ARRAYS = ("output_range_", "n_corrected_", "validation_scores_")
 NAMES = ("classes_", "feature_names_in_")
+"""Arrays whose type may be text."""
 
 
 class Saved(Protocol):
@@ -100,35 +107,28 @@ def named(values: NDArray[Any]) -> dict[str, Any]:
 
 def save(estimator: Saved, path: str | Path) -> None:
     """Write a fitted estimator; see `BaseSDNN.save`."""
-    network = estimator.network_
-    code = network.input_code
-    unique = {id(table): table for table in (*code.modified, *code.modifiers)}
-    number_of = {key: number for number, key in enumerate(unique)}
-    arrays: Arrays = {
-        "weights": narrowed(network.weights),
-        "thresholds": narrowed(network.thresholds),
-    }
-    earlier = vars(estimator).get("_earlier", ())
-    for number, one in enumerate(earlier):
-        arrays[f"weights.{number}"] = narrowed(one.weights)
-        arrays[f"thresholds.{number}"] = narrowed(one.thresholds)
-    for number, table in enumerate(unique.values()):
-        arrays[f"table.{number}"] = np.packbits(table > 0, axis=1)
-    for name in ARRAYS:
-        if hasattr(estimator, name):
-            arrays[name] = np.ascontiguousarray(getattr(estimator, name))
     held = vars(estimator)
+    code = estimator.network_.input_code
+    tables = {id(table): table for table in (*code.modified, *code.modifiers)}
+    number_of = {key: number for number, key in enumerate(tables)}
+    networks = (estimator.network_, *held.get("_earlier", ()))
+    arrays = {name: held[name] for name in ATTRIBUTES if isinstance(held.get(name), np.ndarray)}
+    for number, table in enumerate(tables.values()):
+        arrays[f"table.{number}"] = np.packbits(table > 0, axis=1)
+    for number, network in enumerate(networks):
+        arrays[f"weights.{number}"] = narrowed(network.weights)
+        arrays[f"thresholds.{number}"] = narrowed(network.thresholds)
+    attributes = {name: held[name] for name in ATTRIBUTES if name in held and name not in arrays}
+    parameters = estimator.get_params(deep=False)
     description = {
         "class": type(estimator).__name__,
-        "parameters": {
-            name: plain(value) for name, value in estimator.get_params(deep=False).items()
-        },
-        "plain": {name: held[name] for name in (*PLAIN, *PRIVATE) if name in held},
+        "parameters": {name: plain(value) for name, value in parameters.items()},
+        "attributes": attributes,
         "names": {name: named(held[name]) for name in NAMES if name in held},
         "codings": [to_dict(coding) for coding in code.codings],
         "pairs": code.pairs,
-        "n_units": network.n_units,
-        "n_earlier": len(earlier),
+        "n_units": estimator.network_.n_units,
+        "n_networks": len(networks),
         "n_pattern_units": code.n_units,
         "modified": [number_of[id(table)] for table in code.modified],
         "modifiers": [number_of[id(table)] for table in code.modifiers],
@@ -153,26 +153,17 @@ def load(path: str | Path, kind: type[Estimator]) -> Estimator:
 def read_estimator(description: Description, arrays: Arrays, kind: type[Estimator]) -> Estimator:
     """Make the estimator with its parameters and all it has learned."""
     estimator = kind(**{name: restored(value) for name, value in description["parameters"].items()})
-    for name, value in description["plain"].items():
-        if name in (*PLAIN, *PRIVATE):
-            setattr(estimator, name, value)
-    for name, value in description["names"].items():
-        if name in NAMES:
-            setattr(estimator, name, np.array(value["values"], dtype=value["type"]))
-    for name in ARRAYS:
-        if name in arrays:
-            setattr(estimator, name, arrays[name])
-    estimator.network_ = read_network(description, arrays)
-    if "n_outputs_" in vars(estimator):
-        vars(estimator)["_earlier"] = tuple(
-            Network(
-                estimator.network_.input_code,
-                description["n_units"],
-                weights=arrays[f"weights.{number}"].astype(np.int32),
-                thresholds=arrays[f"thresholds.{number}"].astype(np.int32),
-            )
-            for number in range(description["n_earlier"])
-        )
+    held = vars(estimator)
+    held |= {name: arrays[name] for name in ATTRIBUTES if name in arrays}
+    attributes = description["attributes"]
+    held |= {name: attributes[name] for name in ATTRIBUTES if name in attributes}
+    for name in NAMES:
+        if name in description["names"]:
+            told = description["names"][name]
+            held[name] = np.array(told["values"], dtype=told["type"])
+    estimator.network_, *earlier = read_networks(description, arrays)
+    if "n_outputs_" in held:
+        held["_earlier"] = tuple(earlier)
     require_consistent(estimator)
     return estimator
 
@@ -199,26 +190,22 @@ def require_consistent(estimator: Saved) -> None:
         raise ValueError("its parts do not fit together")
 
 
-def read_network(description: Description, arrays: Arrays) -> Network:
-    """Build the code and the layer; equal tables are shared again."""
+def read_networks(description: Description, arrays: Arrays) -> Iterator[Network]:
+    """Build the code and the layers on it; equal tables are shared again."""
     n_units = description["n_pattern_units"]
-
-    def unpacked(number: int) -> NDArray[np.int8]:
-        bits = np.unpackbits(arrays[f"table.{number}"], axis=1, count=n_units)
-        return (2 * bits.astype(np.int8) - 1).astype(np.int8)
-
-    tables = {
-        number: unpacked(number) for number in {*description["modified"], *description["modifiers"]}
-    }
+    numbers = {*description["modified"], *description["modifiers"]}
+    bits = {i: np.unpackbits(arrays[f"table.{i}"], axis=1, count=n_units) for i in numbers}
+    tables = {i: (2 * table.astype(np.int8) - 1).astype(np.int8) for i, table in bits.items()}
     code = InputCode(
         [from_dict(coding) for coding in description["codings"]],
         [(mu, nu) for mu, nu in description["pairs"]],
         [tables[number] for number in description["modified"]],
         [tables[number] for number in description["modifiers"]],
     )
-    return Network(
-        code,
-        description["n_units"],
-        weights=arrays["weights"].astype(np.int32),
-        thresholds=arrays["thresholds"].astype(np.int32),
-    )
+    for number in range(description["n_networks"]):
+        yield Network(
+            code,
+            description["n_units"],
+            weights=arrays[f"weights.{number}"].astype(np.int32),
+            thresholds=arrays[f"thresholds.{number}"].astype(np.int32),
+        )
