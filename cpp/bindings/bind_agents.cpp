@@ -1,3 +1,4 @@
+#include <pybind11/functional.h>
 #include <pybind11/native_enum.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
@@ -12,6 +13,7 @@
 #include "arrays.hpp"
 #include "bind_config.hpp"
 #include "bindings.hpp"
+#include "sdnn/agents/fixed_rate.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/observation_scale.hpp"
 #include "sdnn/agents/presets.hpp"
@@ -215,6 +217,15 @@ void bind_agents(py::module_& module) {
   module.def(
       "small_preset", [parts](int n_inputs) { return parts(agents::small_preset(n_inputs)); },
       py::arg("n_inputs"), "Settings of approximator and learning, for small processors");
+
+  py::class_<agents::FixedRate>(module, "FixedRate", "Waits for ticks at a fixed rate")
+      .def(py::init<double, agents::FixedRate::Clock, agents::FixedRate::Sleep>(), py::arg("hz"),
+           py::arg("clock"), py::arg("sleep"))
+      .def("wait", &agents::FixedRate::wait, "Waits for the next tick and returns its number")
+      .def_property_readonly("hz", &agents::FixedRate::hz)
+      .def_property_readonly("n_misses", &agents::FixedRate::n_misses)
+      .def_property_readonly("n_skipped", &agents::FixedRate::n_skipped)
+      .def_property_readonly("worst_lateness", &agents::FixedRate::worst_lateness);
 
   module.def("seed_of_dimension", &approximators::seed_of_dimension, py::arg("seed"), py::arg("d"),
              "The seed of the network of a dimension of the action");

@@ -788,6 +788,28 @@ class FuzzyQLearningConfig:
     @property
     def trace_decay(self) -> float:
         ...
+class FixedRate:
+    """
+    Waits for ticks at a fixed rate
+    """
+    def __init__(self, hz: typing.SupportsFloat | typing.SupportsIndex, clock: collections.abc.Callable[[], typing.SupportsFloat | typing.SupportsIndex], sleep: collections.abc.Callable[[float], None]) -> None:
+        ...
+    def wait(self) -> int:
+        """
+        Waits for the next tick and returns its number
+        """
+    @property
+    def hz(self) -> float:
+        ...
+    @property
+    def n_misses(self) -> int:
+        ...
+    @property
+    def n_skipped(self) -> int:
+        ...
+    @property
+    def worst_lateness(self) -> float:
+        ...
 class SDNNQLearning:
     """
     Q-learning with SDNN-C

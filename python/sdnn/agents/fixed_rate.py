@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 
+from sdnn import _core
 from sdnn.arguments import real
 
 __all__ = ["FixedRate"]
 
 
-class FixedRate:
+class FixedRate(_core.FixedRate):
     """Ticks ``hz`` times a second: what a loop that controls a robot iterates over.
 
     Tick k is at start + k / hz, whatever was before: nothing adds up, so the loop does not drift.
@@ -63,50 +63,13 @@ class FixedRate:
         hz: float,
         *,
         clock: Callable[[], float] = time.monotonic,
-        sleep: Callable[[float], object] = time.sleep,
+        sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self.hz = real("hz", hz)
-        if not 1e-3 <= self.hz <= 1e6:
-            raise ValueError(f"hz must be in [0.001, 1e+06], got {hz!r}")
-        self._clock, self._sleep = clock, sleep
-        self._start = 0.0
-        self._tick = -1
-        self.n_misses = 0
-        self.n_skipped = 0
-        self.worst_lateness = 0.0
+        super().__init__(real("hz", hz), clock, sleep)
 
     def __iter__(self) -> FixedRate:
         return self
 
     def __next__(self) -> int:
-        """Wait for the next tick; its number, 0 at once and then the periods since."""
-        if self._tick < 0:
-            self._start = self._clock()
-            self._tick = 0
-            return 0
-        before = self._tick
-        self._tick += 1
-        now = self._clock()
-        if now > self._time_of(self._tick):
-            self._skip(now)
-        while True:
-            while now < self._time_of(self._tick):
-                self._sleep(self._time_of(self._tick) - now)
-                now = self._clock()
-            if now <= self._time_of(self._tick + 1):
-                break
-            self._tick += 1  # slept through it
-            self._skip(now)
-        self.n_skipped += self._tick - before - 1
-        return self._tick
-
-    def _time_of(self, tick: int) -> float:
-        return self._start + tick / self.hz
-
-    def _skip(self, now: float) -> None:
-        """Note that the present tick has passed, and find the next one to come."""
-        self.n_misses += 1
-        self.worst_lateness = max(self.worst_lateness, now - self._time_of(self._tick))
-        self._tick = max(self._tick, math.ceil((now - self._start) * self.hz))
-        if self._time_of(self._tick) < now:  # rounding
-            self._tick += 1
+        """Wait for the next tick and return its number: 0 at once, then the periods since."""
+        return self.wait()

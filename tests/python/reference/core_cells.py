@@ -9,6 +9,7 @@ import copy
 import inspect
 import operator
 import pickle
+import time
 
 import numpy as np
 
@@ -58,6 +59,9 @@ GOOD = {
     "SDNNC": lambda: {"config": network_config(), "seed": 1},
     "FuzzyRules": lambda: {"config": core.FuzzyRulesConfig()},
     "RBFNetwork": lambda: {"config": core.RBFNetworkConfig()},
+    "FixedRate": lambda: {
+        "hz": 50.0, "clock": time.monotonic, "sleep": time.sleep,
+    },
     "GoalSchedule": lambda: {"config": core.GoalScheduleConfig()},
     "Acrobot": lambda: {"config": core.AcrobotConfig()},
     "AcrobotBatch": lambda: {"config": core.AcrobotConfig(), "n_acrobots": 3},

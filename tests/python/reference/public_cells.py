@@ -24,8 +24,8 @@ from sdnn.reproduction import (
     MeasureConfig,
     ProtocolConfig,
     TrialConfig,
-    measures,
 )
+from sdnn.runs import measures
 
 ROOMS = ("agents", "approximators", "coding", "environments", "estimators", "reproduction", "runs")
 
