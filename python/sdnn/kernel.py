@@ -54,7 +54,7 @@ def shared(matrices: Iterable[NDArray[np.float64]]) -> list[NDArray[np.float64]]
 
 
 def correlations(coding: str | Coding, n_units: int = N_UNITS) -> NDArray[np.float64]:
-    """Return the expected correlation of the patterns of each two bins.
+    """Return the expected correlation of the patterns of each two bins, shape (n_bins, n_bins).
 
     Parameters
     ----------
@@ -62,10 +62,6 @@ def correlations(coding: str | Coding, n_units: int = N_UNITS) -> NDArray[np.flo
         On the range [0, 1] unless it names or has learned another one.
     n_units : int
         Units per pattern.
-
-    Returns
-    -------
-    ndarray, shape (n_bins, n_bins)
 
     Examples
     --------
@@ -76,19 +72,7 @@ def correlations(coding: str | Coding, n_units: int = N_UNITS) -> NDArray[np.flo
 
 
 def similarity(coding: str | Coding, n_units: int = N_UNITS, seed: int = 0) -> NDArray[np.float64]:
-    """Correlation of the drawn patterns of each two bins; scattered about `correlations`.
-
-    Parameters
-    ----------
-    coding, n_units
-        As of `correlations`.
-    seed : int
-        Of the patterns.
-
-    Returns
-    -------
-    ndarray, shape (n_bins, n_bins)
-    """
+    """Return the correlation of the patterns drawn from a seed; scattered about `correlations`."""
     patterns = fitted(coding, n_units).patterns(n_units, seed).astype(np.float64)
     return patterns @ patterns.T / n_units
 
@@ -190,23 +174,9 @@ class AnalyticKernel:
 def plot_similarity(
     coding: str | Coding, n_units: int = N_UNITS, seed: int = 0, title: str | None = None
 ) -> Figure:
-    """Draw the correlations of a coding's drawn patterns, and those of one bin as a curve.
+    """Draw the `similarity` of a coding's patterns, and that of one bin as a curve.
 
-    Parameters
-    ----------
-    coding, n_units, seed
-        As of `similarity`.
-    title : str, optional
-        The figure's title; the coding's name where None.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    ModuleNotFoundError
-        If matplotlib is missing (``pip install "sdnn[plot]"``).
+    The title is the coding's name where None. Needs matplotlib (``pip install "sdnn[plot]"``).
     """
     from matplotlib.figure import Figure
 

@@ -119,7 +119,7 @@ class Entries(dict[str, str]):
         """Return an entry that is a whole number within bounds."""
         return whole_of(self[name], name.rpartition("/")[2], low, high)
 
-    def items(self, name: str, default: str | None = None) -> list[str]:  # type: ignore[override]
+    def list_of(self, name: str, default: str | None = None) -> list[str]:
         """Return the items of an entry that is a list."""
         text = self[name] if default is None else self.get(name, default)
         return items_of(text, name.rpartition("/")[2])
@@ -128,7 +128,7 @@ class Entries(dict[str, str]):
         """Return the numbers of a seed; None where it is hardware entropy."""
         if self.get(name, "hardware_entropy") == "hardware_entropy":
             return None
-        return tuple(whole_of(item, name, 0, 2**32 - 1) for item in self.items(name))
+        return tuple(whole_of(item, name, 0, 2**32 - 1) for item in self.list_of(name))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -337,7 +337,7 @@ def _pairs(entries: Entries, n_inputs: int) -> tuple[tuple[int, int], ...]:
     if method == "mutual":
         return tuple((i, j) for i in range(n_inputs) for j in range(n_inputs) if i != j)
     if method == "saved":
-        lines = [item.strip("()") for item in entries.items("SDNN/SD/line", "[(0,1),(1,0)]")]
+        lines = [item.strip("()") for item in entries.list_of("SDNN/SD/line", "[(0,1),(1,0)]")]
     else:
         file = entries.path.parent / entries.get("SDNN/SD/filename", "")
         if not file.is_file():
@@ -363,17 +363,17 @@ def _parameters(text: str, path: Path) -> LibsdnnParameters:
     if n_units % 2 != 0:
         raise ValueError(f"n must be even, got {n_units}")
     name = "SDNN/PC/input_type_and_creation_method"
-    inputs = tuple(_input(item, n_units) for item in entries.items(name))
+    inputs = tuple(_input(item, n_units) for item in entries.list_of(name))
     if len(inputs) != n_inputs:
         raise ValueError(f"{name} must have input_number = {n_inputs} items, got {len(inputs)}")
     name = "initial_value_range"
-    limits = entries.items(f"SDNN/NN/{name}", "[-5,5]")
+    limits = entries.list_of(f"SDNN/NN/{name}", "[-5,5]")
     low, high = (whole_of(item, name, -(10**6), 10**6) for item in (limits * 2)[:2])
     if len(limits) != 2 or low > high:
         raise ValueError(f"{name} must be two numbers that rise, got [{', '.join(limits)[:80]}]")
     given: dict[str, Any] = {}
     if task == "function_approximation":
-        span = entries.items("ISSUE/FA/output_range")
+        span = entries.list_of("ISSUE/FA/output_range")
         step = number_of(entries["ISSUE/FA/required_step_size"], "required_step_size")
         bounds = tuple(number_of(item, "output_range") for item in span)
         if len(bounds) != 2 or not 1e-6 <= step <= bounds[1] - bounds[0]:

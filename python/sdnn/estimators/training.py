@@ -6,11 +6,12 @@ import dataclasses
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sdnn import _core
 from sdnn.estimators.network import Network
 
 __all__ = ["History", "Trainer", "run_epochs", "sample_weights", "weighted_mean"]
@@ -19,48 +20,22 @@ LARGEST_WEIGHT = 10**6
 MOST_PRESENTED = 2**28
 """Samples presented in an epoch: their indices are a GiB."""
 
-
-class Trainer(Protocol):
-    """What the core's trainers have in common."""
-
-    @property
-    def form(self) -> str:
-        """The form of training."""
-
-    @property
-    def memory(self) -> int:
-        """Bytes beside the layer."""
-
-    def present(self, order: NDArray[np.int32]) -> tuple[int, int]:
-        """Present samples in that order; returns how many samples and units were corrected."""
-
-    def synchronize(self) -> None:
-        """Bring the layer's weights up to date."""
+Trainer = _core.PDeltaTrainer | _core.PerceptronTrainer
 
 
 @dataclasses.dataclass
 class History:
-    """What happened in each epoch.
-
-    Attributes
-    ----------
-    network : Network
-        With the weights of the last epoch, or with a validation score of the best one.
-    n_corrected : list of int
-        Samples that were corrected.
-    scores : list of float
-        Validation scores; empty without early stopping.
-    n_epochs : int
-        Epochs that made the weights: with early stopping, up to the best.
-    earlier : tuple of Network
-        The network after each of the epochs before the last of these.
-    """
+    """What happened in each epoch; ``network`` is the last one, or by validation the best one."""
 
     network: Network
     n_corrected: list[int] = dataclasses.field(default_factory=list)
+    """Samples that were corrected."""
     scores: list[float] = dataclasses.field(default_factory=list)
+    """Validation scores; empty without early stopping."""
     n_epochs: int = 0
+    """Epochs that made the weights: with early stopping, up to the best."""
     earlier: tuple[Network, ...] = ()
+    """The network after each of the epochs before the last of these."""
 
 
 @contextmanager
@@ -157,10 +132,8 @@ def run_epochs(
 
     Parameters
     ----------
-    network : Network
-        What the trainer trains.
-    trainer : Trainer
-        Of the network's layer.
+    network, trainer : Network, Trainer
+        What is trained, and the trainer of its layer.
     n_samples, max_iter : int
         Size of the training sample, and the largest number of epochs.
     random : RandomState, optional
@@ -173,8 +146,6 @@ def run_epochs(
         How often each sample is presented per epoch, on average; once by default.
     n_averaged_epochs : int
         How many epochs' networks are kept, the last included.
-    verbose : int
-        Whether to show a progress bar.
     """
     history = History(network)
     quiet, n_quiet = 0, epochs_to_present_all(weights)
