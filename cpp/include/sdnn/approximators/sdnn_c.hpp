@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "sdnn/approximators/detail/potential_memory.hpp"
+#include "sdnn/approximators/detail/activation_cache.hpp"
 #include "sdnn/approximators/detail/weight_average.hpp"
 #include "sdnn/approximators/detail/wiring.hpp"
 #include "sdnn/approximators/error_correction.hpp"
@@ -42,7 +42,7 @@ struct CorrectionCounts {
 ///
 /// Wiring (code books, permutations) is fixed by config and seed. Reading does not change what is
 /// returned, but the network remembers the potentials of recent states and keeps them exact while
-/// it learns (see PotentialMemory), so that one decision needs at most one pass over the weights.
+/// it learns (see ActivationCache), so that one decision needs at most one pass over the weights.
 ///
 /// With averaging_interval > 0 it also keeps an average of its weights (see WeightAverage), of
 /// which averaged_values are the values. Learning uses the weights themselves. Not in the paper.
@@ -84,7 +84,7 @@ class SDNNC {
   const coding::ActionCode& action_code() const noexcept { return actions_; }
   const OutputScale& output_scale() const noexcept { return scale_; }
   const HiddenLayer& hidden_layer() const noexcept { return hidden_layer_; }
-  const PotentialMemory& memory() const noexcept { return memory_; }
+  const ActivationCache& memory() const noexcept { return memory_; }
   const CorrectionCounts& correction_counts() const noexcept { return counts_; }
   std::size_t n_inputs() const noexcept { return code_->n_inputs(); }
   std::size_t n_actions() const noexcept { return actions_.n_actions(); }
@@ -182,7 +182,7 @@ class SDNNC {
     for (int i = 0; i < kStates; ++i) {
       values(std::vector<double>(n_inputs(), (i + 0.5) / kStates), out);
     }
-    memory_ = PotentialMemory(*code_, actions_.n_hidden_units(), actions_.n_active_units());
+    memory_ = ActivationCache(*code_, actions_.n_hidden_units(), actions_.n_active_units());
     if (has_average()) up_to_date_average();
   }
 
@@ -252,7 +252,7 @@ class SDNNC {
   }
 
  private:
-  using Remembered = PotentialMemory::Entry;
+  using Remembered = ActivationCache::Entry;
 
   static OutputScale make_scale(const SDNNCConfig& config) {
     const int u_low = config.u_low.value_or(config.n_active_units / 15);
@@ -323,7 +323,7 @@ class SDNNC {
   /// A hidden layer with the average of the weights.
   struct Averaged {
     HiddenLayer layer;
-    PotentialMemory memory;
+    ActivationCache memory;
     std::uint64_t n_snapshots;
   };
 
@@ -331,7 +331,7 @@ class SDNNC {
     if (!averaged_) {
       averaged_.emplace(Averaged{
           HiddenLayer(1, 1),
-          PotentialMemory(*code_, actions_.n_hidden_units(), actions_.n_active_units()), 0});
+          ActivationCache(*code_, actions_.n_hidden_units(), actions_.n_active_units()), 0});
     }
     if (averaged_->n_snapshots != average_->n_snapshots()) {
       averaged_->layer =
@@ -490,7 +490,7 @@ class SDNNC {
   CorrectionCounts counts_;
 
   // Workspace: sized once, so that a step allocates nothing.
-  PotentialMemory memory_;
+  ActivationCache memory_;
   std::vector<coding::Bin> bins_;
   std::vector<std::int8_t> moves_;  ///< what the count changes by as the window moves on a unit
   std::vector<std::uint32_t> selected_;

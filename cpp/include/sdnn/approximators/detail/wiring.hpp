@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "sdnn/approximators/detail/potential_memory.hpp"
+#include "sdnn/approximators/detail/activation_cache.hpp"
 #include "sdnn/approximators/detail/weight_average.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"
 #include "sdnn/coding/action_code.hpp"
@@ -45,7 +45,7 @@ inline void require_room(const SDNNCConfig& config, double n_bins) {
   }
   const double patterns = config.pattern_bytes(n_bins);
   const double remembered =
-      static_cast<double>(PotentialMemory::n_bytes(sizes.n_hidden_units(), sizes.n_active_units()));
+      static_cast<double>(ActivationCache::n_bytes(sizes.n_hidden_units(), sizes.n_active_units()));
   const char* largest = "max_pairs, n_hidden_units, n_pattern_units or n_inputs";
   if (patterns > std::max(weights, remembered)) {
     largest = config.n_symbols.empty()

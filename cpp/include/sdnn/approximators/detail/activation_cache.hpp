@@ -25,7 +25,7 @@ namespace sdnn::approximators {
 /// h(s') - h(s) = W (x_SD(s') - x_SD(s)) touches only the columns in which the codes differ. The
 /// way that is cheapest by estimate is taken: from a remembered state, or by a full pass. Whichever
 /// it is, the result is the same integers.
-class PotentialMemory {
+class ActivationCache {
  public:
   /// One remembered state. Shapes: bins (l,), potentials (n,).
   struct Entry {
@@ -42,7 +42,7 @@ class PotentialMemory {
   };
 
   /// `max_corrected`: the most units that one correction may touch.
-  PotentialMemory(const coding::StateCode& code, std::size_t n_units, std::size_t max_corrected)
+  ActivationCache(const coding::StateCode& code, std::size_t n_units, std::size_t max_corrected)
       : n_inputs_(code.n_inputs()),
         n_units_(n_units),
         bins_(kEntries * n_inputs_),

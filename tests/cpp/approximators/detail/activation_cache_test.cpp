@@ -1,4 +1,4 @@
-#include "sdnn/approximators/detail/potential_memory.hpp"
+#include "sdnn/approximators/detail/activation_cache.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace {
 
 // A walk with small steps and jumps, with corrections of random actions in between: every way to
 // come by potentials is used, and each gives the integers of a full pass.
-TEST(PotentialMemory, WhateverWayIsTakenThePotentialsAreThoseOfAFullPass) {
+TEST(ActivationCache, WhateverWayIsTakenThePotentialsAreThoseOfAFullPass) {
   SDNNCConfig config;
   config.n_hidden_units = 130;
   config.n_active_units = 50;
@@ -47,7 +47,7 @@ TEST(PotentialMemory, WhateverWayIsTakenThePotentialsAreThoseOfAFullPass) {
   EXPECT_GT(counts.full, 20U);
 }
 
-TEST(PotentialMemory, ReplacedWeightsAreNotRemembered) {
+TEST(ActivationCache, ReplacedWeightsAreNotRemembered) {
   SDNNCConfig config;
   config.n_hidden_units = 20;
   config.n_active_units = 10;
