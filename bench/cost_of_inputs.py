@@ -49,7 +49,7 @@ def measure():
         network = _core.SDNNC(config.to_core(), SEED)
         for _ in range(LEARNING_STEPS):
             target = float(rng.uniform(config.q_low, config.q_high))
-            network.correct(rng.random(n_inputs), int(rng.integers(network.n_actions)), target)
+            network.update(rng.random(n_inputs), int(rng.integers(network.n_actions)), target)
         parts = _core.NetworkParts(network, SEED)
 
         def decide(n, parts=parts):

@@ -23,7 +23,7 @@ class Setting {
         values(network.n_actions()) {
     for (int i = 0; i < kLearningSteps; ++i) {
       move();
-      network.correct(at, random.below(values.size()), 40.0 * random.uniform() - 20.0);
+      network.update(at, random.below(values.size()), 40.0 * random.uniform() - 20.0);
     }
   }
 
@@ -74,7 +74,7 @@ void learning_step(benchmark::State& state) {
   double sign = 1.0;
   for (auto _ : state) {
     const double value = setting.network.value(setting.at, 300);
-    setting.network.correct(setting.at, 300, value + sign * step);
+    setting.network.update(setting.at, 300, value + sign * step);
     sign = -sign;
   }
 }

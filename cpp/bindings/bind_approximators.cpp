@@ -108,9 +108,9 @@ py::class_<Network> bind_network(py::module_& module, const char* name, const ch
           },
           py::arg("state"), "Q(state, a) for every action; shapes (n_inputs,) -> (n_actions,)")
       .def(
-          "correct",
+          "update",
           [](Network& net, const ArrayArgument<double>& state, std::size_t action, double target,
-             double rate) { net.correct(bindings::vector(state, "state"), action, target, rate); },
+             double rate) { net.update(bindings::vector(state, "state"), action, target, rate); },
           py::arg("state"), py::arg("action"), py::arg("target"), py::arg("rate") = 1.0,
           "One correction of Q = Q(state, action) towards (1 - rate) Q + rate target");
 }

@@ -174,7 +174,7 @@ class SDNNC:
     >>> network.value([0.2, 0.7], 300)
     0.0
     >>> for _ in range(50):
-    ...     network.correct([0.2, 0.7], 300, 5.0)
+    ...     network.update([0.2, 0.7], 300, 5.0)
     >>> round(network.value([0.2, 0.7], 300), 1)
     5.1
     """
@@ -227,7 +227,7 @@ class SDNNC:
         """Q(state, action)."""
         return self._core.value(state, action)
 
-    def correct(self, state: ArrayLike, action: int, target: float, rate: float = 1.0) -> None:
+    def update(self, state: ArrayLike, action: int, target: float, rate: float = 1.0) -> None:
         """One step of error correction (Fig. 2): Q towards (1 - rate) Q + rate * target.
 
         Raises
@@ -237,7 +237,7 @@ class SDNNC:
         OverflowError
             If a weight would leave its range; no weight has changed then.
         """
-        self._core.correct(state, action, target, rate)
+        self._core.update(state, action, target, rate)
 
     def weights(self) -> NDArray[np.float64]:
         """Copy the weights in the paper's units, shape (n, D)."""

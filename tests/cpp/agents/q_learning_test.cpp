@@ -48,7 +48,7 @@ TEST(QLearning, EquationOneByHand) {
 
 TEST(QLearning, ATerminatedTransitionDoesNotBootstrapATruncatedOneDoes) {
   LookupTable table(1, 5, 2);
-  table.correct(cell(2), 1, 20.0);
+  table.update(cell(2), 1, 20.0);
   Agent terminated(table, {}, 1);
   Agent truncated(table, {}, 1);
   terminated.learn(cell(1), 0, 1.0, cell(2), true);
@@ -60,7 +60,7 @@ TEST(QLearning, ATerminatedTransitionDoesNotBootstrapATruncatedOneDoes) {
 // The next state's value is taken before the correction, also when it is the same state.
 TEST(QLearning, ATransitionToItselfUsesTheOldValue) {
   LookupTable table(1, 5, 2);
-  table.correct(cell(3), 0, 4.0);
+  table.update(cell(3), 0, 4.0);
   Agent agent(table, {}, 1);
   agent.learn(cell(3), 0, 2.0, cell(3), false);
   EXPECT_DOUBLE_EQ(agent.action_value().value(cell(3), 0), 0.5 * 4.0 + 0.5 * (2.0 + 0.9 * 4.0));
@@ -69,7 +69,7 @@ TEST(QLearning, ATransitionToItselfUsesTheOldValue) {
 // Rewards 1, 2, 4, then the goal with 8; gamma = 1/2, alpha = 1: every number is exact.
 TEST(QLearning, OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown) {
   LookupTable table(1, 5, 2);
-  table.correct(cell(2), 1, 16.0);
+  table.update(cell(2), 1, 16.0);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 2}, 1);
   const auto q = [&](int s) { return agent.action_value().value(cell(s), 0); };
   agent.begin_episode();
@@ -90,7 +90,7 @@ TEST(QLearning, OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown) {
 
 TEST(QLearning, WhatWaitsAtTheTimeLimitIsLearnedWhenTheNextEpisodeBegins) {
   LookupTable table(1, 5, 2);
-  table.correct(cell(2), 1, 16.0);
+  table.update(cell(2), 1, 16.0);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 5}, 1);
   const auto q = [&](int s) { return agent.action_value().value(cell(s), 0); };
   agent.learn(cell(0), 0, 1.0, cell(1), false);
@@ -106,7 +106,7 @@ TEST(QLearning, WhatWaitsAtTheTimeLimitIsLearnedWhenTheNextEpisodeBegins) {
 
 TEST(QLearning, ATransitionFromElsewhereBeginsAnew) {
   LookupTable table(1, 5, 2);
-  table.correct(cell(2), 1, 16.0);
+  table.update(cell(2), 1, 16.0);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 3}, 1);
   const auto q = [&](int s) { return agent.action_value().value(cell(s), 0); };
   agent.learn(cell(0), 0, 1.0, cell(1), false);
@@ -177,7 +177,7 @@ TEST(QLearning, ByActingItFindsTheValuesOfTheSmallProcess) {
 
 TEST(QLearning, StepsAreCountedFromTheBeginningOfAnEpisode) {
   LookupTable table(1, 5, 3);
-  table.correct(cell(0), 2, 1.0);
+  table.update(cell(0), 2, 1.0);
   Agent agent(table, {.policy = {.epsilon = 1.0, .n_greedy_steps = 4}}, 3);
   int others = 0;
   for (int episode = 0; episode < 50; ++episode) {
@@ -294,7 +294,7 @@ TEST(QLearning, ARandomActionLastsKStepsWithProbabilityOneKth) {
 
 TEST(QLearning, AKeptActionEndsWithTheEpisodeAndEvaluationDoesNotUseItUp) {
   LookupTable table(1, 1, 1 << 17);
-  table.correct(cell(0), 5, 1.0);
+  table.update(cell(0), 5, 1.0);
   Agent agent(table, {.policy = {.epsilon = 1.0, .n_greedy_steps = 0}, .max_repetitions = 1000}, 1);
   int n_kept = 0;
   for (int i = 0; i < 200; ++i) {
@@ -311,7 +311,7 @@ TEST(QLearning, AKeptActionEndsWithTheEpisodeAndEvaluationDoesNotUseItUp) {
 
 TEST(QLearning, TheFirstStepsOfALifeAreRandom) {
   LookupTable table(1, 1, 1 << 17);
-  table.correct(cell(0), 5, 1.0);
+  table.update(cell(0), 5, 1.0);
   for (const int longest : {1, 7}) {
     Agent agent(table,
                 {.policy = {.epsilon = 0.0}, .max_repetitions = longest, .n_random_steps = 50}, 1);

@@ -30,8 +30,8 @@ static_assert(!DecoupledActionValue<LookupTable>);
 /// Two dimensions, of 2 and 3 actions: Q_0 = 2 and Q_1 = 6 for action (1, 2) at kHere.
 Decoupled<LookupTable> two_tables() {
   LookupTable first(1, 2, 2), second(1, 2, 3);
-  first.correct(kHere, 1, 2.0);
-  second.correct(kHere, 2, 6.0);
+  first.update(kHere, 1, 2.0);
+  second.update(kHere, 2, 6.0);
   return Decoupled<LookupTable>({first, second});
 }
 
@@ -48,7 +48,7 @@ TEST(Decoupled, TheValueIsTheMean) {
 
 TEST(Decoupled, ACorrectionMovesEveryPartByTheErrorOfTheMean) {
   auto q = two_tables();
-  q.correct(kHere, Indices{1, 2}, 8.0, 0.5);                // the error is 8 - 4
+  q.update(kHere, Indices{1, 2}, 8.0, 0.5);                // the error is 8 - 4
   EXPECT_EQ(q.part(0).value(kHere, 1), 4.0);                // half of 2 and half of 2 + 4
   EXPECT_EQ(q.part(1).value(kHere, 2), 8.0);                // half of 6 and half of 6 + 4
   EXPECT_EQ(q.value(kHere, Indices{1, 2}), 0.5 * (4 + 8));  // half way from 4 to 8
@@ -61,7 +61,7 @@ TEST(Decoupled, TheLargestValueIsTheMeanOfTheLargest) {
   std::vector<LookupTable> tables(3, LookupTable(1, 2, 4));
   for (LookupTable& table : tables) {
     for (std::size_t a = 0; a < 4; ++a) {
-      table.correct(kHere, a, static_cast<double>(random.below(1000)));
+      table.update(kHere, a, static_cast<double>(random.below(1000)));
     }
   }
   Decoupled<LookupTable> q(tables);
@@ -103,14 +103,14 @@ TEST(Decoupled, RefusesWhatDoesNotFit) {
   auto q = two_tables();
   for (const Indices& bad : {Indices{}, Indices{1}, Indices{1, 2, 0}}) {
     EXPECT_THROW((void)q.value(kHere, bad), std::invalid_argument);
-    EXPECT_THROW(q.correct(kHere, bad, 1.0, 0.5), std::invalid_argument);
+    EXPECT_THROW(q.update(kHere, bad, 1.0, 0.5), std::invalid_argument);
   }
   EXPECT_EQ(q.value(kHere, Indices{1, 2}), 4.0);
   const RBFNetworkConfig config{.n_inputs = 1, .n_actions = 3};
   Decoupled<RBFNetwork> networks({RBFNetwork(config), RBFNetwork(config)});
   const core::State before = core::state_of(networks);
   for (const Indices& bad : {Indices{1, 3}, Indices{3, 1}}) {
-    EXPECT_THROW(networks.correct(kHere, bad, 1.0, 0.5), std::invalid_argument);
+    EXPECT_THROW(networks.update(kHere, bad, 1.0, 0.5), std::invalid_argument);
   }
   EXPECT_EQ(core::state_of(networks), before);
 }
@@ -118,7 +118,7 @@ TEST(Decoupled, RefusesWhatDoesNotFit) {
 TEST(Decoupled, RestoresItsPartsOrNone) {
   const RBFNetworkConfig config{.n_inputs = 1, .n_bases = 2, .n_actions = 3};
   Decoupled<RBFNetwork> q({RBFNetwork(config), RBFNetwork(config)});
-  q.correct(kHere, Indices{1, 2}, 8.0, 0.5);
+  q.update(kHere, Indices{1, 2}, 8.0, 0.5);
   testing::expect_that_damage_is_refused(q);
   Decoupled<RBFNetwork> other({RBFNetwork(config), RBFNetwork(config)});
   core::restore(other, core::state_of(q));

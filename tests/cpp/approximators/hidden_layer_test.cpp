@@ -32,7 +32,7 @@ TEST(HiddenLayer, PotentialsAndCorrectionByHand) {
   p.set_threshold(1, 4);
   const Input x{.plus = {0}, .minus = {2}};
   EXPECT_EQ(potentials(p, x), (std::vector<std::int32_t>{3, -4}));
-  p.correct(std::vector<std::uint32_t>{1}, x, 1);  // h_1 += |x|^2 + 1
+  p.update(std::vector<std::uint32_t>{1}, x, 1);  // h_1 += |x|^2 + 1
   EXPECT_EQ(potentials(p, x), (std::vector<std::int32_t>{3, -1}));
   EXPECT_EQ(p.weight(1, 0), 1);
   EXPECT_EQ(p.weight(1, 1), 5);
@@ -44,8 +44,8 @@ TEST(HiddenLayer, PotentialsAndCorrectionByHand) {
 TEST(HiddenLayer, DoubleColumnsMoveByTwiceTheStep) {
   HiddenLayer p(70, 4, 2);
   const Input x{.plus = {0, 3}, .minus = {1, 2}};
-  for (const auto& units : {std::vector<std::uint32_t>{5}, {5, 6}, {5, 69}}) p.correct(units, x, 3);
-  p.correct(std::vector<std::uint32_t>{6}, x, -64);
+  for (const auto& units : {std::vector<std::uint32_t>{5}, {5, 6}, {5, 69}}) p.update(units, x, 3);
+  p.update(std::vector<std::uint32_t>{6}, x, -64);
   const auto row = [&](std::size_t unit) {
     std::vector<std::int32_t> weights;
     for (std::size_t j = 0; j < 4; ++j) weights.push_back(p.weight(unit, j));
@@ -55,7 +55,7 @@ TEST(HiddenLayer, DoubleColumnsMoveByTwiceTheStep) {
   EXPECT_EQ(row(6), (std::vector<std::int32_t>{-122, 122, 61, -61}));
   EXPECT_EQ(row(69), (std::vector<std::int32_t>{6, -6, -3, 3}));
   EXPECT_EQ(p.threshold(5), -9);
-  p.correct(std::vector<std::uint32_t>{6, 7}, x, -64);  // the one needs a high byte, the other not
+  p.update(std::vector<std::uint32_t>{6, 7}, x, -64);  // the one needs a high byte, the other not
   EXPECT_EQ(row(6), (std::vector<std::int32_t>{-250, 250, 125, -125}));
   EXPECT_EQ(row(7), (std::vector<std::int32_t>{-128, 128, 64, -64}));
   EXPECT_THROW(HiddenLayer(1, 3, 4), std::invalid_argument);
@@ -121,17 +121,17 @@ TEST(HiddenLayer, AWeightOutsideAByteHasAHighByte) {
   const Input x{.plus = {0}, .minus = {1}};
   const std::vector<std::uint32_t> unit = {2};
   for (int i = 1; i <= 500; ++i) {
-    p.correct(unit, x, 1);
+    p.update(unit, x, 1);
     ASSERT_EQ(p.weight(2, 0), i);
     ASSERT_EQ(p.weight(2, 1), -i);
     ASSERT_EQ(p.threshold(2), -i);
     ASSERT_EQ(potentials(p, x), (std::vector<std::int32_t>{0, 0, 3 * i}));
   }
   EXPECT_EQ(p.n_high_columns(), 2U);
-  for (int i = 500; i > 0; --i) p.correct(unit, x, -1);
+  for (int i = 500; i > 0; --i) p.update(unit, x, -1);
   EXPECT_EQ(p.weight(2, 0), 0);
   EXPECT_EQ(p.n_high_columns(), 0U);
-  for (int i = 0; i > -500; --i) p.correct(unit, x, -1);
+  for (int i = 0; i > -500; --i) p.update(unit, x, -1);
   EXPECT_EQ(p.weight(2, 0), -500);
   EXPECT_EQ(p.weight(0, 0), 0);
 }
@@ -163,7 +163,7 @@ TEST(HiddenLayer, CorrectionsThatCancelStayInAByte) {
   HiddenLayer p(70, 5);
   const Input x{.plus = {0, 3}, .minus = {4}};
   const std::vector<std::uint32_t> unit = {69};
-  for (int i = 0; i < 2000; ++i) p.correct(unit, x, i % 2 == 0 ? 1 : -1);
+  for (int i = 0; i < 2000; ++i) p.update(unit, x, i % 2 == 0 ? 1 : -1);
   EXPECT_EQ(p.n_high_columns(), 0U);
   EXPECT_EQ(p.weight(69, 3), 0);
 }
@@ -173,13 +173,13 @@ TEST(HiddenLayer, OverflowIsDetectedBeforeAnythingChanges) {
   const Input x{.plus = {0}, .minus = {}};
   p.set_weight(1, 0, 16382);
   const std::vector<std::uint32_t> both = {0, 1};
-  p.correct(both, x, 1);
+  p.update(both, x, 1);
   EXPECT_EQ(p.weight(1, 0), 16383);
-  EXPECT_THROW(p.correct(both, x, 1), std::overflow_error);
+  EXPECT_THROW(p.update(both, x, 1), std::overflow_error);
   EXPECT_EQ(p.weight(1, 0), 16383);
   EXPECT_EQ(p.weight(0, 0), 1);
   EXPECT_EQ(p.threshold(0), -1);
-  p.correct(both, x, -1);  // going back is possible
+  p.update(both, x, -1);  // going back is possible
   EXPECT_EQ(p.weight(1, 0), 16382);
 }
 

@@ -32,7 +32,7 @@ class LookupTable {
   double value(std::span<const double> state, std::size_t action) const {
     return table_.at(row(state) + action);
   }
-  void correct(std::span<const double> state, std::size_t action, double target,
+  void update(std::span<const double> state, std::size_t action, double target,
                double rate = 1.0) {
     core::require(rate > 0.0 && rate <= 1.0, "rate", "in (0, 1]", rate);
     double& q = table_.at(row(state) + action);

@@ -32,7 +32,7 @@ RBFNetwork taught(const RBFNetworkConfig& config, int n_corrections) {
   for (int i = 0; i < n_corrections; ++i) {
     const auto state = random_state(random, network.n_inputs());
     const auto action = static_cast<std::size_t>(random.below(network.n_actions()));
-    network.correct(state, action, 20.0 * random.uniform() - 10.0);
+    network.update(state, action, 20.0 * random.uniform() - 10.0);
   }
   return network;
 }
@@ -43,7 +43,7 @@ TEST(RBFNetwork, OneGradientStepByHand) {
       {.n_inputs = 1, .n_bases = 2, .n_actions = 3, .width = 1.0, .gradient_rate = 0.5});
   EXPECT_EQ(network.n_joint_bases(), 4U);
   const std::vector<double> state = {0.5};
-  network.correct(state, 0, 8.0);  // phi = (1/2, 1/2) o (p, 1 - p), p = 1 / (1 + e^-1/2)
+  network.update(state, 0, 8.0);  // phi = (1/2, 1/2) o (p, 1 - p), p = 1 / (1 + e^-1/2)
   const double p = 1.0 / (1.0 + std::exp(-0.5));
   const std::vector<double> expected = {2.0 * p, 2.0 * (1.0 - p), 2.0 * p, 2.0 * (1.0 - p)};
   for (std::size_t j = 0; j < 4; ++j) EXPECT_NEAR(network.weights()[j], expected[j], 1e-15);
@@ -91,9 +91,9 @@ TEST(RBFNetwork, WhatIsRememberedNeverChangesWhatIsReturned) {
     if (i % 3 == 1) (void)used.value(i % 2 == 0 ? a : b, 3);
     used.values(a, out);
     EXPECT_EQ(out, expected);
-    used.correct(a, 3, i);
+    used.update(a, 3, i);
     fresh.values(b, expected);
-    fresh.correct(a, 3, i);
+    fresh.update(a, 3, i);
     ASSERT_TRUE(std::ranges::equal(used.weights(), fresh.weights()));
   }
 }
@@ -105,7 +105,7 @@ TEST(RBFNetwork, AGradientStepGoesTheRightWayAndNotTooFar) {
     const auto state = random_state(random, 4);
     const auto action = static_cast<std::size_t>(random.below(601));
     const double before = network.value(state, action);
-    network.correct(state, action, 30.0);
+    network.update(state, action, 30.0);
     const double after = network.value(state, action);
     EXPECT_LT(std::abs(30.0 - after), std::abs(30.0 - before));
     EXPECT_EQ(after > 30.0, before > 30.0);
@@ -172,7 +172,7 @@ TEST(RBFNetwork, AStepAllocatesNothing) {
     std::vector<double> out(601);
     const std::size_t before = testing::allocation_count();
     network.values(state, out);
-    network.correct(state, 7, 1.0, 0.5);
+    network.update(state, 7, 1.0, 0.5);
     (void)network.value(state, 7);
     EXPECT_EQ(testing::allocation_count(), before);
   }
@@ -224,13 +224,13 @@ TEST(RBFNetwork, BadArgumentsChangeNothing) {
   EXPECT_THROW(network.values(big, out), std::invalid_argument);
   EXPECT_THROW(network.values(good, short_out), std::invalid_argument);
   EXPECT_THROW((void)network.value(good, 3), std::invalid_argument);
-  EXPECT_THROW(network.correct(big, 0, 1.0), std::invalid_argument);
-  EXPECT_THROW(network.correct(good, 3, 1.0), std::invalid_argument);
-  EXPECT_THROW(network.correct(good, 0, std::nan("")), std::invalid_argument);
-  EXPECT_THROW(network.correct(good, 0, 1.0, 0.0), std::invalid_argument);
-  EXPECT_THROW(network.correct(good, 0, 1.0, 1.5), std::invalid_argument);
-  EXPECT_THROW(network.correct(good, 0, 1.0, std::nan("")), std::invalid_argument);
-  EXPECT_THROW(network.correct(good, 0, std::numeric_limits<double>::infinity()),
+  EXPECT_THROW(network.update(big, 0, 1.0), std::invalid_argument);
+  EXPECT_THROW(network.update(good, 3, 1.0), std::invalid_argument);
+  EXPECT_THROW(network.update(good, 0, std::nan("")), std::invalid_argument);
+  EXPECT_THROW(network.update(good, 0, 1.0, 0.0), std::invalid_argument);
+  EXPECT_THROW(network.update(good, 0, 1.0, 1.5), std::invalid_argument);
+  EXPECT_THROW(network.update(good, 0, 1.0, std::nan("")), std::invalid_argument);
+  EXPECT_THROW(network.update(good, 0, std::numeric_limits<double>::infinity()),
                std::overflow_error);
   EXPECT_TRUE(std::ranges::equal(network.weights(), weights));
 }

@@ -159,7 +159,7 @@ TEST(SDNNC, OneCorrectionMovesOneUnitOfEachSubset) {
     }
     expected[best] += 4 * (self + 1);
   }
-  network.correct(state, action, network.output_scale()(n_firing + 3));
+  network.update(state, action, network.output_scale()(n_firing + 3));
   EXPECT_EQ(potentials(network, state), expected);
   EXPECT_EQ(network.value(state, action), network.output_scale()(n_firing + 3));
 }
@@ -168,8 +168,8 @@ TEST(SDNNC, NothingHappensWhenTheCountIsRightAlready) {
   Network network(small(), 5);
   const Network before = network;
   const State state = {0.1, 0.5, 0.9};
-  network.correct(state, 3, network.value(state, 3));
-  network.correct(state, 3, network.value(state, 3) + 0.01);  // rounds to the same count
+  network.update(state, 3, network.value(state, 3));
+  network.update(state, 3, network.value(state, 3) + 0.01);  // rounds to the same count
   expect_equal_parameters(network, before);
 }
 
@@ -184,7 +184,7 @@ TEST(SDNNC, RoundingDecidesWhatBecomesOfPartsOfAUnit) {
     Network network(config, seed);
     const double unit = network.output_scale()(31) - network.output_scale()(30);
     const double before = network.value(state, 3);
-    network.correct(state, 3, before + units * unit);
+    network.update(state, 3, before + units * unit);
     return static_cast<int>(std::lround((network.value(state, 3) - before) / unit));
   };
   EXPECT_EQ(moved(Rounding::half_up, 0.25, 5), 0);
@@ -212,7 +212,7 @@ TEST(SDNNC, CorrectionsReachAnyTargetAndSaturateBeyond) {
   Network network(small(), 5);
   const State state = {0.3, 0.6, 0.2};
   for (const double target : {20.0, -20.0, 4.0, 1e300, -1e300, 0.0}) {
-    for (int i = 0; i < 400; ++i) network.correct(state, 70, target);
+    for (int i = 0; i < 400; ++i) network.update(state, 70, target);
     EXPECT_NEAR(network.value(state, 70), std::clamp(target, -20.0, 20.0), 20.0 / 52);
   }
 }
@@ -225,7 +225,7 @@ TEST(SDNNC, PopcountsOfWindowsEqualTheSlidingCount) {
     Network network(config, 9);
     for (int i = 0; i < 40; ++i) {
       const State state = random_state(3, random);
-      network.correct(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
+      network.update(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
       EXPECT_EQ(values(network, state), values_by_masks(network, state));
     }
   }
@@ -264,7 +264,7 @@ TEST(SDNNC, RememberingChangesNothingOverThousandsOfLearningSteps) {
         (void)network.value(away, 0);
         (void)network.value(further_away, 0);
       }
-      network.correct(
+      network.update(
           state, action,
           0.5 * network.value(state, action) +
               0.5 * (reward + 0.9 * *std::max_element(following.begin(), following.end())));
@@ -294,7 +294,7 @@ TEST(SDNNC, ActingAndLearningAllocateNothing) {
   for (int step = 0; step < 300; ++step) {
     network.values(state, out);
     const std::size_t action = random.below(network.n_actions());
-    network.correct(state, action, 40.0 * random.uniform() - 20.0);
+    network.update(state, action, 40.0 * random.uniform() - 20.0);
     for (double& value : state) value = random.uniform();
   }
   EXPECT_EQ(testing::allocation_count(), before);
@@ -313,7 +313,7 @@ TEST(SDNNC, LargeWeightsAllocateNothing) {
   const std::size_t before = testing::allocation_count();
   for (int step = 0; step < 300; ++step) {
     network.values(state, out);
-    network.correct(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
+    network.update(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
     for (double& value : state) value = random.uniform();
   }
   EXPECT_EQ(testing::allocation_count(), before);
@@ -324,13 +324,13 @@ TEST(SDNNC, LargeWeightsAllocateNothing) {
 TEST(SDNNC, CopiesShareNothingThatIsLearned) {
   Network original(small(), 3);
   const State state = {0.2, 0.4, 0.6};
-  original.correct(state, 5, 9.0);
+  original.update(state, 5, 9.0);
   const std::vector<double> before = values(original, state);
   const std::vector<std::int32_t> potentials_before = potentials(original, state);
   Network copy = original;
   EXPECT_EQ(values(copy, state), before);
   expect_equal_parameters(copy, original);
-  for (int i = 0; i < 100; ++i) copy.correct(state, 5, -20.0);
+  for (int i = 0; i < 100; ++i) copy.update(state, 5, -20.0);
   EXPECT_NE(values(copy, state), before);
   EXPECT_EQ(values(original, state), before);
   EXPECT_EQ(potentials(original, state), potentials_before);
@@ -342,7 +342,7 @@ TEST(SDNNC, ParametersCanBeMovedToAnotherNetworkOfTheSameWiring) {
   Network teacher(small(), 3);
   Network pupil(small(), 3);
   const State state = {0.2, 0.4, 0.6};
-  for (int i = 0; i < 100; ++i) teacher.correct(state, 5, 12.0);
+  for (int i = 0; i < 100; ++i) teacher.update(state, 5, 12.0);
   (void)pupil.value(state, 5);  // remembered: must be forgotten
   const HiddenLayer& p = teacher.hidden_layer();
   std::vector<std::int32_t> weights;
@@ -405,7 +405,7 @@ TEST(SDNNC, OddSizesLearnAsWell) {
     Network network(config, 1);
     for (int i = 0; i < 60; ++i) {
       const State state = random_state(network.n_inputs(), random);
-      network.correct(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
+      network.update(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
       ASSERT_EQ(values(network, state), values_by_masks(network, state));
     }
   }
@@ -423,7 +423,7 @@ TEST(SDNNC, LearnsOverPatternsOfAnyCoding) {
   EXPECT_EQ(network.state_code().table(1).n_bins(), 4U);
   for (int i = 0; i < 60; ++i) {
     const State state = random_state(3, random);
-    network.correct(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
+    network.update(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
     ASSERT_EQ(values(network, state), values_by_masks(network, state));
   }
   EXPECT_EQ(values(network, {0.1, 0.0, 0.5}), values(network, {0.1, 0.24, 0.5}));  // one symbol
@@ -463,7 +463,7 @@ TEST(SDNNC, PairsOfInputsAreAnEvenShareOfAll) {
   core::Random random(3, core::Stream::code_books);
   for (int i = 0; i < 60; ++i) {
     const State state = random_state(7, random);
-    network.correct(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
+    network.update(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
     ASSERT_EQ(values(network, state), values_by_masks(network, state));
   }
   // All pairs are the paper's code, however they were asked for.
@@ -483,7 +483,7 @@ TEST(SDNNC, SymbolsHavePatternsOfTheirOwn) {
   for (int i = 0; i < 60; ++i) {
     const auto symbol = static_cast<double>(random.below(4));
     const State state = {(symbol + 0.5) / 4.0, random.uniform(), random.uniform()};
-    network.correct(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
+    network.update(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
     ASSERT_EQ(values(network, state), values_by_masks(network, state));
     const State same = {(symbol + 0.9) / 4.0, state[1], state[2]};
     ASSERT_EQ(values(network, same), values(network, state));
@@ -495,12 +495,12 @@ TEST(SDNNC, ARateMixesTargetAndValue) {
   Network other(small(), 5);
   const State state = {0.3, 0.6, 0.2};
   for (int i = 0; i < 50; ++i) {
-    one.correct(state, 70, 12.0, 0.25);
-    other.correct(state, 70, 0.75 * other.value(state, 70) + 0.25 * 12.0);
+    one.update(state, 70, 12.0, 0.25);
+    other.update(state, 70, 0.75 * other.value(state, 70) + 0.25 * 12.0);
   }
   expect_equal_parameters(one, other);
   for (const double rate : {0.0, -0.5, 1.5, std::nan("")}) {
-    EXPECT_THROW(one.correct(state, 70, 1.0, rate), std::invalid_argument);
+    EXPECT_THROW(one.update(state, 70, 1.0, rate), std::invalid_argument);
   }
   expect_equal_parameters(one, other);
 }
@@ -511,7 +511,7 @@ TEST(SDNNC, WarmCachesChangeNothing) {
   warm.warm_caches();
   EXPECT_EQ(warm.memory().counts().full, 0U);
   const State state = {0.3, 0.6, 0.2};
-  for (Network* const network : {&cold, &warm}) network->correct(state, 70, 12.0);
+  for (Network* const network : {&cold, &warm}) network->update(state, 70, 12.0);
   expect_equal_parameters(cold, warm);
   EXPECT_EQ(values(cold, state), values(warm, state));
 }
@@ -609,12 +609,12 @@ TEST(SDNNC, ABadArgumentChangesNothing) {
        {std::nan(""), -1e-300, 1.0000001, std::numeric_limits<double>::infinity()}) {
     const State state = {0.1, bad, 0.3};
     EXPECT_THROW((void)network.value(state, 0), std::invalid_argument);
-    EXPECT_THROW(network.correct(state, 0, 1.0), std::invalid_argument);
+    EXPECT_THROW(network.update(state, 0, 1.0), std::invalid_argument);
     EXPECT_THROW((void)values(network, state), std::invalid_argument);
     EXPECT_THROW((void)potentials(network, state), std::invalid_argument);
   }
-  EXPECT_THROW(network.correct(good, 0, std::nan("")), std::invalid_argument);
-  EXPECT_THROW(network.correct(good, 141, 1.0), std::invalid_argument);
+  EXPECT_THROW(network.update(good, 0, std::nan("")), std::invalid_argument);
+  EXPECT_THROW(network.update(good, 141, 1.0), std::invalid_argument);
   EXPECT_THROW((void)network.value(good, 141), std::invalid_argument);
   EXPECT_THROW((void)network.value(State{0.1, 0.2}, 0), std::invalid_argument);
   std::vector<double> short_row(140);
@@ -627,7 +627,7 @@ TEST(SDNNC, AnotherRangeMovesValuesButNotTheirPlaceInIt) {
   Network network(small(), 1);
   core::Random random(6, core::Stream::ties);
   const State state = random_state(3, random);
-  network.correct(state, 3, 9.0);
+  network.update(state, 3, 9.0);
   const std::vector<double> before = values(network, state);
   const double low = network.output_scale().q_low(), high = network.output_scale().q_high();
   network.set_output_range(100.0, 300.0);
@@ -663,13 +663,13 @@ TEST(SDNNC, CountsWhatBecomesOfCorrections) {
     EXPECT_EQ(network.correction_counts().out_of_range, outside);
   };
   ASSERT_EQ(network.value(state, 0), 15.0);
-  network.correct(state, 0, 15.0);
+  network.update(state, 0, 15.0);
   expect_counts(0, 0, 0);  // nothing was wanted
-  network.correct(state, 0, 15.4);
+  network.update(state, 0, 15.4);
   expect_counts(0, 1, 0);
-  network.correct(state, 0, 16.0);
+  network.update(state, 0, 16.0);
   expect_counts(1, 1, 0);
-  network.correct(state, 0, 31.0);
+  network.update(state, 0, 31.0);
   expect_counts(2, 1, 1);
 }
 
@@ -692,8 +692,8 @@ TEST(SDNNC, AveragingDoesNotTouchLearning) {
     const State state = random_state(3, random);
     const std::size_t action = random.below(network.n_actions());
     const double target = 40.0 * random.uniform() - 20.0;
-    network.correct(state, action, target);
-    averaging_one.correct(state, action, target);
+    network.update(state, action, target);
+    averaging_one.update(state, action, target);
     if (t % 10 == 0) (void)averaged_values(averaging_one, state);
     ASSERT_EQ(values(averaging_one, state), values(network, state)) << t;
   }
@@ -711,7 +711,7 @@ TEST(SDNNC, AveragedValuesAreThoseOfTheAveragedWeights) {
   for (int t = 0; t < 300; ++t) {
     const State state = random_state(3, random);
     EXPECT_EQ(network.has_average(), t >= 7);
-    network.correct(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
+    network.update(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
     if (t % 20 != 8) continue;
     std::vector<std::int32_t> weights, thresholds;
     for (std::size_t unit = 0; unit < 200; ++unit) {
@@ -735,7 +735,7 @@ TEST(SDNNC, TheAverageStillsWhatSwings) {
   const State state = {0.2, 0.7, 0.4};
   double furthest = 0.0;
   for (int t = 0; t < 6000; ++t) {
-    network.correct(state, 30, 20.0 * random.uniform() - 5.0);
+    network.update(state, 30, 20.0 * random.uniform() - 5.0);
     if (t < 1000 || t % 50 != 0) continue;
     furthest = std::max(furthest, std::abs(network.value(state, 30) - 5.0));
     ASSERT_LT(std::abs(averaged_values(network, state)[30] - 5.0), 5.0) << t;
@@ -746,7 +746,7 @@ TEST(SDNNC, TheAverageStillsWhatSwings) {
 TEST(SDNNC, OtherParametersBeginAnotherAverage) {
   Network network(averaging(), 5);
   const State state = {0.2, 0.7, 0.4};
-  for (int t = 0; t < 50; ++t) network.correct(state, 30, 10.0);
+  for (int t = 0; t < 50; ++t) network.update(state, 30, 10.0);
   EXPECT_TRUE(network.has_average());
   const std::size_t n_units = 200, n_columns = network.state_code().n_columns();
   network.set_parameters(std::vector<std::int32_t>(n_units * n_columns),
@@ -759,14 +759,14 @@ TEST(SDNNC, AveragingAllocatesNothingWhileItLearns) {
   Network network(averaging(), 5);
   core::Random random(1, core::Stream::weights);
   State state = random_state(3, random);
-  for (int t = 0; t < 20; ++t) network.correct(state, 3, 5.0);
+  for (int t = 0; t < 20; ++t) network.update(state, 3, 5.0);
   (void)averaged_values(network, state);
   std::vector<double> out(network.n_actions());
   const std::size_t before = testing::allocation_count();
   for (int t = 0; t < 100; ++t) {
     for (double& x : state) x = random.uniform();
     network.values(state, out);
-    network.correct(state, 3, 5.0);
+    network.update(state, 3, 5.0);
   }
   EXPECT_EQ(testing::allocation_count(), before);
 }

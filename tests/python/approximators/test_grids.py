@@ -60,8 +60,8 @@ def test_the_rbf_network_agrees_with_its_definition_bit_for_bit(d, n_steps):
         target = float(rng.uniform(-20, 20))
         if step % 5 == 0:
             assert np.array_equal(net.values(state), slow.values(state)), step
-        net.correct(state, action, target)
-        slow.correct(state, action, target)
+        net.update(state, action, target)
+        slow.update(state, action, target)
         state = walk(rng, state)
     assert np.array_equal(net.weights(), slow.w.ravel())
     assert net.n_joint_bases == slow.w.size
@@ -94,11 +94,11 @@ def test_the_rbf_network_corrects_at_a_rate():
         state, action = rng.random(2), int(rng.integers(config.n_actions))
         target, rate = rng.uniform(-20, 20), rng.uniform(0.1, 1.0)
         value = whole.values(state)[action]
-        whole.correct(state, action, (1.0 - rate) * value + rate * target)
-        at_a_rate.correct(state, action, target, rate=rate)
+        whole.update(state, action, (1.0 - rate) * value + rate * target)
+        at_a_rate.update(state, action, target, rate=rate)
         assert np.array_equal(whole.weights(), at_a_rate.weights())
     with pytest.raises(ValueError, match=r"rate must be in \(0, 1\], got 0"):
-        whole.correct([0.5, 0.5], 0, 1.0, rate=0.0)
+        whole.update([0.5, 0.5], 0, 1.0, rate=0.0)
 
 
 def test_the_exponential_of_the_core_is_the_one_of_numpy_up_to_rounding():

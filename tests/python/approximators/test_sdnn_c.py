@@ -81,7 +81,7 @@ def compare_while_learning(config, seed, n_steps, compare_weights_every):
         expected = slow.values(state)
         assert np.array_equal(core.values(state), expected), step
         assert core.value(state, action) == expected[action]
-        core.correct(state, action, q_hat)
+        core.update(state, action, q_hat)
         n_active += slow.update(state, action, q_hat) > 0
         following = next_state(rng, state)
         if step % compare_weights_every == 0:
@@ -136,7 +136,7 @@ def test_the_core_agrees_with_the_page_at_any_size(n_inputs, m, n, window, latti
         action = int(rng.integers(core.n_actions))
         q_hat = float(rng.uniform(-25, 25))
         assert np.array_equal(core.values(state), slow.values(state))
-        core.correct(state, action, q_hat)
+        core.update(state, action, q_hat)
         slow.update(state, action, q_hat)
     assert_equal_parameters(core, slow)
 
@@ -263,7 +263,7 @@ def test_a_correction_never_moves_the_value_away_from_the_target(state, action, 
     before = network.value(state, action)
     assert before == 0.0
     for _ in range(n):
-        network.correct(state, action, target)
+        network.update(state, action, target)
         after = network.value(state, action)
         assert min(before, goal) <= after <= max(before, goal)
         before = after
@@ -277,8 +277,8 @@ def test_asking_changes_nothing(state, other, target):
     for _ in range(4):
         asked.values(other)
         asked.value(state, 3)
-        asked.correct(state, 5, target)
-        silent.correct(state, 5, target)
+        asked.update(state, 5, target)
+        silent.update(state, 5, target)
     assert np.array_equal(asked.weights(), silent.weights())
     assert np.array_equal(asked.values(other), silent.values(other))
 
@@ -288,7 +288,7 @@ def test_asking_changes_nothing(state, other, target):
 def test_parameters_go_out_and_in_again(state, seed):
     network = _core.SDNNC(_core.SDNNCConfig(**SMALL), seed)
     for action in range(0, 90, 10):
-        network.correct(state, action, 15.0)
+        network.update(state, action, 15.0)
     twin = _core.SDNNC(_core.SDNNCConfig(**SMALL), seed)
     twin.set_parameters(network.weights(), network.thresholds())
     assert np.array_equal(twin.weights(), network.weights())
@@ -302,8 +302,8 @@ def test_c_scales_weights_and_changes_no_decision():
     )
     state = [0.1, 0.5, 0.9]
     for _ in range(30):
-        small.correct(state, 7, 12.0)
-        large.correct(state, 7, 12.0)
+        small.update(state, 7, 12.0)
+        large.update(state, 7, 12.0)
     assert np.array_equal(small.values(state), large.values(state))
     assert np.array_equal(64 * small.weights(), large.weights())
     assert np.array_equal(64 * small.thresholds(), large.thresholds())
@@ -416,7 +416,7 @@ def test_bad_states_are_named_and_change_nothing(state, message):
     for use in (
         lambda: network.values(state),
         lambda: network.value(state, 0),
-        lambda: network.correct(state, 0, 1.0),
+        lambda: network.update(state, 0, 1.0),
     ):
         with pytest.raises(ValueError, match=message):
             use()
@@ -429,7 +429,7 @@ def test_bad_actions_and_targets_are_named():
     with pytest.raises(ValueError, match="action must be less than 91, got 91"):
         network.value(state, 91)
     with pytest.raises(ValueError, match="target must be a number, got nan"):
-        network.correct(state, 0, np.nan)
+        network.update(state, 0, np.nan)
     with pytest.raises(TypeError):
         network.value(state, -1)
     with pytest.raises((TypeError, ValueError)):
@@ -451,7 +451,7 @@ def test_bad_actions_and_targets_are_named():
 def test_states_of_any_layout(make):
     network = SDNNC(SDNNCConfig(**SMALL), seed=1)
     state = [0.125, 0.5, 0.875]
-    network.correct(state, 3, 20.0)
+    network.update(state, 3, 20.0)
     assert np.array_equal(network.values(make(state)), network.values(np.array(state)))
 
 
@@ -479,12 +479,12 @@ def test_patterns_of_any_coding_can_be_given():
     config = SDNNCConfig(n_inputs=2, n_pattern_units=40, n_hidden_units=90, n_active_units=30)
     network = SDNNC(config, seed=3, tables=tables)
     for _ in range(20):
-        network.correct([0.2, 0.1], 10, 8.0)
+        network.update([0.2, 0.1], 10, 8.0)
     np.testing.assert_array_equal(network.values([0.2, 0.1]), network.values([0.2, 0.4]))  # "a"
     assert (network.values([0.2, 0.1]) != network.values([0.2, 0.6])).any()
     same = SDNNC(config, seed=3, tables=[table.tolist() for table in tables])
     for _ in range(20):
-        same.correct([0.2, 0.1], 10, 8.0)
+        same.update([0.2, 0.1], 10, 8.0)
     np.testing.assert_array_equal(same.weights(), network.weights())
 
 
@@ -518,7 +518,7 @@ def test_the_average_agrees_with_its_formula():
     weights, thresholds, due, n_snapshots = 0.0, 0.0, 5, 0
     for n in range(1, 1501):
         target = float(rng.uniform(-20, 20))
-        network.correct(rng.random(3), int(rng.integers(network.n_actions)), target)
+        network.update(rng.random(3), int(rng.integers(network.n_actions)), target)
         if n < due:
             continue
         passed = max(5, n // 64)

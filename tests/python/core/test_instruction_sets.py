@@ -61,7 +61,7 @@ def test_a_learned_network_has_the_same_bits_on_all_levels():
         network = _core.SDNNC(_core.SDNNCConfig(n_inputs=4), 1)
         rng = np.random.default_rng(1)
         for _ in range(300):
-            network.correct(rng.random(4), int(rng.integers(601)), float(rng.uniform(-20, 20)))
+            network.update(rng.random(4), int(rng.integers(601)), float(rng.uniform(-20, 20)))
         networks[level] = (network.weights(), network.thresholds(), network.values([0.5] * 4))
     for level, arrays in networks.items():
         for array, expected in zip(arrays, networks["portable"], strict=True):

@@ -145,7 +145,7 @@ METHODS = {
     ("PerceptronTrainer", "present"): {"order": [0, 2, 1]},
     ("SDNNC", "values"): {"state": [0.1, 0.2]},
     ("SDNNC", "value"): {"state": [0.1, 0.2], "action": 3},
-    ("SDNNC", "correct"): {"state": [0.1, 0.2], "action": 3, "target": 1.0, "rate": 1.0},
+    ("SDNNC", "update"): {"state": [0.1, 0.2], "action": 3, "target": 1.0, "rate": 1.0},
     ("SDNNC", "table"): {"input": 0},
     ("SDNNC", "permutation"): {"mu": 0, "nu": 1},
     ("FuzzyRules", "values"): {"rule": 0},

@@ -145,7 +145,7 @@ class RBFNetwork:
         u = np.add.accumulate(self.phi(state)[:, None] * self.w, axis=0)[-1]
         return np.add.accumulate(self.psi * u, axis=1)[:, -1]
 
-    def correct(self, state: NDArray[np.float64], action: int, target: float) -> None:
+    def update(self, state: NDArray[np.float64], action: int, target: float) -> None:
         """One gradient step of (target - Q)^2 / 2."""
         step = self.rate * (target - float(self.values(state)[action]))
         self.w += np.outer(self.phi(state), step * self.psi[action])

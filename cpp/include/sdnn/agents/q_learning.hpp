@@ -455,9 +455,9 @@ class QLearning {
     const double target = waiting.return_of_oldest(value, config_.discount);
     const WaitingSteps::Step& oldest = waiting.take_oldest();
     if constexpr (kDecoupled) {
-      action_value_.correct(oldest.state, oldest.action, target, learning_rate_);
+      action_value_.update(oldest.state, oldest.action, target, learning_rate_);
     } else {
-      action_value_.correct(oldest.state, oldest.action.front(), target, learning_rate_);
+      action_value_.update(oldest.state, oldest.action.front(), target, learning_rate_);
     }
   }
 

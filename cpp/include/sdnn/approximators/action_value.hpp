@@ -15,7 +15,7 @@ namespace sdnn::approximators {
 /// - q.n_inputs(): l, the size of a state
 /// - q.values(state, out): writes Q(state, a) for every action a; out: (n_actions,)
 /// - q.value(state, action): Q(state, action)
-/// - q.correct(state, action, target, rate): moves Q = Q(state, action) towards
+/// - q.update(state, action, target, rate): moves Q = Q(state, action) towards
 ///   (1 - rate) Q + rate target, as near as it can go; rate in (0, 1]
 ///
 /// values may remember what it computed, but never changes what it returns.
@@ -27,7 +27,7 @@ concept ActionValue =
       { const_q.n_inputs() } -> std::convertible_to<std::size_t>;
       q.values(state, out);
       { q.value(state, action) } -> std::convertible_to<double>;
-      q.correct(state, action, target, rate);
+      q.update(state, action, target, rate);
     };
 
 }  // namespace sdnn::approximators

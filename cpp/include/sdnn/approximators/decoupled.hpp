@@ -51,11 +51,11 @@ class Decoupled {
 
   /// Moves Q(state, action) towards (1 - rate) Q + rate * target. Throws as the parts do; where it
   /// is for an overflow, the parts before have changed.
-  void correct(std::span<const double> state, std::span<const std::size_t> action, double target,
+  void update(std::span<const double> state, std::span<const std::size_t> action, double target,
                double rate) {
     const double error = target - value(state, action);
     for (std::size_t d = 0; d < parts_.size(); ++d) {
-      parts_[d].correct(state, action[d], taken_[d] + error, rate);
+      parts_[d].update(state, action[d], taken_[d] + error, rate);
     }
   }
 

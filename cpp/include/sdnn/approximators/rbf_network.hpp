@@ -28,7 +28,7 @@ struct RBFNetworkConfig {
   int n_bases = 4;             ///< per dimension, of the state and of the action
   int n_actions = 601;         ///< evenly spaced over the action's range
   double width = 0.5;          ///< of a Gaussian, in units of the spacing of the centres
-  double gradient_rate = 3.0;  ///< of the step in correct, at most 1e6; stable below 2 / |phi|^2
+  double gradient_rate = 3.0;  ///< of the step in update, at most 1e6; stable below 2 / |phi|^2
   std::uint64_t max_table_bytes = core::kDefaultMaxTableBytes;  ///< more weights are refused
 
   static constexpr auto fields() noexcept {
@@ -136,7 +136,7 @@ class RBFNetwork {
   /// Throws std::invalid_argument like value, and for a NaN target or a rate outside (0, 1];
   /// std::overflow_error if the step exceeds 1e305 (the network has diverged, or target is
   /// infinite): weights stay finite, and so do values. Nothing has changed then.
-  void correct(std::span<const double> state, std::size_t action, double target,
+  void update(std::span<const double> state, std::size_t action, double target,
                double rate = 1.0) {
     core::require(!std::isnan(target), "target", "a number", target);
     core::require(rate > 0.0 && rate <= 1.0, "rate", "in (0, 1]", rate);

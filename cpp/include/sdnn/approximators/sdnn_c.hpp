@@ -149,7 +149,7 @@ class SDNNC {
   /// Source: Fig. 2, Eqs. (1) to (3); method.md, section 1.8. Throws std::invalid_argument for
   /// a bad state, action or rate or a NaN target, std::overflow_error; then no weight or threshold
   /// has changed and nothing is counted, though a random rounding may have been drawn.
-  void correct(std::span<const double> state, std::size_t action, double target,
+  void update(std::span<const double> state, std::size_t action, double target,
                double rate = 1.0) {
     core::require(!std::isnan(target), "target", "a number", target);
     core::require(rate > 0.0 && rate <= 1.0, "rate", "in (0, 1]", rate);
@@ -444,7 +444,7 @@ class SDNNC {
     for (std::uint32_t& unit : selected_) unit += static_cast<std::uint32_t>(first);
 
     const std::int32_t step = deficit > 0 ? config_.lattice : -config_.lattice;
-    hidden_layer_.correct(selected_, memory_.columns(*code_, entry.bins), step);
+    hidden_layer_.update(selected_, memory_.columns(*code_, entry.bins), step);
     memory_.corrected(entry.bins, selected_, step);
     return true;
   }

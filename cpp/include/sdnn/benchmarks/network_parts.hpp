@@ -69,7 +69,7 @@ class NetworkParts {
           action = random_.below(network_.n_actions());
           target = network_.value(state_, action) + (i % 2 == 0 ? step : -step);
         },
-        [&](int) { network_.correct(state_, action, target); });
+        [&](int) { network_.update(state_, action, target); });
   }
 
   /// `n_selections` selections of units per repetition, each for a deficit of `n_selected` up or

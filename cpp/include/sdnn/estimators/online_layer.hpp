@@ -137,7 +137,7 @@ class OnlineLayer {
       if (now.units.empty()) continue;
       std::sort(now.units.begin(), now.units.end());  // neighbours share cache lines
       done_.reserve(done_.size() + 1);  // once it is done, nothing may fail before it is noted
-      hidden_.correct(now.units, slots_.columns(), direction);
+      hidden_.update(now.units, slots_.columns(), direction);
       done_.push_back(std::move(now));
     }
   }
@@ -147,7 +147,7 @@ class OnlineLayer {
     for (; !done_.empty(); done_.pop_back()) {
       const Done& last = done_.back();
       read(bins.subspan(last.sample * n_inputs, n_inputs));
-      hidden_.correct(last.units, slots_.columns(), -last.direction);
+      hidden_.update(last.units, slots_.columns(), -last.direction);
     }
   }
 

@@ -38,7 +38,7 @@ TEST(ActivationCache, WhateverWayIsTakenThePotentialsAreThoseOfAFullPass) {
       ASSERT_EQ(values[action], network.output_scale()(static_cast<int>(n_firing)));
     }
     if (random.below(3) != 0) {
-      network.correct(state, random.below(values.size()), 20.0 * random.uniform() - 10.0);
+      network.update(state, random.below(values.size()), 20.0 * random.uniform() - 10.0);
     }
   }
   const auto& counts = network.memory().counts();

@@ -32,7 +32,7 @@ TEST(PlainRBFNetwork, OneGradientStepByHand) {
   EXPECT_EQ(network.n_inputs(), 1U);
   EXPECT_EQ(network.n_actions(), 3U);
   const std::vector<double> state = {0.5}, other = {0.2};
-  network.correct(state, 1, 8.0);
+  network.update(state, 1, 8.0);
   std::vector<double> out(3);
   network.values(other, out);
   for (std::size_t action = 0; action < 3; ++action) {
@@ -53,8 +53,8 @@ TEST(PlainRBFNetwork, GivesAndLearnsWhatTheFactoredOneDoes) {
     plain.values(state, out);
     for (std::size_t a = 0; a < 17; ++a) EXPECT_NEAR(out[a], expected[a], 1e-11);
     EXPECT_EQ(plain.value(state, action), factored.value(state, action));
-    factored.correct(state, action, 0.5 * i);
-    plain.correct(state, action, 0.5 * i);
+    factored.update(state, action, 0.5 * i);
+    plain.update(state, action, 0.5 * i);
   }
   EXPECT_TRUE(std::ranges::equal(plain.network().weights(), factored.weights()));
 }
@@ -67,7 +67,7 @@ PlainRBFNetwork taught(const RBFNetworkConfig& config, int n_corrections) {
     std::vector<double> state(network.n_inputs());
     for (double& x : state) x = random.uniform();
     const auto action = static_cast<std::size_t>(random.below(network.n_actions()));
-    network.correct(state, action, 20.0 * random.uniform() - 10.0);
+    network.update(state, action, 20.0 * random.uniform() - 10.0);
   }
   return network;
 }
@@ -147,7 +147,7 @@ TEST(PlainRBFNetwork, RefusesWhatTheFactoredOneRefuses) {
   EXPECT_THROW(network.values(bad, out), std::invalid_argument);
   EXPECT_THROW(network.values(good, short_out), std::invalid_argument);
   EXPECT_THROW((void)network.value(good, 3), std::invalid_argument);
-  EXPECT_THROW(network.correct(bad, 0, 1.0), std::invalid_argument);
+  EXPECT_THROW(network.update(bad, 0, 1.0), std::invalid_argument);
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ namespace sdnn::experiments {
 /// action. They agree with those of RBFNetwork to 1e-12 of the largest |weight|: a second algorithm
 /// for its tests. It learns what RBFNetwork learns, up to rounding.
 ///
-/// `value` and `correct` concern a single action; they stay as they are, and cost less than the
+/// `value` and `update` concern a single action; they stay as they are, and cost less than the
 /// n_actions-th part of `values`. Throws as RBFNetwork does. Cost of `values` at d = 6: 601 x
 /// 16,384 exponentials.
 class PlainRBFNetwork {
@@ -49,9 +49,9 @@ class PlainRBFNetwork {
   double value(std::span<const double> state, std::size_t action) {
     return network_.value(state, action);
   }
-  void correct(std::span<const double> state, std::size_t action, double target,
+  void update(std::span<const double> state, std::size_t action, double target,
                double rate = 1.0) {
-    network_.correct(state, action, target, rate);
+    network_.update(state, action, target, rate);
   }
 
  private:
