@@ -19,11 +19,12 @@ class Setting {
  public:
   explicit Setting(benchmark::State& state)
       : network({.n_inputs = static_cast<int>(state.range(0))}, 1),
+        workspace(network.workspace()),
         at(network.n_inputs()),
         values(network.n_actions()) {
     for (int i = 0; i < kLearningSteps; ++i) {
       move();
-      network.update(at, random.below(values.size()), 40.0 * random.uniform() - 20.0);
+      network.update(at, workspace, random.below(values.size()), 40.0 * random.uniform() - 20.0);
     }
   }
 
@@ -33,6 +34,7 @@ class Setting {
   }
 
   Network network;
+  Network::Workspace workspace;
   core::Random random{1, core::Stream::exploration};
   std::vector<double> at;
   std::vector<double> values;
@@ -42,7 +44,7 @@ void values_of_new_state(benchmark::State& state) {
   Setting setting(state);
   for (auto _ : state) {
     setting.move();
-    setting.network.values(setting.at, setting.values);
+    setting.network.values(setting.at, setting.workspace, setting.values);
     benchmark::DoNotOptimize(setting.values.data());
   }
 }
@@ -56,7 +58,7 @@ BENCHMARK(values_of_new_state)
 void values_of_remembered_state(benchmark::State& state) {
   Setting setting(state);
   for (auto _ : state) {
-    setting.network.values(setting.at, setting.values);
+    setting.network.values(setting.at, setting.workspace, setting.values);
     benchmark::DoNotOptimize(setting.values.data());
   }
 }
@@ -73,8 +75,8 @@ void learning_step(benchmark::State& state) {
   const double step = 5.0 * 40.0 / 260.0;
   double sign = 1.0;
   for (auto _ : state) {
-    const double value = setting.network.value(setting.at, 300);
-    setting.network.update(setting.at, 300, value + sign * step);
+    const double value = setting.network.value(setting.at, setting.workspace, 300);
+    setting.network.update(setting.at, setting.workspace, 300, value + sign * step);
     sign = -sign;
   }
 }

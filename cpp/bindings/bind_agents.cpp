@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -24,6 +25,7 @@
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 #include "states.hpp"
+#include "workspaces.hpp"
 
 namespace py = pybind11;
 using namespace sdnn;
@@ -45,9 +47,22 @@ namespace {
 template <class Agent>
 void def_agent(py::class_<Agent>& agent) {
   using Action = decltype(std::declval<Agent&>().act({}));
-  agent.def("set_n_environments", &Agent::set_n_environments, py::arg("n"))
+  agent
+      .def(
+          "set_n_environments",
+          [](Agent& self, std::size_t n) {
+            bindings::wait_for_readers(self);
+            self.set_n_environments(n);
+          },
+          py::arg("n"))
       .def_property_readonly("n_environments", &Agent::n_environments)
-      .def("begin_episode", &Agent::begin_episode, py::arg("environment") = 0)
+      .def(
+          "begin_episode",
+          [](Agent& self, std::size_t environment) {
+            bindings::wait_for_readers(self);
+            self.begin_episode(environment);
+          },
+          py::arg("environment") = 0)
       .def(
           "act",
           [](Agent& self, const ArrayArgument<double>& state, bool explore,
@@ -59,12 +74,44 @@ void def_agent(py::class_<Agent>& agent) {
           "learn",
           [](Agent& self, const ArrayArgument<double>& state, const Action& action, double reward,
              const ArrayArgument<double>& next_state, bool terminated, std::size_t environment) {
+            bindings::wait_for_readers(self);
             self.learn(bindings::vector(state, "state"), action, reward,
                        bindings::vector(next_state, "next_state"), terminated, environment);
           },
           py::arg("state"), py::arg("action"), py::arg("reward"), py::arg("next_state"),
           py::arg("terminated"), py::arg("environment") = 0);
   bindings::def_state(agent);
+}
+
+/// The approximator of a dimension of the action. Throws std::invalid_argument if there is none.
+template <class Agent>
+auto& approximator_of(Agent& agent, std::size_t dimension) {
+  core::require(dimension < agent.n_dimensions(), "dimension",
+                "less than " + std::to_string(agent.n_dimensions()), dimension);
+  if constexpr (std::remove_const_t<Agent>::kDecoupled) {
+    return agent.action_value().part(dimension);
+  } else {
+    return agent.action_value();
+  }
+}
+
+/// Values of all actions of a dimension, by which greedy actions are chosen. Other threads run
+/// meanwhile, and may read the same agent.
+template <class Agent>
+py::array_t<double> q_values(const Agent& agent, const ArrayArgument<double>& state,
+                             std::size_t dimension) {
+  const auto& network = approximator_of(agent, dimension);
+  const auto at = bindings::copied(bindings::vector(state, "state"));
+  py::array_t<double> out(static_cast<py::ssize_t>(network.n_actions()));
+  const std::span row(out.mutable_data(), network.n_actions());
+  const bindings::WithoutGIL unlocked(agent, network);
+  auto& workspace = bindings::workspace_of(network);
+  if constexpr (requires { network.averaged_values(at, workspace, row); }) {
+    network.averaged_values(at, workspace, row);
+  } else {
+    network.values(at, workspace, row);
+  }
+  return out;
 }
 
 /// What agents that learn by Q-learning have in common.
@@ -75,7 +122,11 @@ void def_q_learning(py::class_<Agent>& agent) {
       .def("set_epsilon", &Agent::set_epsilon, py::arg("epsilon"))
       .def_property_readonly("progress", &Agent::progress)
       .def_property_readonly("learning_rate", &Agent::learning_rate)
-      .def_property_readonly("epsilon", &Agent::epsilon);
+      .def_property_readonly("epsilon", &Agent::epsilon)
+      .def("q_values", &q_values<Agent>, py::arg("state"), py::arg("dimension") = 0,
+           "Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) "
+           "-> "
+           "(n_actions,)");
   def_agent(agent);
 }
 
@@ -85,8 +136,11 @@ void def_fuzzy(py::class_<Agent>& agent) {
   agent.def("last_action", &Agent::last_action, py::arg("environment") = 0)
       .def(
           "value",
-          [](Agent& self, const ArrayArgument<double>& state) {
-            return self.value(bindings::vector(state, "state"));
+          [](const Agent& self, const ArrayArgument<double>& state) {
+            const auto at = bindings::copied(bindings::vector(state, "state"));
+            const bindings::WithoutGIL unlocked(self);
+            auto workspace = self.workspace();
+            return self.value(at, workspace);
           },
           py::arg("state"), "V(state)");
   def_agent(agent);
@@ -128,9 +182,7 @@ void bind_decoupled_q_learning(py::module_& module, const char* name, const char
       .def(
           "action_value",
           [](Agent& self, std::size_t dimension) -> Approximator& {
-            core::require(dimension < self.n_dimensions(), "dimension",
-                          "less than " + std::to_string(self.n_dimensions()), dimension);
-            return self.action_value().part(dimension);
+            return approximator_of(self, dimension);
           },
           py::arg("dimension"), py::return_value_policy::reference_internal);
   def_q_learning(agent);

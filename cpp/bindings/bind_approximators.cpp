@@ -12,6 +12,7 @@
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
+#include "workspaces.hpp"
 
 namespace py = pybind11;
 using namespace sdnn;
@@ -101,16 +102,21 @@ py::class_<Network> bind_network(py::module_& module, const char* name, const ch
       .def_property_readonly("n_actions", &Network::n_actions)
       .def(
           "values",
-          [](Network& net, const ArrayArgument<double>& state) {
+          [](const Network& net, const ArrayArgument<double>& state) {
             py::array_t<double> out(static_cast<py::ssize_t>(net.n_actions()));
-            net.values(bindings::vector(state, "state"), {out.mutable_data(), net.n_actions()});
+            net.values(bindings::vector(state, "state"), bindings::workspace_of(net),
+                       {out.mutable_data(), net.n_actions()});
             return out;
           },
           py::arg("state"), "Q(state, a) for every action; shapes (n_inputs,) -> (n_actions,)")
       .def(
           "update",
           [](Network& net, const ArrayArgument<double>& state, std::size_t action, double target,
-             double rate) { net.update(bindings::vector(state, "state"), action, target, rate); },
+             double rate) {
+            bindings::wait_for_readers(net);
+            net.update(bindings::vector(state, "state"), bindings::workspace_of(net), action,
+                       target, rate);
+          },
           py::arg("state"), py::arg("action"), py::arg("target"), py::arg("rate") = 1.0,
           "One correction of Q = Q(state, action) towards (1 - rate) Q + rate target");
 }
@@ -160,6 +166,7 @@ void bind_rbf_network(py::module_& module) {
       .def(
           "set_weights",
           [](RBFNetwork& net, const ArrayArgument<double>& new_weights) {
+            bindings::wait_for_readers(net);
             net.set_weights(bindings::vector(new_weights, "weights"));
           },
           py::arg("weights"));
@@ -194,8 +201,8 @@ void bind_approximators(py::module_& module) {
       .def_property_readonly("u_high", [](const SDNNC& net) { return net.output_scale().u_high(); })
       .def(
           "value",
-          [](SDNNC& net, const ArrayArgument<double>& state, std::size_t action) {
-            return net.value(bindings::vector(state, "state"), action);
+          [](const SDNNC& net, const ArrayArgument<double>& state, std::size_t action) {
+            return net.value(bindings::vector(state, "state"), bindings::workspace_of(net), action);
           },
           py::arg("state"), py::arg("action"))
       .def(
@@ -228,9 +235,9 @@ void bind_approximators(py::module_& module) {
       .def("thresholds", &thresholds, "A copy, in lattice steps: (n,)")
       .def(
           "averaged_values",
-          [](SDNNC& net, const ArrayArgument<double>& state) {
+          [](const SDNNC& net, const ArrayArgument<double>& state) {
             py::array_t<double> out(static_cast<py::ssize_t>(net.n_actions()));
-            net.averaged_values(bindings::vector(state, "state"),
+            net.averaged_values(bindings::vector(state, "state"), bindings::workspace_of(net),
                                 {out.mutable_data(), net.n_actions()});
             return out;
           },
@@ -259,6 +266,7 @@ void bind_approximators(py::module_& module) {
           "set_parameters",
           [](SDNNC& net, const ArrayArgument<std::int32_t>& new_weights,
              const ArrayArgument<std::int32_t>& new_thresholds) {
+            bindings::wait_for_readers(net);
             net.set_parameters(bindings::flat(new_weights), bindings::flat(new_thresholds));
           },
           py::arg("weights"), py::arg("thresholds"));

@@ -2,6 +2,7 @@
 #include <pybind11/stl.h>
 
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -122,9 +123,11 @@ std::shared_ptr<Trainer> make_trainer(std::shared_ptr<ParallelPerceptron> layer,
 }
 
 Matrix online_potentials_of(const estimators::OnlineLayer& layer, const Bins& bins) {
-  const auto values = matrix(bins, "bins", layer.layer().code().n_inputs());
+  const auto values = copied(matrix(bins, "bins", layer.layer().code().n_inputs()));
   Matrix out({static_cast<std::size_t>(bins.shape(0)), layer.layer().n_units()});
-  layer.potentials(values, {out.mutable_data(), static_cast<std::size_t>(out.size())});
+  const std::span items(out.mutable_data(), static_cast<std::size_t>(out.size()));
+  const bindings::WithoutGIL unlocked(layer);
+  layer.potentials(values, items);
   return out;
 }
 
@@ -132,6 +135,7 @@ template <class Rule>
 std::pair<std::size_t, std::size_t> present_online(estimators::OnlineLayer& layer, const Bins& bins,
                                                    Rule rule) {
   const auto values = copied(matrix(bins, "bins", layer.layer().code().n_inputs()));
+  bindings::wait_for_readers(layer);
   const bindings::WithoutGIL unlocked(layer);
   const auto count = layer.present(values, rule);
   return {count.n_samples, count.n_units};
@@ -170,7 +174,8 @@ void bind_online_layer(py::module_& module) {
       .def(
           "synchronize",
           [](OnlineLayer& self) {
-            const bindings::WithoutGIL unlocked(self, self.layer());
+            // Those who read its own weights may go on meanwhile.
+            const bindings::WithoutGIL unlocked(std::as_const(self), self.layer());
             self.synchronize();
           },
           "Brings the layer up to date");

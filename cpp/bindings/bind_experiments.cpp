@@ -69,7 +69,7 @@ py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
 using SDNNTrial = AcrobotTrial<QLearning<SDNNC>>;
 
 py::typing::Dict<py::str, py::int_> memory_counts(const SDNNTrial& trial) {
-  const auto& counts = trial.agent().action_value().memory().counts();
+  const auto& counts = trial.agent().own_workspace().approximator.cache().counts();
   py::typing::Dict<py::str, py::int_> out;
   out["full"] = counts.full;
   out["neighbour"] = counts.neighbour;

@@ -41,6 +41,13 @@ struct Use {
   const std::byte* end;
   bool changes;
 
+  /// Of an object with all that it holds in itself; const ones are not changed.
+  template <class Object>
+  static Use of(const void* owner, Object& object) noexcept {
+    const auto* const begin = reinterpret_cast<const std::byte*>(&object);
+    return {owner, begin, begin + sizeof(Object), !std::is_const_v<Object>};
+  }
+
   static std::vector<Use>& all() {
     static std::vector<Use> uses;
     return uses;
@@ -62,6 +69,26 @@ inline void require_unused(const Use& wanted, const char* name) {
   }
 }
 
+/// pybind11's gil_scoped_release, but for the end of the interpreter: before 3.14 Python then ends
+/// the threads that ask for the GIL by unwinding their stacks, which frames of C++ answer with
+/// std::terminate. Such a thread waits here for the end of the process.
+class ReleasedGIL {
+ public:
+  ReleasedGIL() : state_(PyEval_SaveThread()) {}
+  ReleasedGIL(const ReleasedGIL&) = delete;
+  ReleasedGIL& operator=(const ReleasedGIL&) = delete;
+  ~ReleasedGIL() {
+    try {
+      PyEval_RestoreThread(state_);
+    } catch (...) {
+      for (;;) std::this_thread::sleep_for(std::chrono::hours(1));
+    }
+  }
+
+ private:
+  PyThreadState* state_;
+};
+
 /// Lets other threads run Python while objects are worked on.
 ///
 /// Objects given as const are read, the others are changed, with all that they hold in themselves.
@@ -80,13 +107,9 @@ class WithoutGIL {
   struct Uses {
     template <class... Object>
     explicit Uses(const void* owner, Object&... objects) : owner_(owner) {
-      const auto use_of = [owner]<class T>(T& object) {
-        const auto* const begin = reinterpret_cast<const std::byte*>(&object);
-        return Use{owner, begin, begin + sizeof(T), !std::is_const_v<T>};
-      };
-      (require_unused(use_of(objects), "object"), ...);
+      (require_unused(Use::of(owner, objects), "object"), ...);
       Use::all().reserve(Use::all().size() + sizeof...(objects));
-      (Use::all().push_back(use_of(objects)), ...);
+      (Use::all().push_back(Use::of(owner, objects)), ...);
     }
     Uses(const Uses&) = delete;
     Uses& operator=(const Uses&) = delete;
@@ -97,29 +120,22 @@ class WithoutGIL {
     const void* owner_;
   };
 
-  /// pybind11's gil_scoped_release, but for the end of the interpreter: before 3.14 Python then
-  /// ends the threads that ask for the GIL by unwinding their stacks, which frames of C++ answer
-  /// with std::terminate. Such a thread waits here for the end of the process.
-  class Release {
-   public:
-    Release() : state_(PyEval_SaveThread()) {}
-    Release(const Release&) = delete;
-    Release& operator=(const Release&) = delete;
-    ~Release() {
-      try {
-        PyEval_RestoreThread(state_);
-      } catch (...) {
-        for (;;) std::this_thread::sleep_for(std::chrono::hours(1));
-      }
-    }
-
-   private:
-    PyThreadState* state_;
-  };
-
   Uses uses_;
-  Release release_;  // last: the GIL is back before the list changes
+  ReleasedGIL released_;  // last: the GIL is back before the list changes
 };
+
+/// Waits until no call in another thread reads the object, for a change with the GIL held. Only for
+/// objects whose readers take little time.
+template <class Object>
+void wait_for_readers(Object& object) {
+  const auto is_reader = [use = Use::of(nullptr, object)](const Use& other) {
+    return !other.changes && other.overlaps(use);
+  };
+  while (std::ranges::any_of(Use::all(), is_reader)) {
+    const ReleasedGIL released;
+    std::this_thread::yield();
+  }
+}
 
 /// Makes pybind11's base of all classes refuse to be called. Nobody does, but pickle's protocols 0
 /// and 1 and object.__reduce__; pybind11 would throw through Python's frames.

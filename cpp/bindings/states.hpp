@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "objects.hpp"
 #include "sdnn/core/state.hpp"
 
 namespace sdnn::bindings {
@@ -64,7 +65,11 @@ void def_state(pybind11::class_<Object, Options...>& type) {
           "What it remembers: arrays by name")
       .def(
           "restore",
-          [](Object& self, const pybind11::dict& state) { core::restore(self, state_from(state)); },
+          [](Object& self, const pybind11::dict& state) {
+            core::State read = state_from(state);
+            wait_for_readers(self);
+            core::restore(self, read);
+          },
           pybind11::arg("state"),
           "Take what `state` of one with the same settings gave; on an error nothing changes");
 }

@@ -162,10 +162,6 @@ class SDNNC:
         """
         Their average, or the weights: (n, D)
         """
-    def update(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
-        """
-        One correction of Q = Q(state, action) towards (1 - rate) Q + rate target
-        """
     def first_units(self) -> numpy.typing.NDArray[numpy.uint32]:
         """
         Where the window of every action begins: (n_actions,)
@@ -191,6 +187,10 @@ class SDNNC:
     def thresholds(self) -> numpy.typing.NDArray[numpy.int32]:
         """
         A copy, in lattice steps: (n,)
+        """
+    def update(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        """
+        One correction of Q = Q(state, action) towards (1 - rate) Q + rate target
         """
     def value(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex) -> float:
         ...
@@ -307,12 +307,12 @@ class RBFNetwork:
     """
     def __init__(self, config: RBFNetworkConfig) -> None:
         ...
+    def set_weights(self, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
     def update(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         """
         One correction of Q = Q(state, action) towards (1 - rate) Q + rate target
         """
-    def set_weights(self, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
-        ...
     def values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         Q(state, a) for every action; shapes (n_inputs,) -> (n_actions,)
@@ -828,6 +828,10 @@ class SDNNQLearning:
         ...
     def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
+    def q_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) -> (n_actions,)
+        """
     def restore(self, state: dict) -> None:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes
@@ -873,6 +877,10 @@ class DecoupledSDNNQLearning:
         ...
     def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
+    def q_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) -> (n_actions,)
+        """
     def restore(self, state: dict) -> None:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes
@@ -913,6 +921,10 @@ class RBFQLearning:
         ...
     def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
+    def q_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) -> (n_actions,)
+        """
     def restore(self, state: dict) -> None:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes
@@ -958,6 +970,10 @@ class DecoupledRBFQLearning:
         ...
     def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
+    def q_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) -> (n_actions,)
+        """
     def restore(self, state: dict) -> None:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes

@@ -61,8 +61,8 @@ void sdnn_c(FuzzedDataProvider& input) {
   fuzz::change(learning, input);
   agents::QLearning agent(approximators::SDNNC(config, 1), learning, 1);
   use(agent, input);
-  std::vector<double> values(agent.action_value().n_actions());
-  agent.action_value().values(std::vector<double>(agent.n_inputs(), 0.5), values);
+  auto workspace = agent.workspace();
+  const auto values = agent.values(std::vector<double>(agent.n_inputs(), 0.5), workspace);
   const auto& scale = agent.action_value().output_scale();
   for (const double value : values) {
     fuzz::expect(value >= scale.q_low() && value <= scale.q_high(), "a value out of range");

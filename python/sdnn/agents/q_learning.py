@@ -171,6 +171,7 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
         """Q(observation, a) of every action of a dimension, shape (n_actions[dimension],).
 
         By the values that greedy actions follow: those of the averaged weights, where there are.
+        Several threads may ask at once; `learn` waits until they have their answers.
 
         Raises
         ------
@@ -180,11 +181,7 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
             If the observation is not usable, or there is no such dimension.
         """
         state = self._state("observation", observation)
-        return self._values(self._network(self._dimension(dimension)), state)
-
-    def _values(self, network: Any, state: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Ask an approximator for the values that greedy actions follow."""
-        values: NDArray[np.float64] = network.values(state)
+        values: NDArray[np.float64] = self._born().q_values(state, self._dimension(dimension))
         return values
 
     def _dimension(self, dimension: int) -> int:
@@ -333,10 +330,6 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
                     f"tables[{number}] must have a row for each of {n} symbols, got {len(table)}"
                 )
         return tables
-
-    def _values(self, network: Any, state: NDArray[np.float64]) -> NDArray[np.float64]:
-        values: NDArray[np.float64] = network.averaged_values(state)
-        return values
 
     def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         sizes = self.approximator

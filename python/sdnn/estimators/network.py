@@ -300,8 +300,7 @@ class Network:
     def potentials(self, bins: NDArray[np.int32], n_threads: int) -> NDArray[np.int32]:
         """Potentials, (n_samples, n inputs in pairs) to (n_samples, n_units)."""
         if self._online is not None and len(bins) <= FEW_SAMPLES:
-            with self._lock:  # the core refuses to read what another thread synchronizes
-                return self._online.potentials(bins)
+            return self._online.potentials(bins)
         return self.layer.potentials(bins, n_threads=n_threads)
 
     def counts(self, bins: NDArray[np.int32], n_groups: int, n_threads: int) -> NDArray[np.int32]:

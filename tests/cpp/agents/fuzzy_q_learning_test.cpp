@@ -35,8 +35,8 @@ TEST(FuzzyQLearning, OneStepByHand) {
   rules.set_value(2, 1, 8.0F);
   FuzzyQLearning agent(rules, {.policy = kGreedy}, 1);
   const State state = {0.125}, next = {0.75};
-  EXPECT_EQ(agent.act(state), 0.5);   // 3/4 (+1) + 1/4 (-1)
-  EXPECT_EQ(agent.value(next), 5.0);  // (2 + 8) / 2
+  EXPECT_EQ(agent.act(state), 0.5);                // 3/4 (+1) + 1/4 (-1)
+  EXPECT_EQ(testing::value_of(agent, next), 5.0);  // (2 + 8) / 2
   // Q = 3/4 4 + 1/4 2 = 3.5; step = 0.5 (1 + 0.9 5 - 3.5) = 1.
   agent.learn(state, 0.5, 1.0, next, false);
   EXPECT_EQ(agent.rules().values(0)[2], 4.75F);
@@ -125,7 +125,7 @@ TEST(FuzzyQLearning, AtTheCentresItIsTabularQLearning) {
     }
   }
   for (int s = 0; s < 4; ++s) {
-    EXPECT_NEAR(agent.value(State{s / 4.0}), std::pow(0.9, 3 - s), 1e-5);
+    EXPECT_NEAR(testing::value_of(agent, State{s / 4.0}), std::pow(0.9, 3 - s), 1e-5);
     EXPECT_EQ(agent.act(State{s / 4.0}, false), 1.0);
   }
 }
@@ -144,7 +144,7 @@ TEST(FuzzyQLearning, EvaluationDoesNotDisturbLearning) {
     const double action = alone.act(state);
     ASSERT_EQ(action, evaluated.act(state));
     for (int j = 0; j < i % 3; ++j) (void)evaluated.act(next, false);
-    (void)evaluated.value(next);
+    (void)testing::value_of(evaluated, next);
     const double reward = world.uniform();
     alone.learn(state, action, reward, next, i % 25 == 24);
     evaluated.learn(state, action, reward, next, i % 25 == 24);
@@ -303,8 +303,10 @@ TEST(FuzzyQLearning, EachEnvironmentHasAnActAndTracesOfItsOwn) {
     other = other_next;
   }
   for (const double x : {0.05, 0.2, 0.3}) {
-    EXPECT_EQ(both.value(State{x, x / 2.0}), low.value(State{x, x / 2.0}));
-    EXPECT_EQ(both.value(State{1.0 - x, 0.8}), high.value(State{1.0 - x, 0.8}));
+    EXPECT_EQ(testing::value_of(both, State{x, x / 2.0}),
+              testing::value_of(low, State{x, x / 2.0}));
+    EXPECT_EQ(testing::value_of(both, State{1.0 - x, 0.8}),
+              testing::value_of(high, State{1.0 - x, 0.8}));
   }
   EXPECT_THROW(both.learn(state, both.act(state), 1.0, state, false, 1), std::invalid_argument);
   EXPECT_THROW((void)both.act(state, true, 2), std::invalid_argument);

@@ -14,6 +14,13 @@
 
 namespace sdnn::testing {
 
+/// V(state) of a fuzzy agent.
+template <class Agent>
+double value_of(const Agent& agent, const std::vector<double>& state) {
+  auto workspace = agent.workspace();
+  return agent.value(state, workspace);
+}
+
 /// A world of random states and rewards. Copies go on alike.
 template <class Agent>
 class World {

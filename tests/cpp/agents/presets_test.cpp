@@ -40,7 +40,8 @@ TEST(Presets, TheRobustOneMakesAnAgentThatLearns) {
     agent.begin_episode();
     agent.learn(state, 7, 5.0, state, true);
   }
-  EXPECT_NEAR(agent.action_value().value(state, 7), 5.0, 0.2);
+  auto workspace = agent.workspace();
+  EXPECT_NEAR(agent.values(state, workspace)[7], 5.0, 0.2);
 }
 
 }  // namespace

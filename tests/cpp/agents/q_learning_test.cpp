@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,6 +21,7 @@
 #include "sdnn/approximators/sdnn_c.hpp"
 #include "sdnn/core/random.hpp"
 #include "states.hpp"
+#include "threads.hpp"
 
 namespace sdnn::agents {
 namespace {
@@ -469,6 +471,7 @@ TEST(QLearning, GreedyActionsFollowTheAverageWhereThereIsOne) {
       {.learning_rate = 1.0, .policy = {.tie_rule = TieRule::lowest}}, 3);
   core::Random random(1, core::Stream::weights);
   std::vector<double> state = {0.2, 0.8}, values(7);
+  auto workspaces = averaging.action_value().workspace().parts;
   int n_other = 0;
   for (int t = 0; t < 300; ++t) {
     for (double& x : state) x = random.uniform();
@@ -477,12 +480,55 @@ TEST(QLearning, GreedyActionsFollowTheAverageWhereThereIsOne) {
     const auto greedy = averaging.act(state, false);
     const auto own = averaging.act(state);
     for (std::size_t d = 0; d < 2; ++d) {
-      averaging.action_value().part(d).averaged_values(state, values);
+      averaging.action_value().part(d).averaged_values(state, workspaces[d], values);
       ASSERT_EQ(greedy[d], std::ranges::max_element(values) - values.begin());
       n_other += greedy[d] != own[d];
     }
   }
   EXPECT_GT(n_other, 0);
+}
+
+// Between two updates many threads may choose greedy actions; equal ties streams, equal actions.
+TEST(QLearning, ManyThreadsMayChooseGreedyActions) {
+  auto agent = vector_agent();
+  testing::World<decltype(agent)> world(agent.n_inputs(), 7);
+  for (int t = 0; t < 300; ++t) world.tick(agent);
+  const auto greedy_actions = [](const auto& learned) {
+    core::Random random(5, core::Stream::sensor_noise), ties(1, core::Stream::evaluation_ties);
+    auto workspace = learned.workspace();
+    std::vector<double> state(learned.n_inputs());
+    std::vector<std::vector<std::size_t>> actions;
+    for (int i = 0; i < 50; ++i) {
+      for (double& x : state) x = random.uniform();
+      actions.push_back(learned.best_action(state, workspace, ties));
+    }
+    return actions;
+  };
+  const auto alone = agent;
+  const auto expected = greedy_actions(alone);
+  for (const auto& actions :
+       testing::in_threads(4, [&](std::size_t) { return greedy_actions(agent); })) {
+    EXPECT_EQ(actions, expected);
+  }
+}
+
+TEST(QLearning, BestActionIsThatOfActWithoutExploring) {
+  approximators::SDNNCConfig config = network();
+  config.averaging_interval = 5;
+  QLearning agent(SDNNC(config, 3), {.policy = {.tie_rule = TieRule::lowest}}, 3);
+  testing::World<decltype(agent)> world(agent.n_inputs(), 7);
+  for (int t = 0; t < 300; ++t) world.tick(agent);
+  auto workspace = agent.workspace();
+  core::Random ties(1, core::Stream::ties), random(5, core::Stream::sensor_noise);
+  std::vector<double> state(agent.n_inputs());
+  std::set<std::size_t> taken;
+  for (int i = 0; i < 100; ++i) {
+    for (double& x : state) x = random.uniform();
+    const std::size_t action = agent.best_action(state, workspace, ties);
+    EXPECT_EQ(action, agent.act(state, false));
+    taken.insert(action);
+  }
+  EXPECT_GT(taken.size(), 1U);
 }
 
 TEST(QLearning, ALifeCanBeCutAnywhere) {

@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "lives.hpp"
+#include "sdnn/core/random.hpp"
 #include "sdnn/core/state.hpp"
+#include "threads.hpp"
 
 namespace sdnn::agents {
 namespace {
@@ -33,7 +35,8 @@ TEST(VectorFuzzyQLearning, EachDimensionLearnsAsAnAgentOfItsOwn) {
     const Numbers action = both.act(state);
     ASSERT_EQ(action, (Numbers{first.act(state), second.act(state)}));
     ASSERT_EQ(both.last_action(), action);
-    ASSERT_EQ(both.value(state), (first.value(state) + second.value(state)) / 2.0);
+    ASSERT_EQ(testing::value_of(both, state),
+              (testing::value_of(first, state) + testing::value_of(second, state)) / 2.0);
     const double reward = action[0] - action[1];
     const Numbers next = {0.5 + 0.4 * action[0], 0.5 + 0.4 * action[1]};
     both.learn(state, action, reward, next, t % 9 == 8);
@@ -86,6 +89,30 @@ TEST(VectorFuzzyQLearning, NamesWhatIsImpossible) {
   EXPECT_THROW(VectorFuzzyQLearning({}), std::invalid_argument);
   const FuzzyQLearning other(FuzzyRules({.n_inputs = 3}), {}, 1);
   EXPECT_THROW(VectorFuzzyQLearning({part(1), other}), std::invalid_argument);
+}
+
+// Between two updates many threads may ask for values and choose greedy actions.
+TEST(VectorFuzzyQLearning, ManyThreadsMayReadIt) {
+  VectorFuzzyQLearning agent = agent_of_two();
+  testing::World<VectorFuzzyQLearning> world(agent.n_inputs(), 7);
+  for (int t = 0; t < 300; ++t) world.tick(agent);
+  const auto read = [](const VectorFuzzyQLearning& learned) {
+    core::Random random(5, core::Stream::sensor_noise), ties(1, core::Stream::evaluation_ties);
+    auto workspace = learned.workspace();
+    std::vector<Numbers> all;
+    Numbers state(learned.n_inputs());
+    for (int i = 0; i < 50; ++i) {
+      for (double& x : state) x = random.uniform();
+      all.push_back(learned.best_action(state, workspace, ties));
+      all.back().push_back(learned.value(state, workspace));
+    }
+    return all;
+  };
+  const VectorFuzzyQLearning alone = agent;
+  const auto expected = read(alone);
+  for (const auto& values : testing::in_threads(4, [&](std::size_t) { return read(agent); })) {
+    EXPECT_EQ(values, expected);
+  }
 }
 
 }  // namespace

@@ -6,11 +6,15 @@
 #include <cmath>
 #include <span>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "approximators/lookup_table.hpp"
+#include "approximators/with_workspace.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
+#include "sdnn/core/random.hpp"
+#include "threads.hpp"
 
 namespace sdnn::approximators {
 namespace {
@@ -18,16 +22,22 @@ namespace {
 struct WithoutUpdate {
   std::size_t n_actions() const { return 1; }
   std::size_t n_inputs() const { return 1; }
-  void values(std::span<const double>, std::span<double>) const {}
-  double value(std::span<const double>, std::size_t) const { return 0.0; }
+  struct Workspace {};
+  Workspace workspace() const { return {}; }
+  void values(std::span<const double>, Workspace&, std::span<double>) const {}
+  double value(std::span<const double>, Workspace&, std::size_t) const { return 0.0; }
 };
 
 struct Complete : WithoutUpdate {
-  void update(std::span<const double>, std::size_t, double, double) {}
+  void update(std::span<const double>, Workspace&, std::size_t, double, double) {}
 };
 
 struct WithoutRate : WithoutUpdate {
-  void update(std::span<const double>, std::size_t, double) {}
+  void update(std::span<const double>, Workspace&, std::size_t, double) {}
+};
+
+struct NotConst : Complete {
+  void values(std::span<const double>, Workspace&, std::span<double>) {}
 };
 
 static_assert(ActionValue<testing::LookupTable>);
@@ -36,6 +46,7 @@ static_assert(ActionValue<RBFNetwork>);
 static_assert(ActionValue<Complete>);
 static_assert(!ActionValue<WithoutUpdate>);
 static_assert(!ActionValue<WithoutRate>);
+static_assert(!ActionValue<NotConst>);
 static_assert(!ActionValue<double>);
 
 TEST(ActionValue, ALookupTableReturnsWhatItWasCorrectedTo) {
@@ -53,10 +64,19 @@ TEST(ActionValue, ALookupTableReturnsWhatItWasCorrectedTo) {
   EXPECT_EQ(q.value(state, 2), 5.75);
 }
 
+SDNNCConfig small_network() {
+  return {.n_inputs = 2,
+          .n_pattern_units = 40,
+          .n_hidden_units = 300,
+          .n_active_units = 100,
+          .n_actions = 5};
+}
+
 // What the table of expressions promises, for every model: values and value agree, asking changes
 // nothing, and corrections move the value to the target.
 template <ActionValue Q>
-void expect_a_model(Q q) {
+void expect_a_model(Q model) {
+  testing::WithWorkspace<Q> q(std::move(model));
   const std::array<double, 2> state = {0.2, 0.9};
   std::vector<double> row(q.n_actions());
   std::vector<double> again(q.n_actions());
@@ -72,19 +92,117 @@ void expect_a_model(Q q) {
 
 TEST(ActionValue, EveryModelKeepsTheConceptsPromises) {
   expect_a_model(testing::LookupTable(2, 4, 5));
-  const SDNNCConfig config{.n_inputs = 2,
-                           .n_pattern_units = 40,
-                           .n_hidden_units = 300,
-                           .n_active_units = 100,
-                           .n_actions = 5};
-  expect_a_model(SDNNC(config, 3));
+  expect_a_model(SDNNC(small_network(), 3));
   expect_a_model(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
+}
+
+/// Random states, some of them again and again.
+std::vector<std::array<double, 2>> some_states(std::size_t n) {
+  core::Random random(3, core::Stream::sensor_noise);
+  std::vector<std::array<double, 2>> states;
+  for (std::size_t i = 0; i < n; ++i) {
+    states.push_back(i % 3 == 2 ? states[random.below(i)]
+                                : std::array{random.uniform(), random.uniform()});
+  }
+  return states;
+}
+
+/// Q(s, a) of all states and actions, in one workspace.
+template <ActionValue Q>
+std::vector<double> all_values(const Q& q, const std::vector<std::array<double, 2>>& states) {
+  auto workspace = q.workspace();
+  std::vector<double> all, row(q.n_actions());
+  for (const auto& state : states) {
+    q.values(state, workspace, row);
+    all.insert(all.end(), row.begin(), row.end());
+    EXPECT_EQ(q.value(state, workspace, 1), row[1]);
+  }
+  return all;
+}
+
+// What each thread reads between the updates is what one reads alone.
+template <ActionValue Q>
+void expect_that_threads_may_read(Q q) {
+  const auto states = some_states(60);
+  auto workspace = q.workspace();
+  for (int round = 0; round < 3; ++round) {
+    for (const auto& state : states) q.update(state, workspace, 1, 7.0 - round, 0.5);
+    const Q alone = q;
+    const auto expected = all_values(alone, states);
+    const auto read = testing::in_threads(4, [&](std::size_t) { return all_values(q, states); });
+    for (const auto& values : read) ASSERT_EQ(values, expected);
+  }
+}
+
+// Workspaces that were not used for an update, or for thousands, and those of a copy.
+template <ActionValue Q>
+void expect_that_workspaces_follow(Q q) {
+  const auto states = some_states(40);
+  auto learning = q.workspace(), reading = q.workspace(), rare = q.workspace();
+  std::vector<double> row(q.n_actions()), fresh(q.n_actions());
+  const auto expect_fresh = [&](const Q& model, auto& workspace, const auto& state) {
+    auto new_one = model.workspace();
+    model.values(state, workspace, row);
+    model.values(state, new_one, fresh);
+    ASSERT_EQ(row, fresh);
+  };
+  for (int round = 0; round < 60; ++round) {
+    for (std::size_t i = 0; i < states.size(); ++i) {
+      q.update(states[i], learning, i % 3, round % 7, 0.5);
+      if (i % 4 == 0) expect_fresh(q, reading, states[i / 2]);
+    }
+    if (round % 20 == 19) expect_fresh(q, rare, states[0]);
+  }
+  Q copy = q;
+  auto workspace_of_both = reading;
+  copy.update(states[0], workspace_of_both, 0, 5.0, 1.0);
+  q.update(states[0], learning, 0, -5.0, 1.0);
+  expect_fresh(copy, workspace_of_both, states[0]);
+  expect_fresh(q, workspace_of_both, states[0]);
+  expect_fresh(copy, workspace_of_both, states[0]);
+}
+
+TEST(ActionValue, ManyThreadsMayReadAModel) {
+  expect_that_threads_may_read(SDNNC(small_network(), 3));
+  expect_that_threads_may_read(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
+  expect_that_threads_may_read(RBFNetwork({.n_inputs = 2, .n_bases = 3, .n_actions = 5}));
+}
+
+TEST(ActionValue, AnyNumberOfWorkspacesFollowsAModel) {
+  expect_that_workspaces_follow(SDNNC(small_network(), 3));
+  expect_that_workspaces_follow(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
+}
+
+// The average is rounded once, by the thread that asks first.
+TEST(ActionValue, ManyThreadsMayReadAnAverage) {
+  SDNNCConfig config = small_network();
+  config.averaging_interval = 5;
+  SDNNC network(config, 3);
+  auto workspace = network.workspace();
+  const auto states = some_states(40);
+  const auto averages = [&](const SDNNC& read) {
+    auto own = read.workspace();
+    std::vector<double> all, row(5);
+    for (const auto& state : states) {
+      read.averaged_values(state, own, row);
+      all.insert(all.end(), row.begin(), row.end());
+    }
+    return all;
+  };
+  for (int round = 0; round < 3; ++round) {
+    for (const auto& state : states) network.update(state, workspace, 1, 9.0 - round);
+    const SDNNC alone = network;
+    const auto expected = averages(alone);
+    for (const auto& values :
+         testing::in_threads(4, [&](std::size_t) { return averages(network); }))
+      ASSERT_EQ(values, expected);
+  }
 }
 
 // A correction at a rate is one at rate 1 towards (1 - rate) Q + rate target: the same bits.
 template <ActionValue Q>
-void expect_rates_as_defined(Q at_a_rate) {
-  Q whole = at_a_rate;
+void expect_rates_as_defined(Q model) {
+  testing::WithWorkspace<Q> whole(model), at_a_rate(model);
   std::vector<double> row(whole.n_actions()), same(whole.n_actions());
   for (int i = 0; i < 100; ++i) {
     const std::array<double, 2> state = {0.01 * (37 * i % 100), 0.01 * i};
@@ -106,12 +224,7 @@ void expect_rates_as_defined(Q at_a_rate) {
 
 TEST(ActionValue, EveryModelCorrectsAtARateAsDefined) {
   expect_rates_as_defined(testing::LookupTable(2, 4, 5));
-  expect_rates_as_defined(SDNNC({.n_inputs = 2,
-                                 .n_pattern_units = 40,
-                                 .n_hidden_units = 300,
-                                 .n_active_units = 100,
-                                 .n_actions = 5},
-                                3));
+  expect_rates_as_defined(SDNNC(small_network(), 3));
   expect_rates_as_defined(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
   expect_rates_as_defined(RBFNetwork({.n_inputs = 2, .n_bases = 3, .n_actions = 5}));
 }

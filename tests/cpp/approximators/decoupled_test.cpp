@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "approximators/lookup_table.hpp"
+#include "approximators/with_workspace.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 #include "sdnn/core/random.hpp"
@@ -27,12 +28,15 @@ static_assert(DecoupledActionValue<Decoupled<LookupTable>>);
 static_assert(DecoupledActionValue<Decoupled<SDNNC>>);
 static_assert(!DecoupledActionValue<LookupTable>);
 
+template <class Q>
+using Used = testing::WithWorkspace<Decoupled<Q>>;
+
 /// Two dimensions, of 2 and 3 actions: Q_0 = 2 and Q_1 = 6 for action (1, 2) at kHere.
-Decoupled<LookupTable> two_tables() {
+Used<LookupTable> two_tables() {
   LookupTable first(1, 2, 2), second(1, 2, 3);
   first.update(kHere, 1, 2.0);
   second.update(kHere, 2, 6.0);
-  return Decoupled<LookupTable>({first, second});
+  return Used<LookupTable>({first, second});
 }
 
 TEST(Decoupled, TheValueIsTheMean) {
@@ -48,7 +52,7 @@ TEST(Decoupled, TheValueIsTheMean) {
 
 TEST(Decoupled, ACorrectionMovesEveryPartByTheErrorOfTheMean) {
   auto q = two_tables();
-  q.update(kHere, Indices{1, 2}, 8.0, 0.5);                // the error is 8 - 4
+  q.update(kHere, Indices{1, 2}, 8.0, 0.5);                 // the error is 8 - 4
   EXPECT_EQ(q.part(0).value(kHere, 1), 4.0);                // half of 2 and half of 2 + 4
   EXPECT_EQ(q.part(1).value(kHere, 2), 8.0);                // half of 6 and half of 6 + 4
   EXPECT_EQ(q.value(kHere, Indices{1, 2}), 0.5 * (4 + 8));  // half way from 4 to 8
@@ -64,7 +68,7 @@ TEST(Decoupled, TheLargestValueIsTheMeanOfTheLargest) {
       table.update(kHere, a, static_cast<double>(random.below(1000)));
     }
   }
-  Decoupled<LookupTable> q(tables);
+  Used<LookupTable> q(tables);
   double largest = -1.0, sum = 0.0;
   for (std::size_t a = 0; a < 64; ++a) {
     largest = std::max(largest, q.value(kHere, Indices{a / 16, a / 4 % 4, a % 4}));
@@ -80,7 +84,7 @@ TEST(Decoupled, TheLargestValueIsTheMeanOfTheLargest) {
 TEST(Decoupled, HasTheRangeOfItsParts) {
   const SDNNCConfig config{
       .n_inputs = 2, .n_pattern_units = 16, .n_hidden_units = 40, .n_active_units = 20};
-  Decoupled<SDNNC> q({SDNNC(config, 1), SDNNC(config, 2)});
+  Used<SDNNC> q({SDNNC(config, 1), SDNNC(config, 2)});
   q.set_output_range(-3.0, 5.0);
   for (const std::size_t d : {0U, 1U}) {
     EXPECT_EQ(q.part(d).output_scale().q_low(), -3.0);
@@ -97,8 +101,8 @@ TEST(Decoupled, EveryDimensionHasAnotherSeedTheFirstThatOfTheWhole) {
 }
 
 TEST(Decoupled, RefusesWhatDoesNotFit) {
-  EXPECT_THROW(Decoupled<LookupTable>({}), std::invalid_argument);
-  EXPECT_THROW(Decoupled<LookupTable>({LookupTable(1, 2, 2), LookupTable(2, 2, 2)}),
+  EXPECT_THROW(Used<LookupTable>({}), std::invalid_argument);
+  EXPECT_THROW(Used<LookupTable>({LookupTable(1, 2, 2), LookupTable(2, 2, 2)}),
                std::invalid_argument);
   auto q = two_tables();
   for (const Indices& bad : {Indices{}, Indices{1}, Indices{1, 2, 0}}) {
@@ -107,7 +111,7 @@ TEST(Decoupled, RefusesWhatDoesNotFit) {
   }
   EXPECT_EQ(q.value(kHere, Indices{1, 2}), 4.0);
   const RBFNetworkConfig config{.n_inputs = 1, .n_actions = 3};
-  Decoupled<RBFNetwork> networks({RBFNetwork(config), RBFNetwork(config)});
+  Used<RBFNetwork> networks({RBFNetwork(config), RBFNetwork(config)});
   const core::State before = core::state_of(networks);
   for (const Indices& bad : {Indices{1, 3}, Indices{3, 1}}) {
     EXPECT_THROW(networks.update(kHere, bad, 1.0, 0.5), std::invalid_argument);
@@ -117,10 +121,10 @@ TEST(Decoupled, RefusesWhatDoesNotFit) {
 
 TEST(Decoupled, RestoresItsPartsOrNone) {
   const RBFNetworkConfig config{.n_inputs = 1, .n_bases = 2, .n_actions = 3};
-  Decoupled<RBFNetwork> q({RBFNetwork(config), RBFNetwork(config)});
+  Used<RBFNetwork> q({RBFNetwork(config), RBFNetwork(config)});
   q.update(kHere, Indices{1, 2}, 8.0, 0.5);
   testing::expect_that_damage_is_refused(q);
-  Decoupled<RBFNetwork> other({RBFNetwork(config), RBFNetwork(config)});
+  Used<RBFNetwork> other({RBFNetwork(config), RBFNetwork(config)});
   core::restore(other, core::state_of(q));
   EXPECT_EQ(other.value(kHere, Indices{1, 2}), q.value(kHere, Indices{1, 2}));
   testing::expect_refused(

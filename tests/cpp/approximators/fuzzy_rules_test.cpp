@@ -103,7 +103,7 @@ TEST(FuzzyRules, ValuesStartAtZeroAndEachHasItsPlace) {
 
 TEST(FuzzyRules, FiringAllocatesNothing) {
   const FuzzyRules rules({.n_inputs = 6});
-  FiredRules fired = rules.no_rules();
+  FiredRules fired = rules.workspace();
   const std::vector<double> state = {0.1, 0.2, 0.3, 0.4, 0.7, 0.9};
   const std::size_t before = testing::allocation_count();
   rules.fire(state, fired);

@@ -26,14 +26,26 @@ class LookupTable {
   std::size_t n_inputs() const noexcept { return n_inputs_; }
   std::size_t n_actions() const noexcept { return n_actions_; }
 
+  struct Workspace {};  // there is nothing to remember
+  Workspace workspace() const noexcept { return {}; }
+
   void values(std::span<const double> state, std::span<double> out) const {
     std::copy_n(&table_[row(state)], n_actions_, out.begin());
+  }
+  void values(std::span<const double> state, Workspace&, std::span<double> out) const {
+    values(state, out);
+  }
+  double value(std::span<const double> state, Workspace&, std::size_t action) const {
+    return value(state, action);
+  }
+  void update(std::span<const double> state, Workspace&, std::size_t action, double target,
+              double rate) {
+    update(state, action, target, rate);
   }
   double value(std::span<const double> state, std::size_t action) const {
     return table_.at(row(state) + action);
   }
-  void update(std::span<const double> state, std::size_t action, double target,
-               double rate = 1.0) {
+  void update(std::span<const double> state, std::size_t action, double target, double rate = 1.0) {
     core::require(rate > 0.0 && rate <= 1.0, "rate", "in (0, 1]", rate);
     double& q = table_.at(row(state) + action);
     q = (1.0 - rate) * q + rate * target;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "allocation_count.hpp"
+#include "approximators/with_workspace.hpp"
 #include "sdnn/approximators/action_value.hpp"
 #include "sdnn/core/elementary.hpp"
 #include "sdnn/core/random.hpp"
@@ -19,6 +20,8 @@ namespace {
 
 static_assert(ActionValue<RBFNetwork>);
 
+using UsedRBF = testing::WithWorkspace<RBFNetwork>;
+
 std::vector<double> random_state(core::Random& random, std::size_t d) {
   std::vector<double> state(d);
   for (double& x : state) x = random.uniform();
@@ -26,8 +29,8 @@ std::vector<double> random_state(core::Random& random, std::size_t d) {
 }
 
 /// A network with weights of several sizes and signs, learned from random targets.
-RBFNetwork taught(const RBFNetworkConfig& config, int n_corrections) {
-  RBFNetwork network(config);
+UsedRBF taught(const RBFNetworkConfig& config, int n_corrections) {
+  UsedRBF network(config);
   core::Random random(7, core::Stream::weights);
   for (int i = 0; i < n_corrections; ++i) {
     const auto state = random_state(random, network.n_inputs());
@@ -39,7 +42,7 @@ RBFNetwork taught(const RBFNetworkConfig& config, int n_corrections) {
 
 // d = 1, two bases at 0 and 1, width 1: at x = 0 Gaussians 1 and e^-1/2, at 1/2 equal ones.
 TEST(RBFNetwork, OneGradientStepByHand) {
-  RBFNetwork network(
+  UsedRBF network(
       {.n_inputs = 1, .n_bases = 2, .n_actions = 3, .width = 1.0, .gradient_rate = 0.5});
   EXPECT_EQ(network.n_joint_bases(), 4U);
   const std::vector<double> state = {0.5};
@@ -57,7 +60,7 @@ TEST(RBFNetwork, OneGradientStepByHand) {
 }
 
 TEST(RBFNetwork, StartsAtZeroForEveryAction) {
-  RBFNetwork network({});
+  UsedRBF network({});
   EXPECT_EQ(network.n_joint_bases(), 1024U);
   std::vector<double> out(601, 1.0);
   network.values(std::vector<double>{0.1, 0.9, 0.0, 1.0}, out);
@@ -67,7 +70,7 @@ TEST(RBFNetwork, StartsAtZeroForEveryAction) {
 // Normalized bases: equal weights give that weight everywhere.
 TEST(RBFNetwork, TheBasesSumToOne) {
   for (const double width : {0.1, 1.0, 100.0}) {
-    RBFNetwork network({.n_inputs = 3, .n_actions = 11, .width = width});
+    UsedRBF network({.n_inputs = 3, .n_actions = 11, .width = width});
     network.set_weights(std::vector<double>(256, 5.0));
     core::Random random(1, core::Stream::ties);
     std::vector<double> out(11);
@@ -80,8 +83,8 @@ TEST(RBFNetwork, TheBasesSumToOne) {
 }
 
 TEST(RBFNetwork, WhatIsRememberedNeverChangesWhatIsReturned) {
-  RBFNetwork used = taught({.n_inputs = 2, .n_actions = 7}, 50);
-  RBFNetwork fresh = used;
+  UsedRBF used = taught({.n_inputs = 2, .n_actions = 7}, 50);
+  UsedRBF fresh = used;
   const std::vector<double> a = {0.2, 0.8}, b = {0.6, 0.1};
   std::vector<double> out(7), expected(7);
   for (int i = 0; i < 20; ++i) {
@@ -99,7 +102,7 @@ TEST(RBFNetwork, WhatIsRememberedNeverChangesWhatIsReturned) {
 }
 
 TEST(RBFNetwork, AGradientStepGoesTheRightWayAndNotTooFar) {
-  RBFNetwork network = taught({.width = 1.0, .gradient_rate = 50.0}, 100);  // |phi|^2 <= 0.019
+  UsedRBF network = taught({.width = 1.0, .gradient_rate = 50.0}, 100);  // |phi|^2 <= 0.019
   core::Random random(5, core::Stream::ties);
   for (int i = 0; i < 200; ++i) {
     const auto state = random_state(random, 4);
@@ -115,7 +118,7 @@ TEST(RBFNetwork, AGradientStepGoesTheRightWayAndNotTooFar) {
 // The values are sums over the bases of the weights as they are written, in that order.
 TEST(RBFNetwork, ValuesAreSumsInTheOrderOfTheBases) {
   for (const int n_bases : {2, 3, 4, 7}) {
-    RBFNetwork network = taught({.n_inputs = 2, .n_bases = n_bases, .n_actions = 9}, 100);
+    UsedRBF network = taught({.n_inputs = 2, .n_bases = n_bases, .n_actions = 9}, 100);
     const std::vector<double> state = {0.25, 0.8};
     std::vector<double> out(9);
     network.values(state, out);
@@ -153,7 +156,7 @@ TEST(RBFNetwork, ValuesAreSumsInTheOrderOfTheBases) {
 // The bits are the same with every compiler, optimization level and instruction set.
 TEST(RBFNetwork, KeepsItsBits) {
   const auto digest_of = [](const RBFNetworkConfig& config) {
-    RBFNetwork network = taught(config, 200);
+    UsedRBF network = taught(config, 200);
     std::uint64_t digest = 0;
     for (const double w : network.weights()) digest = digest * 31 + std::bit_cast<std::uint64_t>(w);
     std::vector<double> out(601);
@@ -167,7 +170,7 @@ TEST(RBFNetwork, KeepsItsBits) {
 
 TEST(RBFNetwork, AStepAllocatesNothing) {
   for (const int n_bases : {3, 4}) {
-    RBFNetwork network({.n_inputs = 5, .n_bases = n_bases});
+    UsedRBF network({.n_inputs = 5, .n_bases = n_bases});
     const std::vector<double> state = {0.1, 0.2, 0.3, 0.4, 0.5};
     std::vector<double> out(601);
     const std::size_t before = testing::allocation_count();
@@ -181,7 +184,7 @@ TEST(RBFNetwork, AStepAllocatesNothing) {
 template <class Error>
 std::string message(const RBFNetworkConfig& config) {
   try {
-    RBFNetwork network(config);
+    UsedRBF network(config);
   } catch (const Error& error) {
     return error.what();
   }
@@ -215,7 +218,7 @@ TEST(RBFNetwork, NamesWhatIsImpossible) {
 }
 
 TEST(RBFNetwork, BadArgumentsChangeNothing) {
-  RBFNetwork network = taught({.n_inputs = 2, .n_actions = 3}, 10);
+  UsedRBF network = taught({.n_inputs = 2, .n_actions = 3}, 10);
   const std::vector<double> weights(network.weights().begin(), network.weights().end());
   const std::vector<double> good = {0.1, 0.2};
   const std::vector<double> big = {0.1, 1.2};

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "allocation_count.hpp"
+#include "approximators/with_workspace.hpp"
 #include "sdnn/coding/anchor_patterns.hpp"
 #include "sdnn/coding/random_inverse.hpp"
 #include "sdnn/core/random.hpp"
@@ -18,7 +19,7 @@
 namespace sdnn::approximators {
 namespace {
 
-using Network = SDNNC;
+using Network = testing::WithWorkspace<SDNNC>;
 using State = std::vector<double>;
 
 /// The learning tests run on a smaller network, which has the same parts.
@@ -509,7 +510,7 @@ TEST(SDNNC, WarmCachesChangeNothing) {
   Network cold(small(), 5);
   Network warm = cold;
   warm.warm_caches();
-  EXPECT_EQ(warm.memory().counts().full, 0U);
+  EXPECT_EQ(warm.own_workspace().cache().counts().full, 0U);
   const State state = {0.3, 0.6, 0.2};
   for (Network* const network : {&cold, &warm}) network->update(state, 70, 12.0);
   expect_equal_parameters(cold, warm);

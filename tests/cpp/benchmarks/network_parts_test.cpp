@@ -49,7 +49,7 @@ TEST(NetworkParts, ACorrectionCorrectsAsManyUnitsAsAsked) {
 TEST(NetworkParts, NewStatesOfThePapersSizesTakeFullPasses) {
   NetworkParts parts(SDNNC({.n_inputs = 6}, 1), 1);
   parts.time_values(200);
-  EXPECT_GE(parts.network().memory().counts().full, 195U);
+  EXPECT_GE(parts.workspace().cache().counts().full, 195U);
 }
 
 // 100 units are padded to 128; of 120 modifiers half are active, and each takes one column of two.

@@ -97,9 +97,16 @@ class EpsilonGreedy {
   std::size_t random_action(std::size_t n_actions) noexcept {
     return static_cast<std::size_t>(exploration_.below(n_actions));
   }
-  /// One of the best actions. Shape: values (n_actions,). Throws as select does.
+  /// One of the best actions; several are told apart by the streams of learning or evaluation, or
+  /// by those that the caller owns. Shape: values (n_actions,). Throws as select does.
   std::size_t best_action(std::span<const double> values, bool explore) {
     return greedy(values, explore ? ties_ : evaluation_ties_);
+  }
+  std::size_t best_action(std::span<const double> values, core::Random& ties) const {
+    return greedy(values, ties);
+  }
+  std::size_t best_action(std::span<const float> values, core::Random& ties) const {
+    return greedy(values, ties);
   }
 
   /// The action for step number `step` (from 0) of an episode; without `explore` always a best one.

@@ -73,7 +73,7 @@ class FuzzyQLearning {
       : config_(checked(config)),
         rules_(with_room(std::move(rules))),
         policy_(config.policy, seed),
-        other_fired_(rules_.no_rules()),
+        workspace_(rules_.workspace()),
         episodes_(new_episode()) {
     for (std::size_t action = 0; action < rules_.n_actions(); ++action) {
       actions_.push_back(coding::action_value(action, rules_.n_actions(), -1.0, 1.0));
@@ -117,19 +117,18 @@ class FuzzyQLearning {
   /// Shape: state (d,) in [0, 1]. Throws std::invalid_argument otherwise, and nothing has changed.
   double act(std::span<const double> state, bool explore = true, std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
-    auto& fired = explore ? episode.fired : other_fired_;
+    auto& fired = explore ? episode.fired : workspace_;
     rules_.fire(state, fired);
     if (explore) {
       std::copy(state.begin(), state.end(), episode.state.begin());
       episode.picked.clear();
     }
-    const double mean = mean_over(fired, [&](std::size_t i) {
-      const std::size_t action =
+    const double action = clamped_mean(fired, [&](std::size_t i) {
+      const std::size_t picked =
           policy_.select(rules_.values(fired.rules[i]), episode.step, explore);
-      if (explore) episode.picked.push_back(action);
-      return actions_[action];
+      if (explore) episode.picked.push_back(picked);
+      return picked;
     });
-    const double action = std::clamp(mean, -1.0, 1.0);
     if (explore) {
       ++episode.step;
       episode.action = action;
@@ -140,11 +139,25 @@ class FuzzyQLearning {
   /// The action itself: act gives a number in [-1, 1].
   double normalized_action(double action) const noexcept { return action; }
 
+  /// What one reader needs: as long as the agent neither acts with `explore` nor learns, many
+  /// threads may call value and best_action, with a workspace each.
+  using Workspace = approximators::FiredRules;
+  Workspace workspace() const { return rules_.workspace(); }
+
   /// The value of `state`, sum max_a v_i[a] alpha_i / sum alpha_i. Throws as act does.
-  double value(std::span<const double> state) {
-    rules_.fire(state, other_fired_);
-    return mean_over(other_fired_, [this](std::size_t i) -> double {
-      return best_value(rules_.values(other_fired_.rules[i]));
+  double value(std::span<const double> state, Workspace& workspace) const {
+    rules_.fire(state, workspace);
+    return mean_over(workspace, [&](std::size_t i) -> double {
+      return best_value(rules_.values(workspace.rules[i]));
+    });
+  }
+
+  /// The action of act without `explore`; `ties` decides between several best ones of a rule.
+  double best_action(std::span<const double> state, Workspace& workspace,
+                     core::Random& ties) const {
+    rules_.fire(state, workspace);
+    return clamped_mean(workspace, [&](std::size_t i) {
+      return policy_.best_action(rules_.values(workspace.rules[i]), ties);
     });
   }
 
@@ -161,7 +174,8 @@ class FuzzyQLearning {
                   "state", "that of the last exploring act", "another");
     core::require(action == episode.action, "action", "that of the last exploring act", action);
     core::require_finite("reward", reward);
-    const double target = terminated ? reward : reward + config_.discount * value(next_state);
+    const double target =
+        terminated ? reward : reward + config_.discount * value(next_state, workspace_);
     const double value_of_picks = mean_over(episode.fired, [&](std::size_t i) -> double {
       return rules_.value(episode.fired.rules[i], episode.picked[i]);
     });
@@ -189,7 +203,7 @@ class FuzzyQLearning {
     Episodes<Episode>::exchange(
         self.episodes_, archive, [&self] { return self.new_episode(); },
         [&](auto& episode) { exchange_episode(self, episode, archive); });
-    if constexpr (Archive::kReads) self.other_fired_ = self.rules_.no_rules();  // as new_episode's
+    if constexpr (Archive::kReads) self.workspace_ = self.rules_.workspace();  // as new_episode's
   }
 
  private:
@@ -223,7 +237,7 @@ class FuzzyQLearning {
   Episode new_episode() const {
     Episode episode;
     episode.state.resize(rules_.n_inputs());
-    episode.fired = rules_.no_rules();
+    episode.fired = rules_.workspace();
     episode.picked.reserve(rules_.max_fired());
     episode.traces.reserve(most_traces());
     return episode;
@@ -310,6 +324,13 @@ class FuzzyQLearning {
     return weighted / total;
   }
 
+  /// The mean over the fired rules of the actions pick(i).
+  template <class Pick>
+  double clamped_mean(const approximators::FiredRules& fired, const Pick& pick) const {
+    return std::clamp(mean_over(fired, [&](std::size_t i) { return actions_[pick(i)]; }), -1.0,
+                      1.0);
+  }
+
   double fading() const noexcept { return config_.discount * config_.trace_decay; }
 
   // Steps after which the largest possible eligibility, 1 / (1 - fading), is forgotten.
@@ -348,8 +369,8 @@ class FuzzyQLearning {
   FuzzyQLearningConfig config_;
   approximators::FuzzyRules rules_;
   EpsilonGreedy policy_;
-  std::vector<double> actions_;            // the discrete ones, in [-1, 1]
-  approximators::FiredRules other_fired_;  // of evaluation and of the next state
+  std::vector<double> actions_;          // the discrete ones, in [-1, 1]
+  approximators::FiredRules workspace_;  // of evaluation and of the next state
   Episodes<Episode> episodes_;
 };
 

@@ -123,6 +123,12 @@ class QLearning {
   static_assert(kDecoupled || approximators::ActionValue<Q>);
   using Action = std::conditional_t<kDecoupled, std::vector<std::size_t>, std::size_t>;
 
+  /// What one reader needs: the workspace of the approximator, and the values of each dimension.
+  struct Workspace {
+    typename Q::Workspace approximator;
+    std::vector<std::vector<double>> values;
+  };
+
   /// Throws std::invalid_argument naming the field that is out of range.
   QLearning(Q action_value, const QLearningConfig& config, std::uint64_t seed)
       : config_(checked(config)),
@@ -132,13 +138,14 @@ class QLearning {
         range_(config.discount),
         n_random_left_(config.n_random_steps),
         learning_rate_(config.learning_rate),
-        episodes_(new_episode()) {
-    for (std::size_t d = 0; d < n_dimensions(); ++d) values_.emplace_back(n_actions(d));
-  }
+        workspace_(workspace()),
+        episodes_(new_episode()) {}
 
   const QLearningConfig& config() const noexcept { return config_; }
   Q& action_value() noexcept { return action_value_; }
   const Q& action_value() const noexcept { return action_value_; }
+  /// In which the agent itself acts and learns.
+  const Workspace& own_workspace() const noexcept { return workspace_; }
 
   std::size_t n_inputs() const { return action_value_.n_inputs(); }
   /// Dimensions of an action.
@@ -205,9 +212,33 @@ class QLearning {
 
   /// Lets the approximator write to the memory that it will need, where it knows how.
   void warm_caches()
-    requires requires(Q& q) { q.warm_caches(); }
+    requires requires(Q& q, typename Q::Workspace& workspace) { q.warm_caches(workspace); }
   {
-    action_value_.warm_caches();
+    action_value_.warm_caches(workspace_.approximator);
+  }
+
+  /// A workspace for a reader beside the agent itself: as long as the agent neither acts with
+  /// `explore` nor learns, many threads may call values and best_action, with one each.
+  Workspace workspace() const {
+    Workspace workspace{action_value_.workspace(), {}};
+    for (std::size_t d = 0; d < n_dimensions(); ++d) workspace.values.emplace_back(n_actions(d));
+    return workspace;
+  }
+
+  /// Q(state, a) for every action of dimension d. The span is valid until the workspace is used
+  /// again. Shape: state (l,) in [0, 1]. Throws as the approximator does.
+  std::span<const double> values(std::span<const double> state, Workspace& workspace,
+                                 std::size_t d = 0) const {
+    part(d).values(state, part(workspace, d), workspace.values[d]);
+    return workspace.values[d];
+  }
+
+  /// A best action, as act without `explore` gives it; `ties` decides between several.
+  Action best_action(std::span<const double> state, Workspace& workspace,
+                     core::Random& ties) const {
+    return each_best([&](std::size_t d) {
+      return policy_.best_action(averaged_values(state, workspace, d), ties);
+    });
   }
 
   /// The action to take in `state`; without `explore` a best one, by the average of the weights
@@ -298,6 +329,7 @@ class QLearning {
       archive.expect(self.n_random_left_ >= 0 && self.n_random_left_ <= self.config_.n_random_steps,
                      "n_random_left", "in [0, n_random_steps]");
       self.apply_rates();
+      self.workspace_ = self.workspace();  // a copy's has no room
     }
   }
 
@@ -405,8 +437,8 @@ class QLearning {
     }
   }
 
-  /// The approximator of a dimension.
-  auto& part(std::size_t d) {
+  /// The approximator of a dimension, and its workspace.
+  const auto& part(std::size_t d) const {
     if constexpr (kDecoupled) {
       return action_value_.part(d);
     } else {
@@ -414,27 +446,30 @@ class QLearning {
       return action_value_;
     }
   }
-
-  /// Fills values_ of a dimension.
-  std::span<const double> values(std::span<const double> state, std::size_t d) {
-    part(d).values(state, values_[d]);
-    return values_[d];
-  }
-
-  /// As values, by the average of the weights where the approximator keeps one.
-  std::span<const double> averaged_values(std::span<const double> state, std::size_t d) {
-    if constexpr (requires { part(d).averaged_values(state, values_[d]); }) {
-      part(d).averaged_values(state, values_[d]);
-      return values_[d];
+  static auto& part(Workspace& workspace, std::size_t d) {
+    if constexpr (kDecoupled) {
+      return workspace.approximator.parts[d];
     } else {
-      return values(state, d);
+      assert(d == 0);
+      return workspace.approximator;
     }
   }
 
-  Action best_action(std::span<const double> state, bool explore) {
-    const auto best = [&](std::size_t d) {
-      return policy_.best_action(explore ? values(state, d) : averaged_values(state, d), explore);
-    };
+  /// As values, by the average of the weights where the approximator keeps one.
+  std::span<const double> averaged_values(std::span<const double> state, Workspace& workspace,
+                                          std::size_t d) const {
+    std::vector<double>& row = workspace.values[d];
+    if constexpr (requires { part(d).averaged_values(state, part(workspace, d), row); }) {
+      part(d).averaged_values(state, part(workspace, d), row);
+      return row;
+    } else {
+      return values(state, workspace, d);
+    }
+  }
+
+  /// The action that has best(d) in dimension d.
+  template <class Best>
+  Action each_best(const Best& best) const {
     if constexpr (kDecoupled) {
       Action action(n_dimensions());
       for (std::size_t d = 0; d < action.size(); ++d) action[d] = best(d);
@@ -444,9 +479,17 @@ class QLearning {
     }
   }
 
+  Action best_action(std::span<const double> state, bool explore) {
+    return each_best([&](std::size_t d) {
+      return policy_.best_action(
+          explore ? values(state, workspace_, d) : averaged_values(state, workspace_, d), explore);
+    });
+  }
+
   double state_value(std::span<const double> state) {
     double sum = 0.0;
-    for (std::size_t d = 0; d < n_dimensions(); ++d) sum += best_value(values(state, d));
+    for (std::size_t d = 0; d < n_dimensions(); ++d)
+      sum += best_value(values(state, workspace_, d));
     if constexpr (kDecoupled) sum /= static_cast<double>(n_dimensions());
     return sum;
   }
@@ -454,10 +497,11 @@ class QLearning {
   void learn_oldest(WaitingSteps& waiting, double value) {
     const double target = waiting.return_of_oldest(value, config_.discount);
     const WaitingSteps::Step& oldest = waiting.take_oldest();
+    typename Q::Workspace& workspace = workspace_.approximator;
     if constexpr (kDecoupled) {
-      action_value_.update(oldest.state, oldest.action, target, learning_rate_);
+      action_value_.update(oldest.state, workspace, oldest.action, target, learning_rate_);
     } else {
-      action_value_.update(oldest.state, oldest.action.front(), target, learning_rate_);
+      action_value_.update(oldest.state, workspace, oldest.action.front(), target, learning_rate_);
     }
   }
 
@@ -474,7 +518,7 @@ class QLearning {
   double progress_ = 0.0;
   std::optional<double> set_learning_rate_, set_epsilon_;
   double learning_rate_;
-  std::vector<std::vector<double>> values_;  ///< of every dimension
+  Workspace workspace_;
   Episodes<Episode> episodes_;
 };
 

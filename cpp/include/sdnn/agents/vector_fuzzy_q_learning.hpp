@@ -77,11 +77,29 @@ class VectorFuzzyQLearning {
     return action;
   }
 
+  /// What one reader needs, as of a part: one for each.
+  using Workspace = std::vector<FuzzyQLearning::Workspace>;
+  Workspace workspace() const {
+    Workspace workspace;
+    for (const FuzzyQLearning& part : parts_) workspace.push_back(part.workspace());
+    return workspace;
+  }
+
   /// The mean of the parts' values of `state`. Throws as they do.
-  double value(std::span<const double> state) {
+  double value(std::span<const double> state, Workspace& workspace) const {
     double sum = 0.0;
-    for (FuzzyQLearning& part : parts_) sum += part.value(state);
+    for (std::size_t d = 0; d < parts_.size(); ++d) sum += parts_[d].value(state, workspace[d]);
     return sum / static_cast<double>(parts_.size());
+  }
+
+  /// The action of act without `explore`. Throws as the parts do.
+  std::vector<double> best_action(std::span<const double> state, Workspace& workspace,
+                                  core::Random& ties) const {
+    std::vector<double> action;
+    for (std::size_t d = 0; d < parts_.size(); ++d) {
+      action.push_back(parts_[d].best_action(state, workspace[d], ties));
+    }
+    return action;
   }
 
   /// Learns the transition that began with the last exploring act in the environment. Throws as the

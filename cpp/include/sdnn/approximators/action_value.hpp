@@ -9,25 +9,30 @@
 
 namespace sdnn::approximators {
 
-/// A learnable table of action values over continuous states in [0, 1]^l.
+/// A learnable table of action values over continuous states in [0, 1]^l: a model that many threads
+/// may read at once, each through a workspace of its own.
 ///
 /// - q.n_actions(): number of actions
 /// - q.n_inputs(): l, the size of a state
-/// - q.values(state, out): writes Q(state, a) for every action a; out: (n_actions,)
-/// - q.value(state, action): Q(state, action)
-/// - q.update(state, action, target, rate): moves Q = Q(state, action) towards
+/// - q.workspace(): what one user needs, a Q::Workspace: caches and room to compute in
+/// - q.values(state, workspace, out): writes Q(state, a) for every action a; out: (n_actions,)
+/// - q.value(state, workspace, action): Q(state, action)
+/// - q.update(state, workspace, action, target, rate): moves Q = Q(state, action) towards
 ///   (1 - rate) Q + rate target, as near as it can go; rate in (0, 1]
 ///
-/// values may remember what it computed, but never changes what it returns.
+/// A workspace may speed up what follows, but never changes what is returned. It serves whatever
+/// the model has become since, and copies of the model. While update runs, nobody else may use the
+/// model.
 template <class Q>
 concept ActionValue =
-    requires(Q q, const Q& const_q, std::span<const double> state, std::span<double> out,
-             std::size_t action, double target, double rate) {
+    requires(Q q, const Q& const_q, typename Q::Workspace& workspace, std::span<const double> state,
+             std::span<double> out, std::size_t action, double target, double rate) {
       { const_q.n_actions() } -> std::convertible_to<std::size_t>;
       { const_q.n_inputs() } -> std::convertible_to<std::size_t>;
-      q.values(state, out);
-      { q.value(state, action) } -> std::convertible_to<double>;
-      q.update(state, action, target, rate);
+      { const_q.workspace() } -> std::same_as<typename Q::Workspace>;
+      const_q.values(state, workspace, out);
+      { const_q.value(state, workspace, action) } -> std::convertible_to<double>;
+      q.update(state, workspace, action, target, rate);
     };
 
 }  // namespace sdnn::approximators

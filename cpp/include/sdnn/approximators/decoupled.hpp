@@ -25,8 +25,14 @@ namespace sdnn::approximators {
 template <ActionValue Q>
 class Decoupled {
  public:
+  /// What one user needs: a workspace for each part.
+  struct Workspace {
+    std::vector<typename Q::Workspace> parts;
+    std::vector<double> taken;  ///< Q_d of the action that was asked for last
+  };
+
   /// Throws std::invalid_argument unless there is a part, and all have the same inputs.
-  explicit Decoupled(std::vector<Q> parts) : parts_(std::move(parts)), taken_(parts_.size()) {
+  explicit Decoupled(std::vector<Q> parts) : parts_(std::move(parts)) {
     core::require(!parts_.empty(), "parts", "at least one", parts_.size());
     for (const Q& part : parts_) {
       core::require(part.n_inputs() == n_inputs(), "parts", "of the same inputs", part.n_inputs());
@@ -38,24 +44,32 @@ class Decoupled {
   Q& part(std::size_t d) noexcept { return parts_[d]; }
   const Q& part(std::size_t d) const noexcept { return parts_[d]; }
 
+  Workspace workspace() const {
+    Workspace workspace;
+    for (const Q& part : parts_) workspace.parts.push_back(part.workspace());
+    workspace.taken.resize(parts_.size());
+    return workspace;
+  }
+
   /// Q(state, action). Shapes: state (l,) in [0, 1], action (n_dimensions,). Throws as the parts.
-  double value(std::span<const double> state, std::span<const std::size_t> action) {
+  double value(std::span<const double> state, Workspace& workspace,
+               std::span<const std::size_t> action) const {
     require_action(action);
     double sum = 0.0;
     for (std::size_t d = 0; d < parts_.size(); ++d) {
-      taken_[d] = parts_[d].value(state, action[d]);
-      sum += taken_[d];
+      workspace.taken[d] = parts_[d].value(state, workspace.parts[d], action[d]);
+      sum += workspace.taken[d];
     }
     return sum / static_cast<double>(parts_.size());
   }
 
   /// Moves Q(state, action) towards (1 - rate) Q + rate * target. Throws as the parts do; where it
   /// is for an overflow, the parts before have changed.
-  void update(std::span<const double> state, std::span<const std::size_t> action, double target,
-               double rate) {
-    const double error = target - value(state, action);
+  void update(std::span<const double> state, Workspace& workspace,
+              std::span<const std::size_t> action, double target, double rate) {
+    const double error = target - value(state, workspace, action);
     for (std::size_t d = 0; d < parts_.size(); ++d) {
-      parts_[d].update(state, action[d], taken_[d] + error, rate);
+      parts_[d].update(state, workspace.parts[d], action[d], workspace.taken[d] + error, rate);
     }
   }
 
@@ -67,10 +81,10 @@ class Decoupled {
   }
 
   /// Lets the parts write to the memory that they will need, where they know how.
-  void warm_caches()
-    requires requires(Q& q) { q.warm_caches(); }
+  void warm_caches(Workspace& workspace)
+    requires requires(Q& q, typename Q::Workspace& of_part) { q.warm_caches(of_part); }
   {
-    for (Q& part : parts_) part.warm_caches();
+    for (std::size_t d = 0; d < parts_.size(); ++d) parts_[d].warm_caches(workspace.parts[d]);
   }
 
   /// Lists what is remembered; see core/state.hpp.
@@ -88,7 +102,6 @@ class Decoupled {
   }
 
   std::vector<Q> parts_;
-  std::vector<double> taken_;  ///< Q_d of the action that was asked for last
 };
 
 /// The seed of a dimension's network: that of the whole for the first, another for every other.

@@ -34,7 +34,7 @@ struct FuzzyRulesConfig {
   bool operator==(const FuzzyRulesConfig&) const = default;
 };
 
-/// The rules that fire in a state, and how true each is.
+/// The rules that fire in a state, and how true each is: the workspace of who reads the rules.
 struct FiredRules {
   std::vector<std::size_t> rules;
   std::vector<double> truth_values;  ///< of `rules`; their sum is 1 up to rounding
@@ -48,7 +48,8 @@ struct FiredRules {
 /// triangles overlap by one half, so an input belongs to two sets, or to one at a centre: at most
 /// 2^d rules fire, and only they are ever read or written. All values start at 0; rules that never
 /// fire cost no memory where the operating system hands out zero pages lazily.
-/// Source: method.md, section 3. The table has 4 n_actions n_sets^d bytes: 45 MB at d = 6.
+/// Source: method.md, section 3. The table has 4 n_actions n_sets^d bytes: 45 MB at d = 6. Thread
+/// safety: const functions may be called by many threads at once.
 class FuzzyRules {
  public:
   /// v(rule, action), a row per rule.
@@ -112,7 +113,7 @@ class FuzzyRules {
   }
 
   /// An empty list with room for every rule that can fire at once.
-  FiredRules no_rules() const {
+  FiredRules workspace() const {
     FiredRules fired;
     fired.rules.reserve(max_fired());
     fired.truth_values.reserve(max_fired());

@@ -149,7 +149,7 @@ class HiddenLayer {
   /// Source: Eqs. (2), (3). Throws std::overflow_error before any change if a weight or threshold
   /// would leave its range. Requires |step| <= 64. Quickest for `units` in rising order.
   void update(std::span<const std::uint32_t> units, const coding::SignedColumns& input,
-               std::int32_t step) {
+              std::int32_t step) {
     const std::array<Part, 4> parts = parts_of(input, step);
     for (const std::uint32_t unit : units) require_room(unit, parts, step);
     for (std::size_t k = 0; k < units.size();) {  // neighbours in a block share its cache lines

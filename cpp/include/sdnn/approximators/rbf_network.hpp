@@ -17,6 +17,7 @@
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
+#include "sdnn/core/detail/identity.hpp"
 #include "sdnn/core/elementary.hpp"
 #include "sdnn/core/errors.hpp"
 
@@ -51,8 +52,8 @@ struct RBFNetworkConfig {
 /// action has psi(a)^T u. All sums start at 0 and add in the order of the bases: columns of Eigen's
 /// arrays, never its products, whose order depends on the instruction set.
 ///
-/// Source: method.md, section 4. Cost at d = 6: 16,384 multiply-adds for all actions. An object must
-/// not be used by two threads at once: it holds its workspace.
+/// Source: method.md, section 4. Cost at d = 6: 16,384 multiply-adds for all actions. Thread
+/// safety: const functions may be called by many threads at once, with a workspace each.
 class RBFNetwork {
  public:
   /// All weights 0. Throws std::invalid_argument naming the field that is impossible;
@@ -62,22 +63,40 @@ class RBFNetwork {
         n_joint_bases_(core::grid_cells("n_bases or n_inputs", "joint bases", n_bases(),
                                         n_inputs() + 1, sizeof(double), config.max_table_bytes)),
         weights_(n_joint_bases_),
-        state_bases_(index(n_joint_bases_ / n_bases())),
-        action_bases_(index(n_actions()), index(n_bases())),
-        one_dimension_(index(n_bases())),
-        mixed_(index(n_bases())),
-        mixed_state_(n_inputs()) {
+        action_bases_(index(n_actions()), index(n_bases())) {
+    Eigen::ArrayXd bases(index(n_bases()));
     for (std::size_t action = 0; action < n_actions(); ++action) {
-      to_one_dimension(coding::action_value(action, n_actions(), 0.0, 1.0));
-      action_bases_.row(index(action)) = one_dimension_.transpose();
+      to_one_dimension(coding::action_value(action, n_actions(), 0.0, 1.0), bases);
+      action_bases_.row(index(action)) = bases.transpose();
     }
   }
+
+  /// What one user owns: room to compute in, and the bases of the last state.
+  class Workspace {
+    friend class RBFNetwork;
+
+    explicit Workspace(const RBFNetwork& network)
+        : state_bases_(index(network.n_joint_bases_ / network.n_bases())),
+          one_dimension_(index(network.n_bases())),
+          mixed_(index(network.n_bases())),
+          state_(network.n_inputs()) {}
+
+    Eigen::ArrayXd state_bases_;  // phi(s)
+    Eigen::ArrayXd one_dimension_;
+    Eigen::ArrayXd mixed_;         // phi(s)^T W
+    std::vector<double> state_;    // s
+    std::uint64_t network_ = 0;    // the identity of the network that all of it is of ...
+    std::uint64_t n_updates_ = 0;  // ... after so many updates
+  };
+  Workspace workspace() const { return Workspace(*this); }
 
   const RBFNetworkConfig& config() const noexcept { return config_; }
   std::size_t n_inputs() const noexcept { return static_cast<std::size_t>(config_.n_inputs); }
   std::size_t n_bases() const noexcept { return static_cast<std::size_t>(config_.n_bases); }
   std::size_t n_actions() const noexcept { return static_cast<std::size_t>(config_.n_actions); }
   std::size_t n_joint_bases() const noexcept { return n_joint_bases_; }
+  /// A number that no other network has.
+  std::uint64_t identity() const noexcept { return identity_.number(); }
 
   /// Row-major over (input 1, ..., input d, action). Shape: (n_bases^(d+1),).
   std::span<const double> weights() const noexcept { return weights_.span(); }
@@ -92,7 +111,7 @@ class RBFNetwork {
                              kLargestWeight);
     }
     std::copy(weights.begin(), weights.end(), weights_.data());
-    is_mixed_ = false;
+    ++n_updates_;
   }
 
   /// Lists what is remembered; see core/state.hpp.
@@ -100,7 +119,7 @@ class RBFNetwork {
   static void exchange(Self& self, Archive& archive) {
     archive.fixed("weights", {self.n_joint_bases_}, self.weights_.span());
     if constexpr (Archive::kReads) {
-      self.is_mixed_ = false;
+      ++self.n_updates_;
       for (const double weight : self.weights()) {
         archive.expect(std::isfinite(weight), "weights", "finite");
       }
@@ -110,23 +129,23 @@ class RBFNetwork {
   /// Q(state, a) for every action. Shapes: state (d,) in [0, 1], out (n_actions,).
   ///
   /// Throws std::invalid_argument for a state of wrong size or outside [0, 1].
-  void values(std::span<const double> state, std::span<double> out) {
+  void values(std::span<const double> state, Workspace& workspace, std::span<double> out) const {
     core::require(out.size() == n_actions(), "out", std::to_string(n_actions()) + " values",
                   out.size());
-    mix(state);
+    const Eigen::ArrayXd& mixed = mix(state, workspace);
     Eigen::Map<Eigen::ArrayXd> q(out.data(), action_bases_.rows());
     q.setZero();
-    for (Eigen::Index b = 0; b < mixed_.size(); ++b) q += mixed_[b] * action_bases_.col(b);
+    for (Eigen::Index b = 0; b < mixed.size(); ++b) q += mixed[b] * action_bases_.col(b);
   }
 
   /// Q(state, action). Throws like values, and std::invalid_argument for an action out of range.
-  double value(std::span<const double> state, std::size_t action) {
+  double value(std::span<const double> state, Workspace& workspace, std::size_t action) const {
     core::require(action < n_actions(), "action", "less than " + std::to_string(n_actions()),
                   action);
-    mix(state);
+    const Eigen::ArrayXd& mixed = mix(state, workspace);
     const auto bases = action_bases_.row(index(action));
     double q = 0.0;
-    for (Eigen::Index b = 0; b < bases.size(); ++b) q += mixed_[b] * bases[b];
+    for (Eigen::Index b = 0; b < bases.size(); ++b) q += mixed[b] * bases[b];
     return q;
   }
 
@@ -136,11 +155,11 @@ class RBFNetwork {
   /// Throws std::invalid_argument like value, and for a NaN target or a rate outside (0, 1];
   /// std::overflow_error if the step exceeds 1e305 (the network has diverged, or target is
   /// infinite): weights stay finite, and so do values. Nothing has changed then.
-  void update(std::span<const double> state, std::size_t action, double target,
-               double rate = 1.0) {
+  void update(std::span<const double> state, Workspace& workspace, std::size_t action,
+              double target, double rate = 1.0) {
     core::require(!std::isnan(target), "target", "a number", target);
     core::require(rate > 0.0 && rate <= 1.0, "rate", "in (0, 1]", rate);
-    const double q = value(state, action);
+    const double q = value(state, workspace, action);
     const double q_hat = (1.0 - rate) * q + rate * target;
     const double step = config_.gradient_rate * (q_hat - q);
     if (!(std::abs(step) <= kLargestStep)) {
@@ -148,12 +167,13 @@ class RBFNetwork {
           std::overflow_error("the RBF network's weights diverge: reward, gradient_rate or "
                               "learning_rate is too large"));
     }
-    is_mixed_ = false;
-    mixed_ = step * action_bases_.row(index(action)).transpose();
-    if (mixed_.size() == kUnrolled) {
-      add_to_columns(Eigen::Array<double, kUnrolled, 1>(mixed_));
+    ++n_updates_;
+    workspace.one_dimension_ = step * action_bases_.row(index(action)).transpose();
+    if (workspace.one_dimension_.size() == kUnrolled) {
+      add_to_columns(workspace.state_bases_,
+                     Eigen::Array<double, kUnrolled, 1>(workspace.one_dimension_));
     } else {
-      add_to_columns(mixed_);
+      add_to_columns(workspace.state_bases_, workspace.one_dimension_);
     }
   }
 
@@ -177,75 +197,75 @@ class RBFNetwork {
 
   static Eigen::Index index(std::size_t i) noexcept { return static_cast<Eigen::Index>(i); }
 
-  // one_dimension_ = the Gaussians of one dimension at x, divided by their sum.
-  void to_one_dimension(double x) noexcept {
+  // bases = the Gaussians of one dimension at x, divided by their sum.
+  void to_one_dimension(double x, Eigen::ArrayXd& bases) const noexcept {
     double total = 0.0;
-    for (Eigen::Index k = 0; k < one_dimension_.size(); ++k) {
+    for (Eigen::Index k = 0; k < bases.size(); ++k) {
       const double distance =
           (x * static_cast<double>(n_bases() - 1) - static_cast<double>(k)) / config_.width;
-      one_dimension_[k] = core::exp(-0.5 * distance * distance);
-      total += one_dimension_[k];
+      bases[k] = core::exp(-0.5 * distance * distance);
+      total += bases[k];
     }
-    one_dimension_ /= total;
+    bases /= total;
   }
 
-  // state_bases_ = phi(state), mixed_ = phi(state)^T W; nothing to do if they are those already.
-  void mix(std::span<const double> state) {
+  // phi(state)^T W, with phi(state) in the workspace; nothing to do if it has them already.
+  const Eigen::ArrayXd& mix(std::span<const double> state, Workspace& workspace) const {
     core::require_unit_values("state", state, n_inputs());
-    if (is_mixed_ && std::equal(state.begin(), state.end(), mixed_state_.begin())) return;
-    std::copy(state.begin(), state.end(), mixed_state_.begin());
-    is_mixed_ = true;
-    if (mixed_.size() == kUnrolled) {
-      Eigen::Array<double, kUnrolled, 1> sums;  // in registers
-      mix_into(sums);
-      mixed_ = sums;
-    } else {
-      mix_into(mixed_);
+    if (workspace.network_ == identity_.number() && workspace.n_updates_ == n_updates_ &&
+        std::equal(state.begin(), state.end(), workspace.state_.begin())) {
+      return workspace.mixed_;
     }
+    std::copy(state.begin(), state.end(), workspace.state_.begin());
+    workspace.network_ = identity_.number();
+    workspace.n_updates_ = n_updates_;
+    if (workspace.mixed_.size() == kUnrolled) {
+      Eigen::Array<double, kUnrolled, 1> sums;  // in registers
+      mix_into(sums, workspace);
+      workspace.mixed_ = sums;
+    } else {
+      mix_into(workspace.mixed_, workspace);
+    }
+    return workspace.mixed_;
   }
 
-  // Fills state_bases_ and sums = phi^T W for the state mixed_state_.
+  // Computes phi and sums = phi^T W for the workspace's state.
   template <class Sums>
-  void mix_into(Sums& sums) {
+  void mix_into(Sums& sums, Workspace& workspace) const {
     const auto n = Eigen::fix<Sums::RowsAtCompileTime>(config_.n_bases);
-    state_bases_[0] = 1.0;
+    Eigen::ArrayXd& state_bases = workspace.state_bases_;
+    state_bases[0] = 1.0;
     Eigen::Index size = 1;
-    for (const double x : mixed_state_) {
-      to_one_dimension(x);
+    for (const double x : workspace.state_) {
+      to_one_dimension(x, workspace.one_dimension_);
       // From the back, so that one array is enough: entry i becomes entries i n .. i n + n - 1.
       for (Eigen::Index i = size; i-- > 0;) {
-        state_bases_.segment(i * n, n) = state_bases_[i] * one_dimension_.head(n);
+        state_bases.segment(i * n, n) = state_bases[i] * workspace.one_dimension_.head(n);
       }
       size *= n;
     }
-    const auto columns = weight_columns<Sums::RowsAtCompileTime>();
+    // The weights, a row per basis of the action and a column per joint basis of the state.
+    using Columns = const Eigen::Array<double, Sums::RowsAtCompileTime, Eigen::Dynamic>;
+    const Eigen::Map<Columns, Eigen::Aligned64> columns(weights_.data(), index(n_bases()),
+                                                        state_bases.size());
     sums.setZero();
-    for (Eigen::Index j = 0; j < columns.cols(); ++j) sums += state_bases_[j] * columns.col(j);
+    for (Eigen::Index j = 0; j < columns.cols(); ++j) sums += state_bases[j] * columns.col(j);
   }
 
   template <class Step>
-  void add_to_columns(const Step& step) {
-    auto columns = weight_columns<Step::RowsAtCompileTime>();
-    for (Eigen::Index j = 0; j < columns.cols(); ++j) columns.col(j) += state_bases_[j] * step;
-  }
-
-  // The weights, a row per basis of the action and a column per joint basis of the state.
-  template <int Rows>
-  auto weight_columns() noexcept {
-    using Columns = Eigen::Array<double, Rows, Eigen::Dynamic>;
-    return Eigen::Map<Columns, Eigen::Aligned64>(weights_.data(), mixed_.size(),
-                                                 state_bases_.size());
+  void add_to_columns(const Eigen::ArrayXd& state_bases, const Step& step) {
+    using Columns = Eigen::Array<double, Step::RowsAtCompileTime, Eigen::Dynamic>;
+    Eigen::Map<Columns, Eigen::Aligned64> columns(weights_.data(), index(n_bases()),
+                                                  state_bases.size());
+    for (Eigen::Index j = 0; j < columns.cols(); ++j) columns.col(j) += state_bases[j] * step;
   }
 
   RBFNetworkConfig config_;
   std::size_t n_joint_bases_;
   core::AlignedBuffer<double> weights_;
-  Eigen::ArrayXd state_bases_;    // phi(s)
   Eigen::ArrayXXd action_bases_;  // psi(a), a row per action
-  Eigen::ArrayXd one_dimension_;
-  Eigen::ArrayXd mixed_;             // phi(s)^T W, or what is to be added to it
-  std::vector<double> mixed_state_;  // the state of both, if is_mixed_
-  bool is_mixed_ = false;
+  core::Identity identity_;
+  std::uint64_t n_updates_ = 0;
 };
 
 }  // namespace sdnn::approximators

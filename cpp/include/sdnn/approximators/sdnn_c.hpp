@@ -1,7 +1,6 @@
 /// SDNN-C: a network that gives Q(s, a) for every action at once.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
@@ -15,6 +14,10 @@
 #include <vector>
 
 #include "sdnn/approximators/detail/activation_cache.hpp"
+#include "sdnn/approximators/detail/averaged_layer.hpp"
+#include "sdnn/approximators/detail/correction_log.hpp"
+#include "sdnn/approximators/detail/initial_layer.hpp"
+#include "sdnn/approximators/detail/paired_weights.hpp"
 #include "sdnn/approximators/detail/weight_average.hpp"
 #include "sdnn/approximators/detail/wiring.hpp"
 #include "sdnn/approximators/error_correction.hpp"
@@ -25,7 +28,7 @@
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/coding/state_code.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/detail/interruption.hpp"
+#include "sdnn/core/detail/on_demand.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::approximators {
@@ -38,18 +41,50 @@ struct CorrectionCounts {
   std::uint64_t out_of_range = 0;  ///< wanted were values outside [q_low, q_high]
 };
 
-/// The network of section 3.
+/// The network of section 3: what is learned, for any number of users.
 ///
-/// Wiring (code books, permutations) is fixed by config and seed. Reading does not change what is
-/// returned, but the network remembers the potentials of recent states and keeps them exact while
-/// it learns (see ActivationCache), so that one decision needs at most one pass over the weights.
+/// Wiring (code books, permutations) is fixed by config and seed and shared by copies. Each user
+/// reads the network through a Workspace of its own, which caches the potentials of recent states
+/// and keeps them exact while the network learns (see ActivationCache), so that one decision needs
+/// at most one pass over the weights. A workspace changes the time of a call, never its result.
 ///
 /// With averaging_interval > 0 it also keeps an average of its weights (see WeightAverage), of
 /// which averaged_values are the values. Learning uses the weights themselves. Not in the paper.
 ///
-/// An object must not be used by two threads at once; copies share the wiring and nothing else.
+/// Thread safety: const functions may be called by many threads at once, with a workspace each.
 class SDNNC {
  public:
+  /// What one user owns to read a network, or to let it learn: the potentials of recent states, and
+  /// room to compute in. For that network, whatever it becomes, and for its copies. Sized once, so
+  /// that a step allocates nothing.
+  class Workspace {
+   public:
+    const ActivationCache& cache() const noexcept { return cache_; }
+
+   private:
+    friend class SDNNC;
+
+    explicit Workspace(const SDNNC& network)
+        : cache_(network.state_code(), network.actions_.n_hidden_units()),
+          bins_(network.n_inputs()),
+          moves_(network.actions_.n_hidden_units() - network.actions_.n_active_units()) {
+      selected_.reserve(network.actions_.n_active_units());
+    }
+
+    ActivationCache& averaged_cache(const SDNNC& network) {
+      if (!averaged_cache_) {
+        averaged_cache_.emplace(network.state_code(), network.actions_.n_hidden_units());
+      }
+      return *averaged_cache_;
+    }
+
+    ActivationCache cache_;
+    std::optional<ActivationCache> averaged_cache_;  ///< made when it is needed
+    std::vector<coding::Bin> bins_;
+    std::vector<std::int8_t> moves_;  ///< what the count changes by as the window moves on a unit
+    std::vector<std::uint32_t> selected_;
+  };
+
   /// Code books by anchor interpolation, or of symbols. Throws std::invalid_argument naming the
   /// field that is impossible; std::length_error naming bytes, max_table_bytes and what to reduce,
   /// before much memory is asked for; std::bad_alloc.
@@ -64,28 +99,28 @@ class SDNNC {
         code_(wiring_of(config, std::move(tables), seed)),
         actions_(config.n_hidden_units, config.n_active_units, config.n_actions),
         scale_(make_scale(config)),
-        hidden_layer_(actions_.n_hidden_units(), code_->n_columns(), code_->n_double_columns()),
-        rounding_(seed, core::Stream::rounding),
-        memory_(*code_, actions_.n_hidden_units(), actions_.n_active_units()) {
+        hidden_layer_(paired_layer(*code_, actions_.n_hidden_units())),
+        log_(code_->n_inputs(), actions_.n_active_units()),
+        rounding_(seed, core::Stream::rounding) {
     core::require_positive("learning_coefficient", config.learning_coefficient);
     core::require_in_range("lattice", config.lattice, 1, 64);
     core::require_in_range("averaging_interval", config.averaging_interval, 0, 1000000000);
     if (config.averaging_interval > 0) average_.emplace(hidden_layer_, config.averaging_interval);
     tabulate_values();
-    initialize_weights(seed);
-    initialize_thresholds();
-    bins_.resize(code_->n_inputs());
-    moves_.resize(actions_.n_hidden_units() - actions_.n_active_units());
-    selected_.reserve(actions_.n_active_units());
+    add_initial_weights(hidden_layer_, *code_, config, seed);
+    set_initial_thresholds(hidden_layer_, config);
   }
+
+  Workspace workspace() const { return Workspace(*this); }
 
   const SDNNCConfig& config() const noexcept { return config_; }
   const coding::StateCode& state_code() const noexcept { return *code_; }
   const coding::ActionCode& action_code() const noexcept { return actions_; }
   const OutputScale& output_scale() const noexcept { return scale_; }
   const HiddenLayer& hidden_layer() const noexcept { return hidden_layer_; }
-  const ActivationCache& memory() const noexcept { return memory_; }
   const CorrectionCounts& correction_counts() const noexcept { return counts_; }
+  /// A number that no other network has; another one when weights are replaced.
+  std::uint64_t identity() const noexcept { return log_.identity(); }
   std::size_t n_inputs() const noexcept { return code_->n_inputs(); }
   std::size_t n_actions() const noexcept { return actions_.n_actions(); }
 
@@ -101,29 +136,28 @@ class SDNNC {
 
   /// The weight of a hidden unit for a unit of x_SD, in the paper's order, in lattice steps.
   std::int32_t weight(std::size_t unit, std::size_t j) const {
-    return weight_at(unit, code_->columns_of(j));
+    return paired_weight(hidden_layer_, unit, code_->columns_of(j));
   }
 
   /// Q(state, a) for every action. Shapes: state (l,) in [0, 1], out (n_actions,).
   ///
   /// Throws std::invalid_argument for a state of wrong size or outside [0, 1].
-  void values(std::span<const double> state, std::span<double> out) {
-    if (out.size() != n_actions()) {
-      core::require(false, "out", std::to_string(n_actions()) + " values", out.size());
-    }
-    fill_values(recall(state).potentials, out);
+  void values(std::span<const double> state, Workspace& workspace, std::span<double> out) const {
+    require_row(out);
+    fill_values(recall(state, workspace).potentials, workspace, out);
   }
 
   /// As values, by the average of the weights, rounded to steps of the lattice, where there is one.
   /// The first call after the average has changed takes some milliseconds. Throws as values.
-  void averaged_values(std::span<const double> state, std::span<double> out) {
-    if (!has_average()) return values(state, out);
-    if (out.size() != n_actions()) {
-      core::require(false, "out", std::to_string(n_actions()) + " values", out.size());
-    }
-    code_->bins_of(state, bins_);
-    Averaged& averaged = up_to_date_average();
-    fill_values(averaged.memory.recall(*code_, averaged.layer, bins_).potentials, out);
+  void averaged_values(std::span<const double> state, Workspace& workspace,
+                       std::span<double> out) const {
+    if (!has_average()) return values(state, workspace, out);
+    require_row(out);
+    code_->bins_of(state, workspace.bins_);
+    const auto averaged = averaged_layer();
+    ActivationCache& cache = workspace.averaged_cache(*this);
+    fill_values(cache.recall(*code_, averaged->layer, averaged->log, workspace.bins_).potentials,
+                workspace, out);
   }
 
   /// Whether there has been a snapshot for the average.
@@ -132,15 +166,16 @@ class SDNNC {
   /// The average of a weight, in the paper's order, and of a threshold, rounded to steps of the
   /// lattice. Requires has_average().
   std::int32_t averaged_weight(std::size_t unit, std::size_t j) const {
-    return averaged_weight_at(unit, code_->columns_of(j));
+    return approximators::averaged_weight(*average_, unit, code_->columns_of(j),
+                                          largest_paired_weight(hidden_layer_));
   }
   std::int32_t averaged_threshold(std::size_t unit) const {
-    return static_cast<std::int32_t>(rounded(average_->threshold(unit), 0));
+    return approximators::averaged_threshold(*average_, unit);
   }
 
   /// Q(state, action). Throws like values, and std::invalid_argument for an action out of range.
-  double value(std::span<const double> state, std::size_t action) {
-    return scale_(count_in_window(recall(state).potentials, action));
+  double value(std::span<const double> state, Workspace& workspace, std::size_t action) const {
+    return scale_(count_in_window(recall(state, workspace).potentials, action));
   }
 
   /// One step of error correction: Q = Q(state, action) moves towards
@@ -149,17 +184,17 @@ class SDNNC {
   /// Source: Fig. 2, Eqs. (1) to (3); method.md, section 1.8. Throws std::invalid_argument for
   /// a bad state, action or rate or a NaN target, std::overflow_error; then no weight or threshold
   /// has changed and nothing is counted, though a random rounding may have been drawn.
-  void update(std::span<const double> state, std::size_t action, double target,
-               double rate = 1.0) {
+  void update(std::span<const double> state, Workspace& workspace, std::size_t action,
+              double target, double rate = 1.0) {
     core::require(!std::isnan(target), "target", "a number", target);
     core::require(rate > 0.0 && rate <= 1.0, "rate", "in (0, 1]", rate);
-    correct_weights(state, action, target, rate);
-    if (average_) average_->note(counts_.asked, hidden_layer_);
+    correct(state, workspace, action, target, rate);
+    if (average_ && average_->note(counts_.asked, hidden_layer_)) averaged_.reset();
   }
 
   /// The inner potentials in lattice steps (c / lattice), by a full pass. Shape: out (n,).
   ///
-  /// Thread-safe: uses nothing remembered. Allocates.
+  /// Needs no workspace. Allocates.
   void potentials(std::span<const double> state, std::span<std::int32_t> out) const {
     core::require(out.size() == hidden_layer_.n_units(), "out",
                   std::to_string(hidden_layer_.n_units()) + " values", out.size());
@@ -175,15 +210,15 @@ class SDNNC {
   /// Asks for some states and forgets them, and touches the memory that learning may need: the
   /// first decision then finds everything in the caches, as every later one does. Nothing that is
   /// ever returned changes.
-  void warm_caches() {
+  void warm_caches(Workspace& workspace) {
     constexpr int kStates = 8;  // each reads a third of the weights
     hidden_layer_.touch_memory();
     std::vector<double> out(n_actions());
     for (int i = 0; i < kStates; ++i) {
-      values(std::vector<double>(n_inputs(), (i + 0.5) / kStates), out);
+      values(std::vector<double>(n_inputs(), (i + 0.5) / kStates), workspace, out);
     }
-    memory_ = ActivationCache(*code_, actions_.n_hidden_units(), actions_.n_active_units());
-    if (has_average()) up_to_date_average();
+    workspace = this->workspace();
+    if (has_average()) averaged_layer();
   }
 
   /// Replaces weights and thresholds, in lattice steps. Shapes: weights (n, D) row by row,
@@ -196,10 +231,12 @@ class SDNNC {
     core::require(thresholds.size() == hidden_layer_.n_units(), "thresholds",
                   "n_hidden_units values", thresholds.size());
     for (const std::int32_t weight : weights) {
-      core::require_in_range("weight", weight, -largest_initial_weight(), largest_initial_weight());
+      core::require_in_range("weight", weight, -largest_paired_weight(hidden_layer_),
+                             largest_paired_weight(hidden_layer_));
     }
     replace_parameters(weights, thresholds);
     if (average_) average_->forget(counts_.asked);
+    averaged_.reset();
   }
 
   /// Gives the range of values other ends. What was learned keeps its place in the range, and so
@@ -222,9 +259,10 @@ class SDNNC {
         thresholds[unit] = self.hidden_layer_.threshold(unit);
       }
       for (std::size_t j = 0; j < n_columns; ++j) {
-        const auto columns = self.code_->columns_of(j);
+        const PairedColumns columns = self.code_->columns_of(j);
         for (std::size_t unit = 0; unit < n_units; ++unit) {
-          weights[unit * n_columns + j] = static_cast<std::int16_t>(self.weight_at(unit, columns));
+          weights[unit * n_columns + j] =
+              static_cast<std::int16_t>(paired_weight(self.hidden_layer_, unit, columns));
         }
       }
     }
@@ -246,13 +284,12 @@ class SDNNC {
         self.replace_parameters(std::vector<std::int32_t>(weights.begin(), weights.end()),
                                 thresholds);
       });
-      self.selected_.reserve(self.actions_.n_active_units());  // a copy has no room
       self.averaged_.reset();
     }
   }
 
  private:
-  using Remembered = ActivationCache::Entry;
+  using Cached = ActivationCache::Entry;
 
   static OutputScale make_scale(const SDNNCConfig& config) {
     const int u_low = config.u_low.value_or(config.n_active_units / 15);
@@ -274,160 +311,59 @@ class SDNNC {
   void replace_parameters(std::span<const std::int32_t> weights,
                           std::span<const std::int32_t> thresholds) {
     const std::size_t n_columns = code_->n_columns();
-    HiddenLayer replaced = layer_with(
-        [&](std::size_t unit, const auto&, std::size_t j) { return weights[unit * n_columns + j]; },
+    hidden_layer_ = paired_layer(
+        *code_, actions_.n_hidden_units(),
+        [&](std::size_t unit, const PairedColumns&, std::size_t j) {
+          return weights[unit * n_columns + j];
+        },
         [&](std::size_t unit) { return thresholds[unit]; });
-    hidden_layer_ = std::move(replaced);
-    memory_.forget();
+    log_.restart();
   }
 
-  /// A hidden layer with the weights weight(unit, columns, j) and the thresholds threshold(unit).
-  template <class Weight, class Threshold>
-  HiddenLayer layer_with(const Weight& weight, const Threshold& threshold) const {
-    HiddenLayer layer(actions_.n_hidden_units(), code_->n_columns(), code_->n_double_columns());
-    for (std::size_t j = 0; j < code_->n_columns(); ++j) {
-      core::interruption_point();
-      const auto columns = code_->columns_of(j);
-      for (std::size_t unit = 0; unit < layer.n_units(); ++unit) {
-        add_weight(layer, unit, columns, weight(unit, columns, j));
-      }
-    }
-    for (std::size_t unit = 0; unit < layer.n_units(); ++unit) {
-      layer.set_threshold(unit, threshold(unit));
-    }
-    return layer;
+  void require_row(std::span<double> out) const {
+    if (out.size() == n_actions()) return;  // only a bad one's text costs memory
+    core::require(false, "out", std::to_string(n_actions()) + " values", out.size());
   }
 
   /// Q of every action, where these are the potentials.
-  void fill_values(std::span<const std::int32_t> h, std::span<double> out) {
+  void fill_values(std::span<const std::int32_t> h, Workspace& workspace,
+                   std::span<double> out) const {
+    std::vector<std::int8_t>& moves = workspace.moves_;
     const std::int32_t* const leaving = h.data();
     const std::int32_t* const entering = h.data() + actions_.n_active_units();
-    for (std::size_t i = 0; i < moves_.size(); ++i) {
-      moves_[i] = static_cast<std::int8_t>((entering[i] > 0) - (leaving[i] > 0));
+    for (std::size_t i = 0; i < moves.size(); ++i) {
+      moves[i] = static_cast<std::int8_t>((entering[i] > 0) - (leaving[i] > 0));
     }
     const double* const value = value_of_count_.data();
     std::ptrdiff_t n_firing = count_in_window(h, 0);
     out[0] = value[n_firing];
-    if (out.size() == moves_.size() + 1) {  // every window: the usual case, in a tight loop
-      for (std::size_t i = 0; i < moves_.size(); ++i) out[i + 1] = value[n_firing += moves_[i]];
+    if (out.size() == moves.size() + 1) {  // every window: the usual case, in a tight loop
+      for (std::size_t i = 0; i < moves.size(); ++i) out[i + 1] = value[n_firing += moves[i]];
       return;
     }
     for (std::size_t action = 1; action < out.size(); ++action) {
       for (std::size_t i = actions_.first_unit(action - 1); i < actions_.first_unit(action); ++i) {
-        n_firing += moves_[i];
+        n_firing += moves[i];
       }
       out[action] = value[n_firing];
     }
   }
 
-  /// A hidden layer with the average of the weights.
-  struct Averaged {
-    HiddenLayer layer;
-    ActivationCache memory;
-    std::uint64_t n_snapshots;
-  };
-
-  Averaged& up_to_date_average() {
-    if (!averaged_) {
-      averaged_.emplace(Averaged{
-          HiddenLayer(1, 1),
-          ActivationCache(*code_, actions_.n_hidden_units(), actions_.n_active_units()), 0});
-    }
-    if (averaged_->n_snapshots != average_->n_snapshots()) {
-      averaged_->layer =
-          layer_with([this](std::size_t unit, const auto& columns,
-                            std::size_t) { return averaged_weight_at(unit, columns); },
-                     [this](std::size_t unit) { return averaged_threshold(unit); });
-      averaged_->memory.forget();
-      averaged_->n_snapshots = average_->n_snapshots();
-    }
-    return *averaged_;
+  std::shared_ptr<const AveragedLayer> averaged_layer() const {
+    return averaged_.get([this] {
+      return AveragedLayer(*average_, *code_, actions_.n_hidden_units(),
+                           largest_paired_weight(hidden_layer_));
+    });
   }
 
-  /// value / 2^(kFractionBits + more), halves up.
-  static std::int64_t rounded(std::int64_t value, int more) noexcept {
-    const int bits = WeightAverage::kFractionBits + more;
-    return (value + (std::int64_t{1} << (bits - 1))) >> bits;
-  }
-
-  std::int32_t averaged_weight_at(std::size_t unit,
-                                  const coding::StateCode::PairedColumns& columns) const noexcept {
-    std::int64_t weight = average_->weight(unit, columns.first);
-    if (columns.paired)
-      weight += columns.sign * std::int64_t{average_->weight(unit, columns.second)};
-    const std::int64_t limit = largest_initial_weight();  // no sum of two leaves the layer's range
-    return static_cast<std::int32_t>(
-        std::clamp(rounded(weight, columns.paired ? 1 : 0), -limit, limit));
-  }
-
-  std::int32_t weight_at(std::size_t unit,
-                         const coding::StateCode::PairedColumns& columns) const noexcept {
-    const std::int32_t first = hidden_layer_.weight(unit, columns.first);
-    return columns.paired ? (first + columns.sign * hidden_layer_.weight(unit, columns.second)) / 2
-                          : first;
-  }
-
-  /// Two weights make a sum that has to fit.
-  std::int32_t largest_initial_weight() const noexcept { return hidden_layer_.weight_limit() / 2; }
-
-  /// Adds to the weight of a unit of x_SD, where the paired code keeps it.
-  static void add_weight(HiddenLayer& hidden_layer, std::size_t unit,
-                         const coding::StateCode::PairedColumns& columns, std::int32_t weight) {
-    const auto add = [&](std::size_t column, std::int32_t change) {
-      hidden_layer.set_weight(unit, column, hidden_layer.weight(unit, column) + change);
-    };
-    add(columns.first, weight);
-    if (columns.paired) add(columns.second, columns.sign * weight);
-  }
-
-  void initialize_weights(std::uint64_t seed) {
-    core::require(std::isfinite(config_.initial_weight_limit) && config_.initial_weight_limit >= 0,
-                  "initial_weight_limit", "finite and not negative", config_.initial_weight_limit);
-    const double limit = config_.initial_weight_limit * config_.lattice;
-    core::require(limit <= largest_initial_weight(), "initial_weight_limit",
-                  "at most " + std::to_string(largest_initial_weight()) + " / lattice",
-                  config_.initial_weight_limit);
-    core::Random random(seed, core::Stream::weights);
-    std::vector<std::int32_t> drawn(hidden_layer_.n_units());
-    for (std::size_t j = 0; j < code_->n_columns(); ++j) {
-      core::interruption_point();
-      std::uint64_t bits = 0;
-      for (std::size_t i = 0; i < drawn.size(); ++i) {
-        if (config_.initial_weights == InitialWeights::ternary) {
-          if (i % 32 == 0) bits = random.bits();  // two bits a weight
-          drawn[i] = static_cast<std::int32_t>(bits & 1) - static_cast<std::int32_t>(bits >> 1 & 1);
-          bits >>= 2;
-        } else {
-          const double weight = limit * (2.0 * random.uniform() - 1.0);
-          drawn[i] = static_cast<std::int32_t>(std::floor(weight + 0.5));
-        }
-      }
-      const auto columns = code_->columns_of(j);
-      hidden_layer_.add_to_column(columns.first, drawn, 1);
-      if (columns.paired) hidden_layer_.add_to_column(columns.second, drawn, columns.sign);
-    }
-  }
-
-  /// Units are numbered from 1 in the paper: the first one is odd and starts active.
-  void initialize_thresholds() {
-    const double steps = config_.initial_threshold * config_.lattice;
-    core::require(steps >= 0 && steps < (1 << 30) && std::floor(steps) == steps,
-                  "initial_threshold", "a multiple of 1 / lattice, not negative",
-                  config_.initial_threshold);
-    const auto threshold = static_cast<std::int32_t>(steps);
-    for (std::size_t i = 0; i < hidden_layer_.n_units(); ++i) {
-      hidden_layer_.set_threshold(i, i % 2 == 0 ? -threshold : threshold);
-    }
-  }
-
-  /// Corrects, after the arguments have been looked at.
-  void correct_weights(std::span<const double> state, std::size_t action, double target,
-                       double rate) {
-    const Remembered entry = recall(state);
+  /// Corrects, after the arguments have been checked.
+  void correct(std::span<const double> state, Workspace& workspace, std::size_t action,
+               double target, double rate) {
+    const Cached entry = recall(state, workspace);
     const int n_firing = count_in_window(entry.potentials, action);
     const double wanted = (1.0 - rate) * scale_(n_firing) + rate * target;
     const int deficit = rounded_count(wanted, n_firing) - n_firing;
-    const bool changes = deficit != 0 && move_count(entry, action, deficit);
+    const bool changes = deficit != 0 && move_count(entry, workspace, action, deficit);
     ++counts_.asked;
     if (wanted < scale_.q_low() || wanted > scale_.q_high()) ++counts_.out_of_range;
     if (deficit == 0 && wanted != scale_(n_firing)) ++counts_.rounded_away;
@@ -436,22 +372,23 @@ class SDNNC {
 
   /// Lets `deficit` units more of the action's window fire, or fewer if it is negative, as far as
   /// there are any; returns whether there are.
-  bool move_count(const Remembered& entry, std::size_t action, int deficit) {
+  bool move_count(const Cached& entry, Workspace& workspace, std::size_t action, int deficit) {
     const std::size_t first = actions_.first_unit(action);
+    std::vector<std::uint32_t>& selected = workspace.selected_;
     select_units(std::span(entry.potentials).subspan(first, actions_.n_active_units()), deficit,
-                 selected_);
-    if (selected_.empty()) return false;
-    for (std::uint32_t& unit : selected_) unit += static_cast<std::uint32_t>(first);
+                 selected);
+    if (selected.empty()) return false;
+    for (std::uint32_t& unit : selected) unit += static_cast<std::uint32_t>(first);
 
     const std::int32_t step = deficit > 0 ? config_.lattice : -config_.lattice;
-    hidden_layer_.update(selected_, memory_.columns(*code_, entry.bins), step);
-    memory_.corrected(entry.bins, selected_, step);
+    hidden_layer_.update(selected, workspace.cache_.columns(*code_, entry.bins), step);
+    log_.add({entry.bins, selected, step});
     return true;
   }
 
-  Remembered recall(std::span<const double> state) {
-    code_->bins_of(state, bins_);
-    return memory_.recall(*code_, hidden_layer_, bins_);
+  Cached recall(std::span<const double> state, Workspace& workspace) const {
+    code_->bins_of(state, workspace.bins_);
+    return workspace.cache_.recall(*code_, hidden_layer_, log_, workspace.bins_);
   }
 
   /// How many units are to fire for the value `wanted`, where `n_firing` do.
@@ -483,17 +420,12 @@ class SDNNC {
   coding::ActionCode actions_;
   OutputScale scale_;
   HiddenLayer hidden_layer_;
+  CorrectionLog log_;
   std::optional<WeightAverage> average_;
-  std::optional<Averaged> averaged_;  ///< made when it is asked for
+  core::OnDemand<AveragedLayer> averaged_;
   core::Random rounding_;
   std::vector<double> value_of_count_;
   CorrectionCounts counts_;
-
-  // Workspace: sized once, so that a step allocates nothing.
-  ActivationCache memory_;
-  std::vector<coding::Bin> bins_;
-  std::vector<std::int8_t> moves_;  ///< what the count changes by as the window moves on a unit
-  std::vector<std::uint32_t> selected_;
 };
 
 }  // namespace sdnn::approximators

@@ -31,24 +31,26 @@ class NetworkParts {
   NetworkParts(approximators::SDNNC network, std::uint64_t seed)
       : network_(std::move(network)),
         random_(seed, core::Stream::exploration),
+        workspace_(network_.workspace()),
         state_(network_.n_inputs()),
         values_(network_.n_actions()),
         potentials_(network_.hidden_layer().n_units()) {}
 
   const approximators::SDNNC& network() const noexcept { return network_; }
+  const approximators::SDNNC::Workspace& workspace() const noexcept { return workspace_; }
 
   /// Q(s, a) of all actions at a new state.
   Times time_values(int n_repetitions) {
     return time_each(
         n_repetitions, [this](int) { draw_state(); },
-        [this](int) { network_.values(state_, values_); });
+        [this](int) { network_.values(state_, workspace_, values_); });
   }
 
   /// The same at a state the network was asked about just before.
   Times time_remembered_values(int n_repetitions) {
     return time_each(
         n_repetitions, [this](int) { recall_new_state(); },
-        [this](int) { network_.values(state_, values_); });
+        [this](int) { network_.values(state_, workspace_, values_); });
   }
 
   /// A learning step at a state the network was just asked about, as an agent takes it; Q moves up
@@ -67,9 +69,9 @@ class NetworkParts {
         [&](int i) {
           recall_new_state();
           action = random_.below(network_.n_actions());
-          target = network_.value(state_, action) + (i % 2 == 0 ? step : -step);
+          target = network_.value(state_, workspace_, action) + (i % 2 == 0 ? step : -step);
         },
-        [&](int) { network_.update(state_, action, target); });
+        [&](int) { network_.update(state_, workspace_, action, target); });
   }
 
   /// `n_selections` selections of units per repetition, each for a deficit of `n_selected` up or
@@ -141,11 +143,12 @@ class NetworkParts {
 
   void recall_new_state() {
     draw_state();
-    network_.values(state_, values_);
+    network_.values(state_, workspace_, values_);
   }
 
   approximators::SDNNC network_;
   core::Random random_;
+  approximators::SDNNC::Workspace workspace_;
   std::vector<double> state_;
   std::vector<double> values_;
   std::vector<std::int32_t> potentials_;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "approximators/with_workspace.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 
 namespace sdnn::approximators {
@@ -16,7 +17,7 @@ TEST(ActivationCache, WhateverWayIsTakenThePotentialsAreThoseOfAFullPass) {
   config.n_hidden_units = 130;
   config.n_active_units = 50;
   config.n_pattern_units = 90;
-  SDNNC network(config, 3);
+  testing::WithWorkspace<SDNNC> network(config, 3);
   core::Random random(5, core::Stream::sensor_noise);
   std::vector<double> centre(4);
   std::vector<double> state(4);
@@ -41,7 +42,7 @@ TEST(ActivationCache, WhateverWayIsTakenThePotentialsAreThoseOfAFullPass) {
       network.update(state, random.below(values.size()), 20.0 * random.uniform() - 10.0);
     }
   }
-  const auto& counts = network.memory().counts();
+  const auto& counts = network.own_workspace().cache().counts();
   EXPECT_GT(counts.exact, 1000U);
   EXPECT_GT(counts.neighbour, 1000U);
   EXPECT_GT(counts.full, 20U);
@@ -52,7 +53,7 @@ TEST(ActivationCache, ReplacedWeightsAreNotRemembered) {
   config.n_hidden_units = 20;
   config.n_active_units = 10;
   config.n_pattern_units = 10;
-  SDNNC network(config, 1);
+  testing::WithWorkspace<SDNNC> network(config, 1);
   const std::vector<double> state = {0.1, 0.2, 0.3, 0.4};
   EXPECT_EQ(network.value(state, 0), 0.0);
   network.set_parameters(std::vector<std::int32_t>(20 * 120, 0), std::vector<std::int32_t>(20, -1));

@@ -103,8 +103,8 @@ TEST(TimeAgentSteps, TimesEveryAgent) {
 TEST(TimeAgentSteps, EveryStepOfALargeNetworkTakesAFullPass) {
   QLearning<SDNNC> agent(SDNNC({.n_inputs = 6}, 1), {}, 1);
   time_agent_steps(agent, 100, 1);
-  EXPECT_GE(agent.action_value().memory().counts().full, 98U);
-  EXPECT_LE(agent.action_value().memory().counts().full, 101U);
+  EXPECT_GE(agent.own_workspace().approximator.cache().counts().full, 98U);
+  EXPECT_LE(agent.own_workspace().approximator.cache().counts().full, 101U);
 }
 
 TEST(TimeAgentSteps, PlainAndFactoredAgentsLearnTheSame) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "allocation_count.hpp"
+#include "approximators/with_workspace.hpp"
 #include "sdnn/agents/agent.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/action_value.hpp"
@@ -25,10 +26,13 @@ using approximators::RBFNetworkConfig;
 static_assert(approximators::ActionValue<PlainRBFNetwork>);
 static_assert(agents::Agent<agents::QLearning<PlainRBFNetwork>>);
 
+using Plain = testing::WithWorkspace<PlainRBFNetwork>;
+using Factored = testing::WithWorkspace<RBFNetwork>;
+
 // d = 1, two bases at 0 and 1; a step at x = 1/2 for the middle of three actions has all four
 // joint bases 1/4: each weight becomes 1/2 of 8 of 1/4 = 1, so Q = 1 everywhere.
 TEST(PlainRBFNetwork, OneGradientStepByHand) {
-  PlainRBFNetwork network({.n_inputs = 1, .n_bases = 2, .n_actions = 3, .gradient_rate = 0.5});
+  Plain network({.n_inputs = 1, .n_bases = 2, .n_actions = 3, .gradient_rate = 0.5});
   EXPECT_EQ(network.n_inputs(), 1U);
   EXPECT_EQ(network.n_actions(), 3U);
   const std::vector<double> state = {0.5}, other = {0.2};
@@ -43,8 +47,8 @@ TEST(PlainRBFNetwork, OneGradientStepByHand) {
 
 TEST(PlainRBFNetwork, GivesAndLearnsWhatTheFactoredOneDoes) {
   const RBFNetworkConfig config = {.n_inputs = 3, .n_actions = 17};
-  RBFNetwork factored(config);
-  PlainRBFNetwork plain(config);
+  Factored factored(config);
+  Plain plain(config);
   std::vector<double> expected(17), out(17);
   for (int i = 1; i <= 50; ++i) {
     const std::vector<double> state = {0.02 * i, 1.0 - 0.01 * i, 0.3};
@@ -60,8 +64,8 @@ TEST(PlainRBFNetwork, GivesAndLearnsWhatTheFactoredOneDoes) {
 }
 
 /// A network with weights of several sizes and signs, learned from random targets.
-PlainRBFNetwork taught(const RBFNetworkConfig& config, int n_corrections) {
-  PlainRBFNetwork network(config);
+Plain taught(const RBFNetworkConfig& config, int n_corrections) {
+  Plain network(config);
   core::Random random(7, core::Stream::weights);
   for (int i = 0; i < n_corrections; ++i) {
     std::vector<double> state(network.n_inputs());
@@ -80,8 +84,8 @@ TEST(PlainRBFNetwork, AgreesWithTheFactoredOneAtEverySize) {
           RBFNetworkConfig{.n_inputs = d, .n_bases = 3, .n_actions = 5, .width = 0.4},
           RBFNetworkConfig{
               .n_inputs = d, .n_bases = 5, .n_actions = 2, .width = 0.1, .gradient_rate = 1.0}}) {
-      PlainRBFNetwork plain = taught(config, 300);
-      RBFNetwork factored = plain.network();
+      Plain plain = taught(config, 300);
+      Factored factored(plain.network());
       double largest = 0.0;
       for (const double w : factored.weights()) largest = std::max(largest, std::abs(w));
       ASSERT_GT(largest, 0.0);
@@ -104,9 +108,9 @@ TEST(PlainRBFNetwork, AgreesWithTheFactoredOneAtEverySize) {
 // Normalized bases: equal weights give that weight everywhere.
 TEST(PlainRBFNetwork, TheBasesSumToOne) {
   for (const double width : {0.1, 1.0, 100.0}) {
-    RBFNetwork equal({.n_inputs = 3, .n_actions = 11, .width = width});
+    Factored equal({.n_inputs = 3, .n_actions = 11, .width = width});
     equal.set_weights(std::vector<double>(256, 5.0));
-    PlainRBFNetwork network(equal);
+    Plain network(equal);
     core::Random random(1, core::Stream::ties);
     std::vector<double> out(11);
     for (int i = 0; i < 100; ++i) {
@@ -118,7 +122,7 @@ TEST(PlainRBFNetwork, TheBasesSumToOne) {
 }
 
 TEST(PlainRBFNetwork, ValuesAllocateNothing) {
-  PlainRBFNetwork network({.n_inputs = 3});
+  Plain network({.n_inputs = 3});
   const std::vector<double> state = {0.1, 0.2, 0.3};
   std::vector<double> out(601);
   const std::size_t before = testing::allocation_count();
@@ -128,7 +132,7 @@ TEST(PlainRBFNetwork, ValuesAllocateNothing) {
 
 // The bits are the same with every compiler and optimization level.
 TEST(PlainRBFNetwork, KeepsItsBits) {
-  PlainRBFNetwork network = taught({.width = 1.0}, 200);
+  Plain network = taught({.width = 1.0}, 200);
   std::uint64_t digest = 0;
   for (const double w : network.network().weights()) {
     digest = digest * 31 + std::bit_cast<std::uint64_t>(w);
@@ -141,7 +145,7 @@ TEST(PlainRBFNetwork, KeepsItsBits) {
 
 TEST(PlainRBFNetwork, RefusesWhatTheFactoredOneRefuses) {
   EXPECT_THROW(PlainRBFNetwork({.n_bases = 1}), std::invalid_argument);
-  PlainRBFNetwork network({.n_inputs = 2, .n_actions = 3});
+  Plain network({.n_inputs = 2, .n_actions = 3});
   const std::vector<double> good = {0.1, 0.2}, bad = {0.1, 1.2};
   std::vector<double> out(3), short_out(2);
   EXPECT_THROW(network.values(bad, out), std::invalid_argument);

@@ -3,31 +3,32 @@
 
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "sdnn/approximators/detail/correction_log.hpp"
 #include "sdnn/approximators/hidden_layer.hpp"
 #include "sdnn/coding/state_code.hpp"
 
 namespace sdnn::approximators {
 
-/// The inner potentials of the last states a network was asked about.
+/// The inner potentials of the last states that one user of a network asked about.
 ///
 /// Most states a network meets are old ones or lie near one. Two exact identities make use of it:
 /// a correction of w_i by step * x_SD(s) moves h_i(s') by step * (<x_SD(s), x_SD(s')> + 1), so a
-/// remembered state is brought up to date by one integer product per correction since; and
+/// cached state is brought up to date by one integer product per correction since; and
 /// h(s') - h(s) = W (x_SD(s') - x_SD(s)) touches only the columns in which the codes differ. The
-/// way that is cheapest by estimate is taken: from a remembered state, or by a full pass. Whichever
-/// it is, the result is the same integers.
+/// way that is cheapest by estimate is taken: from a cached state, or by a full pass. Whichever it
+/// is, the result is the same integers.
+///
+/// Any number of caches may follow one layer: its CorrectionLog has what each needs.
 class ActivationCache {
  public:
-  /// One remembered state. Shapes: bins (l,), potentials (n,).
+  /// One cached state. Shapes: bins (l,), potentials (n,).
   struct Entry {
     std::span<const coding::Bin> bins;
     std::span<const std::int32_t> potentials;
@@ -35,14 +36,13 @@ class ActivationCache {
 
   /// How potentials came about, counted since construction.
   struct Counts {
-    std::uint64_t exact = 0;      ///< the state was remembered
-    std::uint64_t neighbour = 0;  ///< derived from a remembered neighbour
+    std::uint64_t exact = 0;      ///< the state was cached
+    std::uint64_t neighbour = 0;  ///< derived from a cached neighbour
     std::uint64_t full = 0;       ///< a full pass
     std::uint64_t columns = 0;    ///< columns added, by passes and from neighbours
   };
 
-  /// `max_corrected`: the most units that one correction may touch.
-  ActivationCache(const coding::StateCode& code, std::size_t n_units, std::size_t max_corrected)
+  ActivationCache(const coding::StateCode& code, std::size_t n_units)
       : n_inputs_(code.n_inputs()),
         n_units_(n_units),
         bins_(kEntries * n_inputs_),
@@ -51,11 +51,7 @@ class ActivationCache {
         from_(code),
         to_(code),
         changes_(code.column_lists()),
-        listed_{Listed(code), Listed(code)},
-        max_corrected_(max_corrected),
-        log_bins_(kLogSize * n_inputs_),
-        log_units_(kLogSize * max_corrected),
-        log_(kLogSize) {
+        listed_{Listed(code), Listed(code)} {
     // A unit of a modifier switches k inputs, those that it modifies, which are about half as many
     // columns: half the modifiers are active. Neighbouring bins differ in `differing` units of each
     // pattern (about m / 2 / 45); where it is modified, in each of k groups, half of them are
@@ -73,32 +69,32 @@ class ActivationCache {
     columns_of_pass_ = 0.5 * l * static_cast<double>(code.n_pattern_units()) * columns_of_modifier;
   }
 
-  /// Bytes that it holds, but for what does not grow with these sizes.
-  static constexpr std::size_t n_bytes(std::size_t n_units, std::size_t max_corrected) noexcept {
-    return kEntries * n_units * sizeof(std::int32_t) +
-           kLogSize * max_corrected * sizeof(std::uint32_t);
+  /// Bytes that it holds, but for what does not grow with this size.
+  static constexpr std::size_t n_bytes(std::size_t n_units) noexcept {
+    return kEntries * n_units * sizeof(std::int32_t);
   }
 
   const Counts& counts() const noexcept { return counts_; }
 
-  /// Forgets all states: the weights have been replaced.
-  void forget() noexcept { last_use_.fill(0); }
-
-  /// The potentials of the state with these bins, for the present weights; valid until the next
-  /// call.
+  /// The potentials of the state with these bins, for the layer's present weights; valid until the
+  /// next call. `log`: all corrections of the layer.
   Entry recall(const coding::StateCode& code, const HiddenLayer& hidden_layer,
-               std::span<const coding::Bin> bins) {
+               const CorrectionLog& log, std::span<const coding::Bin> bins) {
+    if (layer_ != log.identity()) {
+      last_use_.fill(0);
+      layer_ = log.identity();
+    }
     for (const std::size_t slot : {latest_, before_latest_}) {  // a decision asks repeatedly
       if (last_use_[slot] != 0 && std::ranges::equal(bins_of(slot), bins) &&
-          n_corrections_ - up_to_[slot] <= kLogSize) {
-        return use(code, slot);
+          log.size() - up_to_[slot] <= CorrectionLog::kSize) {
+        return use(code, log, slot);
       }
     }
     std::array<std::int32_t, kEntries> distance{};
     for (std::size_t i = 0; i < n_inputs_; ++i) {
-      const coding::Bin* const remembered = bins_by_input_.data() + i * kEntries;
+      const coding::Bin* const cached = bins_by_input_.data() + i * kEntries;
       for (std::size_t slot = 0; slot < kEntries; ++slot) {
-        distance[slot] += std::abs(remembered[slot] - bins[i]);
+        distance[slot] += std::abs(cached[slot] - bins[i]);
       }
     }
     std::size_t nearest = kEntries;
@@ -106,8 +102,8 @@ class ActivationCache {
     double least = columns_of_pass_;
     for (std::size_t slot = 0; slot < kEntries; ++slot) {
       if (last_use_[slot] < last_use_[oldest]) oldest = slot;
-      const std::uint64_t lag = n_corrections_ - up_to_[slot];
-      if (last_use_[slot] == 0 || lag > kLogSize) continue;
+      const std::uint64_t lag = log.size() - up_to_[slot];
+      if (last_use_[slot] == 0 || lag > CorrectionLog::kSize) continue;
       const double cost =
           columns_per_bin_ * distance[slot] + columns_per_correction_ * static_cast<double>(lag);
       if (cost < least) {
@@ -122,7 +118,7 @@ class ActivationCache {
       ++counts_.full;
       counts_.columns += columns.size();
     } else {
-      const Entry known = use(code, nearest);
+      const Entry known = use(code, log, nearest);
       if (std::ranges::equal(known.bins, bins)) {
         ++counts_.exact;
         return known;
@@ -137,8 +133,8 @@ class ActivationCache {
       bins_[oldest * n_inputs_ + i] = bins[i];
       bins_by_input_[i * kEntries + oldest] = bins[i];
     }
-    up_to_[oldest] = n_corrections_;
-    return use(code, oldest);
+    up_to_[oldest] = log.size();
+    return use(code, log, oldest);
   }
 
   /// The columns of the state with these bins, listed anew unless it was one of the last two that
@@ -150,24 +146,7 @@ class ActivationCache {
     return list(code, bins);
   }
 
-  /// Notes that w_i += step * x_SD(bins) and w_i0 -= step for every i in `units`.
-  void corrected(std::span<const coding::Bin> bins, std::span<const std::uint32_t> units,
-                 std::int32_t step) noexcept {
-    assert(units.size() <= max_corrected_);
-    const std::size_t slot = n_corrections_ % kLogSize;
-    std::ranges::copy(bins, log_bins_.begin() + static_cast<std::ptrdiff_t>(slot * bins.size()));
-    std::ranges::copy(units,
-                      log_units_.begin() + static_cast<std::ptrdiff_t>(slot * max_corrected_));
-    log_[slot] = {step, units.size()};
-    ++n_corrections_;
-  }
-
  private:
-  struct Correction {
-    std::int32_t step = 0;
-    std::size_t n_units = 0;
-  };
-
   /// Room for the paired code of a state.
   class Words {
    public:
@@ -195,7 +174,6 @@ class ActivationCache {
   };
 
   static constexpr std::size_t kEntries = 64;
-  static constexpr std::size_t kLogSize = 512;
 
   std::span<const coding::Bin> bins_of(std::size_t slot) const noexcept {
     return {bins_.data() + slot * n_inputs_, n_inputs_};
@@ -210,22 +188,23 @@ class ActivationCache {
   }
 
   /// Marks a slot as used now and brings its potentials up to date.
-  Entry use(const coding::StateCode& code, std::size_t slot) {
+  Entry use(const coding::StateCode& code, const CorrectionLog& log, std::size_t slot) {
     const Entry entry{bins_of(slot), {potentials_.data() + slot * n_units_, n_units_}};
     std::int32_t* const potentials = potentials_.data() + slot * n_units_;
-    for (std::uint64_t& next = up_to_[slot]; next < n_corrections_; ++next) {
-      const std::size_t at = next % kLogSize;
-      const std::span<const coding::Bin> corrected(log_bins_.data() + at * n_inputs_, n_inputs_);
-      const std::int32_t change = log_[at].step * (code.inner_product(corrected, entry.bins) + 1);
-      const std::uint32_t* const units = log_units_.data() + at * max_corrected_;
-      for (std::size_t k = 0; k < log_[at].n_units; ++k) potentials[units[k]] += change;
+    for (std::uint64_t& next = up_to_[slot]; next < log.size(); ++next) {
+      const CorrectionLog::Entry correction = log[next];
+      const std::int32_t change =
+          correction.step * (code.inner_product(correction.bins, entry.bins) + 1);
+      for (const std::uint32_t unit : correction.units) potentials[unit] += change;
     }
     last_use_[slot] = ++clock_;
     if (slot != latest_) before_latest_ = std::exchange(latest_, slot);
     return entry;
   }
 
-  // What is remembered, slot by slot.
+  std::uint64_t layer_ = 0;  ///< the identity of the layer that the slots are of
+
+  // Slot by slot.
   std::size_t n_inputs_;
   std::size_t n_units_;
   std::vector<coding::Bin> bins_;                   ///< [slot][input]
@@ -240,13 +219,6 @@ class ActivationCache {
   Words to_;
   coding::ColumnLists changes_;
   std::array<Listed, 2> listed_;  ///< the latest first
-
-  // The last kLogSize corrections, in a ring.
-  std::uint64_t n_corrections_ = 0;
-  std::size_t max_corrected_;
-  std::vector<coding::Bin> log_bins_;     ///< [slot][input]
-  std::vector<std::uint32_t> log_units_;  ///< [slot][up to max_corrected_]
-  std::vector<Correction> log_;
 
   // Estimated costs, in columns.
   double columns_per_bin_;

@@ -43,11 +43,12 @@ class WeightAverage {
   /// How many snapshots it is made of; 0: nothing is known.
   std::uint64_t n_snapshots() const noexcept { return n_snapshots_; }
 
-  /// Tells that the layer has had so many corrections in all.
-  void note(std::uint64_t n_corrections, const HiddenLayer& layer) {
-    if (n_corrections < due_) return;
+  /// Takes a snapshot if one is due after so many corrections in all; returns whether it was.
+  bool note(std::uint64_t n_corrections, const HiddenLayer& layer) {
+    if (n_corrections < due_) return false;
     add(layer, shift_at(n_corrections));
     due_ = n_corrections + std::max(interval_, n_corrections >> kLogSnapshots);
+    return true;
   }
 
   /// Forgets what it is made of: the layer has other weights now.

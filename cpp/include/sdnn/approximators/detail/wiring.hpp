@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "sdnn/approximators/detail/activation_cache.hpp"
+#include "sdnn/approximators/detail/correction_log.hpp"
 #include "sdnn/approximators/detail/weight_average.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"
 #include "sdnn/coding/action_code.hpp"
@@ -44,8 +45,8 @@ inline void require_room(const SDNNCConfig& config, double n_bins) {
     weights += WeightAverage::n_bytes(n_units, n_columns) + 2.0 * n_units * n_columns;
   }
   const double patterns = config.pattern_bytes(n_bins);
-  const double remembered =
-      static_cast<double>(ActivationCache::n_bytes(sizes.n_hidden_units(), sizes.n_active_units()));
+  const double remembered = static_cast<double>(ActivationCache::n_bytes(sizes.n_hidden_units()) +
+                                                CorrectionLog::n_bytes(sizes.n_active_units()));
   const char* largest = "max_pairs, n_hidden_units, n_pattern_units or n_inputs";
   if (patterns > std::max(weights, remembered)) {
     largest = config.n_symbols.empty()

@@ -25,10 +25,7 @@ namespace sdnn::experiments {
 /// 16,384 exponentials.
 class PlainRBFNetwork {
  public:
-  explicit PlainRBFNetwork(approximators::RBFNetwork network)
-      : network_(std::move(network)),
-        state_exponents_(network_.n_joint_bases() / network_.n_bases()),
-        exponents_(network_.n_bases()) {}
+  explicit PlainRBFNetwork(approximators::RBFNetwork network) : network_(std::move(network)) {}
   explicit PlainRBFNetwork(const approximators::RBFNetworkConfig& config)
       : PlainRBFNetwork(approximators::RBFNetwork(config)) {}
 
@@ -36,63 +33,76 @@ class PlainRBFNetwork {
   std::size_t n_inputs() const noexcept { return network_.n_inputs(); }
   std::size_t n_actions() const noexcept { return network_.n_actions(); }
 
-  void values(std::span<const double> state, std::span<double> out) {
+  struct Workspace {
+    approximators::RBFNetwork::Workspace network;
+    std::vector<double> state_exponents;
+    std::vector<double> exponents;
+  };
+  Workspace workspace() const {
+    return {network_.workspace(),
+            std::vector<double>(network_.n_joint_bases() / network_.n_bases()),
+            std::vector<double>(network_.n_bases())};
+  }
+
+  void values(std::span<const double> state, Workspace& workspace, std::span<double> out) const {
     core::require(out.size() == n_actions(), "out", std::to_string(n_actions()) + " values",
                   out.size());
     core::require_unit_values("state", state, n_inputs());
-    add_up_exponents(state);
+    add_up_exponents(state, workspace);
     for (std::size_t action = 0; action < out.size(); ++action) {
-      set_exponents(coding::action_value(action, n_actions(), 0.0, 1.0));
-      out[action] = weighted_mean();
+      set_exponents(coding::action_value(action, n_actions(), 0.0, 1.0), workspace.exponents);
+      out[action] = weighted_mean(workspace);
     }
   }
-  double value(std::span<const double> state, std::size_t action) {
-    return network_.value(state, action);
+  double value(std::span<const double> state, Workspace& workspace, std::size_t action) const {
+    return network_.value(state, workspace.network, action);
   }
-  void update(std::span<const double> state, std::size_t action, double target,
-               double rate = 1.0) {
-    network_.update(state, action, target, rate);
+  void update(std::span<const double> state, Workspace& workspace, std::size_t action,
+              double target, double rate = 1.0) {
+    network_.update(state, workspace.network, action, target, rate);
   }
 
  private:
-  // exponents_ = logarithms of one dimension's Gaussians at x: -((x - centre) / width)^2 / 2, in
+  // exponents = logarithms of one dimension's Gaussians at x: -((x - centre) / width)^2 / 2, in
   // units of the centres' spacing.
-  void set_exponents(double x) noexcept {
-    const double n_gaps = static_cast<double>(exponents_.size() - 1);
-    for (std::size_t k = 0; k < exponents_.size(); ++k) {
+  void set_exponents(double x, std::vector<double>& exponents) const noexcept {
+    const double n_gaps = static_cast<double>(exponents.size() - 1);
+    for (std::size_t k = 0; k < exponents.size(); ++k) {
       const double distance = (x * n_gaps - static_cast<double>(k)) / network_.config().width;
-      exponents_[k] = -0.5 * distance * distance;
+      exponents[k] = -0.5 * distance * distance;
     }
   }
 
-  // state_exponents_ = those of the joint bases of the state, row-major over the inputs.
-  void add_up_exponents(std::span<const double> state) noexcept {
-    state_exponents_[0] = 0.0;
+  // state_exponents = those of the joint bases of the state, row-major over the inputs.
+  void add_up_exponents(std::span<const double> state, Workspace& workspace) const noexcept {
+    auto& [network, sums, exponents] = workspace;
+    sums[0] = 0.0;
     std::size_t size = 1;
     for (const double x : state) {
-      set_exponents(x);
-      const std::size_t n = exponents_.size();
+      set_exponents(x, exponents);
+      const std::size_t n = exponents.size();
       // From the back, so that one array is enough: entry i becomes entries i n .. i n + n - 1.
       for (std::size_t i = size; i-- > 0;) {
-        const double before = state_exponents_[i];
-        for (std::size_t k = 0; k < n; ++k) state_exponents_[i * n + k] = before + exponents_[k];
+        const double before = sums[i];
+        for (std::size_t k = 0; k < n; ++k) sums[i * n + k] = before + exponents[k];
       }
       size *= n;
     }
   }
 
-  // sum W G / sum G over all joint bases, with exponents state_exponents_[j] + exponents_[b]. A few
+  // sum W G / sum G over all joint bases, with exponents state_exponents[j] + exponents[b]. A few
   // exponentials at a time, so that the compiler can use vectors; the sums stay in order.
-  double weighted_mean() const noexcept {
+  double weighted_mean(const Workspace& workspace) const noexcept {
+    const auto& [network, state_exponents, exponents] = workspace;
     const std::span<const double> weights = network_.weights();
     std::array<double, 64> bases;
     double weighted = 0.0, total = 0.0;
     for (std::size_t begin = 0; begin < weights.size(); begin += bases.size()) {
       const std::size_t n = std::min(bases.size(), weights.size() - begin);
-      std::size_t j = begin / exponents_.size(), b = begin % exponents_.size();
+      std::size_t j = begin / exponents.size(), b = begin % exponents.size();
       for (std::size_t i = 0; i < n; ++i) {
-        bases[i] = state_exponents_[j] + exponents_[b];
-        if (++b < exponents_.size()) continue;
+        bases[i] = state_exponents[j] + exponents[b];
+        if (++b < exponents.size()) continue;
         b = 0;
         ++j;
       }
@@ -106,8 +116,6 @@ class PlainRBFNetwork {
   }
 
   approximators::RBFNetwork network_;
-  std::vector<double> state_exponents_;
-  std::vector<double> exponents_;
 };
 
 }  // namespace sdnn::experiments

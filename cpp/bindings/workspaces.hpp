@@ -1,0 +1,32 @@
+/// Workspaces for those who read a network from Python.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <list>
+
+namespace sdnn::bindings {
+
+/// The calling thread's workspace for a network; the latest few are kept, so that a state that is
+/// asked for again is cheap.
+template <class Network>
+typename Network::Workspace& workspace_of(const Network& network) {
+  constexpr std::size_t kKept = 8;
+  struct Kept {
+    std::uint64_t network;
+    typename Network::Workspace workspace;
+  };
+  thread_local std::list<Kept> kept;  // the latest first
+  const auto found =
+      std::ranges::find(kept, network.identity(), [](const Kept& one) { return one.network; });
+  if (found != kept.end()) {
+    kept.splice(kept.begin(), kept, found);
+  } else {
+    kept.push_front({network.identity(), network.workspace()});
+    if (kept.size() > kKept) kept.pop_back();
+  }
+  return kept.front().workspace;
+}
+
+}  // namespace sdnn::bindings

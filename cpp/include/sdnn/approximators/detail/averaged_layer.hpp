@@ -1,0 +1,54 @@
+/// The layer that an average of weights makes, rounded to steps of the lattice.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+#include "sdnn/approximators/detail/correction_log.hpp"
+#include "sdnn/approximators/detail/paired_weights.hpp"
+#include "sdnn/approximators/detail/weight_average.hpp"
+#include "sdnn/approximators/hidden_layer.hpp"
+#include "sdnn/coding/state_code.hpp"
+
+namespace sdnn::approximators {
+
+namespace detail {
+
+/// value / 2^(kFractionBits + more), halves up.
+inline std::int64_t rounded_average(std::int64_t value, int more) noexcept {
+  const int bits = WeightAverage::kFractionBits + more;
+  return (value + (std::int64_t{1} << (bits - 1))) >> bits;
+}
+
+}  // namespace detail
+
+/// The average of a threshold, and of the weight of the unit of x_SD that has these columns; of
+/// this at most `limit`, so that no sum of two leaves a layer's range.
+inline std::int32_t averaged_threshold(const WeightAverage& average, std::size_t unit) noexcept {
+  return static_cast<std::int32_t>(detail::rounded_average(average.threshold(unit), 0));
+}
+inline std::int32_t averaged_weight(const WeightAverage& average, std::size_t unit,
+                                    const PairedColumns& columns, std::int64_t limit) noexcept {
+  std::int64_t weight = average.weight(unit, columns.first);
+  if (columns.paired) weight += columns.sign * std::int64_t{average.weight(unit, columns.second)};
+  return static_cast<std::int32_t>(
+      std::clamp(detail::rounded_average(weight, columns.paired ? 1 : 0), -limit, limit));
+}
+
+/// A layer of averaged weights, which never changes, and the log that caches need of it.
+struct AveragedLayer {
+  AveragedLayer(const WeightAverage& average, const coding::StateCode& code, std::size_t n_units,
+                std::int64_t limit)
+      : layer(paired_layer(
+            code, n_units,
+            [&](std::size_t unit, const PairedColumns& columns, std::size_t) {
+              return averaged_weight(average, unit, columns, limit);
+            },
+            [&](std::size_t unit) { return averaged_threshold(average, unit); })) {}
+
+  HiddenLayer layer;
+  CorrectionLog log;
+};
+
+}  // namespace sdnn::approximators

@@ -1,0 +1,54 @@
+/// Weights in the paper's order, where a layer on the paired code keeps them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "sdnn/approximators/hidden_layer.hpp"
+#include "sdnn/coding/state_code.hpp"
+#include "sdnn/core/detail/interruption.hpp"
+
+namespace sdnn::approximators {
+
+using PairedColumns = coding::StateCode::PairedColumns;
+
+/// The weight of a hidden unit for the unit of x_SD that has these columns.
+inline std::int32_t paired_weight(const HiddenLayer& layer, std::size_t unit,
+                                  const PairedColumns& columns) noexcept {
+  const std::int32_t first = layer.weight(unit, columns.first);
+  return columns.paired ? (first + columns.sign * layer.weight(unit, columns.second)) / 2 : first;
+}
+
+/// The largest |weight| that a layer is given: two of them make a sum that has to fit.
+inline std::int32_t largest_paired_weight(const HiddenLayer& layer) noexcept {
+  return layer.weight_limit() / 2;
+}
+
+/// A layer for the paired code, all weights and thresholds zero.
+inline HiddenLayer paired_layer(const coding::StateCode& code, std::size_t n_units) {
+  return {n_units, code.n_columns(), code.n_double_columns()};
+}
+
+/// A layer with the weights weight(unit, columns, j), j in the paper's order, and the thresholds
+/// threshold(unit). Throws std::invalid_argument for one that is out of range.
+template <class Weight, class Threshold>
+HiddenLayer paired_layer(const coding::StateCode& code, std::size_t n_units, const Weight& weight,
+                         const Threshold& threshold) {
+  HiddenLayer layer = paired_layer(code, n_units);
+  const auto add = [&layer](std::size_t unit, std::size_t column, std::int32_t change) {
+    layer.set_weight(unit, column, layer.weight(unit, column) + change);
+  };
+  for (std::size_t j = 0; j < code.n_columns(); ++j) {
+    core::interruption_point();
+    const PairedColumns columns = code.columns_of(j);
+    for (std::size_t unit = 0; unit < n_units; ++unit) {
+      const std::int32_t value = weight(unit, columns, j);
+      add(unit, columns.first, value);
+      if (columns.paired) add(unit, columns.second, columns.sign * value);
+    }
+  }
+  for (std::size_t unit = 0; unit < n_units; ++unit) layer.set_threshold(unit, threshold(unit));
+  return layer;
+}
+
+}  // namespace sdnn::approximators

@@ -1,0 +1,92 @@
+"""Several threads read one agent at once, and get the bits that one alone gets."""
+
+import threading
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from sdnn.agents import FuzzyQLearning, QLearningConfig, RBFQLearning, SDNNQLearning, Transition
+from sdnn.approximators import SDNNCConfig
+
+N_INPUTS = 3
+OBSERVATIONS = gym.spaces.Box(0.0, 1.0, (N_INPUTS,), np.float64)
+ONE = gym.spaces.Box(-1.0, 1.0, (1,), np.float64)
+TWO = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
+SIZES = SDNNCConfig(n_pattern_units=50, n_hidden_units=200, n_active_units=60, n_actions=9)
+AVERAGING = SDNNCConfig(
+    n_pattern_units=50, n_hidden_units=200, n_active_units=60, n_actions=9, averaging_interval=10
+)
+AGENTS = {
+    "sdnn": lambda: SDNNQLearning(OBSERVATIONS, ONE, approximator=SIZES, seed=1),
+    "averaging": lambda: SDNNQLearning(OBSERVATIONS, ONE, approximator=AVERAGING, seed=1),
+    "decoupled": lambda: SDNNQLearning(OBSERVATIONS, TWO, approximator=SIZES, seed=1),
+    "rbf": lambda: RBFQLearning(
+        OBSERVATIONS, ONE, learning=QLearningConfig(n_greedy_steps=0), seed=1
+    ),
+    "fuzzy": lambda: FuzzyQLearning(OBSERVATIONS, ONE, seed=1),
+}
+
+
+def live(agent, n_steps, seed):
+    rng = np.random.default_rng(seed)
+    agent.begin_episode()
+    observation = rng.random(N_INPUTS)
+    for _ in range(n_steps):
+        next_observation = rng.random(N_INPUTS)
+        action = agent.act(observation)
+        agent.learn(Transition(observation, action, rng.normal(), next_observation, False))
+        observation = next_observation
+
+
+def read(agent, seed=0):
+    observations = np.random.default_rng(seed).random((60, N_INPUTS))
+    ask = agent.value if isinstance(agent, FuzzyQLearning) else agent.q_values
+    return np.array([ask(observation) for observation in observations])
+
+
+def in_threads(*works):
+    results = [None] * len(works)
+
+    def run(index):
+        try:
+            results[index] = works[index]()
+        except BaseException as error:
+            results[index] = error
+
+    threads = [threading.Thread(target=run, args=(index,)) for index in range(len(works))]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return results
+
+
+@pytest.mark.parametrize("kind", AGENTS)
+def test_threads_read_what_one_reads_alone(kind):
+    agent = AGENTS[kind]()
+    for round_number in range(3):
+        live(agent, 40, round_number)
+        expected = read(agent)
+        for values in in_threads(*[lambda: read(agent)] * 4):
+            np.testing.assert_array_equal(values, expected)
+
+
+@pytest.mark.parametrize("kind", AGENTS)
+def test_readers_change_nothing_of_what_is_learned_meanwhile(kind):
+    alone, watched = AGENTS[kind](), AGENTS[kind]()
+    live(alone, 300, 7)
+    done = threading.Event()
+
+    def learn():
+        live(watched, 300, 7)
+        done.set()
+
+    def watch():
+        while not done.is_set():
+            read(watched)
+
+    assert in_threads(learn, watch, watch) == [None] * 3
+    for name, array in alone.state().items():
+        np.testing.assert_array_equal(watched.state()[name], array)
+    np.testing.assert_array_equal(read(watched), read(alone))
