@@ -14,11 +14,9 @@ array([ 0,  0, 50, 99], dtype=int32)
 (100, 200)
 """
 
-from sdnn.coding.base import Coding
-from sdnn.coding.missing import WithMissing
-from sdnn.coding.names import CODINGS, coding_named, from_dict, to_dict
+from sdnn.coding.base import CODINGS, Coding, coding_named, from_dict, to_dict
 from sdnn.coding.numeric import Anchor, Circular, CoarseCodeWarning, RandomInverse
-from sdnn.coding.symbols import CorrelationMatrix, Symbolic
+from sdnn.coding.symbols import CorrelationMatrix, Symbolic, WithMissing
 
 __all__ = [
     "CODINGS",
@@ -34,3 +32,6 @@ __all__ = [
     "from_dict",
     "to_dict",
 ]
+
+for _coding in (RandomInverse, Anchor, Circular, Symbolic, CorrelationMatrix, WithMissing):
+    CODINGS[_coding.name] = _coding

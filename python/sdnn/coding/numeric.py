@@ -13,14 +13,6 @@ from numpy.typing import NDArray
 from sdnn import _core
 from sdnn.arguments import one_of, real, whole
 from sdnn.coding.base import Coding, known
-from sdnn.coding.ranges import (
-    Knots,
-    bins_of_positions,
-    checked_knots,
-    learned_range,
-    positions,
-    quantile_knots,
-)
 
 __all__ = ["Anchor", "Circular", "CoarseCodeWarning", "RandomInverse"]
 
@@ -30,6 +22,10 @@ FINE = 1000
 LONGEST = 1000.0
 """The largest length_scale: all values would look alike beyond."""
 FEW_BINS = 8
+MAX_KNOTS = 129
+"""Knots that hold a column's distribution; beyond so many the codes hardly differ."""
+
+Knots = tuple[tuple[float, float], ...]
 
 
 class CoarseCodeWarning(UserWarning):
@@ -37,13 +33,7 @@ class CoarseCodeWarning(UserWarning):
 
 
 def numbers(column: NDArray[Any]) -> NDArray[np.float64]:
-    """Return the column as numbers.
-
-    Raises
-    ------
-    ValueError
-        If a value is not a number, or NaN.
-    """
+    """Return the column as numbers; ValueError if a value is none, or NaN."""
     if np.iscomplexobj(column):
         raise ValueError("Complex data not supported")
     values = np.asarray(column, dtype=np.float64)
@@ -52,8 +42,90 @@ def numbers(column: NDArray[Any]) -> NDArray[np.float64]:
     return values
 
 
+def bins_of_positions(where: NDArray[np.float64], n_bins: int) -> NDArray[np.int32]:
+    """Return the bin among equal half-open parts of [0, 1]; 1 falls into the last."""
+    return np.minimum((where * n_bins).astype(np.int32), np.int32(n_bins - 1))
+
+
+def quantile_knots(column: NDArray[np.float64]) -> Knots:
+    """Values and their mean ranks, scaled to [0, 1]: at most `MAX_KNOTS` of them.
+
+    >>> quantile_knots(np.array([1.0, 2.0, 2.0, 50.0]))
+    ((1.0, 0.0), (2.0, 0.5), (50.0, 1.0))
+    """
+    values, counts = np.unique(column, return_counts=True)
+    if len(values) == 1:
+        return ((float(values[0]), 0.0),)
+    ranks = np.cumsum(counts) - counts / 2
+    levels = (ranks - ranks[0]) / (ranks[-1] - ranks[0])
+    if len(values) > MAX_KNOTS:
+        kept = np.unique(np.searchsorted(levels, np.linspace(0, 1, MAX_KNOTS)))
+        values, levels = values[kept], levels[kept]
+    return tuple(zip(values.tolist(), levels.tolist(), strict=True))
+
+
+def checked_knots(knots: Any, low: float, high: float) -> Knots:
+    """Return knots that an earlier fit has learned; they rise from (low, 0) to (high, 1)."""
+    ends: tuple[float, ...] = ()
+    is_rising = False
+    try:
+        values, levels = np.array(knots, dtype=np.float64).T
+        ends = (values[0], levels[0], values[-1], levels[-1])
+        is_rising = bool(np.all(values[1:] > values[:-1]) and np.all(levels[1:] > levels[:-1]))
+    except (IndexError, TypeError, ValueError):
+        pass
+    if not is_rising or ends != (low, 0.0, high, 1.0 if low < high else 0.0):
+        raise ValueError(
+            f"knots must be (value, position) in rising order from ({low}, 0) to ({high}, 1), "
+            f"got {knots!r}"
+        )
+    return tuple(zip(values.tolist(), levels.tolist(), strict=True))
+
+
+class Ranged(Coding):
+    """A coding of numbers within a range, which is given or learned."""
+
+    low: float | None
+    high: float | None
+    knots: Knots | None = None
+
+    @property
+    def learns(self) -> bool:
+        """Whether ``fit`` learns from the sample."""
+        return self.low is None or self.high is None
+
+    def ends(self) -> tuple[float, float]:
+        """Return the range; see `Coding.ends`."""
+        return known(self.low), known(self.high)
+
+    def even_range(self) -> tuple[float, float] | None:
+        """Return the range unless bins are quantiles; see `Coding.even_range`."""
+        return self.ends() if self.knots is None else None
+
+    def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
+        """Return the bin of each value; see `Coding.bins`."""
+        values, (low, high) = numbers(column), self.ends()
+        if not low < high:  # of a column that had one value only
+            where = np.zeros(len(values))
+        elif self.knots is not None:
+            where = np.interp(values, *np.array(self.knots).T)
+        else:  # halves, so that the width of the widest range is still a number
+            where = (np.clip(values, low, high) / 2 - low / 2) / (high / 2 - low / 2)
+        return bins_of_positions(where, self.size)
+
+    def _learned_range(self, column: NDArray[np.float64]) -> tuple[float, float]:
+        """Return the given ends, or the column's; equal ones are those of a constant column."""
+        low = float(np.min(column)) if self.low is None else real("low", self.low)
+        high = float(np.max(column)) if self.high is None else real("high", self.high)
+        is_constant = low == high and bool(np.all(column == low))
+        is_finite = math.isfinite(low) and math.isfinite(high)
+        if not is_finite or (not self.learns and low >= high and not is_constant):
+            raise ValueError(f"low and high must be finite, low < high, got {low} and {high}")
+        return low, max(low, high)
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class RandomInverse(Coding):
+class RandomInverse(Ranged):
     """The first pattern is random; each next one flips a few units of each sign of its neighbour.
 
     The correlation of two patterns falls exponentially with the distance of their bins,
@@ -70,7 +142,7 @@ class RandomInverse(Coding):
         Bins of equal width, or of equal share of the training sample (robust to outliers and
         skew; a range cannot be given then, but with knots).
     low, high : float, optional
-        The range; values beyond it count as its ends. Learned from the sample where None.
+        The range; values beyond it are clipped. Learned from the sample where None.
     knots : tuple of (value, position), optional
         Learned by ``spacing="quantile"``; learned with the range, or given with it.
     """
@@ -94,7 +166,7 @@ class RandomInverse(Coding):
         if not 0 < real("length_scale", self.length_scale) <= LONGEST:
             raise ValueError(f"length_scale must be in (0, {LONGEST}], got {self.length_scale!r}")
         values = numbers(column)
-        low, high = learned_range(values, self.low, self.high)
+        low, high = self._learned_range(values)
         n_bins, n_flipped = self._bins_and_flips(n_units)
         knots = None
         if self.spacing == "quantile":
@@ -105,11 +177,11 @@ class RandomInverse(Coding):
 
     def _bins_and_flips(self, n_units: int) -> tuple[int, int]:
         most = n_units // 2
+        n_bins = None if self.n_bins is None else whole("n_bins", self.n_bins, 2, MAX_BINS)
         if self.n_flipped is not None:
             flipped = whole("n_flipped", self.n_flipped, 1, most)
-        elif self.n_bins is not None:
-            q = whole("n_bins", self.n_bins, 2, MAX_BINS)
-            kept = math.exp(-1 / (q * self.length_scale))
+        elif n_bins is not None:
+            kept = math.exp(-1 / (n_bins * self.length_scale))
             flipped = min(most, max(1, round(n_units * (1 - kept) / 4)))
         else:
             flipped = max(1, math.ceil(n_units / (4 * self.length_scale * FINE)))
@@ -117,8 +189,8 @@ class RandomInverse(Coding):
                 raise ValueError(
                     f"length_scale must be at least {1 / (2 * FINE)}, got {self.length_scale!r}"
                 )
-        if self.n_bins is not None:
-            return whole("n_bins", self.n_bins, 2, MAX_BINS), flipped
+        if n_bins is not None:
+            return n_bins, flipped
         per_length = n_units / (4 * flipped)
         n_bins = min(MAX_BINS, max(2, round(per_length / self.length_scale)))
         if n_bins < FEW_BINS and self.n_flipped is None:
@@ -132,27 +204,9 @@ class RandomInverse(Coding):
         return n_bins, flipped
 
     @property
-    def learns(self) -> bool:
-        """Whether ``fit`` learns from the sample."""
-        return self.low is None or self.high is None
-
-    @property
     def size(self) -> int:
         """The number of bins."""
         return known(self.n_bins)
-
-    def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        """Return the bin of each value; see `Coding.bins`."""
-        where = positions(numbers(column), known(self.low), known(self.high), self.knots)
-        return bins_of_positions(where, self.size)
-
-    def ends(self) -> tuple[float, float]:
-        """Return the range; see `Coding.ends`."""
-        return known(self.low), known(self.high)
-
-    def even_range(self) -> tuple[float, float] | None:
-        """Return the range unless bins are quantiles; see `Coding.even_range`."""
-        return self.ends() if self.knots is None else None
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
         """Draw the patterns; see `Coding.patterns`."""
@@ -164,28 +218,50 @@ class RandomInverse(Coding):
         return np.power(1 - 4 * known(self.n_flipped) / n_units, distance)
 
 
-def interpolated_correlations(
-    n_stretches: int, n_portions: int, circular: bool
-) -> NDArray[np.float64]:
-    """Return the expected correlations of interpolated patterns, whose anchors are independent.
+class Anchored(Coding):
+    """Patterns interpolated between independent random anchors, on a line or on a circle."""
 
-    Within a stretch between two anchors they fall linearly; in neighbouring stretches they are
-    the product of the shares that both patterns have of the anchor between them.
-    """
-    stretch, portion = np.divmod(np.arange(n_stretches * n_portions), n_portions)
-    share = portion / n_portions
-    step = np.subtract.outer(stretch, stretch)
-    same = 1 - np.abs(np.subtract.outer(share, share))
-    across = np.multiply.outer(1 - share, share)
-    if circular and n_stretches == 1:
-        return np.ones_like(same)  # both ends are the same anchor
-    following = step % n_stretches == 1 if circular else step == 1
-    result: NDArray[np.float64] = (step == 0) * same + following * across + following.T * across.T
-    return result
+    n_anchor_patterns: int
+    n_interpolated: int
+    is_circular: ClassVar[bool]
+
+    def _check_anchors(self) -> None:
+        whole("n_anchor_patterns", self.n_anchor_patterns, 2, 10000)
+        whole("n_interpolated", self.n_interpolated, 0, 10000)
+        whole("(n_anchor_patterns - 1) * (n_interpolated + 1)", self.size, 1, MAX_BINS)
+
+    @property
+    def size(self) -> int:
+        """The number of bins."""
+        return (self.n_anchor_patterns - 1) * (self.n_interpolated + 1)
+
+    def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
+        """Draw the patterns; see `Coding.patterns`."""
+        return _core.anchor_patterns(
+            n_units, self.n_anchor_patterns, self.n_interpolated, self.is_circular, seed
+        )
+
+    def correlations(self, n_units: int) -> NDArray[np.float64]:
+        """Piecewise linear and bilinear; see `Coding.correlations`.
+
+        Within a stretch between two anchors they fall linearly; in neighbouring stretches they are
+        the product of the shares that both patterns have of the anchor between them.
+        """
+        n_stretches, n_portions = self.n_anchor_patterns - 1, self.n_interpolated + 1
+        stretch, portion = np.divmod(np.arange(self.size), n_portions)
+        share = portion / n_portions
+        step = np.subtract.outer(stretch, stretch)
+        same = 1 - np.abs(np.subtract.outer(share, share))
+        across = np.multiply.outer(1 - share, share)
+        if self.is_circular and n_stretches == 1:
+            return np.ones_like(same)  # both ends are the same anchor
+        is_next = step % n_stretches == 1 if self.is_circular else step == 1
+        result: NDArray[np.float64] = (step == 0) * same + is_next * across + is_next.T * across.T
+        return result
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Anchor(Coding):
+class Anchor(Anchored, Ranged):
     """Independent random anchor patterns at even distances, interpolated between.
 
     The correlation of two patterns falls about linearly with their distance and is zero beyond
@@ -197,10 +273,11 @@ class Anchor(Coding):
         Anchors, and patterns between neighbouring ones;
         ``(n_anchor_patterns - 1) * (n_interpolated + 1)`` bins.
     low, high : float, optional
-        The range; values beyond it count as its ends. Learned from the sample where None.
+        The range; values beyond it are clipped. Learned from the sample where None.
     """
 
     name: ClassVar[str] = "anchor"
+    is_circular: ClassVar[bool] = False
     n_anchor_patterns: int = 9
     n_interpolated: int = 44
     low: float | None = None
@@ -208,48 +285,13 @@ class Anchor(Coding):
 
     def fit(self, column: NDArray[Any], n_units: int) -> Anchor:
         """Return a copy with the range known; see `Coding.fit`."""
-        check_anchors(self.n_anchor_patterns, self.n_interpolated)
-        low, high = learned_range(numbers(column), self.low, self.high)
+        self._check_anchors()
+        low, high = self._learned_range(numbers(column))
         return dataclasses.replace(self, low=low, high=high)
-
-    @property
-    def learns(self) -> bool:
-        """Whether ``fit`` learns from the sample."""
-        return self.low is None or self.high is None
-
-    @property
-    def size(self) -> int:
-        """The number of bins."""
-        return (self.n_anchor_patterns - 1) * (self.n_interpolated + 1)
-
-    def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        """Return the bin of each value; see `Coding.bins`."""
-        where = positions(numbers(column), known(self.low), known(self.high), None)
-        return bins_of_positions(where, self.size)
-
-    def ends(self) -> tuple[float, float]:
-        """Return the range; see `Coding.ends`."""
-        return known(self.low), known(self.high)
-
-    def even_range(self) -> tuple[float, float]:
-        """Return the range; see `Coding.even_range`."""
-        return self.ends()
-
-    def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
-        """Draw the patterns; see `Coding.patterns`."""
-        return _core.anchor_patterns(
-            n_units, self.n_anchor_patterns, self.n_interpolated, False, seed
-        )
-
-    def correlations(self, n_units: int) -> NDArray[np.float64]:
-        """Piecewise linear and bilinear; see `Coding.correlations`."""
-        return interpolated_correlations(
-            self.n_anchor_patterns - 1, self.n_interpolated + 1, circular=False
-        )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Circular(Coding):
+class Circular(Anchored):
     """Anchor interpolation on a circle: the last anchor is the first.
 
     Attributes
@@ -261,33 +303,22 @@ class Circular(Coding):
     """
 
     name: ClassVar[str] = "circular"
+    is_circular: ClassVar[bool] = True
     period: float = 2 * math.pi
     origin: float = 0.0
     n_anchor_patterns: int = 9
     n_interpolated: int = 44
+    learns: ClassVar[bool] = False
 
     def fit(self, column: NDArray[Any], n_units: int) -> Circular:
         """Return itself, checked: nothing is learned; see `Coding.fit`."""
-        check_anchors(self.n_anchor_patterns, self.n_interpolated)
+        self._check_anchors()
         numbers(column)
-        if not 0 < real("period", self.period) < math.inf or not math.isfinite(
-            real("origin", self.origin)
-        ):
-            raise ValueError(
-                f"period must be positive and origin finite, got {self.period!r} and "
-                f"{self.origin!r}"
-            )
+        if not 0 < real("period", self.period) < math.inf:
+            raise ValueError(f"period must be positive and finite, got {self.period!r}")
+        if not math.isfinite(real("origin", self.origin)):
+            raise ValueError(f"origin must be finite, got {self.origin!r}")
         return self
-
-    @property
-    def learns(self) -> bool:
-        """Whether ``fit`` learns from the sample."""
-        return False
-
-    @property
-    def size(self) -> int:
-        """The number of bins."""
-        return (self.n_anchor_patterns - 1) * (self.n_interpolated + 1)
 
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
         """Return the bin of each value; see `Coding.bins`."""
@@ -296,23 +327,3 @@ class Circular(Coding):
             raise ValueError("Input contains infinity, which has no place on a circle")
         turns = (values - self.origin) / self.period
         return bins_of_positions(turns - np.floor(turns), self.size)
-
-    def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
-        """Draw the patterns; see `Coding.patterns`."""
-        return _core.anchor_patterns(
-            n_units, self.n_anchor_patterns, self.n_interpolated, True, seed
-        )
-
-    def correlations(self, n_units: int) -> NDArray[np.float64]:
-        """Those of `Anchor`, and across the seam; see `Coding.correlations`."""
-        return interpolated_correlations(
-            self.n_anchor_patterns - 1, self.n_interpolated + 1, circular=True
-        )
-
-
-def check_anchors(n_anchor_patterns: int, n_interpolated: int) -> None:
-    """ValueError if the numbers are impossible."""
-    whole("n_anchor_patterns", n_anchor_patterns, 2, 10000)
-    whole("n_interpolated", n_interpolated, 0, 10000)
-    size = (n_anchor_patterns - 1) * (n_interpolated + 1)
-    whole("(n_anchor_patterns - 1) * (n_interpolated + 1)", size, 1, MAX_BINS)

@@ -1,44 +1,22 @@
-"""Codings of categories: unrelated ones, and ones whose similarity the user knows."""
+"""Codings of categories, unrelated or of known similarity, and of values that may be missing."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Hashable, Iterable
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
+from sdnn.arguments import one_of
 from sdnn.coding.base import Coding, known
+from sdnn.coding.numeric import RandomInverse
 
-__all__ = ["CorrelationMatrix", "Symbolic"]
+__all__ = ["Categorical", "CorrelationMatrix", "Symbolic", "WithMissing", "missing_as_nan"]
 
 Category = str | float | int | bool
-
-
-def listed(categories: Any) -> tuple[Category, ...] | None:
-    """Return given categories as a tuple; ValueError for what are no words or numbers."""
-    if categories is None:
-        return None
-    if isinstance(categories, str | bytes) or not isinstance(categories, Iterable):
-        raise ValueError(f"categories must be a tuple of values, got {categories!r}")
-    found = tuple(categories)
-    if not all(isinstance(category, Hashable) for category in found):
-        raise ValueError(f"categories must be words or numbers, got {found!r}")
-    return found
-
-
-def rows_of(matrix: Any) -> tuple[tuple[float, ...], ...]:
-    """Return the rows of a matrix of numbers; ValueError for what are none."""
-    try:
-        given = np.asarray(matrix)
-        if given.dtype.kind == "c":
-            raise ValueError("complex numbers")
-        rows = np.atleast_2d(given.astype(np.float64))
-    except (OverflowError, TypeError, ValueError) as error:
-        raise ValueError(f"matrix must be numbers, got {matrix!r}: {error}") from None
-    return tuple(map(tuple, rows.tolist()))
 
 
 def is_missing(value: Any) -> bool:
@@ -49,73 +27,32 @@ def is_missing(value: Any) -> bool:
         return True
 
 
-def learned_categories(column: NDArray[Any]) -> tuple[Category, ...]:
-    """Return the different values of a column, in order, as plain Python values.
+def missing_as_nan(values: NDArray[Any]) -> NDArray[np.float64]:
+    """Return numbers of any type as floats, missing ones as NaN; the shape is kept.
 
-    Raises
-    ------
-    ValueError
-        If values cannot be ordered (words and numbers), or one is missing.
+    >>> missing_as_nan(np.array([1, None, "2.5"], dtype=object))
+    array([1. , nan, 2.5])
     """
-    values = column.tolist()
-    if any(map(is_missing, values)):
-        raise ValueError("Input contains NaN: a missing value is not a category")
-    try:
-        return tuple(sorted(set(values)))
-    except TypeError:
-        raise ValueError("the categories of an input must be all words or all numbers") from None
+    plain = [np.nan if is_missing(value) else value for value in values.ravel().tolist()]
+    return np.array(plain, dtype=np.float64).reshape(values.shape)
 
 
-def _as_word(value: Any) -> Any:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return str(value) if is_number and value == value else value
+class Categorical(Coding):
+    """A coding of categories, which are given or learned from the sample in sorted order."""
 
-
-def bins_of_categories(column: NDArray[Any], categories: tuple[Category, ...]) -> NDArray[np.int32]:
-    """Return the place of each value among the categories.
-
-    Raises
-    ------
-    ValueError
-        If a value is none of them.
-    """
-    places = {category: place for place, category in enumerate(categories)}
-    if all(isinstance(category, str) for category in categories):
-        # Lists of words and numbers were all words once: models that learned so know "1.0".
-        column = np.array([_as_word(value) for value in column.tolist()], dtype=object)
-    try:
-        return np.array([places[value] for value in column.tolist()], dtype=np.int32)
-    except (KeyError, TypeError):
-        unknown = [value for value in dict.fromkeys(map(repr, column.tolist()))]
-        unknown = [value for value in unknown if value not in set(map(repr, categories))]
-        raise ValueError(f"Found unknown categories [{', '.join(unknown)}]") from None
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Symbolic(Coding):
-    """Categories without any order or likeness: a random pattern each.
-
-    Attributes
-    ----------
-    categories : tuple, optional
-        All categories; learned from the sample, in sorted order, where None.
-    """
-
-    name: ClassVar[str] = "symbolic"
     is_numeric: ClassVar[bool] = False
-    categories: tuple[Category, ...] | None = None
+    categories: tuple[Category, ...] | None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "categories", listed(self.categories))
-
-    def fit(self, column: NDArray[Any], n_units: int) -> Symbolic:
-        """Return a copy with the categories known; see `Coding.fit`."""
-        given = self.categories
-        if given is not None and (not given or len(set(given)) < len(given)):
-            raise ValueError(f"categories must be different and at least one, got {given!r}")
-        return dataclasses.replace(
-            self, categories=learned_categories(column) if given is None else given
-        )
+        """Keep given categories as a tuple."""
+        given: Any = self.categories
+        if given is None:
+            return
+        if isinstance(given, str | bytes) or not isinstance(given, Iterable):
+            raise ValueError(f"categories must be a tuple of values, got {given!r}")
+        object.__setattr__(self, "categories", tuple(given))
+        if not all(isinstance(category, Hashable) for category in known(self.categories)):
+            raise ValueError(f"categories must be words or numbers, got {self.categories!r}")
 
     @property
     def learns(self) -> bool:
@@ -128,8 +65,61 @@ class Symbolic(Coding):
         return len(known(self.categories))
 
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        """Return the place of each category; see `Coding.bins`."""
-        return bins_of_categories(column, known(self.categories))
+        """Return the place of each category; ValueError for an unknown one."""
+        places = {category: place for place, category in enumerate(known(self.categories))}
+        try:
+            return np.array([places[value] for value in column.tolist()], dtype=np.int32)
+        except (KeyError, TypeError):
+            unknown = dict.fromkeys(map(repr, column.tolist()))
+            names = [value for value in unknown if value not in set(map(repr, places))]
+            raise ValueError(f"Found unknown categories [{', '.join(names)}]") from None
+
+    def knows(self, column: NDArray[Any]) -> NDArray[np.bool_]:
+        """Return whether each value is one of the categories; what cannot be hashed is none."""
+        categories = set(known(self.categories))
+
+        def is_known(value: Any) -> bool:
+            try:
+                return value in categories
+            except TypeError:
+                return False
+
+        return np.array([is_known(value) for value in column.tolist()], dtype=bool)
+
+    def _learned(self, column: NDArray[Any]) -> tuple[Category, ...]:
+        """Return the given categories, or the different values of a column in order."""
+        if self.categories is not None:
+            return self.categories
+        values = column.tolist()
+        if any(map(is_missing, values)):
+            raise ValueError("Input contains NaN: a missing value is not a category")
+        try:
+            return tuple(sorted(set(values)))
+        except TypeError:
+            raise ValueError(
+                "the categories of an input must be all words or all numbers"
+            ) from None
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Symbolic(Categorical):
+    """Categories without any order or likeness: a random pattern each.
+
+    Attributes
+    ----------
+    categories : tuple, optional
+        All categories; learned from the sample, in sorted order, where None.
+    """
+
+    name: ClassVar[str] = "symbolic"
+    categories: tuple[Category, ...] | None = None
+
+    def fit(self, column: NDArray[Any], n_units: int) -> Symbolic:
+        """Return a copy with the categories known; see `Coding.fit`."""
+        given = self.categories
+        if given is not None and (not given or len(set(given)) < len(given)):
+            raise ValueError(f"categories must be different and at least one, got {given!r}")
+        return dataclasses.replace(self, categories=self._learned(column))
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
         """Draw the patterns; see `Coding.patterns`."""
@@ -141,7 +131,7 @@ class Symbolic(Coding):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class CorrelationMatrix(Coding):
+class CorrelationMatrix(Categorical):
     """Categories whose likeness is given: pattern correlations approach a given matrix.
 
     Attributes
@@ -165,13 +155,20 @@ class CorrelationMatrix(Coding):
     """
 
     name: ClassVar[str] = "correlation-matrix"
-    is_numeric: ClassVar[bool] = False
     matrix: Any
     categories: tuple[Category, ...] | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "matrix", rows_of(self.matrix))
-        object.__setattr__(self, "categories", listed(self.categories))
+        """Keep the rows of the matrix as tuples."""
+        super().__post_init__()
+        try:
+            given = np.asarray(self.matrix)
+            if given.dtype.kind == "c":
+                raise ValueError("complex numbers")
+            rows = np.atleast_2d(given.astype(np.float64))
+        except (OverflowError, TypeError, ValueError) as error:
+            raise ValueError(f"matrix must be numbers, got {self.matrix!r}: {error}") from None
+        object.__setattr__(self, "matrix", tuple(map(tuple, rows.tolist())))
 
     def fit(self, column: NDArray[Any], n_units: int) -> CorrelationMatrix:
         """Return a copy with the categories known; see `Coding.fit`."""
@@ -184,27 +181,13 @@ class CorrelationMatrix(Coding):
                 "matrix must have ones on its diagonal and entries in [-1, 1], "
                 f"got {matrix.tolist()}"
             )
-        names = learned_categories(column) if self.categories is None else self.categories
+        names = self._learned(column)
         if len(set(names)) != len(matrix):
             raise ValueError(
                 f"matrix must have a row for each of the categories {names!r}, got "
                 f"{len(matrix)} rows"
             )
         return dataclasses.replace(self, categories=names)
-
-    @property
-    def learns(self) -> bool:
-        """Whether ``fit`` learns from the sample."""
-        return self.categories is None
-
-    @property
-    def size(self) -> int:
-        """The number of categories."""
-        return len(self.matrix)
-
-    def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        """Return the place of each category; see `Coding.bins`."""
-        return bins_of_categories(column, known(self.categories))
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
         """Draw the patterns; see `Coding.patterns`."""
@@ -213,3 +196,88 @@ class CorrelationMatrix(Coding):
     def correlations(self, n_units: int) -> NDArray[np.float64]:
         """Return the matrix itself; see `Coding.correlations`."""
         return np.array(self.matrix)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class WithMissing(Coding):
+    """Another coding, and one pattern more, like no other, for values that are missing.
+
+    Missing are None, NaN and pandas.NA.
+
+    Attributes
+    ----------
+    base : Coding
+        Of the values that are there; it learns from them alone.
+    unknown : {"missing", "error"}
+        Whether a category that was not there in training counts as missing, or is an error.
+
+    Examples
+    --------
+    >>> color = WithMissing(base=Symbolic()).fit(np.array(["red", None, "blue"]), n_units=100)
+    >>> color.bins(np.array(["blue", "red", "pink", None]))
+    array([0, 1, 2, 2], dtype=int32)
+    """
+
+    name: ClassVar[str] = "with-missing"
+    is_numeric: ClassVar[bool] = False  # as scikit-learn lets words through, so it does NaN
+    base: Coding = dataclasses.field(default_factory=RandomInverse)
+    unknown: Literal["missing", "error"] = "missing"
+
+    def fit(self, column: NDArray[Any], n_units: int) -> WithMissing:
+        """Return a copy whose coding is fitted to the values that are there; see `Coding.fit`."""
+        one_of("unknown", self.unknown, ("missing", "error"))
+        learns = self.learns  # first, because it refuses a base that is no coding
+        there = self._values(column[self._is_there(column)])
+        if learns and len(there) == 0:
+            raise ValueError("every value of an input is missing: there is nothing to learn")
+        return dataclasses.replace(self, base=self.base.fit(there, n_units))
+
+    @property
+    def learns(self) -> bool:
+        """Whether ``fit`` learns from the sample."""
+        if not isinstance(self.base, Coding) or isinstance(self.base, WithMissing):
+            raise ValueError(f"base must be a Coding without missing values, got {self.base!r}")
+        return self.base.learns
+
+    @property
+    def size(self) -> int:
+        """The number of bins; the last is that of what is missing."""
+        return self.base.size + 1
+
+    def ends(self) -> tuple[float, float] | None:
+        """Return the range of the values that are there; see `Coding.ends`."""
+        return self.base.ends()
+
+    def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
+        """Return the bin of each value; see `Coding.bins`."""
+        is_there = self._is_there(column)
+        if isinstance(self.base, Categorical) and self.unknown == "missing":
+            is_there &= self.base.knows(column)
+        found = np.full(len(column), self.size - 1, dtype=np.int32)
+        found[is_there] = self.base.bins(self._values(column[is_there]))
+        return found
+
+    def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
+        """Draw the patterns; see `Coding.patterns`."""
+        own = int(np.random.SeedSequence(seed).generate_state(1, np.uint64)[0])
+        return np.vstack(
+            [self.base.patterns(n_units, seed), _core.symbol_patterns(1, n_units, own)]
+        )
+
+    def correlations(self, n_units: int) -> NDArray[np.float64]:
+        """Return those of the coding; what is missing has none with them; see `Coding`."""
+        every = np.eye(self.size)
+        every[:-1, :-1] = self.base.correlations(n_units)
+        return every
+
+    def _is_there(self, column: NDArray[Any]) -> NDArray[np.bool_]:
+        return np.array([not is_missing(value) for value in column.tolist()], dtype=bool)
+
+    def _values(self, there: NDArray[Any]) -> NDArray[Any]:
+        """Return values as the coding wants them; ValueError for numbers that are not finite."""
+        if not self.base.is_numeric:
+            return there
+        values = missing_as_nan(there)
+        if not np.isfinite(values).all():
+            raise ValueError("Input contains infinity")
+        return values

@@ -30,7 +30,7 @@ from sdnn.estimators.network import (
     units_for_pairs,
 )
 from sdnn.estimators.pair_selection import select_pairs, with_categories
-from sdnn.estimators.training import Trainer, run_epochs, sample_weights
+from sdnn.estimators.training import History, Trainer, run_epochs, sample_weights
 
 __all__ = ["BaseSDNN", "OutOfRangeWarning"]
 
@@ -244,38 +244,32 @@ class BaseSDNN(Fitted, CodedInputs):
         def score() -> float:
             return self._validation_score(held_bins, held_targets, held_weights)
 
+        def train(rows: Any, max_iter: int, n_averaged: int) -> tuple[Trainer, History]:
+            part = None if weights is None else weights[rows]
+            trainer = self._trainer(bins[rows], targets[rows], max_iter)
+            return trainer, run_epochs(
+                self.network_,
+                trainer,
+                len(bins[rows]),
+                max_iter=max_iter,
+                random=random if self.shuffle else None,
+                score=score if self.early_stopping and rows is kept else None,
+                n_iter_no_change=self.n_iter_no_change,
+                weights=self._presentations(targets[rows], part),
+                n_averaged_epochs=n_averaged,
+                verbose=self.verbose,
+            )
+
         is_refitted = self.refit and self.early_stopping
-        trainer = self._trainer(bins[kept], targets[kept], self.max_iter)
-        history = run_epochs(
-            self.network_,
-            trainer,
-            len(kept),
-            max_iter=self.max_iter,
-            random=random if self.shuffle else None,
-            score=score if self.early_stopping else None,
-            n_iter_no_change=self.n_iter_no_change,
-            weights=self._presentations(targets[kept], None if weights is None else weights[kept]),
-            n_averaged_epochs=1 if is_refitted else self.n_averaged_epochs,
-            verbose=self.verbose,
-        )
+        trainer, history = train(kept, self.max_iter, 1 if is_refitted else self.n_averaged_epochs)
         self.n_iter_ = len(history.n_corrected)
         self.n_corrected_ = np.array(history.n_corrected, dtype=np.int64)
         self.validation_scores_ = np.array(history.scores)
-        self.training_form_ = trainer.form
-        self.training_memory_ = trainer.memory
+        self.training_form_, self.training_memory_ = trainer.form, trainer.memory
         if is_refitted:  # anew on the whole sample, for as many epochs as were best
             first = self.network_
             self.network_ = Network(first.input_code, first.n_units, seed=self._weight_seed or 0)
-            history = run_epochs(
-                self.network_,
-                self._trainer(bins, targets, history.n_epochs),
-                len(bins),
-                max_iter=history.n_epochs,
-                random=random if self.shuffle else None,
-                weights=self._presentations(targets, weights),
-                n_averaged_epochs=self.n_averaged_epochs,
-                verbose=self.verbose,
-            )
+            _, history = train(slice(None), history.n_epochs, self.n_averaged_epochs)
         self.network_ = history.network
         if self._earlier or history.earlier:
             self._earlier = history.earlier
@@ -456,14 +450,16 @@ class BaseSDNN(Fitted, CodedInputs):
         if self.out_of_range == "error":
             raise ValueError(f"X has {first}, but out_of_range is 'error'")
         if self.n_inputs_out_of_range_ == 0:
-            self._warn(f"X has {first}: values beyond a range count as its ends")
+            self._warn(f"X has {first}: values beyond a range are clipped")
         self.n_inputs_out_of_range_ += n_outside
 
     @staticmethod
     def _warn(message: str) -> None:
         """Warn at the line outside this package and scikit-learn that called."""
         level, frame = 1, sys._getframe()
-        while frame.f_back and frame.f_globals["__name__"].startswith(("sdnn.", "sklearn.")):
+        while frame.f_back and frame.f_globals.get("__name__", "").startswith(
+            ("sdnn.", "sklearn.")
+        ):
             level, frame = level + 1, frame.f_back
         warnings.warn(message, OutOfRangeWarning, stacklevel=level)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.coding import Coding
-from sdnn.coding.missing import missing_as_nan
+from sdnn.coding.symbols import missing_as_nan
 from sdnn.estimators.inputs import PAIR_BUDGET, Pairs
 
 __all__ = ["InputCode", "Network", "code_bytes", "draw_input_code", "units_for_pairs"]

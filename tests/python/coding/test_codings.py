@@ -21,7 +21,7 @@ from sdnn.coding import (
     from_dict,
     to_dict,
 )
-from sdnn.coding.ranges import MAX_KNOTS, quantile_knots
+from sdnn.coding.numeric import MAX_KNOTS, quantile_knots
 
 UNIT = np.array([0.0, 1.0])
 LETTERS = np.array(["c", "a", "b", "a"])
@@ -289,11 +289,3 @@ def test_there_may_be_many_symbols():
     assert (patterns.sum(axis=1) == 0).all()
     fewer = Symbolic(categories=(0, 1, 2)).patterns(20, 3)
     np.testing.assert_array_equal(patterns[:3], fewer)
-
-
-def test_categories_learned_as_words_are_found_by_their_numbers():
-    """Lists of words and numbers were arrays of words once."""
-    coding = Symbolic(categories=("1", "2.5", "a"))
-    assert coding.bins(np.array([2.5, "a", 1], dtype=object)).tolist() == [1, 2, 0]
-    with pytest.raises(ValueError, match="unknown"):
-        coding.bins(np.array([3, "a"], dtype=object))

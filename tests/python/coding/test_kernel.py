@@ -94,9 +94,7 @@ def test_samples_of_another_shape_are_refused(bad):
 DOCUMENTED = (
     "sdnn.coding",
     "sdnn.coding.base",
-    "sdnn.coding.names",
     "sdnn.coding.numeric",
-    "sdnn.coding.ranges",
     "sdnn.coding.symbols",
     "sdnn.estimators.classifier",
     "sdnn.estimators.inputs",
