@@ -229,7 +229,7 @@ def test_dry_run_makes_nothing_and_counts_what_is_stored(invoke, tmp_path):
     assert [(row["planned"], row["stored"]) for row in plan["trials"]] == [(5, 2), (5, 2)]
 
 
-def test_dry_run_looks_at_a_folder_that_cannot_be_written(invoke, tmp_path, monkeypatch):
+def test_dry_run_opens_the_store_for_reading_only(invoke, tmp_path, monkeypatch):
     invoke("reproduce", "a", "--quick")
     files = sorted((tmp_path / "results").iterdir())
     opened = []
@@ -240,11 +240,10 @@ def test_dry_run_looks_at_a_folder_that_cannot_be_written(invoke, tmp_path, monk
 
     real_connect = sqlite3.connect
     monkeypatch.setattr("sdnn.runs.store.sqlite3.connect", connect)
-    monkeypatch.setattr("sdnn.runs.store._is_writable", lambda _: False)
     result = invoke("reproduce", "a", "--quick", "--dry-run")
     assert result.stdout.count("2 trials x 300 episodes, 2 of them stored in results") == 2
     assert opened
-    assert all(place.endswith("?mode=ro&immutable=1") for place in opened)
+    assert all(place.endswith("?mode=ro") for place in opened)
     assert sorted((tmp_path / "results").iterdir()) == files
 
 

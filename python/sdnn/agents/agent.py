@@ -502,9 +502,9 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         if flag("progress", progress):
             from rich.console import Console
 
-            from sdnn.agents.progress import ProgressLine
+            from sdnn.agents.progress import TrainingProgress
 
-            own = [*callbacks, ProgressLine(Console(stderr=True), "learning")]
+            own = [*callbacks, TrainingProgress(Console(stderr=True), "learning")]
         training = Training(
             self,
             env,

@@ -1,10 +1,12 @@
-"""A line on a terminal that says how far a training is."""
+"""Bars on a terminal that show the progress of trainings, studies and measurements."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Hashable
 from statistics import median
-from typing import TYPE_CHECKING
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
 
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
@@ -13,17 +15,123 @@ from sdnn.agents.training import Training
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import TaskID
+    from typing_extensions import Self
 
-__all__ = ["ProgressLine"]
+__all__ = ["ProgressBars", "TrainingProgress"]
 
+_SPEED_SECONDS = 60.0
+"""Time over which the speed is averaged for the time left."""
 _STEPS_BETWEEN = 64
-"""Between two looks at the clock of the line, which costs more than a step."""
-
+"""Between two readings of the clock of a training's bar, which cost more than a step."""
 _RETURNS = 20
 
 
-class ProgressLine(Callback):
-    """Shows a line of progress on a terminal, and nothing elsewhere.
+class ProgressBars:
+    """Shows a bar for each task on a terminal, and nothing elsewhere; a context manager.
+
+    It is an observer of the engine (`sdnn.runs.engine.Observer`), too.
+
+    Parameters
+    ----------
+    console
+        Where to draw.
+    """
+
+    def __init__(self, console: Console) -> None:
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TaskProgressColumn(),
+            TextColumn("{task.fields[news]}"),
+            TimeRemainingColumn(compact=True),
+            console=console,
+            transient=True,
+            disable=not console.is_terminal,
+            speed_estimate_period=_SPEED_SECONDS,
+        )
+        self._tasks: dict[Hashable, TaskID] = {}
+        self._done: dict[Hashable, int] = {}
+        self._n_open = 0
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._progress.stop()
+
+    def add(self, key: Hashable, title: str, total: int | None) -> None:
+        """Open the bar of a task."""
+        self._tasks[key] = self._progress.add_task(title, total=total, news="")
+
+    def update(self, key: Hashable, done: int, **fields: Any) -> None:
+        """Move a bar; ``description`` is another title, ``news`` what is written behind it."""
+        if key in self._tasks:
+            self._progress.update(self._tasks[key], completed=done, **fields)
+
+    def remove(self, key: Hashable) -> None:
+        """Take a bar away."""
+        self._progress.remove_task(self._tasks.pop(key))
+
+    # As an observer: a bar for each trial, one for all, one for costs.
+
+    def begun(self, n_planned: int, n_reused: int, n_episodes: int) -> None:
+        """Open the bar of the whole run."""
+        self._n_open = n_planned - n_reused
+        self.add("all", self._title(), n_episodes)
+
+    def started(self, planned: Any) -> None:
+        """Open a trial's bar."""
+        self.add(planned.key, planned.title, planned.config.length)
+
+    def advanced(self, planned: Any, done: int) -> None:
+        """Move a trial's bar and the whole one."""
+        self._done[planned.key] = done
+        self.update(planned.key, done)
+        self.update("all", sum(self._done.values()))
+
+    def lost(self, planned: Any) -> None:
+        """Take a trial's bar away, and its episodes off the whole one."""
+        self.advanced(planned, 0)
+        self.remove(planned.key)
+
+    def finished(self, planned: Any) -> None:
+        """Close a trial's bar and count its episodes as passed."""
+        self.advanced(planned, planned.config.length)
+        self.remove(planned.key)
+        self._n_open -= 1
+        self.update("all", sum(self._done.values()), description=self._title())
+
+    def failed(self, planned: Any, error: Exception) -> None:
+        """Close a trial's bar and count its episodes as passed."""
+        self.finished(planned)
+
+    def noted(self, text: str) -> None:
+        """Print a line above the bars, on a terminal or not."""
+        self._progress.console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def costs_begun(self, n_missing: int) -> None:
+        """Open the bar of the costs."""
+        if n_missing:
+            self.add("costs", "cost of a step", n_missing)
+
+    def cost_measured(self, description: str) -> None:
+        """Move the bar of the costs."""
+        self._done["costs"] = self._done.get("costs", 0) + 1
+        self.update("costs", self._done["costs"], description=f"cost: {description}")
+
+    def _title(self) -> str:
+        return f"[bold]all ({self._n_open} to go)"
+
+
+class TrainingProgress(Callback):
+    """Shows the bar of one training, with its last returns and evaluation.
 
     Parameters
     ----------
@@ -34,25 +142,17 @@ class ProgressLine(Callback):
     """
 
     def __init__(self, console: Console, title: str) -> None:
-        self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TaskProgressColumn(),
-            TextColumn("{task.fields[news]}"),
-            TimeRemainingColumn(compact=True),
-            console=console,
-            transient=True,
-            disable=not console.is_terminal,
-        )
-        self._task = self._progress.add_task(title, total=None, news="")
+        self._bars = ProgressBars(console)
+        self._title = title
         self._returns: deque[float] = deque(maxlen=_RETURNS)
         self._evaluation = ""
 
     def on_start(self, training: Training) -> None:
-        """Begin the line."""
+        """Open the bar."""
         total = training.steps if training.steps is not None else training.episodes
-        self._progress.update(self._task, total=total, completed=_done(training))
-        self._progress.start()
+        self._bars.add(self, self._title, total)
+        self._bars.update(self, _done(training))
+        self._bars.__enter__()
 
     def on_row(self, training: Training, row: Row) -> None:
         """Remember what is new."""
@@ -62,16 +162,14 @@ class ProgressLine(Callback):
             self._returns.append(row["return"])
 
     def on_step(self, training: Training) -> None:
-        """Move on now and then."""
+        """Move the bar now and then."""
         if training.n_steps % _STEPS_BETWEEN == 0:
             news = f"return {median(self._returns):.4g}" if self._returns else ""
-            self._progress.update(
-                self._task, completed=_done(training), news=news + self._evaluation
-            )
+            self._bars.update(self, _done(training), news=news + self._evaluation)
 
     def on_end(self, training: Training) -> None:
-        """Take the line away."""
-        self._progress.stop()
+        """Take the bar away."""
+        self._bars.__exit__(None, None, None)
 
 
 def _done(training: Training) -> int:

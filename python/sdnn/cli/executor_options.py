@@ -84,7 +84,7 @@ def _make_executor(where: str, jobs: int | None, of_dask: dict[str, Any]) -> Das
     if "scheduler" not in of_dask:
         raise click.UsageError("--executor dask needs --scheduler ADDRESS")
     from sdnn.runs.dask_executor import DaskExecutor
-    from sdnn.runs.trial_errors import ClusterError
+    from sdnn.runs.errors import ClusterError
 
     try:
         return DaskExecutor(of_dask.pop("scheduler"), **of_dask)

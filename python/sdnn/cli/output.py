@@ -40,7 +40,7 @@ def _finite(value: Any) -> Any:
 
 def report_outcome(context: click.Context, outcome: RunOutcome, out: Path) -> str:
     """Tell what failed, exit if interrupted, and say how much is stored."""
-    from sdnn.runs.progress import describe
+    from sdnn.runs.trial_config import describe
 
     n_stored = outcome.n_reused + outcome.n_run
     stored = f"{n_stored} of {outcome.n_planned} trials are stored in {out}"
@@ -69,13 +69,13 @@ def make_console() -> Console:
 @contextmanager
 def experiment_command(context: click.Context) -> Iterator[None]:
     """Make a line and an exit code of what can end a run of trials."""
-    from sdnn.runs.trial_errors import ExperimentError, StudyError
+    from sdnn.runs.errors import RunError, StudyError
 
     try:
         yield
     except StudyError as error:
         raise click.UsageError(str(error)) from error
-    except ExperimentError as error:
+    except RunError as error:
         raise click.ClickException(str(error)) from error
     except KeyboardInterrupt:
         exit_interrupted(context, "interrupted; what was finished is stored")
@@ -85,9 +85,9 @@ def with_progress(run: Callable[..., Done], request: Any) -> Done:
     """Run what was asked for, with a line of progress."""
     from rich.console import Console
 
-    from sdnn.runs.progress import ProgressObserver
+    from sdnn.agents.progress import ProgressBars
 
-    with ProgressObserver(Console(stderr=True)) as observer:
+    with ProgressBars(Console(stderr=True)) as observer:
         return run(request, observer=observer)
 
 

@@ -218,9 +218,9 @@ def train_run(
     if sys.stderr.isatty():
         from rich.console import Console
 
-        from sdnn.agents.progress import ProgressLine
+        from sdnn.agents.progress import TrainingProgress
 
-        callbacks.append(ProgressLine(Console(stderr=True), run.config.environment.id))
+        callbacks.append(TrainingProgress(Console(stderr=True), run.config.environment.id))
     outcome = run.train(
         steps=steps, episodes=episodes, callbacks=callbacks, repeat_episodes=repeat_episodes
     )

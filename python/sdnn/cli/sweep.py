@@ -70,9 +70,9 @@ def sweep(
     """
     from sdnn.reproduction.study_claims import add_claims
     from sdnn.reproduction.sweep.reading import read_study
+    from sdnn.runs.errors import StudyError
     from sdnn.runs.sweep import SweepRequest
     from sdnn.runs.sweep import sweep as run
-    from sdnn.runs.trial_errors import StudyError
 
     try:
         request = SweepRequest(

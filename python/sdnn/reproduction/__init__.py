@@ -19,6 +19,13 @@ if TYPE_CHECKING:
     from sdnn.runs.dask_executor import DaskExecutor
     from sdnn.runs.engine import Observer, run_trials
     from sdnn.runs.environment_trial import EnvironmentConfig, EnvironmentTrialConfig
+    from sdnn.runs.errors import (
+        ClusterError,
+        PlotUnavailableError,
+        StoreError,
+        StudyError,
+        WorkerLostError,
+    )
     from sdnn.runs.executor import Executor
     from sdnn.runs.measures import MeasureConfig
     from sdnn.runs.records import CostRecord, TrialKey, TrialRecord, TrialRows
@@ -29,14 +36,6 @@ if TYPE_CHECKING:
     from sdnn.runs.thread_executor import ThreadExecutor
     from sdnn.runs.trial import ProtocolConfig, Trial
     from sdnn.runs.trial_config import PlannedTrial, TrialConfig, TrialSettings, trial_seed
-    from sdnn.runs.trial_errors import (
-        ClusterError,
-        ExperimentError,
-        PlotUnavailableError,
-        StoreError,
-        StudyError,
-        WorkerLostError,
-    )
 
 _HOMES = {
     "reproduction.cases": "Case EXPERIMENTS Experiment select_experiments",
@@ -59,8 +58,7 @@ _HOMES = {
     "runs.thread_executor": "ThreadExecutor",
     "runs.trial": "ProtocolConfig Trial",
     "runs.trial_config": "PlannedTrial TrialConfig TrialSettings trial_seed",
-    "runs.trial_errors": "ClusterError ExperimentError PlotUnavailableError StoreError StudyError"
-    " WorkerLostError",
+    "runs.errors": "ClusterError PlotUnavailableError StoreError StudyError WorkerLostError",
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
 
@@ -82,7 +80,6 @@ __all__ = [
     "Estimate",
     "Executor",
     "Experiment",
-    "ExperimentError",
     "MeasureConfig",
     "Observer",
     "PlannedTrial",

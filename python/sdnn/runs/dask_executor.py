@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 
 from sdnn import _core
 from sdnn.runs.dask_worker import PROBE_WORKER, MismatchError, probe, run_on_worker
+from sdnn.runs.errors import ClusterError, WorkerLostError
 from sdnn.runs.executor import (
     POLL_SECONDS,
     Advanced,
@@ -39,7 +40,6 @@ from sdnn.runs.executor import (
     Started,
 )
 from sdnn.runs.trial_config import PlannedTrial
-from sdnn.runs.trial_errors import ClusterError, WorkerLostError
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -535,7 +535,7 @@ class _Session:
             if record is None:
                 run.put_back(trial)
             else:
-                run.messages.put(Advanced(planned, planned.config.protocol.n_learning_episodes))
+                run.messages.put(Advanced(planned, planned.config.length))
                 run.finish(Finished(planned, record))
         finally:
             del self._running[attempt]

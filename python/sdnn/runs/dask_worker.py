@@ -11,11 +11,11 @@ import pickle
 import time
 
 from sdnn import _core
+from sdnn.runs.errors import RunError
 from sdnn.runs.executor import run_to_end
 from sdnn.runs.records import TrialRecord, TrialRows
 from sdnn.runs.trial import opened
 from sdnn.runs.trial_config import PlannedTrial
-from sdnn.runs.trial_errors import ExperimentError
 
 PROBE_EPISODES = 10
 """Learning episodes of a probe: few, but every part of agent and task takes part."""
@@ -59,7 +59,7 @@ def probe_worker(version: str, pickled: list[bytes]) -> tuple[str, list[str]]:
     return own, [probe(pickle.loads(one)) for one in pickled]
 
 
-class MismatchError(ExperimentError):
+class MismatchError(RunError):
     """A worker has another version, or reads other settings out of a trial."""
 
 

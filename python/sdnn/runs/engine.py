@@ -132,7 +132,7 @@ def run_trials(
         If `jobs` is less than 1, or is given beside an executor.
     StoreError
         If the store cannot be read or written; running trials are given up.
-    ExperimentError
+    RunError
         If the executor can run no trial any more; what was finished is stored.
     """
     if executor is None:
@@ -143,7 +143,7 @@ def run_trials(
     planned = tuple(plan)
     stored = store.keys()
     missing = tuple(p for p in planned if p.key not in stored)
-    n_episodes = sum(p.config.protocol.n_learning_episodes for p in missing)
+    n_episodes = sum(p.config.length for p in missing)
     watcher.begun(len(planned), len(planned) - len(missing), n_episodes)
     stop = threading.Event()
     failures: list[Failure] = []

@@ -1,10 +1,21 @@
-"""The errors a user of runs can cause and mend."""
+"""The errors that a user can cause and mend."""
 
 from __future__ import annotations
 
 import shlex
 
-__all__ = ["ConfigError", "RunError", "RunTerminatedError", "command_line", "problem_of"]
+__all__ = [
+    "ClusterError",
+    "ConfigError",
+    "PlotUnavailableError",
+    "RunError",
+    "RunTerminatedError",
+    "StoreError",
+    "StudyError",
+    "WorkerLostError",
+    "command_line",
+    "problem_of",
+]
 
 
 class RunError(Exception):
@@ -37,6 +48,26 @@ class ConfigError(RunError):
 
 class RunTerminatedError(RunError):
     """SIGTERM came; the run was saved after the present step."""
+
+
+class StoreError(RunError):
+    """The result file cannot be opened, read or written."""
+
+
+class PlotUnavailableError(RunError):
+    """A figure or page needs a library that is not installed."""
+
+
+class ClusterError(RunError):
+    """A cluster was asked for, but it cannot be reached or has no worker that fits."""
+
+
+class WorkerLostError(RunError):
+    """A trial was given up because worker after worker was lost while running it."""
+
+
+class StudyError(RunError):
+    """A study file says something that cannot be run."""
 
 
 def problem_of(error: ValueError) -> str:

@@ -92,7 +92,7 @@ class Executor(Protocol):
 
         Raises
         ------
-        ExperimentError
+        RunError
             If no trial can be run any more.
         """
 

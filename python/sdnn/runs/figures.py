@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 from sdnn.interrupts import stay_interrupts
 from sdnn.runs.comparison import Comparison, Measured
 from sdnn.runs.curves import HEADER, Curve, csv_rows
-from sdnn.runs.errors import RunError
+from sdnn.runs.errors import PlotUnavailableError, RunError
 from sdnn.runs.measures import CENSORED_MEASURES, MeasureName
 from sdnn.runs.registry import AGENTS, agent_entry
 from sdnn.runs.results import CaseResult
 from sdnn.runs.statistics import estimate_mean, running_median
-from sdnn.runs.trial_errors import PlotUnavailableError
 from sdnn.whole_files import csv_bytes, write_whole
 
 if TYPE_CHECKING:

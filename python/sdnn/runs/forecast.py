@@ -11,14 +11,13 @@ from typing import Any
 
 from sdnn.machine import n_cores
 from sdnn.runs.comparison import Combination
-from sdnn.runs.progress import describe
+from sdnn.runs.errors import RunError
 from sdnn.runs.records import TrialKey, TrialTime
 from sdnn.runs.report import duration_words
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.sweep import SweepRequest
 from sdnn.runs.trial import opened
-from sdnn.runs.trial_config import TrialSettings
-from sdnn.runs.trial_errors import ExperimentError
+from sdnn.runs.trial_config import TrialSettings, describe
 
 PROBE_SECONDS = 0.3
 """Processor time of a probe, about."""
@@ -109,7 +108,7 @@ def forecast(request: SweepRequest) -> Forecast:
         If there is no variant of that name.
     StoreError
         If the result file cannot be used.
-    ExperimentError
+    RunError
         If a trial that is begun to see how long it takes fails.
     """
     study, plan = request.study, request.plan
@@ -161,7 +160,7 @@ class Durations:
         self._probes: dict[tuple[str, str], TrialTime] = {}
 
     def of_trial(self, key: TrialKey, config: TrialSettings) -> Duration:
-        """Estimate the time of a trial; an `ExperimentError` if a probe fails."""
+        """Estimate the time of a trial; an `RunError` if a probe fails."""
         alike = [t for t in self._times if t.key[:2] == key[:2]]
         same = [t for t in alike if t.key.config_hash == key.config_hash]
         if not alike:
@@ -209,7 +208,7 @@ def _probe(key: TrialKey, config: TrialSettings) -> TrialTime:
             n_episodes, n_decisions = int(trial.episode), int(trial.n_decisions)
     except Exception as error:  # whatever a trial raises
         message = f"{type(error).__name__}: {error}"
-        raise ExperimentError(f"{describe(key)} fails: {message}") from error
+        raise RunError(f"{describe(key)} fails: {message}") from error
     return TrialTime(key=key, seconds=seconds, n_episodes=n_episodes, n_decisions=n_decisions)
 
 

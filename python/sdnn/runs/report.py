@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sdnn.runs.errors import PlotUnavailableError
 from sdnn.runs.measures import MEASURES, RETURN_MEASURES, MeasureName
 from sdnn.runs.results import CaseResult
 from sdnn.runs.statistics import DEFAULT_BOOTSTRAP, Estimate
-from sdnn.runs.trial_errors import PlotUnavailableError
 
 if TYPE_CHECKING:
     from rich.console import Console

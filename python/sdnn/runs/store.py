@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from sdnn.runs.errors import StoreError
 from sdnn.runs.records import (
     ROW,
     CostKey,
@@ -27,7 +28,6 @@ from sdnn.runs.records import (
     TrialRows,
     TrialTime,
 )
-from sdnn.runs.trial_errors import StoreError
 
 STORE_NAME = "results.sqlite"
 SCHEMA_VERSION = 4

@@ -54,6 +54,11 @@ class TrialSettings(ABC):
     def max_decisions(self) -> int | None:
         """Decisions in an episode at most; None if nobody knows."""
 
+    @property
+    def length(self) -> int:
+        """Learning episodes of the trial, in which its progress is told."""
+        return self.protocol.n_learning_episodes
+
     def check_agent(self) -> None:
         """Check that there is such an agent, and that the settings are its own.
 
@@ -217,6 +222,17 @@ def trial_seed(root_seed: int, case_id: str, trial: int) -> int:
     return int(word) >> 1
 
 
+def describe(key: TrialKey) -> str:
+    """Name a trial for a reader; trials count from 1.
+
+    Examples
+    --------
+    >>> describe(TrialKey("s4", "sdnn-c", 0, 1, ""))
+    'SDNN-C s4, trial 1'
+    """
+    return f"{agent_entry(key.agent).title} {key.case_id}, trial {key.trial + 1}"
+
+
 @dataclass(frozen=True)
 class PlannedTrial:
     """A trial that a run needs.
@@ -231,3 +247,8 @@ class PlannedTrial:
 
     key: TrialKey
     config: TrialSettings
+
+    @property
+    def title(self) -> str:
+        """Its name for a reader."""
+        return describe(self.key)

@@ -22,7 +22,6 @@ from sdnn.reproduction import ResultStore, StoreError
 from sdnn.reproduction.sweep.reading import read_study
 from sdnn.runs.config import RunConfig
 from sdnn.runs.errors import RunError
-from sdnn.runs.trial_errors import ExperimentError
 
 ROOT = Path(__file__).parents[3]
 X = np.random.RandomState(0).uniform(size=(40, 2))
@@ -136,7 +135,7 @@ READERS = {
         "study.toml",
         lambda: contents_of("docs/studies", "*.toml"),
         read_study,
-        (ExperimentError,),
+        (RunError,),
     ),
     "run": Reader("run.toml", lambda: [RUN], RunConfig.read, (RunError,)),
 }

@@ -16,6 +16,7 @@ from click.testing import CliRunner
 from rich.console import Console
 
 import sdnn
+from sdnn.agents.progress import ProgressBars
 from sdnn.approximators import SDNNCConfig
 from sdnn.cli import main
 from sdnn.reproduction import (
@@ -35,7 +36,6 @@ from sdnn.reproduction import (
 )
 from sdnn.reproduction.cases import EXPERIMENTS
 from sdnn.runs.dask_worker import probe
-from sdnn.runs.progress import ProgressObserver
 from sdnn.runs.records import records_digest
 
 pytest.importorskip("distributed", reason='needs Dask: pip install "sdnn[dask]"')
@@ -244,7 +244,7 @@ def test_a_trial_that_cannot_be_sent_is_reported_and_the_others_are_done(pair, t
     odd = copy.copy(plan[-1].config)
     object.__setattr__(odd, "lock", threading.Lock())
     plan[-1] = PlannedTrial(plan[-1].key, odd)
-    with ProgressObserver(Console(file=StringIO())) as observer:
+    with ProgressBars(Console(file=StringIO())) as observer:
         outcome, _ = run(tmp_path, plan, pair, observer)
     assert outcome.n_run == 3
     (failed,) = outcome.failures

@@ -6,9 +6,9 @@ import time
 import pytest
 from rich.console import Console
 
+from sdnn.agents.progress import ProgressBars
 from sdnn.reproduction import Observer, ResultStore, StoreError, WorkerLostError
 from sdnn.runs.executor import Advanced, Failed, Finished, Lost, Noted, Started
-from sdnn.runs.progress import ProgressObserver
 from sdnn.runs.thread_executor import ThreadExecutor
 
 
@@ -213,7 +213,7 @@ def test_an_executor_tells_and_the_engine_stores(tmp_path, fake, run, record):
     ]  # fmt: skip
     # On a terminal, bars of lost trials go and come again.
     text = io.StringIO()
-    with ProgressObserver(Console(file=text, force_terminal=True, width=80)) as observer:
+    with ProgressBars(Console(file=text, force_terminal=True, width=80)) as observer:
         run(tmp_path / "shown", plan, executor=Scripted(*script), observer=observer)
     assert "hear" in text.getvalue()
     assert "all (0 to go)" in text.getvalue()

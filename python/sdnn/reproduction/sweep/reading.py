@@ -29,11 +29,11 @@ from sdnn.reproduction.sweep.study import (
     StudyVariant,
 )
 from sdnn.runs.environment_trial import EnvironmentConfig, EnvironmentTrialConfig
+from sdnn.runs.errors import StudyError
 from sdnn.runs.preset_agents import PRESET_AGENTS
 from sdnn.runs.registry import AGENTS, agent_entry
 from sdnn.runs.trial import ProtocolConfig
 from sdnn.runs.trial_config import TrialConfig
-from sdnn.runs.trial_errors import StudyError
 from sdnn.toml_lines import KeyPath
 from sdnn.typed_values import possible_words
 

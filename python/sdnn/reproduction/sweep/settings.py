@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
-from sdnn.runs.trial_errors import StudyError
+from sdnn.runs.errors import StudyError
 from sdnn.toml_lines import KeyPath, key_lines, line_of
 from sdnn.typed_values import convert, hints_of, possible_words, words_of
 

@@ -14,7 +14,7 @@ from sdnn.reproduction import (
     plan_trials,
 )
 from sdnn.runs.environment_trial import EnvironmentTrialConfig
-from sdnn.runs.trial_errors import StudyError
+from sdnn.runs.errors import StudyError
 
 PAPER = """
 [study]
