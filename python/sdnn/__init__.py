@@ -19,11 +19,11 @@ core uses.
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sdnn._core import __version__
 from sdnn.instruction_sets import instruction_set, set_instruction_set
+from sdnn.lazy import attach
 
 if TYPE_CHECKING:
     from sdnn import (
@@ -59,14 +59,4 @@ __all__ = [
     "set_instruction_set",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    if name in ("SDNNClassifier", "SDNNKernelRidge", "SDNNRegressor"):
-        return getattr(importlib.import_module("sdnn.estimators"), name)
-    if name in __all__:
-        return importlib.import_module(f"sdnn.{name}")
-    raise AttributeError(f"module 'sdnn' has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = attach(globals())

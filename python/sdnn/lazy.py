@@ -2,36 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import ast
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
 __all__ = ["attach"]
 
 
-def attach(
-    package: str, homes: Mapping[str, Sequence[str]]
-) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Make a package's ``__getattr__`` and ``__dir__``.
+def attach(namespace: dict[str, Any]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """Make ``__getattr__`` and ``__dir__`` of a package from its imports for type checkers.
 
-    Parameters
-    ----------
-    package
-        Its name.
-    homes
-        Names by the submodule that has them.
+    What a package imports under ``if TYPE_CHECKING:`` is thus written once, for type checkers,
+    for readers and for loading. ``namespace`` is the package's ``globals()``.
 
     Examples
     --------
-    >>> getattribute, names = attach("sdnn", {"lazy": ["attach"]})
-    >>> getattribute("attach").__name__, names()
-    ('attach', ['attach'])
+    >>> import sdnn
+    >>> load, names = attach(vars(sdnn))
+    >>> load("coding").__name__, "SDNNRegressor" in names()
+    ('sdnn.coding', True)
     """
-    home_of = {name: home for home, names in homes.items() for name in names}
+    package = namespace["__name__"]
+    with open(namespace["__file__"], encoding="utf-8") as source:
+        blocks = [node for node in ast.parse(source.read()).body if isinstance(node, ast.If)]
+    imports = [node for block in blocks for node in block.body if isinstance(node, ast.ImportFrom)]
+    homes = {name.name: str(node.module) for node in imports for name in node.names}
 
-    def getattribute(name: str) -> Any:
-        if name not in home_of:
+    def load(name: str) -> Any:
+        if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return getattr(import_module(f"{package}.{home_of[name]}"), name)
+        if homes[name] == package:  # a module of the package
+            return import_module(f"{package}.{name}")
+        return getattr(import_module(homes[name]), name)
 
-    return getattribute, lambda: sorted(home_of)
+    return load, lambda: sorted({*namespace, *homes})

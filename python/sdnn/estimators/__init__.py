@@ -16,16 +16,7 @@ if TYPE_CHECKING:
     from sdnn.estimators.libsdnn import read_model_file, read_parameter_file
     from sdnn.estimators.regressor import SDNNRegressor
 
-_load, __dir__ = attach(
-    __name__,
-    {
-        "base": ("OutOfRangeWarning",),
-        "classifier": ("SDNNClassifier",),
-        "kernel_ridge": ("SDNNKernelRidge",),
-        "libsdnn": ("read_model_file", "read_parameter_file"),
-        "regressor": ("SDNNRegressor",),
-    },
-)
+_load, __dir__ = attach(globals())
 
 __all__ = [
     "OutOfRangeWarning",

@@ -5,8 +5,9 @@ Names are loaded when they are first used, so that the command line starts quick
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from sdnn.lazy import attach
 
 if TYPE_CHECKING:
     from sdnn.reproduction.cases import EXPERIMENTS, Case, Experiment, select_experiments
@@ -37,30 +38,7 @@ if TYPE_CHECKING:
     from sdnn.runs.trial import ProtocolConfig, Trial
     from sdnn.runs.trial_config import PlannedTrial, TrialConfig, TrialSettings, trial_seed
 
-_HOMES = {
-    "reproduction.cases": "Case EXPERIMENTS Experiment select_experiments",
-    "reproduction.claims": "CLAIMS Claim",
-    "reproduction.cost": "CostConfig",
-    "reproduction.figures": "draw_cost draw_experiment",
-    "reproduction.plan": "case_config plan_trials",
-    "reproduction.reproduce": "ReproduceRequest Reproduction collect",
-    "reproduction.verdicts": "judge_claims",
-    "runs.dask_executor": "DaskExecutor",
-    "runs.engine": "Observer run_trials",
-    "runs.environment_trial": "EnvironmentConfig EnvironmentTrialConfig",
-    "runs.executor": "Executor",
-    "runs.measures": "MeasureConfig",
-    "runs.records": "CostRecord TrialKey TrialRecord TrialRows",
-    "runs.registry": "AGENTS AgentEntry CostSeries agent_entry register",
-    "runs.results": "CaseResult measure",
-    "runs.statistics": "Estimate",
-    "runs.store": "ResultStore",
-    "runs.thread_executor": "ThreadExecutor",
-    "runs.trial": "ProtocolConfig Trial",
-    "runs.trial_config": "PlannedTrial TrialConfig TrialSettings trial_seed",
-    "runs.errors": "ClusterError PlotUnavailableError StoreError StudyError WorkerLostError",
-}
-_HOME_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
+__getattr__, __dir__ = attach(globals())
 
 __all__ = [
     "AGENTS",
@@ -111,13 +89,3 @@ __all__ = [
     "select_experiments",
     "trial_seed",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME_OF:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"sdnn.{_HOME_OF[name]}"), name)
-
-
-def __dir__() -> list[str]:
-    return __all__

@@ -17,16 +17,7 @@ if TYPE_CHECKING:
     from sdnn.runs.run import Goal, Run, RunEvaluation, RunOutcome
     from sdnn.runs.spec import AgentSpec, BudgetSpec, OutputSpec, ProtocolSpec, RunSpec
 
-__getattr__, __dir__ = attach(
-    __name__,
-    {
-        "config": ("AGENTS", "RunConfig"),
-        "environment": ("EnvironmentSpec",),
-        "errors": ("ConfigError", "RunError", "RunTerminatedError"),
-        "run": ("Goal", "Run", "RunEvaluation", "RunOutcome"),
-        "spec": ("AgentSpec", "BudgetSpec", "OutputSpec", "ProtocolSpec", "RunSpec"),
-    },
-)
+__getattr__, __dir__ = attach(globals())
 
 __all__ = [
     "AGENTS",
