@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from sdnn.runs.engine import RunOutcome
+    from sdnn.runs.report import Finished
 
 Done = TypeVar("Done")
 
@@ -52,11 +53,16 @@ def report_outcome(context: click.Context, outcome: RunOutcome, out: Path) -> st
     return stored
 
 
-def print_files(outcome: RunOutcome, files: tuple[Path, ...], stored: str) -> None:
-    """Say what was run and where to look."""
-    page = next(str(file) for file in files if file.suffix == ".html")
-    done_now = f"{stored} ({outcome.n_run} run now); " if outcome.n_planned else ""
-    click.echo(f"{done_now}wrote {len(files)} files: see {page}")
+def print_finished(done: Finished, stored: str, *, as_json: bool) -> None:
+    """Print the results, as JSON or with what was run and where to look."""
+    if as_json:
+        click.echo(json.dumps(done.table, indent=2))
+        return
+    if done.page is not None:
+        done.page.print(make_console())
+    page = next(str(file) for file in done.files if file.suffix == ".html")
+    done_now = f"{stored} ({done.outcome.n_run} run now); " if done.outcome.n_planned else ""
+    click.echo(f"{done_now}wrote {len(done.files)} files: see {page}")
 
 
 def make_console() -> Console:

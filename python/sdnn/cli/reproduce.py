@@ -12,8 +12,7 @@ from sdnn.cli.executor_options import executor_options
 from sdnn.cli.output import (
     EXIT_FAILURE,
     experiment_command,
-    make_console,
-    print_files,
+    print_finished,
     report_outcome,
     with_progress,
 )
@@ -26,9 +25,9 @@ from sdnn.reproduction.cases import (
 from sdnn.runs.preset_agents import PRESET_AGENTS
 
 if TYPE_CHECKING:
-    from sdnn.reproduction.report import Report
-    from sdnn.reproduction.reproduce import ReproduceRequest, Reproduction
+    from sdnn.reproduction.reproduce import ReproduceRequest
     from sdnn.runs.executor import Executor
+    from sdnn.runs.report import Finished
 
 
 @click.command(short_help="Run the paper's experiments and write a report.")
@@ -129,48 +128,31 @@ def reproduce(
 def _print_plan(request: ReproduceRequest, as_json: bool) -> None:
     from sdnn.reproduction.reproduce import count_stored
 
-    counts = count_stored(request)
+    trials, (n_costs, n_costs_stored) = count_stored(request)
     n_episodes = request.protocol.n_learning_episodes
-    n_costs, n_costs_stored = counts.costs
     if as_json:
-        trials = [
-            {"case": case, "agent": agent, "planned": planned, "stored": stored}
-            for (case, agent), (planned, stored) in counts.trials.items()
-        ]
-        costs = {"planned": n_costs, "stored": n_costs_stored}
-        plan = {"n_learning_episodes": n_episodes, "trials": trials, "costs": costs}
+        plan = {
+            "n_learning_episodes": n_episodes,
+            "trials": [
+                {"case": case, "agent": agent, "planned": planned, "stored": stored}
+                for (case, agent), (planned, stored) in trials.items()
+            ],
+            "costs": {"planned": n_costs, "stored": n_costs_stored},
+        }
         click.echo(json.dumps(plan, indent=2))
         return
-    for (case, agent), (planned, stored) in counts.trials.items():
+    stored_in = f"of them stored in {request.out}"
+    for (case, agent), (planned, stored) in trials.items():
         click.echo(
-            f"{case} {agent}: {planned} trials x {n_episodes} episodes,"
-            f" {stored} of them stored in {request.out}"
+            f"{case} {agent}: {planned} trials x {n_episodes} episodes, {stored} {stored_in}"
         )
     if n_costs:
-        click.echo(
-            f"cost of a step: {n_costs} measurements, {n_costs_stored} of them stored in"
-            f" {request.out}"
-        )
+        click.echo(f"cost of a step: {n_costs} measurements, {n_costs_stored} {stored_in}")
 
 
-def _finish(context: click.Context, done: Reproduction, out: Path, as_json: bool) -> None:
+def _finish(context: click.Context, done: Finished, out: Path, as_json: bool) -> None:
     stored = report_outcome(context, done.outcome, out)
     if done.outcome.failures:
         click.echo(f"Error: no figure drawn; {stored}", err=True)
         context.exit(EXIT_FAILURE)
-    if as_json:
-        click.echo(json.dumps(done.table, indent=2))
-        return
-    if done.report is not None:
-        _print_report(done.report)
-    print_files(done.outcome, done.files, stored)
-
-
-def _print_report(report: Report) -> None:
-    from sdnn.runs.report import print_tables
-
-    console = make_console()
-    if report.agents_note:
-        console.print(report.agents_note, highlight=False)
-    mark = " (QUICK LOOK, not the result)" if report.quick else ""
-    print_tables(console, report.tables(), report.notes(), mark)
+    print_finished(done, stored, as_json=as_json)

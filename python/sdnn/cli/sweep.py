@@ -12,16 +12,15 @@ from sdnn.cli.executor_options import executor_options
 from sdnn.cli.output import (
     EXIT_FAILURE,
     experiment_command,
-    make_console,
-    print_files,
+    print_finished,
     report_outcome,
     with_progress,
 )
 
 if TYPE_CHECKING:
     from sdnn.runs.executor import Executor
-    from sdnn.runs.study_report import StudyReport
-    from sdnn.runs.sweep import Sweep, SweepRequest
+    from sdnn.runs.report import Finished
+    from sdnn.runs.sweep import SweepRequest
 
 
 @click.command(short_help="Run a study: variants of any setting, trial by trial.")
@@ -94,34 +93,19 @@ def sweep(
 
 
 def _print_forecast(request: SweepRequest, as_json: bool) -> None:
-    from sdnn.runs.forecast import forecast
+    from sdnn.runs.forecast import forecast, forecast_lines
 
     found = forecast(request)
-    if as_json:
-        click.echo(json.dumps(found.to_json(), indent=2))
-        return
-    for line in found.lines(request.out):
+    lines = [json.dumps(found, indent=2)] if as_json else forecast_lines(found, request.out)
+    for line in lines:
         click.echo(line)
 
 
-def _finish_sweep(context: click.Context, done: Sweep, out: Path, as_json: bool) -> None:
+def _finish_sweep(context: click.Context, done: Finished, out: Path, as_json: bool) -> None:
     stored = report_outcome(context, done.outcome, out)
-    if done.report is None:
+    if done.page is None:
         click.echo(f"Error: nothing is complete; {stored}", err=True)
         context.exit(EXIT_FAILURE)
-    if as_json:
-        click.echo(json.dumps(done.table, indent=2))
-    else:
-        _print_study(done.report)
-        print_files(done.outcome, done.files, stored)
+    print_finished(done, stored, as_json=as_json)
     if done.outcome.failures:
         context.exit(EXIT_FAILURE)
-
-
-def _print_study(report: StudyReport) -> None:
-    from sdnn.runs.report import print_tables
-
-    console = make_console()
-    lines = [report.title, report.scope, *filter(None, [report.missing])]
-    console.print("\n".join(lines), highlight=False, markup=False)
-    print_tables(console, report.tables(), report.notes())

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from sdnn.reproduction.cost import CostConfig
     from sdnn.reproduction.figures import draw_cost, draw_experiment
     from sdnn.reproduction.plan import case_config, plan_trials
-    from sdnn.reproduction.reproduce import ReproduceRequest, Reproduction, collect
+    from sdnn.reproduction.reproduce import ReproduceRequest, collect
     from sdnn.reproduction.verdicts import judge_claims
     from sdnn.runs.dask_executor import DaskExecutor
     from sdnn.runs.engine import Observer, run_trials
@@ -64,7 +64,6 @@ __all__ = [
     "PlotUnavailableError",
     "ProtocolConfig",
     "ReproduceRequest",
-    "Reproduction",
     "ResultStore",
     "StoreError",
     "StudyError",

@@ -15,19 +15,8 @@ from sdnn.runs.trial_config import PlannedTrial, TrialConfig, trial_seed
 def case_config(case: Case, agent: str, protocol: ProtocolConfig | None = None) -> TrialConfig:
     """Return the configuration of an agent in a case: its entry's defaults, the case's sensors.
 
-    Parameters
-    ----------
-    case
-        What is observed.
-    agent
-        Id of the agent, one of `case.agents`.
-    protocol
-        Another protocol than the paper's.
-
-    Raises
-    ------
-    ValueError
-        If the agent takes no part in the case, or no agent has that id.
+    The protocol is the paper's by default. A ValueError says that the agent takes no part in the
+    case, or that no agent has that id.
     """
     if agent not in case.agents:
         raise ValueError(f"agent must be one of {case.agents} in case {case.id}, got {agent!r}")
@@ -47,11 +36,12 @@ def plan_trials(
     """List the trials of all agents in the given cases, each once.
 
     The first trial of every case comes first, so an interrupted run covers all cases evenly.
+    Experiments share the trials of cases that have the same id.
 
     Parameters
     ----------
     cases
-        Cases; rows that share an id and an agent share their trials.
+        The cases.
     n_trials
         Trials for each case and agent.
     root_seed
@@ -60,12 +50,10 @@ def plan_trials(
         Another protocol than the paper's.
     """
     plan: dict[TrialKey, PlannedTrial] = {}
-    pairs = [
-        (case, agent, case_config(case, agent, protocol)) for case in cases for agent in case.agents
-    ]
+    configs = [(case.id, a, case_config(case, a, protocol)) for case in cases for a in case.agents]
     for trial in range(n_trials):
-        for case, agent, config in pairs:
-            seed = trial_seed(root_seed, case.id, trial)
-            key = TrialKey(case.id, agent, trial, seed, config.config_hash)
+        for case_id, agent, config in configs:
+            seed = trial_seed(root_seed, case_id, trial)
+            key = TrialKey(case_id, agent, trial, seed, config.config_hash)
             plan.setdefault(key, PlannedTrial(key, config))
     return tuple(plan.values())

@@ -1,4 +1,4 @@
-"""The results of a run as tables, as a page and as JSON."""
+"""The results of a run as a page and as JSON."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from sdnn import _core
 from sdnn.reproduction.cases import PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.reproduction.chances import MULTIPLES, N_POWER_DRAWS, Power, powers
 from sdnn.reproduction.claims import Claim, Growth, describe
@@ -19,7 +20,6 @@ from sdnn.reproduction.verdicts import (
     ALWAYS,
     NEVER,
     CheckOutcome,
-    ClaimOutcome,
     SettledClaim,
     Verdict,
     is_paper_scale,
@@ -30,29 +30,26 @@ from sdnn.runs.measures import STEP_MEASURES
 from sdnn.runs.records import CostRecord
 from sdnn.runs.registry import agent_entry, cost_series
 from sdnn.runs.report import (
-    COST_CELLS,
-    NOTE,
-    Call,
+    MEASURE_END,
+    Page,
     Section,
     Table,
     format_estimate,
     format_share,
     measure_cells,
-    measure_terms,
     measures_section,
     settings_section,
-    to_html,
-    to_markdown,
 )
 from sdnn.runs.results import CaseResult
 from sdnn.runs.statistics import Estimate
 
-QUICK_WARNING = "A quick look at a fraction of the experiments, not their result."
+QUICK_WARNING = "QUICK LOOK: a fraction of the experiments, not their result."
 RULE_NOTE = (
     "A line about a claim holds if the whole interval lies in the range that was written down"
     " before the trials were run, does not hold if the whole interval lies outside on one side, and"
     " is undecided otherwise. Runs smaller than"
-    f" {PAPER_TRIALS} trials x {PAPER_EPISODES:,} episodes are not judged."
+    f" {PAPER_TRIALS} trials x {PAPER_EPISODES:,} episodes are not judged. A claim of several lines"
+    " holds if all of them do, and does not hold if one of them does not."
 )
 CHANCE_NOTE = (
     "Ten trials show it: in how many draws of ten of these trials, as the paper's ten were one, the"
@@ -83,29 +80,19 @@ VERDICT_KINDS = {verdict.value: kind for verdict, (kind, _) in _SHOWN.items()}
 
 
 @dataclass(frozen=True)
-class ExperimentReport:
-    """An experiment and the results of its cases, one for each case and agent."""
-
-    experiment: Experiment
-    results: tuple[CaseResult, ...]
-
-
-@dataclass(frozen=True)
 class Report:
-    """Everything that tables and pages are made of.
+    """The results of a run.
 
     Parameters
     ----------
     experiments
-        Those of which every trial is there.
+        Those of which every trial is there, with a result for each case and agent.
     costs
         Measured costs; none if they were not measured.
     quick
         Whether this is a look at a fraction.
     seed
         Root of all seeds.
-    version
-        Version of the library that made the report.
     digest
         Digest of the experiments' rows.
     agents
@@ -114,11 +101,10 @@ class Report:
         Reference results: more trials of the same settings than were run.
     """
 
-    experiments: tuple[ExperimentReport, ...]
+    experiments: tuple[tuple[Experiment, tuple[CaseResult, ...]], ...]
     costs: tuple[CostRecord, ...]
     quick: bool
     seed: int
-    version: str
     digest: str
     agents: tuple[str, ...] = ()
     reference: tuple[ReferenceResult, ...] = ()
@@ -126,220 +112,103 @@ class Report:
     @property
     def results(self) -> list[CaseResult]:
         """The results of all experiments."""
-        return [result for one in self.experiments for result in one.results]
+        return [result for _, results in self.experiments for result in results]
 
     @cached_property
-    def claims(self) -> tuple[ClaimOutcome, ...]:
-        """The claims that these results speak about."""
-        return judge_claims(self.results, self.costs)
-
-    @cached_property
-    def settled(self) -> tuple[SettledClaim, ...]:
-        """The claims with all that speaks about them, also reference results."""
-        return settle(self.claims, self.reference)
+    def claims(self) -> tuple[SettledClaim, ...]:
+        """The claims that these results speak about, with what reference results say of them."""
+        return settle(judge_claims(self.results, self.costs), self.reference)
 
     @cached_property
     def powers(self) -> tuple[tuple[Claim, CheckOutcome, tuple[Power, ...]], ...]:
         """What more trials would say of the checks that the most trials leave undecided."""
         return tuple(
             (one.claim, checked, powers(checked.check, checked.samples))
-            for one in self.settled
+            for one in self.claims
             for checked in one.best.checks
             if checked.verdict is Verdict.UNDECIDED and checked.samples
         )
 
-    @property
-    def agents_note(self) -> str | None:
-        """Which agents were run instead of the paper's; None if those were."""
-        if not self.agents:
-            return None
-        titles = ", ".join(agent_entry(agent).title for agent in self.agents)
-        return f"Not the paper's comparison: {titles} instead of the agents of its cases."
-
-    @cached_property
-    def case_tables(self) -> list[Table]:
-        """The measures of each experiment's cases and agents."""
-        words = (name.replace("_", " ") for name in STEP_MEASURES)
-        header = ("case", "agent", "trials", *words, *COST_CELLS)
-        return [
-            Table(
-                one.experiment.title,
-                header,
-                [
-                    (
-                        result.title,
-                        agent_entry(result.agent).title,
-                        str(result.n_trials),
-                        *measure_cells(result, STEP_MEASURES),
-                    )
-                    for result in one.results
-                ],
-            )
-            for one in self.experiments
-        ]
-
-    @cached_property
-    def claim_table(self) -> Table:
-        """The verdicts about the claims.
-
-        A claim of several checks has a row of its own, with the verdict about all, before theirs.
-        """
-        rows: list[tuple[str, ...]] = []
-        for outcome in self.claims:
-            start: tuple[str, str] = (str(outcome.claim.number), outcome.claim.text)
-            if len(outcome.checks) > 1:
-                rows.append((*start, "", "", "", outcome.verdict.value))
-                start = ("", "")
-            rows += (
-                (*start, describe(checked.check.quantity), checked.check.paper,
-                 format_quantity(checked), checked.verdict.value)
-                for checked in outcome.checks
-            )  # fmt: skip
-        header = ("claim", "the paper says", "measured", "paper", "ours", "verdict")
-        return Table("Beside the paper's claims", header, rows, VERDICT_KINDS)
-
-    @cached_property
-    def more_table(self) -> Table:
-        """The verdicts by reference results: of each claim by the whole rule, then its checks'."""
-        rows: list[tuple[str, ...]] = []
-        for one in self.settled:
-            if one.more is None or one.chance is None:
-                continue
-            start = (str(one.claim.number), one.claim.text, "", "", "")
-            rows.append((*start, one.verdict.value, format_share(one.chance)))
-            rows += (
-                ("", "", describe(checked.check.quantity),
-                 str(min(sample.size for sample in checked.samples)), format_quantity(checked),
-                 checked.verdict.value, "")
-                for checked in one.more.checks
-            )  # fmt: skip
-        header = (
-            "claim", "the paper says", "measured", "trials", "ours", "verdict",
-            "ten trials show it",
-        )  # fmt: skip
-        return Table("With more trials", header, rows, VERDICT_KINDS)
-
-    @property
-    def more_note(self) -> str:
-        """Which trials the reference results are, and what their table means."""
-        seeds = sorted({one.root_seed for one in self.reference})
-        return (
-            "The same settings with more trials on other seeds"
-            f" (root seed{'s' if len(seeds) > 1 else ''} {' and '.join(map(str, seeds))}), whose"
-            f" measures are kept with the library. {CHANCE_NOTE}"
-        )
-
-    @cached_property
-    def power_table(self) -> Table:
-        """What more trials would say of what is undecided."""
-        rows = [
-            (str(claim.number), describe(checked.check.quantity), format_quantity(checked),
-             *(f"{100 * one.holds:.0f} / {100 * one.fails:.0f} %" for one in found))
-            for claim, checked, found in self.powers
-        ]  # fmt: skip
-        header = ("claim", "measured", "ours", *(f"{n} x the trials" for n in MULTIPLES))
-        return Table("What is undecided", header, rows)
-
-    @cached_property
-    def cost_table(self) -> Table:
-        """The costs of a step: a row for each number of inputs, a column for each series."""
-        return cost_table(self.costs)
-
-    def tables(self) -> list[Table]:
-        """Every table that has rows."""
-        last = (self.cost_table, self.claim_table, self.more_table, self.power_table)
-        return [*self.case_tables, *(table for table in last if table.rows)]
-
-    def notes(self) -> list[str]:
-        """Say what the tables mean."""
-        terms = measure_terms(STEP_MEASURES).items()
-        return [
-            *([RULE_NOTE] if self.claims else []),
-            *([self.more_note] if self.more_table.rows else []),
-            *([POWER_NOTE] if self.powers else []),
-            *([NOTE, *(f"{name}: {text}." for name, text in terms)] if self.experiments else []),
-            *([COST_NOTE] if self.costs else []),
-        ]
-
-    def to_markdown(self) -> str:
-        """Write the tables as Markdown."""
-        warning = f"**{QUICK_WARNING}**" if self.quick else None
-        return to_markdown(
-            "The paper's experiments",
-            filter(None, [warning, self.agents_note]),
-            self.tables(),
-            self.notes(),
-            f"Root seed {self.seed}; digest of the rows {self.digest[:16]}; sdnn {self.version}.",
-        )
-
-    def to_html(self, pictures: Mapping[str, bytes], call: Call) -> str:
-        """Make the page.
-
-        Parameters
-        ----------
-        pictures
-            SVG of each figure, by the name of its file without suffix.
-        call
-            How it came about.
-        """
-        warning = QUICK_WARNING if self.quick else None
-        if not self.quick and not all(map(is_paper_scale, self.results)):
-            warning = (
+    def page(self, pictures: Mapping[str, bytes]) -> Page:
+        """Return the page, with the SVG of figures by the names of their files without suffix."""
+        warnings = []
+        if self.quick:
+            warnings.append(QUICK_WARNING)
+        elif not all(map(is_paper_scale, self.results)):
+            warnings.append(
                 f"Smaller than the paper's experiments ({PAPER_TRIALS} trials x"
                 f" {PAPER_EPISODES:,} episodes): nothing is judged."
             )
-        return to_html(
-            title="Q-learning with SDNN-C: the paper's experiments, reproduced",
-            heading="Q-learning with noisy and redundant inputs by SDNN-C: the paper's experiments,"
+        if self.agents:
+            titles = ", ".join(agent_entry(agent).title for agent in self.agents)
+            warnings.append(
+                f"Not the paper's comparison: {titles} instead of the agents of its cases."
+            )
+        return Page(
+            title="Q-learning with noisy and redundant inputs by SDNN-C: the paper's experiments,"
             " run again",
             intro="Every figure of T. Kobayashi, T. Shibuya and M. Morita (JACIII 19(6), 825-832,"
             " 2015) redrawn from stored rows, and each of its claims beside what these rows say.",
-            warnings=filter(None, [warning, self.agents_note]),
-            provenance=f"{call.describe()} sdnn {self.version} on {call.machine}. Root seed"
-            f" {self.seed}, digest of the rows",
-            code=self.digest[:16],
-            sections=self._sections(pictures),
+            warnings=warnings,
+            sections=[*self._claim_sections(), *self._result_sections(pictures)],
+            source=f"Root seed {self.seed}; digest of the rows {self.digest[:16]}; sdnn"
+            f" {_core.__version__}.",
         )
 
-    def _sections(self, pictures: Mapping[str, bytes]) -> Iterator[Section]:
+    def _claim_sections(self) -> Iterator[Section]:
         if self.claims:
-            yield Section(
-                title="What the paper claims, and what our data say",
-                tally=tally(one.verdict for one in self.settled),
-                table=self.claim_table,
-                notes=[
-                    f"{RULE_NOTE} A claim of several lines holds if all of them do, and does not"
-                    " hold if one of them does not."
-                ],
+            counts = tally(one.verdict for one in self.claims)
+            yield Section(tally=counts, table=_claim_table(self.claims), notes=[RULE_NOTE])
+        more = _more_table(self.claims)
+        if more.rows:
+            seeds = sorted({one.root_seed for one in self.reference})
+            note = (
+                "The same settings with more trials on other seeds (root"
+                f" seed{'s' if len(seeds) > 1 else ''} {' and '.join(map(str, seeds))}), whose"
+                f" measures are kept with the library. {CHANCE_NOTE}"
             )
-        for table, note in ((self.more_table, self.more_note), (self.power_table, POWER_NOTE)):
-            if table.rows:
-                yield Section(title=table.title, level=3, table=table, notes=[note])
-        for one, table in zip(self.experiments, self.case_tables, strict=True):
+            yield Section(level=3, table=more, notes=[note])
+        if self.powers:
+            rows = [
+                (str(claim.number), describe(checked.check.quantity), format_quantity(checked),
+                 *(f"{100 * one.holds:.0f} / {100 * one.fails:.0f} %" for one in found))
+                for claim, checked, found in self.powers
+            ]  # fmt: skip
+            header = ("claim", "measured", "ours", *(f"{n} x the trials" for n in MULTIPLES))
+            table = Table("What is undecided", header, rows)
+            yield Section(level=3, table=table, notes=[POWER_NOTE])
+
+    def _result_sections(self, pictures: Mapping[str, bytes]) -> Iterator[Section]:
+        words = tuple(name.replace("_", " ") for name in STEP_MEASURES)
+        header = ("case", "agent", "trials", *words, *MEASURE_END)
+        for experiment, results in self.experiments:
+            rows = [
+                (one.title, agent_entry(one.agent).title, str(one.n_trials),
+                 *measure_cells(one, STEP_MEASURES))
+                for one in results
+            ]  # fmt: skip
             yield Section(
-                title=table.title,
-                picture=pictures[f"experiment-{one.experiment.id}"],
-                alt=f"{table.title}: steps per test episode against learning episodes",
-                table=table,
+                picture=pictures[f"experiment-{experiment.id}"],
+                alt=f"{experiment.title}: steps per test episode against learning episodes",
+                table=Table(experiment.title, header, rows),
             )
         if self.experiments:
-            yield measures_section(measure_terms(STEP_MEASURES))
+            yield measures_section(STEP_MEASURES)
         if self.costs:
             yield Section(
-                title=self.cost_table.title,
                 picture=pictures["cost"],
                 alt="Time of a step against the number of inputs, logarithmic",
                 is_narrow=True,
-                table=self.cost_table,
+                table=cost_table(self.costs),
                 notes=[COST_NOTE],
             )
-        if self.results:
+        if self.experiments:
             yield settings_section(
                 (f"{agent_entry(one.agent).title}, {one.title}", one) for one in self.results
             )
 
     def to_json(self) -> dict[str, Any]:
-        """Return the tables as values that JSON can hold.
+        """Return the results as values that JSON can hold.
 
         A censored value is the text ``">n"`` with n the last episode; an interval that one trial
         cannot give is null.
@@ -347,15 +216,15 @@ class Report:
         return {
             "quick": self.quick,
             "seed": self.seed,
-            "version": self.version,
+            "version": _core.__version__,
             "digest": self.digest,
             "experiments": [
                 {
-                    "id": one.experiment.id,
-                    "title": one.experiment.title,
-                    "cases": [_case_json(one.experiment, result) for result in one.results],
+                    "id": experiment.id,
+                    "title": experiment.title,
+                    "cases": [_case_json(experiment, result) for result in results],
                 }
-                for one in self.experiments
+                for experiment, results in self.experiments
             ],
             "costs": [cost.to_json() for cost in self.costs],
             "claims": [
@@ -365,7 +234,7 @@ class Report:
                     "ten_trials_show_it": chance_json(one.chance),
                     "settled": one.verdict.value,
                 }
-                for one in self.settled
+                for one in self.claims
             ],
             "powers": [
                 {
@@ -376,6 +245,39 @@ class Report:
                 for claim, checked, found in self.powers
             ],
         }
+
+
+def _claim_table(claims: Iterable[SettledClaim]) -> Table:
+    """Return the verdicts; a claim of several checks has a row of its own before theirs."""
+    rows: list[tuple[str, ...]] = []
+    for claim in claims:
+        own = claim.own
+        start: tuple[str, str] = (str(own.claim.number), own.claim.text)
+        if len(own.checks) > 1:
+            rows.append((*start, "", "", "", own.verdict.value))
+            start = ("", "")
+        for one in own.checks:
+            words = (describe(one.check.quantity), one.check.paper, format_quantity(one))
+            rows.append((*start, *words, one.verdict.value))
+    header = ("claim", "the paper says", "measured", "paper", "ours", "verdict")
+    return Table("What the paper claims, and what our data say", header, rows, VERDICT_KINDS)
+
+
+def _more_table(claims: Iterable[SettledClaim]) -> Table:
+    """Return verdicts by reference results: of each claim by the whole rule, then of its checks."""
+    rows: list[tuple[str, ...]] = []
+    for claim in claims:
+        if claim.more is None or claim.chance is None:
+            continue
+        start = (str(claim.claim.number), claim.claim.text, "", "", "")
+        rows.append((*start, claim.verdict.value, format_share(claim.chance)))
+        for one in claim.more.checks:
+            words = (describe(one.check.quantity), str(min(s.size for s in one.samples)))
+            rows.append(("", "", *words, format_quantity(one), one.verdict.value, ""))
+    header = (
+        "claim", "the paper says", "measured", "trials", "ours", "verdict", "ten trials show it"
+    )  # fmt: skip
+    return Table("With more trials", header, rows, VERDICT_KINDS)
 
 
 def _case_json(experiment: Experiment, result: CaseResult) -> dict[str, Any]:

@@ -1,17 +1,14 @@
-"""Run experiments and write what they gave: the body of ``sdnn reproduce``."""
+"""Run experiments and write their results: the body of ``sdnn reproduce``."""
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
-from sdnn import _core, machine
 from sdnn.reproduction.cases import (
     EXPERIMENTS,
     MOST_EPISODES,
@@ -23,8 +20,8 @@ from sdnn.reproduction.cost import QUICK_COST, CostConfig, cost_keys, measure_co
 from sdnn.reproduction.figures import draw_cost, draw_experiment
 from sdnn.reproduction.plan import plan_trials
 from sdnn.reproduction.reference_results import reference_results
-from sdnn.reproduction.report import ExperimentReport, Report
-from sdnn.runs.engine import Observer, RunOutcome, run_trials
+from sdnn.reproduction.report import Report
+from sdnn.runs.engine import Observer, run_trials
 from sdnn.runs.executor import Executor
 from sdnn.runs.figures import figure_bytes, require_matplotlib
 from sdnn.runs.records import (
@@ -38,7 +35,7 @@ from sdnn.runs.records import (
     trial_rows,
 )
 from sdnn.runs.registry import cost_series
-from sdnn.runs.report import Call, require_jinja
+from sdnn.runs.report import Finished, describe_call, json_bytes, require_jinja
 from sdnn.runs.results import CaseResult, measure
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.trial import ProtocolConfig
@@ -51,17 +48,10 @@ QUICK_EPISODES = 300
 
 @dataclass(frozen=True)
 class Plan:
-    """What a request needs, and what its report may show.
+    """What a request needs: its trials and costs, in order, and what its report may show.
 
-    Parameters
-    ----------
-    trials
-        Trials to run, in this order.
-    costs
-        Costs to measure, in this order.
-    experiments
-        Every experiment under the request's settings with the keys of its trials: the report shows
-        those whose trials are all there, asked for or not.
+    ``experiments`` are all of them under the request's settings with the keys of their trials: the
+    report shows those whose trials are all there, asked for or not.
     """
 
     trials: tuple[PlannedTrial, ...]
@@ -73,6 +63,9 @@ class Plan:
 class ReproduceRequest:
     """What to run and where to put it.
 
+    Files of other agents, presets, trials, episodes or seeds than the default have these in their
+    names, and those of a quick look are marked so.
+
     Parameters
     ----------
     experiments
@@ -82,23 +75,21 @@ class ReproduceRequest:
     out
         Folder of the result file, figures and tables.
     n_trials
-        Trials per case and agent; default the paper's, or `QUICK_TRIALS`. Files of others are named
-        so.
+        Trials per case and agent; default the paper's, or `QUICK_TRIALS`.
     n_episodes
-        The same of learning episodes per trial; default the paper's, or `QUICK_EPISODES`.
+        Learning episodes per trial; default the paper's, or `QUICK_EPISODES`.
     seed
-        Root of all seeds; files of another than 0 are named so.
+        Root of all seeds.
     jobs
         Trials at the same time; default one for each core.
     executor
         Where trials run; default threads of this process. Costs are always measured here.
     quick
-        Whether this is a look at a fraction; its files are named and marked so.
+        Whether this is a look at a fraction.
     agents
-        Ids of the agents to run in every case instead of the case's own; files are named so.
+        Ids of the agents to run in every case instead of the case's own.
     presets
-        Names of settings under which SDNN-C runs beside the agents of every case; files are named
-        so.
+        Names of settings under which SDNN-C runs beside the agents of every case.
     """
 
     experiments: tuple[Experiment, ...]
@@ -117,6 +108,12 @@ class ReproduceRequest:
         object.__setattr__(self, "agents", tuple(dict.fromkeys(self.agents)))
         object.__setattr__(self, "presets", tuple(dict.fromkeys(self.presets)))
 
+    @property
+    def _defaults(self) -> tuple[int, int]:
+        """Numbers of trials and episodes."""
+        quick, paper = (QUICK_TRIALS, QUICK_EPISODES), (PAPER_TRIALS, PAPER_EPISODES)
+        return quick if self.quick else paper
+
     @cached_property
     def protocol(self) -> ProtocolConfig:
         """How long a trial is.
@@ -127,7 +124,7 @@ class ReproduceRequest:
             If the trials would be too short to hold a test episode, or have more than
             `MOST_EPISODES`.
         """
-        n_episodes = self.n_episodes or self._default_episodes
+        n_episodes = self.n_episodes or self._defaults[1]
         protocol = ProtocolConfig(n_learning_episodes=n_episodes)
         if n_episodes < protocol.test_interval:
             raise ValueError(
@@ -148,14 +145,10 @@ class ReproduceRequest:
             If the trials are too short or too long (see `protocol`), no agent has one of the ids,
             or only costs are asked for, of agents that have none.
         """
-        n_trials = self.n_trials or self._default_trials
         by_id = {experiment.id: experiment for experiment in (*EXPERIMENTS, *self.experiments)}
-        known = [
-            experiment.with_agents(self.agents).with_presets(self.presets)
-            for experiment in by_id.values()
-        ]
+        known = [e.with_agents(self.agents).with_presets(self.presets) for e in by_id.values()]
         cases = [case for experiment in known for case in experiment.cases]
-        planned = plan_trials(cases, n_trials, self.seed, self.protocol)
+        planned = plan_trials(cases, self.n_trials or self._defaults[0], self.seed, self.protocol)
         asked = {experiment.id for experiment in self.experiments}
         wanted = {pair for e in known if e.id in asked for pair in e.pairs}
         costs = cost_keys(self.cost_config, self.agents or None) if self.cost else ()
@@ -188,95 +181,50 @@ class ReproduceRequest:
         if self.agents and self.presets:
             marks.append("with")  # sdnn-c with robust is not the agent sdnn-c-robust
         marks += self.presets
-        for word, given, default in (
-            ("trials", self.n_trials, self._default_trials),
-            ("episodes", self.n_episodes, self._default_episodes),
-        ):
-            if given and given != default:
-                marks.append(f"{given}-{word}")
-        if self.seed:
-            marks.append(f"seed-{self.seed}")
-        if self.quick:
-            marks.append("quick")
+        given = {"trials": self.n_trials, "episodes": self.n_episodes}
+        for (word, number), default in zip(given.items(), self._defaults, strict=True):
+            if number and number != default:
+                marks.append(f"{number}-{word}")
+        marks += [f"seed-{self.seed}"] if self.seed else []
+        marks += ["quick"] if self.quick else []
         return "-".join([stem, *marks]) + f".{kind}"
 
-    @property
-    def _default_trials(self) -> int:
-        return QUICK_TRIALS if self.quick else PAPER_TRIALS
 
-    @property
-    def _default_episodes(self) -> int:
-        return QUICK_EPISODES if self.quick else PAPER_EPISODES
+def count_stored(
+    request: ReproduceRequest,
+) -> tuple[dict[tuple[str, str], tuple[int, int]], tuple[int, int]]:
+    """Count what is planned and what of it is stored, without making any file.
 
-
-@dataclass(frozen=True)
-class Reproduction:
-    """What a run gave.
-
-    Parameters
-    ----------
-    outcome
-        What became of the trials.
-    report
-        The results; none unless every trial is there.
-    files
-        Files written; empty unless every trial is there.
-    table
-        Content of the JSON file; empty unless every trial is there.
+    Returns
+    -------
+    tuple
+        Pairs (planned, stored): of the trials of each case and agent, and of all costs.
     """
-
-    outcome: RunOutcome
-    report: Report | None = None
-    files: tuple[Path, ...] = ()
-    table: dict[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, kw_only=True)
-class StoredCounts:
-    """How much a request needs and how much of it is stored: pairs (planned, stored).
-
-    Parameters
-    ----------
-    trials
-        Of each case and agent.
-    costs
-        Of measurements of costs.
-    """
-
-    trials: dict[tuple[str, str], tuple[int, int]]
-    costs: tuple[int, int]
-
-
-def count_stored(request: ReproduceRequest) -> StoredCounts:
-    """Count what is planned and what of it is stored, without making any file."""
-    trial_keys: set[TrialKey] = set()
-    known_costs: set[CostKey] = set()
+    keys: set[TrialKey | CostKey] = set()
     if (request.out / STORE_NAME).exists() or request.out.is_file():
         with ResultStore(request.out, read_only=True) as store:
-            trial_keys = store.keys()
-            found = store.load_costs(request.cost_config.config_hash)
-            known_costs = {record.key for record in found}
+            keys |= store.keys()
+            keys |= {one.key for one in store.load_costs(request.cost_config.config_hash)}
     trials: dict[tuple[str, str], tuple[int, int]] = {}
     for planned in request.plan.trials:
-        pair = (planned.key.case_id, planned.key.agent)
-        n_planned, n_stored = trials.get(pair, (0, 0))
-        trials[pair] = (n_planned + 1, n_stored + (planned.key in trial_keys))
-    wanted = set(request.plan.costs)
-    return StoredCounts(trials=trials, costs=(len(wanted), len(wanted & known_costs)))
+        n_planned, n_stored = trials.get(planned.key[:2], (0, 0))
+        trials[planned.key[:2]] = (n_planned + 1, n_stored + (planned.key in keys))
+    costs = request.plan.costs
+    return trials, (len(costs), len(keys.intersection(costs)))
 
 
-def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) -> Reproduction:
+def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) -> Finished:
     """Run what is missing; when all is there, draw the figures and write tables and page.
 
     The files cover every experiment whose trials are all stored under the request's settings, not
-    only those that were asked for now.
+    only those that were asked for now. None is written unless every trial is there.
 
     Parameters
     ----------
     request
         What to run.
     observer
-        Told how the run goes.
+        Receives the progress.
 
     Raises
     ------
@@ -300,17 +248,32 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
             plan.trials, store, executor=request.executor, jobs=request.jobs, observer=watcher
         )
         if outcome.failures or outcome.interrupted:
-            return Reproduction(outcome)
+            return Finished(outcome)
         measure_costs(plan.costs, request.cost_config, store, watcher)
         report, records = _read(request, store)
-    call = Call(
-        machine=machine.description(),
-        seconds=time.monotonic() - begin,
-        n_run=outcome.n_run,
-        n_planned=outcome.n_planned,
-        processor_seconds=sum(record.seconds for record in records),
-    )
-    return Reproduction(outcome, report, *_write(request, report, records, call))
+    drawn = {
+        f"experiment-{experiment.id}": draw_experiment(experiment, results, quick=request.quick)
+        for experiment, results in report.experiments
+    }
+    if report.costs:
+        drawn["cost"] = draw_cost(report.costs, quick=request.quick)
+    contents: dict[str, bytes] = {}
+    for name, figure in drawn.items():
+        contents[f"{name}.png"], contents[f"{name}.svg"] = figure_bytes(figure)
+    page = report.page({name: contents[f"{name}.svg"] for name in drawn})
+    table = report.to_json()
+    contents["results.md"] = page.to_markdown().encode()
+    contents["table.json"] = json_bytes(table)
+    contents["results.csv"] = csv_bytes(ROW_HEADER, trial_rows(records))
+    if report.costs:
+        contents["cost.csv"] = csv_bytes(COST_ROW_HEADER, round_rows(report.costs))
+    seconds = sum(record.seconds for record in records)
+    call = describe_call(outcome, time.monotonic() - begin, seconds)
+    contents["report.html"] = page.to_html(call).encode()
+    files = {request.out / request.file_name(name): text for name, text in contents.items()}
+    for path, content in files.items():
+        write_whole(path, content)
+    return Finished(outcome, page, tuple(files), table)
 
 
 def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[TrialRecord, ...]]:
@@ -319,20 +282,18 @@ def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[
     complete = [(e, keys) for e, keys in request.plan.experiments if stored.issuperset(keys)]
     records = store.load(key for _, keys in complete for key in keys)
     shown = {series.id for _, series in cost_series(request.agents or None)}
-    experiments = tuple(ExperimentReport(e, collect(e, records)) for e, _ in complete)
+    costs = store.load_costs(request.cost_config.config_hash)
+    experiments = tuple((e, collect(e, records)) for e, _ in complete)
     n_run = {
-        (r.case_id, r.agent, r.config_hash): r.n_trials for one in experiments for r in one.results
+        (one.case_id, one.agent, one.config_hash): one.n_trials
+        for _, results in experiments
+        for one in results
     }
     report = Report(
         experiments=experiments,
-        costs=tuple(
-            cost
-            for cost in store.load_costs(request.cost_config.config_hash)
-            if cost.key.series in shown
-        ),
+        costs=tuple(cost for cost in costs if cost.key.series in shown),
         quick=request.quick,
         seed=request.seed,
-        version=_core.__version__,
         digest=records_digest(records),
         agents=request.agents,
         reference=tuple(
@@ -345,50 +306,12 @@ def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[
 
 
 def collect(experiment: Experiment, records: Iterable[TrialRecord]) -> tuple[CaseResult, ...]:
-    """Measure the trials of each case and agent of an experiment.
-
-    Parameters
-    ----------
-    experiment
-        Its cases and agents.
-    records
-        Trials of the plan, in the order in which they are to be shown; those of other experiments
-        are passed over.
-    """
+    """Measure the trials of each case and agent of an experiment; others are passed over."""
     by_pair: dict[tuple[str, str], list[TrialRecord]] = {}
     for record in records:
-        by_pair.setdefault((record.key.case_id, record.key.agent), []).append(record)
+        by_pair.setdefault(record.key[:2], []).append(record)
     return tuple(
         measure(case.title, by_pair.get((case.id, agent), ()))
         for case in experiment.cases
         for agent in case.agents
     )
-
-
-def _write(
-    request: ReproduceRequest, report: Report, records: tuple[TrialRecord, ...], call: Call
-) -> tuple[tuple[Path, ...], dict[str, Any]]:
-    """Draw and write everything; returns the files and the content of the JSON file."""
-    drawn = {
-        f"experiment-{one.experiment.id}": draw_experiment(
-            one.experiment, one.results, quick=request.quick
-        )
-        for one in report.experiments
-    }
-    if report.costs:
-        drawn["cost"] = draw_cost(report.costs, quick=request.quick)
-    contents: dict[str, bytes] = {}
-    for name, figure in drawn.items():
-        contents[f"{name}.png"], contents[f"{name}.svg"] = figure_bytes(figure)
-    pictures = {name: contents[f"{name}.svg"] for name in drawn}
-    table = report.to_json()
-    contents["results.md"] = report.to_markdown().encode()
-    contents["table.json"] = (json.dumps(table, indent=2, allow_nan=False) + "\n").encode()
-    contents["results.csv"] = csv_bytes(ROW_HEADER, trial_rows(records))
-    if report.costs:
-        contents["cost.csv"] = csv_bytes(COST_ROW_HEADER, round_rows(report.costs))
-    contents["report.html"] = report.to_html(pictures, call).encode()
-    files = {request.out / request.file_name(name): text for name, text in contents.items()}
-    for path, content in files.items():
-        write_whole(path, content)
-    return tuple(files), table

@@ -13,7 +13,7 @@ from sdnn.reproduction.report import RULE_NOTE, VERDICT_KINDS, chance_json, form
 from sdnn.reproduction.verdicts import ClaimOutcome, Verdict, judge_claims
 from sdnn.runs.comparison import Comparison
 from sdnn.runs.environment_trial import EnvironmentTrialConfig
-from sdnn.runs.report import Table, format_share
+from sdnn.runs.report import Folded, Section, Table, format_share
 from sdnn.runs.results import CaseResult
 from sdnn.runs.statistics import Estimate
 from sdnn.runs.study_report import Addition
@@ -181,13 +181,16 @@ def _moved(outcome: ClaimOutcome, reference: ClaimOutcome | None) -> bool | None
 def add_claims(comparison: Comparison) -> Addition:
     """Make the addition about the paper's claims to the report of a study."""
     claims = StudyClaims(comparison)
+    sections = []
+    if claims.shown:
+        sections.append(Section(table=claims.overview(), notes=[CLAIMS_NOTE, RULE_NOTE]))
     chances = claims.chances()
+    if chances.rows:
+        sections.append(Section(level=3, table=chances, notes=[CHANCES_NOTE]))
+    tables = map(claims.details, claims.shown)
+    sections.append(Section(folded=[Folded(summary=one.title, table=one) for one in tables]))
     return Addition(
-        tables=[
-            *([(claims.overview(), (CLAIMS_NOTE, RULE_NOTE))] if claims.shown else []),
-            *([(chances, (CHANCES_NOTE,))] if chances.rows else []),
-        ],
-        details=[claims.details(claim) for claim in claims.shown],
+        sections=sections,
         json={
             "claims": [
                 {

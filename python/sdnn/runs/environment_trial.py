@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -211,12 +211,6 @@ class EnvironmentTrialConfig(TrialSettings):
     def is_compiled(self) -> bool:
         """Whether it runs in C++: never."""
         return False
-
-    @property
-    def max_decisions(self) -> int | None:
-        """Decisions in an episode at most; None if its registration does not say."""
-        with closing(self.environment.make()) as env:
-            return None if env.spec is None else env.spec.max_episode_steps
 
     def make_trial(self, seed: int) -> TrainingTrial:
         """Make the trial; see `environment_trial` for the errors it raises."""

@@ -1,4 +1,4 @@
-"""Tables whose cells are written once, on the screen, as Markdown and as an HTML page.
+"""Pages of figures and tables: on the screen, as Markdown and as HTML; each cell is written once.
 
 Jinja and rich are imported when they are needed; Jinja is an extra.
 """
@@ -8,13 +8,16 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sdnn import machine
+from sdnn.runs.engine import RunOutcome
 from sdnn.runs.errors import PlotUnavailableError
 from sdnn.runs.measures import MEASURES, RETURN_MEASURES, MeasureName
 from sdnn.runs.results import CaseResult
@@ -28,21 +31,15 @@ NOTE = (
     f"Medians over trials with {PERCENT} bootstrap intervals over trials. us/decision: processor"
     " time of sensing, choosing, physics and learning."
 )
-_TEMPLATE = "page.html.jinja"
+MEASURE_END = ("decisions", "us/decision")
+"""Header of the last `measure_cells`."""
 
 
 @dataclass(frozen=True)
 class Table:
     """A table of texts.
 
-    Parameters
-    ----------
-    title
-        Its title.
-    header, rows
-        Texts of all cells.
-    kinds
-        How a page colors a cell of such a text: ``"good"``, ``"bad"``, ``"open"`` or ``"none"``.
+    ``kinds`` says how a page colors a cell of some text: as good, bad, open or none.
     """
 
     title: str
@@ -53,7 +50,7 @@ class Table:
 
 @dataclass(frozen=True, kw_only=True)
 class Folded:
-    """A part of a page that opens on demand: a summary with an aside, a note, a text or a table."""
+    """A part of an HTML page that opens on demand, shown in the order of its fields."""
 
     summary: str
     aside: str = ""
@@ -69,15 +66,11 @@ class Section:
     Parameters
     ----------
     title, level
-        Heading and its level; level 0 is a faint paragraph.
-    text
-        A paragraph.
+        Heading and its level; level 0 is a faint paragraph. Default: those of the table, and 2.
     tally
         How a count is colored, the count, and what is counted.
-    picture, alt
-        SVG of a figure and its description.
-    is_narrow
-        Whether the figure takes a part of the width only.
+    picture, alt, is_narrow
+        SVG of a figure, its description, and whether it takes a part of the width only.
     table
         A table.
     notes
@@ -90,7 +83,6 @@ class Section:
 
     title: str = ""
     level: int = 2
-    text: str = ""
     tally: Sequence[tuple[str, int, str]] = ()
     picture: bytes = b""
     alt: str = ""
@@ -101,42 +93,99 @@ class Section:
     folded: Sequence[Folded] = ()
 
     @property
+    def heading(self) -> str:
+        """The title, by default that of the table."""
+        return self.title or (self.table.title if self.table else "")
+
+    @property
     def picture_url(self) -> str:
         """The figure as an address that holds it: its names cannot clash with those of another."""
         return "data:image/svg+xml;base64," + base64.b64encode(self.picture).decode()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Call:
-    """The call of the command that made a page.
+class Page:
+    """A report.
 
     Parameters
     ----------
-    machine
-        Processor and instruction set.
-    seconds
-        Wall time.
-    n_run, n_planned
-        Trials that it ran, and that it needed.
-    processor_seconds
-        Processor time of all trials on the page.
+    title, intro, warnings
+        The head.
+    sections
+        All else.
+    source
+        Where the rows come from.
     """
 
-    machine: str
-    seconds: float
-    n_run: int
-    n_planned: int
-    processor_seconds: float
+    title: str
+    intro: str
+    warnings: Sequence[str] = ()
+    sections: Sequence[Section]
+    source: str
 
-    def describe(self) -> str:
-        """Write how long it took."""
-        of_trials = f"Processor time of the trials shown: {duration_words(self.processor_seconds)}."
-        if self.n_run < self.n_planned:
-            return (
-                f"{of_trials} {self.n_planned - self.n_run} of {self.n_planned} trials were stored"
-                " before the call that made this page."
-            )
-        return f"Everything asked for was run in {duration_words(self.seconds)}. {of_trials}"
+    @property
+    def tables(self) -> Iterator[Table]:
+        """All tables; those that open on demand come last."""
+        yield from (one.table for one in self.sections if one.table)
+        yield from (one.table for part in self.sections for one in part.folded if one.table)
+
+    @property
+    def notes(self) -> list[str]:
+        """What the tables mean."""
+        notes = [note for part in self.sections for note in part.notes]
+        terms = [f"{name}: {text}." for part in self.sections for name, text in part.terms.items()]
+        return notes + terms
+
+    def print(self, console: Console) -> None:
+        """Print it without figures."""
+        from rich import box
+        from rich.table import Table as RichTable
+        from rich.text import Text
+
+        for line in (self.title, self.intro, *self.warnings):
+            console.print(line, highlight=False, markup=False)
+        for table in self.tables:
+            title = Text(table.title)
+            shown = RichTable(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+            for column in table.header:
+                shown.add_column(Text(column), overflow="fold")
+            for row in table.rows:
+                shown.add_row(*map(Text, row))
+            console.print(shown)
+        for note in self.notes:
+            console.print(note, style="dim", highlight=False, markup=False)
+
+    def to_markdown(self) -> str:
+        """Write it without figures."""
+        lines = [f"# {self.title}", "", self.intro, ""]
+        for warning in self.warnings:
+            lines += [f"**{warning}**", ""]
+        for table in self.tables:
+            rows = [table.header, ("---",) * len(table.header), *table.rows]
+            texts = (" | ".join(cell.replace("|", "\\|") for cell in row) for row in rows)
+            lines += [f"## {table.title}", "", *(f"| {text} |" for text in texts), ""]
+        return "\n".join([*lines, *(f"- {note}" for note in self.notes), "", self.source, ""])
+
+    def to_html(self, call: str) -> str:
+        """Make it one self-contained HTML page; `call` says how it came about."""
+        require_jinja()
+        from jinja2 import Environment, PackageLoader, StrictUndefined
+
+        environment = Environment(
+            loader=PackageLoader("sdnn.runs", "."), autoescape=True, undefined=StrictUndefined,
+            trim_blocks=True, lstrip_blocks=True,
+        )  # fmt: skip
+        return environment.get_template("page.html.jinja").render(page=self, call=call)
+
+
+@dataclass(frozen=True)
+class Finished:
+    """The outcome of the trials, and what was written of them: page, files, JSON's content."""
+
+    outcome: RunOutcome
+    page: Page | None = None
+    files: tuple[Path, ...] = ()
+    table: dict[str, Any] = field(default_factory=dict)
 
 
 def require_jinja() -> None:
@@ -147,104 +196,47 @@ def require_jinja() -> None:
         )
 
 
-def to_html(
-    *, title: str, heading: str, intro: str, warnings: Iterable[str], provenance: str,
-    code: str, sections: Iterable[Section],
-) -> str:  # fmt: skip
-    """Make one self-contained HTML page.
-
-    Parameters
-    ----------
-    title, heading
-        Title of the window and of the page.
-    intro, warnings
-        Paragraphs at the top.
-    provenance, code
-        Where the rows come from, a text that ends with a code.
-    sections
-        All else.
-    """
-    require_jinja()
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("sdnn.runs", "."), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    return environment.get_template(_TEMPLATE).render(
-        title=title, heading=heading, intro=intro, warnings=list(warnings), provenance=provenance,
-        code=code, sections=list(sections),
-    )  # fmt: skip
+def describe_call(outcome: RunOutcome, seconds: float, processor_seconds: float) -> str:
+    """Write how a page came about: wall time of the call, processor time of all trials shown."""
+    text = f"Processor time of the trials shown: {duration_words(processor_seconds)}."
+    if outcome.n_run < outcome.n_planned:
+        text += (
+            f" {outcome.n_planned - outcome.n_run} of {outcome.n_planned} trials were stored"
+            " before the call that made this page."
+        )
+    else:
+        text = f"Everything asked for was run in {duration_words(seconds)}. {text}"
+    return f"{text} Made on {machine.description()}."
 
 
-def to_markdown(
-    title: str, head: Iterable[str], tables: Iterable[Table], notes: Iterable[str], end: str
-) -> str:
-    """Write a page of tables as Markdown: a title, paragraphs, tables, a list of notes, an end."""
-
-    def line(cells: Sequence[str]) -> str:
-        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
-
-    lines = [f"# {title}", ""]
-    for text in head:
-        lines += [text, ""]
-    for table in tables:
-        lines += [f"## {table.title}", "", line(table.header), "|" + "---|" * len(table.header)]
-        lines += [*map(line, table.rows), ""]
-    lines += [f"- {text}" for text in notes]
-    return "\n".join([*lines, "", end, ""])
+def json_bytes(values: object) -> bytes:
+    """Return the content of a JSON file."""
+    return (json.dumps(values, indent=2, allow_nan=False) + "\n").encode()
 
 
-def print_tables(
-    console: Console, tables: Iterable[Table], notes: Iterable[str], mark: str = ""
-) -> None:
-    """Print tables, their titles followed by a mark, then notes."""
-    from rich import box
-    from rich.table import Table as RichTable
-    from rich.text import Text
-
-    for table in tables:
-        shown = RichTable(title=Text(table.title + mark), title_justify="left", box=box.SIMPLE_HEAD)
-        for column in table.header:
-            shown.add_column(Text(column), overflow="fold")
-        for row in table.rows:
-            shown.add_row(*map(Text, row))
-        console.print(shown)
-    for note in notes:
-        console.print(note, style="dim", highlight=False, markup=False)
-
-
-def measure_terms(names: Iterable[MeasureName]) -> dict[str, str]:
-    """Return what measures mean, by their names in words."""
-    return {name.replace("_", " "): MEASURES[name][0] for name in names}
-
-
-def measures_section(terms: Mapping[str, str], notes: Sequence[str] = ()) -> Section:
+def measures_section(names: Iterable[MeasureName], notes: Sequence[str] = ()) -> Section:
     """Return the section that explains measures."""
-    return Section(title="What is measured", text=NOTE, notes=notes, terms=terms)
+    terms = {name.replace("_", " "): MEASURES[name][0] for name in names}
+    return Section(title="What is measured", notes=[NOTE, *notes], terms=terms)
 
 
 def settings_section(results: Iterable[tuple[str, CaseResult]]) -> Section:
     """Return the section of what fixes the rows of results, each with a title."""
-    return Section(
-        title="Settings and seeds",
-        text="Everything that fixes the rows. The same settings and seeds give the same rows on any"
-        " machine, with any number of jobs.",
-        folded=[
-            Folded(
-                summary=title,
-                aside=f"· configuration {result.config_hash}",
-                note=f"sdnn {', '.join(sorted({one.version for one in result.records}))}; seeds of"
-                f" the trials: {', '.join(str(one.key.seed) for one in result.records)}",
-                text=json.dumps(json.loads(result.records[0].config), indent=2),
-            )
-            for title, result in results
-        ],
-    )
+    folded = [
+        Folded(
+            summary=title,
+            aside=f"· configuration {result.config_hash}",
+            note=f"sdnn {', '.join(sorted({one.version for one in result.records}))}; seeds of"
+            f" the trials: {', '.join(str(one.key.seed) for one in result.records)}",
+            text=json.dumps(json.loads(result.records[0].config), indent=2),
+        )
+        for title, result in results
+    ]
+    return Section(title="Settings and seeds: all that fixes the rows", folded=folded)
 
 
 def measure_cells(result: CaseResult, names: Iterable[MeasureName]) -> tuple[str, ...]:
-    """Write the medians of measures, then `COST_CELLS`; what a result does not have is ``"-"``."""
+    """Write the medians of measures, then `MEASURE_END`; what a result lacks is ``"-"``."""
     return (
         *(
             format_estimate(result.medians[name], name, result.last_episode)
@@ -255,9 +247,6 @@ def measure_cells(result: CaseResult, names: Iterable[MeasureName]) -> tuple[str
         f"{result.n_decisions:,}",
         f"{result.microseconds_per_decision:.1f}",
     )
-
-
-COST_CELLS = ("decisions", "us/decision")
 
 
 def format_estimate(

@@ -1,4 +1,4 @@
-"""A study's results as tables, as a page and as JSON."""
+"""A study's results as a page and as JSON."""
 
 from __future__ import annotations
 
@@ -6,24 +6,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from sdnn import _core
 from sdnn.runs.comparison import MIN_TRIALS_TO_DIFFER, Comparison, Measured
 from sdnn.runs.measures import DEFAULT_MEASURES, MEASURES, SHARE_STABLE, MeasureName
 from sdnn.runs.registry import agent_entry
 from sdnn.runs.report import (
-    COST_CELLS,
-    NOTE,
+    MEASURE_END,
     PERCENT,
-    Call,
     Folded,
+    Page,
     Section,
     Table,
     format_estimate,
     measure_cells,
-    measure_terms,
     measures_section,
     settings_section,
-    to_html,
-    to_markdown,
 )
 
 DIFFERENCE_NOTE = (
@@ -40,228 +37,139 @@ SOLVED_NOTE = (
 
 @dataclass(frozen=True, kw_only=True)
 class Addition:
-    """What else the results of a study say, such as about claims.
+    """What else the results of a study say, such as about claims: for the page and the JSON."""
 
-    Parameters
-    ----------
-    tables
-        Tables before those of the cases, each with its notes.
-    details
-        Tables after those of the cases, folded on a page.
-    json
-        Entries of the JSON file.
-    """
-
-    tables: Sequence[tuple[Table, Sequence[str]]] = ()
-    details: Sequence[Table] = ()
+    sections: Sequence[Section] = ()
     json: dict[str, Any] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, kw_only=True)
-class StudyReport:
-    """Everything that a study's tables and page are made of.
+def study_page(comparison: Comparison, digest: str, addition: Addition, picture: bytes) -> Page:
+    """Return the page of a study.
 
     Parameters
     ----------
     comparison
         The results.
-    version
-        Version of the library that made the report.
     digest
         Digest of the trials' rows.
     addition
         What else they say.
+    picture
+        SVG of the figure.
     """
+    study = comparison.study
+    n_all, n_measured = len(study.combinations), len(comparison.measured)
+    counts = {"variant": study.variants, "case": study.cases, "trial": range(study.n_trials)}
+    variants, cases, trials = (
+        f"{len(found)} {word}{'' if len(found) == 1 else 's'}" for word, found in counts.items()
+    )
+    missing = (
+        f"Not complete: {n_all - n_measured} of {n_all} combinations of case and variant lack"
+        " trials and are left out."
+    )
+    alt = f"{study.title}: each variant in each case, trial by trial"
+    return Page(
+        title=study.title,
+        intro=f"{variants} in {cases}, {trials} each; reference: {study.reference}.",
+        warnings=[missing] if n_measured < n_all else [],
+        sections=[
+            Section(title="At a glance", picture=picture, alt=alt),
+            *addition.sections,
+            *_case_sections(comparison),
+            _measures(comparison),
+            Section(
+                title="The study",
+                folded=[Folded(summary=study.file.path.name, text=study.file.text)],
+            ),
+            settings_section(
+                (f"{m.variant.title}, {m.result.title}, {_title(m)}", m.result)
+                for m in comparison.measured.values()
+            ),
+        ],
+        source=f"Study {study.file.path.name}; root seed {study.seed}; digest of the rows"
+        f" {digest[:16]}; sdnn {_core.__version__}.",
+    )
 
-    comparison: Comparison
-    version: str
-    digest: str
-    addition: Addition = field(default_factory=Addition)
 
-    @property
-    def title(self) -> str:
-        """Title of the study."""
-        return str(self.comparison.study.title)
+def _title(measured: Measured) -> str:
+    return agent_entry(measured.result.agent).title
 
-    @property
-    def scope(self) -> str:
-        """How much was run."""
-        study = self.comparison.study
-        return (
-            f"{_count(len(study.variants), 'variant')} in {_count(len(study.cases), 'case')},"
-            f" {_count(study.n_trials, 'trial')} each; reference: {study.reference}."
-        )
 
-    @property
-    def missing(self) -> str | None:
-        """What of the study is not there yet; None if all is."""
-        n_all, n_measured = len(self.comparison.study.combinations), len(self.comparison.measured)
-        if n_all == n_measured:
-            return None
-        return (
-            f"Not complete: {n_all - n_measured} of {n_all} combinations of case and variant lack"
-            " trials and are left out."
-        )
-
-    def case_tables(self) -> Iterator[tuple[Table, Table | None]]:
-        """For each case the table of measures, and that of differences if there are any."""
-        for case in self.comparison.cases:
-            measured = self.comparison.of_case(case.id)
-            names = [n for n in MEASURES if any(n in m.result.values for m in measured)]
-            with_end = any(m.solved_at_end is not None for m in measured)
-            words = tuple(name.replace("_", " ") for name in names)
-            end = ("end solved",) if with_end else ()
-            table = Table(
-                case.title,
-                ("variant", "agent", "trials", *end, *words, *COST_CELLS),
-                [_measure_row(one, names, with_end) for one in measured],
-            )
-            differences = Table(
-                f"{case.title}: less {self.comparison.study.reference}, trial by trial",
-                ("variant", *words),
-                [_difference_row(one, names) for one in measured if one.differences],
-            )
-            yield table, differences if differences.rows else None
-
-    def tables(self) -> list[Table]:
-        """All tables."""
-        of_cases = [table for pair in self.case_tables() for table in pair if table is not None]
-        return [*(table for table, _ in self.addition.tables), *of_cases, *self.addition.details]
-
-    def table_notes(self) -> list[str]:
-        """Say what the tables of the cases mean beside the measures."""
-        found, study = self.comparison.measured.values(), self.comparison.study
-        copies = ((v.id, study.same_as(v.id)) for v in study.variants)
-        return [
-            *(f"{variant} is the same as {first}." for variant, first in copies if first),
-            *([DIFFERENCE_NOTE] if any(m.differences for m in found) else []),
-            *([SOLVED_NOTE] if any(m.solved_at_end is not None for m in found) else []),
-        ]
-
-    def terms(self) -> dict[str, str]:
-        """Say what the measures shown mean."""
-        shown = {name for m in self.comparison.measured.values() for name in m.result.values}
-        return measure_terms(name for name in MEASURES if name in shown)
-
-    def notes(self) -> list[str]:
-        """Say what all tables mean."""
-        return [
-            NOTE,
-            *self.table_notes(),
-            *(note for _, notes in self.addition.tables for note in notes),
-            *(f"{name}: {text}." for name, text in self.terms().items()),
-        ]
-
-    def to_markdown(self) -> str:
-        """Write the tables as Markdown."""
-        study = self.comparison.study
-        return to_markdown(
-            self.title,
-            [self.scope, *([f"**{self.missing}**"] if self.missing else [])],
-            self.tables(),
-            self.notes(),
-            f"Study {study.file.path.name}; root seed {study.seed}; digest of the rows"
-            f" {self.digest[:16]}; sdnn {self.version}.",
-        )
-
-    def to_html(self, picture: bytes, call: Call) -> str:
-        """Make the page, with the SVG of the figure and what is known of the call."""
-        study = self.comparison.study
-        return to_html(
-            title=self.title,
-            heading=self.title,
-            intro=self.scope,
-            warnings=filter(None, [self.missing]),
-            provenance=f"{call.describe()} sdnn {self.version} on {call.machine}. Root seed"
-            f" {study.seed}, digest of the rows",
-            code=self.digest[:16],
-            sections=self._sections(picture),
-        )
-
-    def _sections(self, picture: bytes) -> Iterator[Section]:
-        alt = f"{self.title}: each variant in each case, trial by trial"
-        yield Section(title="At a glance", picture=picture, alt=alt)
-        for number, (table, notes) in enumerate(self.addition.tables):
-            level = 3 if number else 2
-            yield Section(title=table.title, level=level, table=table, notes=[" ".join(notes)])
-        if self.addition.details:
-            details = self.addition.details
-            yield Section(folded=[Folded(summary=table.title, table=table) for table in details])
-        for table, differences in self.case_tables():
-            yield Section(title=table.title, table=table)
-            if differences is not None:
-                yield Section(title=differences.title, level=0, table=differences)
-        yield measures_section(self.terms(), self.table_notes())
-        file = self.comparison.study.file
-        yield Section(title="The study", folded=[Folded(summary=file.path.name, text=file.text)])
-        yield settings_section(
+def _case_sections(comparison: Comparison) -> Iterator[Section]:
+    """For each case the table of measures, and that of differences if there are any."""
+    for case in comparison.cases:
+        measured = comparison.of_case(case.id)
+        names = [n for n in MEASURES if any(n in m.result.values for m in measured)]
+        words = tuple(name.replace("_", " ") for name in names)
+        with_end = any(m.solved_at_end is not None for m in measured)
+        rows = [
             (
-                f"{one.variant.title}, {one.result.title}, {agent_entry(one.result.agent).title}",
-                one.result,
+                m.variant.title,
+                _title(m),
+                str(m.result.n_trials),
+                *([m.end_solved] if with_end else []),
+                *measure_cells(m.result, names),
             )
-            for one in self.comparison.measured.values()
-        )
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the results as values that JSON can hold; see `CaseResult.to_json`."""
-        study = self.comparison.study
-        return {
-            "title": study.title,
-            "file": study.file.path.name,
-            "n_trials": study.n_trials,
-            "seed": study.seed,
-            "reference": study.reference,
-            "version": self.version,
-            "digest": self.digest,
-            "cases": [{"id": case.id, "title": case.title} for case in study.cases],
-            "variants": [
-                {"id": v.id, "title": v.title, "same_as": study.same_as(v.id)}
-                for v in study.variants
-            ],
-            "results": [
-                {
-                    "case": case,
-                    "variant": variant,
-                    "n_end_solved": None
-                    if (solved := one.solved_at_end) is None
-                    else int(solved.sum()),
-                    **one.result.to_json(),
-                    "differences": {
-                        name: estimate.to_json(one.result.last_episode)
-                        for name, estimate in one.differences.items()
-                    },
-                }
-                for (case, variant), one in self.comparison.measured.items()
-            ],
-            **self.addition.json,
-        }
+            for m in measured
+        ]
+        end = ("end solved",) if with_end else ()
+        header = ("variant", "agent", "trials", *end, *words, *MEASURE_END)
+        yield Section(table=Table(case.title, header, rows))
+        title = f"{case.title}: less {comparison.study.reference}, trial by trial"
+        rows = [
+            (m.variant.title, *(_difference(m, n) for n in names))
+            for m in measured
+            if m.differences
+        ]
+        if rows:
+            yield Section(level=0, table=Table(title, ("variant", *words), rows))
 
 
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}{'' if number == 1 else 's'}"
+def _difference(measured: Measured, name: MeasureName) -> str:
+    if name not in measured.differences:
+        return "-"
+    text = format_estimate(measured.differences[name], name, sign="+")
+    return text + (" *" if measured.differs(name) else "")
 
 
-def _measure_row(
-    measured: Measured, names: Sequence[MeasureName], with_end: bool
-) -> tuple[str, ...]:
-    result = measured.result
-    return (
-        measured.variant.title,
-        agent_entry(result.agent).title,
-        str(result.n_trials),
-        *([measured.end_solved] if with_end else []),
-        *measure_cells(result, names),
-    )
+def _measures(comparison: Comparison) -> Section:
+    """Explain the measures shown, and which variants are the same."""
+    found, study = comparison.measured.values(), comparison.study
+    copies = ((v.id, study.same_as(v.id)) for v in study.variants)
+    notes = [f"{variant} is the same as {first}." for variant, first in copies if first]
+    notes += [DIFFERENCE_NOTE] if any(m.differences for m in found) else []
+    notes += [SOLVED_NOTE] if any(m.solved_at_end is not None for m in found) else []
+    shown = {name for m in found for name in m.result.values}
+    return measures_section((name for name in MEASURES if name in shown), notes)
 
 
-def _difference_row(measured: Measured, names: Sequence[MeasureName]) -> tuple[str, ...]:
-    return (
-        measured.variant.title,
-        *(
-            format_estimate(measured.differences[name], name, sign="+")
-            + (" *" if measured.differs(name) else "")
-            if name in measured.differences
-            else "-"
-            for name in names
-        ),
-    )
+def study_json(comparison: Comparison, digest: str, addition: Addition) -> dict[str, Any]:
+    """Return the results as values that JSON can hold; see `CaseResult.to_json`."""
+    study = comparison.study
+    return {
+        "title": study.title,
+        "file": study.file.path.name,
+        "n_trials": study.n_trials,
+        "seed": study.seed,
+        "reference": study.reference,
+        "version": _core.__version__,
+        "digest": digest,
+        "cases": [{"id": case.id, "title": case.title} for case in study.cases],
+        "variants": [
+            {"id": v.id, "title": v.title, "same_as": study.same_as(v.id)} for v in study.variants
+        ],
+        "results": [
+            {
+                "case": case,
+                "variant": variant,
+                "n_end_solved": None if m.solved_at_end is None else int(m.solved_at_end.sum()),
+                **m.result.to_json(),
+                "differences": {
+                    name: estimate.to_json(m.result.last_episode)
+                    for name, estimate in m.differences.items()
+                },
+            }
+            for (case, variant), m in comparison.measured.items()
+        ],
+        **addition.json,
+    }

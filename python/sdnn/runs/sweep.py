@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
-from sdnn import _core, machine
+from sdnn import _core
 from sdnn.runs.comparison import Comparison, Study, compare
-from sdnn.runs.engine import Observer, RunOutcome, run_trials
+from sdnn.runs.engine import Observer, run_trials
 from sdnn.runs.executor import Executor
 from sdnn.runs.figures import draw_study, figure_bytes, require_matplotlib
 from sdnn.runs.records import ROW_HEADER, records_digest, trial_rows
-from sdnn.runs.report import Call, require_jinja
+from sdnn.runs.report import Finished, describe_call, json_bytes, require_jinja
 from sdnn.runs.store import STORE_NAME, ResultStore
-from sdnn.runs.study_report import Addition, StudyReport
+from sdnn.runs.study_report import Addition, study_json, study_page
 from sdnn.runs.trial_config import PlannedTrial
 from sdnn.whole_files import csv_pieces, gzip_pieces, remove_abandoned_files, write_whole
 
@@ -55,45 +53,20 @@ class SweepRequest:
         """The trials that are asked for; a ValueError if there is no variant of a name."""
         return tuple(self.study.plan(self.only))
 
-    def path(self, name: str) -> Path:
-        """Return where a file of this study is written: ``OUT/STUDY-report.html``."""
-        return self.out / f"{self.study.file.path.stem}-{name}"
 
-
-@dataclass(frozen=True)
-class Sweep:
-    """The outcome of a sweep.
-
-    Parameters
-    ----------
-    outcome
-        What became of the trials.
-    report
-        The results of all that is complete; none if nothing is, or the run was interrupted.
-    files
-        Files written.
-    table
-        Content of the JSON file.
-    """
-
-    outcome: RunOutcome
-    report: StudyReport | None = None
-    files: tuple[Path, ...] = ()
-    table: dict[str, Any] = field(default_factory=dict)
-
-
-def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Sweep:
+def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Finished:
     """Run what is missing, then draw and write everything that is complete.
 
     A variant in a case is complete when all its trials are stored, whether asked for now or not. A
-    trial that raises leaves its variant out of the report and nothing else.
+    trial that raises leaves its variant out of the report and nothing else. There is no report if
+    nothing is complete, or the run was interrupted.
 
     Parameters
     ----------
     request
         What to run.
     observer
-        Told how the run goes.
+        Receives the progress.
 
     Raises
     ------
@@ -123,42 +96,35 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Sweep:
             plan, store, executor=request.executor, jobs=request.jobs, observer=observer
         )
         if outcome.interrupted:
-            return Sweep(outcome)
+            return Finished(outcome)
         records = store.load({key for pair in study.combinations for key in study.keys(*pair)})
     comparison = compare(study, records)
     if not comparison.measured:
-        return Sweep(outcome)
+        return Finished(outcome)
     complete = {key for pair in comparison.measured for key in study.keys(*pair)}
     shown = [record for record in records if record.key in complete]
-    report = StudyReport(
-        comparison=comparison,
-        version=_core.__version__,
-        digest=records_digest(shown),
-        addition=request.addition(comparison),
-    )
-    call = Call(
-        machine=machine.description(),
-        seconds=time.monotonic() - begin,
-        n_run=outcome.n_run,
-        n_planned=outcome.n_planned,
-        processor_seconds=sum(record.seconds for record in shown),
-    )
-    table = report.to_json()
+    digest = records_digest(shown)
+    addition = request.addition(comparison)
     name = study.file.path.name
-    footer = f"{name}; sdnn {report.version}; digest of the rows {report.digest[:16]}"
+    footer = f"{name}; sdnn {_core.__version__}; digest of the rows {digest[:16]}"
     png, svg = figure_bytes(draw_study(comparison, footer))
+    page = study_page(comparison, digest, addition, svg)
+    table = study_json(comparison, digest, addition)
+    seconds = sum(record.seconds for record in shown)
+    call = describe_call(outcome, time.monotonic() - begin, seconds)
     contents: dict[str, bytes | Iterator[bytes]] = {
         "figure.png": png,
         "figure.svg": svg,
-        "results.md": report.to_markdown().encode(),
-        "table.json": (json.dumps(table, indent=2, allow_nan=False) + "\n").encode(),
+        "results.md": page.to_markdown().encode(),
+        "table.json": json_bytes(table),
         "trials.csv": csv_pieces(*_trial_table(comparison)),
         "results.csv.gz": gzip_pieces(csv_pieces(("variant", *ROW_HEADER), _test_rows(comparison))),
-        "report.html": report.to_html(svg, call).encode(),
+        "report.html": page.to_html(call).encode(),
     }
-    for name, content in contents.items():
-        write_whole(request.path(name), content)
-    return Sweep(outcome, report, tuple(map(request.path, contents)), table)
+    files = {request.out / f"{study.file.path.stem}-{end}": c for end, c in contents.items()}
+    for path, content in files.items():
+        write_whole(path, content)
+    return Finished(outcome, page, tuple(files), table)
 
 
 def _test_rows(comparison: Comparison) -> Iterator[tuple[object, ...]]:
@@ -168,23 +134,22 @@ def _test_rows(comparison: Comparison) -> Iterator[tuple[object, ...]]:
             yield (variant, *row)
 
 
-def _trial_table(comparison: Comparison) -> tuple[tuple[str, ...], Iterator[tuple[object, ...]]]:
+def _trial_table(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
     """Header and rows of the measures of each trial; what a task does not have is empty."""
-    names = list(dict.fromkeys(n for m in comparison.measured.values() for n in m.result.values))
+    found = comparison.measured.items()
+    names = list(dict.fromkeys(name for _, one in found for name in one.result.values))
     header = (
         "case", "variant", "agent", "trial", "seed", "config_hash", "version", *names, "decisions",
         "seconds",
     )  # fmt: skip
-
-    def rows() -> Iterator[tuple[object, ...]]:
-        for (case, variant), measured in comparison.measured.items():
-            values = measured.result.values
-            for number, record in enumerate(measured.result.records):
-                key = record.key
-                of_trial = (values[n][number] if n in values else "" for n in names)
-                yield (
-                    case, variant, key.agent, key.trial, key.seed, key.config_hash, record.version,
-                    *of_trial, record.n_decisions, round(record.seconds, 3),
-                )  # fmt: skip
-
-    return header, rows()
+    rows: list[tuple[object, ...]] = []
+    for (case, variant), measured in found:
+        values = measured.result.values
+        for n, record in enumerate(measured.result.records):
+            key = record.key
+            rows.append(
+                (case, variant, key.agent, key.trial, key.seed, key.config_hash, record.version,
+                 *(values[name][n] if name in values else "" for name in names),
+                 record.n_decisions, round(record.seconds, 3))
+            )  # fmt: skip
+    return header, rows

@@ -50,11 +50,6 @@ class TrialSettings(ABC):
         """Whether the trial runs in C++, where it holds no GIL."""
 
     @property
-    @abstractmethod
-    def max_decisions(self) -> int | None:
-        """Decisions in an episode at most; None if nobody knows."""
-
-    @property
     def length(self) -> int:
         """Learning episodes of the trial, in which its progress is told."""
         return self.protocol.n_learning_episodes
@@ -160,11 +155,6 @@ class TrialConfig(TrialSettings):
     def is_compiled(self) -> bool:
         """Whether the agent has a trial in C++."""
         return agent_entry(self.agent).core_trial is not None
-
-    @property
-    def max_decisions(self) -> int:
-        """Decisions in an episode at most."""
-        return self.acrobot.max_decisions
 
     def make_trial(self, seed: int) -> Trial | TrainingTrial:
         """Make the trial: in C++ if the agent has one there, else in Python.

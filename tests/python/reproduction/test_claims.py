@@ -18,7 +18,7 @@ from sdnn.reproduction.claims import (
     describe,
 )
 from sdnn.reproduction.cost import QUICK_COST, CostConfig
-from sdnn.reproduction.report import POWER_NOTE, ExperimentReport, Report
+from sdnn.reproduction.report import POWER_NOTE, Report
 from sdnn.reproduction.verdicts import (
     CheckOutcome,
     ClaimOutcome,
@@ -29,9 +29,9 @@ from sdnn.reproduction.verdicts import (
 )
 from sdnn.runs.records import CostKey, CostRecord, StepTimes
 from sdnn.runs.registry import cost_series
-from sdnn.runs.report import Call
 from sdnn.runs.statistics import estimate_contrast, estimate_median
 
+PICTURES = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}
 CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
 
 
@@ -157,26 +157,23 @@ def test_reports_tell_what_more_trials_would_say():
     split = [4] * 7 + [50] * 3
     summaries = (result("s4", "sdnn-c", split), result("s6", "sdnn-c", 4))
     report = Report(
-        experiments=(ExperimentReport(EXPERIMENTS[0], summaries),), costs=(), quick=False, seed=0,
-        version="0", digest="d" * 64,
-    )  # fmt: skip
-    table = report.tables()[-1]
-    assert table.title == "What is undecided"
+        experiments=((EXPERIMENTS[0], summaries),), costs=(), quick=False, seed=0, digest="d" * 64
+    )
+    page = report.page(PICTURES)
+    table = next(one for one in page.tables if one.title == "What is undecided")
     assert table.header[-1] == f"{MULTIPLES[-1]} x the trials"
     rows = table.rows
-    assert POWER_NOTE in report.notes()
+    assert POWER_NOTE in page.notes
     row = next(row for row in rows if row[:2] == ("2", "final steps: SDNN-C, 4 inputs"))
     assert row[-1] == "100 / 0 %"
     told = report.to_json()["powers"]
     assert [one["claim"] for one in told] == [int(row[0]) for row in rows]
     one = next(one for one in told if one["measured"] == row[1])
     assert one["with"][-1] == {"n_trials": 320, "holds": 1.0, "fails": 0.0}
-    picture = b"<svg xmlns='http://www.w3.org/2000/svg'/>"
-    call = Call(machine="", seconds=1, n_run=0, n_planned=0, processor_seconds=0)
-    assert "What is undecided" in report.to_html({"experiment-a": picture}, call)
-    decided = replace(report, experiments=(ExperimentReport(EXPERIMENTS[0], summaries[1:]),))
-    assert decided.tables()[-1].title == "Beside the paper's claims"
-    assert "What is undecided" not in decided.to_html({"experiment-a": picture}, call)
+    assert "What is undecided" in page.to_html("")
+    decided = replace(report, experiments=((EXPERIMENTS[0], summaries[1:]),)).page(PICTURES)
+    assert "What is undecided" not in [table.title for table in decided.tables]
+    assert "What is undecided" not in decided.to_html("")
 
 
 @pytest.mark.parametrize("size", [{"n_trials": 9}, {"n_tests": 1499}])

@@ -21,14 +21,16 @@ from sdnn.reproduction import (
     plan_trials,
     select_experiments,
 )
-from sdnn.reproduction.report import ExperimentReport, Report
+from sdnn.reproduction.report import Report
 from sdnn.reproduction.reproduce import ReproduceRequest, reproduce
+from sdnn.runs.engine import RunOutcome
 from sdnn.runs.figures import COLORS, SMOOTHED_TESTS, agent_colors, colors_of, figure_bytes
 from sdnn.runs.records import ROW_HEADER, records_digest, trial_rows
-from sdnn.runs.report import Call, format_estimate
+from sdnn.runs.report import describe_call, format_estimate
 from sdnn.runs.statistics import Estimate, running_median
 
 (EXPERIMENT,) = select_experiments("a")
+PICTURES = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}
 
 
 @pytest.fixture
@@ -140,10 +142,10 @@ def test_a_run_plans_once_and_reads_its_trials_once(monkeypatch, tmp_path, fake,
     request = ReproduceRequest(experiments=select_experiments("all"), out=tmp_path, quick=True)
     done = reproduce(request)
     # SDNN-C in Case I belongs to both figures.
-    assert [len(one.results) for one in done.report.experiments] == [2, 8]
+    assert [len(one["cases"]) for one in done.table["experiments"]] == [2, 8]
     assert calls == ["plan"] + ["trial"] * 18
     with ResultStore(tmp_path) as store:
-        assert done.report.digest == records_digest(store.load())
+        assert done.table["digest"] == records_digest(store.load())
 
 
 def test_a_colour_stands_for_an_agent_in_every_figure(tmp_path, fake, run):
@@ -213,17 +215,16 @@ def test_estimates_as_text():
 @pytest.fixture
 def report(results):
     return Report(
-        experiments=(ExperimentReport(EXPERIMENT, results),),
+        experiments=((EXPERIMENT, results),),
         costs=(),
         quick=False,
         seed=0,
-        version="0.0.test",
         digest="d" * 64,
     )
 
 
 def test_tables_hold_cases_and_claims(report):
-    cases, claims = report.tables()
+    claims, cases = report.page(PICTURES).tables
     assert cases.title == EXPERIMENT.title
     assert [row[0] for row in cases.rows] == [case.title for case in EXPERIMENT.cases]
     assert {len(row) for row in cases.rows} == {len(cases.header)}
@@ -233,12 +234,9 @@ def test_tables_hold_cases_and_claims(report):
 
 
 def test_json_is_valid_and_marks_what_is_censored(report):
-    (one,) = report.experiments
-    never = replace(
-        one.results[0],
-        values=one.results[0].values | {"episodes_to_learn": np.array([math.inf])},
-    )
-    table = replace(report, experiments=(replace(one, results=(never,)),)).to_json()
+    first = report.results[0]
+    never = replace(first, values=first.values | {"episodes_to_learn": np.array([math.inf])})
+    table = replace(report, experiments=((EXPERIMENT, (never,)),)).to_json()
     text = json.dumps(table, allow_nan=False)
     (case,) = json.loads(text)["experiments"][0]["cases"]
     assert case["measures"]["episodes_to_learn"]["trials"] == [">3000"]
@@ -247,10 +245,11 @@ def test_json_is_valid_and_marks_what_is_censored(report):
 
 
 def test_markdown_holds_the_tables(report):
-    markdown = replace(report, quick=True).to_markdown()
+    page = replace(report, quick=True).page(PICTURES)
+    markdown = page.to_markdown()
     assert "not their result" in markdown
     lines = [line for line in markdown.splitlines() if line.startswith("|")]
-    assert len(lines) == sum(2 + len(table.rows) for table in report.tables())
+    assert len(lines) == sum(2 + len(table.rows) for table in page.tables)
     assert "digest of the rows dddddddddddddddd" in markdown
 
 
@@ -265,21 +264,24 @@ def test_row_files_hold_every_test_episode_once(report, results):
     assert rows[0]["solved"] in (0, 1)
 
 
-def test_page_is_one_file_with_everything(report):
-    picture = b"<svg xmlns='http://www.w3.org/2000/svg'/>"
-    call = Call(machine="a <machine>", seconds=61, n_run=6, n_planned=6, processor_seconds=7)
-    html = report.to_html({"experiment-a": picture}, call)
+def test_page_is_one_file_with_everything(report, monkeypatch):
+    outcome = RunOutcome(n_planned=6, n_reused=0, n_run=6, failures=(), interrupted=False)
+    monkeypatch.setattr("sdnn.machine.description", lambda: "a <machine>")
+    page = report.page(PICTURES)
+    html = page.to_html(describe_call(outcome, 61, 7))
     assert html.startswith("<!doctype html>")
-    assert "data:image/svg+xml;base64," + base64.b64encode(picture).decode() in html
+    assert (
+        "data:image/svg+xml;base64," + base64.b64encode(PICTURES["experiment-a"]).decode() in html
+    )
     assert not re.search(r'(src|href)="(?!data:)', html)
     assert "a &lt;machine&gt;" in html
     assert "Everything asked for was run in 1 min 1 s" in html
     assert "Smaller than the paper" in html
-    for table in report.tables():
+    for table in page.tables:
         for cell in (*table.header, *(cell for row in table.rows for cell in row)):
             assert escape(cell, quote=False) in html
     for result in report.results:
         assert result.config_hash in html
         assert all(str(record.key.seed) in html for record in result.records)
-    later = report.to_html({"experiment-a": picture}, replace(call, n_run=2))
+    later = page.to_html(describe_call(replace(outcome, n_run=2), 61, 7))
     assert "4 of 6 trials were stored before" in later

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import sdnn.reproduction.reference_results as reference_module
+import sdnn.reproduction.reproduce as reproduce_module
 from sdnn.reproduction import (
     EXPERIMENTS,
     Estimate,
@@ -26,7 +27,7 @@ from sdnn.reproduction.reference_results import (
     reference_csv,
     reference_results,
 )
-from sdnn.reproduction.report import ExperimentReport, Report
+from sdnn.reproduction.report import Report
 from sdnn.reproduction.reproduce import reproduce
 from sdnn.reproduction.verdicts import (
     CheckOutcome,
@@ -38,7 +39,6 @@ from sdnn.reproduction.verdicts import (
     settle,
 )
 from sdnn.runs.measures import STEP_MEASURES
-from sdnn.runs.report import Call
 from sdnn.runs.results import TrialMeasures
 
 CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
@@ -210,17 +210,16 @@ def test_short_trials_are_not_kept(fake_results):
 
 def report_of(results, kept=()):
     return Report(
-        experiments=(ExperimentReport(EXPERIMENTS[0], tuple(results)),), costs=(), quick=False,
-        seed=0, version="0", digest="d" * 64, reference=tuple(kept),
+        experiments=((EXPERIMENTS[0], tuple(results)),), costs=(), quick=False, seed=0,
+        digest="d" * 64, reference=tuple(kept),
     )  # fmt: skip
 
 
 def test_reports_tell_what_reference_results_say(fake_results):
     picture = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}
-    call = Call(machine="", seconds=1, n_run=0, n_planned=0, processor_seconds=0)
     alone = report_of(fake_results)
-    assert "With more trials" not in [table.title for table in alone.tables()]
-    assert "With more trials" not in alone.to_html(picture, call)
+    assert "With more trials" not in [table.title for table in alone.page(picture).tables]
+    assert "With more trials" not in alone.page(picture).to_html("")
     assert alone.to_json()["claims"][0]["with_more_trials"] is None
 
     half = measured("s4", 10 * [4] + 10 * [50])
@@ -229,7 +228,8 @@ def test_reports_tell_what_reference_results_say(fake_results):
         for one in (half, measured("s6", 20 * [4]))
     ]
     report = report_of(fake_results, kept)
-    rows = next(table.rows for table in report.tables() if table.title == "With more trials")
+    tables = report.page(picture).tables
+    rows = next(table.rows for table in tables if table.title == "With more trials")
     ends = next(row for row in rows if row[0] == "2")
     assert ends[5] == "a matter of chance"
     assert ends[6].startswith("3")  # 0.377: six good trials among ten
@@ -239,7 +239,7 @@ def test_reports_tell_what_reference_results_say(fake_results):
     ]  # fmt: skip
     told = next(one for one in report.to_json()["claims"] if one["number"] == 2)
     assert (told["verdict"], told["settled"]) == ("holds", "a matter of chance")
-    page = report.to_html(picture, call)
+    page = report.page(picture).to_html("")
     assert "root seed 7" in page
     assert "<b>1</b>are a matter of chance with ten trials" in page
 
@@ -249,8 +249,12 @@ def test_only_more_trials_of_the_same_settings_are_shown(monkeypatch, tmp_path, 
     (experiment,) = select_experiments("a")
 
     def shown(**request):
-        done = reproduce(ReproduceRequest(experiments=(experiment,), out=tmp_path, **request))
-        return {(one.case_id, one.n_trials) for one in done.report.reference}
+        found = []
+        monkeypatch.setattr(
+            reproduce_module, "Report", lambda **parts: found.append(Report(**parts)) or found[-1]
+        )
+        reproduce(ReproduceRequest(experiments=(experiment,), out=tmp_path, **request))
+        return {(one.case_id, one.n_trials) for one in found[0].reference}
 
     assert shown(n_trials=2) == {("s4", 100), ("s6", 100)}
     assert shown(n_trials=2, n_episodes=100) == set()

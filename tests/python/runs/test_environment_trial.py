@@ -226,7 +226,6 @@ def test_every_agent_runs_and_the_seed_fixes_the_rows(agent, approximator, learn
     assert rows[0] == rows[1]
     assert rows[0] != rows[2]
     assert not config.is_compiled
-    assert config.max_decisions == 200
 
 
 def test_the_hash_covers_every_setting():

@@ -11,9 +11,9 @@ from sdnn.reproduction.verdicts import Verdict
 from sdnn.runs.comparison import compare
 from sdnn.runs.figures import draw_study, figure_bytes
 from sdnn.runs.records import TrialRecord, TrialRows
-from sdnn.runs.report import Call, format_estimate
+from sdnn.runs.report import format_estimate
 from sdnn.runs.statistics import Estimate
-from sdnn.runs.study_report import StudyReport
+from sdnn.runs.study_report import study_json, study_page
 
 
 def record(study, case, variant, number, steps, returns=None, interval=10):
@@ -37,10 +37,12 @@ def record(study, case, variant, number, steps, returns=None, interval=10):
     )
 
 
-def report_of(comparison):
-    return StudyReport(
-        comparison=comparison, version="1", digest="abc", addition=add_claims(comparison)
-    )
+def page_of(comparison):
+    return study_page(comparison, "abc", add_claims(comparison), b"<svg/>")
+
+
+def json_of(comparison):
+    return study_json(comparison, "abc", add_claims(comparison))
 
 
 def steps_of(*runs):
@@ -119,7 +121,7 @@ def test_what_only_lasts_longer_does_not_differ(study):
         longer = found.measured[case, "long"]
         assert longer.differences[name].value == 0.0
         assert not longer.differs(name)
-    tables = {table.title: table.rows for table in report_of(found).tables()}
+    tables = {table.title: table.rows for table in page_of(found).tables}
     rows = tables["Case I: 4 inputs, no noise"]
     assert [row[6] for row in rows] == [">1000 [>1000, >1000]", ">3000 [>3000, >3000]"]
     (row,) = tables["Case I: 4 inputs, no noise: less short, trial by trial"]
@@ -140,7 +142,7 @@ def test_claims_are_censored_where_their_own_trials_end(study):
     found = compare(mine, records)
     claim = StudyClaims(found).by_variant["long"][1]  # of the episodes to learn in both
     assert [checked.last_episode for checked in claim.outcome.checks] == [3000, 5000]
-    told = report_of(found).to_json()["claims"][0]
+    told = json_of(found)["claims"][0]
     assert [one["ours"]["value"] for one in told["checks"]] == [">3000", ">5000"]
 
 
@@ -187,7 +189,7 @@ def test_what_is_not_complete_is_left_out_and_said_so(study):
     records = records_of_two(mine)
     found = compare(mine, records[:-1])
     assert list(found.measured) == [("s4-noise", "old")]
-    assert report_of(found).missing.startswith("Not complete: 1 of 2 combinations")
+    assert page_of(found).warnings[0].startswith("Not complete: 1 of 2 combinations")
     found = compare(mine, records[4:])
     assert found.measured["s4-noise", "new"].differences == {}
     assert compare(mine, ()).measured == {}
@@ -232,18 +234,16 @@ def test_claims_are_judged_for_each_variant(study):
         "fuzzy": {3: (Verdict.HOLDS, None), 4: (Verdict.FAILS, None)},
     }  # fmt: skip
     assert [claim.number for claim in StudyClaims(found).shown] == [3, 4, 5, 6, 7]
-    report = report_of(found)
-    overview = report.tables()[0]
+    overview = next(page_of(found).tables)
     assert overview.header == ("variant", "claim 3", "claim 4", "claim 5", "claim 6", "claim 7")
     assert overview.rows[1] == (
         "new", "-", "-", "does not hold (moved)", "does not hold (moved)", "holds",
     )  # fmt: skip
-    call = Call(machine="a machine", seconds=1.0, n_run=120, n_planned=120, processor_seconds=2.0)
-    page = report.to_html(b"<svg/>", call)
+    page = page_of(found).to_html("")
     assert page.count('<td class="verdict bad">does not hold (moved)</td>') == 2
     assert page.count('<td class="verdict good">holds</td>') == 5
     assert "<summary>Claim 6: SDNN-C in Case III keeps solving until later" in page
-    table = report.to_json()
+    table = json_of(found)
     assert {(c["variant"], c["number"], c["moved"]) for c in table["claims"]} >= {
         ("new", 5, True), ("new", 7, False), ("old", 5, None),
     }  # fmt: skip
@@ -252,15 +252,15 @@ def test_claims_are_judged_for_each_variant(study):
 def test_chances_are_shown_from_twice_the_papers_trials_on(study):
     def chances(n_trials):
         mine = study(CLAIMED, n_trials=n_trials)
-        return report_of(compare(mine, claimed_records(mine, n_trials)))
+        return compare(mine, claimed_records(mine, n_trials))
 
-    def tables(report):
-        return {table.title: table for table in report.tables()}
+    def tables(found):
+        return {table.title: table for table in page_of(found).tables}
 
     title = "How often ten trials show the claims"
     assert title not in tables(chances(19))
-    report = chances(20)
-    table = tables(report)[title]
+    found = chances(20)
+    table = tables(found)[title]
     assert table.header[1:] == (*(f"claim {n}" for n in (3, 4, 5, 6, 7)), "all of these")
     always, never = "100 % [100, 100]", "0 % [0, 0]"
     assert table.rows == [
@@ -268,12 +268,9 @@ def test_chances_are_shown_from_twice_the_papers_trials_on(study):
         ("new", "-", "-", never, never, always, never),
         ("fuzzy", always, never, "-", "-", "-", never),
     ]
-    told = {
-        (c["variant"], c["number"]): c["ten_trials_show_it"] for c in report.to_json()["claims"]
-    }
+    told = {(c["variant"], c["number"]): c["ten_trials_show_it"] for c in json_of(found)["claims"]}
     assert told["new", 6] == {"value": 0.0, "lower": 0.0, "upper": 0.0}
-    call = Call(machine="", seconds=1.0, n_run=0, n_planned=0, processor_seconds=1.0)
-    assert title in report.to_html(b"<svg/>", call)
+    assert title in page_of(found).to_html("")
 
 
 def test_small_runs_are_not_judged_and_claims_without_their_cases_not_shown(study):
@@ -324,11 +321,11 @@ def mixed(study):
         for variant, shift in (("a", 0.0), ("b", 10.0))
         for number in range(2)
     ]
-    return report_of(compare(mine, records))
+    return compare(mine, records)
 
 
 def test_environments_are_judged_by_their_return(mixed):
-    swing = mixed.comparison.measured["swing", "b"]
+    swing = mixed.measured["swing", "b"]
     assert tuple(swing.result.values) == ("final_return", "mean_return")
     assert swing.result.values["final_return"].tolist() == [28.5, 28.5]  # the last 2 of 20
     assert swing.result.values["mean_return"].tolist() == [19.5, 19.5]
@@ -337,7 +334,7 @@ def test_environments_are_judged_by_their_return(mixed):
 
 
 def test_tables_have_a_row_for_each_variant_in_each_case(mixed):
-    tables = {table.title: (table.header, table.rows) for table in mixed.tables()}
+    tables = {table.title: (table.header, table.rows) for table in page_of(mixed).tables}
     header, rows = tables["Case I: 4 inputs, no noise"]
     assert header[:5] == ("variant", "agent", "trials", "end solved", "episodes to learn")
     # The tie rule of c is that of a: the same trials.
@@ -348,15 +345,15 @@ def test_tables_have_a_row_for_each_variant_in_each_case(mixed):
     assert rows == [
         ("b", "+10 [+10, +10]", "+10 [+10, +10]"), ("c", "0 [0, 0]", "0 [0, 0]"),
     ]  # fmt: skip
-    assert "c is the same as a." in mixed.notes()
-    assert mixed.missing is None
-    text = mixed.to_markdown()
+    assert "c is the same as a." in page_of(mixed).notes
+    assert page_of(mixed).warnings == []
+    text = page_of(mixed).to_markdown()
     assert text.startswith("# Both | kinds\n\n3 variants in 2 cases, 2 trials each; reference: a.")
     assert "| b | +10 [+10, +10] | +10 [+10, +10] |" in text
 
 
 def test_the_table_is_json(mixed):
-    table = json.loads(json.dumps(mixed.to_json(), allow_nan=False))
+    table = json.loads(json.dumps(json_of(mixed), allow_nan=False))
     assert [(r["case"], r["variant"], r["n_end_solved"]) for r in table["results"]] == [
         ("s4", "a", 2), ("s4", "b", 2), ("s4", "c", 2),
         ("swing", "a", None), ("swing", "b", None), ("swing", "c", None),
@@ -368,8 +365,8 @@ def test_the_table_is_json(mixed):
 
 
 def test_the_figure_is_the_same_each_time_and_shows_every_trial(mixed):
-    figure = draw_study(mixed.comparison, "footer")
-    assert figure_bytes(figure) == figure_bytes(draw_study(mixed.comparison, "footer"))
+    figure = draw_study(mixed, "footer")
+    assert figure_bytes(figure) == figure_bytes(draw_study(mixed, "footer"))
     assert "filled: the reference, and what" in figure.texts[-1].get_text()
     assert len(figure.axes) == 4
     assert [axes.get_title("left") for axes in figure.axes] == [
