@@ -28,23 +28,16 @@ _DTYPES: dict[str, type[np.float32] | type[np.float64]] = {
 class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
     r"""Swing a two-link pendulum up with a motor at its elbow, as gently as asked for.
 
-    ## Description
-
     Two links hang from a fixed joint. A motor at the joint between them is the only drive. The
     tip must pass 1.5 m above the fixed joint, at speeds below the limits times `goal_tolerance`: at
-    1 it may fly past, at 0.01 it has to come almost to rest there. The agent decides once a second
-    and has 50 decisions.
+    1 it may fly past, at 0.01 it has to come almost to rest there. An episode starts at rest,
+    hanging down; the agent decides once a second and has 50 decisions. Nothing is random.
+    docs/explanation/method.md, section 2, has the dynamics.
 
     ## Action space
 
-    `Box(-1, 1, (1,), float32)`: the torque as a share of `max_torque`, held until the next
-    decision.
-
-    | Num | Action                            | Min | Max | Unit          |
-    |-----|-----------------------------------|-----|-----|---------------|
-    | 0   | torque on the joint between links | -1  | 1   | 10 N m        |
-
-    An action outside the range or NaN raises ValueError.
+    `Box(-1, 1, (1,), float32)`: the torque as a share of `max_torque`, 10 N m, held until the next
+    decision. An action outside the range or NaN raises ValueError.
 
     ## Observation space
 
@@ -57,50 +50,23 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
     | 2   | s3 = sat(theta1' / (6 pi) + 1/2)  | -3 pi        | 3 pi         | rad/s |
     | 3   | s4 = sat(theta2' / (10 pi) + 1/2) | -5 pi        | 5 pi         | rad/s |
 
-    - `theta1` is the angle of link 1, 0 where it hangs down;
-    - `theta2` is the angle of link 2 relative to link 1, 0 where they are in line.
+    `theta1` is the angle of link 1, 0 where it hangs down; `theta2` that of link 2 relative to
+    link 1. Redundant and noisy sensors are wrappers: `RedundantSensors`, then `NoisySensors`.
 
-    Angles are wrapped to [-pi, pi); speeds are not clipped, their observations are. Redundant and
-    noisy sensors are wrappers: `RedundantSensors`, then `NoisySensors`.
+    ## Rewards and episode end
 
-    ## Dynamics
-
-    Spong's equations with m = 1 kg, l = 1 m, lc = 0.5 m, I = 1 kg m^2 for both links and
-    g = 9.8 m/s^2, integrated by the classical Runge-Kutta method in steps of 0.02 s. All of it is
-    compiled and gives the same bits on every machine.
-
-    ## Rewards
-
-    | Reward | When, at the decision instant                                          |
-    |--------|------------------------------------------------------------------------|
-    | +10    | the goal was reached                                                   |
-    | -5     | else, \|theta1\| < 5 degrees, \|theta1'\| > 3 pi or \|theta2'\| > 5 pi |
-    | 0      | else                                                                   |
-
-    ## Starting state
-
-    At rest, hanging down. Nothing is random.
-
-    ## Episode end
-
-    1. Termination: the goal. The tip is at least 1.5 m above joint 1, with
-       \|theta1'\| < 3 pi `goal_tolerance` and \|theta2'\| < 5 pi `goal_tolerance`. It is looked
-       for after every integration step, and the episode ends at that instant.
-    2. Truncation: after 50 decisions, by the environment itself.
-
-    ## Goal tolerance
-
-    The task's one difficulty, the paper's lambda; it stays as it is until another is given, in the
-    constructor, by `reset(options={"goal_tolerance": ...})` or as the attribute
-    `env.unwrapped.goal_tolerance`, which holds from the next reset on. The paper goes from
-    1 to 0.01 over 10,000 learning episodes: that is the wrapper `TighteningGoal`, which is given
-    the episode.
+    +10 at the goal, which terminates the episode at that instant: the tip is at least 1.5 m above
+    joint 1, with \|theta1'\| < 3 pi `goal_tolerance` and \|theta2'\| < 5 pi `goal_tolerance`. Else
+    -5 if \|theta1\| < 5 degrees, \|theta1'\| > 3 pi or \|theta2'\| > 5 pi at the decision instant,
+    or 0. The environment truncates after 50 decisions.
 
     ## Arguments
 
     - `config`: an `AcrobotConfig`, all the numbers above and the alternatives where the paper is
       silent;
-    - `goal_tolerance`: the factor of the goal's speed limits, >= 0;
+    - `goal_tolerance`: the factor of the goal's speed limits, >= 0, the task's one difficulty.
+      `reset(options={"goal_tolerance": ...})` gives another, as does the attribute of the
+      unwrapped environment from the next reset on; `TighteningGoal` follows the paper's schedule;
     - `render_mode`: `"human"`, a window in real time; `"rgb_array"`, a picture at each decision;
       `"rgb_array_list"`, all pictures since the last `render()`, 25 a second; or None. Pictures
       need pygame-ce;
@@ -122,14 +88,6 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
     (0.0, False, False, 0.496)
 
     ```
-
-    ## References
-
-    - Kobayashi, T., Shibuya, T., Morita, M. (2015). Q-Learning in Continuous State-Action Space
-      with Noisy and Redundant Inputs by Using a Selective Desensitization Neural Network. Journal
-      of Advanced Computational Intelligence and Intelligent Informatics 19(6), 825-832.
-    - Spong, M. W. (1995). The Swing Up Control Problem for the Acrobot. IEEE Control Systems
-      15(1), 49-55.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
