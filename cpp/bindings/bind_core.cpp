@@ -47,9 +47,6 @@ void bind_instruction_set(py::module_& module) {
       "instruction_set", [] { return core::name_of(core::instruction_set()); },
       "The instruction set in use");
   module.def(
-      "best_instruction_set", [] { return core::name_of(core::best_instruction_set()); },
-      "The best instruction set that this machine offers");
-  module.def(
       "available_instruction_sets",
       [] {
         std::vector<std::string_view> names;

@@ -1278,10 +1278,6 @@ def basic_observation(state: typing.Annotated[numpy.typing.ArrayLike, numpy.floa
     """
     s1..s4 of a state
     """
-def best_instruction_set() -> str:
-    """
-    The best instruction set that this machine offers
-    """
 def correlation_matrix_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, correlations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
     ...
 def energy_sensor(s3: typing.SupportsFloat | typing.SupportsIndex, s4: typing.SupportsFloat | typing.SupportsIndex) -> float:

@@ -10,16 +10,7 @@ from __future__ import annotations
 
 from sdnn import _core
 
-__all__ = [
-    "INSTRUCTION_SETS",
-    "available_instruction_sets",
-    "best_instruction_set",
-    "instruction_set",
-    "set_instruction_set",
-]
-
-INSTRUCTION_SETS = ("portable", "neon", "avx2", "avx512")
-"""All levels, those of one processor in rising order."""
+__all__ = ["available_instruction_sets", "instruction_set", "set_instruction_set"]
 
 
 def instruction_set() -> str:
@@ -33,13 +24,8 @@ def instruction_set() -> str:
     return _core.instruction_set()
 
 
-def best_instruction_set() -> str:
-    """Return the highest level that this processor and operating system offer."""
-    return _core.best_instruction_set()
-
-
 def available_instruction_sets() -> tuple[str, ...]:
-    """Return the levels that can be chosen here, in rising order.
+    """Return the levels that can be chosen here, the best one last.
 
     Examples
     --------
@@ -50,12 +36,7 @@ def available_instruction_sets() -> tuple[str, ...]:
 
 
 def set_instruction_set(name: str) -> None:
-    """Force a level, for the whole process.
-
-    Parameters
-    ----------
-    name : str
-        One of `available_instruction_sets`.
+    """Force a level of `available_instruction_sets`, for the whole process.
 
     Raises
     ------

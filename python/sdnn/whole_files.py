@@ -1,4 +1,4 @@
-"""Files that are there as a whole or not at all, also after a kill."""
+"""Files that are written as a whole or not at all, also after a kill."""
 
 from __future__ import annotations
 
@@ -64,14 +64,7 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
 
 
 def write_whole(path: Path, content: bytes | Iterable[bytes | memoryview]) -> None:
-    """Write a file as a whole or not at all.
-
-    Parameters
-    ----------
-    path
-        Its name.
-    content
-        All of it, or pieces that are made while it is written.
+    """Write a file as a whole or not at all; ``content`` may be made while it is written.
 
     Raises
     ------
@@ -105,13 +98,10 @@ def _open_at_once(name: str, flags: int) -> int:
 
 
 def lock(descriptor: int) -> bool | None:
-    """Lock an open file for this process alone; the lock of a killed process is gone with it.
+    """Lock an open file for this process; a killed process loses its locks.
 
-    Returns
-    -------
-    bool or None
-        Whether the file is locked now: False if another process holds it, None where files cannot
-        be locked.
+    Returns whether it is locked now: False if another process holds it, None where files cannot be
+    locked.
     """
     if fcntl is None:
         return None

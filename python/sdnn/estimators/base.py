@@ -268,7 +268,7 @@ class BaseSDNN(Fitted, CodedInputs):
         self.training_form_, self.training_memory_ = trainer.form, trainer.memory
         if is_refitted:  # anew on the whole sample, for as many epochs as were best
             first = self.network_
-            self.network_ = Network(first.input_code, first.n_units, seed=self._weight_seed or 0)
+            self.network_ = Network(first.input_code, first.n_units, seed=self._weight_seed)
             _, history = train(slice(None), history.n_epochs, self.n_averaged_epochs)
         self.network_ = history.network
         if self._earlier or history.earlier:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
+from sdnn.arguments import seed_of
 from sdnn.coding import Coding, from_dict, to_dict
 from sdnn.estimators.network import InputCode, Network
 from sdnn.files import Arrays, Description, read_file, write_file
@@ -171,6 +172,7 @@ def read_estimator(description: Description, arrays: Arrays, kind: type[Estimato
 def require_consistent(estimator: Saved) -> None:
     """ValueError if the parts of a loaded estimator do not fit together."""
     held = vars(estimator)
+    seed_of(held["_weight_seed"])
     network = estimator.network_
     code = network.input_code
     if "classes_" in held:

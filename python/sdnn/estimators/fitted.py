@@ -30,7 +30,7 @@ class Fitted:
     validation_scores_: NDArray[np.float64]
     training_form_: str
     training_memory_: int
-    _weight_seed: int | None = None
+    _weight_seed: int
     _earlier: tuple[Network, ...] = ()
 
     @property
@@ -67,8 +67,6 @@ class Fitted:
         """
         network = self._fitted_network
         code = network.input_code
-        if self._weight_seed is None:
-            raise AttributeError("the file that was loaded does not say what the weights began as")
         begun = _core.ParallelPerceptron(code.core, network.n_units, seed=self._weight_seed)
         change = network.weights - begun.weights
         of_pairs = change.reshape(network.n_units, len(code.pairs), code.n_units)

@@ -9,9 +9,7 @@ import pytest
 import sdnn
 from sdnn import _core, instruction_sets
 from sdnn.instruction_sets import (
-    INSTRUCTION_SETS,
     available_instruction_sets,
-    best_instruction_set,
     instruction_set,
     set_instruction_set,
 )
@@ -70,7 +68,6 @@ def test_a_learned_network_has_the_same_bits_on_all_levels():
 
 @pytest.mark.usefixtures("restore")
 def test_levels_can_be_chosen():
-    assert best_instruction_set() in INSTRUCTION_SETS
     for level in available_instruction_sets():
         sdnn.set_instruction_set(level)
         assert sdnn.instruction_set() == level
@@ -89,7 +86,7 @@ def test_bad_names(name):
 
 
 def test_levels_beyond_the_processor():
-    for name in set(INSTRUCTION_SETS) - set(available_instruction_sets()):
+    for name in {"portable", "neon", "avx2", "avx512"} - set(available_instruction_sets()):
         with pytest.raises(ValueError, match="one that this processor offers"):
             set_instruction_set(name)
 
