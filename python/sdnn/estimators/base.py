@@ -228,14 +228,14 @@ class BaseSDNN(Fitted, CodedInputs):
         # Not by scikit-learn's _fit_context: an interrupt could leave its global setting changed.
         self._validate_params()
         resumes = bool(self.warm_start) and hasattr(self, "network_")
-        table, labels = self._check_samples(X, y, reset=not resumes, in_fit=True)
+        table, given = self._check_samples(X, y, reset=not resumes, in_fit=True)
         weights = sample_weights(sample_weight, len(table))
         if resumes:
-            random = self._resume(table, labels)
+            random = self._resume(table, given)
         else:
-            pairs = self._select_pairs(X, table, labels, weights)
-            random = self._begin(X, table, labels, pairs, self._n_networks())
-        targets = self._targets(labels, at_once=True)
+            pairs = self._select_pairs(X, table, given, weights)
+            random = self._begin(X, table, given, pairs, self._n_networks())
+        targets = self._targets(given, at_once=True)
         bins = self.network_.input_code.bins(table)
         held, kept = self._split(random, len(table))
         held_bins, held_targets = bins[held], targets[held]
@@ -280,14 +280,14 @@ class BaseSDNN(Fitted, CodedInputs):
         first = not hasattr(self, "network_")
         if first:
             self._validate_params()
-        table, labels = work._check_samples(X, y, reset=first)
+        table, given = work._check_samples(X, y, reset=first)
         if first:
-            work._begin(X, table, labels if classes is None else classes)
+            work._begin(X, table, given if classes is None else classes)
             work.n_iter_ = 0
         else:
-            work._check_outputs(labels, classes)
+            work._check_outputs(given, classes)
             work._note_inputs(work._finite(table, work.codings_))
-        work._learn(work.network_.input_code.bins(table), work._targets(labels))
+        work._learn(work.network_.input_code.bins(table), work._targets(given))
         self.__dict__ = work.__dict__
         return self
 

@@ -146,7 +146,7 @@ def load(path: str | Path, kind: type[Estimator]) -> Estimator:
     try:
         return read_estimator(description, arrays, kind)
     except (
-        AttributeError, IndexError, KeyError, RecursionError, TypeError, ValueError,
+        AttributeError, IndexError, KeyError, OverflowError, RecursionError, TypeError, ValueError,
     ) as error:  # fmt: skip
         raise ValueError(f"{path} is damaged: {error!r}") from error
 

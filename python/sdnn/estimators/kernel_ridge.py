@@ -81,7 +81,7 @@ class SDNNKernelRidge(RegressorMixin, CodedInputs):
     }
 
     def __sklearn_tags__(self) -> Any:
-        """Say that several outputs can be learned at once."""
+        """Declare that several outputs can be learned at once."""
         tags = super().__sklearn_tags__()
         tags.target_tags.multi_output = True
         return tags
@@ -118,9 +118,10 @@ class SDNNKernelRidge(RegressorMixin, CodedInputs):
             coding.fit(table[:, index], N_UNITS)
             for index, coding in enumerate(self._codings(X, table))
         ]
-        pairs = input_pairs(self.pairs, self._feature_names(), table.shape[1])
-        every = isinstance(self.pairs, str)
-        self.kernel_ = AnalyticKernel(codings, pairs=None if every else pairs)
+        pairs = None
+        if not isinstance(self.pairs, str):
+            pairs = input_pairs(self.pairs, self._feature_names(), table.shape[1])
+        self.kernel_ = AnalyticKernel(codings, pairs=pairs)
         self.X_fit_ = table
         self.y_mean_ = targets.mean(axis=0)
         self.ridge_ = KernelRidge(kernel="precomputed", alpha=self.alpha)
