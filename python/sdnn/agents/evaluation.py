@@ -61,6 +61,17 @@ class Evaluation:
         """The median of the returns."""
         return float(np.median(self.returns))
 
+    def row(self) -> dict[str, Any]:
+        """Return it as values that JSON can hold."""
+        return {
+            "mean_return": self.mean_return,
+            "returns": self.returns.tolist(),
+            "mean_length": float(self.lengths.mean()),
+            "lengths": self.lengths.tolist(),
+            "share_terminated": float(self.terminated.mean()),
+            "terminated": self.terminated.tolist(),
+        }
+
 
 def episode_seed(seed: int, kind: int, episode: int) -> int:
     """Give the seed that an episode's `reset` gets: own ones for learning and evaluation."""

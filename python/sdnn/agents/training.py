@@ -475,16 +475,7 @@ class Training:
             options=self._options(self.n_episodes),
         )
         self.evaluations.append((self.n_steps, found.mean_return))
-        return self._row(
-            "evaluation",
-            episode=self.n_episodes,
-            mean_return=found.mean_return,
-            returns=found.returns.tolist(),
-            mean_length=float(found.lengths.mean()),
-            lengths=found.lengths.tolist(),
-            share_terminated=float(found.terminated.mean()),
-            terminated=found.terminated.tolist(),
-        )
+        return self._row("evaluation", episode=self.n_episodes, **found.row())
 
     def _row(self, kind: str, **values: Any) -> Row:
         self.n_rows += 1

@@ -39,7 +39,7 @@ def probe(planned: PlannedTrial) -> str:
         if not planned.config.is_compiled:
             return planned.config.canonical_json()
         trial.advance(PROBE_EPISODES)
-    rows = TrialRows.from_arrays(trial.test_rows())
+    rows = TrialRows.of_tests(**trial.test_rows())
     return f"{planned.config.canonical_json()} {trial.n_decisions} {rows.digest()}"
 
 

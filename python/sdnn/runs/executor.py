@@ -127,7 +127,7 @@ def run_to_end(
         n_decisions=int(trial.n_decisions),
         seconds=time.thread_time() - begin,
         finished_at=datetime.now(timezone.utc).isoformat(timespec="seconds"),
-        rows=TrialRows.from_arrays(trial.test_rows()),
+        rows=_rows(trial),
     )
 
 
@@ -143,6 +143,12 @@ def _pieces(trial: Trial | TrainingTrial) -> Iterator[None]:
         trial.advance(chunk)
         chunk = _next_chunk(chunk, time.monotonic() - begin)
         yield
+
+
+def _rows(trial: Trial | TrainingTrial) -> TrialRows:
+    if isinstance(trial, TrainingTrial):
+        return TrialRows.from_training(trial.training.rows)
+    return TrialRows.of_tests(**trial.test_rows())
 
 
 def _next_chunk(chunk: int, seconds: float) -> int:

@@ -1,25 +1,25 @@
-"""One SQLite file that holds every finished trial and measurement, each in one transaction.
+"""One SQLite file that holds the rows of all runs and measurements.
 
-The file survives a kill at any instant (write-ahead log, full synchronization): a trial is in it
-as a whole or not at all. Trials under different settings live side by side under different keys.
+Finished trials and measurements are stored in one transaction each, and so are the rows of a run in
+progress with every checkpoint. The file survives a kill at any instant (SQLite's rollback journal,
+full synchronization). Runs under different settings live side by side under different keys.
 """
 
 from __future__ import annotations
 
 import json
-import math
-import os
 import sqlite3
-import time
 from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 import numpy as np
 
 from sdnn.runs.errors import StoreError
 from sdnn.runs.records import (
+    ROW,
     CostKey,
     CostRecord,
     StepTimes,
@@ -30,37 +30,32 @@ from sdnn.runs.records import (
 )
 
 STORE_NAME = "results.sqlite"
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 APPLICATION_ID = int.from_bytes(b"sdnn", "big")
 """Marks a SQLite file as ours (SQLite's header field of that name)."""
 BUSY_SECONDS = 60.0
 """How long to wait for another process that writes the same file."""
 
-EMPTIED_EVERY = 1.0
-"""Seconds between two times that SQLite's log is emptied, which takes some hundredths of one."""
-
-_LOG_HEAD_BYTES, _FRAME_HEAD_BYTES = 32, 24
-"""Of the log that SQLite keeps beside a file, by its file format."""
-
 _SCHEMA = """
-CREATE TABLE trials (
+CREATE TABLE runs (
   id INTEGER PRIMARY KEY,
   case_id TEXT NOT NULL, agent TEXT NOT NULL, trial INTEGER NOT NULL, seed INTEGER NOT NULL,
   config_hash TEXT NOT NULL, config TEXT NOT NULL, version TEXT NOT NULL,
-  n_decisions INTEGER NOT NULL, seconds REAL NOT NULL, finished_at TEXT NOT NULL,
-  rows_digest TEXT NOT NULL,
+  n_decisions INTEGER NOT NULL, seconds REAL NOT NULL,
+  finished_at TEXT, checksum TEXT, -- NULL while it is in progress
   UNIQUE (case_id, agent, trial, seed, config_hash)
 );
 CREATE TABLE rows (
-  trial_id INTEGER NOT NULL REFERENCES trials (id),
-  episode INTEGER NOT NULL, steps INTEGER NOT NULL, episode_return REAL NOT NULL,
-  solved INTEGER NOT NULL,
-  PRIMARY KEY (trial_id, episode)
+  run_id INTEGER NOT NULL REFERENCES runs (id),
+  number INTEGER NOT NULL, part INTEGER NOT NULL, kind TEXT NOT NULL, episode INTEGER NOT NULL,
+  step INTEGER, length INTEGER NOT NULL, "return" REAL NOT NULL, terminated INTEGER NOT NULL,
+  environment INTEGER,
+  PRIMARY KEY (run_id, number, part)
 ) WITHOUT ROWID;
 CREATE VIEW labelled_rows AS
-  SELECT case_id, agent, trial, seed, config_hash, version,
-         episode, steps, episode_return, solved
-  FROM rows JOIN trials ON trials.id = rows.trial_id;
+  SELECT case_id, agent, trial, seed, config_hash, version, kind, episode, part, step, length,
+         "return", terminated, environment
+  FROM rows JOIN runs ON runs.id = rows.run_id;
 CREATE TABLE costs (
   series TEXT NOT NULL, n_inputs INTEGER NOT NULL, config_hash TEXT NOT NULL,
   version TEXT NOT NULL, machine TEXT NOT NULL, finished_at TEXT NOT NULL,
@@ -68,6 +63,13 @@ CREATE TABLE costs (
   PRIMARY KEY (series, n_inputs, config_hash)
 ) WITHOUT ROWID;
 """
+
+_KEY = "case_id = ? AND agent = ? AND trial = ? AND seed = ? AND config_hash = ?"
+_KEY_COLUMNS = "case_id, agent, trial, seed, config_hash"
+_ROW_COLUMNS = (
+    'number, part, kind, episode, ifnull(step, -1), length, "return", terminated,'
+    " ifnull(environment, -1)"
+)
 
 
 class ResultStore:
@@ -91,17 +93,16 @@ class ResultStore:
     def __init__(self, folder: str | Path, *, read_only: bool = False) -> None:
         folder = Path(folder)
         self.path = folder / STORE_NAME
-        self._emptied_at = -math.inf
         if folder.exists() and not folder.is_dir():
             raise StoreError(f"the output must be a folder, but {folder} is a file")
         with _as_store_error(self.path):
             if not read_only:
                 folder.mkdir(parents=True, exist_ok=True)
             is_new = _inspect(self.path)
-            if read_only and not is_new and not _is_writable(folder):
+            if read_only and not is_new:
                 self._connection = _connect_to_read(self.path)
                 return
-            place = ":memory:" if read_only and is_new else self.path
+            place = ":memory:" if read_only else self.path
             self._connection = sqlite3.connect(place, timeout=BUSY_SECONDS)
             try:
                 self._prepare(is_new)
@@ -111,7 +112,7 @@ class ResultStore:
 
     def _prepare(self, is_new: bool) -> None:
         connection = self._connection
-        connection.execute("PRAGMA journal_mode = WAL")
+        connection.execute("PRAGMA journal_mode = DELETE")
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute("PRAGMA foreign_keys = ON")
         if is_new:
@@ -141,18 +142,20 @@ class ResultStore:
         """Close the file."""
         self._connection.close()
 
+    # Runs.
+
     def add(self, record: TrialRecord, *, is_exact: bool = True) -> None:
-        """Store a finished trial, as a whole or not at all.
+        """Store a finished trial, or finish a run in progress, as a whole or not at all.
 
         Storing the same trial again (another process was quicker) changes nothing.
 
         Parameters
         ----------
         record
-            The trial.
+            The trial; of a run in progress, with the rows that are not yet stored.
         is_exact
-            Whether it owes the same rows each time, as compiled trials do. The first rows stay
-            where it does not.
+            Whether it must have the same rows each time, as compiled trials do. The first rows stay
+            where it need not.
 
         Raises
         ------
@@ -160,89 +163,78 @@ class ResultStore:
             If the file cannot be written, or holds other rows of an exact trial.
         """
         rows = record.rows
-        digest = rows.digest()
-        with _as_store_error(self.path), self._connection as connection:
-            connection.execute("BEGIN IMMEDIATE")
-            known = connection.execute(
-                "SELECT rows_digest FROM trials WHERE case_id = ? AND agent = ? AND trial = ?"
-                " AND seed = ? AND config_hash = ?",
-                record.key,
-            ).fetchone()
-            if known is not None:
-                if is_exact and known[0] != digest:
+        with self._writing() as connection:
+            known = self._find(record.key, "id, checksum")
+            if known is not None and known[1] is not None:
+                if is_exact and known[1] != rows.checksum():
                     raise StoreError(
                         f"{self.path} already holds other rows for {record.key}:"
                         " the same trial gave two results"
                     )
                 return
-            cursor = connection.execute(
-                "INSERT INTO trials (case_id, agent, trial, seed, config_hash, config, version,"
-                " n_decisions, seconds, finished_at, rows_digest)"
-                " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            run_id = self._run_id(record.key, record.config, record.version)
+            self._insert(run_id, rows)
+            whole = rows if known is None else self._rows(run_id)
+            connection.execute(
+                "UPDATE runs SET version = ?, n_decisions = ?, seconds = seconds + ?,"
+                " finished_at = ?, checksum = ? WHERE id = ?",
                 (
-                    *record.key,
-                    record.config,
                     record.version,
                     record.n_decisions,
                     record.seconds,
                     record.finished_at,
-                    digest,
+                    whole.checksum(),
+                    run_id,
                 ),
             )
-            trial_id = cursor.lastrowid
-            columns = (rows.episode, rows.steps, rows.episode_return, rows.solved.astype(int))
-            connection.executemany(
-                "INSERT INTO rows VALUES (?, ?, ?, ?, ?)",
-                ((trial_id, *row) for row in zip(*(c.tolist() for c in columns), strict=True)),
-            )
-        self._empty_log()
 
-    def _empty_log(self) -> None:
-        """Bring what SQLite keeps beside the file into it, so that it is whole if it is copied.
+    def extend(
+        self, key: TrialKey, rows: TrialRows, first: int, *, config: str, version: str
+    ) -> None:
+        """Store rows of a run in progress, in the place of those from the number `first` on.
 
-        And so that a killed process leaves nothing that would be taken for part of another file in
-        its place. While others read or write it has to wait for the next time, as it does where
-        trials come quickly.
+        Raises
+        ------
+        StoreError
+            If the file cannot be written.
         """
-        now = time.monotonic()
-        if now - self._emptied_at < EMPTIED_EVERY:
-            return
-        self._emptied_at = now
+        with self._writing() as connection:
+            run_id = self._run_id(key, config, version)
+            connection.execute(
+                "UPDATE runs SET finished_at = NULL, checksum = NULL WHERE id = ?", (run_id,)
+            )
+            connection.execute("DELETE FROM rows WHERE run_id = ? AND number >= ?", (run_id, first))
+            self._insert(run_id, rows)
+
+    def rows(self, key: TrialKey) -> TrialRows:
+        """Return the rows of a run, finished or in progress; none if it is not stored."""
         with _as_store_error(self.path):
-            self._connection.execute("PRAGMA busy_timeout = 0")
-            self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
-            self._connection.execute(f"PRAGMA busy_timeout = {int(1000 * BUSY_SECONDS)}")
+            found = self._find(key, "id")
+            return TrialRows(np.zeros(0, ROW)) if found is None else self._rows(found[0])
 
     def keys(self) -> set[TrialKey]:
-        """Return the keys of all stored trials."""
-        with _as_store_error(self.path):
-            return {
-                TrialKey(*row)
-                for row in self._connection.execute(
-                    "SELECT case_id, agent, trial, seed, config_hash FROM trials"
-                )
-            }
-
-    def times(self) -> tuple[TrialTime, ...]:
-        """Return how long the stored trials took, without reading their rows."""
+        """Return the keys of all finished trials."""
         with _as_store_error(self.path):
             found = self._connection.execute(
-                "SELECT case_id, agent, trial, seed, config_hash, seconds, n_decisions,"
-                " (SELECT max(episode) FROM rows WHERE trial_id = trials.id)"
-                " FROM trials ORDER BY id"
+                f"SELECT {_KEY_COLUMNS} FROM runs WHERE checksum IS NOT NULL"
+            )
+            return {_key_of(row) for row in found}
+
+    def times(self) -> tuple[TrialTime, ...]:
+        """Return how long the finished trials took, without reading their rows."""
+        with _as_store_error(self.path):
+            found = self._connection.execute(
+                f"SELECT {_KEY_COLUMNS}, seconds, n_decisions,"
+                " (SELECT max(episode) FROM rows WHERE run_id = runs.id)"
+                " FROM runs WHERE checksum IS NOT NULL ORDER BY id"
             ).fetchall()
         return tuple(
-            TrialTime(
-                key=TrialKey(*row[:5]),
-                seconds=row[5],
-                n_episodes=row[7] or 0,
-                n_decisions=row[6],
-            )
+            TrialTime(key=_key_of(row), seconds=row[5], n_decisions=row[6], n_episodes=row[7] or 0)
             for row in found
         )
 
     def load(self, keys: Iterable[TrialKey] | None = None) -> tuple[TrialRecord, ...]:
-        """Return the stored trials of the given keys (default: all), sorted by key.
+        """Return the finished trials of the given keys (default: all), sorted by key.
 
         Keys that are not stored are left out.
 
@@ -256,24 +248,12 @@ class ResultStore:
             return tuple(self._load_one(key) for key in wanted)
 
     def _load_one(self, key: TrialKey) -> TrialRecord:
-        (trial_id, config, version, n_decisions, seconds, finished_at, digest) = (
-            self._connection.execute(
-                "SELECT id, config, version, n_decisions, seconds, finished_at, rows_digest"
-                " FROM trials WHERE case_id = ? AND agent = ? AND trial = ? AND seed = ?"
-                " AND config_hash = ?",
-                key,
-            ).fetchone()
+        columns = "id, config, version, n_decisions, seconds, finished_at, checksum"
+        run_id, config, version, n_decisions, seconds, finished_at, checksum = self._find(
+            key, columns
         )
-        found = self._connection.execute(
-            "SELECT episode, steps, episode_return, solved FROM rows WHERE trial_id = ?"
-            " ORDER BY episode",
-            (trial_id,),
-        ).fetchall()
-        names = ("episode", "steps", "episode_return", "solved")
-        rows = TrialRows.from_arrays(
-            {name: np.array([row[i] for row in found]) for i, name in enumerate(names)}
-        )
-        if rows.digest() != digest:
+        rows = self._rows(run_id)
+        if rows.checksum() != checksum:
             raise StoreError(f"{self.path} is damaged: the rows of {key} have changed")
         return TrialRecord(
             key=key,
@@ -285,6 +265,41 @@ class ResultStore:
             rows=rows,
         )
 
+    @contextmanager
+    def _writing(self) -> Iterator[sqlite3.Connection]:
+        with _as_store_error(self.path), self._connection as connection:
+            connection.execute("BEGIN IMMEDIATE")
+            yield connection
+
+    def _find(self, key: TrialKey, columns: str) -> Any:
+        return self._connection.execute(
+            f"SELECT {columns} FROM runs WHERE {_KEY}", _stored(key)
+        ).fetchone()
+
+    def _run_id(self, key: TrialKey, config: str, version: str) -> int:
+        """Return the id of a run, which is begun if it is not there."""
+        self._connection.execute(
+            f"INSERT OR IGNORE INTO runs ({_KEY_COLUMNS}, config, version, n_decisions, seconds)"
+            " VALUES (?, ?, ?, ?, ?, ?, ?, 0, 0.0)",
+            (*_stored(key), config, version),
+        )
+        run_id: int = self._find(key, "id")[0]
+        return run_id
+
+    def _insert(self, run_id: int, rows: TrialRows) -> None:
+        self._connection.executemany(
+            "INSERT INTO rows VALUES (?, ?, ?, ?, ?, nullif(?, -1), ?, ?, ?, nullif(?, -1))",
+            ((run_id, *row) for row in rows.table.tolist()),
+        )
+
+    def _rows(self, run_id: int) -> TrialRows:
+        found = self._connection.execute(
+            f"SELECT {_ROW_COLUMNS} FROM rows WHERE run_id = ? ORDER BY number, part", (run_id,)
+        ).fetchall()
+        return TrialRows(np.array(found, ROW))
+
+    # Costs.
+
     def add_cost(self, record: CostRecord) -> None:
         """Store a measurement; one that another process stored first stays.
 
@@ -294,33 +309,38 @@ class ResultStore:
             If the file cannot be written.
         """
         times = record.times
-        with _as_store_error(self.path), self._connection as connection:
+        values = (
+            *record.key,
+            record.version,
+            record.machine,
+            record.finished_at,
+            times.n_steps,
+            times.table_bytes,
+            json.dumps(times.microseconds.tolist()),
+        )
+        with self._writing() as connection:
             connection.execute(
-                "INSERT OR IGNORE INTO costs (series, n_inputs, config_hash, version, machine,"
-                " finished_at, n_steps, table_bytes, microseconds)"
-                " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                (
-                    *record.key,
-                    record.version,
-                    record.machine,
-                    record.finished_at,
-                    times.n_steps,
-                    times.table_bytes,
-                    json.dumps(times.microseconds.tolist()),
-                ),
+                "INSERT OR IGNORE INTO costs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", values
             )
-        self._empty_log()
 
     def load_costs(self, config_hash: str) -> tuple[CostRecord, ...]:
         """Return the measurements under the given settings, sorted by key."""
         with _as_store_error(self.path):
             found = self._connection.execute(
-                "SELECT series, n_inputs, config_hash, version, machine, finished_at, n_steps,"
-                " table_bytes, microseconds FROM costs WHERE config_hash = ?"
-                " ORDER BY series, n_inputs",
+                "SELECT * FROM costs WHERE config_hash = ? ORDER BY series, n_inputs",
                 (config_hash,),
             ).fetchall()
             return tuple(_cost_record(*row) for row in found)
+
+
+def _stored(key: TrialKey) -> TrialKey:
+    """Return a key as it is stored: SQLite's integers have a sign."""
+    return key._replace(seed=key.seed - 2**64 if key.seed >= 2**63 else key.seed)
+
+
+def _key_of(row: tuple[Any, ...]) -> TrialKey:
+    key = TrialKey(*row[:5])
+    return key._replace(seed=key.seed % 2**64)
 
 
 def _cost_record(
@@ -346,7 +366,7 @@ def _as_store_error(path: Path) -> Iterator[None]:
     """Turn errors of SQLite and the file system into one that names the file."""
     try:
         yield
-    except (sqlite3.DatabaseError, OSError, ValueError, OverflowError) as error:
+    except (sqlite3.DatabaseError, OSError, ValueError, TypeError, OverflowError) as error:
         if isinstance(error, sqlite3.OperationalError | OSError):
             raise StoreError(f"cannot use {path}: {error}") from error
         raise StoreError(
@@ -366,12 +386,10 @@ def _inspect(path: Path) -> bool:
             connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
     if not path.exists() or path.stat().st_size == 0:
         return True
-    _refuse_other_log(path)
     with path.open("rb") as file:
         if file.read(16) != b"SQLite format 3\0":
             raise sqlite3.DatabaseError("no SQLite file")
-    connection = _connect_to_read(path)
-    try:
+    with closing(_connect_to_read(path)) as connection:
         application_id = connection.execute("PRAGMA application_id").fetchone()[0]
         version = connection.execute("PRAGMA user_version").fetchone()[0]
         n_objects = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
@@ -390,50 +408,7 @@ def _inspect(path: Path) -> bool:
         if findings != [("ok",)]:
             raise sqlite3.DatabaseError(str(findings[0][0]))
         return False
-    finally:
-        connection.close()
-
-
-def _refuse_other_log(path: Path) -> None:
-    """Refuse a file beside which lies the log of another one, which SQLite would write into it.
-
-    As where a file was copied to the place of one whose process was killed. Files only grow here,
-    so one that has more pages than its log knows of is not the log's.
-    """
-    log = path.with_name(f"{path.name}-wal")
-    n_bytes = path.stat().st_size  # before the log is read: others may write to both
-    if not log.exists():
-        return
-    with log.open("rb") as file:
-        head = file.read(_LOG_HEAD_BYTES)
-        if len(head) < _LOG_HEAD_BYTES:
-            return
-        page_bytes, salts = int.from_bytes(head[8:12], "big"), head[16:24]
-        n_pages = 0
-        while len(frame := file.read(_FRAME_HEAD_BYTES)) == _FRAME_HEAD_BYTES:
-            if frame[8:16] != salts:
-                break
-            n_pages = int.from_bytes(frame[4:8], "big") or n_pages  # 0 but at a commit
-            file.seek(page_bytes, os.SEEK_CUR)
-    if 0 < n_pages * page_bytes < n_bytes:
-        raise StoreError(
-            f"{log} is the log of another file than {path}, which it would overwrite: if you have"
-            f" copied the file there, remove {log.name} and {path.name}-shm"
-        )
-
-
-def _is_writable(folder: Path) -> bool:
-    return os.access(folder, os.W_OK)
 
 
 def _connect_to_read(path: Path) -> sqlite3.Connection:
-    """Open a file for reading, also in a folder that cannot be written.
-
-    There SQLite cannot make what it keeps beside a file for those who write it at the same time. It
-    needs none of that unless a log is there, which holds what is not yet in the file.
-    """
-    log = path.with_name(f"{path.name}-wal")
-    has_log = log.exists() and log.stat().st_size > 0
-    is_fixed = not has_log and not _is_writable(path.parent)
-    uri = f"{path.absolute().as_uri()}?mode=ro" + ("&immutable=1" if is_fixed else "")
-    return sqlite3.connect(uri, uri=True, timeout=BUSY_SECONDS)
+    return sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=BUSY_SECONDS)

@@ -9,7 +9,7 @@ from sdnn.reproduction import TrialKey, TrialRecord, TrialRows
 
 def make_record(trial=0, config_hash="aa", steps=(50, 7), **changes):
     n = len(steps)
-    rows = TrialRows(
+    rows = TrialRows.of_tests(
         episode=10 * np.arange(1, n + 1, dtype=np.int32),
         steps=np.array(steps, np.int32),
         episode_return=np.linspace(-5.0, 0.1, n),

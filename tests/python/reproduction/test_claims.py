@@ -46,7 +46,7 @@ def result(case_id, agent, steps, n_trials=10, n_tests=1500):
             n_decisions=1,
             seconds=1.0,
             finished_at="",
-            rows=TrialRows(
+            rows=TrialRows.of_tests(
                 episode=10 * np.arange(1, n_tests + 1, dtype=np.int32),
                 steps=np.full(n_tests, taken, np.int32),
                 episode_return=np.zeros(n_tests),

@@ -58,7 +58,7 @@ def test_it_reproduces_the_compiled_trial_bit_for_bit(agent, n_sensors, noise, m
     for name, column in expected.items():
         assert rows[name].dtype == column.dtype
         np.testing.assert_array_equal(rows[name], column)
-    assert TrialRows.from_arrays(rows).digest() == TrialRows.from_arrays(expected).digest()
+    assert TrialRows.of_tests(**rows).digest() == TrialRows.of_tests(**expected).digest()
 
 
 def test_the_settings_of_the_task_reach_it(monkeypatch):

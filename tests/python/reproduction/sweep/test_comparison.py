@@ -19,7 +19,7 @@ from sdnn.runs.study_report import study_json, study_page
 def record(study, case, variant, number, steps, returns=None, interval=10):
     """A trial whose tests took so many steps; 50 is not solved."""
     steps = np.asarray(steps, np.int32)
-    rows = TrialRows(
+    rows = TrialRows.of_tests(
         episode=interval * np.arange(1, steps.size + 1, dtype=np.int32),
         steps=steps,
         episode_return=np.zeros(steps.size) if returns is None else np.asarray(returns, float),
