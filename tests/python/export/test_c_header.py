@@ -569,7 +569,7 @@ def test_the_example_balances_as_the_agent_does(needs, tmp_path):
 
 
 def test_docstrings():
-    result = doctest.testmod(importlib.import_module("sdnn.export.c_header"))
+    result = doctest.testmod(importlib.import_module("sdnn.export.header"))
     assert result.failed == 0
     assert result.attempted > 0
 
