@@ -9,13 +9,13 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator
+from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils import assert_all_finite
 from sklearn.utils.validation import validate_data
 
 from sdnn.coding import Coding, RandomInverse, WithMissing, coding_named
 
-__all__ = ["PAIR_BUDGET", "CodedInputs", "Pairs", "column_indices", "input_pairs"]
+__all__ = ["PAIR_BUDGET", "CodedInputs", "CodedRegressor", "Pairs", "column_indices", "input_pairs"]
 
 Columns = int | str | slice | Sequence[int] | Sequence[str] | Sequence[bool] | Callable[[Any], Any]
 Pairs = list[tuple[int, int]]
@@ -287,3 +287,27 @@ class CodedInputs(BaseEstimator):
         if names is not None:
             self.feature_names_in_ = np.array(names, dtype=object)
         return table
+
+
+class CodedRegressor(RegressorMixin, CodedInputs):
+    """Validation of targets that are numbers, of one output or several."""
+
+    def __sklearn_tags__(self) -> Any:
+        """Declare that several outputs can be learned at once."""
+        tags = super().__sklearn_tags__()
+        tags.target_tags.multi_output = True
+        return tags
+
+    def _validated_numbers(
+        self, X: Any, y: Any, reset: bool
+    ) -> tuple[NDArray[Any], NDArray[np.float64]]:
+        if y is None:
+            # Here because scikit-learn's message is less clear where several outputs may come.
+            raise ValueError(
+                f"{type(self).__name__} requires y to be passed, but the target y is None"
+            )
+        table, targets = self._validated(X, y, multi_output=True, y_numeric=True, reset=reset)
+        try:
+            return table, np.asarray(targets, dtype=np.float64)
+        except ValueError as error:
+            raise ValueError(f"y must be numbers: {error}") from None

@@ -8,12 +8,11 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import RegressorMixin
 from sklearn.kernel_ridge import KernelRidge
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from sdnn.estimators.inputs import CodedInputs, input_pairs
+from sdnn.estimators.inputs import CodedRegressor, input_pairs
 from sdnn.kernel import N_UNITS, AnalyticKernel
 
 __all__ = ["SDNNKernelRidge"]
@@ -25,7 +24,7 @@ Self = TypeVar("Self", bound="SDNNKernelRidge")
 
 
 @dataclasses.dataclass(eq=False, repr=False)
-class SDNNKernelRidge(RegressorMixin, CodedInputs):
+class SDNNKernelRidge(CodedRegressor):
     """Kernel ridge regression with the network's kernel, as of codes of infinitely many units.
 
     For samples that are all at hand, some thousand at most, and noisy: unlike the network it has a
@@ -75,16 +74,10 @@ class SDNNKernelRidge(RegressorMixin, CodedInputs):
     pairs: Any = dataclasses.field(default="all", kw_only=True)
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
-        **CodedInputs._parameter_constraints,
+        **CodedRegressor._parameter_constraints,
         "alpha": [Interval(Real, 0, np.inf, closed="neither")],
         "pairs": [StrOptions({"all"}), "array-like"],
     }
-
-    def __sklearn_tags__(self) -> Any:
-        """Declare that several outputs can be learned at once."""
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = True
-        return tags
 
     def fit(self: Self, X: ArrayLike, y: ArrayLike) -> Self:
         """Learn ranges, and weights of the training samples.
@@ -110,10 +103,7 @@ class SDNNKernelRidge(RegressorMixin, CodedInputs):
 
     def _fit(self, X: ArrayLike, y: ArrayLike) -> None:
         self._validate_params()
-        if y is None:
-            raise ValueError("SDNNKernelRidge requires y to be passed, but the target y is None")
-        table, targets = self._validated(X, y, multi_output=True, y_numeric=True)
-        targets = np.asarray(targets, dtype=np.float64)
+        table, targets = self._validated_numbers(X, y, reset=True)
         codings = [
             coding.fit(table[:, index], N_UNITS)
             for index, coding in enumerate(self._codings(X, table))

@@ -8,10 +8,10 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import RegressorMixin
 from sklearn.utils._param_validation import Interval, StrOptions
 
 from sdnn.estimators.base import BaseSDNN
+from sdnn.estimators.inputs import CodedRegressor
 from sdnn.estimators.training import weighted_mean
 
 __all__ = ["SDNNRegressor"]
@@ -26,7 +26,7 @@ Self = TypeVar("Self", bound="SDNNRegressor")
 
 
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
-class SDNNRegressor(RegressorMixin, BaseSDNN):
+class SDNNRegressor(CodedRegressor, BaseSDNN):
     """Regression by a selective desensitization neural network, exact and online.
 
     Each input becomes a binary pattern, the patterns of each two inputs are combined by selective
@@ -91,12 +91,6 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
         "n_averaged_epochs": [Interval(Integral, 1, 1000, closed="both")],
         "refit": ["boolean"],
     }
-
-    def __sklearn_tags__(self) -> Any:
-        """Declare that several outputs can be learned at once."""
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = True
-        return tags
 
     def partial_fit(self: Self, X: ArrayLike, y: ArrayLike) -> Self:
         """Go once through the samples, in their order.
@@ -213,14 +207,7 @@ class SDNNRegressor(RegressorMixin, BaseSDNN):
     ) -> tuple[NDArray[Any], NDArray[np.float64]]:
         if in_fit and self.warm_start and self.refit:
             raise ValueError("refit=True trains a new network: it cannot be with warm_start=True")
-        if y is None:
-            # Here because scikit-learn's message is less clear where several outputs may come.
-            raise ValueError("SDNNRegressor requires y to be passed, but the target y is None")
-        table, targets = self._validated(X, y, multi_output=True, y_numeric=True, reset=reset)
-        try:
-            return table, np.asarray(targets, dtype=np.float64)
-        except ValueError as error:
-            raise ValueError(f"y must be numbers: {error}") from None
+        return self._validated_numbers(X, y, reset)
 
     def _set_outputs(self, y: NDArray[np.float64]) -> int:
         self._flat: bool = y.ndim == 1
