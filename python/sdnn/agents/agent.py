@@ -502,7 +502,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         if flag("progress", progress):
             from rich.console import Console
 
-            from sdnn.agents.progress import TrainingProgress
+            from sdnn.agents.callbacks import TrainingProgress
 
             own = [*callbacks, TrainingProgress(Console(stderr=True), "learning")]
         training = Training(

@@ -4,17 +4,34 @@ from __future__ import annotations
 
 import json
 import math
+from collections import deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from sdnn.arguments import path_of, real, whole
+from sdnn.progress import ProgressBars
 from sdnn.whole_files import write_whole
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from sdnn.agents.training import Training
 
-__all__ = ["Callback", "Checkpoints", "EarlyStop", "JSONLines", "Row", "Schedule", "TensorBoard"]
+__all__ = [
+    "Callback",
+    "Checkpoints",
+    "EarlyStop",
+    "JSONLines",
+    "Row",
+    "Schedule",
+    "TensorBoard",
+    "TrainingProgress",
+]
+
+_STEPS_BETWEEN = 64
+"""Between two readings of the clock of a training's bar, which cost more than a step."""
 
 Row: TypeAlias = Mapping[str, Any]
 """An episode (``kind``, ``step``, ``episode``, ``return``, ``length``, ``terminated``, and with
@@ -195,6 +212,48 @@ class Schedule(Callback):
             setattr(training.agent, name, function(training.agent.progress))
 
 
+class TrainingProgress(Callback):
+    """Shows the bar of one training, with its last returns and evaluation.
+
+    Parameters
+    ----------
+    console
+        Where to draw.
+    title
+        What is learned.
+    """
+
+    def __init__(self, console: Console, title: str) -> None:
+        self._bars = ProgressBars(console)
+        self._title = title
+        self._returns: deque[float] = deque(maxlen=20)
+        self._evaluation = ""
+
+    def on_start(self, training: Training) -> None:
+        """Open the bar."""
+        total = training.steps if training.steps is not None else training.episodes
+        self._bars.add(self, self._title, total)
+        self._bars.update(self, _done(training))
+        self._bars.__enter__()
+
+    def on_row(self, training: Training, row: Row) -> None:
+        """Remember what is new."""
+        if row["kind"] == "evaluation":
+            self._evaluation = f", evaluation {row['mean_return']:.4g}"
+        else:
+            self._returns.append(row["return"])
+
+    def on_step(self, training: Training) -> None:
+        """Move the bar now and then."""
+        if training.n_steps % _STEPS_BETWEEN == 0:
+            news = f"return {median(self._returns):.4g}" if self._returns else ""
+            self._bars.update(self, _done(training), news=news + self._evaluation)
+
+    def on_end(self, training: Training) -> None:
+        """Take the bar away."""
+        self._bars.__exit__(None, None, None)
+
+
 class TensorBoard(Callback):
     """Writes the numbers of each row for TensorBoard; needs ``tensorboardX`` or ``torch``.
 
@@ -231,3 +290,7 @@ def _summary_writer() -> Callable[[str], Any]:
             continue
         return make
     raise ImportError("TensorBoard rows need tensorboardX: pip install tensorboardX")
+
+
+def _done(training: Training) -> int:
+    return training.n_steps if training.steps is not None else training.n_episodes

@@ -91,7 +91,7 @@ def with_progress(run: Callable[..., Done], request: Any) -> Done:
     """Run what was asked for, with a line of progress."""
     from rich.console import Console
 
-    from sdnn.agents.progress import ProgressBars
+    from sdnn.progress import ProgressBars
 
     with ProgressBars(Console(stderr=True)) as observer:
         return run(request, observer=observer)

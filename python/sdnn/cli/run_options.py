@@ -218,7 +218,7 @@ def train_run(
     if sys.stderr.isatty():
         from rich.console import Console
 
-        from sdnn.agents.progress import TrainingProgress
+        from sdnn.agents.callbacks import TrainingProgress
 
         callbacks.append(TrainingProgress(Console(stderr=True), run.config.environment.id))
     outcome = run.train(

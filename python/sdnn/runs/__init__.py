@@ -1,6 +1,6 @@
 """Runs: one agent that learns in one environment, in a folder of its own, which can be resumed.
 
-A folder holds ``config.json`` (all that defines the run), ``rows.jsonl`` (its episodes and
+A folder holds ``config.json`` (all that defines the run), ``results.sqlite`` (its episodes and
 evaluations), ``checkpoint.safetensors`` (where it goes on) and, once it is finished,
 ``agent.safetensors``. The commands ``sdnn train``, ``resume``, ``evaluate``, ``plot`` and
 ``record`` work on such folders.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import re
 import sys
@@ -169,6 +170,18 @@ class RunConfig:
                 "finds no angles in scaled observations: not together with noise or redundant",
             )
         object.__setattr__(self, "settings", self._checked_settings())
+
+    def canonical_json(self) -> str:
+        """Return what defines the run but its seed and output, as one line of JSON."""
+        values = self.values()
+        for name in ("seed", "checkpoint_every", "tensorboard", "version"):
+            values.pop(name, None)
+        return json.dumps(values, sort_keys=True, separators=(",", ":"))
+
+    @property
+    def config_hash(self) -> str:
+        """First 16 hexadecimal digits of the SHA-256 of `canonical_json`."""
+        return hashlib.sha256(self.canonical_json().encode()).hexdigest()[:16]
 
     @property
     def warm_up_steps(self) -> int:

@@ -106,6 +106,7 @@ def run_trials(
     *,
     executor: Executor | None = None,
     jobs: int | None = None,
+    stop: threading.Event | None = None,
     observer: Observer | None = None,
 ) -> RunOutcome:
     """Run the planned trials that are not stored, and store each as soon as it is finished.
@@ -123,6 +124,8 @@ def run_trials(
         Where they run; default threads of this process.
     jobs
         Threads of the default executor; default one for each core.
+    stop
+        Set by Ctrl-C; whoever sets it ends the run, too.
     observer
         Told what happens.
 
@@ -145,7 +148,7 @@ def run_trials(
     missing = tuple(p for p in planned if p.key not in stored)
     n_episodes = sum(p.config.length for p in missing)
     watcher.begun(len(planned), len(planned) - len(missing), n_episodes)
-    stop = threading.Event()
+    stop = threading.Event() if stop is None else stop
     failures: list[Failure] = []
     n_run = 0
     if missing:

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from typing import Protocol
@@ -103,7 +104,7 @@ def run_to_end(
     wanted: Callable[[], bool],
     advanced: Callable[[int], None],
 ) -> TrialRecord | None:
-    """Run one trial, in pieces of about `CHUNK_SECONDS`.
+    """Run one trial, in pieces of about `CHUNK_SECONDS`; None where it did not come to its end.
 
     Parameters
     ----------
@@ -116,10 +117,13 @@ def run_to_end(
     """
     begin = time.thread_time()
     with opened(planned.config.make_trial(planned.key.seed)) as trial:
-        for _ in _pieces(trial):
-            advanced(int(trial.episode))
-            if not wanted():
-                return None
+        with closing(_pieces(trial)) as pieces:
+            for _ in pieces:
+                advanced(int(trial.episode))
+                if not wanted():
+                    return None
+        if not trial.finished:
+            return None
     return TrialRecord(
         key=planned.key,
         config=planned.config.canonical_json(),
@@ -131,7 +135,7 @@ def run_to_end(
     )
 
 
-def _pieces(trial: Trial | TrainingTrial) -> Iterator[None]:
+def _pieces(trial: Trial | TrainingTrial) -> Generator[None, None, None]:
     """Run a trial to its end; yield about every `CHUNK_SECONDS`, and first of all."""
     yield
     if isinstance(trial, TrainingTrial):  # whose episodes may be long
@@ -147,7 +151,7 @@ def _pieces(trial: Trial | TrainingTrial) -> Iterator[None]:
 
 def _rows(trial: Trial | TrainingTrial) -> TrialRows:
     if isinstance(trial, TrainingTrial):
-        return TrialRows.from_training(trial.training.rows)
+        return trial.rows()
     return TrialRows.of_tests(**trial.test_rows())
 
 

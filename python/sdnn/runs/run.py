@@ -1,4 +1,4 @@
-"""A run in its folder: begun, stopped anywhere, and gone on with exactly."""
+"""A run in its folder: begun, stopped anywhere, and resumed exactly."""
 
 from __future__ import annotations
 
@@ -6,25 +6,20 @@ import dataclasses
 import json
 import os
 import signal
+import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium as gym
 
 from sdnn.agents import (
     Agent,
     Callback,
-    Checkpoints,
-    EarlyStop,
     Evaluation,
-    JSONLines,
     SDNNQLearning,
-    TensorBoard,
-    Training,
-    UnrepeatedEpisodeError,
     UnusableStepError,
     evaluate,
     load_agent,
@@ -35,8 +30,14 @@ from sdnn.agents.spaces import require_same_kind
 from sdnn.arguments import whole
 from sdnn.interrupts import Interrupts
 from sdnn.runs.config import RunConfig, read_json
+from sdnn.runs.engine import run_trials
 from sdnn.runs.environment import render_modes
-from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line, problem_of
+from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line
+from sdnn.runs.records import TrialKey
+from sdnn.runs.run_training import AGENT, CHECKPOINT, Reason, RunTask, one_of, tensorboard_in
+from sdnn.runs.store import ResultStore
+from sdnn.runs.thread_executor import SerialExecutor
+from sdnn.runs.trial_config import PlannedTrial, TrialSettings
 from sdnn.whole_files import lock, remove_abandoned_files, write_whole
 
 if TYPE_CHECKING:
@@ -45,15 +46,7 @@ if TYPE_CHECKING:
 __all__ = ["Goal", "Run", "RunEvaluation", "RunOutcome"]
 
 CONFIG = "config.json"
-ROWS = "rows.jsonl"
-CHECKPOINT = "checkpoint.safetensors"
-AGENT = "agent.safetensors"
-TENSORBOARD = "tensorboard"
 LOCK = ".lock"
-
-TrainingEnv: TypeAlias = gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any]
-
-Reason: TypeAlias = Literal["done", "target", "stopped"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,15 +126,6 @@ class RunEvaluation(Evaluation):
     is_warming_up: bool
 
 
-class _Target(EarlyStop):
-    """Stops where the target was reached, also if that was just before the run was killed."""
-
-    def on_start(self, training: Training) -> None:
-        """Look at the evaluation made at the present step."""
-        if self.is_reached(training) and training.evaluations[-1][0] == training.n_steps:
-            training.stop()
-
-
 class Run:
     """A run in its folder.
 
@@ -183,7 +167,7 @@ class Run:
         cls(place, config).check()
         place.mkdir(parents=True, exist_ok=True)
         run = cls(place, config)
-        run._write_config()
+        run.write_config()
         return run
 
     @classmethod
@@ -208,10 +192,10 @@ class Run:
 
     def check(self) -> None:
         """Make all that is needed once, to see that it works; ConfigError if not."""
-        with closing(self.config.environment.make()) as env, self._evaluation_env():
+        with closing(self.config.environment.make()) as env, self.evaluation_env():
             self.config.make_agent(env)
         if self.config.tensorboard:
-            self._tensorboard()
+            tensorboard_in(self.folder)
 
     def train(
         self,
@@ -246,44 +230,38 @@ class Run:
         with ExitStack() as stack:
             stack.enter_context(self._locked())
             remove_abandoned_files(self.folder)
-            environment = self.config.environment
-            env = stack.enter_context(closing(self.config.make_training_env()))
-            evaluation_env = stack.enter_context(self._evaluation_env())
-            has_goal = steps is not None or episodes is not None
-            target = None
-            if self.config.target_return is not None and not (self.goals or has_goal):
-                target = _Target(self.config.target_return)
-            # Rows are written before the checkpoint that counts them.
-            checkpoints = Checkpoints(self.folder / CHECKPOINT, self.config.checkpoint_every)
-            own = [JSONLines(self.folder / ROWS), target, checkpoints, *callbacks]
-            if self.config.tensorboard:
-                own.append(self._tensorboard())
-            told = [one for one in own if one is not None]
-            training = self._training(env, evaluation_env, told, repeat_episodes)
-            if has_goal:
-                self._set_goal(training, steps, episodes)
-            began_at = training.n_steps
-            try:
-                with Interrupts(training.stop, (signal.SIGTERM,)) as terminations:
-                    result = training.run()
-            except UnusableStepError as error:
-                saved = self._saved(checkpoints.n_saved or began_at)
-                raise RunError(f"{environment.id}: {error}; {saved}") from error
+            if (self.folder / AGENT).exists() and not (self.folder / CHECKPOINT).exists():
+                raise RunError(
+                    f"{self.folder} was trained, but has no {CHECKPOINT} to go on from: a new run"
+                    f" needs another folder, {AGENT} would be written over"
+                )
+            store = stack.enter_context(ResultStore(self.folder))
+            store.reopen(self.key)
+            stop = threading.Event()
+            task = RunTask(
+                self, store, callbacks, repeat_episodes=repeat_episodes, steps=steps,
+                episodes=episodes, stop=stop,
+            )  # fmt: skip
+            planned = PlannedTrial(self.key, cast("TrialSettings", task))
+            with Interrupts(stop.set, (signal.SIGTERM,)) as terminations:
+                done = run_trials([planned], store, executor=SerialExecutor(), stop=stop)
+            for failure in done.failures:
+                raise task.told(failure.error)
+            training = task.trial.training
             if terminations.received is not None:
                 raise RunTerminatedError(f"terminated after {training.n_steps} steps")
+            if done.interrupted:
+                raise KeyboardInterrupt
             agent = training.agent
-            assert isinstance(agent, Agent)  # what make_agent and load give
             agent.save(self.folder / AGENT)
-        is_target = target is not None and target.is_reached(training)
-        reason: Reason = "target" if is_target else "done" if result.is_finished else "stopped"
         return RunOutcome(
-            n_steps=result.n_steps,
-            n_episodes=result.n_episodes,
-            reason=reason,
+            n_steps=training.n_steps,
+            n_episodes=training.n_episodes,
+            reason=task.trial.reason,
             last_evaluation=_last_row(self.rows(), "evaluation"),
             learning_report=_report(agent),
             is_warming_up=agent.is_warming_up,
-            has_pictures="rgb_array" in render_modes(_one_of(env)),
+            has_pictures="rgb_array" in render_modes(one_of(training.env)),
             scaling=agent.scaling,
         )
 
@@ -347,20 +325,29 @@ class Run:
         """A root of episodes that the run itself does not have."""
         return (self.config.seed + 2**63) % 2**64
 
+    @property
+    def key(self) -> TrialKey:
+        """Where its rows are stored."""
+        return TrialKey(
+            self.config.environment.id, self.config.agent, 0, self.config.seed,
+            self.config.config_hash,
+        )  # fmt: skip
+
     def rows(self) -> list[Row]:
         """Read the rows: episodes and evaluations, in order.
 
         Raises
         ------
-        RunError
-            If a line cannot be read; file and line are named.
+        StoreError
+            If they cannot be read.
         """
-        return _read_rows(self.folder / ROWS)
+        with ResultStore(self.folder, read_only=True) as store:
+            return store.rows(self.key).to_training()
 
     # Parts.
 
     @contextmanager
-    def _evaluation_env(self) -> Iterator[gym.Env[Any, Any] | None]:
+    def evaluation_env(self) -> Iterator[gym.Env[Any, Any] | None]:
         """Make an environment for evaluations where there are any; there may be one robot only."""
         if not self.config.evaluate_every:
             yield None
@@ -373,72 +360,18 @@ class Run:
         with closing(env):
             yield env
 
-    def _training(
-        self,
-        env: TrainingEnv,
-        evaluation_env: gym.Env[Any, Any] | None,
-        callbacks: list[Callback],
-        repeat_episodes: bool,
-    ) -> Training:
-        path = self.folder / CHECKPOINT
-        if not path.exists():
-            if (self.folder / AGENT).exists():
-                raise RunError(
-                    f"{self.folder} was trained, but has no {CHECKPOINT} to go on from: a new run"
-                    f" needs another folder, {AGENT} would be written over"
-                )
-            goal = self.goals[-1] if self.goals else self.config
-            return Training(
-                self.config.make_agent(_one_of(env)),
-                env,
-                steps=goal.steps,
-                episodes=goal.episodes,
-                seed=self.config.seed,
-                callbacks=callbacks,
-                evaluate_every=self.config.evaluate_every or None,
-                evaluation_env=evaluation_env,
-                evaluation_episodes=self.config.evaluation_episodes,
-            )
-        try:
-            training = Training.load(
-                path, env, callbacks=callbacks, evaluation_env=evaluation_env,
-                repeat_episodes=repeat_episodes,
-            )  # fmt: skip
-        except UnrepeatedEpisodeError as error:
-            begins = command_line("sdnn", "resume", self.folder, "--new-episode")
-            raise RunError(f"{error}; {begins} begins a new one") from error
-        except ValueError as error:
-            raise RunError(str(error)) from error
-        assert isinstance(training.agent, Agent)  # what load gives
-        rows = _read_rows(self.folder / ROWS)
-        if len(rows) < training.n_rows:
-            raise RunError(
-                f"{self.folder / ROWS} must have the {training.n_rows} rows that were written"
-                f" before {path.name}: it was changed"
-            )
-        return training
+    @property
+    def goal(self) -> Goal | RunConfig:
+        """How many steps or episodes it is to learn in all."""
+        return self.goals[-1] if self.goals else self.config
 
-    def _set_goal(self, training: Training, steps: int | None, episodes: int | None) -> None:
-        """Note a new goal: in the checkpoint, which is followed, then in the configuration."""
-        if steps is not None and episodes is not None:
-            raise ConfigError("episodes", "must not be given together with steps")
-        name, goal, done = (
-            ("steps", steps, training.n_steps)
-            if steps is not None
-            else ("episodes", episodes, training.n_episodes)
-        )
-        try:
-            if whole(name, goal, 1, 2**53) < done:
-                raise ConfigError(name, f"must be at least the {done} that are done, got {goal}")
-        except ValueError as error:
-            raise ConfigError(name, problem_of(error)) from None
-        training.steps, training.episodes = steps, episodes
-        if (self.folder / CHECKPOINT).exists():
-            training.save(self.folder / CHECKPOINT)
-        self.goals += (Goal(at_step=training.n_steps, steps=steps, episodes=episodes),)
-        self._write_config()
+    def add_goal(self, at_step: int, steps: int | None, episodes: int | None) -> None:
+        """Note a new goal in the configuration."""
+        self.goals += (Goal(at_step=at_step, steps=steps, episodes=episodes),)
+        self.write_config()
 
-    def _write_config(self) -> None:
+    def write_config(self) -> None:
+        """Write the configuration and the goals."""
         values = self.config.values()
         if self.goals:
             values["goals"] = [
@@ -450,19 +383,6 @@ class Run:
                 for goal in self.goals
             ]
         write_whole(self.folder / CONFIG, (json.dumps(values, indent=2) + "\n").encode())
-
-    def _saved(self, n_steps: int) -> str:
-        """Say what is left of a training that failed."""
-        goes_on = command_line("sdnn", "resume", self.folder)
-        if n_steps == 0:
-            return f"nothing is learned yet: {goes_on} begins again once the environment is mended"
-        return f"the first {n_steps} steps are saved: {goes_on} goes on there with a new episode"
-
-    def _tensorboard(self) -> TensorBoard:
-        try:
-            return TensorBoard(self.folder / TENSORBOARD)
-        except ImportError as error:
-            raise ConfigError("tensorboard", str(error)) from error
 
     @contextmanager
     def _locked(self) -> Iterator[None]:
@@ -476,53 +396,10 @@ class Run:
             os.close(file)
 
 
-def _one_of(env: TrainingEnv) -> gym.Env[Any, Any]:
-    """Give a single environment of those that the agent learns in."""
-    if isinstance(env, gym.vector.VectorEnv):
-        assert isinstance(env, gym.vector.SyncVectorEnv)  # what the configuration makes
-        return env.envs[0]
-    return env
-
-
 def _report(agent: object) -> Mapping[str, Any] | None:
     if not isinstance(agent, SDNNQLearning) or agent.is_warming_up:
         return None
     return agent.learning_report()
-
-
-def _is_row(row: Any) -> bool:
-    """Whether it has what rows of its kind have."""
-    if not isinstance(row, dict) or type(row.get("step")) is not int:
-        return False
-    if not 0 <= row["step"] <= 2**53:
-        return False
-    if row.get("kind") == "episode":
-        return _is_number(row.get("return"))
-    if row.get("kind") == "evaluation":
-        returns = row.get("returns")
-        are_numbers = isinstance(returns, list) and returns and all(map(_is_number, returns))
-        return bool(are_numbers) and _is_number(row.get("mean_return"))
-    return "kind" in row
-
-
-def _is_number(value: Any) -> bool:
-    return type(value) in (int, float)
-
-
-def _read_rows(path: Path) -> list[Row]:
-    if not path.exists():
-        return []
-    rows: list[Row] = []
-    lines = path.read_bytes().split(b"\n")
-    for number, line in enumerate(lines[:-1], 1):  # what follows the last line end is not whole
-        try:
-            row = json.loads(line)
-        except ValueError:
-            row = None
-        if not _is_row(row):
-            raise RunError(f"{path}:{number}: must be a row of a training, got {line[:80]!r}")
-        rows.append(row)
-    return rows
 
 
 def _last_row(rows: Iterable[Row], kind: str) -> Row | None:

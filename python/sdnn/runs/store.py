@@ -65,6 +65,7 @@ CREATE TABLE costs (
 """
 
 _KEY = "case_id = ? AND agent = ? AND trial = ? AND seed = ? AND config_hash = ?"
+_REOPEN = f"UPDATE runs SET finished_at = NULL, checksum = NULL WHERE {_KEY}"
 _KEY_COLUMNS = "case_id, agent, trial, seed, config_hash"
 _ROW_COLUMNS = (
     'number, part, kind, episode, ifnull(step, -1), length, "return", terminated,'
@@ -200,11 +201,14 @@ class ResultStore:
         """
         with self._writing() as connection:
             run_id = self._run_id(key, config, version)
-            connection.execute(
-                "UPDATE runs SET finished_at = NULL, checksum = NULL WHERE id = ?", (run_id,)
-            )
+            connection.execute(_REOPEN, _stored(key))
             connection.execute("DELETE FROM rows WHERE run_id = ? AND number >= ?", (run_id, first))
             self._insert(run_id, rows)
+
+    def reopen(self, key: TrialKey) -> None:
+        """Let a finished run be in progress again; its rows stay."""
+        with self._writing() as connection:
+            connection.execute(_REOPEN, _stored(key))
 
     def rows(self, key: TrialKey) -> TrialRows:
         """Return the rows of a run, finished or in progress; none if it is not stored."""

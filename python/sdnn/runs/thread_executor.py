@@ -1,4 +1,4 @@
-"""Runs trials in threads of this process.
+"""Runs trials in threads of this process, or in the calling one.
 
 A trial releases Python's lock while it advances, so threads scale over the cores.
 """
@@ -70,6 +70,28 @@ class ThreadExecutor:
                 n_open -= not isinstance(message, Started | Advanced)
                 if not isinstance(message, _Abandoned):
                     yield message
+
+
+class SerialExecutor:
+    """Runs trials one after another in the calling thread, as an environment may need it."""
+
+    def run(
+        self, planned: Sequence[PlannedTrial], stop: threading.Event
+    ) -> Generator[Message, None, None]:
+        """Run the trials; see `sdnn.runs.executor.Executor`."""
+        for item in planned:
+            yield Started(item)
+            try:
+                record = run_to_end(
+                    item, wanted=lambda: not stop.is_set(), advanced=lambda episode: None
+                )
+            except Exception as error:
+                yield Failed(item, error)
+                continue
+            if stop.is_set() and record is None:
+                return
+            if record is not None:
+                yield Finished(item, record)
 
 
 def _run_one(

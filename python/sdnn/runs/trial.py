@@ -29,6 +29,7 @@ from sdnn.environments import (
     SensorConfig,
     TighteningGoal,
 )
+from sdnn.runs.records import TrialRows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,6 +146,10 @@ class TrainingTrial:
             "episode_return": np.array(self._evaluated("returns"), np.float64),
             "solved": np.array(self._evaluated("terminated"), np.bool_),
         }
+
+    def rows(self) -> TrialRows:
+        """Return all rows so far: learning episodes and evaluations."""
+        return TrialRows.from_training(self.training.rows)
 
     def close(self) -> None:
         """Close the environments, if they are open still."""

@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from sdnn.agents import RBFQLearning, Training
-from sdnn.agents.progress import TrainingProgress
+from sdnn.agents.callbacks import TrainingProgress
 
 
 @pytest.mark.parametrize("is_terminal", [True, False])

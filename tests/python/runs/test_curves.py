@@ -9,6 +9,8 @@ from sdnn.runs import EnvironmentSpec, Goal, Run, RunConfig, RunError
 from sdnn.runs.curves import curves_of
 from sdnn.runs.figures import draw_curves, write_curves
 from sdnn.runs.groups import groups_of
+from sdnn.runs.records import TrialRows
+from sdnn.runs.store import ResultStore
 
 CONFIG = RunConfig(environment=EnvironmentSpec(id="CartPole-v1"))
 
@@ -17,19 +19,29 @@ def make(folder, config, returns=(), evaluations=(), every=20):
     """Make a run that nobody trained: an episode every 10 steps, an evaluation every 20 or so."""
     run = Run.create(folder, config)
     rows = [
-        {"kind": "episode", "step": 10 * (n + 1), "return": float(value)}
+        {
+            "kind": "episode",
+            "step": 10 * (n + 1),
+            "episode": n,
+            "return": float(value),
+            "length": 10,
+            "terminated": True,
+        }
         for n, value in enumerate(returns)
     ]
     rows += [
         {
             "kind": "evaluation",
             "step": every * (n + 1),
-            "mean_return": float(np.mean(values)),
+            "episode": n,
             "returns": list(values),
+            "lengths": [10] * len(values),
+            "terminated": [True] * len(values),
         }
         for n, values in enumerate(evaluations)
     ]
-    (folder / "rows.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    with ResultStore(folder) as store:
+        store.extend(run.key, TrialRows.from_training(rows), 0, config="{}", version="0.1")
     return run
 
 

@@ -16,9 +16,9 @@ from click.testing import CliRunner
 from rich.console import Console
 
 import sdnn
-from sdnn.agents.progress import ProgressBars
 from sdnn.approximators import SDNNCConfig
 from sdnn.cli import main
+from sdnn.progress import ProgressBars
 from sdnn.reproduction import (
     AGENTS,
     ClusterError,

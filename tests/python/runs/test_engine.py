@@ -6,7 +6,7 @@ import time
 import pytest
 from rich.console import Console
 
-from sdnn.agents.progress import ProgressBars
+from sdnn.progress import ProgressBars
 from sdnn.reproduction import Observer, ResultStore, StoreError, WorkerLostError
 from sdnn.runs.executor import Advanced, Failed, Finished, Lost, Noted, Started
 from sdnn.runs.thread_executor import ThreadExecutor

@@ -13,6 +13,8 @@ import pytest
 import drifting_env  # noqa: F401
 from sdnn.agents import Callback, Training, load_agent
 from sdnn.runs import ConfigError, EnvironmentSpec, Run, RunConfig, RunError
+from sdnn.runs.records import TrialRows
+from sdnn.runs.store import ResultStore
 
 SMALL = {
     "approximator": {"n_hidden_units": 60, "n_active_units": 20, "n_pattern_units": 20},
@@ -34,16 +36,12 @@ CONFIG = RunConfig(
 WARMING_UP = dataclasses.replace(CONFIG, environment=EnvironmentSpec(id="tests/Drifting-v0"))
 
 
-def untimed(rows):
-    return [{name: v for name, v in row.items() if name != "seconds"} for row in rows]
-
-
 def contents(run):
-    """All of a run but the time that it took."""
+    """All of a run that must not depend on kills."""
     files = {name: (run.folder / name).read_bytes() for name in (
         "checkpoint.safetensors", "agent.safetensors"
     )}  # fmt: skip
-    return files | {"rows": untimed(run.rows())}
+    return files | {"rows": run.rows()}
 
 
 @pytest.fixture(scope="module")
@@ -87,11 +85,11 @@ def test_a_run_is_the_training_that_its_configuration_says(whole, tmp_path):
         evaluation_episodes=2,
     )
     rows = training.run().rows
-    assert untimed(run.rows()) == untimed(rows)
+    assert run.rows() == list(rows)
     training.agent.save(tmp_path / "agent.safetensors")
     assert (tmp_path / "agent.safetensors").read_bytes() == contents(run)["agent.safetensors"]
     assert {path.name for path in run.folder.iterdir()} == {
-        ".lock", "agent.safetensors", "checkpoint.safetensors", "config.json", "rows.jsonl",
+        ".lock", "agent.safetensors", "checkpoint.safetensors", "config.json", "results.sqlite",
     }  # fmt: skip
 
 
@@ -206,7 +204,8 @@ def test_what_is_there_is_not_overwritten(whole, tmp_path):
 
 def test_what_was_learned_is_not_written_over_by_a_new_beginning(tmp_path):
     run = Run.create(tmp_path / "run", CONFIG)
-    (run.folder / "rows.jsonl").write_text("")  # killed before the first checkpoint
+    with ResultStore(run.folder):  # killed before the first checkpoint
+        pass
     run.train()
     (run.folder / "checkpoint.safetensors").unlink()
     before = [path.read_bytes() for path in sorted(run.folder.iterdir())]
@@ -260,26 +259,17 @@ def test_folders_that_hold_no_run_or_a_damaged_one(whole, tmp_path):
     with pytest.raises(RunError, match="no checkpoint yet"):
         run.agent()
     run.train(steps=100)
-    rows = run.folder / "rows.jsonl"
-    kept = rows.read_bytes()
-    rows.write_bytes(kept.splitlines(keepends=True)[0])
-    with pytest.raises(RunError, match=r"rows\.jsonl must have the"):
+    path = run.folder / "results.sqlite"
+    kept = path.read_bytes()
+    with ResultStore(run.folder) as store:
+        store.extend(run.key, TrialRows.from_training([]), 2, config="{}", version="0.1")
+    with pytest.raises(RunError, match=r"results\.sqlite must have the"):
         run.train(steps=200)
-    rows.write_bytes(b"cake\n" + kept)
-    with pytest.raises(RunError, match=r"rows\.jsonl:1: must be a row"):
-        run.rows()
-    for row in (
-        {"kind": "episode", "step": 1},
-        {"kind": "episode", "step": 1, "return": "much"},
-        {"kind": "episode", "step": 0.5, "return": 1.0},
-        {"kind": "evaluation", "step": 1, "mean_return": 1.0, "returns": []},
-        {"kind": "evaluation", "step": 1, "mean_return": None, "returns": [1.0]},
-    ):
-        rows.write_bytes(json.dumps(row).encode() + b"\n" + kept)
-        with pytest.raises(RunError, match=r"rows\.jsonl:1: must be a row"):
-            run.rows()
-    rows.write_bytes(kept + b'{"kind": "epi')  # killed while it wrote
-    assert len(run.rows()) == len(kept.splitlines())
+    path.write_bytes(b"cake\n" + kept)
+    for use in (run.rows, run.train):
+        with pytest.raises(RunError, match=r"results\.sqlite is damaged or not a result file"):
+            use()
+    path.write_bytes(kept)
     (run.folder / "checkpoint.safetensors").write_bytes(b"cake")
     with pytest.raises(RunError, match=r"checkpoint\.safetensors is not a file of sdnn"):
         run.agent()

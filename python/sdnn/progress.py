@@ -1,30 +1,20 @@
-"""Bars on a terminal that show the progress of trainings, studies and measurements."""
+"""Bars on a terminal: of trainings, studies and measurements."""
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Hashable
-from statistics import median
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
-
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-from sdnn.agents.callbacks import Callback, Row
-from sdnn.agents.training import Training
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import TaskID
     from typing_extensions import Self
 
-__all__ = ["ProgressBars", "TrainingProgress"]
+__all__ = ["ProgressBars"]
 
 _SPEED_SECONDS = 60.0
 """Time over which the speed is averaged for the time left."""
-_STEPS_BETWEEN = 64
-"""Between two readings of the clock of a training's bar, which cost more than a step."""
-_RETURNS = 20
 
 
 class ProgressBars:
@@ -39,6 +29,14 @@ class ProgressBars:
     """
 
     def __init__(self, console: Console) -> None:
+        from rich.progress import (
+            BarColumn,
+            Progress,
+            TaskProgressColumn,
+            TextColumn,
+            TimeRemainingColumn,
+        )
+
         self._progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -128,49 +126,3 @@ class ProgressBars:
 
     def _title(self) -> str:
         return f"[bold]all ({self._n_open} to go)"
-
-
-class TrainingProgress(Callback):
-    """Shows the bar of one training, with its last returns and evaluation.
-
-    Parameters
-    ----------
-    console
-        Where to draw.
-    title
-        What is learned.
-    """
-
-    def __init__(self, console: Console, title: str) -> None:
-        self._bars = ProgressBars(console)
-        self._title = title
-        self._returns: deque[float] = deque(maxlen=_RETURNS)
-        self._evaluation = ""
-
-    def on_start(self, training: Training) -> None:
-        """Open the bar."""
-        total = training.steps if training.steps is not None else training.episodes
-        self._bars.add(self, self._title, total)
-        self._bars.update(self, _done(training))
-        self._bars.__enter__()
-
-    def on_row(self, training: Training, row: Row) -> None:
-        """Remember what is new."""
-        if row["kind"] == "evaluation":
-            self._evaluation = f", evaluation {row['mean_return']:.4g}"
-        else:
-            self._returns.append(row["return"])
-
-    def on_step(self, training: Training) -> None:
-        """Move the bar now and then."""
-        if training.n_steps % _STEPS_BETWEEN == 0:
-            news = f"return {median(self._returns):.4g}" if self._returns else ""
-            self._bars.update(self, _done(training), news=news + self._evaluation)
-
-    def on_end(self, training: Training) -> None:
-        """Take the bar away."""
-        self._bars.__exit__(None, None, None)
-
-
-def _done(training: Training) -> int:
-    return training.n_steps if training.steps is not None else training.n_episodes

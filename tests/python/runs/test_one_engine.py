@@ -1,0 +1,69 @@
+"""There is one training loop, one store, one progress display and one name for each agent."""
+
+import ast
+from pathlib import Path
+
+import sdnn
+from sdnn.cli.train import train
+from sdnn.runs.registry import AGENTS
+
+PACKAGE = Path(sdnn.__file__).parent
+
+
+def modules_with(is_wanted):
+    """Names of the modules of the package that have a wanted node in their syntax trees."""
+    found = set()
+    for path in PACKAGE.rglob("*.py"):
+        if any(map(is_wanted, ast.walk(ast.parse(path.read_text("utf-8"))))):
+            found.add(path.relative_to(PACKAGE).with_suffix("").as_posix())
+    return found
+
+
+def calls(method):
+    """Whether a node calls a method of this name, but of ``self`` or a part that is compiled."""
+
+    def is_wanted(node):
+        return (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Attribute)
+            and node.func.attr == method
+        )
+
+    return is_wanted
+
+
+def imports(name):
+    def is_wanted(node):
+        if isinstance(node, ast.Import):
+            return any(one.name == name for one in node.names)
+        return isinstance(node, ast.ImportFrom) and node.module == name
+
+    return is_wanted
+
+
+def test_one_loop_steps_environments_and_learns():
+    steps, acts, learns = map(modules_with, map(calls, ("step", "act", "learn")))
+    outside = {name for name in steps if not name.startswith("environments/")}
+    assert outside == {"agents/rounds", "agents/episode", "agents/evaluation"}
+    agents = {"agents/agent", "agents/q_learning", "agents/fuzzy_q_learning"}
+    assert learns - agents == {"agents/training"}
+    assert acts - agents == {"agents/training", "agents/evaluation"}
+
+
+def test_one_store_knows_sqlite():
+    assert modules_with(imports("sqlite3")) == {"runs/store"}
+
+
+def test_one_display_draws_progress():
+    drawn = modules_with(imports("rich.progress"))
+    # The estimators' bars are the epochs of `verbose`, in notebooks and logs, too.
+    assert drawn - {"estimators/training"} == {"progress"}
+
+
+def test_one_name_for_each_agent():
+    (option,) = (one for one in train.params if one.name == "agent")
+    offered = set(option.type.choices)
+    assert offered <= set(AGENTS)
+    kinds = {entry.agent for entry in AGENTS.values()}
+    assert len(kinds) == len(offered)
+    assert len({AGENTS[name].agent for name in offered}) == len(offered)
