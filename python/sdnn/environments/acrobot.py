@@ -208,8 +208,8 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
 
     def _draw(self, state: NDArray[np.float64], solved: bool) -> NDArray[np.uint8] | None:
         if self._picture is None:
-            window_fps = self.metadata["render_fps"] if self.render_mode == "human" else None
-            self._picture = AcrobotPicture(self.config, window_fps)
+            fps = self.metadata["render_fps"] if self.render_mode == "human" else None
+            self._picture = AcrobotPicture(self.config, fps)
         return self._picture.draw(
             state=state, torque=self._torque, decision=self._acrobot.decisions(), solved=solved
         )

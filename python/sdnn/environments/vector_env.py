@@ -185,10 +185,9 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         if self.render_mode is None:
             gym.logger.warn("render() needs a render_mode: 'rgb_array'")
             return None
-        if self._picture is None:
-            self._picture = AcrobotPicture(self.config, None)
+        picture = self._picture = self._picture or AcrobotPicture(self.config, None)
         pictures = (
-            self._picture.draw(
+            picture.draw(
                 state=state,
                 torque=float(self._torques[i]),
                 decision=self._batch.decisions(i),
@@ -196,13 +195,11 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
             )
             for i, state in enumerate(self._batch.states())
         )
-        return tuple(picture for picture in pictures if picture is not None)
+        return tuple(pixels for pixels in pictures if pixels is not None)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Let go of the pictures."""
-        if self._picture is not None:
-            self._picture.close()
-            self._picture = None
+        self._picture = None
 
     def _reset_mask(self, mask: Any) -> NDArray[np.bool_]:
         chosen = np.ones(self.num_envs, np.bool_) if mask is None else np.asarray(mask)
@@ -220,15 +217,14 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
             given = np.empty(0, object)
         if given.dtype.kind not in "iuf":
             raise TypeError(f"goal_tolerance must be numbers, got {values!r}")
-        tolerances = given.astype(np.float64)
-        if tolerances.shape not in ((), (self.num_envs,)):
+        if given.shape not in ((), (self.num_envs,)):
             raise ValueError(
                 f"goal_tolerance must be a number or of shape ({self.num_envs},), "
-                f"got shape {tolerances.shape}"
+                f"got shape {given.shape}"
             )
-        if not (tolerances >= 0.0).all():
+        if not (given >= 0.0).all():
             raise ValueError(f"goal_tolerance must be at least 0, got {values!r}")
-        return np.broadcast_to(tolerances, self.num_envs).copy()
+        return np.full(self.num_envs, given, np.float64)
 
     def _begin(self, mask: NDArray[np.bool_]) -> None:
         """Begin an episode wherever the mask is set."""
