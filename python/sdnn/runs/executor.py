@@ -119,7 +119,7 @@ def run_to_end(
     with opened(planned.config.make_trial(planned.key.seed)) as trial:
         with closing(_pieces(trial)) as pieces:
             for _ in pieces:
-                advanced(int(trial.episode))
+                advanced(trial.done if isinstance(trial, TrainingTrial) else int(trial.episode))
                 if not wanted():
                     return None
         if not trial.finished:

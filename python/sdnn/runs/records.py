@@ -180,6 +180,11 @@ class TrialRows:
         """Whether the goal was reached, (n_tests,) bool; of larger evaluations the share."""
         return self._column("terminated", np.bool_)
 
+    @property
+    def n_evaluated(self) -> int:
+        """Decisions in evaluations."""
+        return int(self._tests[0]["length"].sum())
+
     def digest(self) -> str:
         """SHA-256 of the test episodes, independent of the machine's byte order."""
         tests, _ = self._tests

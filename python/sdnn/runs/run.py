@@ -25,16 +25,22 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.agents.callbacks import Row
-from sdnn.agents.scaling import Scaling
 from sdnn.agents.spaces import require_same_kind
-from sdnn.arguments import whole
 from sdnn.interrupts import Interrupts
 from sdnn.runs.config import RunConfig, read_json
 from sdnn.runs.engine import run_trials
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line
 from sdnn.runs.records import TrialKey
-from sdnn.runs.run_training import AGENT, CHECKPOINT, Reason, RunTask, one_of, tensorboard_in
+from sdnn.runs.run_training import (
+    AGENT,
+    CHECKPOINT,
+    Goal,
+    RunOutcome,
+    RunTask,
+    one_of,
+    tensorboard_in,
+)
 from sdnn.runs.store import ResultStore
 from sdnn.runs.thread_executor import SerialExecutor
 from sdnn.runs.trial_config import PlannedTrial, TrialSettings
@@ -47,68 +53,6 @@ __all__ = ["Goal", "Run", "RunEvaluation", "RunOutcome"]
 
 CONFIG = "config.json"
 LOCK = ".lock"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Goal:
-    """A new goal that a run was given when it was resumed.
-
-    Parameters
-    ----------
-    at_step
-        Steps it had learned then.
-    steps, episodes
-        How many it is to learn in all: one of them.
-
-    Raises
-    ------
-    ValueError
-        If a number is out of its range, or not one of ``steps`` and ``episodes`` is given.
-    """
-
-    at_step: int
-    steps: int | None = None
-    episodes: int | None = None
-
-    def __post_init__(self) -> None:
-        whole("at_step", self.at_step, 0, 2**53)
-        if (self.steps is None) == (self.episodes is None):
-            raise ValueError("steps or episodes must be given")
-        name = "episodes" if self.steps is None else "steps"
-        whole(name, getattr(self, name), 1, 2**53)
-
-
-@dataclass(frozen=True, kw_only=True)
-class RunOutcome:
-    """What came of training a run.
-
-    Parameters
-    ----------
-    n_steps, n_episodes
-        Learned in all, and whole episodes among them.
-    reason
-        Why it ended: all was done, an evaluation reached the target, or a callback stopped it.
-    last_evaluation
-        Its row; None if there was none.
-    learning_report
-        See `sdnn.agents.SDNNQLearning.learning_report`; None for other agents and while it is
-        warming up.
-    is_warming_up
-        Whether the agent has only acted at random so far, to see ranges, and learned nothing.
-    has_pictures
-        Whether the environment says that it can be rendered as pictures, as `record` needs it.
-    scaling
-        How what the agent observes is scaled; None: not at all.
-    """
-
-    n_steps: int
-    n_episodes: int
-    reason: Reason
-    last_evaluation: Row | None
-    learning_report: Mapping[str, Any] | None
-    is_warming_up: bool
-    has_pictures: bool
-    scaling: Scaling | None
 
 
 @dataclass(frozen=True, kw_only=True)

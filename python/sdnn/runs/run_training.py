@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, closing
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 
@@ -21,22 +22,83 @@ from sdnn.agents import (
     UnusableStepError,
 )
 from sdnn.agents.callbacks import Row
+from sdnn.agents.scaling import Scaling
 from sdnn.arguments import whole
 from sdnn.runs.errors import ConfigError, RunError, command_line, problem_of
 from sdnn.runs.records import TrialRows
 from sdnn.runs.store import STORE_NAME, ResultStore
-from sdnn.runs.trial import TrainingTrial
+from sdnn.runs.trial import Reason, TrainingTrial
 
 if TYPE_CHECKING:
     from sdnn.runs.run import Run
 
-__all__ = ["AGENT", "CHECKPOINT", "Reason", "RunTask", "one_of", "tensorboard_in"]
+__all__ = ["AGENT", "CHECKPOINT", "Goal", "RunOutcome", "RunTask", "one_of", "tensorboard_in"]
 
 CHECKPOINT = "checkpoint.safetensors"
 AGENT = "agent.safetensors"
 TENSORBOARD = "tensorboard"
 
-Reason: TypeAlias = Literal["done", "target", "stopped"]
+
+@dataclass(frozen=True, kw_only=True)
+class Goal:
+    """A new goal that a run was given when it was resumed.
+
+    Parameters
+    ----------
+    at_step
+        Steps it had learned then.
+    steps, episodes
+        How many it is to learn in all: one of them.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, or not one of ``steps`` and ``episodes`` is given.
+    """
+
+    at_step: int
+    steps: int | None = None
+    episodes: int | None = None
+
+    def __post_init__(self) -> None:
+        whole("at_step", self.at_step, 0, 2**53)
+        if (self.steps is None) == (self.episodes is None):
+            raise ValueError("steps or episodes must be given")
+        name = "episodes" if self.steps is None else "steps"
+        whole(name, getattr(self, name), 1, 2**53)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOutcome:
+    """What came of training a run.
+
+    Parameters
+    ----------
+    n_steps, n_episodes
+        Learned in all, and whole episodes among them.
+    reason
+        Why it ended: all was done, an evaluation reached the target, or a callback stopped it.
+    last_evaluation
+        Its row; None if there was none.
+    learning_report
+        See `sdnn.agents.SDNNQLearning.learning_report`; None for other agents and while it is
+        warming up.
+    is_warming_up
+        Whether the agent has only acted at random so far, to see ranges, and learned nothing.
+    has_pictures
+        Whether the environment says that it can be rendered as pictures, as `record` needs it.
+    scaling
+        How what the agent observes is scaled; None: not at all.
+    """
+
+    n_steps: int
+    n_episodes: int
+    reason: Reason
+    last_evaluation: Row | None
+    learning_report: Mapping[str, Any] | None
+    is_warming_up: bool
+    has_pictures: bool
+    scaling: Scaling | None
 
 
 class _Target(EarlyStop):
@@ -89,32 +151,19 @@ class _StoredCheckpoints(Checkpoints):
 
 
 class RunTrial(TrainingTrial):
-    """The training of a run; its rows are stored with its checkpoints already."""
+    """The training of a run, whose rows are stored with its checkpoints already."""
 
     def __init__(
-        self, training: Training, environments: Iterable[gym.Env[Any, Any]], run: Run,
-        store: ResultStore, target: _Target | None,
+        self, training: Training, environments: Iterable[gym.Env[Any, Any]], target: _Target | None,
+        stored: Callable[[], TrialRows],
     ) -> None:  # fmt: skip
-        super().__init__(training, environments)
-        self._run, self._store, self._target = run, store, target
-
-    @property
-    def reason(self) -> Reason:
-        """Why it ended."""
-        if self._target is not None and self._target.is_reached(self.training):
-            return "target"
-        return "done" if self.training.is_finished else "stopped"
-
-    @property
-    def finished(self) -> bool:
-        """Whether all is learned, or the target is reached."""
-        return self.reason != "stopped"
+        super().__init__(training, environments, target)
+        self._stored = stored
 
     @property
     def n_decisions(self) -> int:
         """Decisions of the whole run, in learning and evaluations."""
-        table = self._store.rows(self._run.key).table
-        return self.training.n_steps + int(table["length"][table["kind"] == "evaluation"].sum())
+        return self.training.n_steps + self._stored().n_evaluated
 
     def rows(self) -> TrialRows:
         """Return the rows that are not yet stored: none."""
@@ -188,7 +237,7 @@ class RunTask:
             self._began_at = training.n_steps
             stack.pop_all()
         environments = [one for one in (env, evaluation_env) if one is not None]
-        self.trial = RunTrial(training, environments, run, self._store, target)
+        self.trial = RunTrial(training, environments, target, lambda: self._store.rows(run.key))
         return self.trial
 
     def told(self, error: Exception) -> Exception:

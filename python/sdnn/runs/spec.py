@@ -29,7 +29,7 @@ from sdnn.runs.environment import EnvironmentSpec, Stream
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.registry import agent_entry
 from sdnn.runs.settings import Settings, argument_of, changed, kinds_of, read, values_of
-from sdnn.runs.trial import ProtocolConfig, Trial
+from sdnn.runs.trial import ProtocolConfig, TrainingTrial, Trial, training_trial
 
 __all__ = [
     "AgentSpec",
@@ -350,6 +350,24 @@ class RunSpec(Settings, frozen=True):
         )
         core = {name: part.to_core() for name, part in {**parts, "protocol": protocol}.items()}
         return entry.core_trial(**core, seed=self.seed)
+
+    @property
+    def length(self) -> int:
+        """Episodes or steps to learn, in which progress is told."""
+        return self.budget.episodes or self.budget.steps or 0
+
+    def make_trial(self, seed: int) -> Trial | TrainingTrial:
+        """Make the trial of a seed: in C++ if that can do the whole run, else a training.
+
+        Raises
+        ------
+        ConfigError
+            If environment or agent cannot be made.
+        ValueError
+            If a value is out of its range.
+        """
+        spec = self.replace(seed=seed)
+        return spec.core_trial() if spec.is_compiled else training_trial(spec)
 
     def make_env(
         self,

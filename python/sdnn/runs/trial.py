@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypeVar
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.agents import Training
+from sdnn.agents import Callback, EarlyStop, Training
 from sdnn.agents.transition import Learner
 from sdnn.arguments import whole
 from sdnn.config import to_core
@@ -30,6 +30,9 @@ from sdnn.environments import (
     TighteningGoal,
 )
 from sdnn.runs.records import TrialRows
+
+if TYPE_CHECKING:
+    from sdnn.runs.spec import RunSpec
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,6 +97,9 @@ def opened(trial: _AnyTrial) -> Iterator[_AnyTrial]:
             trial.close()
 
 
+Reason: TypeAlias = Literal["done", "target", "stopped"]
+
+
 class TrainingTrial:
     """A `sdnn.agents.Training` as a trial; its evaluations are the test episodes.
 
@@ -103,11 +109,19 @@ class TrainingTrial:
         Learns for a number of episodes, or of steps.
     environments
         Closed at the end.
+    target
+        One of its callbacks, with which it is finished before that number.
     """
 
-    def __init__(self, training: Training, environments: Iterable[gym.Env[Any, Any]]) -> None:
+    def __init__(
+        self,
+        training: Training,
+        environments: Iterable[gym.Env[Any, Any]],
+        target: EarlyStop | None = None,
+    ) -> None:
         self.training = training
         self._open = tuple(environments)
+        self._target = target
 
     @property
     def episode(self) -> int:
@@ -115,14 +129,27 @@ class TrainingTrial:
         return self.training.n_episodes
 
     @property
+    def done(self) -> int:
+        """Learning episodes or steps done, whichever its length is told in."""
+        training = self.training
+        return training.n_episodes if training.steps is None else training.n_steps
+
+    @property
+    def reason(self) -> Reason:
+        """Why it ended."""
+        if self._target is not None and self._target.is_reached(self.training):
+            return "target"
+        return "done" if self.training.is_finished else "stopped"
+
+    @property
     def finished(self) -> bool:
-        """Whether all that was asked for is learned."""
-        return self.training.is_finished
+        """Whether all is learned, or the target is reached."""
+        return self.reason != "stopped"
 
     @property
     def n_decisions(self) -> int:
         """Decisions made so far, in learning and test episodes."""
-        return self.training.n_steps + sum(map(int, self._evaluated("lengths")))
+        return self.training.n_steps + self.rows().n_evaluated
 
     def advance(self, n_episodes: int, /) -> None:
         """Run up to so many more learning episodes and the evaluations due among them."""
@@ -138,14 +165,9 @@ class TrainingTrial:
 
     def test_rows(self) -> dict[str, NDArray[Any]]:
         """Test episodes so far: arrays `episode`, `steps`, `episode_return`, `solved`, (n,)."""
-        evaluations = [row for row in self.training.rows if row["kind"] == "evaluation"]
-        episodes = [row["episode"] for row in evaluations for _ in row["returns"]]
-        return {
-            "episode": np.array(episodes, np.int32),
-            "steps": np.array(self._evaluated("lengths"), np.int32),
-            "episode_return": np.array(self._evaluated("returns"), np.float64),
-            "solved": np.array(self._evaluated("terminated"), np.bool_),
-        }
+        rows = self.rows()
+        names = ("episode", "steps", "episode_return", "solved")
+        return {name: getattr(rows, name) for name in names}
 
     def rows(self) -> TrialRows:
         """Return all rows so far: learning episodes and evaluations."""
@@ -158,9 +180,55 @@ class TrainingTrial:
             for env in environments:
                 stack.callback(env.close)
 
-    def _evaluated(self, name: str) -> list[Any]:
-        rows = self.training.rows
-        return [one for row in rows if row["kind"] == "evaluation" for one in row[name]]
+
+def training_trial(spec: RunSpec) -> TrainingTrial:
+    """Make the trial of a specification in Python: the rows of a compiled one, bit for bit.
+
+    Raises
+    ------
+    ConfigError
+        If environment or agent cannot be made.
+    """
+    target = None
+    if spec.budget.target_return is not None:
+        target = EarlyStop(spec.budget.target_return)
+    with ExitStack() as stack:
+        env: Any = spec.make_training_env()
+        stack.callback(env.close)
+        evaluation_env = None
+        if spec.is_evaluated:
+            evaluation_env = spec.make_env("evaluation_sensor_noise")
+            stack.callback(evaluation_env.close)
+        training = training_of(spec, env, evaluation_env, () if target is None else (target,))
+        stack.pop_all()
+    environments = [one for one in (env, evaluation_env) if one is not None]
+    return TrainingTrial(training, environments, target)
+
+
+def training_of(
+    spec: RunSpec, env: Any, evaluation_env: gym.Env[Any, Any] | None, callbacks: Iterable[Callback]
+) -> Training:
+    """Make the training of a specification in environments that it has made.
+
+    On the paper's acrobot the streams of the sensors' noise run on over all episodes, and resets
+    are told the number of the episode, for the goal that tightens. Elsewhere each episode has a
+    seed of its own.
+    """
+    is_acrobot = spec.environment is None
+    return Training(
+        spec.make_agent(env.envs[0] if isinstance(env, gym.vector.SyncVectorEnv) else env),
+        env,
+        steps=spec.budget.steps,
+        episodes=spec.budget.episodes,
+        seed=None if is_acrobot else spec.seed,
+        callbacks=callbacks,
+        evaluate_every=spec.protocol.evaluate_every or None,
+        evaluate_every_episodes=spec.protocol.evaluate_every_episodes,
+        evaluation_env=evaluation_env,
+        evaluation_episodes=spec.protocol.evaluation_episodes or 1,
+        limit_bootstraps=spec.protocol.limit_bootstraps,
+        reset_options=(lambda episode: {"episode": episode}) if is_acrobot else None,
+    )
 
 
 def python_trial(

@@ -17,8 +17,9 @@ from sdnn.reproduction import (
     case_config,
     register,
 )
+from sdnn.runs import AgentSpec, BudgetSpec, EnvironmentSpec, ProtocolSpec, RunSpec
 from sdnn.runs.records import TrialRows
-from sdnn.runs.trial import TrainingTrial
+from sdnn.runs.trial import TrainingTrial, training_trial
 
 PROTOCOL = ProtocolConfig(n_learning_episodes=60, test_interval=5)
 SEED = 11
@@ -198,3 +199,59 @@ def test_the_papers_settings_have_the_hashes_under_which_results_are_stored(
     agent, n_sensors, noise, config_hash
 ):
     assert config_of(agent, n_sensors, noise, None).config_hash == config_hash
+
+
+def spec_of(agent="sdnn-c", **changes):
+    given = {
+        "agent": AgentSpec(name=agent),
+        "protocol": ProtocolSpec(evaluate_every_episodes=5),
+        "budget": BudgetSpec(episodes=60),
+    }
+    return RunSpec(**given | changes)
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [
+        *map(spec_of, ("sdnn-c", "rbf", "fuzzy")),
+        spec_of(
+            agent="fuzzy",
+            acrobot={"max_decisions": 3, "penalty": -1.0},
+            sensors={"n_sensors": 5, "noise": 0.02},
+            protocol=ProtocolSpec(
+                evaluate_every_episodes=5, limit_bootstraps=False, noisy_evaluations=False
+            ),
+        ),
+    ],
+)
+def test_both_trials_of_a_specification_have_the_same_rows(spec):
+    core, trial = spec.make_trial(SEED), training_trial(spec.replace(seed=SEED))
+    assert (type(core).__module__, spec.length) == (_core.__name__, 60)
+    core.advance(60)
+    trial.advance(60)
+    assert trial.n_decisions == core.n_decisions
+    assert trial.rows().digest() == TrialRows.of_tests(**core.test_rows()).digest()
+    trial.close()
+
+
+def test_a_specification_that_cpp_does_not_know_is_a_training():
+    environment = EnvironmentSpec(id="MountainCar-v0", kwargs={"max_episode_steps": 30}, noise=0.01)
+    for protocol, budget, expected in (
+        (ProtocolSpec(evaluate_every=40, evaluation_episodes=3), BudgetSpec(steps=90), [1, 2]),
+        (ProtocolSpec(evaluate_every_episodes=2), BudgetSpec(episodes=4), [2, 4]),
+        (ProtocolSpec(evaluate_every=0, n_envs=2), BudgetSpec(steps=90), []),
+    ):
+        spec = RunSpec(environment=environment, protocol=protocol, budget=budget)
+        trial = spec.make_trial(SEED)
+        for _ in trial.pieces(0.0):
+            pass
+        assert (trial.finished, trial.reason, trial.done) == (True, "done", spec.length)
+        assert trial.rows().episode.tolist() == expected
+        trial.close()
+    target = BudgetSpec(steps=500, target_return=-1000.0)
+    trial = RunSpec(
+        environment=environment, protocol=ProtocolSpec(evaluate_every=40), budget=target
+    ).make_trial(SEED)
+    for _ in trial.pieces(0.0):
+        pass
+    assert (trial.finished, trial.reason, trial.done) == (True, "target", 40)
