@@ -245,7 +245,7 @@ class Episodes:
             )
         if self._seed is None:
             raise ValueError(
-                "episodes without seeds cannot be repeated: repeat_episodes=False begins new ones"
+                "repeat_episodes must be False for a training whose episodes had no seeds, got True"
             )
         if not self._rounds.can_repeat:
             raise ValueError(

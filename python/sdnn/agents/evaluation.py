@@ -121,6 +121,8 @@ def evaluate(
     require_same_kind(agent, env)
     root = None if seed is None else seed_of(seed)
     n_episodes = whole("episodes", episodes, 1, 10**9)
+    if options is not None and not isinstance(options, dict):
+        raise TypeError(f"options must be a dictionary or None, got {options!r}")
     returns, lengths, ends = [], [], []
     for episode in range(n_episodes):
         for now in greedy_episode(agent, env, root, episode, options):

@@ -162,7 +162,7 @@ class Training:
             raise ValueError(
                 f"one of steps and episodes must be given, got steps={steps}, episodes={episodes}"
             )
-        if None not in (evaluate_every, evaluate_every_episodes):
+        if evaluate_every is not None and evaluate_every_episodes is not None:
             raise ValueError("evaluate_every must not be given with evaluate_every_episodes")
         self.agent: Any = agent
         self.env = env
@@ -178,6 +178,8 @@ class Training:
         self.evaluation_env = evaluation_env
         self.evaluation_episodes = whole("evaluation_episodes", evaluation_episodes, 1, 10**9)
         self.limit_bootstraps = flag("limit_bootstraps", limit_bootstraps)
+        if reset_options is not None and not callable(reset_options):
+            raise TypeError(f"reset_options must be a function or None, got {reset_options!r}")
         self.reset_options = reset_options
         self.n_steps = 0
         """Steps learned."""
@@ -379,7 +381,12 @@ class Training:
         return training
 
     def _options(self, episode: int) -> dict[str, Any] | None:
-        return None if self.reset_options is None else dict(self.reset_options(episode))
+        if self.reset_options is None:
+            return None
+        options = self.reset_options(episode)
+        if not isinstance(options, Mapping):
+            raise TypeError(f"reset_options must return a mapping, got {options!r}")
+        return dict(options)
 
     def _begin_episode(self, environment: int) -> None:
         self.agent.begin_episode(**self._place[environment])

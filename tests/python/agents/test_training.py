@@ -709,7 +709,7 @@ def test_without_a_seed_the_streams_of_environments_run_on(tmp_path):
     training.run()
     training.run()
     assert (env.seeds, tested.seeds) == ([None] * 6, [None] * 30)
-    with pytest.raises(ValueError, match="repeat_episodes=False"):
+    with pytest.raises(ValueError, match="repeat_episodes must be False"):
         Training.load(tmp_path / "t", Corridor(), evaluation_env=Corridor())
     other = Training.load(
         tmp_path / "t", Corridor(), evaluation_env=Corridor(), repeat_episodes=False

@@ -413,6 +413,10 @@ def arguments(agent, parameters):
         "callbacks": (),
         "progress": False,
         "evaluate_every": None,
+        "evaluate_every_episodes": None,
+        "limit_bootstraps": True,
+        "options": None,
+        "reset_options": None,
         "evaluation_env": Slope(agent.action_space, ENOUGH),
         "evaluation_episodes": 1,
         "every": 3,
@@ -557,7 +561,8 @@ def _file_cell(description, arrays, kind):
             except OverflowError:
                 continue  # values as large as can be were in the file
             except ValueError as error:
-                fault = "" if str(path) in str(error) or "env must" in str(error) else str(error)
+                words = (str(path), "env must", "repeat_episodes must")  # what was asked for
+                fault = "" if any(word in str(error) for word in words) else str(error)
             if fault:
                 return fault
         return ""
