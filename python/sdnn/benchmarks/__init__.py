@@ -5,6 +5,47 @@
 
 from __future__ import annotations
 
-from sdnn.benchmarks.run import BenchmarkError, run_benchmarks
+import json
+import os
+import subprocess
+import sys
+from typing import Any
 
 __all__ = ["BenchmarkError", "run_benchmarks"]
+
+
+_ONE_THREAD = {
+    f"{name}_THREADS": "1"
+    for name in ("OPENBLAS_NUM", "MKL_NUM", "OMP_NUM", "BLIS_NUM", "VECLIB_MAXIMUM")
+}
+"""What makes NumPy's linear algebra use one thread; it is read when NumPy is loaded."""
+
+
+class BenchmarkError(Exception):
+    """The measuring process failed; the message is its last line."""
+
+
+def run_benchmarks(*, quick: bool = False) -> dict[str, Any]:
+    """Measure everything in a new process and return the results as ``sdnn bench --json`` does.
+
+    In that process NumPy's linear algebra has one thread, and nothing else has touched the memory.
+
+    Parameters
+    ----------
+    quick : bool
+        Few repetitions: to see that it works, not how quick it is.
+
+    Raises
+    ------
+    BenchmarkError
+        If the process fails.
+    """
+    command = [sys.executable, "-m", "sdnn.benchmarks", *(["--quick"] if quick else [])]
+    done = subprocess.run(
+        command, env=os.environ | _ONE_THREAD, capture_output=True, text=True, check=False
+    )
+    if done.returncode != 0:
+        lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+        raise BenchmarkError(lines[-1])
+    results: dict[str, Any] = json.loads(done.stdout)
+    return results

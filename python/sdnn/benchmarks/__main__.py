@@ -1,4 +1,4 @@
-"""The process that measures: prints its results as JSON (see `sdnn.benchmarks.run`)."""
+"""The process that measures: prints its results as JSON (see `run_benchmarks`)."""
 
 from __future__ import annotations
 

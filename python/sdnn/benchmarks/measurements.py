@@ -3,45 +3,35 @@
 Other programs disturb every measurement. So everything is repeated often and briefly, things that
 are compared take turns, and medians are taken. The loops are in C++; here are nanoseconds per
 repetition only.
+
+Results are values that JSON can hold. Times are in microseconds unless named otherwise; a spread
+has the quartiles of repetitions as ``lower``, ``median`` and ``upper``.
 """
 
 from __future__ import annotations
 
+import platform
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import date
-from typing import TYPE_CHECKING, Any, cast
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.approximators import SDNNCConfig
-from sdnn.benchmarks.machine import describe_machine
-from sdnn.environments import AcrobotConfig, SensorConfig
 from sdnn.instruction_sets import (
     available_instruction_sets,
     instruction_set,
     set_instruction_set,
 )
-from sdnn.runs.trial import ProtocolConfig
-from sdnn.runs.trial_config import TrialConfig
+from sdnn.machine import n_cores, processor
 
-if TYPE_CHECKING:
-    from sdnn.benchmarks.results import (
-        AcrobotResult,
-        DecisionsResult,
-        NetworkResult,
-        Results,
-        Spread,
-        ThreadsResult,
-    )
-    from sdnn.runs.trial import Trial
-
-Nanoseconds = NDArray[np.int64]
-Run = Callable[[int], Nanoseconds]
+Nanoseconds: TypeAlias = NDArray[np.int64]
+Run: TypeAlias = Callable[[int], Nanoseconds]
 """Makes n repetitions and returns the time of each, shape (n,)."""
 
 SEED = 1
@@ -62,6 +52,9 @@ SELECTIONS_PER_REPETITION = 100
 
 N_COLD = 2
 """Repetitions after which a turn has the caches it would have without the others."""
+
+_CACHE_FOLDER = Path("/sys/devices/system/cpu/cpu0/cache")
+_MULTIPLES = {"K": 2**10, "M": 2**20, "G": 2**30}
 
 
 @dataclass(frozen=True)
@@ -89,10 +82,10 @@ class Effort:
 QUICK = Effort(n_rounds=3, n_repetitions=2, n_episodes=10, n_runs=2)
 
 
-def measure(*, quick: bool = False) -> Results:
+def measure(*, quick: bool = False) -> dict[str, Any]:
     """Measure everything, about half a minute; with `quick` little of it.
 
-    NumPy's linear algebra should have one thread: see `sdnn.benchmarks.run`.
+    NumPy's linear algebra should have one thread: see `sdnn.benchmarks.run_benchmarks`.
     """
     effort = QUICK if quick else Effort()
     return {
@@ -110,6 +103,43 @@ def measure(*, quick: bool = False) -> Results:
     }
 
 
+def describe_machine() -> dict[str, Any]:
+    """Describe this machine; what cannot be found out is "unknown" or left out.
+
+    ``n_cores`` are those this process may use, ``caches`` the bytes of each that one core sees.
+    """
+    try:
+        found = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
+        blas = f"{found['name']} {found['version']}"
+    except (KeyError, TypeError):
+        blas = "unknown"
+    return {
+        "processor": processor(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "n_cores": n_cores(),
+        "caches": _caches(_CACHE_FOLDER),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "blas": blas,
+    }
+
+
+def _caches(folder: Path) -> dict[str, int]:
+    """Bytes of the first core's caches by name, such as L1d, L2."""
+    caches = {}
+    try:
+        for index in sorted(folder.glob("index*")):
+            kind, level, size = (
+                (index / name).read_text().strip() for name in ("type", "level", "size")
+            )
+            if kind != "Instruction":
+                name = f"L{level}{'d' if kind == 'Data' else ''}"
+                caches[name] = int(size.rstrip("KMG")) * _MULTIPLES.get(size[-1:], 1)
+    except (OSError, ValueError):
+        pass
+    return caches
+
+
 def in_turns(runs: Mapping[str, Run], effort: Effort) -> dict[str, Nanoseconds]:
     """Let everything take turns; the first repetitions of a turn find cold caches and are dropped.
 
@@ -125,7 +155,7 @@ def in_turns(runs: Mapping[str, Run], effort: Effort) -> dict[str, Nanoseconds]:
     return {name: np.concatenate(turns) for name, turns in times.items()}
 
 
-def spread(times: Nanoseconds, n_parts: int = 1) -> Spread:
+def spread(times: Nanoseconds, n_parts: int = 1) -> dict[str, float]:
     """Quartiles, in microseconds, of repetitions that consist of `n_parts` equal parts each.
 
     Examples
@@ -133,17 +163,30 @@ def spread(times: Nanoseconds, n_parts: int = 1) -> Spread:
     >>> spread(np.array([1000, 2000, 3000, 4000, 5000]))
     {'lower': 2.0, 'median': 3.0, 'upper': 4.0}
     """
-    lower, median, upper = np.percentile(times, (25, 50, 75)) / (1000.0 * n_parts)
-    return {"lower": float(lower), "median": float(median), "upper": float(upper)}
+    quartiles = np.percentile(times, (25, 50, 75)) / (1000.0 * n_parts)
+    return dict(zip(("lower", "median", "upper"), map(float, quartiles), strict=True))
 
 
-def measure_network(n_inputs: int, effort: Effort) -> NetworkResult:
-    """Time the parts of a network that has learned a little, beside a dense product of its size."""
+def measure_network(n_inputs: int, effort: Effort) -> dict[str, Any]:
+    """Time the parts of a network that has learned a little, beside a dense product of its size.
+
+    Returns
+    -------
+    dict
+        Spreads of ``values`` (all action values of a new state, by instruction set),
+        ``remembered_values`` (of the same state again), ``correction`` (a learning step of a state
+        just asked about), ``selection`` (of its units), ``dense`` (a float32 product of
+        n_hidden_units x n_columns weights, by who computes it) and ``read`` (a buffer of
+        ``weight_bytes``). ``pass_bytes`` are those that a pass has to read, on average, and
+        ``least_time`` their time at the rate of ``read``: no pass can be quicker.
+        ``ratio_to_dense`` is the time of ``values`` over that of the quickest dense product,
+        ``share_of_limit`` ``least_time`` over it.
+    """
     trial = _short_trial(n_inputs, 0.0, effort.n_episodes)
     trial.advance(effort.n_episodes)
-    parts = _core.NetworkParts(cast("_core.AcrobotTrial", trial), SEED)
-    config = SDNNCConfig(n_inputs=n_inputs)
-    n_columns = config.n_pattern_units * config.n_pairs
+    parts = _core.NetworkParts(trial, SEED)
+    config = _core.SDNNCConfig(n_inputs=n_inputs)
+    n_columns = config.n_pattern_units * n_inputs * (n_inputs - 1)
     levels = available_instruction_sets()
     read = _core.BufferRead(parts.weight_bytes)
     dense: dict[str, Run] = {
@@ -157,16 +200,16 @@ def measure_network(n_inputs: int, effort: Effort) -> NetworkResult:
         "remembered_values": parts.time_remembered_values,
         "selection": lambda n: parts.time_selections(n, SELECTIONS_PER_REPETITION, N_CORRECTED),
     }
-    times = {name: spread(taken) for name, taken in in_turns(runs, effort).items()}
+    n_parts = {"selection": SELECTIONS_PER_REPETITION}
+    taken = in_turns(runs, effort)
+    times = {name: spread(one, n_parts.get(name, 1)) for name, one in taken.items()}
     # Afterwards, because corrections change the weights.
     corrections = in_turns(
         {"correction": lambda n: parts.time_corrections(n, N_CORRECTED)}, effort
     )["correction"]
-
     pass_bytes = parts.mean_bytes_of_pass(effort.n_rounds)
     least_time = times["read"]["median"] * pass_bytes / read.n_bytes
     least_dense = min(times[name]["median"] for name in dense)
-    n_selections = SELECTIONS_PER_REPETITION
     return {
         "n_inputs": n_inputs,
         "n_hidden_units": config.n_hidden_units,
@@ -177,11 +220,7 @@ def measure_network(n_inputs: int, effort: Effort) -> NetworkResult:
         "remembered_values": times["remembered_values"],
         "correction": spread(corrections),
         "n_corrected": N_CORRECTED,
-        "selection": {
-            "lower": times["selection"]["lower"] / n_selections,
-            "median": times["selection"]["median"] / n_selections,
-            "upper": times["selection"]["upper"] / n_selections,
-        },
+        "selection": times["selection"],
         "dense": {name: times[name] for name in dense},
         "read": times["read"],
         "weight_bytes": parts.weight_bytes,
@@ -193,9 +232,9 @@ def measure_network(n_inputs: int, effort: Effort) -> NetworkResult:
     }
 
 
-def measure_acrobot(effort: Effort) -> AcrobotResult:
+def measure_acrobot(effort: Effort) -> dict[str, Any]:
     """Time the acrobot alone."""
-    acrobot = _core.AcrobotDecisions(AcrobotConfig().to_core(), SEED)
+    acrobot = _core.AcrobotDecisions(_core.AcrobotConfig(), SEED)
     times = spread(in_turns({"acrobot": acrobot.run}, effort)["acrobot"])
     n_steps = acrobot.n_integration_steps
     return {
@@ -205,12 +244,17 @@ def measure_acrobot(effort: Effort) -> AcrobotResult:
     }
 
 
-def measure_decisions(n_inputs: int, noise: float, effort: Effort) -> DecisionsResult:
-    """Time every decision of a short trial, in several runs of the same trial."""
-    runs = []
-    for _ in range(effort.n_runs):
-        trial = _short_trial(n_inputs, noise, effort.n_episodes)
-        runs.append(_core.time_decisions(cast("_core.AcrobotTrial", trial), effort.n_episodes))
+def measure_decisions(n_inputs: int, noise: float, effort: Effort) -> dict[str, Any]:
+    """Time whole decisions of a short trial: acting, the acrobot, its sensors, learning.
+
+    A trial makes the same decisions whenever it is run; the time of a decision is its median over
+    the runs, so that what else the machine did shows little. ``max_of_all_runs`` is the longest
+    single decision of any run.
+    """
+    runs = [
+        _core.time_decisions(_short_trial(n_inputs, noise, effort.n_episodes), effort.n_episodes)
+        for _ in range(effort.n_runs)
+    ]
     all_times = np.stack(runs) / 1000.0
     times = np.median(all_times, axis=0)
     p50, p99, longest = (float(q) for q in np.percentile(times, (50, 99, 100)))
@@ -229,10 +273,14 @@ def measure_decisions(n_inputs: int, noise: float, effort: Effort) -> DecisionsR
     }
 
 
-def measure_threads(n_inputs: int, noise: float, effort: Effort) -> ThreadsResult:
-    """Time equal trials alone and at once, in turns; the quickest of the runs."""
+def measure_threads(n_inputs: int, noise: float, effort: Effort) -> dict[str, Any]:
+    """Time equal trials alone and at once, in turns; the quickest of the runs.
 
-    def advance(trial: Trial) -> float:
+    Wall-clock times tell about the cores that are free; the processor's time per trial tells
+    whether trials are in each other's way.
+    """
+
+    def advance(trial: _core.AcrobotTrial) -> float:
         begin = time.thread_time()
         trial.advance(effort.n_episodes)
         return time.thread_time() - begin
@@ -259,14 +307,17 @@ def measure_threads(n_inputs: int, noise: float, effort: Effort) -> ThreadsResul
     }
 
 
-def _short_trial(n_inputs: int, noise: float, n_episodes: int) -> Trial:
+def _short_trial(n_inputs: int, noise: float, n_episodes: int) -> _core.AcrobotTrial:
     """Make a trial of learning episodes only: its test episodes would not learn."""
-    config = TrialConfig(
-        approximator=replace(SDNNCConfig(), n_inputs=n_inputs),
-        sensors=SensorConfig(n_sensors=n_inputs, noise=noise),
-        protocol=ProtocolConfig(n_learning_episodes=n_episodes, test_interval=n_episodes + 1),
+    return _core.AcrobotTrial(
+        approximator=_core.SDNNCConfig(n_inputs=n_inputs),
+        learning=_core.QLearningConfig(),
+        acrobot=_core.AcrobotConfig(),
+        goal=_core.GoalScheduleConfig(),
+        sensors=_core.SensorConfig(n_sensors=n_inputs, noise=noise),
+        protocol=_core.ProtocolConfig(n_learning_episodes=n_episodes, test_interval=n_episodes + 1),
+        seed=SEED,
     )
-    return config.make_trial(SEED)
 
 
 def _at_level(level: str, run: Run) -> Run:

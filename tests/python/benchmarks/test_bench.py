@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from sdnn import _core
-from sdnn.benchmarks import BenchmarkError, machine, measurements, report, results, run
+from sdnn.benchmarks import BenchmarkError, measurements, report, run_benchmarks
 from sdnn.cli import main
 from sdnn.instruction_sets import available_instruction_sets, instruction_set
 
@@ -36,27 +36,33 @@ def performance_tables():
     return module
 
 
-def check_shape(value, shape, path):
-    """``value`` has exactly the fields of a TypedDict, whose numbers are positive and finite."""
-    assert set(value) == set(shape.__annotations__), path
-    for name, item in value.items():
-        if isinstance(item, float):
-            assert math.isfinite(item), (path, name)
-            assert item > 0 or name == "noise", (path, name)
-        elif isinstance(item, int):
-            assert item > 0, (path, name)
+def check_like(value, stored, path):
+    """``value`` has the fields of a stored run, and its numbers are positive and finite."""
+    assert type(value) is type(stored), path
+    if isinstance(value, list):
+        for number, one in enumerate(value):
+            check_like(one, stored[0], (*path, number))
+    elif isinstance(value, dict):
+        if path[-1:] not in BY_NAME:
+            assert value.keys() == stored.keys(), path
+            stored = {name: stored[name] for name in value}
+        for name, item in value.items():
+            check_like(item, stored.get(name, next(iter(stored.values()))), (*path, name))
+        if "median" in value:
+            assert value["lower"] <= value["median"] <= value["upper"], path
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        assert math.isfinite(value), path
+        assert value > 0 or path[-1] == "noise", path
 
 
-def check_spread(value, path):
-    check_shape(value, results.Spread, path)
-    assert value["lower"] <= value["median"] <= value["upper"], path
+BY_NAME = {("caches",), ("values",), ("ratio_to_dense",), ("share_of_limit",)}
+"""What has a field for each cache or instruction set."""
 
 
 def test_quick_run_has_all_fields(quick):
-    check_shape(quick, results.Results, "results")
+    check_like(quick, json.loads(performance_tables().RESULTS.read_text()), ())
     assert quick["quick"] is True
     assert quick["sdnn"] == _core.__version__
-    check_shape(quick["machine"], results.Machine, "machine")
     levels = list(available_instruction_sets())
     assert quick["instruction_sets"] == levels
     assert quick["best_instruction_set"] == levels[-1]
@@ -64,19 +70,11 @@ def test_quick_run_has_all_fields(quick):
     assert [network["n_inputs"] for network in quick["networks"]] == [4, 6]
     assert [network["n_columns"] for network in quick["networks"]] == [2400, 6000]
     for network in quick["networks"]:
-        check_shape(network, results.NetworkResult, "network")
         assert (network["n_hidden_units"], network["n_actions"]) == (900, 601)
         for name in ("values", "ratio_to_dense", "share_of_limit"):
             assert list(network[name]) == levels
-        for name in ("values", "dense"):
-            for who, times in network[name].items():
-                check_spread(times, (name, who))
         assert set(network["dense"]) == {"numpy", "core"}
-        for name in ("remembered_values", "correction", "selection", "read"):
-            check_spread(network[name], name)
         assert network["pass_bytes"] < network["weight_bytes"]
-    check_shape(quick["acrobot"], results.AcrobotResult, "acrobot")
-    check_spread(quick["acrobot"]["decision"], "acrobot")
     assert quick["acrobot"]["n_integration_steps"] == 50
     assert [(d["n_inputs"], d["noise"]) for d in quick["decisions"]] == [
         (4, 0.0),
@@ -84,10 +82,8 @@ def test_quick_run_has_all_fields(quick):
         (6, 0.02),
     ]
     for decisions in quick["decisions"]:
-        check_shape(decisions, results.DecisionsResult, "decisions")
         assert decisions["p50"] <= decisions["p99"] <= decisions["max"]
         assert decisions["max"] <= decisions["max_of_all_runs"]
-    check_shape(quick["threads"], results.ThreadsResult, "threads")
 
 
 def test_tables_are_on_the_screen_and_in_markdown(quick, monkeypatch):
@@ -115,7 +111,7 @@ def test_a_failing_process_is_one_clear_line(monkeypatch):
     assert done.stderr.count("\n") == 1
     assert "instruction set must be portable, neon, avx2 or avx512, got sse9" in done.stderr
     with pytest.raises(BenchmarkError, match="sse9"):
-        run.run_benchmarks(quick=True)
+        run_benchmarks(quick=True)
 
 
 def test_wrong_usage():
@@ -157,8 +153,8 @@ def test_times_of_the_core_are_nanoseconds_per_repetition():
 
 def test_machines_that_tell_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr("sdnn.machine._PROCESSOR_FILE", tmp_path / "none")
-    monkeypatch.setattr(machine, "_CACHE_FOLDER", tmp_path / "none")
-    described = machine.describe_machine()
+    monkeypatch.setattr(measurements, "_CACHE_FOLDER", tmp_path / "none")
+    described = measurements.describe_machine()
     assert described["processor"]
     assert described["caches"] == {}
 
@@ -171,7 +167,7 @@ def test_caches_are_read(tmp_path):
         folder.mkdir()
         for name, text in (("level", level), ("type", kind), ("size", size)):
             (folder / name).write_text(text + "\n")
-    assert machine._caches(tmp_path) == {"L1d": 32 * 2**10, "L3": 8 * 2**20}
+    assert measurements._caches(tmp_path) == {"L1d": 32 * 2**10, "L3": 8 * 2**20}
 
 
 def test_the_page_shows_the_stored_run():
