@@ -28,22 +28,8 @@ SENSOR_NOISE = 0.02
 class Case:
     """What the agents observe in one panel of a figure.
 
-    Rows with the same `id` observe the same thing, so their trials are shared by experiments.
-
-    Parameters
-    ----------
-    id
-        The word used in the result file; seeds are derived from it.
-    title
-        Title of the panel.
-    n_sensors
-        Number of observed variables: 4, 5 (with s5) or 6 (with s5 and s6).
-    noise
-        Standard deviation of the sensor noise, in units of the normalized variables.
-    agents
-        Ids of the agents compared, as in `sdnn.runs.registry`.
-    paper_figure
-        Where the paper shows this case.
+    Seeds are derived from `id`: cases that share it share their trials. `n_sensors` is 4, 5 (with
+    s5) or 6 (with s5 and s6), `noise` the standard deviation in units of the normalized variables.
     """
 
     id: str
@@ -56,18 +42,9 @@ class Case:
 
 @dataclass(frozen=True)
 class Experiment:
-    """One figure: its cases side by side.
+    """One figure with a panel for each case.
 
-    Parameters
-    ----------
-    id
-        The word used on the command line.
-    title
-        Title of the figure.
-    cases
-        One panel each, in order.
-    start_panels
-        Whether a small panel below each case shows its first episodes again.
+    With `start_panels` a small panel below each case shows its first episodes again.
     """
 
     id: str
@@ -83,9 +60,8 @@ class Experiment:
     def with_agents(self, agents: Iterable[str]) -> Experiment:
         """Return the experiment with other agents in all its cases; with none: as it is."""
         others = tuple(dict.fromkeys(agents))
-        if not others:
-            return self
-        return replace(self, cases=tuple(replace(case, agents=others) for case in self.cases))
+        cases = tuple(replace(case, agents=others or case.agents) for case in self.cases)
+        return replace(self, cases=cases)
 
     def with_presets(self, presets: Iterable[str]) -> Experiment:
         """Return the experiment with SDNN-C under some of `PRESET_AGENTS` beside its agents."""
@@ -134,13 +110,7 @@ WORDS = (*(experiment.id for experiment in EXPERIMENTS), COST, "all")
 
 
 def select_experiments(word: str) -> tuple[Experiment, ...]:
-    """Experiments that one of `WORDS` stands for; none for ``"cost"``.
-
-    Raises
-    ------
-    ValueError
-        If it is another word.
-    """
+    """Return the experiments that one of `WORDS` stands for; none for ``"cost"``."""
     if word not in WORDS:
         raise ValueError(f"experiment must be one of {list(WORDS)}, got {word!r}")
     return tuple(e for e in EXPERIMENTS if word in (e.id, "all"))

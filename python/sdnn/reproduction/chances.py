@@ -34,13 +34,7 @@ _Met = NDArray[np.bool_]
 
 
 class TenTrials:
-    """Experiments of ten trials, drawn from more: the same draws for all that is asked of them.
-
-    Parameters
-    ----------
-    measured
-        Trials to draw from, of each case and agent.
-    """
+    """Experiments of ten trials, drawn from more: the same draws for all that is asked of them."""
 
     def __init__(self, measured: Iterable[TrialMeasures]) -> None:
         self._measured = {Subject(one.case_id, one.agent): one for one in measured}
@@ -50,17 +44,8 @@ class TenTrials:
     def chance(self, *claims: Claim) -> Estimate | None:
         """Return in which share of the draws all the claims are shown.
 
-        The interval is a bootstrap over the trials that are drawn from.
-
-        Parameters
-        ----------
-        claims
-            At least one.
-
-        Returns
-        -------
-        Estimate or None
-            None where trials of one that a claim speaks of are missing, or one is about costs.
+        The interval is a bootstrap over the trials that are drawn from. It is None where trials of
+        one that a claim speaks of are missing, or a claim is about costs.
         """
         checks = [check for claim in claims for check in claim.checks]
         for check in checks:
@@ -124,15 +109,7 @@ class Power:
 
 
 def powers(check: Check, samples: Sequence[FloatArray]) -> tuple[Power, ...]:
-    """Return the power of a check with each of `MULTIPLES`.
-
-    Parameters
-    ----------
-    check
-        The check.
-    samples
-        The trials' values by which it was judged: one array, or two of a difference.
-    """
+    """Return the power of a check that was judged by these samples, with each of `MULTIPLES`."""
     found = []
     for multiple in MULTIPLES:
         generator = np.random.default_rng(DEFAULT_BOOTSTRAP.seed)

@@ -8,6 +8,7 @@ says by which rule they are judged.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -98,97 +99,75 @@ class Claim:
 _NOISY = ("s4-noise", "s5-noise", "s6-noise")
 _BELOW_STABLE = SHARE_STABLE - 0.02  # the step of a share of 50 tests
 
+
+def _medians(
+    measure: MeasureName, cases: Iterable[str], paper: str, agent: str = "sdnn-c", **limits: float
+) -> tuple[Check, ...]:
+    return tuple(Check(Median(measure, Subject(case, agent)), paper, **limits) for case in cases)
+
+
+def _difference(
+    measure: MeasureName, case: str, other: str, paper: str, **limits: float
+) -> tuple[Check, ...]:
+    return (Check(Difference(measure, Subject(case), Subject(other)), paper, **limits),)
+
+
 CLAIMS = (
     Claim(
         1,
         "SDNN-C learns the swing-up within about 150 learning episodes, with 4 and 6 inputs",
-        tuple(
-            Check(Median("episodes_to_learn", Subject(case)), "about 150", at_most=150)
-            for case in ("s4", "s6")
-        ),
+        _medians("episodes_to_learn", ("s4", "s6"), "about 150", at_most=150),
     ),
     Claim(
         2,
         "At the end SDNN-C reaches the goal within 10 steps in both",
-        tuple(
-            Check(Median("final_steps", Subject(case)), "within 10", at_most=10)
-            for case in ("s4", "s6")
-        ),
+        _medians("final_steps", ("s4", "s6"), "within 10", at_most=10),
     ),
     Claim(
         3,
         "FQL learns within about 100 episodes without noise",
-        (Check(Median("episodes_to_learn", Subject("s4", "fuzzy")), "about 100", at_most=100),),
+        _medians("episodes_to_learn", ("s4",), "about 100", "fuzzy", at_most=100),
     ),
     Claim(
         4,
         "FQL never learns a stable swing-up with noise",
-        tuple(
-            Check(
-                Median("final_share_solved", Subject(case, "fuzzy")),
-                "unstable",
-                at_most=_BELOW_STABLE,
-            )
-            for case in _NOISY
-        ),
+        _medians("final_share_solved", _NOISY, "unstable", "fuzzy", at_most=_BELOW_STABLE),
     ),
     Claim(
         5,
         "SDNN-C in Case II does as well as in Case I in early episodes, worsens from about episode"
         " 7,500 and ends not stably solving",
         (
-            Check(
-                Difference("early_steps", Subject("s4-noise"), Subject("s4")),
-                "almost equal",
-                at_most=EQUAL_STEPS,
+            *_difference("early_steps", "s4-noise", "s4", "almost equal", at_most=EQUAL_STEPS),
+            *_medians(
+                "episode_of_collapse", ("s4-noise",), "about 7,500", at_least=5_000, at_most=10_000
             ),
-            Check(
-                Median("episode_of_collapse", Subject("s4-noise")),
-                "about 7,500",
-                at_least=5_000,
-                at_most=10_000,
-            ),
-            Check(
-                Median("final_share_solved", Subject("s4-noise")),
-                "not stable",
-                at_most=_BELOW_STABLE,
-            ),
+            *_medians("final_share_solved", ("s4-noise",), "not stable", at_most=_BELOW_STABLE),
         ),
     ),
     Claim(
         6,
         "SDNN-C in Case III keeps solving until later than in Case II",
-        (
-            Check(
-                Difference("episode_of_collapse", Subject("s5-noise"), Subject("s4-noise")),
-                "later",
-                at_least=10,
-            ),
-        ),
+        _difference("episode_of_collapse", "s5-noise", "s4-noise", "later", at_least=10),
     ),
     Claim(
         7,
         "SDNN-C in Case IV ends at about 4 steps, about as in Case I",
         (
-            Check(Median("final_steps", Subject("s6-noise")), "about 4", at_most=4 + EQUAL_STEPS),
-            Check(
-                Difference("final_steps", Subject("s6-noise"), Subject("s4")),
-                "almost the same",
-                at_least=-EQUAL_STEPS,
-                at_most=EQUAL_STEPS,
+            *_medians("final_steps", ("s6-noise",), "about 4", at_most=4 + EQUAL_STEPS),
+            *_difference(
+                "final_steps", "s6-noise", "s4", "almost the same",
+                at_least=-EQUAL_STEPS, at_most=EQUAL_STEPS,
             ),
         ),
     ),
     Claim(
         8,
         "The time SDNN-C needs to learn does not grow with redundant inputs",
-        tuple(
-            Check(
-                Difference("episodes_to_learn", Subject(more), Subject(fewer)),
-                "does not grow",
-                at_most=15,
-            )
-            for more, fewer in (("s6", "s4"), ("s5-noise", "s4-noise"), ("s6-noise", "s4-noise"))
+        (
+            *_difference("episodes_to_learn", "s6", "s4", "does not grow", at_most=15),
+            *_difference("episodes_to_learn", "s5-noise", "s4-noise", "does not grow", at_most=15),
+            *_difference("episodes_to_learn", "s6-noise", "s4-noise", "does not grow", at_most=15),
         ),
     ),
     Claim(
@@ -203,15 +182,13 @@ CLAIMS = (
             Check(Growth("rbf-plain", 8, 4), "exponential", at_least=16),
         ),
     ),
-)
+)  # fmt: skip
 """The paper's nine claims, by their numbers in the spec's list."""
 
 
 def describe(quantity: Quantity) -> str:
     """Say for a reader what is measured on whom.
 
-    Examples
-    --------
     >>> describe(Growth("rbf", 8, 4))
     'time per step, 8 inputs / 4 inputs: RBFN, factored'
     """

@@ -30,20 +30,9 @@ SEED = 1
 class CostConfig:
     """How thoroughly costs are measured.
 
-    Parameters
-    ----------
-    n_inputs
-        Numbers of inputs d.
-    n_rounds
-        Rounds; each gives the median over its steps, and rounds are what intervals are drawn from.
-    round_seconds
-        Time of a round, as far as steps allow: every round has at least `min_steps`.
-    min_steps
-        Fewest steps in a round.
-    n_learned
-        Steps of learning before the first round: an agent at work has no fresh weights.
-    most_plain_inputs
-        Largest number of inputs of what is evaluated plainly: seconds a step with 8.
+    Each of `n_rounds` gives the median over its steps, at least `min_steps` of them; intervals are
+    drawn from rounds. An agent learns `n_learned` steps before the first, so it has no fresh
+    weights. Plain evaluations, seconds a step with 8 inputs, end at `most_plain_inputs`.
     """
 
     n_inputs: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 8)
@@ -68,13 +57,7 @@ QUICK_COST = CostConfig(n_rounds=3, round_seconds=0.01, min_steps=1, most_plain_
 
 
 def cost_keys(config: CostConfig, agents: Iterable[str] | None = None) -> tuple[CostKey, ...]:
-    """Keys of all measurements of some agents (default: all), inputs ascending in each series.
-
-    Raises
-    ------
-    ValueError
-        If no agent has one of the ids.
-    """
+    """Keys of all measurements of some agents (default: all), inputs ascending in each series."""
     return tuple(
         CostKey(series.id, n_inputs, config.config_hash)
         for _, series in cost_series(agents)
@@ -84,29 +67,9 @@ def cost_keys(config: CostConfig, agents: Iterable[str] | None = None) -> tuple[
 
 
 def measure_costs(
-    keys: Sequence[CostKey],
-    config: CostConfig,
-    store: ResultStore,
-    observer: Observer,
+    keys: Sequence[CostKey], config: CostConfig, store: ResultStore, observer: Observer
 ) -> None:
-    """Measure what is not stored yet, one after another, and store each at once.
-
-    Parameters
-    ----------
-    keys
-        What is wanted.
-    config
-        How thoroughly.
-    store
-        Where the records go.
-    observer
-        Told what happens.
-
-    Raises
-    ------
-    StoreError
-        If the store cannot be read or written.
-    """
+    """Measure what is not stored yet, one after another, and store each at once."""
     stored = {record.key for record in store.load_costs(config.config_hash)}
     missing = [key for key in keys if key not in stored]
     observer.costs_begun(len(missing))
@@ -131,21 +94,7 @@ def measure_steps(
 ) -> StepTimes | None:
     """Measure a step of an agent of the paper's sizes: acting in a new state and learning.
 
-    Parameters
-    ----------
-    entry
-        Which agent.
-    series
-        Evaluated how.
-    n_inputs
-        Number of inputs d.
-    config
-        How thoroughly.
-
-    Returns
-    -------
-    StepTimes or None
-        None where there is no memory for the agent.
+    It is None where there is no memory for the agent.
     """
     approximator = entry.approximator(**(dict(series.settings) | {"n_inputs": n_inputs}))
     try:

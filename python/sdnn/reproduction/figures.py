@@ -45,14 +45,7 @@ def draw_experiment(
 ) -> Figure:
     """Draw an experiment: a panel per case, a line and an interquartile band per agent.
 
-    Parameters
-    ----------
-    experiment
-        Its cases give the panels.
-    results
-        One for each case and agent.
-    quick
-        Whether to mark the figure as a quick look, which is no result.
+    With `quick` the figure is marked as a quick look, which is no result.
     """
     require_matplotlib()
     from matplotlib.figure import Figure
@@ -112,13 +105,6 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
 
     Exponential growth is a straight line there; quadratic growth bends. A dotted line continues
     what SDNN-C needs with 4 inputs by its number of columns.
-
-    Parameters
-    ----------
-    costs
-        Measured costs, at least one.
-    quick
-        Whether to mark the figure as a quick look, which is no result.
     """
     require_matplotlib()
     from matplotlib.figure import Figure

@@ -37,17 +37,6 @@ def plan_trials(
 
     The first trial of every case comes first, so an interrupted run covers all cases evenly.
     Experiments share the trials of cases that have the same id.
-
-    Parameters
-    ----------
-    cases
-        The cases.
-    n_trials
-        Trials for each case and agent.
-    root_seed
-        Seed from which the trials' seeds are derived.
-    protocol
-        Another protocol than the paper's.
     """
     plan: dict[TrialKey, PlannedTrial] = {}
     configs = [(case.id, a, case_config(case, a, protocol)) for case in cases for a in case.agents]

@@ -27,17 +27,7 @@ HEADER = ("case", "agent", "config_hash", "root_seed", "trial", "rows_digest", *
 
 @dataclass(frozen=True, kw_only=True)
 class ReferenceResult(TrialMeasures):
-    """The reference results of an agent in a case.
-
-    Parameters
-    ----------
-    config_hash
-        Hash of their settings.
-    root_seed
-        Root of their seeds.
-    rows_digests
-        Digest of the rows of each trial.
-    """
+    """The reference results of an agent in a case, with a digest of the rows of each trial."""
 
     config_hash: str
     root_seed: int
@@ -66,20 +56,7 @@ def reference_results() -> tuple[ReferenceResult, ...]:
 
 
 def reference_csv(results: Iterable[CaseResult], root_seed: int) -> bytes:
-    """Make the content of the file from trials that were run.
-
-    Parameters
-    ----------
-    results
-        Their measures.
-    root_seed
-        Root of their seeds.
-
-    Raises
-    ------
-    ValueError
-        If the trials have another length than the paper's.
-    """
+    """Make the content of the file; a ValueError if trials have another length than the paper's."""
     rows = []
     for result in results:
         if result.last_episode != PAPER_EPISODES:

@@ -41,15 +41,9 @@ _KINDS = {
 class VariantClaim:
     """A claim of the paper about a variant.
 
-    Parameters
-    ----------
-    outcome
-        The verdict and the quantities behind it.
-    moved
-        Whether the verdict about the reference is another one; None where there is none.
-    chance
-        In which share of draws of ten of its trials the claim is shown; None where there are fewer
-        than `MIN_TRIALS_TO_DRAW`.
+    `moved` is whether the verdict about the reference is another one, None where there is none;
+    `chance` the share of draws of ten of its trials in which the claim is shown, None where there
+    are fewer than `MIN_TRIALS_TO_DRAW`.
     """
 
     outcome: ClaimOutcome

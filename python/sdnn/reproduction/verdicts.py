@@ -69,20 +69,10 @@ def verdict_of(check: Check, estimate: Estimate) -> Verdict:
 
 @dataclass(frozen=True)
 class CheckOutcome:
-    """A check with what our data give.
+    """A check with the estimate of its quantity, None where its trials were not run.
 
-    Parameters
-    ----------
-    check
-        The check.
-    estimate
-        The quantity; None where its trials were not run.
-    verdict
-        The verdict.
-    samples
-        The trials' values that it was judged by: one array, or two of a difference.
-    last_episode
-        That of the trials, where what is censored is cut off.
+    `samples` are the trials' values that it was judged by, one array or two of a difference;
+    censored values are cut off at `last_episode`.
     """
 
     check: Check
@@ -129,16 +119,9 @@ class ClaimOutcome:
 
 @dataclass(frozen=True)
 class SettledClaim:
-    """A claim with all that speaks about it.
+    """A claim with what the trials that were run say of it, and what more trials do, if any.
 
-    Parameters
-    ----------
-    own
-        What the trials that were run give.
-    more
-        What more trials of the same settings give; None where there are none.
-    chance
-        In which share of draws of ten of these it is shown.
+    `chance` is the share of draws of ten of these in which it is shown.
     """
 
     own: ClaimOutcome
@@ -172,25 +155,18 @@ def settle(
 ) -> tuple[SettledClaim, ...]:
     """Put beside each claim what more trials of the same settings say of it.
 
-    Parameters
-    ----------
-    outcomes
-        Claims judged by the trials that were run.
-    more
-        Other trials, one for each case and agent. A claim is judged by them if all cases and agents
-        that it speaks of are among them.
+    A claim is judged by them if all cases and agents that it speaks of are among them.
     """
     trials = tuple(more)
     judged = {one.claim.number: one for one in judge_claims(trials)}
     draws = TenTrials(trials)
-    settled = []
-    for own in outcomes:
-        found = judged.get(own.claim.number)
-        if found is None or found.verdict is Verdict.NOT_RUN:
-            settled.append(SettledClaim(own))
-        else:
-            settled.append(SettledClaim(own, found, draws.chance(own.claim)))
-    return tuple(settled)
+    judged = {number: one for number, one in judged.items() if one.verdict is not Verdict.NOT_RUN}
+    return tuple(
+        SettledClaim(own, judged[own.claim.number], draws.chance(own.claim))
+        if own.claim.number in judged
+        else SettledClaim(own)
+        for own in outcomes
+    )
 
 
 def judge_claims(
@@ -198,12 +174,7 @@ def judge_claims(
 ) -> tuple[ClaimOutcome, ...]:
     """Judge the claims that the given results speak about, at least in part.
 
-    Parameters
-    ----------
-    measured
-        One for each case and agent; a case that experiments share may come more than once.
-    costs
-        Measured costs.
+    A case that experiments share may come more than once.
     """
     by_subject = {Subject(one.case_id, one.agent): one for one in measured}
     outcomes = (

@@ -28,16 +28,9 @@ MIN_TRIALS_TO_DIFFER = 6
 class Measured:
     """A variant in a case, measured.
 
-    Parameters
-    ----------
-    combination
-        The variant and the case.
-    result
-        Its trials and their measures.
-    differences
-        Mean over trials of a measure minus that of the reference's trial of the same number, with
-        censored values as the last episode of the shorter one; empty for the reference itself and
-        without it.
+    `differences` are means over trials of a measure minus that of the reference's trial of the same
+    number, with censored values as the last episode of the shorter one; there are none for the
+    reference itself and without it.
     """
 
     combination: Combination
@@ -75,15 +68,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Everything that is complete of a study.
-
-    Parameters
-    ----------
-    study
-        The study.
-    measured
-        By ids of case and variant, those of which every trial is there.
-    """
+    """What is complete of a study: by ids of case and variant, those that have every trial."""
 
     study: Study
     measured: Mapping[tuple[str, str], Measured]

@@ -128,16 +128,7 @@ def draw_steps(
 ) -> None:
     """Draw steps of test episodes: a median and an interquartile band per agent, the first on top.
 
-    Parameters
-    ----------
-    axes
-        The panel.
-    results
-        One for each agent.
-    colors
-        By agent.
-    smooth
-        Whether to put running medians over the curves.
+    With `smooth` running medians lie over the curves.
     """
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
@@ -181,19 +172,9 @@ def draw_curves(curves: Sequence[Curve]) -> Figure:
 
 
 def write_curves(curves: Sequence[Curve], path: Path) -> tuple[Path, Path]:
-    """Draw the curves of runs into a file, and write their numbers beside it as CSV.
+    """Draw the curves of runs into a file, and write their numbers beside it as CSV; return both.
 
-    Returns
-    -------
-    tuple
-        Both files.
-
-    Raises
-    ------
-    RunError
-        If the name has another ending than those of `SUFFIXES`, or matplotlib is not installed.
-    OSError
-        If a file cannot be written.
+    A RunError says that the name has another ending than those of `SUFFIXES`.
     """
     if path.suffix not in SUFFIXES:
         raise RunError(f"out must end in one of {', '.join(SUFFIXES)}, got {path}")
@@ -228,14 +209,7 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
 
     Faint dots are trials, since outcomes often lie in two heaps; a large dot is their median, of
     shares their mean, and a bar its interval. It is filled for the reference and where a variant
-    differs from it.
-
-    Parameters
-    ----------
-    comparison
-        The results, at least one.
-    footer
-        Where the rows come from.
+    differs from it. The footer says where the rows come from.
     """
     require_matplotlib()
     from matplotlib.figure import Figure

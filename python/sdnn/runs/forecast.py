@@ -171,13 +171,8 @@ def _probe(key: TrialKey, config: TrialSettings) -> TrialTime:
 def wall_seconds(trials: list[tuple[float, bool]], jobs: int) -> float:
     """Estimate the time that passes while trials run.
 
-    Parameters
-    ----------
-    trials
-        Processor time of each, and whether it is compiled. Others share one core however many jobs
-        there are: they hold Python's lock.
-    jobs
-        Trials at the same time; no more than there are cores are any help.
+    Each has a processor time and is compiled or not. Those that are not share one core however many
+    jobs there are, because they hold Python's lock; no more jobs than cores are any help.
     """
     times = [seconds for seconds, _ in trials]
     locked = [seconds for seconds, is_compiled in trials if not is_compiled]

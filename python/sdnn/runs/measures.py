@@ -40,23 +40,9 @@ FINAL_PART = 10
 class MeasureConfig:
     """Constants of the measures.
 
-    Parameters
-    ----------
-    good_steps
-        A test episode of at most this many steps is good: the paper's "within 10 steps".
-    learned_window
-        Consecutive test episodes whose median must be good for the task to count as learned.
-    early_episodes
-        Learning episodes that count as early: a third of the way to the paper's 7,500.
-    stable_window
-        Consecutive test episodes whose median must be good for the task to count as mastered.
-    final_window
-        Test episodes at the end of a trial over which its final state is measured.
-
-    Raises
-    ------
-    ValueError
-        If a value is no number, or a window is empty.
+    A test episode of at most `good_steps` is good: the paper's "within 10 steps". The median of
+    `learned_window` consecutive tests must be good for the task to count as learned, and of
+    `stable_window` as mastered. `early_episodes` are a third of the way to the paper's 7,500.
     """
 
     good_steps: float = 10.0
@@ -89,8 +75,6 @@ def episodes_to_learn(
     (2) keeps a single lucky test from counting. A later relapse does not undo learning. A window
     that the trial's end cuts off does not count.
 
-    Examples
-    --------
     >>> episode = 10 * np.arange(1, 13)
     >>> episodes_to_learn(episode, [50, 50] + 10 * [7])
     30.0
@@ -108,8 +92,6 @@ def early_steps(
 ) -> float:
     """Median steps over the test episodes after at most `early_episodes` learning episodes.
 
-    Examples
-    --------
     >>> early_steps([1000, 2000, 3000], [4, 6, 50])
     5.0
     """
@@ -128,8 +110,6 @@ def episode_of_collapse(
     before a collapse. It is 0 if there is no such run: there was nothing to collapse; NaN if there
     are fewer tests than in a run. Relapses from which the agent recovers do not count.
 
-    Examples
-    --------
     >>> episode = 10 * np.arange(1, 201)
     >>> episode_of_collapse(episode, 100 * [4] + 100 * [50])
     1240.0

@@ -63,22 +63,8 @@ class Folded:
 class Section:
     """A part of a page, shown in the order of its fields; what is empty is left out.
 
-    Parameters
-    ----------
-    title, level
-        Heading and its level; level 0 is a faint paragraph. Default: those of the table, and 2.
-    tally
-        How a count is colored, the count, and what is counted.
-    picture, alt, is_narrow
-        SVG of a figure, its description, and whether it takes a part of the width only.
-    table
-        A table.
-    notes
-        Faint paragraphs.
-    terms
-        Explanations of words.
-    folded
-        Parts that open on demand.
+    The title is that of the table by default; one of level 0 is a faint paragraph. A tally has
+    counts: how one is colored, the number, and what is counted. A picture is an SVG.
     """
 
     title: str = ""
@@ -105,17 +91,7 @@ class Section:
 
 @dataclass(frozen=True, kw_only=True)
 class Page:
-    """A report.
-
-    Parameters
-    ----------
-    title, intro, warnings
-        The head.
-    sections
-        All else.
-    source
-        Where the rows come from.
-    """
+    """A report: its head, its sections, and where the rows come from."""
 
     title: str
     intro: str

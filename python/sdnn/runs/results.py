@@ -28,14 +28,7 @@ from sdnn.runs.statistics import Estimate, FloatArray, estimate_median, json_num
 class TrialMeasures:
     """Measures of the trials of an agent in a case, whether or not their rows are at hand.
 
-    Parameters
-    ----------
-    case_id, agent
-        Ids of both.
-    last_episode
-        Learning episodes of a trial.
-    values
-        Measures of each trial, arrays (n_trials,).
+    `last_episode` are the learning episodes of a trial; `values` are arrays (n_trials,).
     """
 
     case_id: str
@@ -66,15 +59,7 @@ class TrialMeasures:
 
 @dataclass(frozen=True, kw_only=True)
 class CaseResult(TrialMeasures):
-    """The trials of an agent in a case, all under the same settings, with their measures.
-
-    Parameters
-    ----------
-    title
-        Title of the case.
-    records
-        The trials.
-    """
+    """The trials of an agent in a case, all under the same settings, with their measures."""
 
     title: str
     records: tuple[TrialRecord, ...]
@@ -140,18 +125,7 @@ def measure(
     names: Iterable[MeasureName] = STEP_MEASURES,
     config: MeasureConfig = DEFAULT_MEASURES,
 ) -> CaseResult:
-    """Measure the trials of an agent in a case.
-
-    Parameters
-    ----------
-    title
-        Title of the case.
-    records
-        Its trials, at least one, all under the same settings.
-    names
-        Which measures.
-    config
-        Constants of the measures.
+    """Measure the trials of an agent in a case of some title.
 
     Raises
     ------

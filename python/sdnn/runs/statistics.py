@@ -34,8 +34,6 @@ DEFAULT_BOOTSTRAP = BootstrapConfig()
 def json_number(value: float, last_episode: int | None) -> float | str | None:
     """Return a number as JSON can hold it: NaN is null, infinity ``">last_episode"`` or null.
 
-    Examples
-    --------
     >>> json_number(math.inf, 15000)
     '>15000'
     """
@@ -61,17 +59,8 @@ class Estimate:
 
 
 def running_median(values: ArrayLike, window: int) -> FloatArray:
-    """Return the median of each value with its neighbours, fewer at both ends.
+    """Return the median of each value with its neighbours, fewer at both ends; the window is odd.
 
-    Parameters
-    ----------
-    values : (n,)
-        A curve.
-    window
-        Values in all, an odd number.
-
-    Examples
-    --------
     >>> running_median([1, 9, 2, 3, 8], 3)
     array([5. , 2. , 3. , 3. , 5.5])
     """
@@ -83,13 +72,6 @@ def running_median(values: ArrayLike, window: int) -> FloatArray:
 def estimate_median(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTRAP) -> Estimate:
     """Return the median of the values of trials, (n_trials,), with its interval.
 
-    Raises
-    ------
-    ValueError
-        If there are no values.
-
-    Examples
-    --------
     >>> estimate_median([4.0, 4.0, 4.0])
     Estimate(value=4.0, lower=4.0, upper=4.0)
     """
@@ -99,13 +81,6 @@ def estimate_median(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTR
 def estimate_mean(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTRAP) -> Estimate:
     """Return the mean of the values of trials, (n_trials,), with its interval; NaN gives NaN.
 
-    Raises
-    ------
-    ValueError
-        If there are no values, or an infinite one.
-
-    Examples
-    --------
     >>> estimate_mean([3.0, 3.0])
     Estimate(value=3.0, lower=3.0, upper=3.0)
     """
@@ -121,22 +96,8 @@ def estimate_contrast(
 ) -> Estimate:
     """Compare the medians of two groups of trials; each group is resampled by itself.
 
-    Parameters
-    ----------
-    values, others : (n_trials,)
-        One value per trial of a group; NaN gives NaN.
-    contrast
-        Function of both medians: their difference, or another one of two arrays.
-    config
-        Constants.
+    NaN gives NaN; a ValueError says that a group has no values or an infinite one.
 
-    Raises
-    ------
-    ValueError
-        If a group has no values or an infinite one.
-
-    Examples
-    --------
     >>> estimate_contrast([7.0, 7.0], [4.0, 4.0, 4.0])
     Estimate(value=3.0, lower=3.0, upper=3.0)
     """
@@ -149,8 +110,6 @@ def estimate_contrast(
 def tails(distribution: FloatArray, confidence: float) -> FloatArray:
     """Return the ends of the middle part of distributions over the last axis, values of theirs.
 
-    Examples
-    --------
     >>> tails(np.arange(101.0), 0.9)
     array([ 5., 95.])
     """

@@ -44,19 +44,7 @@ class Addition:
 
 
 def study_page(comparison: Comparison, digest: str, addition: Addition, picture: bytes) -> Page:
-    """Return the page of a study.
-
-    Parameters
-    ----------
-    comparison
-        The results.
-    digest
-        Digest of the trials' rows.
-    addition
-        What else they say.
-    picture
-        SVG of the figure.
-    """
+    """Return the page of a study, with the digest of its rows and the SVG of its figure."""
     study = comparison.study
     n_all, n_measured = len(study.combinations), len(comparison.measured)
     counts = {"variant": study.variants, "case": study.cases, "trial": range(study.n_trials)}

@@ -172,7 +172,7 @@ def test_an_experiment_with_other_agents_differs_in_nothing_else():
         experiment.cases
     )
     assert ("s4", "rbf") in other.pairs
-    assert experiment.with_agents([]) is experiment
+    assert experiment.with_agents([]) == experiment
 
 
 def test_trial_seed_follows_its_definition():
