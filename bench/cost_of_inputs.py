@@ -46,7 +46,7 @@ def measure():
     for n_inputs in N_INPUTS:
         config = SDNNCConfig(n_inputs=n_inputs)
         rng = np.random.default_rng(SEED)
-        network = _core.SDNNC(config.to_core(), SEED)
+        network = _core.SDNNC(config, SEED)
         for _ in range(LEARNING_STEPS):
             target = float(rng.uniform(config.q_low, config.q_high))
             network.update(rng.random(n_inputs), int(rng.integers(network.n_actions)), target)

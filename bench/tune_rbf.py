@@ -86,11 +86,11 @@ def run(task: tuple[str, Setting, int]) -> dict[str, object]:
     trial = _core.RBFAcrobotTrial(
         approximator=RBFNetworkConfig(
             n_bases=setting.n_bases, width=setting.width, gradient_rate=setting.gradient_rate
-        ).to_core(),
-        learning=QLearningConfig(tie_rule=setting.tie_rule).to_core(),
-        acrobot=AcrobotConfig().to_core(),
-        goal=GoalScheduleConfig().to_core(),
-        sensors=SensorConfig().to_core(),
+        ),
+        learning=QLearningConfig(tie_rule=setting.tie_rule),
+        acrobot=AcrobotConfig(),
+        goal=GoalScheduleConfig(),
+        sensors=SensorConfig(),
         protocol=_core.ProtocolConfig(n_learning_episodes=N_EPISODES, test_interval=TEST_INTERVAL),
         seed=seed,
     )

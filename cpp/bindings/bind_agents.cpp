@@ -1,7 +1,7 @@
 #include <pybind11/functional.h>
-#include <pybind11/native_enum.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
+#include <pybind11/typing.h>
 
 #include <cstdint>
 #include <optional>
@@ -220,14 +220,9 @@ void bind_observation_scale(py::module_& module) {
 
 void bind_agents(py::module_& module) {
   bind_observation_scale(module);
-  py::native_enum<agents::TieRule>(module, "TieRule", "enum.Enum",
-                                   "Which of several best actions is taken")
-      .value("uniform", agents::TieRule::uniform)
-      .value("lowest", agents::TieRule::lowest)
-      .value("middle", agents::TieRule::middle)
-      .finalize();
-  bindings::bind_config<agents::EpsilonGreedyConfig>(module, "EpsilonGreedyConfig",
-                                                     "The policy's parameters");
+  bindings::bind_config<agents::EpsilonGreedyConfig>(
+      module, "EpsilonGreedyConfig",
+      "The parameters of the policy; the defaults are the paper's (section 4.2).");
   py::class_<agents::EpsilonGreedy>(module, "EpsilonGreedy", "The policy, over rows of values")
       .def(py::init<const agents::EpsilonGreedyConfig&, std::uint64_t>(), py::arg("config"),
            py::arg("seed"))
@@ -238,37 +233,25 @@ void bind_agents(py::module_& module) {
             return policy.select(bindings::vector(values, "values"), step, explore);
           },
           py::arg("values"), py::arg("step"), py::arg("explore") = true);
-  py::native_enum<agents::ValueRange>(module, "ValueRange", "enum.Enum",
-                                      "Whether the range of values is fixed")
-      .value("given", agents::ValueRange::given)
-      .value("seen", agents::ValueRange::seen)
-      .finalize();
-  py::native_enum<agents::Schedule>(module, "Schedule", "enum.Enum",
-                                    "How rates go to their final values")
-      .value("linear", agents::Schedule::linear)
-      .value("exponential", agents::Schedule::exponential)
-      .finalize();
-  bindings::bind_config<QLearningConfig>(module, "QLearningConfig", "The parameters of Q-learning")
+  bindings::bind_config<QLearningConfig>(
+      module, "QLearningConfig",
+      "The parameters of Q-learning; the defaults are the paper's (section 4.2).")
       .def("learning_rate_at", &QLearningConfig::learning_rate_at, py::arg("progress"))
       .def("epsilon_at", &QLearningConfig::epsilon_at, py::arg("progress"));
-  bindings::bind_config<FuzzyQLearningConfig>(module, "FuzzyQLearningConfig",
-                                              "The parameters of fuzzy Q-learning");
+  bindings::bind_config<FuzzyQLearningConfig>(
+      module, "FuzzyQLearningConfig",
+      "The parameters of fuzzy Q-learning; the defaults are the paper's (section 4.3).");
 
-  const auto parts = [](agents::Preset preset) {
-    return std::pair(std::move(preset.approximator), preset.learning);
-  };
   module.def(
-      "paper_preset", [parts](int n_inputs) { return parts(agents::paper_preset(n_inputs)); },
-      py::arg("n_inputs"), "Settings of approximator and learning, as in the paper");
-  module.def(
-      "general_preset", [parts](int n_inputs) { return parts(agents::general_preset(n_inputs)); },
-      py::arg("n_inputs"), "Settings of approximator and learning, as recommended for any task");
-  module.def(
-      "robust_preset", [parts](int n_inputs) { return parts(agents::robust_preset(n_inputs)); },
-      py::arg("n_inputs"), "Settings of approximator and learning, as recommended");
-  module.def(
-      "small_preset", [parts](int n_inputs) { return parts(agents::small_preset(n_inputs)); },
-      py::arg("n_inputs"), "Settings of approximator and learning, for small processors");
+      "presets",
+      [] {
+        py::typing::Dict<py::str, py::typing::Tuple<py::str, SDNNCConfig, QLearningConfig>> found;
+        for (const auto& [name, title, preset] : agents::presets(SDNNCConfig{}.n_inputs)) {
+          found[name] = py::make_tuple(title, preset.approximator, preset.learning);
+        }
+        return found;
+      },
+      "Named settings of Q-learning with SDNN-C: titles, settings of approximator and learning");
 
   py::class_<agents::FixedRate>(module, "FixedRate", "Waits for ticks at a fixed rate")
       .def(py::init<double, agents::FixedRate::Clock, agents::FixedRate::Sleep>(), py::arg("hz"),

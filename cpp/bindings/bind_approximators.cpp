@@ -1,4 +1,3 @@
-#include <pybind11/native_enum.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
@@ -122,8 +121,9 @@ py::class_<Network> bind_network(py::module_& module, const char* name, const ch
 }
 
 void bind_fuzzy_rules(py::module_& module) {
-  bindings::bind_config<FuzzyRulesConfig>(module, "FuzzyRulesConfig",
-                                          "The sizes of a table of fuzzy rules");
+  bindings::bind_config<FuzzyRulesConfig>(
+      module, "FuzzyRulesConfig",
+      "The sizes of a table of fuzzy rules; the defaults are the paper's.");
 
   py::class_<FuzzyRules>(module, "FuzzyRules", "Rules over a grid of triangular sets")
       .def(py::init<const FuzzyRulesConfig&>(), py::arg("config"))
@@ -150,8 +150,11 @@ void bind_fuzzy_rules(py::module_& module) {
 }
 
 void bind_rbf_network(py::module_& module) {
-  bindings::bind_config<RBFNetworkConfig>(module, "RBFNetworkConfig",
-                                          "The sizes of an RBF network");
+  bindings::bind_config<RBFNetworkConfig>(
+      module, "RBFNetworkConfig",
+      "The sizes of an RBF network: normalized Gaussians on an even grid, linear in the weights. "
+      "The "
+      "paper gives 4 bases per dimension and 601 actions; the rest are readings.");
 
   bind_network<RBFNetwork>(module, "RBFNetwork", "Q(s, a) linear in normalized Gaussian bases")
       .def(py::init<const RBFNetworkConfig&>(), py::arg("config"))
@@ -175,18 +178,19 @@ void bind_rbf_network(py::module_& module) {
 }  // namespace
 
 void bind_approximators(py::module_& module) {
-  py::native_enum<approximators::InitialWeights>(module, "InitialWeights", "enum.Enum",
-                                                 "How the weights start")
-      .value("ternary", approximators::InitialWeights::ternary)
-      .value("uniform", approximators::InitialWeights::uniform)
-      .finalize();
-  py::native_enum<approximators::Rounding>(module, "Rounding", "enum.Enum",
-                                           "How numbers of units are rounded")
-      .value("half_up", approximators::Rounding::half_up)
-      .value("random", approximators::Rounding::random)
-      .value("away", approximators::Rounding::away)
-      .finalize();
-  bindings::bind_config<SDNNCConfig>(module, "SDNNCConfig", "Everything that defines an SDNN-C");
+  bindings::bind_config<SDNNCConfig>(
+      module, "SDNNCConfig",
+      "Everything that defines an SDNN-C; the defaults are the paper's values.")
+      .def_property_readonly(
+          "n_pairs",
+          [](const SDNNCConfig& config) { return config.n_inputs * config.n_partners(); },
+          "Pairs of inputs that are formed; the code has n_pattern_units for each.")
+      .def_property_readonly(
+          "n_code_bytes",
+          [](const SDNNCConfig& config) {
+            return static_cast<std::uint64_t>(config.pattern_bytes(config.n_bins()));
+          },
+          "Bytes of the patterns, by anchors and of symbols, plain and permuted.");
 
   bind_network<SDNNC>(module, "SDNNC", "A network that gives Q(s, a) for every action at once")
       .def(py::init<const SDNNCConfig&, std::uint64_t>(), py::arg("config"), py::arg("seed"))

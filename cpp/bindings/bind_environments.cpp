@@ -1,4 +1,3 @@
-#include <pybind11/native_enum.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
@@ -51,25 +50,18 @@ std::span<double> items(py::array_t<double>& array) {
 }
 
 void bind_goal_schedule(py::module_& module) {
-  py::native_enum<GoalScheduleKind>(module, "GoalScheduleKind", "enum.Enum",
-                                    "The formula of lambda(k)")
-      .value("inverse_linear", GoalScheduleKind::inverse_linear)
-      .value("inverse_sqrt", GoalScheduleKind::inverse_sqrt)
-      .value("constant", GoalScheduleKind::constant)
-      .finalize();
-  bindings::bind_config<GoalScheduleConfig>(module, "GoalScheduleConfig", "How lambda(k) falls");
+  bindings::bind_config<GoalScheduleConfig>(
+      module, "GoalScheduleConfig",
+      "How the goal tolerance lambda(k) falls with the learning episode k (section 4.1).");
   py::class_<GoalSchedule>(module, "GoalSchedule", "lambda as a function of the learning episode")
       .def(py::init<const GoalScheduleConfig&>(), py::arg("config"))
       .def("__call__", &GoalSchedule::operator(), py::arg("episode"));
 }
 
 void bind_acrobot(py::module_& module) {
-  py::native_enum<GoalTest>(module, "GoalTest", "enum.Enum", "When the goal is looked for")
-      .value("every_step", GoalTest::every_step)
-      .value("decision_instant", GoalTest::decision_instant)
-      .finalize();
-  bindings::bind_config<AcrobotConfig>(module, "AcrobotConfig",
-                                       "The numbers of the acrobot's task");
+  bindings::bind_config<AcrobotConfig>(
+      module, "AcrobotConfig",
+      "The numbers of the acrobot's task; the defaults are the paper's (section 4.1).");
 
   py::class_<Acrobot>(module, "Acrobot", "Dynamics, reward and episode end of the acrobot")
       .def(py::init<const AcrobotConfig&>(), py::arg("config"))
@@ -149,11 +141,6 @@ void bind_acrobot_batch(py::module_& module) {
 }
 
 void bind_sensors(py::module_& module) {
-  py::native_enum<SensorEdge>(module, "SensorEdge", "enum.Enum",
-                              "What noise does at the ends of a sensor's range")
-      .value("wrap", SensorEdge::wrap)
-      .value("saturate", SensorEdge::saturate)
-      .finalize();
   module.def(
       "basic_observation",
       [](const ArrayArgument<double>& state) {
@@ -177,12 +164,9 @@ void bind_sensors(py::module_& module) {
             return array(noisy);
           },
           py::arg("values"), "A noisy copy");
-  py::native_enum<NoiseEntry>(module, "NoiseEntry", "enum.Enum", "Where noise enters")
-      .value("every_sensor", NoiseEntry::every_sensor)
-      .value("basic_sensors", NoiseEntry::basic_sensors)
-      .finalize();
   bindings::bind_config<SensorConfig>(module, "SensorConfig",
-                                      "Which sensors there are and how noisy");
+                                      "What the agent observes (section 4.3).")
+      .def_property_readonly("n_inputs", &SensorConfig::n_inputs, "Numbers in an observation.");
   py::class_<AcrobotSensors>(module, "AcrobotSensors", "s1..s4, s5 and s6 with their noise")
       .def(py::init<const SensorConfig&, std::uint64_t, core::Stream>(), py::arg("config"),
            py::arg("seed"), py::arg("stream"))

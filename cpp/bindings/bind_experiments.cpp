@@ -128,7 +128,9 @@ QLearning<SDNNC> sdnn_agent(const SDNNCConfig& approximator, const QLearningConf
 }  // namespace
 
 void bind_experiments(py::module_& module) {
-  bindings::bind_config<ProtocolConfig>(module, "ProtocolConfig", "How long a trial is");
+  bindings::bind_config<ProtocolConfig>(
+      module, "ProtocolConfig",
+      "Learning protocol of a trial; the defaults are the paper's (section 4.2).");
 
   def_trial(module, "AcrobotTrial", "SDNN-C learns the acrobot swing-up", &sdnn_agent)
       .def("memory_counts", &memory_counts,

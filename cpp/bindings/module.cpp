@@ -1,6 +1,10 @@
 // The extension's table of contents: one line per room, floor by floor.
+#include <pybind11/pybind11.h>
+
+#include <exception>
 #include <string>
 
+#include "bind_config.hpp"
 #include "bindings.hpp"
 
 namespace {
@@ -16,12 +20,32 @@ std::string compiler() {
 #endif
 }
 
+void set_error(PyObject* kind, const sdnn::core::ArgumentError& error) {
+  namespace py = pybind11;
+  py::object raised = py::handle(kind)(error.what());
+  raised.attr("argument") = error.name();
+  PyErr_SetObject(kind, raised.ptr());
+}
+
+/// Errors about an argument have its name as an attribute, `argument`.
+void translate(std::exception_ptr error) {
+  if (!error) return;
+  try {
+    std::rethrow_exception(error);
+  } catch (const sdnn::bindings::ArgumentTypeError& e) {
+    set_error(PyExc_TypeError, e);
+  } catch (const sdnn::core::ArgumentError& e) {
+    set_error(PyExc_ValueError, e);
+  }
+}
+
 }  // namespace
 
 PYBIND11_MODULE(_core, module) {
   module.doc() = "The compiled core of sdnn; use it through the package's rooms.";
   module.attr("__version__") = SDNN_VERSION;
   module.attr("compiler") = compiler();
+  pybind11::register_exception_translator(&translate);
   sdnn::bindings::refuse_bare_objects();
   bind_core(module);
   bind_coding(module);

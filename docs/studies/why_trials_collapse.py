@@ -48,12 +48,10 @@ class Inspector:
     """What can be asked of an agent at work without changing what it does."""
 
     def __init__(self, config: TrialConfig) -> None:
-        self._acrobot_config = config.acrobot.to_core()
-        clean = replace(config.sensors, noise=0.0).to_core()
+        self._acrobot_config = config.acrobot
+        clean = replace(config.sensors, noise=0.0)
         self._clean = _core.AcrobotSensors(clean, 0, _core.Stream.sensor_noise)
-        self._noisy = _core.AcrobotSensors(
-            config.sensors.to_core(), 12345, _core.Stream.sensor_noise
-        )
+        self._noisy = _core.AcrobotSensors(config.sensors, 12345, _core.Stream.sensor_noise)
 
     def greedy(self, agent: Any, observation: NDArray[np.float64]) -> tuple[float, float]:
         """Return the mean of the best torques, in N m, and their value."""
@@ -91,7 +89,7 @@ def look(
 ) -> Iterator[tuple[int, Any, Inspector, float]]:
     """Advance a trial, stopping after the given numbers of learning episodes."""
     trial = config.make_trial(trial_seed(0, CASE.id, number))
-    goal = _core.GoalSchedule(config.goal.to_core())
+    goal = _core.GoalSchedule(config.goal)
     inspector = Inspector(config)
     for episode in episodes:
         trial.advance(episode - trial.episode)
@@ -133,10 +131,10 @@ def around(config: TrialConfig, number: int, middle: int) -> Rows:
 
 def begun_anew(config: TrialConfig, agent: Any, seed: int) -> NDArray[np.bool_]:
     """Let an agent live through the schedule's first episodes; return which tests it solved."""
-    acrobot = _core.Acrobot(config.acrobot.to_core())
-    goal = _core.GoalSchedule(config.goal.to_core())
+    acrobot = _core.Acrobot(config.acrobot)
+    goal = _core.GoalSchedule(config.goal)
     sensors, test_sensors = (
-        _core.AcrobotSensors(config.sensors.to_core(), seed, stream)
+        _core.AcrobotSensors(config.sensors, seed, stream)
         for stream in (_core.Stream.sensor_noise, _core.Stream.evaluation_sensor_noise)
     )
     n_actions = agent.action_value.n_actions

@@ -45,99 +45,209 @@ class SelectiveDesensitization:
     @property
     def n_units(self) -> int:
         ...
-class InitialWeights(enum.Enum):
-    """
-    How the weights start
-    """
-    ternary = 0
-    uniform = 1
-class Rounding(enum.Enum):
-    """
-    How numbers of units are rounded
-    """
-    away = 2
-    half_up = 0
-    random = 1
 class SDNNCConfig:
     """
-    Everything that defines an SDNN-C
+    Everything that defines an SDNN-C; the defaults are the paper's values.
+    
+    Parameters
+    ----------
+    n_inputs : int
+        l, number of inputs (section 3.1). Must be in [2, 1024].
+    max_pairs : int
+        Most pairs of inputs that are formed: all l (l - 1) if there are no more or with 0; else an even share of them at random, each input modified by as many others as it modifies, and by one at least. Cost grows with pairs, so with many inputs it then grows as their number, not as its square. Not in the paper, which has all. Must be in [0, 1048576].
+    n_pattern_units : int
+        m, units per pattern (section 4.2: 200). Must be in [2, 65536].
+    n_anchor_patterns : int
+        Random anchor patterns p_1, p_2, ... of a code book (section 3.1: 9). The last one is not assigned to a bin. Must be in [2, 10000].
+    n_interpolated : int
+        Patterns between neighbouring anchors (section 3.1: 44). There are (n_anchor_patterns - 1) (n_interpolated + 1) bins, 360 in the paper. Must be in [0, 10000].
+    balanced_anchors : bool
+        Whether anchors have as many +1 as -1. A reading: the paper says "random".
+    circular : tuple[bool, ...]
+        Per input, whether the last anchor equals the first, as angles want it; empty: none. A reading: the paper does not say.
+    n_symbols : tuple[int, ...]
+        Per input, how many symbols it may be, each with a random pattern of its own: symbol k of n is a value of (k + 0.5) / n. 0 for a number; empty: numbers only. Not in the paper. Must be in [0, 16777216].
+    n_hidden_units : int
+        n, hidden units (section 4.2: 900). Must be in [1, 1048576].
+    n_active_units : int
+        n', units in an action's window (section 4.2: 300), at most n_hidden_units. Must be in [1, 1048576].
+    n_actions : int
+        Number of actions; 0 stands for all n_hidden_units - n_active_units + 1 (601). Must be in [0, 1048576].
+    q_low : float
+        Lowest value of the output range (section 4.2: -20). Must be in [-1e+301, 1e+301].
+    q_high : float
+        Highest value of the output range (section 4.2: 20). Must be in [-1e+301, 1e+301].
+    u_low : int | None
+        Count of active units at which the output is q_low; by default n_active_units // 15 (section 4.2: 20). Must be in [0, 1048576].
+    u_high : int | None
+        Count of active units at which the output is q_high; by default n_active_units - u_low (section 4.2: 280). Must be in [0, 1048576].
+    learning_coefficient : float
+        c (section 4.2: 0.1). It scales weights and thresholds alike and changes no decision. Must be a finite number greater than 0.
+    lattice : int
+        Weights are integer multiples of learning_coefficient / lattice. Must be in [1, 64].
+    initial_threshold : float
+        The "large" initial threshold, in units of c: a multiple of 1 / lattice. A reading. Must be finite and at least 0.
+    initial_weights : {'ternary', 'uniform'}
+        The "small random" initial weights: `ternary`: one lattice step down, none, or up with probabilities 1/4, 1/2, 1/4; `uniform`: within initial_weight_limit, rounded to the lattice. A reading.
+    initial_weight_limit : float
+        Of `uniform` initial weights, in units of c. Must be finite and at least 0.
+    rounding : {'half_up', 'random', 'away'}
+        Of the number of units that are to fire. `half_up`: to the nearest; `random`: up or down at random in proportion, so that no small change is lost on average; `away`: in the direction of the change by at least one unit. A reading.
+    averaging_interval : int
+        With more than 0 the network keeps an average of its weights, by which greedy actions are chosen; learning continues with the weights themselves. Snapshots for it are taken after so many corrections, 100 for example, or after every 64th part of all, whichever is more; what was learned last counts most. The weights take four times the memory. Not in the paper, which has 0. Must be in [0, 1000000000].
+    max_table_bytes : int
+        A larger network (weights, patterns, remembered potentials) is refused before memory is allocated; 1 GiB by default. For all action dimensions together, where an agent has several.
+    
+    Raises
+    ------
+    TypeError, ValueError
+        For a value of another type or out of its bounds; ``argument`` is its name.
     """
-    __hash__: typing.ClassVar[None] = None
+    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
+    fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, max_pairs: typing.SupportsInt | typing.SupportsIndex = 0, n_pattern_units: typing.SupportsInt | typing.SupportsIndex = 200, n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex = 9, n_interpolated: typing.SupportsInt | typing.SupportsIndex = 44, balanced_anchors: bool = True, circular: collections.abc.Sequence[bool] = [], n_symbols: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], n_hidden_units: typing.SupportsInt | typing.SupportsIndex = 900, n_active_units: typing.SupportsInt | typing.SupportsIndex = 300, n_actions: typing.SupportsInt | typing.SupportsIndex = 0, q_low: typing.SupportsFloat | typing.SupportsIndex = -20.0, q_high: typing.SupportsFloat | typing.SupportsIndex = 20.0, u_low: typing.SupportsInt | typing.SupportsIndex | None = None, u_high: typing.SupportsInt | typing.SupportsIndex | None = None, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.1, lattice: typing.SupportsInt | typing.SupportsIndex = 1, initial_threshold: typing.SupportsFloat | typing.SupportsIndex = 200.0, initial_weights: InitialWeights = InitialWeights.ternary, initial_weight_limit: typing.SupportsFloat | typing.SupportsIndex = 0.1, rounding: Rounding = Rounding.half_up, averaging_interval: typing.SupportsInt | typing.SupportsIndex = 0, max_table_bytes: typing.SupportsInt | typing.SupportsIndex = 1073741824) -> None:
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_inputs: int = ..., max_pairs: int = ..., n_pattern_units: int = ..., n_anchor_patterns: int = ..., n_interpolated: int = ..., balanced_anchors: bool = ..., circular: collections.abc.Sequence[bool] = ..., n_symbols: collections.abc.Sequence[int] = ..., n_hidden_units: int = ..., n_active_units: int = ..., n_actions: int = ..., q_low: float = ..., q_high: float = ..., u_low: int | None = ..., u_high: int | None = ..., learning_coefficient: float = ..., lattice: int = ..., initial_threshold: float = ..., initial_weights: typing.Literal['ternary', 'uniform'] = ..., initial_weight_limit: float = ..., rounding: typing.Literal['half_up', 'random', 'away'] = ..., averaging_interval: int = ..., max_table_bytes: int = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> SDNNCConfig:
         ...
     def __repr__(self) -> str:
         ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
+    def replace(self, **changes: typing.Any) -> SDNNCConfig:
+        """
+        Return a copy with other values of some fields.
+        """
     @property
     def averaging_interval(self) -> int:
-        ...
+        """
+        With more than 0 the network keeps an average of its weights, by which greedy actions are chosen; learning continues with the weights themselves. Snapshots for it are taken after so many corrections, 100 for example, or after every 64th part of all, whichever is more; what was learned last counts most. The weights take four times the memory. Not in the paper, which has 0.
+        """
     @property
     def balanced_anchors(self) -> bool:
-        ...
+        """
+        Whether anchors have as many +1 as -1. A reading: the paper says "random".
+        """
     @property
-    def circular(self) -> list[bool]:
-        ...
+    def circular(self) -> tuple[bool, ...]:
+        """
+        Per input, whether the last anchor equals the first, as angles want it; empty: none. A reading: the paper does not say.
+        """
     @property
     def initial_threshold(self) -> float:
-        ...
+        """
+        The "large" initial threshold, in units of c: a multiple of 1 / lattice. A reading.
+        """
     @property
     def initial_weight_limit(self) -> float:
-        ...
+        """
+        Of `uniform` initial weights, in units of c.
+        """
     @property
-    def initial_weights(self) -> InitialWeights:
-        ...
+    def initial_weights(self) -> typing.Literal['ternary', 'uniform']:
+        """
+        The "small random" initial weights: `ternary`: one lattice step down, none, or up with probabilities 1/4, 1/2, 1/4; `uniform`: within initial_weight_limit, rounded to the lattice. A reading.
+        """
     @property
     def lattice(self) -> int:
-        ...
+        """
+        Weights are integer multiples of learning_coefficient / lattice.
+        """
     @property
     def learning_coefficient(self) -> float:
-        ...
+        """
+        c (section 4.2: 0.1). It scales weights and thresholds alike and changes no decision.
+        """
     @property
     def max_pairs(self) -> int:
-        ...
+        """
+        Most pairs of inputs that are formed: all l (l - 1) if there are no more or with 0; else an even share of them at random, each input modified by as many others as it modifies, and by one at least. Cost grows with pairs, so with many inputs it then grows as their number, not as its square. Not in the paper, which has all.
+        """
     @property
     def max_table_bytes(self) -> int:
-        ...
+        """
+        A larger network (weights, patterns, remembered potentials) is refused before memory is allocated; 1 GiB by default. For all action dimensions together, where an agent has several.
+        """
     @property
     def n_actions(self) -> int:
-        ...
+        """
+        Number of actions; 0 stands for all n_hidden_units - n_active_units + 1 (601).
+        """
     @property
     def n_active_units(self) -> int:
-        ...
+        """
+        n', units in an action's window (section 4.2: 300), at most n_hidden_units.
+        """
     @property
     def n_anchor_patterns(self) -> int:
-        ...
+        """
+        Random anchor patterns p_1, p_2, ... of a code book (section 3.1: 9). The last one is not assigned to a bin.
+        """
+    @property
+    def n_code_bytes(self) -> int:
+        """
+        Bytes of the patterns, by anchors and of symbols, plain and permuted.
+        """
     @property
     def n_hidden_units(self) -> int:
-        ...
+        """
+        n, hidden units (section 4.2: 900).
+        """
     @property
     def n_inputs(self) -> int:
-        ...
+        """
+        l, number of inputs (section 3.1).
+        """
     @property
     def n_interpolated(self) -> int:
-        ...
+        """
+        Patterns between neighbouring anchors (section 3.1: 44). There are (n_anchor_patterns - 1) (n_interpolated + 1) bins, 360 in the paper.
+        """
+    @property
+    def n_pairs(self) -> int:
+        """
+        Pairs of inputs that are formed; the code has n_pattern_units for each.
+        """
     @property
     def n_pattern_units(self) -> int:
-        ...
+        """
+        m, units per pattern (section 4.2: 200).
+        """
     @property
-    def n_symbols(self) -> list[int]:
-        ...
+    def n_symbols(self) -> tuple[int, ...]:
+        """
+        Per input, how many symbols it may be, each with a random pattern of its own: symbol k of n is a value of (k + 0.5) / n. 0 for a number; empty: numbers only. Not in the paper.
+        """
     @property
     def q_high(self) -> float:
-        ...
+        """
+        Highest value of the output range (section 4.2: 20).
+        """
     @property
     def q_low(self) -> float:
-        ...
+        """
+        Lowest value of the output range (section 4.2: -20).
+        """
     @property
-    def rounding(self) -> Rounding:
-        ...
+    def rounding(self) -> typing.Literal['half_up', 'random', 'away']:
+        """
+        Of the number of units that are to fire. `half_up`: to the nearest; `random`: up or down at random in proportion, so that no small change is lost on average; `away`: in the direction of the change by at least one unit. A reading.
+        """
     @property
     def u_high(self) -> int | None:
-        ...
+        """
+        Count of active units at which the output is q_high; by default n_active_units - u_low (section 4.2: 280).
+        """
     @property
     def u_low(self) -> int | None:
-        ...
+        """
+        Count of active units at which the output is q_low; by default n_active_units // 15 (section 4.2: 20).
+        """
 class SDNNC:
     """
     A network that gives Q(s, a) for every action at once
@@ -234,27 +344,64 @@ class SDNNC:
         ...
 class FuzzyRulesConfig:
     """
-    The sizes of a table of fuzzy rules
+    The sizes of a table of fuzzy rules; the defaults are the paper's.
+    
+    Parameters
+    ----------
+    n_inputs : int
+        d, number of inputs. Must be in [1, 62].
+    n_sets : int
+        Triangular sets per input, evenly spaced over its range. There are n_sets to the power of n_inputs rules of 4 n_actions bytes: 45 MB with 6 inputs. Must be in [2, 1048576].
+    n_actions : int
+        Discrete actions that every rule has values of, evenly spaced over the action's range. Must be in [1, 1048576].
+    max_table_bytes : int
+        A larger table is refused before memory is allocated; 1 GiB by default. For all action dimensions together, where an agent has several.
+    
+    Raises
+    ------
+    TypeError, ValueError
+        For a value of another type or out of its bounds; ``argument`` is its name.
     """
-    __hash__: typing.ClassVar[None] = None
+    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
+    fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_sets: typing.SupportsInt | typing.SupportsIndex = 9, n_actions: typing.SupportsInt | typing.SupportsIndex = 21, max_table_bytes: typing.SupportsInt | typing.SupportsIndex = 1073741824) -> None:
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_inputs: int = ..., n_sets: int = ..., n_actions: int = ..., max_table_bytes: int = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> FuzzyRulesConfig:
         ...
     def __repr__(self) -> str:
         ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
+    def replace(self, **changes: typing.Any) -> FuzzyRulesConfig:
+        """
+        Return a copy with other values of some fields.
+        """
     @property
     def max_table_bytes(self) -> int:
-        ...
+        """
+        A larger table is refused before memory is allocated; 1 GiB by default. For all action dimensions together, where an agent has several.
+        """
     @property
     def n_actions(self) -> int:
-        ...
+        """
+        Discrete actions that every rule has values of, evenly spaced over the action's range.
+        """
     @property
     def n_inputs(self) -> int:
-        ...
+        """
+        d, number of inputs.
+        """
     @property
     def n_sets(self) -> int:
-        ...
+        """
+        Triangular sets per input, evenly spaced over its range. There are n_sets to the power of n_inputs rules of 4 n_actions bytes: 45 MB with 6 inputs.
+        """
 class FuzzyRules:
     """
     Rules over a grid of triangular sets
@@ -274,33 +421,78 @@ class FuzzyRules:
         ...
 class RBFNetworkConfig:
     """
-    The sizes of an RBF network
+    The sizes of an RBF network: normalized Gaussians on an even grid, linear in the weights. The paper gives 4 bases per dimension and 601 actions; the rest are readings.
+    
+    Parameters
+    ----------
+    n_inputs : int
+        d, number of inputs. Must be in [1, 62].
+    n_bases : int
+        Bases per dimension, of the inputs and of the action. There are n_bases to the power of n_inputs + 1 joint bases. Must be in [2, 1048576].
+    n_actions : int
+        Actions over which the maximum is taken, evenly spaced over the action's range. Must be in [1, 1048576].
+    width : float
+        Standard deviation of a Gaussian in units of the spacing of the centres. Must be in [0.1, 100].
+    gradient_rate : float
+        Rate of a gradient step. With Q-learning's learning_rate 0.5 the default is stable whatever the sizes and the width. Must be in (0, 1000000].
+    max_table_bytes : int
+        More weights are refused before memory is allocated; 1 GiB by default. For all action dimensions together, where an agent has several.
+    
+    Raises
+    ------
+    TypeError, ValueError
+        For a value of another type or out of its bounds; ``argument`` is its name.
     """
-    __hash__: typing.ClassVar[None] = None
+    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
+    fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, n_inputs: typing.SupportsInt | typing.SupportsIndex = 4, n_bases: typing.SupportsInt | typing.SupportsIndex = 4, n_actions: typing.SupportsInt | typing.SupportsIndex = 601, width: typing.SupportsFloat | typing.SupportsIndex = 0.5, gradient_rate: typing.SupportsFloat | typing.SupportsIndex = 3.0, max_table_bytes: typing.SupportsInt | typing.SupportsIndex = 1073741824) -> None:
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_inputs: int = ..., n_bases: int = ..., n_actions: int = ..., width: float = ..., gradient_rate: float = ..., max_table_bytes: int = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> RBFNetworkConfig:
         ...
     def __repr__(self) -> str:
         ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
+    def replace(self, **changes: typing.Any) -> RBFNetworkConfig:
+        """
+        Return a copy with other values of some fields.
+        """
     @property
     def gradient_rate(self) -> float:
-        ...
+        """
+        Rate of a gradient step. With Q-learning's learning_rate 0.5 the default is stable whatever the sizes and the width.
+        """
     @property
     def max_table_bytes(self) -> int:
-        ...
+        """
+        More weights are refused before memory is allocated; 1 GiB by default. For all action dimensions together, where an agent has several.
+        """
     @property
     def n_actions(self) -> int:
-        ...
+        """
+        Actions over which the maximum is taken, evenly spaced over the action's range.
+        """
     @property
     def n_bases(self) -> int:
-        ...
+        """
+        Bases per dimension, of the inputs and of the action. There are n_bases to the power of n_inputs + 1 joint bases.
+        """
     @property
     def n_inputs(self) -> int:
-        ...
+        """
+        d, number of inputs.
+        """
     @property
     def width(self) -> float:
-        ...
+        """
+        Standard deviation of a Gaussian in units of the spacing of the centres.
+        """
 class RBFNetwork:
     """
     Q(s, a) linear in normalized Gaussian bases
@@ -330,39 +522,73 @@ class RBFNetwork:
     @property
     def n_joint_bases(self) -> int:
         ...
-class GoalScheduleKind(enum.Enum):
-    """
-    The formula of lambda(k)
-    """
-    constant = 2
-    inverse_linear = 0
-    inverse_sqrt = 1
 class GoalScheduleConfig:
     """
-    How lambda(k) falls
+    How the goal tolerance lambda(k) falls with the learning episode k (section 4.1).
+    
+    Parameters
+    ----------
+    kind : {'inverse_linear', 'inverse_sqrt', 'constant'}
+        `inverse_linear`: 1 / (1 + k / scale); `inverse_sqrt`: 1 / sqrt(1 + k); or `constant`: constant_value. A reading: the formula is garbled in print.
+    scale : float
+        Episodes; of `inverse_linear`. Must be a finite number greater than 0.
+    last_episode : int
+        The formula holds up to this episode; lambda is floor beyond. Must be at least 0.
+    floor : float
+        lambda beyond last_episode. Must be finite and at least 0.
+    constant_value : float
+        lambda of `constant`. Must be finite and at least 0.
+    
+    Raises
+    ------
+    TypeError, ValueError
+        For a value of another type or out of its bounds; ``argument`` is its name.
     """
-    __hash__: typing.ClassVar[None] = None
+    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
+    fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, kind: GoalScheduleKind = GoalScheduleKind.inverse_linear, scale: typing.SupportsFloat | typing.SupportsIndex = 100.0, last_episode: typing.SupportsInt | typing.SupportsIndex = 10000, floor: typing.SupportsFloat | typing.SupportsIndex = 0.01, constant_value: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, kind: typing.Literal['inverse_linear', 'inverse_sqrt', 'constant'] = ..., scale: float = ..., last_episode: int = ..., floor: float = ..., constant_value: float = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> GoalScheduleConfig:
         ...
     def __repr__(self) -> str:
         ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
+    def replace(self, **changes: typing.Any) -> GoalScheduleConfig:
+        """
+        Return a copy with other values of some fields.
+        """
     @property
     def constant_value(self) -> float:
-        ...
+        """
+        lambda of `constant`.
+        """
     @property
     def floor(self) -> float:
-        ...
+        """
+        lambda beyond last_episode.
+        """
     @property
-    def kind(self) -> GoalScheduleKind:
-        ...
+    def kind(self) -> typing.Literal['inverse_linear', 'inverse_sqrt', 'constant']:
+        """
+        `inverse_linear`: 1 / (1 + k / scale); `inverse_sqrt`: 1 / sqrt(1 + k); or `constant`: constant_value. A reading: the formula is garbled in print.
+        """
     @property
     def last_episode(self) -> int:
-        ...
+        """
+        The formula holds up to this episode; lambda is floor beyond.
+        """
     @property
     def scale(self) -> float:
-        ...
+        """
+        Episodes; of `inverse_linear`.
+        """
 class GoalSchedule:
     """
     lambda as a function of the learning episode
@@ -371,83 +597,178 @@ class GoalSchedule:
         ...
     def __init__(self, config: GoalScheduleConfig) -> None:
         ...
-class GoalTest(enum.Enum):
-    """
-    When the goal is looked for
-    """
-    decision_instant = 1
-    every_step = 0
 class AcrobotConfig:
     """
-    The numbers of the acrobot's task
+    The numbers of the acrobot's task; the defaults are the paper's (section 4.1).
+    
+    Parameters
+    ----------
+    link_mass_1 : float
+        Mass of link 1, kg. Must be a finite number greater than 0.
+    link_mass_2 : float
+        Mass of link 2, kg. Must be a finite number greater than 0.
+    link_length_1 : float
+        Length of link 1, m. Must be a finite number greater than 0.
+    link_length_2 : float
+        Length of link 2, m. Must be a finite number greater than 0.
+    center_of_mass_1 : float
+        Centre of mass of link 1, m from the joint that it hangs on. Must be a finite number greater than 0.
+    center_of_mass_2 : float
+        Centre of mass of link 2, m from the joint that it hangs on. Must be a finite number greater than 0.
+    inertia_1 : float
+        Inertia of link 1 about its centre of mass, kg m^2. Must be a finite number greater than 0.
+    inertia_2 : float
+        Inertia of link 2 about its centre of mass, kg m^2. Must be a finite number greater than 0.
+    gravity : float
+        m/s^2.
+    max_torque : float
+        N m; the torque is in [-max_torque, max_torque]. Must be a finite number greater than 0.
+    decision_interval : float
+        s; the torque is held for it. Must be a finite number greater than 0.
+    integration_step : float
+        s, a whole fraction of decision_interval: Runge-Kutta of fourth order. A reading. Must be a finite number greater than 0.
+    max_decisions : int
+        Decisions in an episode. Must be at least 1.
+    goal_height : float
+        m above joint 1, which the tip must reach.
+    goal_velocity_1 : float
+        rad/s. Limit of |theta1_dot|: times the goal tolerance in the goal, as it is in the penalty. Must be a finite number greater than 0.
+    goal_velocity_2 : float
+        rad/s. Limit of |theta2_dot|: times the goal tolerance in the goal, as it is in the penalty. Must be a finite number greater than 0.
+    goal_test : {'every_step', 'decision_instant'}
+        When the goal is tested: `every_step`: after every integration step, and the episode ends there; `decision_instant`: only when the next decision is due. A reading.
+    goal_reward : float
+        Reward at the goal.
+    penalty : float
+        Reward for idling or too much speed at a decision instant; it ends nothing.
+    idle_angle : float
+        rad: |theta1| below it is idling; 0 turns the rule off. A reading: 5 degrees; pi / 5 is the alternative. Must be in [0, 3.14159].
+    
+    Raises
+    ------
+    TypeError, ValueError
+        For a value of another type or out of its bounds; ``argument`` is its name.
     """
-    __hash__: typing.ClassVar[None] = None
+    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
+    fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, link_mass_1: typing.SupportsFloat | typing.SupportsIndex = 1.0, link_mass_2: typing.SupportsFloat | typing.SupportsIndex = 1.0, link_length_1: typing.SupportsFloat | typing.SupportsIndex = 1.0, link_length_2: typing.SupportsFloat | typing.SupportsIndex = 1.0, center_of_mass_1: typing.SupportsFloat | typing.SupportsIndex = 0.5, center_of_mass_2: typing.SupportsFloat | typing.SupportsIndex = 0.5, inertia_1: typing.SupportsFloat | typing.SupportsIndex = 1.0, inertia_2: typing.SupportsFloat | typing.SupportsIndex = 1.0, gravity: typing.SupportsFloat | typing.SupportsIndex = 9.8, max_torque: typing.SupportsFloat | typing.SupportsIndex = 10.0, decision_interval: typing.SupportsFloat | typing.SupportsIndex = 1.0, integration_step: typing.SupportsFloat | typing.SupportsIndex = 0.02, max_decisions: typing.SupportsInt | typing.SupportsIndex = 50, goal_height: typing.SupportsFloat | typing.SupportsIndex = 1.5, goal_velocity_1: typing.SupportsFloat | typing.SupportsIndex = 9.42477796076938, goal_velocity_2: typing.SupportsFloat | typing.SupportsIndex = 15.707963267948966, goal_test: GoalTest = GoalTest.every_step, goal_reward: typing.SupportsFloat | typing.SupportsIndex = 10.0, penalty: typing.SupportsFloat | typing.SupportsIndex = -5.0, idle_angle: typing.SupportsFloat | typing.SupportsIndex = 0.08726646259971647) -> None:
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, link_mass_1: float = ..., link_mass_2: float = ..., link_length_1: float = ..., link_length_2: float = ..., center_of_mass_1: float = ..., center_of_mass_2: float = ..., inertia_1: float = ..., inertia_2: float = ..., gravity: float = ..., max_torque: float = ..., decision_interval: float = ..., integration_step: float = ..., max_decisions: int = ..., goal_height: float = ..., goal_velocity_1: float = ..., goal_velocity_2: float = ..., goal_test: typing.Literal['every_step', 'decision_instant'] = ..., goal_reward: float = ..., penalty: float = ..., idle_angle: float = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> AcrobotConfig:
         ...
     def __repr__(self) -> str:
         ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
+    def replace(self, **changes: typing.Any) -> AcrobotConfig:
+        """
+        Return a copy with other values of some fields.
+        """
     @property
     def center_of_mass_1(self) -> float:
-        ...
+        """
+        Centre of mass of link 1, m from the joint that it hangs on.
+        """
     @property
     def center_of_mass_2(self) -> float:
-        ...
+        """
+        Centre of mass of link 2, m from the joint that it hangs on.
+        """
     @property
     def decision_interval(self) -> float:
-        ...
+        """
+        s; the torque is held for it.
+        """
     @property
     def goal_height(self) -> float:
-        ...
+        """
+        m above joint 1, which the tip must reach.
+        """
     @property
     def goal_reward(self) -> float:
-        ...
+        """
+        Reward at the goal.
+        """
     @property
-    def goal_test(self) -> GoalTest:
-        ...
+    def goal_test(self) -> typing.Literal['every_step', 'decision_instant']:
+        """
+        When the goal is tested: `every_step`: after every integration step, and the episode ends there; `decision_instant`: only when the next decision is due. A reading.
+        """
     @property
     def goal_velocity_1(self) -> float:
-        ...
+        """
+        rad/s. Limit of |theta1_dot|: times the goal tolerance in the goal, as it is in the penalty.
+        """
     @property
     def goal_velocity_2(self) -> float:
-        ...
+        """
+        rad/s. Limit of |theta2_dot|: times the goal tolerance in the goal, as it is in the penalty.
+        """
     @property
     def gravity(self) -> float:
-        ...
+        """
+        m/s^2.
+        """
     @property
     def idle_angle(self) -> float:
-        ...
+        """
+        rad: |theta1| below it is idling; 0 turns the rule off. A reading: 5 degrees; pi / 5 is the alternative.
+        """
     @property
     def inertia_1(self) -> float:
-        ...
+        """
+        Inertia of link 1 about its centre of mass, kg m^2.
+        """
     @property
     def inertia_2(self) -> float:
-        ...
+        """
+        Inertia of link 2 about its centre of mass, kg m^2.
+        """
     @property
     def integration_step(self) -> float:
-        ...
+        """
+        s, a whole fraction of decision_interval: Runge-Kutta of fourth order. A reading.
+        """
     @property
     def link_length_1(self) -> float:
-        ...
+        """
+        Length of link 1, m.
+        """
     @property
     def link_length_2(self) -> float:
-        ...
+        """
+        Length of link 2, m.
+        """
     @property
     def link_mass_1(self) -> float:
-        ...
+        """
+        Mass of link 1, kg.
+        """
     @property
     def link_mass_2(self) -> float:
-        ...
+        """
+        Mass of link 2, kg.
+        """
     @property
     def max_decisions(self) -> int:
-        ...
+        """
+        Decisions in an episode.
+        """
     @property
     def max_torque(self) -> float:
-        ...
+        """
+        N m; the torque is in [-max_torque, max_torque].
+        """
     @property
     def penalty(self) -> float:
-        ...
+        """
+        Reward for idling or too much speed at a decision instant; it ends nothing.
+        """
 class Acrobot:
     """
     Dynamics, reward and episode end of the acrobot
@@ -494,54 +815,88 @@ class AcrobotBatch:
         """
     def tip_heights(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
-class SensorEdge(enum.Enum):
-    """
-    What noise does at the ends of a sensor's range
-    """
-    saturate = 1
-    wrap = 0
 class SensorNoise:
     """
     Gaussian noise on every channel
     """
-    def __init__(self, sigma: typing.SupportsFloat | typing.SupportsIndex, edges: collections.abc.Sequence[SensorEdge], seed: typing.SupportsInt | typing.SupportsIndex, stream: Stream) -> None:
+    def __init__(self, sigma: typing.SupportsFloat | typing.SupportsIndex, edges: collections.abc.Sequence[str], seed: typing.SupportsInt | typing.SupportsIndex, stream: Stream) -> None:
         ...
     def apply(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         A noisy copy
         """
-class NoiseEntry(enum.Enum):
-    """
-    Where noise enters
-    """
-    basic_sensors = 1
-    every_sensor = 0
 class SensorConfig:
     """
-    Which sensors there are and how noisy
+    What the agent observes (section 4.3).
+    
+    Parameters
+    ----------
+    n_sensors : int
+        4: s1..s4; 5: s5, the energy, too; 6: s6, the height, too. Must be in [4, 6].
+    noise : float
+        Standard deviation of the noise on every sensor; 0.02 in the paper's noisy cases. Must be finite and at least 0.
+    noise_entry : {'every_sensor', 'basic_sensors'}
+        Where noise enters: `every_sensor`: s5 and s6 are computed from the true s1..s4 and get noise of their own; `basic_sensors`: they are computed from the noisy ones. A reading.
+    n_constant : int
+        Useless inputs besides: always 1/2, with noise as on the sensors. Not in the paper. Must be in [0, 100].
+    n_random : int
+        Useless inputs besides: a new uniform number each time. Not in the paper. Must be in [0, 100].
+    
+    Raises
+    ------
+    TypeError, ValueError
+        For a value of another type or out of its bounds; ``argument`` is its name.
     """
-    __hash__: typing.ClassVar[None] = None
+    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
+    fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, n_sensors: typing.SupportsInt | typing.SupportsIndex = 4, noise: typing.SupportsFloat | typing.SupportsIndex = 0.0, noise_entry: NoiseEntry = NoiseEntry.every_sensor, n_constant: typing.SupportsInt | typing.SupportsIndex = 0, n_random: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_sensors: int = ..., noise: float = ..., noise_entry: typing.Literal['every_sensor', 'basic_sensors'] = ..., n_constant: int = ..., n_random: int = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> SensorConfig:
         ...
     def __repr__(self) -> str:
         ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
+    def replace(self, **changes: typing.Any) -> SensorConfig:
+        """
+        Return a copy with other values of some fields.
+        """
     @property
     def n_constant(self) -> int:
-        ...
+        """
+        Useless inputs besides: always 1/2, with noise as on the sensors. Not in the paper.
+        """
+    @property
+    def n_inputs(self) -> int:
+        """
+        Numbers in an observation.
+        """
     @property
     def n_random(self) -> int:
-        ...
+        """
+        Useless inputs besides: a new uniform number each time. Not in the paper.
+        """
     @property
     def n_sensors(self) -> int:
-        ...
+        """
+        4: s1..s4; 5: s5, the energy, too; 6: s6, the height, too.
+        """
     @property
     def noise(self) -> float:
-        ...
+        """
+        Standard deviation of the noise on every sensor; 0.02 in the paper's noisy cases.
+        """
     @property
-    def noise_entry(self) -> NoiseEntry:
-        ...
+    def noise_entry(self) -> typing.Literal['every_sensor', 'basic_sensors']:
+        """
+        Where noise enters: `every_sensor`: s5 and s6 are computed from the true s1..s4 and get noise of their own; `basic_sensors`: they are computed from the noisy ones. A reading.
+        """
 class AcrobotSensors:
     """
     s1..s4, s5 and s6 with their noise
@@ -649,36 +1004,66 @@ class ObservationScale:
         """
     def __init__(self, low: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], high: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], inputs: collections.abc.Sequence[tuple[str, typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]]) -> None:
         ...
-class TieRule(enum.Enum):
-    """
-    Which of several best actions is taken
-    """
-    lowest = 1
-    middle = 2
-    uniform = 0
 class EpsilonGreedyConfig:
     """
-    The policy's parameters
+    The parameters of the policy; the defaults are the paper's (section 4.2).
+    
+    Parameters
+    ----------
+    epsilon : float
+        Probability of a random action; in fuzzy Q-learning each fired rule picks one for itself. Must be in [0, 1].
+    n_greedy_steps : int
+        First steps of an episode in which epsilon is 0. Must be in [0, 1073741824].
+    tie_rule : {'uniform', 'lowest', 'middle'}
+        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. A reading.
+    tie_tolerance : float
+        Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau. Must be finite and at least 0.
+    
+    Raises
+    ------
+    TypeError, ValueError
+        For a value of another type or out of its bounds; ``argument`` is its name.
     """
-    __hash__: typing.ClassVar[None] = None
+    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
+    fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform, tie_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> EpsilonGreedyConfig:
         ...
     def __repr__(self) -> str:
         ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
+    def replace(self, **changes: typing.Any) -> EpsilonGreedyConfig:
+        """
+        Return a copy with other values of some fields.
+        """
     @property
     def epsilon(self) -> float:
-        ...
+        """
+        Probability of a random action; in fuzzy Q-learning each fired rule picks one for itself.
+        """
     @property
     def n_greedy_steps(self) -> int:
-        ...
+        """
+        First steps of an episode in which epsilon is 0.
+        """
     @property
-    def tie_rule(self) -> TieRule:
-        ...
+    def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
+        """
+        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. A reading.
+        """
     @property
     def tie_tolerance(self) -> float:
-        ...
+        """
+        Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau.
+        """
 class EpsilonGreedy:
     """
     The policy, over rows of values
@@ -687,107 +1072,221 @@ class EpsilonGreedy:
         ...
     def select(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step: typing.SupportsInt | typing.SupportsIndex, explore: bool = True) -> int:
         ...
-class ValueRange(enum.Enum):
-    """
-    Whether the range of values is fixed
-    """
-    given = 0
-    seen = 1
-class Schedule(enum.Enum):
-    """
-    How rates go to their final values
-    """
-    exponential = 1
-    linear = 0
 class QLearningConfig:
     """
-    The parameters of Q-learning
+    The parameters of Q-learning; the defaults are the paper's (section 4.2).
+    
+    Parameters
+    ----------
+    learning_rate : float
+        alpha. Must be in (0, 1].
+    discount : float
+        gamma. Must be in [0, 1].
+    epsilon : float
+        Probability of a random action; in fuzzy Q-learning each fired rule picks one for itself. Must be in [0, 1].
+    n_greedy_steps : int
+        First steps of an episode in which epsilon is 0. Must be in [0, 1073741824].
+    tie_rule : {'uniform', 'lowest', 'middle'}
+        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. A reading.
+    tie_tolerance : float
+        Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau. Must be finite and at least 0.
+    n_steps : int
+        Rewards in a target before it bootstraps. Not in the paper, which has 1: with more, a transition is learned, once, when so many steps are known or the episode ends. Must be in [1, 1000].
+    max_repetitions : int
+        Steps that a random action may last. Not in the paper, which has 1: with more, it is kept for at least k steps with probability 1 / k. Must be in [1, 1000000].
+    final_learning_rate : float | None
+        What alpha becomes as the agent's progress goes from 0 to 1; by default it stays. Not in the paper. Must be in (0, 1].
+    final_epsilon : float | None
+        What epsilon becomes as the agent's progress goes from 0 to 1; by default it stays. Not in the paper. Must be in [0, 1].
+    value_range : {'given', 'seen'}
+        Whether Q has the approximator's range, q_low to q_high (`given`), or one that grows with the discounted sums of the rewards that come (`seen`). Not in the paper.
+    schedule : {'linear', 'exponential'}
+        How alpha and epsilon go to their final values: `linear`: in a straight line; `exponential`: by the same factor in equal parts of the progress, first * (final / first) ** progress. A constant rate is the common choice where the task itself changes; a line is what most libraries of deep Q-learning take for epsilon; an exponential spends more of the training near a small final value, which must not be 0. Any other function of the progress: `sdnn.agents.Schedule`.
+    exploration_fraction : float
+        Part of the progress in which epsilon goes to final_epsilon, where it then stays. Not in the paper. Must be in (0, 1].
+    n_random_steps : int
+        First steps of the agent's life in which every action is random, whatever epsilon. Not in the paper, which has 0: a rare success is found before the greedy actions have learned to do nothing. Must be in [0, 1073741824].
+    
+    Raises
+    ------
+    TypeError, ValueError
+        For a value of another type or out of its bounds; ``argument`` is its name.
     """
-    __hash__: typing.ClassVar[None] = None
+    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
+    fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, learning_rate: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform, tie_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0, n_steps: typing.SupportsInt | typing.SupportsIndex = 1, max_repetitions: typing.SupportsInt | typing.SupportsIndex = 1, final_learning_rate: typing.SupportsFloat | typing.SupportsIndex | None = None, final_epsilon: typing.SupportsFloat | typing.SupportsIndex | None = None, value_range: ValueRange = ValueRange.given, schedule: Schedule = Schedule.linear, exploration_fraction: typing.SupportsFloat | typing.SupportsIndex = 1.0, n_random_steps: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, learning_rate: float = ..., discount: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ..., n_steps: int = ..., max_repetitions: int = ..., final_learning_rate: float | None = ..., final_epsilon: float | None = ..., value_range: typing.Literal['given', 'seen'] = ..., schedule: typing.Literal['linear', 'exponential'] = ..., exploration_fraction: float = ..., n_random_steps: int = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> QLearningConfig:
         ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
         ...
     def epsilon_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
         ...
     def learning_rate_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
         ...
+    def replace(self, **changes: typing.Any) -> QLearningConfig:
+        """
+        Return a copy with other values of some fields.
+        """
     @property
     def discount(self) -> float:
-        ...
+        """
+        gamma.
+        """
     @property
     def epsilon(self) -> float:
-        ...
+        """
+        Probability of a random action; in fuzzy Q-learning each fired rule picks one for itself.
+        """
     @property
     def exploration_fraction(self) -> float:
-        ...
+        """
+        Part of the progress in which epsilon goes to final_epsilon, where it then stays. Not in the paper.
+        """
     @property
     def final_epsilon(self) -> float | None:
-        ...
+        """
+        What epsilon becomes as the agent's progress goes from 0 to 1; by default it stays. Not in the paper.
+        """
     @property
     def final_learning_rate(self) -> float | None:
-        ...
+        """
+        What alpha becomes as the agent's progress goes from 0 to 1; by default it stays. Not in the paper.
+        """
     @property
     def learning_rate(self) -> float:
-        ...
+        """
+        alpha.
+        """
     @property
     def max_repetitions(self) -> int:
-        ...
+        """
+        Steps that a random action may last. Not in the paper, which has 1: with more, it is kept for at least k steps with probability 1 / k.
+        """
     @property
     def n_greedy_steps(self) -> int:
-        ...
+        """
+        First steps of an episode in which epsilon is 0.
+        """
     @property
     def n_random_steps(self) -> int:
-        ...
+        """
+        First steps of the agent's life in which every action is random, whatever epsilon. Not in the paper, which has 0: a rare success is found before the greedy actions have learned to do nothing.
+        """
     @property
     def n_steps(self) -> int:
-        ...
+        """
+        Rewards in a target before it bootstraps. Not in the paper, which has 1: with more, a transition is learned, once, when so many steps are known or the episode ends.
+        """
     @property
-    def schedule(self) -> Schedule:
-        ...
+    def schedule(self) -> typing.Literal['linear', 'exponential']:
+        """
+        How alpha and epsilon go to their final values: `linear`: in a straight line; `exponential`: by the same factor in equal parts of the progress, first * (final / first) ** progress. A constant rate is the common choice where the task itself changes; a line is what most libraries of deep Q-learning take for epsilon; an exponential spends more of the training near a small final value, which must not be 0. Any other function of the progress: `sdnn.agents.Schedule`.
+        """
     @property
-    def tie_rule(self) -> TieRule:
-        ...
+    def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
+        """
+        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. A reading.
+        """
     @property
     def tie_tolerance(self) -> float:
-        ...
+        """
+        Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau.
+        """
     @property
-    def value_range(self) -> ValueRange:
-        ...
+    def value_range(self) -> typing.Literal['given', 'seen']:
+        """
+        Whether Q has the approximator's range, q_low to q_high (`given`), or one that grows with the discounted sums of the rewards that come (`seen`). Not in the paper.
+        """
 class FuzzyQLearningConfig:
     """
-    The parameters of fuzzy Q-learning
+    The parameters of fuzzy Q-learning; the defaults are the paper's (section 4.3).
+    
+    Parameters
+    ----------
+    learning_coefficient : float
+        c_fql. A reading: the paper does not give it; 0.1 and 1.0 are alternatives. Must be in (0, 1].
+    discount : float
+        gamma. Must be in [0, 1].
+    trace_decay : float
+        lambda of accumulating eligibility traces; 0: none, as in the paper. At most 0.99 / discount. Must be in [0, 1].
+    epsilon : float
+        Probability of a random action; in fuzzy Q-learning each fired rule picks one for itself. Must be in [0, 1].
+    n_greedy_steps : int
+        First steps of an episode in which epsilon is 0. Must be in [0, 1073741824].
+    tie_rule : {'uniform', 'lowest', 'middle'}
+        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. A reading.
+    tie_tolerance : float
+        Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau. Must be finite and at least 0.
+    
+    Raises
+    ------
+    TypeError, ValueError
+        For a value of another type or out of its bounds; ``argument`` is its name.
     """
-    __hash__: typing.ClassVar[None] = None
+    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
+    fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, learning_coefficient: typing.SupportsFloat | typing.SupportsIndex = 0.5, discount: typing.SupportsFloat | typing.SupportsIndex = 0.9, trace_decay: typing.SupportsFloat | typing.SupportsIndex = 0.0, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.1, n_greedy_steps: typing.SupportsInt | typing.SupportsIndex = 10, tie_rule: TieRule = TieRule.uniform, tie_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, learning_coefficient: float = ..., discount: float = ..., trace_decay: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> FuzzyQLearningConfig:
         ...
     def __repr__(self) -> str:
         ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
+    def replace(self, **changes: typing.Any) -> FuzzyQLearningConfig:
+        """
+        Return a copy with other values of some fields.
+        """
     @property
     def discount(self) -> float:
-        ...
+        """
+        gamma.
+        """
     @property
     def epsilon(self) -> float:
-        ...
+        """
+        Probability of a random action; in fuzzy Q-learning each fired rule picks one for itself.
+        """
     @property
     def learning_coefficient(self) -> float:
-        ...
+        """
+        c_fql. A reading: the paper does not give it; 0.1 and 1.0 are alternatives.
+        """
     @property
     def n_greedy_steps(self) -> int:
-        ...
+        """
+        First steps of an episode in which epsilon is 0.
+        """
     @property
-    def tie_rule(self) -> TieRule:
-        ...
+    def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
+        """
+        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. A reading.
+        """
     @property
     def tie_tolerance(self) -> float:
-        ...
+        """
+        Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau.
+        """
     @property
     def trace_decay(self) -> float:
-        ...
+        """
+        lambda of accumulating eligibility traces; 0: none, as in the paper. At most 0.99 / discount.
+        """
 class FixedRate:
     """
     Waits for ticks at a fixed rate
@@ -1071,27 +1570,64 @@ class VectorFuzzyQLearning:
         ...
 class ProtocolConfig:
     """
-    How long a trial is
+    Learning protocol of a trial; the defaults are the paper's (section 4.2).
+    
+    Parameters
+    ----------
+    n_learning_episodes : int
+        Learning episodes in a trial. Must be in [1, 1073741824].
+    test_interval : int
+        One test episode follows every so many learning episodes. Must be in [1, 1073741824].
+    limit_bootstraps : bool
+        Whether the last transition before the time limit bootstraps, as one that goes on; else it counts as terminated. A reading.
+    noisy_tests : bool
+        Whether the sensors are as noisy in test episodes as in learning ones. A reading.
+    
+    Raises
+    ------
+    TypeError, ValueError
+        For a value of another type or out of its bounds; ``argument`` is its name.
     """
-    __hash__: typing.ClassVar[None] = None
+    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
+    fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __init__(self, *, n_learning_episodes: typing.SupportsInt | typing.SupportsIndex = 15000, test_interval: typing.SupportsInt | typing.SupportsIndex = 10, limit_bootstraps: bool = True, noisy_tests: bool = True) -> None:
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_learning_episodes: int = ..., test_interval: int = ..., limit_bootstraps: bool = ..., noisy_tests: bool = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> ProtocolConfig:
         ...
     def __repr__(self) -> str:
         ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
+    def replace(self, **changes: typing.Any) -> ProtocolConfig:
+        """
+        Return a copy with other values of some fields.
+        """
     @property
     def limit_bootstraps(self) -> bool:
-        ...
+        """
+        Whether the last transition before the time limit bootstraps, as one that goes on; else it counts as terminated. A reading.
+        """
     @property
     def n_learning_episodes(self) -> int:
-        ...
+        """
+        Learning episodes in a trial.
+        """
     @property
     def noisy_tests(self) -> bool:
-        ...
+        """
+        Whether the sensors are as noisy in test episodes as in learning ones. A reading.
+        """
     @property
     def test_interval(self) -> int:
-        ...
+        """
+        One test episode follows every so many learning episodes.
+        """
 class AcrobotTrial:
     """
     SDNN-C learns the acrobot swing-up
@@ -1284,10 +1820,6 @@ def energy_sensor(s3: typing.SupportsFloat | typing.SupportsIndex, s4: typing.Su
     ...
 def exp(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
-def general_preset(n_inputs: typing.SupportsInt | typing.SupportsIndex) -> tuple[SDNNCConfig, QLearningConfig]:
-    """
-    Settings of approximator and learning, as recommended for any task
-    """
 def height_sensor(s1: typing.SupportsFloat | typing.SupportsIndex, s2: typing.SupportsFloat | typing.SupportsIndex) -> float:
     ...
 def instruction_set() -> str:
@@ -1310,16 +1842,12 @@ def n_units_for(scheme: str, n_classes: typing.SupportsInt | typing.SupportsInde
     """
 def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
-def paper_preset(n_inputs: typing.SupportsInt | typing.SupportsIndex) -> tuple[SDNNCConfig, QLearningConfig]:
+def presets() -> dict[str, tuple[str, SDNNCConfig, QLearningConfig]]:
     """
-    Settings of approximator and learning, as in the paper
+    Named settings of Q-learning with SDNN-C: titles, settings of approximator and learning
     """
 def random_inverse_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, n_bins: typing.SupportsInt | typing.SupportsIndex, n_flipped: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
     ...
-def robust_preset(n_inputs: typing.SupportsInt | typing.SupportsIndex) -> tuple[SDNNCConfig, QLearningConfig]:
-    """
-    Settings of approximator and learning, as recommended
-    """
 def seed_of_dimension(seed: typing.SupportsInt | typing.SupportsIndex, d: typing.SupportsInt | typing.SupportsIndex) -> int:
     """
     The seed of the network of a dimension of the action
@@ -1331,10 +1859,6 @@ def set_instruction_set(name: str) -> None:
 def sin_cos(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     (sin x, cos x), item by item
-    """
-def small_preset(n_inputs: typing.SupportsInt | typing.SupportsIndex) -> tuple[SDNNCConfig, QLearningConfig]:
-    """
-    Settings of approximator and learning, for small processors
     """
 def symbol_patterns(n_symbols: typing.SupportsInt | typing.SupportsIndex, n_units: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
     ...

@@ -1,50 +1,92 @@
-"""From a frozen dataclass to the core's struct of the same fields."""
+"""The settings that the core declares: their fields, checks and documentation come from C++."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, TypeVar
+import inspect
+import typing
+from typing import Any, NamedTuple
 
-from sdnn.arguments import choice
+from sdnn._core import (
+    AcrobotConfig,
+    FuzzyQLearningConfig,
+    FuzzyRulesConfig,
+    GoalScheduleConfig,
+    ProtocolConfig,
+    QLearningConfig,
+    RBFNetworkConfig,
+    SDNNCConfig,
+    SensorConfig,
+)
 
-__all__ = ["to_core"]
+__all__ = [
+    "AcrobotConfig",
+    "Field",
+    "FuzzyQLearningConfig",
+    "FuzzyRulesConfig",
+    "GoalScheduleConfig",
+    "ProtocolConfig",
+    "QLearningConfig",
+    "RBFNetworkConfig",
+    "SDNNCConfig",
+    "SensorConfig",
+    "fields_of",
+]
 
-CoreConfig = TypeVar("CoreConfig")
+
+class Field(NamedTuple):
+    """A setting of the core."""
+
+    name: str
+    hint: str
+    default: Any
+    doc: str
+    low: float
+    high: float
+    excludes_low: bool
+
+    @property
+    def type(self) -> Any:
+        """Its type, as Python's type hints have it."""
+        return eval(self.hint, {"typing": typing})
 
 
-def to_core(config: Any, core_type: type[CoreConfig]) -> CoreConfig:
-    """Make the core's struct of the values of a dataclass; words become its enumerations.
+def fields_of(kind: Any) -> tuple[Field, ...]:
+    """Return the settings of one of the core's classes; none of any other class.
 
-    Raises
-    ------
-    ValueError
-        If a word is none of its enumeration's.
-    TypeError
-        If a value has the wrong type, or is too large for the core's; the message names its field.
+    Examples
+    --------
+    >>> [field.name for field in fields_of(FuzzyRulesConfig)]
+    ['n_inputs', 'n_sets', 'n_actions', 'max_table_bytes']
     """
-    defaults = core_type()
-    values = {}
-    for field in dataclasses.fields(config):
-        value = getattr(config, field.name)
-        members = getattr(type(getattr(defaults, field.name)), "__members__", None)
-        values[field.name] = value if members is None else choice(field.name, value, members)
-        _check_type(core_type, field, values[field.name], getattr(defaults, field.name))
-    return core_type(**values)
+    return tuple(Field(*field) for field in getattr(kind, "fields", ()))
 
 
-def _check_type(core_type: Any, field: dataclasses.Field[Any], value: Any, default: Any) -> None:
-    """Raise TypeError unless the core takes the value; it takes True for 1 and None for False."""
-    kind = getattr(getattr(value, "dtype", None), "kind", "")
-    is_truth = kind == "b" or isinstance(value, bool)
-    try:
-        if is_truth != isinstance(default, bool):
-            raise TypeError
-        core_type(**{field.name: value})
-    except TypeError:
-        hint = str(field.type)
-        words = {"bool": "True or False", "int": "a whole number", "float": "a number"}
-        first = hint.partition(" | ")[0]
-        expected = words.get(first, first) + (" or None" if hint.endswith("None") else "")
-        if isinstance(value, int) and not is_truth:
-            expected += " that the core can hold"
-        raise TypeError(f"{field.name} must be {expected}, got {value!r}") from None
+def _complete(kind: Any) -> None:
+    """Make a class of the core a dataclass: for `dataclasses.replace`, `fields` and `asdict`."""
+    fields = fields_of(kind)
+    like = dataclasses.make_dataclass(
+        kind.__name__,
+        [(field.name, field.type, dataclasses.field(default=field.default)) for field in fields],
+        init=False,
+        repr=False,
+        eq=False,
+        kw_only=True,
+    )
+    kind.__dataclass_fields__ = vars(like)["__dataclass_fields__"]
+    kind.__annotations__ = like.__annotations__
+    parameters = [
+        inspect.Parameter(
+            field.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=field.default,
+            annotation=field.type,
+        )
+        for field in fields
+    ]
+    kind.__signature__ = inspect.Signature(parameters)
+
+
+for _name in __all__:
+    if _name.endswith("Config"):
+        _complete(globals()[_name])

@@ -135,7 +135,6 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         for name, part, kind in settings:
             if not isinstance(part, kind):
                 raise TypeError(f"{name} must be a {kind.__name__}, got {part!r}")
-            part.to_core()  # the types of its fields
         self.observation_space = observation_space
         self.action_space = action_space
         self.approximator = approximator
@@ -201,12 +200,11 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     def _core_approximator(self) -> Any:
         """Give the core's settings of one dimension, of the memory's limit its share."""
         settings: Any = self.approximator
-        core = settings.to_core()
         n_dimensions = self._actions.n_dimensions
         if n_dimensions == 1:
-            return core
+            return settings
         share = settings.max_table_bytes // n_dimensions
-        return dataclasses.replace(settings, max_table_bytes=share).to_core()
+        return settings.replace(max_table_bytes=share)
 
     def _checked(self) -> Any:
         """Make the compiled agent; an error about sizes says which space they follow from."""

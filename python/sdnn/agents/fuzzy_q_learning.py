@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -14,46 +13,10 @@ from sdnn import _core
 from sdnn.agents.actions import Actions, ContinuousActions
 from sdnn.agents.agent import Agent, check_shape
 from sdnn.agents.observations import AnglePairs, Ranges
-from sdnn.approximators.fuzzy_rules import FuzzyRulesConfig
 from sdnn.arguments import whole
-from sdnn.config import to_core
+from sdnn.config import FuzzyQLearningConfig, FuzzyRulesConfig
 
-__all__ = ["FuzzyQLearning", "FuzzyQLearningConfig"]
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class FuzzyQLearningConfig:
-    """The parameters of fuzzy Q-learning; the defaults are the paper's (section 4.3).
-
-    Attributes
-    ----------
-    learning_coefficient : float
-        c_fql, in (0, 1]. A reading: the paper does not give it; 0.1 and 1.0 are alternatives.
-    discount : float
-        gamma, in [0, 1].
-    trace_decay : float
-        lambda of accumulating eligibility traces, in [0, 1]; 0: none, as in the paper.
-    epsilon : float
-        Probability that a fired rule picks a random action, each rule for itself, in [0, 1].
-    n_greedy_steps : int
-        First steps of an episode in which epsilon is 0.
-    tie_rule : {"uniform", "lowest", "middle"}
-        Which of several best actions a rule picks; see `QLearningConfig`. A reading.
-    tie_tolerance : float
-        Values at most this far below the best tie with it, >= 0.
-    """
-
-    learning_coefficient: float = 0.5
-    discount: float = 0.9
-    trace_decay: float = 0.0
-    epsilon: float = 0.1
-    n_greedy_steps: int = 10
-    tie_rule: Literal["uniform", "lowest", "middle"] = "uniform"
-    tie_tolerance: float = 0.0
-
-    def to_core(self) -> _core.FuzzyQLearningConfig:
-        """Make the core's struct of the same values; see `sdnn.config.to_core`."""
-        return to_core(self, _core.FuzzyQLearningConfig)
+__all__ = ["FuzzyQLearning"]
 
 
 class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
@@ -145,10 +108,8 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
         return ContinuousActions(space)
 
     def _make(self) -> Any:
-        self.approximator = dataclasses.replace(
-            self.approximator, n_inputs=self._observations.n_inputs
-        )
-        approximator, learning = self._core_approximator(), self.learning.to_core()
+        self.approximator = self.approximator.replace(n_inputs=self._observations.n_inputs)
+        approximator, learning = self._core_approximator(), self.learning
         if self._is_scalar:
             return _core.FuzzyQLearning(
                 approximator=approximator, learning=learning, seed=self.seed

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import abc
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Generic, TypeAlias, TypeVar
@@ -17,10 +16,9 @@ from sdnn.agents.actions import Actions, IndexedActions
 from sdnn.agents.agent import Agent, check_shape
 from sdnn.agents.observations import AnglePairs, Ranges
 from sdnn.agents.presets import PRESETS
-from sdnn.agents.q_learning_config import QLearningConfig
-from sdnn.approximators.rbf_network import RBFNetworkConfig
-from sdnn.approximators.sdnn_c import SDNNCConfig, pattern_tables
+from sdnn.approximators.sdnn_c import pattern_tables
 from sdnn.arguments import choice, real, whole
+from sdnn.config import QLearningConfig, RBFNetworkConfig, SDNNCConfig
 
 __all__ = ["RBFQLearning", "SDNNQLearning"]
 
@@ -54,7 +52,7 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
         sizes: dict[str, Any] = {"n_inputs": self._observations.n_inputs}
         if len(n_actions) == 1 and not self._actions.is_box:
             sizes["n_actions"] = n_actions[0]
-        self.approximator = dataclasses.replace(self.approximator, **sizes)
+        self.approximator = self.approximator.replace(**sizes)
         core = self._make_core()
         for name, value in self._rates.items():
             getattr(core, f"set_{name}")(value)
@@ -119,7 +117,7 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
     def _rate(self, name: str) -> float:
         if self._compiled is not None:
             return float(getattr(self._compiled, name))
-        at_progress: float = getattr(self.learning.to_core(), f"{name}_at")(self.progress)
+        at_progress: float = getattr(self.learning, f"{name}_at")(self.progress)
         return self._rates.get(name, at_progress)
 
     def _set_rate(self, name: str, value: float | None) -> None:
@@ -301,8 +299,8 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         for name in ("circular", "n_symbols"):
             follows = getattr(self._observations, name)
             if any(follows) and not getattr(self.approximator, name):
-                self.approximator = dataclasses.replace(self.approximator, **{name: follows})
-        config, learning = self._core_approximator(), self.learning.to_core()
+                self.approximator = self.approximator.replace(**{name: follows})
+        config, learning = self._core_approximator(), self.learning
         if self.n_dimensions > 1:
             if self._tables is not None:
                 raise ValueError("tables must be None where actions have several dimensions")
@@ -314,9 +312,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
             )
         given = {} if self._tables is None else {"tables": self._tables_for_symbols()}
         core = _core.SDNNQLearning(approximator=config, learning=learning, seed=self.seed, **given)
-        self.approximator = dataclasses.replace(
-            self.approximator, n_actions=core.action_value.n_actions
-        )
+        self.approximator = self.approximator.replace(n_actions=core.action_value.n_actions)
         return core
 
     def _tables_for_symbols(self) -> list[NDArray[np.int8]]:
@@ -464,7 +460,7 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
         )
 
     def _make_core(self) -> CoreAgent | CoreVectorAgent:
-        config, learning = self._core_approximator(), self.learning.to_core()
+        config, learning = self._core_approximator(), self.learning
         if self.n_dimensions > 1:
             return _core.DecoupledRBFQLearning(
                 approximator=config,

@@ -1,7 +1,6 @@
 """Approximators of action values."""
 
-from sdnn.approximators.fuzzy_rules import FuzzyRulesConfig
-from sdnn.approximators.rbf_network import RBFNetworkConfig
-from sdnn.approximators.sdnn_c import SDNNC, SDNNCConfig
+from sdnn.approximators.sdnn_c import SDNNC
+from sdnn.config import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
 
 __all__ = ["SDNNC", "FuzzyRulesConfig", "RBFNetworkConfig", "SDNNCConfig"]

@@ -17,8 +17,8 @@ learns, as in the paper.
 
 import gymnasium as gym
 
+from sdnn.config import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
-from sdnn.environments.config import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.environments.goal import GoalSchedule, TighteningGoal
 from sdnn.environments.sensors import AcrobotSensors, NoisySensors, RedundantSensors, UnitSensors
 from sdnn.environments.vector_env import AcrobotSwingUpVectorEnv

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.arguments import choice, one_of, real
-from sdnn.environments.config import AcrobotConfig
+from sdnn.config import AcrobotConfig
 from sdnn.environments.picture import AcrobotMotion, AcrobotPicture
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         self.config = AcrobotConfig() if config is None else config
         self.goal_tolerance = goal_tolerance
         self.render_mode = render_mode
-        self._acrobot = _core.Acrobot(self.config.to_core())
+        self._acrobot = _core.Acrobot(self.config)
         self._was_reset = False
         self._tolerance = self.goal_tolerance
         self._torque = 0.0

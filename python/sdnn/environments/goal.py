@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.arguments import whole
-from sdnn.environments.config import GoalScheduleConfig
+from sdnn.config import GoalScheduleConfig
 
 __all__ = ["GoalSchedule", "TighteningGoal"]
 
@@ -34,7 +34,7 @@ class GoalSchedule:
 
     def __init__(self, config: GoalScheduleConfig | None = None) -> None:
         self.config = config or GoalScheduleConfig()
-        self._core = _core.GoalSchedule(self.config.to_core())
+        self._core = _core.GoalSchedule(self.config)
 
     def __call__(self, episode: int) -> float:
         """Return the goal tolerance of the 1-based learning episode; ValueError below 1."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.environments.config import AcrobotConfig
+from sdnn.config import AcrobotConfig
 
 if TYPE_CHECKING:
     import pygame
@@ -54,7 +54,7 @@ class AcrobotMotion:
         parts = dataclasses.replace(
             config, decision_interval=self.interval, max_decisions=self._n_intervals
         )
-        self._acrobot = _core.Acrobot(parts.to_core())
+        self._acrobot = _core.Acrobot(parts)
         self._tests_goal = config.goal_test == "every_step"
 
     def between(

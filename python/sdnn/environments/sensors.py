@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import choice, seed_of
+from sdnn.arguments import choice, one_of, seed_of
 from sdnn.bounds import with_infinities
-from sdnn.environments.config import SensorConfig
+from sdnn.config import SensorConfig
 
 __all__ = ["AcrobotSensors", "NoisySensors", "RedundantSensors", "UnitSensors"]
 
@@ -220,7 +220,7 @@ class NoisySensors(_RandomSensors):
         if len(words) != n_channels:
             raise ValueError(f"edge must have {n_channels} entries, got {len(words)}")
         self.sigma = sigma
-        self._edges = [choice("edge", word, _core.SensorEdge.__members__) for word in words]
+        self._edges = [one_of("edge", word, ("wrap", "saturate")) for word in words]
         self._restart(seed)
         self.observation_space = gym.spaces.Box(0.0, 1.0, (n_channels,), self._float)
 
@@ -268,7 +268,7 @@ class AcrobotSensors(_RandomSensors):
         stream: NoiseStream = "sensor_noise",
     ) -> None:
         super().__init__(env, config=config, seed=seed, stream=stream)
-        self._config = config.to_core()
+        self._config = config
         self._restart(seed)
         self.observation_space = gym.spaces.Box(0.0, 1.0, (config.n_inputs,), self._float)
 

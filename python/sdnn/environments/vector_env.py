@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.arguments import one_of, whole
+from sdnn.config import AcrobotConfig
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
-from sdnn.environments.config import AcrobotConfig
 from sdnn.environments.picture import AcrobotPicture
 
 __all__ = ["AcrobotSwingUpVectorEnv"]
@@ -97,7 +97,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         self.action_space = batch_space(single.action_space, self.num_envs)
         self.observation_space = batch_space(single.observation_space, self.num_envs)
         self._dtype = single.observation_space.dtype
-        self._batch = _core.AcrobotBatch(self.config.to_core(), self.num_envs)
+        self._batch = _core.AcrobotBatch(self.config, self.num_envs)
         self._tolerances = self._goal_tolerance.copy()
         self._was_reset = np.zeros(self.num_envs, np.bool_)
         self._torques = np.zeros(self.num_envs)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from sdnn.lazy import attach
 
 if TYPE_CHECKING:
+    from sdnn.config import ProtocolConfig
     from sdnn.reproduction.cases import EXPERIMENTS, Case, Experiment, select_experiments
     from sdnn.reproduction.claims import CLAIMS, Claim
     from sdnn.reproduction.cost import CostConfig
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from sdnn.runs.statistics import Estimate
     from sdnn.runs.store import ResultStore
     from sdnn.runs.thread_executor import ThreadExecutor
-    from sdnn.runs.trial import ProtocolConfig, Trial
+    from sdnn.runs.trial import Trial
     from sdnn.runs.trial_config import PlannedTrial, TrialConfig, TrialSettings, trial_seed
 
 __getattr__, __dir__ = attach(globals())

@@ -122,9 +122,7 @@ def measure_steps(
 def _core_agent(entry: AgentEntry, series: CostSeries, approximator: Any) -> Any:
     learning = entry.learning()
     if series.core_agent is not None:
-        return series.core_agent(
-            approximator=approximator.to_core(), learning=learning.to_core(), seed=SEED
-        )
+        return series.core_agent(approximator=approximator, learning=learning, seed=SEED)
     states = Box(0.0, 1.0, (approximator.n_inputs,), np.float64)
     actions = Box(-1.0, 1.0, (1,), np.float64)
     agent: Any = entry.make_agent(

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from sdnn.config import ProtocolConfig
 from sdnn.environments import SensorConfig
 from sdnn.reproduction.cases import Case
 from sdnn.runs.records import TrialKey
 from sdnn.runs.registry import agent_entry
-from sdnn.runs.trial import ProtocolConfig
 from sdnn.runs.trial_config import PlannedTrial, TrialConfig, trial_seed
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from sdnn.config import ProtocolConfig
 from sdnn.reproduction.cases import (
     EXPERIMENTS,
     MOST_EPISODES,
@@ -38,7 +39,6 @@ from sdnn.runs.registry import cost_series
 from sdnn.runs.report import Finished, describe_call, json_bytes, require_jinja
 from sdnn.runs.results import CaseResult, measure
 from sdnn.runs.store import STORE_NAME, ResultStore
-from sdnn.runs.trial import ProtocolConfig
 from sdnn.runs.trial_config import PlannedTrial
 from sdnn.whole_files import csv_bytes, remove_abandoned_files, write_whole
 

@@ -24,14 +24,12 @@ from sdnn.agents import (
     RBFQLearning,
     SDNNQLearning,
 )
-from sdnn.approximators.fuzzy_rules import FuzzyRulesConfig
-from sdnn.approximators.rbf_network import RBFNetworkConfig
-from sdnn.approximators.sdnn_c import SDNNCConfig
 from sdnn.arguments import whole
+from sdnn.config import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.runs.environment import EnvironmentSpec
 from sdnn.runs.errors import ConfigError, problem_of
+from sdnn.runs.settings import kinds_of, values_of
 from sdnn.runs.settings import read as read_settings
-from sdnn.runs.settings import values_of
 from sdnn.toml_lines import key_lines, line_of
 from sdnn.typed_values import convert, hints_of, possible_words, words_of
 
@@ -245,10 +243,12 @@ class RunConfig:
         if self.preset is not None:
             preset = PRESETS[self.preset]
             parts = {"approximator": preset.approximator, "learning": preset.learning}
-        given: dict[str, Any] = {
-            name: dataclasses.replace(part, **self.settings.get(name, {}))
-            for name, part in parts.items()
-        }
+        given: dict[str, Any] = {}
+        for name, part in parts.items():
+            try:
+                given[name] = part.replace(**self.settings.get(name, {}))
+            except (TypeError, ValueError) as error:
+                raise ConfigError(self._key_of(str(error)), str(error)) from error
         given |= self.settings.get("agent", {})
         if self.environment.ranges and not self.environment.changes_observations:
             if "observation_range" in given:
@@ -275,7 +275,7 @@ class RunConfig:
         _, approximator, learning = AGENTS[self.agent]
         given = [(section, name) for section, values in self.settings.items() for name in values]
         for kind, section in ((approximator, "approximator"), (learning, "learning")):
-            given += [(section, one.name) for one in dataclasses.fields(kind)]
+            given += [(section, name) for name in kinds_of(kind)]
         given = [one for one in given if one != ("approximator", "n_inputs")]  # not a setting
         keys = [f"settings.{section}.{name}" for section, name in given if name in words]
         return keys[0] if keys else "environment.id"

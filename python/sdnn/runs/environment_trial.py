@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from sdnn.agents import QLearningConfig
 from sdnn.approximators import SDNNCConfig
 from sdnn.arguments import real
+from sdnn.config import ProtocolConfig
 from sdnn.environments import NoisySensors, UnitSensors
 from sdnn.runs.registry import agent_entry
-from sdnn.runs.trial import ProtocolConfig, TrainingTrial, check_protocol, protocol_trial
+from sdnn.runs.trial import TrainingTrial, check_protocol, protocol_trial
 from sdnn.runs.trial_config import TrialSettings
 
 _LEARNING, _TEST = 0, 1

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import gymnasium as gym
@@ -120,7 +120,7 @@ class AgentEntry:
         """Return the approximator's settings in experiments, for so many inputs."""
         if self.preset is None:
             return self.approximator(n_inputs=n_inputs)
-        return replace(self.preset.approximator, n_inputs=n_inputs)
+        return self.preset.approximator.replace(n_inputs=n_inputs)
 
     def learning_settings(self) -> Any:
         """Return the agent's settings in experiments."""

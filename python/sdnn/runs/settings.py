@@ -9,11 +9,12 @@ import math
 import typing
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, Literal, TypeVar, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 import msgspec
 import numpy as np
 
+from sdnn.config import Field, fields_of
 from sdnn.runs.errors import ConfigError
 
 __all__ = ["Settings", "changed", "checked", "kinds_of", "possible_words", "read", "values_of"]
@@ -68,6 +69,8 @@ def kinds_of(kind: Any) -> Mapping[str, Any]:
 
 @functools.cache
 def _kinds_of(kind: Any) -> Mapping[str, Any]:
+    if fields := fields_of(kind):
+        return {field.name: _kind_of(field) for field in fields}
     try:
         hints = typing.get_type_hints(kind, include_extras=True)
     except (NameError, TypeError):  # an agent from elsewhere: its values are taken as they are
@@ -75,6 +78,11 @@ def _kinds_of(kind: Any) -> Mapping[str, Any]:
     if issubclass(kind, msgspec.Struct):
         return {name: hints.get(name, Any) for name in kind.__struct_fields__}
     return {one.name: hints.get(one.name, Any) for one in dataclasses.fields(kind) if one.init}
+
+
+def _kind_of(field: Field) -> Any:
+    """Return the type of a setting of the core; the core itself checks its bounds."""
+    return Annotated[field.type, msgspec.Meta(description=field.doc)]
 
 
 def checked(kind: Any, value: Any, key: str = "") -> Any:
@@ -228,8 +236,9 @@ def values_of(config: Any) -> dict[str, Any]:
 
 
 def argument_of(error: BaseException) -> str:
-    """Return the name of the argument that an error is about: the first word of its message."""
-    return str(error).partition(" ")[0].partition("[")[0]
+    """Return the name of the argument that an error is about: else its message's first word."""
+    name = getattr(error, "argument", None)
+    return name if isinstance(name, str) else str(error).partition(" ")[0].partition("[")[0]
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from msgspec import Meta
 
 from sdnn.agents import Agent
 from sdnn.agents.transition import Learner
+from sdnn.config import ProtocolConfig
 from sdnn.environments import (
     AcrobotConfig,
     AcrobotSensors,
@@ -29,7 +30,7 @@ from sdnn.runs.environment import EnvironmentSpec, Stream
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.registry import agent_entry
 from sdnn.runs.settings import Settings, argument_of, changed, kinds_of, read, values_of
-from sdnn.runs.trial import ProtocolConfig, TrainingTrial, Trial, training_trial
+from sdnn.runs.trial import TrainingTrial, Trial, training_trial
 
 __all__ = [
     "AgentSpec",
@@ -348,8 +349,7 @@ class RunSpec(Settings, frozen=True):
             limit_bootstraps=self.protocol.limit_bootstraps,
             noisy_tests=self.protocol.noisy_evaluations,
         )
-        core = {name: part.to_core() for name, part in {**parts, "protocol": protocol}.items()}
-        return entry.core_trial(**core, seed=self.seed)
+        return entry.core_trial(**parts, protocol=protocol, seed=self.seed)
 
     @property
     def length(self) -> int:

@@ -8,18 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypeVar
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn import _core
 from sdnn.agents import Callback, EarlyStop, Training
 from sdnn.agents.transition import Learner
 from sdnn.arguments import whole
-from sdnn.config import to_core
+from sdnn.config import ProtocolConfig
 from sdnn.environments import (
     AcrobotConfig,
     AcrobotSensors,
@@ -33,33 +31,6 @@ from sdnn.runs.records import TrialRows
 
 if TYPE_CHECKING:
     from sdnn.runs.spec import RunSpec
-
-
-@dataclass(frozen=True, kw_only=True)
-class ProtocolConfig:
-    """Learning protocol of a trial; the defaults are the paper's values (method.md, section 5.2).
-
-    Parameters
-    ----------
-    n_learning_episodes
-        Learning episodes in a trial, at least 1.
-    test_interval
-        One test episode follows every so many learning episodes, at least 1.
-    limit_bootstraps
-        Whether the last transition before the time limit bootstraps, as one that goes on; else it
-        counts as terminated. A reading.
-    noisy_tests
-        Whether the sensors are as noisy in test episodes as in learning ones. A reading.
-    """
-
-    n_learning_episodes: int = 15_000
-    test_interval: int = 10
-    limit_bootstraps: bool = True
-    noisy_tests: bool = True
-
-    def to_core(self) -> _core.ProtocolConfig:
-        """Make the core's struct of the same values; see `sdnn.config.to_core`."""
-        return to_core(self, _core.ProtocolConfig)
 
 
 class Trial(Protocol):
@@ -269,7 +240,7 @@ def python_trial(
             f"n_inputs must be the number of inputs of the sensors, {sensors.n_inputs},"
             f" got {approximator.n_inputs}"
         )
-    tested = sensors if protocol.noisy_tests else replace(sensors, noise=0.0)
+    tested = sensors if protocol.noisy_tests else sensors.replace(noise=0.0)
     env = _environment(acrobot, goal, sensors, seed, "sensor_noise")
     test_env = _environment(acrobot, goal, tested, seed, "evaluation_sensor_noise")
     agent = make_agent(

@@ -14,10 +14,11 @@ import numpy as np
 
 from sdnn.agents import QLearningConfig
 from sdnn.approximators import SDNNCConfig
+from sdnn.config import ProtocolConfig
 from sdnn.environments import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.runs.records import TrialKey
 from sdnn.runs.registry import agent_entry
-from sdnn.runs.trial import ProtocolConfig, TrainingTrial, Trial, python_trial
+from sdnn.runs.trial import TrainingTrial, Trial, python_trial
 
 CONFIG_HASH_DIGITS = 16
 """Hexadecimal digits kept of a configuration's SHA-256: 64 bits."""
@@ -170,7 +171,7 @@ class TrialConfig(TrialSettings):
         parts = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "agent"}
         if entry.core_trial is None:
             return python_trial(entry.make_agent, **parts, seed=seed)
-        return entry.core_trial(**{n: part.to_core() for n, part in parts.items()}, seed=seed)
+        return entry.core_trial(**parts, seed=seed)
 
 
 def _canonical(value: Any) -> Any:

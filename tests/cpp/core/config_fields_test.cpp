@@ -12,7 +12,9 @@ namespace {
 struct Policy {
   double epsilon = 0.1;
 
-  static constexpr auto fields() noexcept { return std::tuple(field("epsilon", &Policy::epsilon)); }
+  static constexpr auto fields() noexcept {
+    return std::tuple(field("epsilon", &Policy::epsilon, "Of chance.", within(0, 1)));
+  }
 };
 
 struct Learning {
@@ -20,7 +22,7 @@ struct Learning {
   Policy policy = {};
 
   static constexpr auto fields() noexcept {
-    return std::tuple_cat(std::tuple(field("n_steps", &Learning::n_steps)),
+    return std::tuple_cat(std::tuple(field("n_steps", &Learning::n_steps, "Steps.", at_least(1))),
                           nested_fields(&Learning::policy));
   }
 };

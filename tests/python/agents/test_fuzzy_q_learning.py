@@ -1,4 +1,3 @@
-import dataclasses
 import doctest
 import importlib
 
@@ -38,7 +37,7 @@ def positions(rng, d):
 def test_learning_agrees_with_its_definition_bit_for_bit(d, n_steps, tie_rule):
     learning = FuzzyQLearningConfig(tie_rule=tie_rule)
     rules = FuzzyRulesConfig(n_inputs=d)
-    agent = _core.FuzzyQLearning(approximator=rules.to_core(), learning=learning.to_core(), seed=6)
+    agent = _core.FuzzyQLearning(approximator=rules, learning=learning, seed=6)
     slow = paper.FuzzyQLearning(
         d,
         n_sets=rules.n_sets,
@@ -46,7 +45,7 @@ def test_learning_agrees_with_its_definition_bit_for_bit(d, n_steps, tie_rule):
         coefficient=learning.learning_coefficient,
         discount=learning.discount,
     )
-    config = _core.EpsilonGreedyConfig(tie_rule=_core.TieRule.__members__[tie_rule])
+    config = _core.EpsilonGreedyConfig(tie_rule=tie_rule)
     policy = _core.EpsilonGreedy(config, seed=6)
     rng = np.random.default_rng(d)
     walk = positions(rng, d)
@@ -74,31 +73,6 @@ def test_learning_agrees_with_its_definition_bit_for_bit(d, n_steps, tie_rule):
 
 
 # The Python faces.
-
-
-def test_the_defaults_are_those_of_the_core():
-    core = _core.FuzzyQLearningConfig()
-    names = {name for name in dir(core) if not name.startswith("_")}
-    values = {name: getattr(core, name) for name in names}
-    values["tie_rule"] = values["tie_rule"].name
-    assert values == dataclasses.asdict(FuzzyQLearningConfig())
-
-
-def test_every_field_reaches_the_core():
-    other = FuzzyQLearningConfig(
-        learning_coefficient=0.25,
-        discount=0.5,
-        trace_decay=0.125,
-        epsilon=0.75,
-        n_greedy_steps=3,
-        tie_rule="lowest",
-        tie_tolerance=0.5,
-    )
-    core = other.to_core()
-    for field in dataclasses.fields(FuzzyQLearningConfig):
-        value = getattr(core, field.name)
-        value = value.name if field.name == "tie_rule" else value
-        assert getattr(other, field.name) == value != field.default, field.name
 
 
 @pytest.mark.parametrize(

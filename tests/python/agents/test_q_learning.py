@@ -119,7 +119,7 @@ def test_learning_agrees_with_the_page_at_odd_sizes():
         n_actions=7,
         circular=[True, True, False, False],
         lattice=8,
-        initial_weights=_core.InitialWeights.uniform,
+        initial_weights="uniform",
         initial_threshold=10.0,
     )
     learning = _core.QLearningConfig(learning_rate=0.3, discount=0.99, epsilon=0.5)
@@ -144,43 +144,6 @@ def test_one_transition_by_hand():
 
 
 # The Python face.
-
-
-ENUMERATIONS = ("tie_rule", "value_range", "schedule")
-
-
-def test_the_defaults_are_those_of_the_core():
-    core = _core.QLearningConfig()
-    for field in dataclasses.fields(QLearningConfig):
-        value = getattr(core, field.name)
-        value = value.name if field.name in ENUMERATIONS else value
-        assert getattr(QLearningConfig(), field.name) == value, field.name
-    public = {n for n in dir(core) if not (n.startswith("_") or callable(getattr(core, n)))}
-    assert public == {field.name for field in dataclasses.fields(QLearningConfig)}
-
-
-def test_every_field_reaches_the_core():
-    other = QLearningConfig(
-        learning_rate=0.25,
-        discount=0.5,
-        epsilon=0.75,
-        n_greedy_steps=3,
-        tie_rule="lowest",
-        tie_tolerance=0.5,
-        n_steps=3,
-        max_repetitions=5,
-        final_learning_rate=0.125,
-        final_epsilon=0.25,
-        value_range="seen",
-        schedule="exponential",
-        exploration_fraction=0.5,
-        n_random_steps=7,
-    )
-    core = other.to_core()
-    for field in dataclasses.fields(QLearningConfig):
-        value = getattr(core, field.name)
-        value = value.name if field.name in ENUMERATIONS else value
-        assert getattr(other, field.name) == value != field.default, field.name
 
 
 @pytest.mark.parametrize(
@@ -322,8 +285,8 @@ def test_a_preset_is_used_where_nothing_is_given():
     )
     assert (given.n_actions, given.learning) == (61, QLearningConfig(discount=0.5))
     for name, chosen in PRESETS.items():
-        core = getattr(_core, f"{name}_preset")(4)
-        assert core == (chosen.approximator.to_core(), chosen.learning.to_core())
+        agent = SDNNQLearning(OBSERVATIONS, TORQUES, preset=name)
+        assert agent.learning == chosen.learning
     words = "'paper', 'general', 'robust', 'small'"
     with pytest.raises(ValueError, match=f"preset must be one of {words}"):
         SDNNQLearning(OBSERVATIONS, TORQUES, preset="best")

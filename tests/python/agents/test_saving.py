@@ -319,11 +319,11 @@ def changed(path, to, change):
         ),
         (
             lambda d, a: d["approximator"].update(n_symbols=[2**30, 0], max_table_bytes=2**62),
-            "is damaged: n_interpolated or n_symbols must be smaller.*, got 17179874944 bytes",
+            "is damaged: n_symbols must be in",
         ),
         (
             lambda d, a: d["approximator"].update(n_inputs=0, max_pairs=2),
-            "is damaged: integer division",
+            "is damaged: n_inputs must be in",
         ),
         (lambda d, a: a.pop("agent.step"), "is damaged: state: step must be there"),
         (

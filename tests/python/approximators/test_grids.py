@@ -1,18 +1,11 @@
 """Fuzzy rules and the RBF network against their transcription; their settings."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
 from grid_transcription import FuzzyQLearning, RBFNetwork, joint_bases
 from sdnn import _core
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig
-
-CONFIGS = [
-    (FuzzyRulesConfig, _core.FuzzyRulesConfig),
-    (RBFNetworkConfig, _core.RBFNetworkConfig),
-]
 
 
 def walk(rng, state):
@@ -106,26 +99,11 @@ def test_the_exponential_of_the_core_is_the_one_of_numpy_up_to_rounding():
     np.testing.assert_allclose(_core.exp(x), np.exp(x), rtol=4e-16, atol=0)
 
 
-@pytest.mark.parametrize(("python", "core"), CONFIGS)
-def test_defaults_equal_the_cores(python, core):
-    names = {name for name in dir(core) if not name.startswith("_")}
-    assert {name: getattr(core(), name) for name in names} == dataclasses.asdict(python())
-
-
-@pytest.mark.parametrize("python", [pair[0] for pair in CONFIGS])
-def test_every_number_arrives_in_the_core(python):
-    numbers = {
-        field.name: type(field.default)(i + 7) for i, field in enumerate(dataclasses.fields(python))
-    }
-    core = python(**numbers).to_core()
-    assert {name: getattr(core, name) for name in numbers} == numbers
-
-
 def test_tables_that_are_too_large_are_refused():
     with pytest.raises(ValueError, match=r"9\^9 = 387420489 rules needs 32543321076 bytes"):
-        _core.FuzzyRules(FuzzyRulesConfig(n_inputs=9).to_core())
+        _core.FuzzyRules(FuzzyRulesConfig(n_inputs=9))
     with pytest.raises(ValueError, match=r"4\^14 = 268435456 joint bases needs 2147483648 bytes"):
-        _core.RBFNetwork(RBFNetworkConfig(n_inputs=13).to_core())
+        _core.RBFNetwork(RBFNetworkConfig(n_inputs=13))
 
 
 @pytest.mark.parametrize("size", [1, 3])

@@ -1,75 +1,94 @@
-"""The dataclasses of the configurations: the core's fields, the core's defaults."""
+"""The settings of the core: classes made of its fields, which are checked when they are made."""
 
+import copy
 import dataclasses
+import inspect
+import math
+import pickle
 
+import numpy as np
 import pytest
 
-from sdnn import _core, agents, approximators, environments
-from sdnn.config import to_core
-from sdnn.reproduction import ProtocolConfig
+from sdnn import config
+from sdnn.config import QLearningConfig, SDNNCConfig, fields_of
 
-CONFIGS = (
-    agents.FuzzyQLearningConfig,
-    agents.QLearningConfig,
-    approximators.FuzzyRulesConfig,
-    approximators.RBFNetworkConfig,
-    approximators.SDNNCConfig,
-    environments.AcrobotConfig,
-    environments.GoalScheduleConfig,
-    environments.SensorConfig,
-    ProtocolConfig,
-)
+KINDS = [getattr(config, name) for name in config.__all__ if name.endswith("Config")]
+FIELDS = [(kind, field) for kind in KINDS for field in fields_of(kind)]
+IDS = [f"{kind.__name__}.{field.name}" for kind, field in FIELDS]
 
 
-def core_fields(core):
-    return {name for name, kind in vars(type(core)).items() if isinstance(kind, property)}
+def other_value(field):
+    """A possible value that is not the default."""
+    if field.hint.startswith("typing.Literal"):
+        return next(word for word in field.type.__args__ if word != field.default)
+    if field.hint == "bool":
+        return not field.default
+    if field.hint.startswith("tuple"):
+        return (True,) if "bool" in field.hint else (1, 0)
+    number = field.default or 0
+    tried = (number + 1, number / 2, number - 1, 0.5)
+    inside = [x for x in tried if field.low <= x <= field.high and x != field.low]
+    return next(x for x in inside if "float" in field.hint or x == int(x))
 
 
-@pytest.mark.parametrize("config", CONFIGS, ids=lambda config: config.__name__)
-def test_a_dataclass_has_the_fields_and_defaults_of_the_core(config):
-    core = getattr(_core, config.__name__)
-    assert {field.name for field in dataclasses.fields(config)} == core_fields(core())
-    assert config().to_core() == core()
+@pytest.mark.parametrize(("kind", "field"), FIELDS, ids=IDS)
+def test_a_field_is_set_copied_and_kept(kind, field):
+    value = other_value(field)
+    made = kind(**{field.name: value})
+    assert getattr(made, field.name) == value != field.default == getattr(kind(), field.name)
+    assert made != kind()
+    assert f"{field.name}={value!r}" in repr(made).replace(f"{value}.0", f"{value}")
+    for again in (
+        pickle.loads(pickle.dumps(made)),
+        copy.deepcopy(made),
+        kind().replace(**{field.name: value}),
+        dataclasses.replace(kind(), **{field.name: value}),
+        kind(**dataclasses.asdict(made)),
+    ):
+        assert again == made
+        assert hash(again) == hash(made)
 
 
-@pytest.mark.parametrize("config", CONFIGS, ids=lambda config: config.__name__)
-def test_every_field_reaches_the_core(config):
-    for field in dataclasses.fields(config):
-        other = changed(getattr(config(), field.name), core_default(config, field.name))
-        core = dataclasses.replace(config(), **{field.name: other}).to_core()
-        assert core != config().to_core()
-        if not isinstance(other, str):
-            assert getattr(core, field.name) == (list(other) if other == (True,) else other)
-        else:
-            assert getattr(core, field.name).name == other
+@pytest.mark.parametrize(("kind", "field"), FIELDS, ids=IDS)
+def test_a_bad_value_is_refused_with_the_name_of_its_field(kind, field):
+    bad = ["four", b"x", {}, object(), 5 if field.hint == "bool" else True]
+    if not field.hint.endswith("None"):
+        bad.append(None)
+    if field.hint in ("int", "float"):
+        bad += [math.nan, math.inf, 10**400]
+        bad += [field.low] * field.excludes_low
+        bad += [field.low - 1 - abs(field.low)] * math.isfinite(field.low)
+        bad += [field.high * 2] * math.isfinite(field.high)
+    if field.hint == "int":
+        bad.append(1.5)
+    for value in bad:
+        if field.hint.startswith("tuple") and value == {}:
+            continue
+        with pytest.raises((TypeError, ValueError)) as caught:
+            kind(**{field.name: value})
+        assert caught.value.argument == field.name
+        assert str(caught.value).startswith(f"{field.name} must be ")
 
 
-def core_default(config, name):
-    return getattr(config().to_core(), name)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_class_is_frozen_keyword_only_and_documented(kind):
+    (first, *_) = fields_of(kind)
+    with pytest.raises(TypeError):
+        kind(first.default)
+    with pytest.raises(AttributeError):
+        setattr(kind(), first.name, first.default)
+    with pytest.raises(TypeError, match="is not a field: they are"):
+        kind(nothing=1)
+    names = [field.name for field in fields_of(kind)]
+    assert list(inspect.signature(kind).parameters) == names
+    assert [field.name for field in dataclasses.fields(kind)] == names
+    for field in fields_of(kind):
+        assert field.doc.endswith(".")
+        assert f"\n{field.name} : " in kind.__doc__
 
 
-def changed(value, core_value):
-    """Another value of a field."""
-    if isinstance(value, bool):
-        return not value
-    if isinstance(value, str):
-        return next(name for name in type(core_value).__members__ if name != value)
-    if isinstance(value, tuple):
-        return (True,)
-    return 7 if value is None else value + 1
-
-
-def test_a_repr_tells_every_field():
-    text = repr(_core.QLearningConfig(discount=0.25))
-    assert text.startswith("QLearningConfig(learning_rate=0.5, discount=0.25, epsilon=0.1,")
-
-
-def test_an_unknown_word_is_refused_with_its_name():
-    config = agents.QLearningConfig(tie_rule="best")
-    with pytest.raises(ValueError, match="tie_rule must be one of 'uniform', 'lowest', 'middle'"):
-        to_core(config, _core.QLearningConfig)
-
-
-def test_a_value_of_another_type_is_refused():
-    with pytest.raises(TypeError, match="n_inputs"):
-        approximators.SDNNCConfig(n_inputs="four").to_core()
+def test_numbers_of_numpy_are_numbers():
+    made = QLearningConfig(n_steps=np.int64(3), epsilon=np.float32(0.5), discount=1)
+    assert (made.n_steps, made.epsilon, made.discount) == (3, 0.5, 1.0)
+    assert SDNNCConfig(circular=[np.True_, False]).circular == (True, False)
+    assert SDNNCConfig(balanced_anchors=np.False_).balanced_anchors is False

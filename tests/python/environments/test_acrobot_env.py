@@ -84,7 +84,7 @@ def test_spaces():
 
 def test_equals_the_core_bit_for_bit():
     env = AcrobotSwingUpEnv(dtype="float64")
-    core = _core.Acrobot(AcrobotConfig().to_core())
+    core = _core.Acrobot(AcrobotConfig())
     sensors = _core.AcrobotSensors(_core.SensorConfig(), 1, _core.Stream.sensor_noise)
     n_ends = 0
     for episode in range(1, 41):
@@ -290,12 +290,12 @@ def test_pictures_divide_the_decision_interval(interval, step, n_pictures, rate)
 
 def test_states_between_decisions_are_on_the_way_of_the_acrobot():
     config = AcrobotConfig()
-    acrobot = _core.Acrobot(config.to_core())
+    acrobot = _core.Acrobot(config)
     acrobot.step(3.0, 0.0)
     before = acrobot.state()
     states = list(AcrobotMotion(config).between(before, -7.0, 0.0))
     acrobot.step(-7.0, 0.0)
-    short = _core.Acrobot(AcrobotConfig(decision_interval=0.04, max_decisions=99).to_core())
+    short = _core.Acrobot(AcrobotConfig(decision_interval=0.04, max_decisions=99))
     short.set_state(before)
     for state in states:
         short.step(-7.0, 0.0)

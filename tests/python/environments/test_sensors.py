@@ -39,7 +39,7 @@ def test_wrappers_equal_the_core_bit_for_bit(n_sensors, noise, stream):
     env = RedundantSensors(AcrobotSwingUpEnv(dtype="float64"), functions)
     env = NoisySensors(env, sigma=noise, seed=42, stream=stream)
     config = SensorConfig(n_sensors=n_sensors, noise=noise)
-    core = _core.AcrobotSensors(config.to_core(), 42, _core.Stream.__members__[stream])
+    core = _core.AcrobotSensors(config, 42, _core.Stream.__members__[stream])
     seen, states = run(env)
     assert len(seen) > 50
     for observation, state in zip(seen, states, strict=True):

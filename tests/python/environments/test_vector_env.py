@@ -237,7 +237,7 @@ def test_bad_arguments():
 
 
 def test_core_batch_checks_its_arguments():
-    batch = _core.AcrobotBatch(AcrobotConfig().to_core(), 3)
+    batch = _core.AcrobotBatch(AcrobotConfig(), 3)
     assert len(batch) == 3
     every = np.ones(3, bool)
     good = np.zeros(3)
@@ -254,7 +254,7 @@ def test_core_batch_checks_its_arguments():
     with pytest.raises(IndexError):
         batch.decisions(3)
     with pytest.raises(ValueError, match="n_acrobots must be in"):
-        _core.AcrobotBatch(AcrobotConfig().to_core(), 0)
+        _core.AcrobotBatch(AcrobotConfig(), 0)
     batch.set_state(1, [0.0, 0.0, 1e300, 0.0])
     with pytest.raises(OverflowError, match="speed of acrobot 1"):
         batch.step(good, good, every)
@@ -263,7 +263,7 @@ def test_core_batch_checks_its_arguments():
 
 def test_steps_without_the_global_lock():
     config = AcrobotConfig(integration_step=1e-4)
-    batch = _core.AcrobotBatch(config.to_core(), 400)
+    batch = _core.AcrobotBatch(config, 400)
     done = threading.Event()
 
     def step():

@@ -11,6 +11,25 @@ from pathlib import Path
 import sdnn._core
 
 
+def _typed_config(found: re.Match[str]) -> str:
+    """The class of a configuration with the types of its fields, which its list of them has."""
+    text = found[0]
+    hints = {name: hint for name, hint, *_ in getattr(sdnn._core, found[1]).fields}
+    for name, hint in hints.items():
+        text = re.sub(rf"(    def {name}\(self\)) -> .*:", rf"\1 -> {hint}:", text)
+    sequence = ("tuple[", "collections.abc.Sequence["), (", ...]", "]")
+    given = []
+    for name, hint in hints.items():
+        for old, new in sequence:
+            hint = hint.replace(old, new)
+        given.append(f"{name}: {hint} = ...")
+    text = re.sub(r"def __init__\(self, .*\)", f"def __init__(self, *, {', '.join(given)})", text)
+    text = text.replace("**kwargs) -> " + found[1], "**changes: typing.Any) -> " + found[1])
+    text = re.sub(r"    fields: .*", "    fields: typing.ClassVar[tuple[typing.Any, ...]]", text)
+    fields = "    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]\n"
+    return text.replace("    fields: ", fields + "    fields: ", 1)
+
+
 def generate() -> str:
     """The text that ``python/sdnn/_core.pyi`` should have for the installed core."""
     with tempfile.TemporaryDirectory() as folder:
@@ -25,12 +44,15 @@ def generate() -> str:
         text = re.sub(r"^__all__.*?\]\n", "", text, flags=re.MULTILINE | re.DOTALL)
     # It writes members of enumerations as Python's type checkers no longer take them.
     text = re.sub(
-        r"^    (\w+): typing\.ClassVar\[(\w+)\]$",
+        r"^    (\w+): typing\.ClassVar\[((?!tuple)\w+)\]$",
         lambda line: f"    {line[1]} = {getattr(sdnn._core, line[2])[line[1]].value}",
         text,
         flags=re.MULTILINE,
     )
     text = text.replace("    @classmethod\n    def __new__(cls, value):\n        ...\n", "")
+    text = re.sub(
+        r"^class (\w+Config):\n(?:(?:    .*)?\n)+", _typed_config, text, flags=re.MULTILINE
+    )
     return re.sub(r"^__version__: str = .*$", "__version__: str", text, flags=re.MULTILINE)
 
 

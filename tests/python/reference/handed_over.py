@@ -33,7 +33,7 @@ def transcribe(core: _core.SDNNC, **learning: Any) -> page.SDNNC:
     config = core.config
     n, n_active, n_actions = config.n_hidden_units, config.n_active_units, core.n_actions
     u_low = n_active // 15 if config.u_low is None else config.u_low
-    is_away = config.rounding == _core.Rounding.away
+    is_away = config.rounding == "away"
     network = object.__new__(RoundedAway if is_away else page.SDNNC)
     network.settings = page.Settings(
         n_active_units=n_active,

@@ -275,8 +275,6 @@ def _config_cell(config, parameter, value):
                     return f"gave {observation}, {reward}"
                 if terminated or truncated:
                     break
-        else:
-            made.to_core()
         return ""
 
     def run():

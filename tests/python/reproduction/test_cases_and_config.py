@@ -101,7 +101,7 @@ def test_protocol_defaults_are_the_papers_and_the_cores():
     }
     assert core.n_learning_episodes == 15000
     assert core.test_interval == 10
-    assert ProtocolConfig(n_learning_episodes=20).to_core().n_learning_episodes == 20
+    assert ProtocolConfig(n_learning_episodes=20).n_learning_episodes == 20
 
 
 def test_canonical_json_is_sorted_and_does_not_depend_on_how_numbers_are_typed():

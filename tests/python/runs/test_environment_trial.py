@@ -254,7 +254,6 @@ def test_the_hash_covers_every_setting():
     ("change", "error", "message"),
     [
         ({"approximator": SDNNCConfig()}, ValueError, "n_inputs must be the number of observed"),
-        ({"protocol": ProtocolConfig(test_interval=0)}, ValueError, "test_interval"),
         ({"environment": EnvironmentConfig(id="Nowhere-v0")}, gym.error.Error, "Nowhere"),
         ({"environment": EnvironmentConfig(id="CartPole-v1")}, ValueError, "observation_low"),
         ({"environment": EnvironmentConfig(id="FrozenLake-v1")}, ValueError, "one-dimensional"),

@@ -95,21 +95,22 @@ def test_before_its_first_test_it_has_no_rows(monkeypatch):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"protocol": ProtocolConfig(n_learning_episodes=0)}, "n_learning_episodes"),
-        ({"protocol": ProtocolConfig(test_interval=0)}, "test_interval"),
+        ({"protocol": {"n_learning_episodes": 0}}, "n_learning_episodes"),
+        ({"protocol": {"test_interval": 0}}, "test_interval"),
         ({"sensors": {"n_sensors": 5}}, "n_inputs must be the number of inputs of the sensors, 5"),
         ({"sensors": {"n_sensors": 7}, "approximator": {"n_inputs": 7}}, "n_sensors"),
         ({"sensors": {"n_sensors": 3}, "approximator": {"n_inputs": 3}}, "n_sensors"),
     ],
 )
 def test_both_refuse_the_same(compiled, change, message, monkeypatch):
-    config = config_of("rbf")
-    for name, value in change.items():
-        part = replace(getattr(config, name), **value) if isinstance(value, dict) else value
-        config = replace(config, **{name: part})
-    make = config.make_trial if compiled else lambda _: python_trial(config, monkeypatch)
+    def make():
+        config = config_of("rbf")
+        for name, values in change.items():
+            config = replace(config, **{name: replace(getattr(config, name), **values)})
+        return config.make_trial(SEED) if compiled else python_trial(config, monkeypatch)
+
     with pytest.raises(ValueError, match=message):
-        make(SEED)
+        make()
 
 
 def test_episodes_cannot_be_taken_back(monkeypatch):

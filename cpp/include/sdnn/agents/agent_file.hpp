@@ -64,23 +64,6 @@ struct IsOptional : std::false_type {};
 template <class T>
 struct IsOptional<std::optional<T>> : std::true_type {};
 
-/// The words of enumerations, in the order of their values.
-constexpr std::array<std::string_view, 3> words_of(TieRule) noexcept {
-  return {"uniform", "lowest", "middle"};
-}
-constexpr std::array<std::string_view, 2> words_of(ValueRange) noexcept {
-  return {"given", "seen"};
-}
-constexpr std::array<std::string_view, 2> words_of(Schedule) noexcept {
-  return {"linear", "exponential"};
-}
-constexpr std::array<std::string_view, 2> words_of(approximators::InitialWeights) noexcept {
-  return {"ternary", "uniform"};
-}
-constexpr std::array<std::string_view, 3> words_of(approximators::Rounding) noexcept {
-  return {"half_up", "random", "away"};
-}
-
 template <class Value>
 nlohmann::json json_of(const Value& value) {
   if constexpr (IsOptional<Value>::value) {

@@ -3,14 +3,17 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string_view>
 #include <tuple>
 
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::agents {
@@ -21,19 +24,33 @@ enum class TieRule {
   lowest,   ///< the one with the lowest index
   middle,   ///< the middle (rounded down) of the widest run of neighbours, the first such run
 };
+constexpr std::array<std::string_view, 3> words_of(TieRule) noexcept {
+  return {"uniform", "lowest", "middle"};
+}
 
 /// The policy's parameters; the defaults are the paper's (section 4.2).
 struct EpsilonGreedyConfig {
-  double epsilon = 0.1;     ///< probability of a random action, in [0, 1]
-  int n_greedy_steps = 10;  ///< first steps of an episode without random actions
+  double epsilon = 0.1;
+  int n_greedy_steps = 10;
   TieRule tie_rule = TieRule::uniform;
-  double tie_tolerance = 0.0;  ///< values at most this far below the best tie with it; >= 0
+  double tie_tolerance = 0.0;
 
   static constexpr auto fields() noexcept {
-    return std::tuple(core::field("epsilon", &EpsilonGreedyConfig::epsilon),
-                      core::field("n_greedy_steps", &EpsilonGreedyConfig::n_greedy_steps),
-                      core::field("tie_rule", &EpsilonGreedyConfig::tie_rule),
-                      core::field("tie_tolerance", &EpsilonGreedyConfig::tie_tolerance));
+    return std::tuple(
+        core::field("epsilon", &EpsilonGreedyConfig::epsilon,
+                    "Probability of a random action; in fuzzy Q-learning each fired rule picks "
+                    "one for itself.",
+                    core::within(0, 1)),
+        core::field("n_greedy_steps", &EpsilonGreedyConfig::n_greedy_steps,
+                    "First steps of an episode in which epsilon is 0.", core::within(0, 1 << 30)),
+        core::field("tie_rule", &EpsilonGreedyConfig::tie_rule,
+                    "Which of several best actions is taken: `uniform`: any with the same "
+                    "probability; `lowest`: the one with the lowest index; `middle`: the middle "
+                    "of the widest run of neighbours. A reading."),
+        core::field("tie_tolerance", &EpsilonGreedyConfig::tie_tolerance,
+                    "Values at most this far below the best tie with it. Not in the paper: with "
+                    "`middle` the agent acts from the middle of the widest high plateau.",
+                    core::at_least(0)));
   }
   bool operator==(const EpsilonGreedyConfig&) const = default;
 };
@@ -66,10 +83,7 @@ class EpsilonGreedy {
         exploration_(seed, core::Stream::exploration),
         ties_(seed, core::Stream::ties),
         evaluation_ties_(seed, core::Stream::evaluation_ties) {
-    core::require_in_range("epsilon", config.epsilon, 0.0, 1.0);
-    core::require_in_range("n_greedy_steps", config.n_greedy_steps, 0, 1 << 30);
-    core::require(std::isfinite(config.tie_tolerance) && config.tie_tolerance >= 0.0,
-                  "tie_tolerance", "finite and at least 0", config.tie_tolerance);
+    core::check_fields(config);
   }
 
   const EpsilonGreedyConfig& config() const noexcept { return config_; }

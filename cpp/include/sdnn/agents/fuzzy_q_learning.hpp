@@ -18,6 +18,7 @@
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/elementary.hpp"
 #include "sdnn/core/errors.hpp"
@@ -26,16 +27,24 @@ namespace sdnn::agents {
 
 /// The agent's parameters; the defaults are the paper's (method.md, sections 3 and 5).
 struct FuzzyQLearningConfig {
-  double learning_coefficient = 0.5;  ///< c_fql, in (0, 1] (reading)
-  double discount = 0.9;              ///< gamma, in [0, 1]
-  double trace_decay = 0.0;           ///< lambda of the eligibility traces, in [0, 1]; 0: none
-  EpsilonGreedyConfig policy = {};    ///< of every fired rule for itself
+  double learning_coefficient = 0.5;
+  double discount = 0.9;
+  double trace_decay = 0.0;
+  EpsilonGreedyConfig policy = {};  ///< of every fired rule for itself
 
   static constexpr auto fields() noexcept {
     return std::tuple_cat(
-        std::tuple(core::field("learning_coefficient", &FuzzyQLearningConfig::learning_coefficient),
-                   core::field("discount", &FuzzyQLearningConfig::discount),
-                   core::field("trace_decay", &FuzzyQLearningConfig::trace_decay)),
+        std::tuple(
+            core::field(
+                "learning_coefficient", &FuzzyQLearningConfig::learning_coefficient,
+                "c_fql. A reading: the paper does not give it; 0.1 and 1.0 are alternatives.",
+                core::above_up_to(0, 1)),
+            core::field("discount", &FuzzyQLearningConfig::discount, "gamma.", core::within(0, 1)),
+            core::field(
+                "trace_decay", &FuzzyQLearningConfig::trace_decay,
+                "lambda of accumulating eligibility traces; 0: none, as in the paper. At most "
+                "0.99 / discount.",
+                core::within(0, 1))),
         core::nested_fields(&FuzzyQLearningConfig::policy));
   }
   bool operator==(const FuzzyQLearningConfig&) const = default;
@@ -300,10 +309,7 @@ class FuzzyQLearning {
   }
 
   static FuzzyQLearningConfig checked(const FuzzyQLearningConfig& config) {
-    core::require(config.learning_coefficient > 0.0 && config.learning_coefficient <= 1.0,
-                  "learning_coefficient", "in (0, 1]", config.learning_coefficient);
-    core::require_in_range("discount", config.discount, 0.0, 1.0);
-    core::require_in_range("trace_decay", config.trace_decay, 0.0, 1.0);
+    core::check_fields(config);
     core::require(config.discount * config.trace_decay <= kSlowestFading, "trace_decay",
                   "at most 0.99 / discount", config.trace_decay);
     return config;

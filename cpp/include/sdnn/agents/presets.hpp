@@ -1,6 +1,8 @@
 /// Named settings of Q-learning with SDNN-C: the paper's, and those we recommend.
 #pragma once
 
+#include <array>
+
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"
 
@@ -51,6 +53,22 @@ inline Preset small_preset(int n_inputs) {
 /// (docs/collapse.md).
 inline Preset robust_preset(int n_inputs) {
   return {.approximator = {.n_inputs = n_inputs, .n_actions = 61}, .learning = {.n_steps = 5}};
+}
+
+/// A preset, as users know it.
+struct NamedPreset {
+  const char* name;
+  const char* title;
+  Preset preset;
+};
+
+inline std::array<NamedPreset, 4> presets(int n_inputs) {
+  return {{{"paper", "as in the paper", paper_preset(n_inputs)},
+           {"general", "as recommended for any task", general_preset(n_inputs)},
+           {"robust", "as recommended for the paper's task: steady with noisy sensors",
+            robust_preset(n_inputs)},
+           {"small", "as recommended for small processors: the general one, fewer units",
+            small_preset(n_inputs)}}};
 }
 
 }  // namespace sdnn::agents

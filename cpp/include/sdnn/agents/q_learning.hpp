@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
@@ -24,6 +25,7 @@
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/elementary.hpp"
 #include "sdnn/core/random.hpp"
 
@@ -34,26 +36,32 @@ enum class ValueRange {
   given,  ///< as the approximator was made
   seen,   ///< that of ReturnRange, where the approximator has a range
 };
+constexpr std::array<std::string_view, 2> words_of(ValueRange) noexcept {
+  return {"given", "seen"};
+}
 
 /// How alpha and epsilon go from their first to their final values.
 enum class Schedule {
   linear,       ///< in a straight line
   exponential,  ///< by the same factor in equal parts of the progress; no end may be 0
 };
+constexpr std::array<std::string_view, 2> words_of(Schedule) noexcept {
+  return {"linear", "exponential"};
+}
 
 /// The agent's parameters; the defaults are the paper's (section 4.2).
 struct QLearningConfig {
-  double learning_rate = 0.5;  ///< alpha, in (0, 1]
-  double discount = 0.9;       ///< gamma, in [0, 1]
+  double learning_rate = 0.5;
+  double discount = 0.9;
   EpsilonGreedyConfig policy = {};
-  int n_steps = 1;          ///< rewards in a target before it bootstraps, in [1, 1000]
-  int max_repetitions = 1;  ///< steps that a random action may last, in [1, 10^6]
-  std::optional<double> final_learning_rate = {};  ///< at progress 1, in (0, 1]; none: the same
-  std::optional<double> final_epsilon = {};        ///< at progress 1, in [0, 1]; none: the same
+  int n_steps = 1;
+  int max_repetitions = 1;
+  std::optional<double> final_learning_rate = {};
+  std::optional<double> final_epsilon = {};
   ValueRange value_range = ValueRange::given;
-  Schedule schedule = Schedule::linear;  ///< to the final values
-  double exploration_fraction = 1.0;     ///< of the progress, until final_epsilon; in (0, 1]
-  int n_random_steps = 0;  ///< first steps of a life without greedy actions, in [0, 2^30]
+  Schedule schedule = Schedule::linear;
+  double exploration_fraction = 1.0;
+  int n_random_steps = 0;
 
   /// Alpha and epsilon at a progress in [0, 1].
   double learning_rate_at(double progress) const noexcept {
@@ -65,17 +73,56 @@ struct QLearningConfig {
 
   static constexpr auto fields() noexcept {
     return std::tuple_cat(
-        std::tuple(core::field("learning_rate", &QLearningConfig::learning_rate),
-                   core::field("discount", &QLearningConfig::discount)),
+        std::tuple(
+            core::field("learning_rate", &QLearningConfig::learning_rate, "alpha.",
+                        core::above_up_to(0, 1)),
+            core::field("discount", &QLearningConfig::discount, "gamma.", core::within(0, 1))),
         core::nested_fields(&QLearningConfig::policy),
-        std::tuple(core::field("n_steps", &QLearningConfig::n_steps),
-                   core::field("max_repetitions", &QLearningConfig::max_repetitions),
-                   core::field("final_learning_rate", &QLearningConfig::final_learning_rate),
-                   core::field("final_epsilon", &QLearningConfig::final_epsilon),
-                   core::field("value_range", &QLearningConfig::value_range),
-                   core::field("schedule", &QLearningConfig::schedule),
-                   core::field("exploration_fraction", &QLearningConfig::exploration_fraction),
-                   core::field("n_random_steps", &QLearningConfig::n_random_steps)));
+        std::tuple(
+            core::field("n_steps", &QLearningConfig::n_steps,
+                        "Rewards in a target before it bootstraps. Not in the paper, which has 1: "
+                        "with more, a transition is learned, once, when so many steps are known or "
+                        "the episode ends.",
+                        core::within(1, 1000)),
+            core::field("max_repetitions", &QLearningConfig::max_repetitions,
+                        "Steps that a random action may last. Not in the paper, which has 1: with "
+                        "more, it is kept for at least k steps with probability 1 / k.",
+                        core::within(1, 1000000)),
+            core::field(
+                "final_learning_rate", &QLearningConfig::final_learning_rate,
+                "What alpha becomes as the agent's progress goes from 0 to 1; by default it "
+                "stays. Not in the paper.",
+                core::above_up_to(0, 1)),
+            core::field(
+                "final_epsilon", &QLearningConfig::final_epsilon,
+                "What epsilon becomes as the agent's progress goes from 0 to 1; by default it "
+                "stays. Not in the paper.",
+                core::within(0, 1)),
+            core::field(
+                "value_range", &QLearningConfig::value_range,
+                "Whether Q has the approximator's range, q_low to q_high (`given`), or one "
+                "that grows with the discounted sums of the rewards that come (`seen`). Not "
+                "in the paper."),
+            core::field(
+                "schedule", &QLearningConfig::schedule,
+                "How alpha and epsilon go to their final values: `linear`: in a straight "
+                "line; `exponential`: by the same factor in equal parts of the progress, "
+                "first * (final / first) ** progress. A constant rate is the common choice "
+                "where the task itself changes; a line is what most libraries of deep "
+                "Q-learning take for epsilon; an exponential spends more of the training near "
+                "a small final value, which must not be 0. Any other function of the "
+                "progress: `sdnn.agents.Schedule`."),
+            core::field(
+                "exploration_fraction", &QLearningConfig::exploration_fraction,
+                "Part of the progress in which epsilon goes to final_epsilon, where it then "
+                "stays. Not in the paper.",
+                core::above_up_to(0, 1)),
+            core::field(
+                "n_random_steps", &QLearningConfig::n_random_steps,
+                "First steps of the agent's life in which every action is random, whatever "
+                "epsilon. Not in the paper, which has 0: a rare success is found before the "
+                "greedy actions have learned to do nothing.",
+                core::within(0, 1 << 30))));
   }
   bool operator==(const QLearningConfig&) const = default;
 
@@ -385,14 +432,7 @@ class QLearning {
   }
 
   static QLearningConfig checked(const QLearningConfig& config) {
-    require_rate("learning_rate", config.learning_rate);
-    core::require_in_range("discount", config.discount, 0.0, 1.0);
-    core::require_in_range("n_steps", config.n_steps, 1, 1000);
-    core::require_in_range("max_repetitions", config.max_repetitions, 1, 1000000);
-    require_rate("final_learning_rate", config.final_learning_rate.value_or(1.0));
-    core::require_in_range("final_epsilon", config.final_epsilon.value_or(0.0), 0.0, 1.0);
-    require_rate("exploration_fraction", config.exploration_fraction);
-    core::require_in_range("n_random_steps", config.n_random_steps, 0, 1 << 30);
+    core::check_fields(config);
     if (config.schedule == Schedule::exponential && config.final_epsilon) {
       const char* const expected = "greater than 0 where the schedule is exponential";
       core::require(config.policy.epsilon > 0.0, "epsilon", expected, config.policy.epsilon);

@@ -16,6 +16,7 @@
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/detail/identity.hpp"
 #include "sdnn/core/elementary.hpp"
@@ -25,20 +26,35 @@ namespace sdnn::approximators {
 
 /// The sizes of an RBF network (method.md, section 4).
 struct RBFNetworkConfig {
-  int n_inputs = 4;            ///< d
-  int n_bases = 4;             ///< per dimension, of the state and of the action
-  int n_actions = 601;         ///< evenly spaced over the action's range
-  double width = 0.5;          ///< of a Gaussian, in units of the spacing of the centres
-  double gradient_rate = 3.0;  ///< of the step in update, at most 1e6; stable below 2 / |phi|^2
-  std::uint64_t max_table_bytes = core::kDefaultMaxTableBytes;  ///< more weights are refused
+  int n_inputs = 4;
+  int n_bases = 4;
+  int n_actions = 601;
+  double width = 0.5;          // below 0.1, gaps between the bases would be 0
+  double gradient_rate = 3.0;  // stable below 2 / |phi|^2
+  std::uint64_t max_table_bytes = core::kDefaultMaxTableBytes;
 
   static constexpr auto fields() noexcept {
-    return std::tuple(core::field("n_inputs", &RBFNetworkConfig::n_inputs),
-                      core::field("n_bases", &RBFNetworkConfig::n_bases),
-                      core::field("n_actions", &RBFNetworkConfig::n_actions),
-                      core::field("width", &RBFNetworkConfig::width),
-                      core::field("gradient_rate", &RBFNetworkConfig::gradient_rate),
-                      core::field("max_table_bytes", &RBFNetworkConfig::max_table_bytes));
+    return std::tuple(
+        core::field("n_inputs", &RBFNetworkConfig::n_inputs, "d, number of inputs.",
+                    core::within(1, 62)),
+        core::field("n_bases", &RBFNetworkConfig::n_bases,
+                    "Bases per dimension, of the inputs and of the action. There are n_bases to "
+                    "the power of n_inputs + 1 joint bases.",
+                    core::within(2, 1 << 20)),
+        core::field("n_actions", &RBFNetworkConfig::n_actions,
+                    "Actions over which the maximum is taken, evenly spaced over the action's "
+                    "range.",
+                    core::within(1, 1 << 20)),
+        core::field("width", &RBFNetworkConfig::width,
+                    "Standard deviation of a Gaussian in units of the spacing of the centres.",
+                    core::within(0.1, 100)),
+        core::field("gradient_rate", &RBFNetworkConfig::gradient_rate,
+                    "Rate of a gradient step. With Q-learning's learning_rate 0.5 the default is "
+                    "stable whatever the sizes and the width.",
+                    core::above_up_to(0, 1e6)),
+        core::field("max_table_bytes", &RBFNetworkConfig::max_table_bytes,
+                    "More weights are refused before memory is allocated; 1 GiB by default. For "
+                    "all action dimensions together, where an agent has several."));
   }
   bool operator==(const RBFNetworkConfig&) const = default;
 };
@@ -183,13 +199,7 @@ class RBFNetwork {
   static constexpr double kLargestWeight = 1e300;  // of given ones: sums of them stay finite
 
   static RBFNetworkConfig checked(const RBFNetworkConfig& config) {
-    core::require_in_range("n_inputs", config.n_inputs, 1, 62);
-    core::require_in_range("n_bases", config.n_bases, 2, 1 << 20);
-    core::require_in_range("n_actions", config.n_actions, 1, 1 << 20);
-    core::require_in_range("width", config.width, 0.1, 100.0);  // narrower ones leave gaps of 0
-    core::require_positive("gradient_rate", config.gradient_rate);
-    core::require(config.gradient_rate <= 1e6, "gradient_rate", "at most 1e6",
-                  config.gradient_rate);
+    core::check_fields(config);
     core::require_table_bytes("n_actions or n_bases", "the bases of all actions",
                               8.0 * config.n_actions * config.n_bases, config.max_table_bytes);
     return config;

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <string_view>
 #include <tuple>
 #include <vector>
 
@@ -13,11 +15,14 @@
 
 namespace sdnn::approximators {
 
-/// How the weights start (method.md, section 1.7).
+/// How the weights start (method.md, section 1, "Start").
 enum class InitialWeights {
   ternary,  ///< -1, 0 or +1 lattice steps with probabilities 1/4, 1/2, 1/4
   uniform,  ///< uniform within +- initial_weight_limit, rounded to the lattice
 };
+constexpr std::array<std::string_view, 2> words_of(InitialWeights) noexcept {
+  return {"ternary", "uniform"};
+}
 
 /// To which whole number of firing units a wanted value is rounded (reading: the paper is silent).
 enum class Rounding {
@@ -25,56 +30,124 @@ enum class Rounding {
   random,   ///< up or down at random, in proportion: right on average, nothing is lost
   away,     ///< the next one in the direction of the change: always at least one unit
 };
+constexpr std::array<std::string_view, 3> words_of(Rounding) noexcept {
+  return {"half_up", "random", "away"};
+}
 
 /// Everything that defines an SDNN-C; the defaults are the paper's values.
 struct SDNNCConfig {
-  int n_inputs = 4;                 ///< l >= 2
-  int max_pairs = 0;                ///< of inputs, an even share at random; 0: all l (l - 1)
-  int n_pattern_units = 200;        ///< m
-  int n_anchor_patterns = 9;        ///< p_1 .. p_9
-  int n_interpolated = 44;          ///< patterns between neighbouring anchors
-  bool balanced_anchors = true;     ///< reading: anchors have as many +1 as -1
-  std::vector<bool> circular = {};  ///< per input; empty: none (reading: p_9 independent of p_1)
-  std::vector<int> n_symbols = {};  ///< per input; 0: a number; empty: numbers only
-  int n_hidden_units = 900;         ///< n
-  int n_active_units = 300;         ///< n', units in an action's window
-  int n_actions = 0;                ///< 0: all n - n' + 1 windows
-  double q_low = -20.0;             ///< g saturates at these values ...
+  int n_inputs = 4;
+  int max_pairs = 0;
+  int n_pattern_units = 200;
+  int n_anchor_patterns = 9;
+  int n_interpolated = 44;
+  bool balanced_anchors = true;
+  std::vector<bool> circular = {};
+  std::vector<int> n_symbols = {};
+  int n_hidden_units = 900;
+  int n_active_units = 300;
+  int n_actions = 0;
+  double q_low = -20.0;
   double q_high = 20.0;
-  std::optional<int> u_low = {};      ///< ... at these counts; none: n' / 15 rounded down (20),
-  std::optional<int> u_high = {};     ///< and n' - u_low (280)
-  double learning_coefficient = 0.1;  ///< c; scales weights only, never decisions
-  int lattice = 1;                    ///< weights are multiples of c / lattice
-  double initial_threshold = 200.0;   ///< |w_i0| at the start, in units of c
+  std::optional<int> u_low = {};
+  std::optional<int> u_high = {};
+  double learning_coefficient = 0.1;
+  int lattice = 1;
+  double initial_threshold = 200.0;
   InitialWeights initial_weights = InitialWeights::ternary;
-  double initial_weight_limit = 0.1;      ///< of InitialWeights::uniform, in units of c
-  Rounding rounding = Rounding::half_up;  ///< of the number of units that are to fire
-  int averaging_interval = 0;  ///< least corrections between snapshots of WeightAverage; 0: none
-  std::uint64_t max_table_bytes = core::kDefaultMaxTableBytes;  ///< larger networks are refused
+  double initial_weight_limit = 0.1;
+  Rounding rounding = Rounding::half_up;
+  int averaging_interval = 0;
+  std::uint64_t max_table_bytes = core::kDefaultMaxTableBytes;
 
   static constexpr auto fields() noexcept {
     return std::tuple(
-        core::field("n_inputs", &SDNNCConfig::n_inputs),
-        core::field("max_pairs", &SDNNCConfig::max_pairs),
-        core::field("n_pattern_units", &SDNNCConfig::n_pattern_units),
-        core::field("n_anchor_patterns", &SDNNCConfig::n_anchor_patterns),
-        core::field("n_interpolated", &SDNNCConfig::n_interpolated),
-        core::field("balanced_anchors", &SDNNCConfig::balanced_anchors),
-        core::field("circular", &SDNNCConfig::circular),
-        core::field("n_symbols", &SDNNCConfig::n_symbols),
-        core::field("n_hidden_units", &SDNNCConfig::n_hidden_units),
-        core::field("n_active_units", &SDNNCConfig::n_active_units),
-        core::field("n_actions", &SDNNCConfig::n_actions),
-        core::field("q_low", &SDNNCConfig::q_low), core::field("q_high", &SDNNCConfig::q_high),
-        core::field("u_low", &SDNNCConfig::u_low), core::field("u_high", &SDNNCConfig::u_high),
-        core::field("learning_coefficient", &SDNNCConfig::learning_coefficient),
-        core::field("lattice", &SDNNCConfig::lattice),
-        core::field("initial_threshold", &SDNNCConfig::initial_threshold),
-        core::field("initial_weights", &SDNNCConfig::initial_weights),
-        core::field("initial_weight_limit", &SDNNCConfig::initial_weight_limit),
-        core::field("rounding", &SDNNCConfig::rounding),
-        core::field("averaging_interval", &SDNNCConfig::averaging_interval),
-        core::field("max_table_bytes", &SDNNCConfig::max_table_bytes));
+        core::field("n_inputs", &SDNNCConfig::n_inputs, "l, number of inputs (section 3.1).",
+                    core::within(2, 1024)),
+        core::field("max_pairs", &SDNNCConfig::max_pairs,
+                    "Most pairs of inputs that are formed: all l (l - 1) if there are no more or "
+                    "with 0; else an even share of them at random, each input modified by as many "
+                    "others as it modifies, and by one at least. Cost grows with pairs, so with "
+                    "many inputs it then grows as their number, not as its square. Not in the "
+                    "paper, which has all.",
+                    core::within(0, 1 << 20)),
+        core::field("n_pattern_units", &SDNNCConfig::n_pattern_units,
+                    "m, units per pattern (section 4.2: 200).", core::within(2, 1 << 16)),
+        core::field("n_anchor_patterns", &SDNNCConfig::n_anchor_patterns,
+                    "Random anchor patterns p_1, p_2, ... of a code book (section 3.1: 9). The "
+                    "last one is not assigned to a bin.",
+                    core::within(2, 10000)),
+        core::field("n_interpolated", &SDNNCConfig::n_interpolated,
+                    "Patterns between neighbouring anchors (section 3.1: 44). There are "
+                    "(n_anchor_patterns - 1) (n_interpolated + 1) bins, 360 in the paper.",
+                    core::within(0, 10000)),
+        core::field("balanced_anchors", &SDNNCConfig::balanced_anchors,
+                    "Whether anchors have as many +1 as -1. A reading: the paper says \"random\"."),
+        core::field("circular", &SDNNCConfig::circular,
+                    "Per input, whether the last anchor equals the first, as angles want it; "
+                    "empty: none. A reading: the paper does not say."),
+        core::field("n_symbols", &SDNNCConfig::n_symbols,
+                    "Per input, how many symbols it may be, each with a random pattern of its "
+                    "own: symbol k of n is a value of (k + 0.5) / n. 0 for a number; empty: "
+                    "numbers only. Not in the paper.",
+                    core::within(0, 1 << 24)),
+        core::field("n_hidden_units", &SDNNCConfig::n_hidden_units,
+                    "n, hidden units (section 4.2: 900).", core::within(1, 1 << 20)),
+        core::field("n_active_units", &SDNNCConfig::n_active_units,
+                    "n', units in an action's window (section 4.2: 300), at most n_hidden_units.",
+                    core::within(1, 1 << 20)),
+        core::field("n_actions", &SDNNCConfig::n_actions,
+                    "Number of actions; 0 stands for all n_hidden_units - n_active_units + 1 "
+                    "(601).",
+                    core::within(0, 1 << 20)),
+        core::field("q_low", &SDNNCConfig::q_low,
+                    "Lowest value of the output range (section 4.2: -20).",
+                    core::within(-1e301, 1e301)),
+        core::field("q_high", &SDNNCConfig::q_high,
+                    "Highest value of the output range (section 4.2: 20).",
+                    core::within(-1e301, 1e301)),
+        core::field("u_low", &SDNNCConfig::u_low,
+                    "Count of active units at which the output is q_low; by default "
+                    "n_active_units // 15 (section 4.2: 20).",
+                    core::within(0, 1 << 20)),
+        core::field("u_high", &SDNNCConfig::u_high,
+                    "Count of active units at which the output is q_high; by default "
+                    "n_active_units - u_low (section 4.2: 280).",
+                    core::within(0, 1 << 20)),
+        core::field("learning_coefficient", &SDNNCConfig::learning_coefficient,
+                    "c (section 4.2: 0.1). It scales weights and thresholds alike and changes no "
+                    "decision.",
+                    core::above(0)),
+        core::field("lattice", &SDNNCConfig::lattice,
+                    "Weights are integer multiples of learning_coefficient / lattice.",
+                    core::within(1, 64)),
+        core::field("initial_threshold", &SDNNCConfig::initial_threshold,
+                    "The \"large\" initial threshold, in units of c: a multiple of 1 / lattice. A "
+                    "reading.",
+                    core::at_least(0)),
+        core::field("initial_weights", &SDNNCConfig::initial_weights,
+                    "The \"small random\" initial weights: `ternary`: one lattice step down, "
+                    "none, or up with probabilities 1/4, 1/2, 1/4; `uniform`: within "
+                    "initial_weight_limit, rounded to the lattice. A reading."),
+        core::field("initial_weight_limit", &SDNNCConfig::initial_weight_limit,
+                    "Of `uniform` initial weights, in units of c.", core::at_least(0)),
+        core::field("rounding", &SDNNCConfig::rounding,
+                    "Of the number of units that are to fire. `half_up`: to the nearest; "
+                    "`random`: up or down at random in proportion, so that no small change is "
+                    "lost on average; `away`: in the direction of the change by at least one "
+                    "unit. A reading."),
+        core::field("averaging_interval", &SDNNCConfig::averaging_interval,
+                    "With more than 0 the network keeps an average of its weights, by which "
+                    "greedy actions are chosen; learning continues with the weights themselves. "
+                    "Snapshots for it are taken after so many corrections, 100 for example, or "
+                    "after every 64th part of all, whichever is more; what was learned last "
+                    "counts most. The weights take four times the memory. Not in the paper, which "
+                    "has 0.",
+                    core::within(0, 1000000000)),
+        core::field("max_table_bytes", &SDNNCConfig::max_table_bytes,
+                    "A larger network (weights, patterns, remembered potentials) is refused "
+                    "before memory is allocated; 1 GiB by default. For all action dimensions "
+                    "together, where an agent has several."));
   }
   bool operator==(const SDNNCConfig&) const = default;
 

@@ -1,6 +1,12 @@
-/// The named members of a configuration: listed once, read by whoever needs all of them.
+/// The fields of a configuration: name, member, documentation and bounds of each, listed once, and
+/// read by whoever needs all of them: checks, files, the bindings, and through these the commands.
 #pragma once
 
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <string_view>
 #include <tuple>
 #include <type_traits>
 #include <utility>
@@ -9,11 +15,35 @@
 
 namespace sdnn::core {
 
-/// A member of a configuration and its name.
+/// The numbers that a field takes: finite ones from `low` to `high`.
+struct Bounds {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+  bool excludes_low = false;
+};
+
+constexpr Bounds at_least(double low) noexcept { return {.low = low}; }
+constexpr Bounds above(double low) noexcept { return {.low = low, .excludes_low = true}; }
+/// In [low, high].
+constexpr Bounds within(double low, double high) noexcept { return {.low = low, .high = high}; }
+/// In (low, high].
+constexpr Bounds above_up_to(double low, double high) noexcept {
+  return {.low = low, .high = high, .excludes_low = true};
+}
+
+/// An enumeration with words: `words_of(value)` beside it gives them in the order of its values.
+template <class Enum>
+concept HasWords = std::is_enum_v<Enum> && requires(Enum value) {
+  { words_of(value)[0] } -> std::convertible_to<std::string_view>;
+};
+
+/// A member of a configuration.
 template <class Config, class Value>
 struct ConfigField {
   const char* name;
   Value Config::* member;
+  const char* doc;
+  Bounds bounds;
 
   constexpr const Value& of(const Config& config) const noexcept { return config.*member; }
   constexpr Value& of(Config& config) const noexcept { return config.*member; }
@@ -25,15 +55,18 @@ struct NestedField {
   const char* name;
   Inner Config::* outer;
   Value Inner::* member;
+  const char* doc;
+  Bounds bounds;
 
   constexpr const Value& of(const Config& config) const noexcept { return config.*outer.*member; }
   constexpr Value& of(Config& config) const noexcept { return config.*outer.*member; }
 };
 
-/// The field called `name`.
+/// The field called `name`. `doc` says what it is, for readers of the documentation.
 template <class Config, class Value>
-constexpr ConfigField<Config, Value> field(const char* name, Value Config::* member) noexcept {
-  return {name, member};
+constexpr ConfigField<Config, Value> field(const char* name, Value Config::* member,
+                                           const char* doc, Bounds bounds = {}) noexcept {
+  return {name, member, doc, bounds};
 }
 
 /// The type of a field's values.
@@ -46,7 +79,8 @@ template <class Config, class Inner>
 constexpr auto nested_fields(Inner Config::* member) noexcept {
   return std::apply(
       [member]<class... Value>(const ConfigField<Inner, Value>&... field) {
-        return std::tuple(NestedField<Config, Inner, Value>{field.name, member, field.member}...);
+        return std::tuple(NestedField<Config, Inner, Value>{field.name, member, field.member,
+                                                            field.doc, field.bounds}...);
       },
       Inner::fields());
 }

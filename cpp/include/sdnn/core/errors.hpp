@@ -9,7 +9,24 @@
 #include <cstdlib>
 #endif
 
+#include <stdexcept>
+#include <string>
+#include <utility>
+
 namespace sdnn::core {
+
+/// An argument, or a field of a configuration, is not what it must be.
+class ArgumentError : public std::invalid_argument {
+ public:
+  ArgumentError(std::string name, const std::string& message)
+      : std::invalid_argument(message), name_(std::move(name)) {}
+
+  /// Of the argument or field.
+  const std::string& name() const noexcept { return name_; }
+
+ private:
+  std::string name_;
+};
 
 #if !SDNN_EXCEPTIONS
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
@@ -26,6 +27,9 @@ enum class SensorEdge {
   wrap,      ///< an angle: 1 continues at 0, the result is in [0, 1)
   saturate,  ///< the result stays at the end
 };
+constexpr std::array<std::string_view, 2> words_of(SensorEdge) noexcept {
+  return {"wrap", "saturate"};
+}
 
 /// Number of turns apart from a whole number, in [0, 1).
 inline double wrap_to_unit(double x) noexcept {
@@ -91,20 +95,41 @@ enum class NoiseEntry {
   every_sensor,   ///< s5 and s6 are computed from the true s1..s4 and have noise of their own
   basic_sensors,  ///< on s1..s4 alone: s5 and s6 are computed from the noisy ones
 };
+constexpr std::array<std::string_view, 2> words_of(NoiseEntry) noexcept {
+  return {"every_sensor", "basic_sensors"};
+}
 
+/// What the agent observes (section 4.3).
 struct SensorConfig {
-  int n_sensors = 4;   ///< 4: s1..s4; 5: with s5; 6: with s5 and s6
-  double noise = 0.0;  ///< standard deviation on every sensor; the paper's noisy cases have 0.02
+  int n_sensors = 4;
+  double noise = 0.0;
   NoiseEntry noise_entry = NoiseEntry::every_sensor;
-  int n_constant = 0;  ///< useless inputs besides: always 1/2, with noise as the sensors
-  int n_random = 0;    ///< useless inputs besides: a new uniform number each time
+  int n_constant = 0;
+  int n_random = 0;
+
+  /// Numbers in an observation.
+  int n_inputs() const noexcept { return n_sensors + n_constant + n_random; }
 
   static constexpr auto fields() noexcept {
-    return std::tuple(core::field("n_sensors", &SensorConfig::n_sensors),
-                      core::field("noise", &SensorConfig::noise),
-                      core::field("noise_entry", &SensorConfig::noise_entry),
-                      core::field("n_constant", &SensorConfig::n_constant),
-                      core::field("n_random", &SensorConfig::n_random));
+    return std::tuple(
+        core::field("n_sensors", &SensorConfig::n_sensors,
+                    "4: s1..s4; 5: s5, the energy, too; 6: s6, the height, too.",
+                    core::within(4, 6)),
+        core::field("noise", &SensorConfig::noise,
+                    "Standard deviation of the noise on every sensor; 0.02 in the paper's noisy "
+                    "cases.",
+                    core::at_least(0)),
+        core::field("noise_entry", &SensorConfig::noise_entry,
+                    "Where noise enters: `every_sensor`: s5 and s6 are computed from the true "
+                    "s1..s4 and get noise of their own; `basic_sensors`: they are computed from "
+                    "the noisy ones. A reading."),
+        core::field("n_constant", &SensorConfig::n_constant,
+                    "Useless inputs besides: always 1/2, with noise as on the sensors. Not in the "
+                    "paper.",
+                    core::within(0, 100)),
+        core::field("n_random", &SensorConfig::n_random,
+                    "Useless inputs besides: a new uniform number each time. Not in the paper.",
+                    core::within(0, 100)));
   }
   bool operator==(const SensorConfig&) const = default;
 };

@@ -1,12 +1,14 @@
 /// lambda(k): the goal tolerance of the acrobot's task, which falls with the learning episode k.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <string_view>
 #include <tuple>
 
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/check_fields.hpp"
 
 namespace sdnn::environments {
 
@@ -16,20 +18,32 @@ enum class GoalScheduleKind {
   inverse_sqrt,    ///< 1 / sqrt(1 + k): continuous at k = 10000
   constant,        ///< `constant_value` for every k
 };
+constexpr std::array<std::string_view, 3> words_of(GoalScheduleKind) noexcept {
+  return {"inverse_linear", "inverse_sqrt", "constant"};
+}
 
+/// How the goal tolerance lambda(k) falls with the learning episode k (section 4.1).
 struct GoalScheduleConfig {
   GoalScheduleKind kind = GoalScheduleKind::inverse_linear;
-  double scale = 100.0;         ///< of inverse_linear, in episodes, > 0
-  int last_episode = 10000;     ///< the formula holds up to this episode, `floor` beyond; >= 0
-  double floor = 0.01;          ///< lambda beyond `last_episode`, >= 0
-  double constant_value = 1.0;  ///< of constant, >= 0
+  double scale = 100.0;
+  int last_episode = 10000;
+  double floor = 0.01;
+  double constant_value = 1.0;
 
   static constexpr auto fields() noexcept {
-    return std::tuple(core::field("kind", &GoalScheduleConfig::kind),
-                      core::field("scale", &GoalScheduleConfig::scale),
-                      core::field("last_episode", &GoalScheduleConfig::last_episode),
-                      core::field("floor", &GoalScheduleConfig::floor),
-                      core::field("constant_value", &GoalScheduleConfig::constant_value));
+    return std::tuple(
+        core::field("kind", &GoalScheduleConfig::kind,
+                    "`inverse_linear`: 1 / (1 + k / scale); `inverse_sqrt`: 1 / sqrt(1 + k); or "
+                    "`constant`: constant_value. A reading: the formula is garbled in print."),
+        core::field("scale", &GoalScheduleConfig::scale, "Episodes; of `inverse_linear`.",
+                    core::above(0)),
+        core::field("last_episode", &GoalScheduleConfig::last_episode,
+                    "The formula holds up to this episode; lambda is floor beyond.",
+                    core::at_least(0)),
+        core::field("floor", &GoalScheduleConfig::floor, "lambda beyond last_episode.",
+                    core::at_least(0)),
+        core::field("constant_value", &GoalScheduleConfig::constant_value, "lambda of `constant`.",
+                    core::at_least(0)));
   }
   bool operator==(const GoalScheduleConfig&) const = default;
 };
@@ -42,10 +56,7 @@ class GoalSchedule {
  public:
   /// Throws std::invalid_argument if a number is outside its range.
   explicit GoalSchedule(const GoalScheduleConfig& config = {}) : config_(config) {
-    core::require_positive("scale", config.scale);
-    core::require(config.last_episode >= 0, "last_episode", "at least 0", config.last_episode);
-    require_factor("floor", config.floor);
-    require_factor("constant_value", config.constant_value);
+    core::check_fields(config);
   }
 
   /// lambda of the 1-based learning episode `episode`. Throws std::invalid_argument below 1.
@@ -61,10 +72,6 @@ class GoalSchedule {
   const GoalScheduleConfig& config() const noexcept { return config_; }
 
  private:
-  static void require_factor(std::string_view name, double value) {
-    core::require(std::isfinite(value) && value >= 0.0, name, "finite and at least 0", value);
-  }
-
   GoalScheduleConfig config_;
 };
 

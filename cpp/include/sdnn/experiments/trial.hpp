@@ -14,6 +14,7 @@
 #include "sdnn/agents/agent.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/errors.hpp"
@@ -27,15 +28,23 @@ namespace sdnn::experiments {
 /// How long a trial is, and how often the agent is tested (section 4.2).
 struct ProtocolConfig {
   int n_learning_episodes = 15000;
-  int test_interval = 10;        ///< learning episodes between two test episodes
-  bool limit_bootstraps = true;  ///< reading: the time limit is no termination for the agent
-  bool noisy_tests = true;       ///< reading: sensors are as noisy in test episodes
+  int test_interval = 10;
+  bool limit_bootstraps = true;
+  bool noisy_tests = true;
 
   static constexpr auto fields() noexcept {
-    return std::tuple(core::field("n_learning_episodes", &ProtocolConfig::n_learning_episodes),
-                      core::field("test_interval", &ProtocolConfig::test_interval),
-                      core::field("limit_bootstraps", &ProtocolConfig::limit_bootstraps),
-                      core::field("noisy_tests", &ProtocolConfig::noisy_tests));
+    return std::tuple(
+        core::field("n_learning_episodes", &ProtocolConfig::n_learning_episodes,
+                    "Learning episodes in a trial.", core::within(1, 1 << 30)),
+        core::field("test_interval", &ProtocolConfig::test_interval,
+                    "One test episode follows every so many learning episodes.",
+                    core::within(1, 1 << 30)),
+        core::field("limit_bootstraps", &ProtocolConfig::limit_bootstraps,
+                    "Whether the last transition before the time limit bootstraps, as one that "
+                    "goes on; else it counts as terminated. A reading."),
+        core::field("noisy_tests", &ProtocolConfig::noisy_tests,
+                    "Whether the sensors are as noisy in test episodes as in learning ones. A "
+                    "reading."));
   }
   bool operator==(const ProtocolConfig&) const = default;
 };
@@ -72,8 +81,7 @@ class AcrobotTrial {
         protocol_(protocol),
         observed_(sensors_.n_inputs()),
         next_observed_(observed_.size()) {
-    core::require_in_range("n_learning_episodes", protocol.n_learning_episodes, 1, 1 << 30);
-    core::require_in_range("test_interval", protocol.test_interval, 1, 1 << 30);
+    core::check_fields(protocol);
     core::require(agent_.n_inputs() == observed_.size(), "n_inputs",
                   "the number of inputs of the sensors, " + std::to_string(observed_.size()),
                   agent_.n_inputs());

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from sdnn.config import ProtocolConfig
 from sdnn.environments import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.reproduction.cases import PAPER_CASES, PAPER_TRIALS
 from sdnn.reproduction.sweep.settings import (
@@ -32,7 +33,6 @@ from sdnn.runs.environment_trial import EnvironmentConfig, EnvironmentTrialConfi
 from sdnn.runs.errors import StudyError
 from sdnn.runs.preset_agents import PRESET_AGENTS
 from sdnn.runs.registry import AGENTS, agent_entry
-from sdnn.runs.trial import ProtocolConfig
 from sdnn.runs.trial_config import TrialConfig
 from sdnn.toml_lines import KeyPath
 from sdnn.typed_values import possible_words

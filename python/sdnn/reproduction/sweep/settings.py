@@ -6,12 +6,13 @@ import json
 import re
 import sys
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 from sdnn.runs.errors import StudyError
+from sdnn.runs.settings import kinds_of
 from sdnn.toml_lines import KeyPath, key_lines, line_of
 from sdnn.typed_values import convert, hints_of, possible_words, words_of
 
@@ -232,7 +233,7 @@ def build(
     """
     kind = defaults if isinstance(defaults, type) else type(defaults)
     hints = hints_of(kind)
-    possible = [f.name for f in fields(kind) if f.init and f.name not in given]  # type: ignore[arg-type]
+    possible = [name for name in kinds_of(kind) if name not in given]
     values: dict[str, Any] = {}
     for name, setting in settings.items():
         if name[0] != section:

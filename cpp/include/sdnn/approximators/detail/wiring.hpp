@@ -21,14 +21,14 @@
 #include "sdnn/coding/state_code.hpp"
 #include "sdnn/coding/symbol_patterns.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::approximators {
 
 inline std::size_t checked_inputs(const SDNNCConfig& config) {
-  core::require_in_range("n_inputs", config.n_inputs, 2, 1024);
-  core::require_in_range("max_pairs", config.max_pairs, 0, 1 << 20);
+  core::check_fields(config);
   return static_cast<std::size_t>(config.n_inputs);
 }
 
@@ -64,7 +64,6 @@ inline void require_room(const SDNNCConfig& config, double n_bins) {
 inline std::vector<coding::PatternTable> code_books_of(const SDNNCConfig& config,
                                                        std::uint64_t seed) {
   const std::size_t l = checked_inputs(config);
-  core::require_in_range("n_pattern_units", config.n_pattern_units, 2, 1 << 16);
   core::require(config.circular.empty() || config.circular.size() == l, "circular",
                 "empty or one flag per input", config.circular.size());
   core::require(config.n_symbols.empty() || config.n_symbols.size() == l, "n_symbols",
@@ -76,7 +75,6 @@ inline std::vector<coding::PatternTable> code_books_of(const SDNNCConfig& config
     return !config.circular.empty() && config.circular[mu];
   };
   for (std::size_t mu = 0; mu < l; ++mu) {
-    core::require_in_range("n_symbols", n_symbols_of(mu), 0, 1 << 24);
     core::require(n_symbols_of(mu) == 0 || !is_circular(mu), "circular",
                   "false for an input of symbols", true);
   }

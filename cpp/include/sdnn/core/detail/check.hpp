@@ -15,13 +15,13 @@
 
 namespace sdnn::core {
 
-/// Throws std::invalid_argument "<name> must be <expected>, got <value>" unless `valid`.
+/// Throws ArgumentError "<name> must be <expected>, got <value>" unless `valid`.
 template <class Value>
 void require(bool valid, std::string_view name, std::string_view expected, const Value& value) {
   if (valid) return;
   std::ostringstream message;
   message << name << " must be " << expected << ", got " << value;
-  fail(std::invalid_argument(message.str()));
+  fail(ArgumentError(std::string(name), message.str()));
 }
 
 /// Throws std::invalid_argument unless low <= value <= high; NaN is outside every range.

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/detail/lanes.hpp"
 #include "sdnn/core/elementary.hpp"
 #include "sdnn/environments/acrobot_config.hpp"
@@ -219,32 +220,12 @@ class AcrobotDynamics {
 };
 
 inline void AcrobotDynamics::check(const AcrobotConfig& config) {
-  const std::pair<const char*, double> positive[] = {
-      {"link_mass_1", config.link_mass_1},
-      {"link_mass_2", config.link_mass_2},
-      {"link_length_1", config.link_length_1},
-      {"link_length_2", config.link_length_2},
-      {"center_of_mass_1", config.center_of_mass_1},
-      {"center_of_mass_2", config.center_of_mass_2},
-      {"inertia_1", config.inertia_1},
-      {"inertia_2", config.inertia_2},
-      {"max_torque", config.max_torque},
-      {"decision_interval", config.decision_interval},
-      {"integration_step", config.integration_step},
-      {"goal_velocity_1", config.goal_velocity_1},
-      {"goal_velocity_2", config.goal_velocity_2}};
-  for (const auto& [name, value] : positive) core::require_positive(name, value);
-  core::require_finite("gravity", config.gravity);
+  core::check_fields(config);
   const double ratio = config.decision_interval / config.integration_step;
   core::require(ratio > 0.5 && ratio <= kMaxIntegrationSteps &&
                     std::abs(ratio - std::nearbyint(ratio)) <= 1e-9 * ratio,
                 "integration_step", "a whole fraction of decision_interval, at most 1e6 of them",
                 config.integration_step);
-  core::require(config.max_decisions >= 1, "max_decisions", "at least 1", config.max_decisions);
-  core::require_finite("goal_height", config.goal_height);
-  core::require_finite("goal_reward", config.goal_reward);
-  core::require_finite("penalty", config.penalty);
-  core::require_in_range("idle_angle", config.idle_angle, 0.0, core::kPi);
 }
 
 }  // namespace sdnn::environments

@@ -1,0 +1,38 @@
+/// Enumerations with words are texts in Python: "uniform".
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <string_view>
+#include <type_traits>
+
+#include "sdnn/core/config_fields.hpp"
+
+namespace pybind11::detail {
+
+template <class Enum>
+struct type_caster_enum_type_enabled<Enum, std::enable_if_t<sdnn::core::HasWords<Enum>>>
+    : std::false_type {};
+
+template <class Enum>
+class type_caster<Enum, std::enable_if_t<sdnn::core::HasWords<Enum>>> {
+ public:
+  PYBIND11_TYPE_CASTER(Enum, const_name("str"));
+
+  bool load(handle source, bool) {
+    if (!isinstance<str>(source)) return false;
+    const auto words = words_of(Enum{});
+    const auto found = std::ranges::find(words, source.cast<std::string_view>());
+    value = static_cast<Enum>(found - words.begin());
+    return found != words.end();
+  }
+
+  static handle cast(Enum value, return_value_policy, handle) {
+    const std::string_view word = words_of(value).at(static_cast<std::size_t>(value));
+    return str(word.data(), word.size()).release();
+  }
+};
+
+}  // namespace pybind11::detail
