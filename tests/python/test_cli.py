@@ -158,7 +158,7 @@ def test_the_most_episodes_make_a_trial(tmp_path):
 def no_costs(monkeypatch):
     """Costs that take no time, and a list of what was asked."""
     from sdnn.reproduction import cost
-    from sdnn.runs.records import StepTimes
+    from sdnn.reproduction.cost import StepTimes
 
     asked = []
 

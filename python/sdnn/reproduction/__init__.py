@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from sdnn.config import ProtocolConfig
     from sdnn.reproduction.cases import EXPERIMENTS, Case, Experiment, select_experiments
     from sdnn.reproduction.claims import CLAIMS, Claim
-    from sdnn.reproduction.cost import CostConfig
+    from sdnn.reproduction.cost import CostConfig, CostRecord
     from sdnn.reproduction.figures import draw_cost, draw_experiment
     from sdnn.reproduction.plan import case_config, plan_trials
     from sdnn.reproduction.reproduce import ReproduceRequest, collect
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     )
     from sdnn.runs.executor import Executor
     from sdnn.runs.measures import MeasureConfig
-    from sdnn.runs.records import CostRecord, TrialKey, TrialRecord, TrialRows
+    from sdnn.runs.records import TrialKey, TrialRecord, TrialRows
     from sdnn.runs.registry import AGENTS, AgentEntry, CostSeries, agent_entry, register
     from sdnn.runs.results import CaseResult, measure
     from sdnn.runs.statistics import Estimate

@@ -9,21 +9,126 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.spaces import Box
+from numpy.typing import NDArray
 
 from sdnn import _core, machine
 from sdnn.runs.engine import Observer
-from sdnn.runs.records import CostKey, CostRecord, StepTimes
 from sdnn.runs.registry import AgentEntry, CostSeries, cost_series
 from sdnn.runs.store import ResultStore
 
 SEED = 1
+KIND = "cost"
+"""Of these measurements in a result file."""
+
+COST_ROW_HEADER = (
+    "series", "n_inputs", "round", "microseconds", "n_steps", "table_bytes", "version", "machine"
+)  # fmt: skip
+"""Columns of the file of all rounds of cost measurements."""
+
+
+class CostKey(NamedTuple):
+    """What makes two measurements the same: stored once, not measured again."""
+
+    series: str
+    n_inputs: int
+    config_hash: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepTimes:
+    """Measured times of an agent's steps.
+
+    Parameters
+    ----------
+    microseconds : (n_rounds,)
+        Median time of a step in each round.
+    n_steps
+        Steps in a round.
+    table_bytes
+        Memory of what the agent learns.
+    """
+
+    microseconds: NDArray[np.float64]
+    n_steps: int
+    table_bytes: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class CostRecord:
+    """The cost of a series at one number of inputs.
+
+    Parameters
+    ----------
+    key
+        Which measurement it is.
+    version
+        Version of the library.
+    machine
+        Processor and instruction set.
+    finished_at
+        Time of the end, ISO 8601, UTC.
+    times
+        What was measured.
+    """
+
+    key: CostKey
+    version: str
+    machine: str
+    finished_at: str
+    times: StepTimes
+
+    @property
+    def microseconds(self) -> NDArray[np.float64]:
+        """Median time of a step in each round, (n_rounds,)."""
+        return self.times.microseconds
+
+    def stored(self) -> dict[str, Any]:
+        """Return it as the result file has it; `load_costs` reads it."""
+        values = {"config_hash": self.key.config_hash, "finished_at": self.finished_at}
+        return {**self.to_json(), **values}
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as values that JSON can hold."""
+        return {
+            "series": self.key.series,
+            "n_inputs": self.key.n_inputs,
+            "microseconds": self.microseconds.tolist(),
+            "n_steps": self.times.n_steps,
+            "table_bytes": self.times.table_bytes,
+            "machine": self.machine,
+            "version": self.version,
+        }
+
+
+def round_rows(costs: Iterable[CostRecord]) -> Iterator[tuple[object, ...]]:
+    """All rounds of cost measurements under `COST_ROW_HEADER`."""
+    for cost in costs:
+        end = (cost.times.n_steps, cost.times.table_bytes, cost.version, cost.machine)
+        for number, microseconds in enumerate(cost.microseconds.tolist()):
+            yield (cost.key.series, cost.key.n_inputs, number, microseconds, *end)
+
+
+def load_costs(store: ResultStore, config_hash: str) -> tuple[CostRecord, ...]:
+    """Read the stored measurements under the given settings, sorted by key."""
+    found = []
+    for told in store.measurements(KIND).values():
+        if told["config_hash"] == config_hash:
+            times = StepTimes(
+                microseconds=np.array(told["microseconds"], np.float64),
+                n_steps=told["n_steps"],
+                table_bytes=told["table_bytes"],
+            )
+            key = CostKey(told["series"], told["n_inputs"], config_hash)
+            rest = {name: told[name] for name in ("version", "machine", "finished_at")}
+            found.append(CostRecord(key=key, times=times, **rest))
+    return tuple(sorted(found, key=lambda record: record.key))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +175,7 @@ def measure_costs(
     keys: Sequence[CostKey], config: CostConfig, store: ResultStore, observer: Observer
 ) -> None:
     """Measure what is not stored yet, one after another, and store each at once."""
-    stored = {record.key for record in store.load_costs(config.config_hash)}
+    stored = {record.key for record in load_costs(store, config.config_hash)}
     missing = [key for key in keys if key not in stored]
     observer.costs_begun(len(missing))
     by_id = {series.id: (entry, series) for entry, series in cost_series()}
@@ -85,7 +190,7 @@ def measure_costs(
                 finished_at=datetime.now(timezone.utc).isoformat(timespec="seconds"),
                 times=times,
             )
-            store.add_cost(record)
+            store.put(KIND, repr(tuple(key)), record.stored())
         observer.cost_measured(f"{series.title}, {key.n_inputs} inputs")
 
 

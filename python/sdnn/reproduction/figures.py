@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sdnn.reproduction.cases import EXPERIMENTS, PAPER_EPISODES, PAPER_TRIALS, Experiment
+from sdnn.reproduction.cost import CostRecord
 from sdnn.runs.figures import (
     FAINT,
     INK,
@@ -20,7 +21,6 @@ from sdnn.runs.figures import (
     style,
     write_footer,
 )
-from sdnn.runs.records import CostRecord
 from sdnn.runs.registry import cost_series
 from sdnn.runs.results import CaseResult
 

@@ -15,6 +15,7 @@ from sdnn import _core
 from sdnn.reproduction.cases import PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.reproduction.chances import MULTIPLES, N_POWER_DRAWS, Power, powers
 from sdnn.reproduction.claims import Claim, Growth, describe
+from sdnn.reproduction.cost import CostRecord
 from sdnn.reproduction.reference_results import ReferenceResult
 from sdnn.reproduction.verdicts import (
     ALWAYS,
@@ -27,7 +28,6 @@ from sdnn.reproduction.verdicts import (
     settle,
 )
 from sdnn.runs.measures import STEP_MEASURES
-from sdnn.runs.records import CostRecord
 from sdnn.runs.registry import agent_entry, cost_series
 from sdnn.runs.report import (
     MEASURE_END,

@@ -17,7 +17,16 @@ from sdnn.reproduction.cases import (
     PAPER_TRIALS,
     Experiment,
 )
-from sdnn.reproduction.cost import QUICK_COST, CostConfig, cost_keys, measure_costs
+from sdnn.reproduction.cost import (
+    COST_ROW_HEADER,
+    QUICK_COST,
+    CostConfig,
+    CostKey,
+    cost_keys,
+    load_costs,
+    measure_costs,
+    round_rows,
+)
 from sdnn.reproduction.figures import draw_cost, draw_experiment
 from sdnn.reproduction.plan import plan_trials
 from sdnn.reproduction.reference_results import reference_results
@@ -26,13 +35,10 @@ from sdnn.runs.engine import Observer, run_trials
 from sdnn.runs.executor import Executor
 from sdnn.runs.figures import figure_bytes, require_matplotlib
 from sdnn.runs.records import (
-    COST_ROW_HEADER,
     ROW_HEADER,
-    CostKey,
     TrialKey,
     TrialRecord,
     records_digest,
-    round_rows,
     trial_rows,
 )
 from sdnn.runs.registry import cost_series
@@ -204,7 +210,7 @@ def count_stored(
     if (request.out / STORE_NAME).exists() or request.out.is_file():
         with ResultStore(request.out, read_only=True) as store:
             keys |= store.keys()
-            keys |= {one.key for one in store.load_costs(request.cost_config.config_hash)}
+            keys |= {one.key for one in load_costs(store, request.cost_config.config_hash)}
     trials: dict[tuple[str, str], tuple[int, int]] = {}
     for planned in request.plan.trials:
         n_planned, n_stored = trials.get(planned.key[:2], (0, 0))
@@ -282,7 +288,7 @@ def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[
     complete = [(e, keys) for e, keys in request.plan.experiments if stored.issuperset(keys)]
     records = store.load(key for _, keys in complete for key in keys)
     shown = {series.id for _, series in cost_series(request.agents or None)}
-    costs = store.load_costs(request.cost_config.config_hash)
+    costs = load_costs(store, request.cost_config.config_hash)
     experiments = tuple((e, collect(e, records)) for e, _ in complete)
     n_run = {
         (one.case_id, one.agent, one.config_hash): one.n_trials

@@ -30,8 +30,7 @@ import numpy as np
 from sdnn.reproduction.cases import PAPER_EPISODES, PAPER_TRIALS
 from sdnn.reproduction.chances import TenTrials
 from sdnn.reproduction.claims import CLAIMS, Check, Claim, Difference, Growth, Subject, describe
-from sdnn.reproduction.cost import CostConfig
-from sdnn.runs.records import CostRecord
+from sdnn.reproduction.cost import CostConfig, CostRecord
 from sdnn.runs.results import TrialMeasures, on_equal_terms
 from sdnn.runs.statistics import Estimate, FloatArray, estimate_contrast, json_number
 

@@ -1,6 +1,6 @@
-"""What is measured, as data: finished trials and costs, with their keys.
+"""The rows of runs as data, with their keys.
 
-Nothing here knows how a trial is run, how a time is taken, or where records are kept.
+Nothing here knows how a trial is run, or where records are kept.
 """
 
 from __future__ import annotations
@@ -22,11 +22,6 @@ ROW_HEADER = (
     "episode_return", "solved",
 )  # fmt: skip
 """Columns of the file of all test episodes."""
-
-COST_ROW_HEADER = (
-    "series", "n_inputs", "round", "microseconds", "n_steps", "table_bytes", "version", "machine"
-)  # fmt: skip
-"""Columns of the file of all rounds of cost measurements."""
 
 
 class TrialKey(NamedTuple):
@@ -276,80 +271,3 @@ def trial_rows(records: Iterable[TrialRecord]) -> Iterator[tuple[object, ...]]:
         columns = (rows.episode, rows.steps, rows.episode_return, rows.solved.astype(int))
         for row in zip(*(column.tolist() for column in columns), strict=True):
             yield (*start, *row)
-
-
-class CostKey(NamedTuple):
-    """What makes two measurements the same: stored once, not measured again."""
-
-    series: str
-    n_inputs: int
-    config_hash: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class StepTimes:
-    """Measured times of an agent's steps.
-
-    Parameters
-    ----------
-    microseconds : (n_rounds,)
-        Median time of a step in each round.
-    n_steps
-        Steps in a round.
-    table_bytes
-        Memory of what the agent learns.
-    """
-
-    microseconds: NDArray[np.float64]
-    n_steps: int
-    table_bytes: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class CostRecord:
-    """The cost of a series at one number of inputs.
-
-    Parameters
-    ----------
-    key
-        Which measurement it is.
-    version
-        Version of the library.
-    machine
-        Processor and instruction set.
-    finished_at
-        Time of the end, ISO 8601, UTC.
-    times
-        What was measured.
-    """
-
-    key: CostKey
-    version: str
-    machine: str
-    finished_at: str
-    times: StepTimes
-
-    @property
-    def microseconds(self) -> NDArray[np.float64]:
-        """Median time of a step in each round, (n_rounds,)."""
-        return self.times.microseconds
-
-    def to_json(self) -> dict[str, Any]:
-        """Return it as values that JSON can hold."""
-        return {
-            "series": self.key.series,
-            "n_inputs": self.key.n_inputs,
-            "microseconds": self.microseconds.tolist(),
-            "n_steps": self.times.n_steps,
-            "table_bytes": self.times.table_bytes,
-            "machine": self.machine,
-            "version": self.version,
-        }
-
-
-def round_rows(costs: Iterable[CostRecord]) -> Iterator[tuple[object, ...]]:
-    """All rounds of cost measurements under `COST_ROW_HEADER`."""
-    for cost in costs:
-        end = (cost.times.n_steps, cost.times.table_bytes, cost.version, cost.machine)
-        for number, microseconds in enumerate(cost.microseconds.tolist()):
-            yield (cost.key.series, cost.key.n_inputs, number, microseconds, *end)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -20,9 +20,6 @@ import numpy as np
 from sdnn.runs.errors import StoreError
 from sdnn.runs.records import (
     ROW,
-    CostKey,
-    CostRecord,
-    StepTimes,
     TrialKey,
     TrialRecord,
     TrialRows,
@@ -30,7 +27,7 @@ from sdnn.runs.records import (
 )
 
 STORE_NAME = "results.sqlite"
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 APPLICATION_ID = int.from_bytes(b"sdnn", "big")
 """Marks a SQLite file as ours (SQLite's header field of that name)."""
 BUSY_SECONDS = 60.0
@@ -56,11 +53,9 @@ CREATE VIEW labelled_rows AS
   SELECT case_id, agent, trial, seed, config_hash, version, kind, episode, part, step, length,
          "return", terminated, environment
   FROM rows JOIN runs ON runs.id = rows.run_id;
-CREATE TABLE costs (
-  series TEXT NOT NULL, n_inputs INTEGER NOT NULL, config_hash TEXT NOT NULL,
-  version TEXT NOT NULL, machine TEXT NOT NULL, finished_at TEXT NOT NULL,
-  n_steps INTEGER NOT NULL, table_bytes INTEGER NOT NULL, microseconds TEXT NOT NULL,
-  PRIMARY KEY (series, n_inputs, config_hash)
+CREATE TABLE measurements (
+  kind TEXT NOT NULL, key TEXT NOT NULL, content TEXT NOT NULL,
+  PRIMARY KEY (kind, key)
 ) WITHOUT ROWID;
 """
 
@@ -302,39 +297,36 @@ class ResultStore:
         ).fetchall()
         return TrialRows(np.array(found, ROW))
 
-    # Costs.
+    # What is measured beside runs.
 
-    def add_cost(self, record: CostRecord) -> None:
+    def put(self, kind: str, key: str, content: Mapping[str, Any]) -> None:
         """Store a measurement; one that another process stored first stays.
+
+        Parameters
+        ----------
+        kind, key
+            Which measurement it is.
+        content
+            Values that JSON has.
 
         Raises
         ------
         StoreError
             If the file cannot be written.
         """
-        times = record.times
-        values = (
-            *record.key,
-            record.version,
-            record.machine,
-            record.finished_at,
-            times.n_steps,
-            times.table_bytes,
-            json.dumps(times.microseconds.tolist()),
-        )
         with self._writing() as connection:
             connection.execute(
-                "INSERT OR IGNORE INTO costs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", values
+                "INSERT OR IGNORE INTO measurements VALUES (?, ?, ?)",
+                (kind, key, json.dumps(content)),
             )
 
-    def load_costs(self, config_hash: str) -> tuple[CostRecord, ...]:
-        """Return the measurements under the given settings, sorted by key."""
+    def measurements(self, kind: str) -> dict[str, Any]:
+        """Return the contents of all measurements of a kind, by their keys, which are sorted."""
         with _as_store_error(self.path):
             found = self._connection.execute(
-                "SELECT * FROM costs WHERE config_hash = ? ORDER BY series, n_inputs",
-                (config_hash,),
-            ).fetchall()
-            return tuple(_cost_record(*row) for row in found)
+                "SELECT key, content FROM measurements WHERE kind = ? ORDER BY key", (kind,)
+            )
+            return {key: json.loads(content) for key, content in found}
 
 
 def _stored(key: TrialKey) -> TrialKey:
@@ -345,24 +337,6 @@ def _stored(key: TrialKey) -> TrialKey:
 def _key_of(row: tuple[Any, ...]) -> TrialKey:
     key = TrialKey(*row[:5])
     return key._replace(seed=key.seed % 2**64)
-
-
-def _cost_record(
-    series: str, n_inputs: int, config_hash: str, version: str, machine: str, finished_at: str,
-    n_steps: int, table_bytes: int, microseconds: str,
-) -> CostRecord:  # fmt: skip
-    times = StepTimes(
-        microseconds=np.array(json.loads(microseconds), np.float64),
-        n_steps=n_steps,
-        table_bytes=table_bytes,
-    )
-    return CostRecord(
-        key=CostKey(series, n_inputs, config_hash),
-        version=version,
-        machine=machine,
-        finished_at=finished_at,
-        times=times,
-    )
 
 
 @contextmanager

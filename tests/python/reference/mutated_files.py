@@ -101,7 +101,7 @@ def read_store(path):
     with ResultStore(path.parent) as results:
         results.load()
         results.times()
-        results.load_costs("aa")
+        results.measurements("cost")
 
 
 RUN = b"""steps = 1000

@@ -17,7 +17,7 @@ from sdnn.reproduction.claims import (
     Subject,
     describe,
 )
-from sdnn.reproduction.cost import QUICK_COST, CostConfig
+from sdnn.reproduction.cost import QUICK_COST, CostConfig, CostKey, CostRecord, StepTimes
 from sdnn.reproduction.report import POWER_NOTE, Report
 from sdnn.reproduction.verdicts import (
     CheckOutcome,
@@ -27,7 +27,6 @@ from sdnn.reproduction.verdicts import (
     judge_claims,
     verdict_of,
 )
-from sdnn.runs.records import CostKey, CostRecord, StepTimes
 from sdnn.runs.registry import cost_series
 from sdnn.runs.statistics import estimate_contrast, estimate_median
 

@@ -7,9 +7,16 @@ import pytest
 
 from sdnn import _core, machine
 from sdnn.reproduction import AGENTS, CostConfig, Observer, ResultStore, StoreError, draw_cost
-from sdnn.reproduction.cost import QUICK_COST, cost_keys, measure_costs, measure_steps
+from sdnn.reproduction.cost import (
+    QUICK_COST,
+    StepTimes,
+    cost_keys,
+    load_costs,
+    measure_costs,
+    measure_steps,
+)
 from sdnn.reproduction.report import cost_table
-from sdnn.runs.records import StepTimes, records_digest
+from sdnn.runs.records import records_digest
 from sdnn.runs.registry import cost_series
 
 SERIES = [series for _, series in cost_series()]
@@ -40,7 +47,7 @@ def measured(monkeypatch):
         with ResultStore(folder) as store:
             keys = cost_keys(config)
             measure_costs(keys, config, store, Observer())
-            return store.load_costs(config.config_hash)
+            return load_costs(store, config.config_hash)
 
     return _measured
 
@@ -90,7 +97,7 @@ def test_settings_of_costs_live_side_by_side(tmp_path, measured):
     other = replace(SMALL, n_rounds=5)
     assert [c.microseconds.size for c in measured(tmp_path, FakeMeasure(), other)] == [5] * 8
     with ResultStore(tmp_path) as store:
-        assert len(store.load_costs(SMALL.config_hash)) == 8
+        assert len(load_costs(store, SMALL.config_hash)) == 8
         assert store.load() == ()
         assert records_digest(store.load()) == records_digest(())
 
@@ -107,10 +114,10 @@ def test_times_of_another_machine_or_version_are_measured_anew(tmp_path, measure
 def test_damaged_costs_are_named(tmp_path, measured):
     measured(tmp_path, FakeMeasure())
     with ResultStore(tmp_path) as store:
-        store._connection.execute("UPDATE costs SET microseconds = 'x'")
+        store._connection.execute("UPDATE measurements SET content = 'x'")
         store._connection.commit()
         with pytest.raises(StoreError, match=r"results\.sqlite is damaged"):
-            store.load_costs(SMALL.config_hash)
+            load_costs(store, SMALL.config_hash)
 
 
 def test_table_gives_times_and_growth(tmp_path, measured):

@@ -83,7 +83,7 @@ def test_a_folder_that_is_only_looked_at_stays_as_it_is(tmp_path):
     for folder in (tmp_path / "empty", tmp_path / "none"):
         with ResultStore(folder, read_only=True) as store:
             assert store.keys() == set()
-            assert store.times() == store.load_costs("aa") == ()
+            assert (store.times(), store.measurements("cost")) == ((), {})
     assert (tmp_path / "empty" / path.name).stat().st_size == 0
     assert not (tmp_path / "none").exists()
 
@@ -325,3 +325,14 @@ def test_a_file_whose_making_was_killed_is_made_anew(tmp_path):
     with ResultStore(tmp_path) as store:
         store.add(make_record())
         assert len(store.keys()) == 1
+
+
+def test_a_measurement_is_stored_once(tmp_path):
+    with ResultStore(tmp_path) as store:
+        for value in (1.5, 2.5):
+            store.put("cost", "b", {"value": value})
+        store.put("cost", "a", {"value": [1, None]})
+        store.put("other", "a", {})
+        assert list(store.measurements("cost").items()) == [
+            ("a", {"value": [1, None]}), ("b", {"value": 1.5}),
+        ]  # fmt: skip
