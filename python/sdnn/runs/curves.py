@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents.callbacks import Row
 from sdnn.runs.errors import RunError
 from sdnn.runs.groups import Group, groups_of
 from sdnn.runs.run import Run
@@ -19,40 +18,27 @@ __all__ = ["HEADER", "Curve", "csv_rows", "curves_of"]
 WINDOW = 20
 """Episodes in the running median of the returns, or all so far where they are fewer."""
 
-_NOTHING = "no episode and no evaluation"
-
 HEADER = ("task", "agent", "kind", "n_runs", "run", "step", "value", "low", "high")
 
-Kind = Literal["return", "running median", "evaluation"]
+Kind: TypeAlias = Literal["return", "running median", "evaluation"]
+_Series: TypeAlias = tuple[NDArray[np.int64], NDArray[np.float64]]
+_NOTHING = "no episode and no evaluation"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curve:
-    """Numbers against steps.
+    """Numbers against steps, arrays (n,).
 
-    Parameters
-    ----------
-    task, agent
-        What was learned by what: of several runs, which differ in their seeds only.
-    kind
-        Of episodes their returns, or the running median of these; or the evaluations: of one run
-        the mean, of several the median of their means.
-    n_runs
-        How many runs it is of.
-    run
-        The folder, if it is of one.
-    steps, values
-        Shape (n,).
-    low, high
-        Lower and upper quartiles, over the episodes of each evaluation of one run, or over runs;
-        None: there are none. Shape (n,).
+    They are returns of episodes, the running median of these, or evaluations: of one run, whose
+    folder is `run`, the mean, of several that differ in their seeds the median of their means.
+    `low` and `high` are quartiles over the episodes of each evaluation of one run, or over runs.
     """
 
     task: str
     agent: str
     kind: Kind
-    n_runs: int
-    run: str
+    n_runs: int = 1
+    run: str = ""
     steps: NDArray[np.int64]
     values: NDArray[np.float64]
     low: NDArray[np.float64] | None = None
@@ -72,11 +58,7 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
     curves: list[Curve] = []
     notes: list[str] = []
     for group in groups_of(runs):
-        if len(group.runs) == 1:
-            made = _curves_of_one(group, group.runs[0], group.runs[0].rows())
-            told = [] if made else [f"{group.runs[0].folder}: {_NOTHING} is whole yet"]
-        else:
-            made, told = _curves_of_several(group)
+        made, told = _curves_of_group(group)
         curves += made
         notes += told
     if not curves:
@@ -84,47 +66,25 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
     return curves, notes
 
 
-def _curves_of_one(group: Group, run: Run, rows: Sequence[Row]) -> list[Curve]:
-    episodes, evaluations = _of_kind(rows, "episode"), _of_kind(rows, "evaluation")
-    names: dict[str, Any] = {
-        "task": group.task,
-        "agent": group.agent,
-        "n_runs": 1,
-        "run": str(run.folder),
-    }
-    curves = []
-    if episodes:
-        steps, returns = _episodes(episodes)
-        medians = _running_median(returns)
-        curves += [
-            Curve(**names, kind="return", steps=steps, values=returns),
-            Curve(**names, kind="running median", steps=steps, values=medians),
-        ]
-    if evaluations:
-        quartiles = [np.percentile(row["returns"], (25, 75)) for row in evaluations]
-        low, high = np.array(quartiles).T
-        steps, means = _evaluations(evaluations)
-        curves.append(
-            Curve(**names, kind="evaluation", steps=steps, values=means, low=low, high=high)
-        )
-    return curves
-
-
-def _curves_of_several(group: Group) -> tuple[list[Curve], list[str]]:
-    """Make the one curve of runs, and notes on what it leaves out."""
+def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
+    """Make the curves of one run, or the one of several, and notes on what it leaves out."""
     rows = {run: run.rows() for run in group.runs}
+    if len(rows) == 1:
+        (run,) = rows
+        made = _curves_of_run(group, run, rows[run])
+        return made, [] if made else [f"{run.folder}: {_NOTHING} is whole yet"]
     kind: Kind = "evaluation"
-    series = {run: _evaluations(_of_kind(rows[run], "evaluation")) for run in group.runs}
+    series = {run: _evaluations(own) for run, own in rows.items()}
     if not any(len(steps) for steps, _ in series.values()):
         kind = "running median"
-        for run in group.runs:
-            steps, returns = _episodes(_of_kind(rows[run], "episode"))
+        for run, own in rows.items():
+            steps, returns = _episodes(own)
             series[run] = steps, _running_median(returns)
     what = "no evaluation" if kind == "evaluation" else _NOTHING
-    notes = [f"{run.folder}: {what} is whole yet" for run in group.runs if not len(series[run][0])]
+    notes = [f"{run.folder}: {what} is whole yet" for run in series if not len(series[run][0])]
     series = {run: one for run, one in series.items() if len(one[0])}
     if len(series) < 2:
-        return [curve for run in series for curve in _curves_of_one(group, run, rows[run])], notes
+        return [curve for run in series for curve in _curves_of_run(group, run, rows[run])], notes
     folders = ", ".join(str(run.folder) for run in series)
     steps = _steps_of_all([own for own, _ in series.values()], is_grid=kind == "evaluation")
     if not len(steps):
@@ -133,18 +93,25 @@ def _curves_of_several(group: Group) -> tuple[list[Curve], list[str]]:
         notes.append(f"{folders}: drawn to step {steps[-1]}, which all of them have reached")
     values = np.array([np.interp(steps, own, numbers) for own, numbers in series.values()])
     low, middle, high = np.percentile(values, (25, 50, 75), axis=0)
-    curve = Curve(
-        task=group.task,
-        agent=group.agent,
-        kind=kind,
-        n_runs=len(series),
-        run="",
-        steps=steps,
-        values=middle,
-        low=low,
-        high=high,
-    )
-    return [curve], notes
+    names: dict[str, Any] = {"task": group.task, "agent": group.agent, "n_runs": len(series)}
+    return [Curve(**names, kind=kind, steps=steps, values=middle, low=low, high=high)], notes
+
+
+def _curves_of_run(group: Group, run: Run, rows: Sequence[Any]) -> list[Curve]:
+    names: dict[str, Any] = {"task": group.task, "agent": group.agent, "run": str(run.folder)}
+    curves = []
+    steps, returns = _episodes(rows)
+    if len(steps):
+        medians = _running_median(returns)
+        curves.append(Curve(**names, kind="return", steps=steps, values=returns))
+        curves.append(Curve(**names, kind="running median", steps=steps, values=medians))
+    steps, means = _evaluations(rows)
+    if len(steps):
+        evaluations = (row["returns"] for row in rows if row["kind"] == "evaluation")
+        low, high = np.array([np.percentile(one, (25, 75)) for one in evaluations]).T
+        bounds = {"low": low, "high": high}
+        curves.append(Curve(**names, kind="evaluation", steps=steps, values=means, **bounds))
+    return curves
 
 
 def _steps_of_all(all_steps: Sequence[NDArray[np.int64]], is_grid: bool) -> NDArray[np.int64]:
@@ -154,25 +121,23 @@ def _steps_of_all(all_steps: Sequence[NDArray[np.int64]], is_grid: bool) -> NDAr
         return np.array(sorted(shared), np.int64)
     first = max(int(steps[0]) for steps in all_steps)
     last = min(int(steps[-1]) for steps in all_steps)
-    return (
-        np.unique(np.linspace(first, last, 100).astype(np.int64))
-        if first <= last
-        else (np.array([], np.int64))
-    )
+    steps = np.linspace(first, last, 100 if first <= last else 0)
+    return np.unique(steps.astype(np.int64))
 
 
-def _of_kind(rows: Sequence[Row], kind: str) -> list[Row]:
-    return [row for row in rows if row["kind"] == kind]
+def _episodes(rows: Sequence[Any]) -> _Series:
+    own = [(row["step"], row["return"]) for row in rows if row["kind"] == "episode"]
+    return _series(own)
 
 
-def _episodes(rows: Sequence[Any]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    steps = np.array([row["step"] for row in rows], np.int64)
-    return steps, np.array([row["return"] for row in rows], np.float64)
+def _evaluations(rows: Sequence[Any]) -> _Series:
+    own = [(row["step"], row["mean_return"]) for row in rows if row["kind"] == "evaluation"]
+    return _series(own)
 
 
-def _evaluations(rows: Sequence[Any]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    steps = np.array([row["step"] for row in rows], np.int64)
-    return steps, np.array([row["mean_return"] for row in rows], np.float64)
+def _series(pairs: Sequence[tuple[int, float]]) -> _Series:
+    steps, values = np.array([p[0] for p in pairs], np.int64), np.array([p[1] for p in pairs])
+    return steps, values.astype(np.float64)
 
 
 def _running_median(values: NDArray[np.float64]) -> NDArray[np.float64]:

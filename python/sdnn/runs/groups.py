@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from sdnn.runs.config import RunConfig
 from sdnn.runs.run import Run
 
 __all__ = ["Group", "groups_of"]
@@ -15,18 +15,13 @@ __all__ = ["Group", "groups_of"]
 _CHANGES_NOTHING = ("format", "seed", "checkpoint_every", "tensorboard")
 """Of a configuration: what may differ within a group."""
 
+_NOT_NAMED = ("0", "0.0", "none", "false", "null")
+"""Values of an environment or agent that its name leaves out."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Group:
-    """Runs that differ in their seeds only.
-
-    Parameters
-    ----------
-    task, agent
-        What was learned by what; no other group has both names.
-    runs
-        In the order in which they were given.
-    """
+    """Runs that differ in their seeds only; no other group has both its task and its agent."""
 
     task: str
     agent: str
@@ -35,91 +30,71 @@ class Group:
 
 def groups_of(runs: Sequence[Run]) -> list[Group]:
     """Put runs together that differ in their seeds only, in the order of the first of each."""
-    alike: dict[str, list[Run]] = {}
+    groups: dict[tuple[tuple[str, str], ...], list[Run]] = {}
     for run in runs:
-        alike.setdefault(_definition(run), []).append(run)
-    members = list(alike.values())
-    tasks = [_task(group[0].config) for group in members]
-    agents = [_agent(group[0].config) for group in members]
-    agents = _told_apart(tasks, agents, [_details(group[0]) for group in members])
-    folders = [{"folder": str(group[0].folder)} for group in members]
-    agents = _told_apart(tasks, agents, folders)
+        groups.setdefault(tuple(sorted(_definition(run).items())), []).append(run)
+    names = [_names(_definition(members[0])) for members in groups.values()]
+    names = _told_apart(names, [dict(definition) for definition in groups])
+    names = _told_apart(names, [{"folder": str(own[0].folder)} for own in groups.values()])
     return [
-        Group(task=task, agent=agent, runs=tuple(group))
-        for task, agent, group in zip(tasks, agents, members, strict=True)
+        Group(task=task, agent=agent, runs=tuple(members))
+        for (task, agent), members in zip(names, groups.values(), strict=True)
     ]
 
 
 def _told_apart(
-    tasks: Sequence[str], agents: Sequence[str], details: Sequence[dict[str, str]]
-) -> list[str]:
-    """Add to equal names those details in which they differ."""
-    names = list(zip(tasks, agents, strict=True))
+    names: Sequence[tuple[str, str]], definitions: Sequence[Mapping[str, str]]
+) -> list[tuple[str, str]]:
+    """Add the values in which they differ to the agents of equal names."""
     counts = Counter(names)
     found = []
-    for name, own in zip(names, details, strict=True):
-        others = [one for other, one in zip(names, details, strict=True) if other == name]
-        words = [word for key, word in own.items() if any(other[key] != word for other in others)]
-        found.append(", ".join([name[1], *words]) if counts[name] > 1 else name[1])
+    for name, own in zip(names, definitions, strict=True):
+        others = [one for other, one in zip(names, definitions, strict=True) if other == name]
+        keys = sorted({key for one in others for key in one if one[key] != own.get(key)})
+        words = [_word(key, own[key]) for key in keys if key in own]
+        found.append((name[0], ", ".join([name[1], *words])) if counts[name] > 1 else name)
     return found
 
 
-def _definition(run: Run) -> str:
-    """All that defines what a run learns, but for its seed."""
-    values = run.config.values()
-    for name in _CHANGES_NOTHING:
-        values.pop(name, None)
-    return json.dumps([values, _goals(run)], sort_keys=True)
+def _definition(run: Run) -> dict[str, str]:
+    """Return what defines what a run learns, but for its seed, as texts by dotted keys."""
+    values = {k: v for k, v in run.config.values().items() if k not in _CHANGES_NOTHING}
+    return dict(_flat(values)) | {"goals": ", then ".join(_goals(run))}
 
 
-def _goals(run: Run) -> list[tuple[int | None, str]]:
-    """Its goals, each after the step where it was given, if that was the user's choice."""
+def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{name}.")
+        elif prefix or name not in ("steps", "episodes"):
+            yield f"{prefix}{name}", value if isinstance(value, str) else json.dumps(value)
+
+
+def _names(values: Mapping[str, str]) -> tuple[str, str]:
+    """Return the name of the task and that of the agent."""
+    task, agent = [values["environment.id"]], [values["agent"]]
+    if "preset" in values:
+        agent[0] += f" {values['preset']}"
+    for key, value in values.items():
+        if key.startswith("environment.") and key != "environment.id" and value not in _NOT_NAMED:
+            task.append(_word(key, value))
+        if key.startswith("settings.") or (key == "angle_pairs" and value not in _NOT_NAMED):
+            agent.append(_word(key, value))
+    return ", ".join(task), ", ".join(agent)
+
+
+def _word(key: str, value: str) -> str:
+    return value if key in ("goals", "folder") else f"{key.rpartition('.')[2]}={value}"
+
+
+def _goals(run: Run) -> list[str]:
+    """Write its goals, each after the step where it was given, if that was the user's choice."""
     config = run.config
-    goals: list[tuple[int | None, str]] = [(None, _goal(config.steps, config.episodes))]
+    words = [f"{config.episodes} episodes" if config.steps is None else f"{config.steps} steps"]
     due = None if config.target_return is not None else config.steps
     for goal in run.goals:
+        text = f"{goal.episodes} episodes" if goal.steps is None else f"{goal.steps} steps"
         is_early = due is not None and goal.at_step < due
-        goals.append((goal.at_step if is_early else None, _goal(goal.steps, goal.episodes)))
+        words.append(f"from {goal.at_step} on {text}" if is_early else text)
         due = goal.steps
-    return goals
-
-
-def _goal(steps: int | None, episodes: int | None) -> str:
-    return f"{episodes} episodes" if steps is None else f"{steps} steps"
-
-
-def _task(config: RunConfig) -> str:
-    environment = config.environment
-    words = [environment.id]
-    words += [f"{name}={value}" for name, value in environment.kwargs.items()]
-    words += [f"range {key}: {low} to {high}" for key, (low, high) in environment.ranges.items()]
-    if environment.noise:
-        words.append(f"noise {environment.noise}")
-    if environment.redundant:
-        words.append(f"{environment.redundant} redundant")
-    return ", ".join(words)
-
-
-def _agent(config: RunConfig) -> str:
-    words = [config.agent if config.preset is None else f"{config.agent} {config.preset}"]
-    words += [
-        f"{name}={value}" for values in config.settings.values() for name, value in values.items()
-    ]
-    if config.angle_pairs != "none":
-        words.append("angle pairs")
-    return ", ".join(words)
-
-
-def _details(run: Run) -> dict[str, str]:
-    """Say what else may tell runs of one task and agent apart."""
-    config = run.config
-    every, target = config.evaluate_every, config.target_return
-    goals = [goal if step is None else f"from {step} on {goal}" for step, goal in _goals(run)]
-    return {
-        "goals": ", then ".join(goals),
-        "n_envs": f"{config.n_envs} environment{'s' if config.n_envs > 1 else ''}",
-        "target": "no target" if target is None else f"target {target:g}",
-        "evaluate_every": f"evaluated every {every} steps" if every else "not evaluated",
-        "evaluation_episodes": f"in {config.evaluation_episodes} episodes",
-        "version": f"sdnn {config.version}",
-    }
+    return words

@@ -115,7 +115,7 @@ def test_tasks_and_agents_are_parted(tmp_path):
     assert {(curve.task, curve.agent) for curve in curves} == {
         ("CartPole-v1", "sdnn-c general"),
         ("CartPole-v1", "sdnn-c general, discount=0.9"),
-        ("CartPole-v1, max_episode_steps=9, range all: -4.0 to 4.0, noise 0.02", "sdnn-c general"),
+        ("CartPole-v1, max_episode_steps=9, all=[-4.0, 4.0], noise=0.02", "sdnn-c general"),
     }
     assert len(draw_curves(curves).axes) == 2
 
@@ -173,11 +173,11 @@ def test_names_say_in_what_runs_differ(tmp_path):
     }
     groups = groups_of([Run(tmp_path / name, *parts) for name, parts in goals.items()])
     assert [group.agent.removeprefix("sdnn-c general, ") for group in groups] == [
-        "600 steps, 1 environment",
-        "300 steps, 1 environment",
-        "300 steps, then 600 steps, 1 environment",
-        "300 steps, then from 150 on 600 steps, 1 environment",
-        "300 steps, 4 environments",
+        "600 steps, n_envs=1",
+        "300 steps, n_envs=1",
+        "300 steps, then 600 steps, n_envs=1",
+        "300 steps, then from 150 on 600 steps, n_envs=1",
+        "300 steps, n_envs=4",
     ]
 
 
@@ -214,8 +214,8 @@ def test_runs_that_are_evaluated_at_other_steps_are_both_drawn(tmp_path):
     assert [
         (curve.agent, curve.steps.tolist()) for curve in curves if curve.kind == "evaluation"
     ] == [
-        ("sdnn-c general, evaluated every 500 steps", [500]),
-        ("sdnn-c general, evaluated every 700 steps", [700]),
+        ("sdnn-c general, evaluate_every=500", [500]),
+        ("sdnn-c general, evaluate_every=700", [700]),
     ]
     assert {curve.run for curve in curves} == {str(run.folder) for run in runs}
 
