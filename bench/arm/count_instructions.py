@@ -34,6 +34,7 @@ def build(folder):
         "-DNDEBUG",
         "-ffp-contract=off",
         f"-I{ROOT / 'cpp' / 'include'}",
+        f"-I{ROOT / 'cpp'}",
     )
     headers = (f"-I{eigen}", "-isystem", "/usr/include/eigen3")
     subprocess.run(

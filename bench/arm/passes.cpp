@@ -11,13 +11,13 @@
 #include <vector>
 
 #include "sdnn/approximators/hidden_layer.hpp"
-#include "sdnn/benchmarks/yardsticks.hpp"
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/core/instruction_set.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/environments/acrobot_batch.hpp"
 #include "sdnn/estimators/detail/signed_sums.hpp"
-#include "sdnn/experiments/detail/stopwatch.hpp"
+#include "tools/stopwatch.hpp"
+#include "tools/yardsticks.hpp"
 
 namespace {
 
@@ -45,7 +45,7 @@ void hidden_pass(int n) {
   std::vector<std::int32_t> potentials(kUnits);
   for (int i = 0; i < n; ++i) {
     layer.potentials({plus, minus}, potentials);
-    experiments::keep(potentials[0]);
+    tools::keep(potentials[0]);
   }
 }
 
@@ -55,8 +55,8 @@ void dense_product(int n) {
   const std::vector<float> input(kColumns, 1.0F);
   std::vector<float> out(kUnits);
   for (int i = 0; i < n; ++i) {
-    benchmarks::multiply(weights.data(), kUnits, kColumns, input.data(), out.data());
-    experiments::keep(out[0]);
+    tools::multiply(weights.data(), kUnits, kColumns, input.data(), out.data());
+    tools::keep(out[0]);
   }
 }
 
@@ -68,7 +68,7 @@ void inner_product(int n) {
   for (auto& word : words) word = random.below(~std::uint64_t{0});
   const coding::TernaryCode one{words.data(), words.data() + kWords};
   const coding::TernaryCode other{words.data() + 2 * kWords, words.data() + 3 * kWords};
-  for (int i = 0; i < n; ++i) experiments::keep(coding::inner_product(one, other, kWords));
+  for (int i = 0; i < n; ++i) tools::keep(coding::inner_product(one, other, kWords));
 }
 
 /// One decision interval of 64 acrobots.
@@ -96,7 +96,7 @@ void signed_sums(int n) {
   std::vector<std::int32_t> to(kSize);
   for (int i = 0; i < n; ++i) {
     estimators::add_signed(to.data(), kSize, rows, 0, std::size_t{1} << 15);
-    experiments::keep(to[0]);
+    tools::keep(to[0]);
   }
 }
 

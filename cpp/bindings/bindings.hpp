@@ -1,4 +1,4 @@
-/// What every binding file shares: one function per room.
+/// What every binding file shares: one function per package.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -11,5 +11,4 @@ void bind_approximators(pybind11::module_& module);
 void bind_estimators(pybind11::module_& module);
 void bind_agents(pybind11::module_& module);
 void bind_environments(pybind11::module_& module);
-void bind_experiments(pybind11::module_& module);
-void bind_benchmarks(pybind11::module_& module);
+void bind_tools(pybind11::module_& module);

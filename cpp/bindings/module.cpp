@@ -53,6 +53,5 @@ PYBIND11_MODULE(_core, module) {
   bind_environments(module);
   bind_estimators(module);
   bind_agents(module);
-  bind_experiments(module);
-  bind_benchmarks(module);
+  bind_tools(module);
 }

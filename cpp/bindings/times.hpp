@@ -7,14 +7,14 @@
 #include <cstdint>
 
 #include "objects.hpp"
-#include "sdnn/experiments/detail/stopwatch.hpp"
+#include "tools/stopwatch.hpp"
 
 namespace sdnn::bindings {
 
 /// The times that `measure` of an object returns, int64 nanoseconds (n,); it runs without the GIL.
 template <class Object, class Measure>
 pybind11::array_t<std::int64_t> times_of(Object& object, const Measure& measure) {
-  experiments::Times times;
+  tools::Times times;
   {
     const WithoutGIL unlocked(object);
     times = measure();

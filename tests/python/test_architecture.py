@@ -11,7 +11,6 @@ ROOT = Path(__file__).parents[2]
 INCLUDE = ROOT / "cpp" / "include" / "sdnn"
 LAYERS = {
     "core": 0, "coding": 1, "approximators": 2, "agents": 3, "estimators": 3, "environments": 3,
-    "experiments": 4, "benchmarks": 5,
 }  # fmt: skip
 """Packages may include those of smaller numbers, and environments core only."""
 
@@ -44,11 +43,7 @@ def test_includes_point_down():
 
 
 def test_the_umbrella_includes_what_is_public():
-    public = {
-        header.as_posix()
-        for header in headers()
-        if "detail" not in header.parts and header.parts[0] != "benchmarks"
-    }
+    public = {header.as_posix() for header in headers() if "detail" not in header.parts}
     assert {path.as_posix() for path in includes("sdnn.hpp")} == public - NOT_IN_UMBRELLA
 
 

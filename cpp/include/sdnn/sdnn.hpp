@@ -49,4 +49,3 @@
 #include "sdnn/estimators/parallel_perceptron.hpp"
 #include "sdnn/estimators/trainer.hpp"
 #include "sdnn/estimators/training_form.hpp"
-#include "sdnn/experiments/trial.hpp"

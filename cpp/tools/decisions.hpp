@@ -8,12 +8,10 @@
 #include "sdnn/agents/agent.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/environments/acrobot.hpp"
-#include "sdnn/experiments/detail/stopwatch.hpp"
-#include "sdnn/experiments/trial.hpp"
+#include "tools/stopwatch.hpp"
+#include "tools/trial.hpp"
 
-namespace sdnn::benchmarks {
-
-using experiments::keep, experiments::now, experiments::time_each, experiments::Times;
+namespace sdnn::tools {
 
 /// The times of all decisions in the next `n_episodes` learning episodes of a trial: choosing an
 /// action, the acrobot, its sensors, and learning from it. Test episodes among them count too.
@@ -21,7 +19,7 @@ using experiments::keep, experiments::now, experiments::time_each, experiments::
 /// The same trial makes the same decisions whenever it is run, so several runs can be compared
 /// decision by decision. Throws as the trial's advance does.
 template <agents::Agent Agent>
-Times time_decisions(experiments::AcrobotTrial<Agent>& trial, int n_episodes) {
+Times time_decisions(tools::AcrobotTrial<Agent>& trial, int n_episodes) {
   Times times;
   std::int64_t before = now();
   trial.advance(n_episodes, [&] {
@@ -73,4 +71,4 @@ class AcrobotDecisions {
   core::Random random_;
 };
 
-}  // namespace sdnn::benchmarks
+}  // namespace sdnn::tools

@@ -23,7 +23,7 @@
 #include "sdnn/environments/acrobot_sensors.hpp"
 #include "sdnn/environments/goal_schedule.hpp"
 
-namespace sdnn::experiments {
+namespace sdnn::tools {
 
 /// How long a trial is, and how often the agent is tested (section 4.2).
 struct ProtocolConfig {
@@ -196,4 +196,4 @@ class AcrobotTrial {
   bool in_episode_ = false;  // also after something was thrown there
 };
 
-}  // namespace sdnn::experiments
+}  // namespace sdnn::tools

@@ -8,7 +8,7 @@
 
 #include "sdnn/core/detail/check.hpp"
 
-namespace sdnn::experiments {
+namespace sdnn::tools {
 
 /// One duration per repetition, in nanoseconds of std::chrono::steady_clock.
 using Times = std::vector<std::int64_t>;
@@ -56,4 +56,4 @@ Times time_each(int n_repetitions, Timed&& timed) {
   return time_each(n_repetitions, [](int) {}, timed);
 }
 
-}  // namespace sdnn::experiments
+}  // namespace sdnn::tools

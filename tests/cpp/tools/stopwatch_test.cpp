@@ -1,4 +1,4 @@
-#include "sdnn/experiments/detail/stopwatch.hpp"
+#include "tools/stopwatch.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace sdnn::experiments {
+namespace sdnn::tools {
 namespace {
 
 TEST(TimeEach, PreparesAndTimesEveryRepetitionInOrder) {
@@ -41,4 +41,4 @@ TEST(TimeEach, RefusesImpossibleNumbers) {
 }
 
 }  // namespace
-}  // namespace sdnn::experiments
+}  // namespace sdnn::tools

@@ -8,10 +8,13 @@
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
-#include "sdnn/experiments/detail/agent_steps.hpp"
-#include "sdnn/experiments/detail/plain_rbf_network.hpp"
-#include "sdnn/experiments/trial.hpp"
 #include "times.hpp"
+#include "tools/agent_steps.hpp"
+#include "tools/decisions.hpp"
+#include "tools/network_parts.hpp"
+#include "tools/plain_rbf_network.hpp"
+#include "tools/trial.hpp"
+#include "tools/yardsticks.hpp"
 
 namespace py = pybind11;
 using namespace sdnn;
@@ -28,9 +31,9 @@ using approximators::SDNNCConfig;
 using environments::AcrobotConfig;
 using environments::GoalScheduleConfig;
 using environments::SensorConfig;
-using experiments::AcrobotTrial;
-using experiments::PlainRBFNetwork;
-using experiments::ProtocolConfig;
+using tools::AcrobotTrial;
+using tools::PlainRBFNetwork;
+using tools::ProtocolConfig;
 
 namespace {
 
@@ -40,7 +43,7 @@ void def_time_agent_steps(py::module_& module) {
       "time_agent_steps",
       [](Agent& agent, int n_repetitions, std::uint64_t seed) {
         return bindings::times_of(
-            agent, [&] { return experiments::time_agent_steps(agent, n_repetitions, seed); });
+            agent, [&] { return tools::time_agent_steps(agent, n_repetitions, seed); });
       },
       py::arg("agent"), py::arg("n_repetitions"), py::arg("seed"),
       "The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)");
@@ -56,7 +59,7 @@ py::array_t<Value> column(const Trial& trial, Read read) {
 
 template <class Trial>
 py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
-  using experiments::TestRow;
+  using tools::TestRow;
   py::typing::Dict<py::str, py::array> rows;
   rows["episode"] = column<std::int32_t>(trial, [](const TestRow& row) { return row.episode; });
   rows["steps"] = column<std::int32_t>(trial, [](const TestRow& row) { return row.steps; });
@@ -125,9 +128,7 @@ QLearning<SDNNC> sdnn_agent(const SDNNCConfig& approximator, const QLearningConf
   return {SDNNC(approximator, seed), learning, seed};
 }
 
-}  // namespace
-
-void bind_experiments(py::module_& module) {
+void bind_trials(py::module_& module) {
   bindings::bind_config<ProtocolConfig>(
       module, "ProtocolConfig",
       "Learning protocol of a trial; the defaults are the paper's (section 4.2).");
@@ -150,4 +151,86 @@ void bind_experiments(py::module_& module) {
           "action_value", [](const PlainRBFAgent& agent) { return agent.action_value().network(); },
           "A copy of the network behind it");
   def_time_agent_steps<PlainRBFAgent>(module);
+}
+
+void bind_times(py::module_& module) {
+  py::class_<tools::BufferRead>(module, "BufferRead", "Reads a buffer from front to back")
+      .def(py::init<std::size_t>(), py::arg("n_bytes"))
+      .def_property_readonly("n_bytes", &tools::BufferRead::n_bytes)
+      .def(
+          "run",
+          [](const tools::BufferRead& buffer, int n) {
+            return bindings::times_of(buffer, [&] { return buffer.run(n); });
+          },
+          py::arg("n_repetitions"), "Nanoseconds per reading: (n_repetitions,)");
+  py::class_<tools::DenseProduct>(module, "DenseProduct", "A dense float32 matrix-vector product")
+      .def(py::init<std::size_t, std::size_t, std::uint64_t>(), py::arg("n_rows"),
+           py::arg("n_columns"), py::arg("seed"))
+      .def(
+          "run",
+          [](tools::DenseProduct& product, int n) {
+            return bindings::times_of(product, [&] { return product.run(n); });
+          },
+          py::arg("n_repetitions"), "Nanoseconds per product: (n_repetitions,)");
+  py::class_<tools::NetworkParts>(module, "NetworkParts", "The network's parts of a decision")
+      .def(py::init([](const SDNNTrial& trial, std::uint64_t seed) {
+             return tools::NetworkParts(trial.agent().action_value(), seed);
+           }),
+           py::arg("trial"), py::arg("seed"), "Times a copy of the trial's network")
+      .def(py::init<SDNNC, std::uint64_t>(), py::arg("network"), py::arg("seed"),
+           "Times a copy of the network")
+      .def(
+          "time_values",
+          [](tools::NetworkParts& parts, int n) {
+            return bindings::times_of(parts, [&] { return parts.time_values(n); });
+          },
+          py::arg("n_repetitions"), "All values at a new state: nanoseconds (n_repetitions,)")
+      .def(
+          "time_remembered_values",
+          [](tools::NetworkParts& parts, int n) {
+            return bindings::times_of(parts, [&] { return parts.time_remembered_values(n); });
+          },
+          py::arg("n_repetitions"), "All values at the same state again")
+      .def(
+          "time_corrections",
+          [](tools::NetworkParts& parts, int n, int n_corrected) {
+            return bindings::times_of(parts,
+                                      [&] { return parts.time_corrections(n, n_corrected); });
+          },
+          py::arg("n_repetitions"), py::arg("n_corrected"), "Learning steps")
+      .def(
+          "time_selections",
+          [](tools::NetworkParts& parts, int n, int n_selections, int n_selected) {
+            return bindings::times_of(
+                parts, [&] { return parts.time_selections(n, n_selections, n_selected); });
+          },
+          py::arg("n_repetitions"), py::arg("n_selections"), py::arg("n_selected"),
+          "n_selections selections of units per repetition")
+      .def_property_readonly("weight_bytes", &tools::NetworkParts::weight_bytes)
+      .def("mean_bytes_of_pass", &tools::NetworkParts::mean_bytes_of_pass, py::arg("n_states"));
+  py::class_<tools::AcrobotDecisions>(module, "AcrobotDecisions",
+                                      "The acrobot under random torques")
+      .def(py::init<const environments::AcrobotConfig&, std::uint64_t>(), py::arg("config"),
+           py::arg("seed"))
+      .def_property_readonly("n_integration_steps", &tools::AcrobotDecisions::n_integration_steps)
+      .def(
+          "run",
+          [](tools::AcrobotDecisions& acrobot, int n) {
+            return bindings::times_of(acrobot, [&] { return acrobot.run(n); });
+          },
+          py::arg("n_repetitions"), "Nanoseconds per decision: (n_repetitions,)");
+  module.def(
+      "time_decisions",
+      [](SDNNTrial& trial, int n_episodes) {
+        return bindings::times_of(trial, [&] { return tools::time_decisions(trial, n_episodes); });
+      },
+      py::arg("trial"), py::arg("n_episodes"),
+      "Advances a trial; nanoseconds of every decision in it");
+}
+
+}  // namespace
+
+void bind_tools(py::module_& module) {
+  bind_trials(module);
+  bind_times(module);
 }

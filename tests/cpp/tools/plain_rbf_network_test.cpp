@@ -1,4 +1,4 @@
-#include "sdnn/experiments/detail/plain_rbf_network.hpp"
+#include "tools/plain_rbf_network.hpp"
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@
 #include "sdnn/approximators/action_value.hpp"
 #include "sdnn/core/random.hpp"
 
-namespace sdnn::experiments {
+namespace sdnn::tools {
 namespace {
 
 using approximators::RBFNetwork;
@@ -155,4 +155,4 @@ TEST(PlainRBFNetwork, RefusesWhatTheFactoredOneRefuses) {
 }
 
 }  // namespace
-}  // namespace sdnn::experiments
+}  // namespace sdnn::tools

@@ -4,14 +4,14 @@
 #include <Eigen/Core>
 #include <cstddef>
 
-#include "sdnn/benchmarks/yardsticks.hpp"
+#include "tools/yardsticks.hpp"
 
 namespace {
 
 constexpr int kUnits = 900;
 
 void own_product(benchmark::State& state) {
-  sdnn::benchmarks::DenseProduct product(kUnits, static_cast<std::size_t>(state.range(0)), 1);
+  sdnn::tools::DenseProduct product(kUnits, static_cast<std::size_t>(state.range(0)), 1);
   for (auto _ : state) benchmark::DoNotOptimize(product.multiply().data());
   state.SetBytesProcessed(state.iterations() * state.range(0) * kUnits * 4);
 }

@@ -1,4 +1,4 @@
-#include "sdnn/benchmarks/decisions.hpp"
+#include "tools/decisions.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,11 +7,11 @@
 #include "approximators/lookup_table.hpp"
 #include "sdnn/agents/q_learning.hpp"
 
-namespace sdnn::benchmarks {
+namespace sdnn::tools {
 namespace {
 
 using Table = testing::LookupTable;
-using Trial = experiments::AcrobotTrial<agents::QLearning<Table>>;
+using Trial = tools::AcrobotTrial<agents::QLearning<Table>>;
 
 Trial table_trial() {
   return Trial(agents::QLearning<Table>(Table(4, 8, 21), {}, 1), {}, {}, {},
@@ -47,4 +47,4 @@ TEST(AcrobotDecisions, CountsTheStepsOfOtherIntervals) {
 }
 
 }  // namespace
-}  // namespace sdnn::benchmarks
+}  // namespace sdnn::tools

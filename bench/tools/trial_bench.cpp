@@ -5,12 +5,12 @@
 
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
-#include "sdnn/experiments/trial.hpp"
+#include "tools/trial.hpp"
 
 namespace {
 
 using namespace sdnn;
-using Trial = experiments::AcrobotTrial<agents::QLearning<approximators::SDNNC>>;
+using Trial = tools::AcrobotTrial<agents::QLearning<approximators::SDNNC>>;
 
 /// Arguments: inputs, noise in per cent, learning episodes.
 void trial(benchmark::State& state) {

@@ -10,7 +10,7 @@
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/kernel.hpp"
 #include "sdnn/core/random.hpp"
-#include "sdnn/experiments/detail/stopwatch.hpp"
+#include "tools/stopwatch.hpp"
 
 #if SDNN_X86_KERNELS
 #include <immintrin.h>
@@ -19,9 +19,7 @@
 #include <arm_neon.h>
 #endif
 
-namespace sdnn::benchmarks {
-
-using experiments::keep, experiments::time_each, experiments::Times;
+namespace sdnn::tools {
 
 namespace detail {
 
@@ -219,7 +217,7 @@ class DenseProduct {
 
   /// The product; valid until the next call. Shape: (n_rows,).
   std::span<const float> multiply() {
-    benchmarks::multiply(weights_.data(), n_rows_, n_columns_, input_.data(), out_.data());
+    tools::multiply(weights_.data(), n_rows_, n_columns_, input_.data(), out_.data());
     return out_.span();
   }
 
@@ -240,4 +238,4 @@ class DenseProduct {
   core::AlignedBuffer<float> out_;
 };
 
-}  // namespace sdnn::benchmarks
+}  // namespace sdnn::tools

@@ -1,4 +1,4 @@
-#include "sdnn/benchmarks/yardsticks.hpp"
+#include "tools/yardsticks.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 
 #include "instruction_sets.hpp"
 
-namespace sdnn::benchmarks {
+namespace sdnn::tools {
 namespace {
 
 TEST(BufferRead, ReadsEveryWord) {
@@ -65,4 +65,4 @@ TEST(Yardsticks, RefuseImpossibleSizes) {
 }
 
 }  // namespace
-}  // namespace sdnn::benchmarks
+}  // namespace sdnn::tools

@@ -1,4 +1,4 @@
-#include "sdnn/experiments/trial.hpp"
+#include "tools/trial.hpp"
 
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 
-namespace sdnn::experiments {
+namespace sdnn::tools {
 namespace {
 
 using testing::LookupTable;
@@ -327,4 +327,4 @@ TEST(AcrobotTrial, NamesWhatIsImpossible) {
 }
 
 }  // namespace
-}  // namespace sdnn::experiments
+}  // namespace sdnn::tools

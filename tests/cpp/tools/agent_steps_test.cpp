@@ -1,4 +1,4 @@
-#include "sdnn/experiments/detail/agent_steps.hpp"
+#include "tools/agent_steps.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,9 +13,9 @@
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
-#include "sdnn/experiments/detail/plain_rbf_network.hpp"
+#include "tools/plain_rbf_network.hpp"
 
-namespace sdnn::experiments {
+namespace sdnn::tools {
 namespace {
 
 using agents::FuzzyQLearning;
@@ -121,4 +121,4 @@ TEST(TimeAgentSteps, PlainAndFactoredAgentsLearnTheSame) {
 }
 
 }  // namespace
-}  // namespace sdnn::experiments
+}  // namespace sdnn::tools

@@ -8,9 +8,9 @@
 
 #include "sdnn/agents/agent.hpp"
 #include "sdnn/core/random.hpp"
-#include "sdnn/experiments/detail/stopwatch.hpp"
+#include "tools/stopwatch.hpp"
 
-namespace sdnn::experiments {
+namespace sdnn::tools {
 
 /// The times of `n_repetitions` whole steps at random states: learning the transition from the
 /// state before to a new one, then acting, with exploration, in the new one.
@@ -48,4 +48,4 @@ Times time_agent_steps(Agent& agent, int n_repetitions, std::uint64_t seed) {
       });
 }
 
-}  // namespace sdnn::experiments
+}  // namespace sdnn::tools

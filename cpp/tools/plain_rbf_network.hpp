@@ -14,7 +14,7 @@
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/elementary.hpp"
 
-namespace sdnn::experiments {
+namespace sdnn::tools {
 
 /// An RBF network whose `values` are evaluated as the definition says: every joint basis of every
 /// action. They agree with those of RBFNetwork to 1e-12 of the largest |weight|: a second algorithm
@@ -118,4 +118,4 @@ class PlainRBFNetwork {
   approximators::RBFNetwork network_;
 };
 
-}  // namespace sdnn::experiments
+}  // namespace sdnn::tools

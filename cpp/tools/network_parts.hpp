@@ -15,11 +15,9 @@
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
-#include "sdnn/experiments/detail/stopwatch.hpp"
+#include "tools/stopwatch.hpp"
 
-namespace sdnn::benchmarks {
-
-using experiments::keep, experiments::kMaxRepetitions, experiments::time_each, experiments::Times;
+namespace sdnn::tools {
 
 /// Times a network at random states, which are new to it: nothing it remembers helps.
 ///
@@ -154,4 +152,4 @@ class NetworkParts {
   std::vector<std::int32_t> potentials_;
 };
 
-}  // namespace sdnn::benchmarks
+}  // namespace sdnn::tools

@@ -1,11 +1,11 @@
-#include "sdnn/benchmarks/network_parts.hpp"
+#include "tools/network_parts.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cstddef>
 #include <stdexcept>
 
-namespace sdnn::benchmarks {
+namespace sdnn::tools {
 namespace {
 
 using approximators::SDNNC;
@@ -70,4 +70,4 @@ TEST(NetworkParts, RefusesImpossibleNumbers) {
 }
 
 }  // namespace
-}  // namespace sdnn::benchmarks
+}  // namespace sdnn::tools
