@@ -20,8 +20,8 @@ struct Counting {
   Episodes<Count> episodes{Count{first}};
 
   template <class Self, class Archive>
-  static void exchange(Self& self, Archive& archive) {
-    Episodes<Count>::exchange(
+  static void serialize(Self& self, Archive& archive) {
+    Episodes<Count>::serialize(
         self.episodes, archive, [&self] { return Count{self.first}; },
         [&archive](auto& episode) { archive.number("steps", episode.steps); });
   }

@@ -18,7 +18,7 @@ struct Inner {
   double value = 0.5;
 
   template <class Self, class Archive>
-  static void exchange(Self& self, Archive& archive) {
+  static void serialize(Self& self, Archive& archive) {
     archive.number("value", self.value);
   }
 };
@@ -31,7 +31,7 @@ struct Outer {
   Inner first, second;
 
   template <class Self, class Archive>
-  static void exchange(Self& self, Archive& archive) {
+  static void serialize(Self& self, Archive& archive) {
     archive.number("step", self.step);
     archive.number("is_on", self.is_on);
     archive.part("first", self.first);
@@ -107,12 +107,12 @@ struct Sparse {
   std::vector<Inner> others;
 
   template <class Self, class Archive>
-  static void exchange(Self& self, Archive& archive) {
+  static void serialize(Self& self, Archive& archive) {
     archive.number("limit", self.limit);
     if constexpr (Archive::kReads) self.others.resize(archive.n_numbered("other"));
     for (std::size_t i = 0; i < self.others.size(); ++i) {
       archive.within("other." + std::to_string(i + 1),
-                     [&] { Inner::exchange(self.others[i], archive); });
+                     [&] { Inner::serialize(self.others[i], archive); });
     }
   }
 };

@@ -43,7 +43,7 @@ class Episodes {
   /// Lists what `list(episode)` lists of each: the first one's as if there were no others, so that
   /// states do not tell an agent that can have several environments from one that cannot.
   template <class Self, class Archive, class Make, class List>
-  static void exchange(Self& self, Archive& archive, const Make& make, const List& list) {
+  static void serialize(Self& self, Archive& archive, const Make& make, const List& list) {
     if constexpr (Archive::kReads) self.resize(archive.n_numbered("environment") + 1, make);
     list(self.episodes_.front());
     for (std::size_t i = 1; i < self.size(); ++i) {

@@ -96,7 +96,7 @@ class EpsilonGreedy {
 
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
-  static void exchange(Self& self, Archive& archive) {
+  static void serialize(Self& self, Archive& archive) {
     archive.part("exploration", self.exploration_);
     archive.part("ties", self.ties_);
     archive.part("evaluation_ties", self.evaluation_ties_);

@@ -206,12 +206,12 @@ class FuzzyQLearning {
 
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
-  static void exchange(Self& self, Archive& archive) {
+  static void serialize(Self& self, Archive& archive) {
     archive.part("rules", self.rules_);
     archive.part("policy", self.policy_);
-    Episodes<Episode>::exchange(
+    Episodes<Episode>::serialize(
         self.episodes_, archive, [&self] { return self.new_episode(); },
-        [&](auto& episode) { exchange_episode(self, episode, archive); });
+        [&](auto& episode) { serialize_episode(self, episode, archive); });
     if constexpr (Archive::kReads) self.workspace_ = self.rules_.workspace();  // as new_episode's
   }
 
@@ -253,7 +253,7 @@ class FuzzyQLearning {
   }
 
   template <class Self, class Listed, class Archive>
-  static void exchange_episode(Self& self, Listed& listed, Archive& archive) {
+  static void serialize_episode(Self& self, Listed& listed, Archive& archive) {
     archive.number("step", listed.step);
     archive.fixed("last_state", {listed.state.size()}, listed.state);
     archive.number("last_action", listed.action);

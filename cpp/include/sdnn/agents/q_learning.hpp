@@ -352,7 +352,7 @@ class QLearning {
 
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
-  static void exchange(Self& self, Archive& archive) {
+  static void serialize(Self& self, Archive& archive) {
     archive.part("action_value", self.action_value_);
     archive.part("policy", self.policy_);
     archive.part("repetitions", self.repetitions_);
@@ -363,9 +363,9 @@ class QLearning {
     std::optional<int> n_random_left;  // none where there are no more
     if (self.n_random_left_ > 0) n_random_left = self.n_random_left_;
     archive.number("n_random_left", n_random_left);
-    Episodes<Episode>::exchange(
+    Episodes<Episode>::serialize(
         self.episodes_, archive, [&self] { return self.new_episode(); },
-        [&](auto& episode) { exchange_episode(self, episode, archive); });
+        [&](auto& episode) { serialize_episode(self, episode, archive); });
     if constexpr (Archive::kReads) {
       archive.expect(self.progress_ >= 0.0 && self.progress_ <= 1.0, "progress", "in [0, 1]");
       const double rate = self.set_learning_rate_.value_or(1.0);
@@ -399,7 +399,7 @@ class QLearning {
   }
 
   template <class Self, class Listed, class Archive>
-  static void exchange_episode(Self& self, Listed& episode, Archive& archive) {
+  static void serialize_episode(Self& self, Listed& episode, Archive& archive) {
     archive.part("waiting", episode.waiting);
     archive.number("range.sum", episode.sum);
     archive.number("step", episode.step);

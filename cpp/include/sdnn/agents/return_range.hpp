@@ -41,7 +41,7 @@ class ReturnRange {
 
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
-  static void exchange(Self& self, Archive& archive) {
+  static void serialize(Self& self, Archive& archive) {
     archive.number("low", self.low_);
     archive.number("high", self.high_);
     if constexpr (Archive::kReads) {  // comparisons with NaN are false

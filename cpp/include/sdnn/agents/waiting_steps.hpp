@@ -81,7 +81,7 @@ class WaitingSteps {
 
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
-  static void exchange(Self& self, Archive& archive) {
+  static void serialize(Self& self, Archive& archive) {
     std::vector<double> states;
     std::vector<std::int64_t> actions;
     std::vector<double> rewards;

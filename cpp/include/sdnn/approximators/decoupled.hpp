@@ -89,7 +89,7 @@ class Decoupled {
 
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
-  static void exchange(Self& self, Archive& archive) {
+  static void serialize(Self& self, Archive& archive) {
     for (std::size_t d = 0; d < self.parts_.size(); ++d) {
       archive.part(std::to_string(d), self.parts_[d]);
     }

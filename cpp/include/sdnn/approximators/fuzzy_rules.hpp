@@ -84,7 +84,7 @@ class FuzzyRules {
 
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
-  static void exchange(Self& self, Archive& archive) {
+  static void serialize(Self& self, Archive& archive) {
     archive.fixed("values", {self.n_rules_, self.n_actions()}, self.table_.span());
     if constexpr (Archive::kReads) {
       for (const float value : self.table_.span()) {

@@ -132,7 +132,7 @@ class RBFNetwork {
 
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
-  static void exchange(Self& self, Archive& archive) {
+  static void serialize(Self& self, Archive& archive) {
     archive.fixed("weights", {self.n_joint_bases_}, self.weights_.span());
     if constexpr (Archive::kReads) {
       ++self.n_updates_;

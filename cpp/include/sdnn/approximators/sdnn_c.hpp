@@ -248,7 +248,7 @@ class SDNNC {
 
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
-  static void exchange(Self& self, Archive& archive) {
+  static void serialize(Self& self, Archive& archive) {
     const std::size_t n_units = self.hidden_layer_.n_units();
     const std::size_t n_columns = self.code_->n_columns();
     std::vector<std::int16_t> weights(n_units * n_columns);  // weight_limit() is below 2^15

@@ -47,7 +47,7 @@ class Random {
 
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
-  static void exchange(Self& self, Archive& archive) {
+  static void serialize(Self& self, Archive& archive) {
     archive.fixed("words", {self.state_.size()}, self.state_);
     if constexpr (Archive::kReads) {  // of zeros alone come zeros for ever
       archive.expect(self.state_ != std::array<std::uint64_t, 4>{}, "words", "not all 0");

@@ -87,7 +87,7 @@ class Prefixed {
 /// Collects a state. A class that has one lists its members once, for writing and for reading:
 ///
 ///     template <class Self, class Archive>
-///     static void exchange(Self& self, Archive& archive) {
+///     static void serialize(Self& self, Archive& archive) {
 ///       archive.number("step", self.step_);
 ///       archive.numbers("rewards", self.rewards_);
 ///       archive.part("network", self.network_);
@@ -123,7 +123,7 @@ class StateWriter {
   }
   template <class Part>
   void part(std::string_view name, const Part& part) {
-    within(name, [&] { Part::exchange(part, *this); });
+    within(name, [&] { Part::serialize(part, *this); });
   }
   /// What `list` lists, with `name` before.
   template <class List>
@@ -183,7 +183,7 @@ class StateReader {
   }
   template <class Part>
   void part(std::string_view name, Part& part) {
-    within(name, [&] { Part::exchange(part, *this); });
+    within(name, [&] { Part::serialize(part, *this); });
   }
   /// What `list` lists, with `name` before.
   template <class List>
@@ -273,7 +273,7 @@ class StateReader {
 template <class Object>
 State state_of(const Object& object) {
   StateWriter writer;
-  Object::exchange(object, writer);
+  Object::serialize(object, writer);
   return std::move(writer.state);
 }
 
@@ -283,7 +283,7 @@ template <class Object>
 void restore(Object& object, const State& state) {
   Object restored = object;
   StateReader reader(state);
-  Object::exchange(restored, reader);
+  Object::serialize(restored, reader);
   reader.finish();
   object = std::move(restored);
 }

@@ -65,7 +65,7 @@ class WeightAverage {
 
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
-  static void exchange(Self& self, Archive& archive) {
+  static void serialize(Self& self, Archive& archive) {
     std::vector<std::int32_t> weights(self.n_units_ * self.n_columns_);
     if constexpr (!Archive::kReads) {
       for (std::size_t unit = 0; unit < self.n_units_; ++unit) {
