@@ -41,7 +41,7 @@ def run(task: tuple[str, int, float, int]) -> dict[str, object]:
     trial.advance(15_000)
     seconds = time.thread_time() - start
     dense = float(np.median([dense, dense_microseconds(n_inputs)]))
-    counts = trial.memory_counts()
+    counts = trial.cache_counts()
     n = trial.n_decisions
     return {
         "case": case,

@@ -71,7 +71,7 @@ py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
 
 using SDNNTrial = AcrobotTrial<QLearning<SDNNC>>;
 
-py::typing::Dict<py::str, py::int_> memory_counts(const SDNNTrial& trial) {
+py::typing::Dict<py::str, py::int_> cache_counts(const SDNNTrial& trial) {
   const auto& counts = trial.agent().own_workspace().approximator.cache().counts();
   py::typing::Dict<py::str, py::int_> out;
   out["full"] = counts.full;
@@ -134,7 +134,7 @@ void bind_trials(py::module_& module) {
       "Learning protocol of a trial; the defaults are the paper's (section 4.2).");
 
   def_trial(module, "AcrobotTrial", "SDNN-C learns the acrobot swing-up", &sdnn_agent)
-      .def("memory_counts", &memory_counts,
+      .def("cache_counts", &cache_counts,
            "How potentials came about so far: full passes, from neighbours, columns added");
   def_trial(module, "FuzzyAcrobotTrial", "Fuzzy Q-learning learns the acrobot swing-up",
             &agent_with<FuzzyQLearning, FuzzyRules, FuzzyRulesConfig, FuzzyQLearningConfig>);

@@ -1638,7 +1638,7 @@ class AcrobotTrial:
         """
         Runs up to n more learning episodes
         """
-    def memory_counts(self) -> dict[str, int]:
+    def cache_counts(self) -> dict[str, int]:
         """
         How potentials came about so far: full passes, from neighbours, columns added
         """
