@@ -12,13 +12,13 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents import QLearningConfig
+from sdnn.agents import QLearningConfig, Training
 from sdnn.approximators import SDNNCConfig
-from sdnn.arguments import real
+from sdnn.arguments import real, whole
 from sdnn.config import ProtocolConfig
 from sdnn.environments import NoisySensors, UnitSensors
 from sdnn.runs.registry import agent_entry
-from sdnn.runs.trial import TrainingTrial, check_protocol, protocol_trial
+from sdnn.runs.trial import TrainingTrial
 from sdnn.runs.trial_config import TrialSettings
 
 _LEARNING, _TEST = 0, 1
@@ -126,7 +126,9 @@ def environment_trial(config: EnvironmentTrialConfig, seed: int) -> TrainingTria
     ValueError
         If a value is out of its range, or agent and environment do not fit.
     """
-    check_protocol(config.protocol)
+    protocol = config.protocol
+    for name in ("n_learning_episodes", "test_interval"):
+        whole(name, getattr(protocol, name), 1, 2**53)
     with ExitStack() as stack:
         env = config.environment.make(seed, "sensor_noise")
         stack.callback(env.close)
@@ -151,9 +153,18 @@ def environment_trial(config: EnvironmentTrialConfig, seed: int) -> TrainingTria
             learning=config.learning,
             seed=seed,
         )
-        trial = protocol_trial(agent, env, test_env, config.protocol)
+        training = Training(
+            agent,
+            env,
+            episodes=protocol.n_learning_episodes,
+            seed=None,
+            evaluate_every_episodes=protocol.test_interval,
+            evaluation_env=test_env,
+            evaluation_episodes=1,
+            limit_bootstraps=protocol.limit_bootstraps,
+        )
         stack.pop_all()
-    return trial
+    return TrainingTrial(training, (env, test_env))
 
 
 def _environment_seed(seed: int, number: int) -> int:

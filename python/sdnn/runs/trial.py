@@ -6,27 +6,15 @@ siblings), by the same protocol, bit for bit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypeVar
 
 import gymnasium as gym
-import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents import Callback, EarlyStop, Training
-from sdnn.agents.transition import Learner
 from sdnn.arguments import whole
-from sdnn.config import ProtocolConfig
-from sdnn.environments import (
-    AcrobotConfig,
-    AcrobotSensors,
-    AcrobotSwingUpEnv,
-    GoalSchedule,
-    GoalScheduleConfig,
-    SensorConfig,
-    TighteningGoal,
-)
 from sdnn.runs.records import TrialRows
 
 if TYPE_CHECKING:
@@ -200,110 +188,3 @@ def training_of(
         limit_bootstraps=spec.protocol.limit_bootstraps,
         reset_options=(lambda episode: {"episode": episode}) if is_acrobot else None,
     )
-
-
-def python_trial(
-    make_agent: Callable[..., Learner],
-    *,
-    approximator: Any,
-    learning: Any,
-    acrobot: AcrobotConfig,
-    goal: GoalScheduleConfig,
-    sensors: SensorConfig,
-    protocol: ProtocolConfig,
-    seed: int,
-) -> TrainingTrial:
-    """Make the trial of an agent in Python, on Gymnasium environments.
-
-    For the same agent and seed it gives the rows of the compiled trial, bit for bit.
-
-    Parameters
-    ----------
-    make_agent
-        Makes the agent from an observation space, an action space and ``approximator=``,
-        ``learning=``, ``seed=``.
-    approximator, learning
-        The agent's settings. ``approximator.n_inputs`` must be the number of sensors.
-    acrobot, goal, sensors, protocol
-        The task's settings.
-    seed
-        The same seed gives every agent the same sensor noise, observation by observation.
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its range, or agent and sensors do not fit.
-    """
-    check_protocol(protocol)
-    if approximator.n_inputs != sensors.n_inputs:
-        raise ValueError(
-            f"n_inputs must be the number of inputs of the sensors, {sensors.n_inputs},"
-            f" got {approximator.n_inputs}"
-        )
-    tested = sensors if protocol.noisy_tests else sensors.replace(noise=0.0)
-    env = _environment(acrobot, goal, sensors, seed, "sensor_noise")
-    test_env = _environment(acrobot, goal, tested, seed, "evaluation_sensor_noise")
-    agent = make_agent(
-        env.observation_space,
-        env.action_space,
-        approximator=approximator,
-        learning=learning,
-        seed=seed,
-    )
-    return protocol_trial(agent, env, test_env, protocol, lambda episode: {"episode": episode})
-
-
-def protocol_trial(
-    agent: Learner,
-    env: gym.Env[Any, Any],
-    test_env: gym.Env[Any, Any],
-    protocol: ProtocolConfig,
-    reset_options: Callable[[int], dict[str, Any]] | None = None,
-) -> TrainingTrial:
-    """Make a trial by the paper's protocol; the environments' random streams run on.
-
-    Parameters
-    ----------
-    agent
-        Acts in both environments and learns in the first.
-    env, test_env
-        The task of the learning and of the test episodes; with own random streams, so that tests
-        change nothing that is learned later.
-    protocol
-        Learning and test episodes.
-    reset_options
-        See `sdnn.agents.Training`.
-    """
-    training = Training(
-        agent,
-        env,
-        episodes=protocol.n_learning_episodes,
-        seed=None,
-        evaluate_every_episodes=protocol.test_interval,
-        evaluation_env=test_env,
-        evaluation_episodes=1,
-        limit_bootstraps=protocol.limit_bootstraps,
-        reset_options=reset_options,
-    )
-    return TrainingTrial(training, (env, test_env))
-
-
-def check_protocol(protocol: ProtocolConfig) -> None:
-    """Check what the core checks of a trial in C++.
-
-    Raises
-    ------
-    ValueError
-        If a number of the protocol is less than 1.
-    """
-    for name in ("n_learning_episodes", "test_interval"):
-        if getattr(protocol, name) < 1:
-            raise ValueError(f"{name} must be at least 1, got {getattr(protocol, name)}")
-
-
-def _environment(
-    acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, seed: int, stream: Any
-) -> gym.Env[NDArray[np.float64], Any]:
-    """Stack the task as the core does."""
-    env = TighteningGoal(AcrobotSwingUpEnv(config=acrobot, dtype="float64"), GoalSchedule(goal))
-    return AcrobotSensors(env, sensors, seed=seed, stream=stream)

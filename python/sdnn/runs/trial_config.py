@@ -18,7 +18,8 @@ from sdnn.config import ProtocolConfig
 from sdnn.environments import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.runs.records import TrialKey
 from sdnn.runs.registry import agent_entry
-from sdnn.runs.trial import TrainingTrial, Trial, python_trial
+from sdnn.runs.spec import AgentSpec, BudgetSpec, ProtocolSpec, RunSpec
+from sdnn.runs.trial import TrainingTrial, Trial, training_trial
 
 CONFIG_HASH_DIGITS = 16
 """Hexadecimal digits kept of a configuration's SHA-256: 64 bits."""
@@ -54,6 +55,32 @@ class TrialSettings(ABC):
     def length(self) -> int:
         """Learning episodes of the trial, in which its progress is told."""
         return self.protocol.n_learning_episodes
+
+    def specification(self, seed: int, **task: Any) -> RunSpec:
+        """Give the same agent and protocol as the specification of a run.
+
+        Parameters
+        ----------
+        seed
+            Of the run.
+        task
+            What it is done in.
+        """
+        protocol = self.protocol
+        return RunSpec(
+            agent=AgentSpec(name=self.agent),
+            approximator=self.approximator,
+            learning=self.learning,
+            protocol=ProtocolSpec(
+                evaluate_every_episodes=protocol.test_interval,
+                evaluation_episodes=1,
+                limit_bootstraps=protocol.limit_bootstraps,
+                noisy_evaluations=protocol.noisy_tests,
+            ),
+            budget=BudgetSpec(episodes=protocol.n_learning_episodes),
+            seed=seed,
+            **task,
+        )
 
     def check_agent(self) -> None:
         """Check that there is such an agent, and that the settings are its own.
@@ -168,10 +195,16 @@ class TrialConfig(TrialSettings):
             If a value of the configuration is out of its range.
         """
         entry = agent_entry(self.agent)
-        parts = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "agent"}
-        if entry.core_trial is None:
-            return python_trial(entry.make_agent, **parts, seed=seed)
-        return entry.core_trial(**parts, seed=seed)
+        if entry.core_trial is not None:
+            parts = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "agent"}
+            return entry.core_trial(**parts, seed=seed)
+        if self.approximator.n_inputs != self.sensors.n_inputs:
+            raise ValueError(
+                f"n_inputs must be the number of inputs of the sensors, {self.sensors.n_inputs},"
+                f" got {self.approximator.n_inputs}"
+            )
+        task = {"acrobot": self.acrobot, "goal": self.goal, "sensors": self.sensors}
+        return training_trial(self.specification(seed, **task))
 
 
 def _canonical(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The trial in Python against the compiled ones, and the registry that chooses between them."""
+"""Trainings against the compiled trials, and the registry that chooses between them."""
 
 from dataclasses import dataclass, replace
 
