@@ -5,12 +5,15 @@ from __future__ import annotations
 import abc
 import copy
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import gymnasium as gym
 import numpy as np
 
 __all__ = ["Outcome", "Rounds", "rounds_in"]
+
+Seeds: TypeAlias = Mapping[int, int | None]
+Options: TypeAlias = dict[str, Any] | None
 
 
 class Outcome(NamedTuple):
@@ -52,9 +55,7 @@ class Rounds(abc.ABC):
     can_repeat: bool
 
     @abc.abstractmethod
-    def reset(
-        self, seeds: Mapping[int, int | None], options: dict[str, Any] | None = None
-    ) -> dict[int, Any]:
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
         """Begin episodes in some environments, with seeds: their first observations.
 
         One that is missing has none yet: its episode begins with the next `step`, which gives it.
@@ -82,19 +83,14 @@ class _OneEnvironment(Rounds):
     def __init__(self, env: gym.Env[Any, Any]) -> None:
         self._env = env
 
-    def reset(
-        self, seeds: Mapping[int, int | None], options: dict[str, Any] | None = None
-    ) -> dict[int, Any]:
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
         return {
             i: own_copy(self._env.reset(seed=seed, options=options)[0]) for i, seed in seeds.items()
         }
 
     def step(self, actions: Sequence[Any]) -> list[Outcome]:
-        action = actions[0]
-        taken = action.copy() if type(action) is np.ndarray else own_copy(action)
-        seen, reward, terminated, truncated, _ = self._env.step(taken)
-        seen = seen.copy() if type(seen) is np.ndarray else own_copy(seen)
-        return [Outcome(seen, reward, bool(terminated), bool(truncated))]
+        seen, reward, terminated, truncated, _ = self._env.step(own_copy(actions[0]))
+        return [Outcome(own_copy(seen), reward, bool(terminated), bool(truncated))]
 
 
 class _Vector(Rounds, abc.ABC):
@@ -146,9 +142,7 @@ class _SeparateResets(_Vector):
 
     can_repeat = True
 
-    def reset(
-        self, seeds: Mapping[int, int | None], options: dict[str, Any] | None = None
-    ) -> dict[int, Any]:
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
         mask = np.array([i in seeds for i in range(self.n_environments)])
         # Without the option where it is not needed: some wrappers know complete resets only.
         options = None if mask.all() else {"reset_mask": mask}
@@ -171,9 +165,7 @@ class _OwnResets(_Vector):
         self._seen: list[Any] | None = None
         self._taken: list[Any] = []
 
-    def reset(
-        self, seeds: Mapping[int, int | None], options: dict[str, Any] | None = None
-    ) -> dict[int, Any]:
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
         if self._seen is None:
             observations, _ = self._env.reset(seed=seeds[0])
             self._seen = self._listed(observations)

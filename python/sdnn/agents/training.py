@@ -30,6 +30,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Training", "TrainingResult"]
 
+_SETTINGS = (
+    "seed", "evaluate_every", "evaluate_every_episodes", "evaluation_episodes", "limit_bootstraps"
+)  # fmt: skip
+_COUNTS = ("n_steps", "n_episodes", "n_rows")
+"""Attributes that are saved as they are."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingResult:
@@ -296,18 +302,9 @@ class Training:
         OSError
             If the file cannot be written.
         """
+        names = ("steps", "episodes", "next_episode", *_SETTINGS, *_COUNTS)
         saved = SavedTraining(
-            steps=self.steps,
-            episodes=self.episodes,
-            seed=self.seed,
-            n_steps=self.n_steps,
-            n_episodes=self.n_episodes,
-            n_rows=self.n_rows,
-            next_episode=self.next_episode,
-            evaluate_every=self.evaluate_every,
-            evaluate_every_episodes=self.evaluate_every_episodes,
-            evaluation_episodes=self.evaluation_episodes,
-            limit_bootstraps=self.limit_bootstraps,
+            **{name: getattr(self, name) for name in names},
             evaluations=np.array(self.evaluations, np.float64).reshape(-1, 2),
             present=self._episodes.saved(
                 self.agent.action_space.shape or (), self.agent.flat_observation
@@ -363,18 +360,14 @@ class Training:
             env,
             steps=steps if has_goal else saved.steps,
             episodes=episodes if has_goal else saved.episodes,
-            seed=saved.seed,
             first_episode=saved.next_episode,
             callbacks=callbacks,
-            evaluate_every=saved.evaluate_every,
-            evaluate_every_episodes=saved.evaluate_every_episodes,
             evaluation_env=evaluation_env,
-            evaluation_episodes=saved.evaluation_episodes,
-            limit_bootstraps=saved.limit_bootstraps,
             reset_options=reset_options,
+            **{name: getattr(saved, name) for name in _SETTINGS},
         )
-        training.n_steps, training.n_episodes = saved.n_steps, saved.n_episodes
-        training.n_rows = saved.n_rows
+        for name in _COUNTS:
+            setattr(training, name, getattr(saved, name))
         training.evaluations = [(int(step), mean) for step, mean in saved.evaluations.tolist()]
         if does_repeat:
             training._episodes.repeat(saved.present, agent.flat_observation)
