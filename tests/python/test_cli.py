@@ -158,14 +158,13 @@ def test_the_most_episodes_make_a_trial(tmp_path):
 def no_costs(monkeypatch):
     """Costs that take no time, and a list of what was asked."""
     from sdnn.reproduction import cost
-    from sdnn.reproduction.cost import StepTimes
 
     asked = []
 
     def measure(entry, series, n_inputs, config):
         asked.append((series.id, n_inputs))
         times = float(n_inputs) * np.ones(config.n_rounds)
-        return StepTimes(microseconds=times, n_steps=1, table_bytes=1)
+        return tuple(times.tolist()), 1, 1
 
     monkeypatch.setattr(cost, "measure_steps", measure)
     return asked

@@ -11,12 +11,10 @@ import hashlib
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
-from datetime import datetime, timezone
 from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.spaces import Box
-from numpy.typing import NDArray
 
 from sdnn import _core, machine
 from sdnn.runs.engine import Observer
@@ -42,92 +40,46 @@ class CostKey(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class StepTimes:
-    """Measured times of an agent's steps.
+class CostRecord:
+    """The cost of a series at one number of inputs: the median time of a step in each round.
 
-    Parameters
-    ----------
-    microseconds : (n_rounds,)
-        Median time of a step in each round.
-    n_steps
-        Steps in a round.
-    table_bytes
-        Memory of what the agent learns.
+    `n_steps` are those of a round, `table_bytes` the memory of what the agent learns.
     """
 
-    microseconds: NDArray[np.float64]
+    series: str
+    n_inputs: int
+    microseconds: tuple[float, ...]
     n_steps: int
     table_bytes: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class CostRecord:
-    """The cost of a series at one number of inputs.
-
-    Parameters
-    ----------
-    key
-        Which measurement it is.
-    version
-        Version of the library.
-    machine
-        Processor and instruction set.
-    finished_at
-        Time of the end, ISO 8601, UTC.
-    times
-        What was measured.
-    """
-
-    key: CostKey
-    version: str
     machine: str
-    finished_at: str
-    times: StepTimes
+    version: str
+    config_hash: str
 
     @property
-    def microseconds(self) -> NDArray[np.float64]:
-        """Median time of a step in each round, (n_rounds,)."""
-        return self.times.microseconds
-
-    def stored(self) -> dict[str, Any]:
-        """Return it as the result file has it; `load_costs` reads it."""
-        values = {"config_hash": self.key.config_hash, "finished_at": self.finished_at}
-        return {**self.to_json(), **values}
+    def key(self) -> CostKey:
+        """Which measurement it is."""
+        return CostKey(self.series, self.n_inputs, self.config_hash)
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as values that JSON can hold."""
-        return {
-            "series": self.key.series,
-            "n_inputs": self.key.n_inputs,
-            "microseconds": self.microseconds.tolist(),
-            "n_steps": self.times.n_steps,
-            "table_bytes": self.times.table_bytes,
-            "machine": self.machine,
-            "version": self.version,
-        }
+        """Return it as values that JSON can hold, without its settings."""
+        return {k: v for k, v in asdict(self).items() if k != "config_hash"}
 
 
 def round_rows(costs: Iterable[CostRecord]) -> Iterator[tuple[object, ...]]:
     """All rounds of cost measurements under `COST_ROW_HEADER`."""
     for cost in costs:
-        end = (cost.times.n_steps, cost.times.table_bytes, cost.version, cost.machine)
-        for number, microseconds in enumerate(cost.microseconds.tolist()):
-            yield (cost.key.series, cost.key.n_inputs, number, microseconds, *end)
+        end = (cost.n_steps, cost.table_bytes, cost.version, cost.machine)
+        for number, microseconds in enumerate(cost.microseconds):
+            yield (cost.series, cost.n_inputs, number, microseconds, *end)
 
 
 def load_costs(store: ResultStore, config_hash: str) -> tuple[CostRecord, ...]:
     """Read the stored measurements under the given settings, sorted by key."""
-    found = []
-    for told in store.measurements(KIND).values():
-        if told["config_hash"] == config_hash:
-            times = StepTimes(
-                microseconds=np.array(told["microseconds"], np.float64),
-                n_steps=told["n_steps"],
-                table_bytes=told["table_bytes"],
-            )
-            key = CostKey(told["series"], told["n_inputs"], config_hash)
-            rest = {name: told[name] for name in ("version", "machine", "finished_at")}
-            found.append(CostRecord(key=key, times=times, **rest))
+    found = (
+        CostRecord(**values | {"microseconds": tuple(values["microseconds"])})
+        for values in store.measurements(KIND).values()
+        if values["config_hash"] == config_hash
+    )
     return tuple(sorted(found, key=lambda record: record.key))
 
 
@@ -181,25 +133,31 @@ def measure_costs(
     by_id = {series.id: (entry, series) for entry, series in cost_series()}
     for key in missing:
         entry, series = by_id[key.series]
-        times = measure_steps(entry, series, key.n_inputs, config)
-        if times is not None:
+        measured = measure_steps(entry, series, key.n_inputs, config)
+        if measured is not None:
+            microseconds, n_steps, table_bytes = measured
             record = CostRecord(
-                key=key,
-                version=_core.__version__,
+                **key._asdict(),
+                microseconds=microseconds,
+                n_steps=n_steps,
+                table_bytes=table_bytes,
                 machine=machine.description(),
-                finished_at=datetime.now(timezone.utc).isoformat(timespec="seconds"),
-                times=times,
+                version=_core.__version__,
             )
-            store.put(KIND, repr(tuple(key)), record.stored())
+            store.put(KIND, repr(tuple(key)), asdict(record))
         observer.cost_measured(f"{series.title}, {key.n_inputs} inputs")
 
 
 def measure_steps(
     entry: AgentEntry, series: CostSeries, n_inputs: int, config: CostConfig
-) -> StepTimes | None:
+) -> tuple[tuple[float, ...], int, int] | None:
     """Measure a step of an agent of the paper's sizes: acting in a new state and learning.
 
-    It is None where there is no memory for the agent.
+    Returns
+    -------
+    tuple or None
+        Microseconds in each round, steps in a round, and bytes of what the agent learns; None where
+        there is no memory for the agent.
     """
     approximator = entry.approximator(**(dict(series.settings) | {"n_inputs": n_inputs}))
     try:
@@ -213,15 +171,11 @@ def measure_steps(
     if n_learned:
         in_a_round = int(config.round_seconds * 1e9 / float(np.median(learning)))
     n_steps = max(config.min_steps, in_a_round)
-    medians = [
+    medians = tuple(
         float(np.median(_core.time_agent_steps(agent, n_steps, SEED + 2 + number))) / 1e3
         for number in range(config.n_rounds)
-    ]
-    return StepTimes(
-        microseconds=np.array(medians, np.float64),
-        n_steps=n_steps,
-        table_bytes=series.learned_bytes(approximator),
     )
+    return medians, n_steps, series.learned_bytes(approximator)
 
 
 def _core_agent(entry: AgentEntry, series: CostSeries, approximator: Any) -> Any:

@@ -114,10 +114,10 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
     axes = figure.add_subplot()
     colors = colors_of(range(len(cost_series())))
     for number, (_, series) in enumerate(cost_series()):
-        own = sorted((c for c in costs if c.key.series == series.id), key=lambda c: c.key.n_inputs)
+        own = sorted((c for c in costs if c.series == series.id), key=lambda c: c.n_inputs)
         if not own:
             continue
-        x = [cost.key.n_inputs for cost in own]
+        x = [cost.n_inputs for cost in own]
         lower, middle, upper = np.transpose(
             [np.percentile(cost.microseconds, (25, 50, 75)) for cost in own]
         )
@@ -134,7 +134,7 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
                 label="proportional to $d(d-1)$",
             )  # fmt: skip
     axes.set_yscale("log")
-    axes.set_xticks(sorted({cost.key.n_inputs for cost in costs}))
+    axes.set_xticks(sorted({cost.n_inputs for cost in costs}))
     axes.set_xlabel("number of inputs d")
     axes.set_ylabel("time of a step [µs]")
     style(axes)

@@ -320,13 +320,13 @@ def format_quantity(checked: CheckOutcome) -> str:
 
 def cost_table(costs: Sequence[CostRecord]) -> Table:
     """Return the table of costs: a row for each number of inputs, a column for each series."""
-    by_key = {(cost.key.series, cost.key.n_inputs): cost for cost in costs}
+    by_key = {(cost.series, cost.n_inputs): cost for cost in costs}
     series = [series for _, series in cost_series()]
     rows = []
-    for n_inputs in sorted({cost.key.n_inputs for cost in costs}):
+    for n_inputs in sorted({cost.n_inputs for cost in costs}):
         cells = [_cost(by_key, one.id, n_inputs) for one in series]
         table = by_key.get(("fuzzy", n_inputs))
-        size = "-" if table is None else _scaled(table.times.table_bytes, _BYTES, "B")
+        size = "-" if table is None else _scaled(table.table_bytes, _BYTES, "B")
         rows.append((str(n_inputs), *cells, size))
     return Table("Cost of a step", ("inputs", *(one.title for one in series), "FQL's table"), rows)
 

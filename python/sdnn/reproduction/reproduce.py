@@ -297,7 +297,7 @@ def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[
     }
     report = Report(
         experiments=experiments,
-        costs=tuple(cost for cost in costs if cost.key.series in shown),
+        costs=tuple(cost for cost in costs if cost.series in shown),
         quick=request.quick,
         seed=request.seed,
         digest=records_digest(records),

@@ -190,11 +190,11 @@ def _judge(
     samples: tuple[FloatArray, ...] = ()
     last_episode = PAPER_EPISODES
     if isinstance(quantity, Growth):
-        times = {c.key.n_inputs: c.microseconds for c in costs if c.key.series == quantity.series}
+        times = {c.n_inputs: c.microseconds for c in costs if c.series == quantity.series}
         if not {quantity.n_inputs, quantity.n_fewer} <= times.keys():
             return CheckOutcome(check, None, Verdict.NOT_RUN)
         estimate = estimate_contrast(times[quantity.n_inputs], times[quantity.n_fewer], np.divide)
-        is_full = all(one.key.config_hash == CostConfig().config_hash for one in costs)
+        is_full = all(one.config_hash == CostConfig().config_hash for one in costs)
     else:
         if not measured.keys() >= set(quantity.subjects):
             return CheckOutcome(check, None, Verdict.NOT_RUN)

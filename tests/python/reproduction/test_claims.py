@@ -17,7 +17,7 @@ from sdnn.reproduction.claims import (
     Subject,
     describe,
 )
-from sdnn.reproduction.cost import QUICK_COST, CostConfig, CostKey, CostRecord, StepTimes
+from sdnn.reproduction.cost import QUICK_COST, CostConfig, CostRecord
 from sdnn.reproduction.report import POWER_NOTE, Report
 from sdnn.reproduction.verdicts import (
     CheckOutcome,
@@ -58,9 +58,11 @@ def result(case_id, agent, steps, n_trials=10, n_tests=1500):
 
 
 def cost(series, n_inputs, microseconds, config=None):
-    times = StepTimes(microseconds=np.array(microseconds, float), n_steps=1, table_bytes=1)
-    key = CostKey(series, n_inputs, (config or CostConfig()).config_hash)
-    return CostRecord(key=key, version="0", machine="m", finished_at="", times=times)
+    config_hash = (config or CostConfig()).config_hash
+    return CostRecord(
+        series=series, n_inputs=n_inputs, microseconds=tuple(map(float, microseconds)), n_steps=1,
+        table_bytes=1, machine="m", version="0", config_hash=config_hash,
+    )  # fmt: skip
 
 
 def verdicts(summaries, costs=()):
