@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from sdnn.reproduction.sweep.reading import read_study
-from sdnn.reproduction.sweep.study import Study
+from sdnn.reproduction.studies import read_study
 from sdnn.runs.figures import figure_bytes, require_matplotlib
 from sdnn.runs.measures import SHARE_STABLE, final_share_solved
 from sdnn.runs.registry import agent_entry
 from sdnn.runs.store import ResultStore
+from sdnn.runs.study import Study
 from sdnn.whole_files import write_whole
 
 STUDY = Path(__file__).with_name("noise-surface.toml")

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from sdnn.cli import main
 from sdnn.reproduction import AGENTS
-from sdnn.reproduction.sweep.reading import read_study
+from sdnn.reproduction.studies import read_study
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "sweep.md").read_text()
@@ -59,7 +59,7 @@ def test_the_agent_of_the_page_runs(tmp_path, monkeypatch):
     [
         "runs.environment_trial", "runs.measures",
         "runs.report", "runs.statistics", "reproduction.report",
-        "reproduction.sweep.settings", "toml_lines", "typed_values",
+        "runs.study_settings", "toml_lines", "typed_values",
     ],
 )  # fmt: skip
 def test_examples_in_docstrings(name):

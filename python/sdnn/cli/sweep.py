@@ -67,8 +67,7 @@ def sweep(
     Finished trials are kept in OUT/results.sqlite, which `reproduce` may share; the same command
     goes on where it stopped.
     """
-    from sdnn.reproduction.study_claims import add_claims
-    from sdnn.reproduction.sweep.reading import read_study
+    from sdnn.reproduction.studies import add_claims, read_study
     from sdnn.runs.errors import StudyError
     from sdnn.runs.sweep import SweepRequest
     from sdnn.runs.sweep import sweep as run

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +13,7 @@ from sdnn.runs.measures import RETURN_MEASURES, SHARE_STABLE, STEP_MEASURES, Mea
 from sdnn.runs.records import TrialRecord
 from sdnn.runs.results import CaseResult, measure, on_equal_terms
 from sdnn.runs.statistics import Estimate, estimate_mean
-
-Study: TypeAlias = Any
-Combination: TypeAlias = Any
-StudyCase: TypeAlias = Any
-StudyVariant: TypeAlias = Any
+from sdnn.runs.study import Combination, Study, StudyCase, StudyVariant
 
 MIN_TRIALS_TO_DIFFER = 6
 """Fewer paired trials are all on one side by chance more often than once in twenty times."""

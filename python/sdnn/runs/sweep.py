@@ -9,13 +9,14 @@ from functools import cached_property
 from pathlib import Path
 
 from sdnn import _core
-from sdnn.runs.comparison import Comparison, Study, compare
+from sdnn.runs.comparison import Comparison, compare
 from sdnn.runs.engine import Observer, run_trials
 from sdnn.runs.executor import Executor
 from sdnn.runs.figures import draw_study, figure_bytes, require_matplotlib
 from sdnn.runs.records import ROW_HEADER, records_digest, trial_rows
 from sdnn.runs.report import Finished, describe_call, json_bytes, require_jinja
 from sdnn.runs.store import STORE_NAME, ResultStore
+from sdnn.runs.study import Study
 from sdnn.runs.study_report import Addition, study_json, study_page
 from sdnn.runs.trial_config import PlannedTrial
 from sdnn.whole_files import csv_pieces, gzip_pieces, remove_abandoned_files, write_whole

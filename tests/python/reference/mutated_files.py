@@ -19,7 +19,7 @@ from sdnn.agents.agent import load_agent
 from sdnn.coding import Symbolic, WithMissing
 from sdnn.estimators import libsdnn
 from sdnn.reproduction import ResultStore, StoreError
-from sdnn.reproduction.sweep.reading import read_study
+from sdnn.reproduction.studies import read_study
 from sdnn.runs.config import RunConfig
 from sdnn.runs.errors import RunError
 

@@ -304,11 +304,11 @@ WRONG = {
     "study value": ("[study]\ntrials = 'x'\n", 2, "study.trials: must be a whole number, got 'x'"),
     "trials": ("[study]\ntrials = 0\n", 2, "study.trials: must be at least 1, got 0"),
     "seed": ("[study]\nseed = -1\n", 2, "study.seed: must be at least 0, got -1"),
-    "no cases": ("[base]\nagent = 'fuzzy'\n", None, "no cases: give some of the paper's"),
+    "no cases": ("[base]\nagent = 'fuzzy'\n", None, "no cases: give some of s4, s6"),
     "case": (
         "[study]\ncases = [\n 's4',\n 's5-nois',\n]\n", 4,
-        "study.cases[1]: no case 's5-nois': neither a table [cases.s5-nois] nor a case of the"
-        " paper; possible: s5-noise,",
+        "study.cases[1]: no case 's5-nois': neither a table [cases.s5-nois] nor a known case"
+        "; possible: s5-noise,",
     ),
     "unlisted case": (
         "[study]\ncases = ['s4']\n[cases.x]\n", 3,
@@ -316,12 +316,12 @@ WRONG = {
     ),
     "paper's case": (
         "[cases.s4-noise]\n[cases.s4]\nsensors.noise = 0.1\n", 3,
-        "cases.s4.sensors.noise: s4 is the paper's case of 4 sensors with noise 0:",
+        "cases.s4.sensors.noise: s4 is the known case of 4 sensors with noise 0:",
     ),
     "no table of sensors": ("[cases.s4]\nsensors = 3\n", 2, "cases.s4.sensors: must be a table of"),
     "paper's case elsewhere": (
         "[cases.s4]\nenvironment = 'Pendulum-v1'\n", 2,
-        "cases.s4.environment: s4 is the paper's case",
+        "cases.s4.environment: s4 is the known case",
     ),
     "reference": (
         "[study]\nreference = 'slo'\n[cases.s4]\n[variants.slow]\n[variants.b]\n", 2,

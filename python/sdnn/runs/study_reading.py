@@ -14,8 +14,18 @@ from typing import Any, Literal
 
 from sdnn.config import ProtocolConfig
 from sdnn.environments import AcrobotConfig, GoalScheduleConfig, SensorConfig
-from sdnn.reproduction.cases import PAPER_CASES, PAPER_TRIALS
-from sdnn.reproduction.sweep.settings import (
+from sdnn.runs.environment_trial import EnvironmentConfig, EnvironmentTrialConfig
+from sdnn.runs.errors import StudyError
+from sdnn.runs.preset_agents import PRESET_AGENTS
+from sdnn.runs.registry import AGENTS, agent_entry
+from sdnn.runs.study import (
+    Combination,
+    KnownCase,
+    Study,
+    StudyCase,
+    StudyVariant,
+)
+from sdnn.runs.study_settings import (
     Setting,
     Settings,
     StudyFile,
@@ -23,16 +33,6 @@ from sdnn.reproduction.sweep.settings import (
     build,
     place_of,
 )
-from sdnn.reproduction.sweep.study import (
-    Combination,
-    Study,
-    StudyCase,
-    StudyVariant,
-)
-from sdnn.runs.environment_trial import EnvironmentConfig, EnvironmentTrialConfig
-from sdnn.runs.errors import StudyError
-from sdnn.runs.preset_agents import PRESET_AGENTS
-from sdnn.runs.registry import AGENTS, agent_entry
 from sdnn.runs.trial_config import TrialConfig
 from sdnn.toml_lines import KeyPath
 from sdnn.typed_values import possible_words
@@ -53,14 +53,20 @@ class _Header:
     """The table [study]."""
 
     title: str = ""
-    trials: int = PAPER_TRIALS
+    trials: int = 10
     seed: int = 0
     reference: str | None = None
     imports: tuple[str, ...] = ()
     cases: tuple[str, ...] | None = field(default=None)
 
 
-def read_study(path: Path, *, n_trials: int | None = None, seed: int | None = None) -> Study:
+def read_study(
+    path: Path,
+    *,
+    n_trials: int | None = None,
+    seed: int | None = None,
+    known_cases: Mapping[str, KnownCase] | None = None,
+) -> Study:
     """Read a study.
 
     Modules that it imports are looked for beside the file, too.
@@ -71,6 +77,8 @@ def read_study(path: Path, *, n_trials: int | None = None, seed: int | None = No
         A TOML file; ``docs/sweep.md`` describes it.
     n_trials, seed
         Instead of the file's.
+    known_cases
+        Cases of the acrobot that a study may name, by their ids.
 
     Raises
     ------
@@ -87,7 +95,7 @@ def read_study(path: Path, *, n_trials: int | None = None, seed: int | None = No
     _import(file, header.imports)
     base = file.settings((BASE,), content.get(BASE, {}))
     agents = _agents(file)
-    cases = _cases(file, header, base)
+    cases = _cases(file, header, base, known_cases or {})
     variants = _variants(file, [case.id for case in cases])
     reader = _Reader(file, base, agents)
     reference = _reference(file, header, variants)
@@ -152,52 +160,53 @@ def _agents(file: StudyFile) -> dict[str, Settings]:
     return agents
 
 
-def _cases(file: StudyFile, header: _Header, base: Settings) -> tuple[StudyCase, ...]:
+def _cases(
+    file: StudyFile, header: _Header, base: Settings, known_cases: Mapping[str, KnownCase]
+) -> tuple[StudyCase, ...]:
     tables = file.content.get("cases", {})
     ids: Collection[str] = tables if header.cases is None else header.cases
-    known = list(dict.fromkeys([*tables, *PAPER_CASES]))
+    known = list(dict.fromkeys([*tables, *known_cases]))
     for number, case_id in enumerate(header.cases or ()):
         if case_id not in known:
             raise file.error(
                 ("study", "cases", number),
-                f"no case {case_id!r}: neither a table [cases.{case_id}] nor a case of the paper;"
+                f"no case {case_id!r}: neither a table [cases.{case_id}] nor a known case;"
                 f" {possible_words(case_id, known)}",
             )
     for case_id in tables:
         if case_id not in ids:
             raise file.error(("cases", case_id), "is not among the cases that [study] lists")
     if ids:
-        return tuple(_case(file, case_id) for case_id in dict.fromkeys(ids))
+        return tuple(_case(file, one, known_cases.get(one)) for one in dict.fromkeys(ids))
     if ("environment", "id") in base:
         # A place for the only task there is.
         name = str(base["environment", "id"].value)
         return (StudyCase(name, name, {}, ()),)
     raise file.error(
         (),
-        'no cases: give some of the paper\'s, [study] cases = ["s4", ...], tables [cases.ID] of'
-        ' your own, or [base] environment = "a Gymnasium id"',
+        f"no cases: give some of {', '.join(known_cases) or 'known ones'}, [study] cases = [...],"
+        ' tables [cases.ID] of your own, or [base] environment = "a Gymnasium id"',
     )
 
 
-def _case(file: StudyFile, case_id: str) -> StudyCase:
+def _case(file: StudyFile, case_id: str, known: KnownCase | None) -> StudyCase:
     where: KeyPath = ("cases", case_id)
     table = dict(file.table(where, file.content.get("cases", {}).get(case_id, {})))
-    paper = PAPER_CASES.get(case_id)
     title = file.value(
-        (*where, "title"), str, table.pop("title", paper.title if paper else case_id)
+        (*where, "title"), str, table.pop("title", known.title if known else case_id)
     )
     settings = file.settings(where, table)
-    if paper is None:
+    if known is None:
         return StudyCase(case_id, title, settings, where)
-    observed = {"n_sensors": paper.n_sensors, "noise": paper.noise}
+    observed = {"n_sensors": known.n_sensors, "noise": known.noise}
     for name, setting in settings.items():
         if name[0] == "environment" or (
             name[0] == "sensors" and setting.value != observed.get(name[-1], setting.value)
         ):
             raise file.error(
                 setting.where,
-                f"{case_id} is the paper's case of {paper.n_sensors} sensors with noise"
-                f" {paper.noise:g}: give a case that observes something else another name",
+                f"{case_id} is the known case of {known.n_sensors} sensors with noise"
+                f" {known.noise:g}: give a case that observes something else another name",
             )
     sensors = {("sensors", key): Setting(value, where) for key, value in observed.items()}
     return StudyCase(case_id, title, sensors | settings, where)

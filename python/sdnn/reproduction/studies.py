@@ -1,21 +1,24 @@
-"""What the results of a study say about the paper's claims: an addition to its report."""
+"""Studies of the paper's cases, and what their results say about its claims."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 from sdnn.reproduction.cases import PAPER_CASES, PAPER_TRIALS
 from sdnn.reproduction.chances import TenTrials
 from sdnn.reproduction.claims import Claim, describe
 from sdnn.reproduction.report import RULE_NOTE, VERDICT_KINDS, chance_json, format_quantity
 from sdnn.reproduction.verdicts import ClaimOutcome, Verdict, judge_claims
+from sdnn.runs import study_reading
 from sdnn.runs.comparison import Comparison
 from sdnn.runs.environment_trial import EnvironmentTrialConfig
 from sdnn.runs.report import Folded, Section, Table, format_share
 from sdnn.runs.results import CaseResult
 from sdnn.runs.statistics import Estimate
+from sdnn.runs.study import Study
 from sdnn.runs.study_report import Addition
 
 MIN_TRIALS_TO_DRAW = 2 * PAPER_TRIALS
@@ -35,6 +38,11 @@ _KINDS = {
     **VERDICT_KINDS,
     **{f"{word} (moved)": kind for word, kind in VERDICT_KINDS.items()},
 }
+
+
+def read_study(path: Path, *, n_trials: int | None = None, seed: int | None = None) -> Study:
+    """Read a study that may name the paper's cases; see `sdnn.runs.study_reading.read_study`."""
+    return study_reading.read_study(path, n_trials=n_trials, seed=seed, known_cases=PAPER_CASES)
 
 
 @dataclass(frozen=True)

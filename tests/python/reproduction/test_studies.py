@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from sdnn.reproduction.study_claims import StudyClaims, add_claims
+from sdnn.reproduction.studies import StudyClaims, add_claims
 from sdnn.reproduction.verdicts import Verdict
 from sdnn.runs.comparison import compare
 from sdnn.runs.figures import draw_study, figure_bytes

@@ -4,15 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import gymnasium as gym
 
-from sdnn.reproduction.sweep.settings import Settings, StudyFile, blamed, place_of
 from sdnn.runs.records import TrialKey
+from sdnn.runs.study_settings import Settings, StudyFile, blamed, place_of
 from sdnn.runs.trial import opened
 from sdnn.runs.trial_config import PlannedTrial, TrialSettings, trial_seed
 from sdnn.toml_lines import KeyPath
 from sdnn.typed_values import possible_words
+
+
+class KnownCase(Protocol):
+    """A case of the acrobot that studies may name."""
+
+    @property
+    def title(self) -> str:
+        """For a reader."""
+
+    @property
+    def n_sensors(self) -> int:
+        """Number of observed variables."""
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of the sensor noise."""
 
 
 @dataclass(frozen=True)
