@@ -12,7 +12,8 @@ std::vector<std::uint8_t> with_checksum(std::vector<std::uint8_t> file) {
   using namespace sdnn::core::detail;
   if (file.size() < kChecksumEnd) return file;
   std::ranges::copy(kBeginning, file.begin() + sizeof(std::uint64_t));
-  std::ranges::copy(checksum_of(std::as_bytes(std::span(file))), file.begin() + kChecksumBegin);
+  std::ranges::copy(checksum_of(file.size(), sdnn::fuzz::reader_of(file)),
+                    file.begin() + kChecksumBegin);
   return file;
 }
 

@@ -5,6 +5,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -93,6 +94,14 @@ void change(Config& config, FuzzedDataProvider& input) {
       ((Index == chosen ? set_any(std::get<Index>(kFields).of(config), input) : void()), ...);
     }(std::make_index_sequence<kSize>());
   }
+}
+
+/// Reads from these bytes as from a file.
+inline auto reader_of(std::span<const std::uint8_t> file) {
+  return [file](std::uint64_t begin, std::span<std::byte> into) {
+    const auto part = std::as_bytes(file).subspan(static_cast<std::size_t>(begin), into.size());
+    std::ranges::copy(part, into.begin());
+  };
 }
 
 /// A file in memory with these bytes.

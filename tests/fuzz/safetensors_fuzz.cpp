@@ -6,7 +6,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace sdnn;
   fuzz::accepted([&] {
     const core::detail::Safetensors parsed =
-        core::detail::parse_safetensors(std::as_bytes(std::span(data, size)));
+        core::detail::parse_safetensors(size, fuzz::reader_of({data, size}));
     const std::string copy = "/dev/shm/sdnn_fuzz_" + std::to_string(::getpid());
     const auto write = [&] {
       core::write_file(copy, {"agent", {{"about", parsed.about}}, parsed.tensors});

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <span>
@@ -33,8 +35,15 @@ const std::string kHeader =
 const std::string kData =
     std::string("\0\0\0\0\0\0\xf8\x3f", 8) + std::string("\x01\0\xff\xff\x07", 5);
 
+/// Reads from a text as from a file.
+auto reader_of(const std::string& file) {
+  return [&file](std::uint64_t begin, std::span<std::byte> into) {
+    std::ranges::copy(std::as_bytes(std::span(file)).subspan(begin, into.size()), into.begin());
+  };
+}
+
 detail::Safetensors parsed(const std::string& file) {
-  return detail::parse_safetensors(std::as_bytes(std::span(file)));
+  return detail::parse_safetensors(file.size(), reader_of(file));
 }
 
 FileContent example() {
@@ -63,7 +72,7 @@ TEST(Files, AreWrittenAsByTheLibraryOfSafetensors) {
                      kVersion + R"(\"})");
   header.append((8 - header.size() % 8) % 8, ' ');
   EXPECT_EQ(file, file_of(header, kData));
-  EXPECT_EQ(digits, detail::checksum_of(std::as_bytes(std::span(file))));
+  EXPECT_EQ(digits, detail::checksum_of(file.size(), reader_of(file)));
   EXPECT_EQ(folder.n_files(), 1U);
 }
 
@@ -135,7 +144,7 @@ TEST(Files, OfAnotherKindFormatOrProgramAreRefused) {
   EXPECT_EQ(error_of(), unknown);
   std::string newer = file_of(
       std::string(detail::kBeginning) + R"(00000000\",\"format\":2,\"version\":\"9.9\"}"}})", "");
-  newer.replace(detail::kChecksumBegin, 8, detail::checksum_of(std::as_bytes(std::span(newer))));
+  newer.replace(detail::kChecksumBegin, 8, detail::checksum_of(newer.size(), reader_of(newer)));
   testing::write_content(path, newer);
   EXPECT_EQ(error_of(), "has format 2, written by sdnn 9.9; this is sdnn " + std::string(kVersion) +
                             ", which reads format 1");

@@ -121,26 +121,27 @@ struct Safetensors {
   State tensors;
 };
 
-/// Source: https://huggingface.co/docs/safetensors, "Format". All sizes are checked before any
-/// memory is asked for.
-inline Safetensors parse_safetensors(std::span<const std::byte> bytes) {
+/// `read(begin, into)` gives the bytes of a file of `size` bytes. All sizes are checked before any
+/// memory is asked for. Source: https://huggingface.co/docs/safetensors, "Format".
+template <class Read>
+Safetensors parse_safetensors(std::uint64_t size, const Read& read) {
   std::uint64_t header_size = 0;
-  expect_of_file(bytes.size() >= sizeof(header_size), "is too short to be a safetensors file");
-  std::memcpy(&header_size, bytes.data(), sizeof(header_size));
-  bytes = bytes.subspan(sizeof(header_size));
-  expect_of_file(header_size <= kLongestHeader && header_size <= bytes.size(),
+  expect_of_file(size >= sizeof(header_size), "is too short to be a safetensors file");
+  read(0, std::as_writable_bytes(std::span(&header_size, 1)));
+  const std::uint64_t n_left = size - sizeof(header_size);
+  expect_of_file(header_size <= kLongestHeader && header_size <= n_left,
                  "is no safetensors file, or was cut: its header would have " +
                      std::to_string(header_size) + " bytes");
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()),
-                              static_cast<std::size_t>(header_size));
-  const std::span<const std::byte> data = bytes.subspan(text.size());
+  std::string text(static_cast<std::size_t>(header_size), ' ');
+  read(sizeof(header_size), std::as_writable_bytes(std::span(text)));
   expect_of_file(text.starts_with('{'), "is no safetensors file: its header is no JSON object");
   const nlohmann::json header = parse_json(text);
+  const std::uint64_t n_bytes = n_left - header_size;
   Safetensors content;
   std::vector<std::pair<TensorPlace, std::string>> places;
   for (const auto& [name, entry] : header.items()) {
     if (name != "__metadata__") {
-      places.emplace_back(tensor_place(name, entry, data.size()), name);
+      places.emplace_back(tensor_place(name, entry, n_bytes), name);
       continue;
     }
     expect_of_file(entry.is_object() && entry.contains("sdnn") && entry["sdnn"].is_string(),
@@ -150,16 +151,18 @@ inline Safetensors parse_safetensors(std::span<const std::byte> bytes) {
   std::ranges::sort(places, {},
                     [](const auto& item) { return std::pair(item.first.begin, item.first.end); });
   std::uint64_t reached = 0;
-  for (auto& [place, name] : places) {
+  for (const auto& [place, name] : places) {
     expect_of_file(place.begin == reached, "tensor " + name + " leaves a gap or overlaps another");
     reached = place.end;
-    const auto part = data.subspan(static_cast<std::size_t>(place.begin),
-                                   static_cast<std::size_t>(place.end - place.begin));
-    content.tensors.emplace(name,
-                            Tensor{place.type, std::move(place.shape), {part.begin(), part.end()}});
   }
-  expect_of_file(reached == data.size(), "has " + std::to_string(data.size() - reached) +
-                                             " bytes after its last tensor, or lost one");
+  expect_of_file(reached == n_bytes, "has " + std::to_string(n_bytes - reached) +
+                                         " bytes after its last tensor, or lost one");
+  for (auto& [place, name] : places) {
+    Tensor tensor{place.type, std::move(place.shape), {}};
+    tensor.bytes.resize(static_cast<std::size_t>(place.end - place.begin));
+    read(size - n_bytes + place.begin, std::span(tensor.bytes));
+    content.tensors.emplace(name, std::move(tensor));
+  }
   return content;
 }
 
@@ -174,32 +177,42 @@ inline std::string digits_of(std::uint32_t crc) {
   return digits;
 }
 
-/// The checksum of a file: of all bytes but its own.
-inline std::string checksum_of(std::span<const std::byte> file) {
-  return digits_of(crc32(file.subspan(kChecksumEnd), crc32(file.first(kChecksumBegin))));
+/// The checksum of a file of `size` bytes: of all but its own.
+template <class Read>
+std::string checksum_of(std::uint64_t size, const Read& read) {
+  std::vector<std::byte> piece(std::size_t{1} << 16);
+  std::uint32_t crc = 0;
+  const auto add = [&](std::uint64_t begin, std::uint64_t end) {
+    while (begin < end) {
+      const auto part = std::span(piece).first(
+          static_cast<std::size_t>(std::min<std::uint64_t>(piece.size(), end - begin)));
+      read(begin, part);
+      crc = crc32(part, crc);
+      begin += part.size();
+    }
+  };
+  add(0, kChecksumBegin);
+  add(kChecksumEnd, size);
+  return digits_of(crc);
 }
 
-/// What a file holds, as text of `n` bytes from `begin`.
-inline std::string_view text_in(std::span<const std::byte> file, std::size_t begin, std::size_t n) {
-  return {reinterpret_cast<const char*>(file.data()) + begin, n};
-}
-
-inline std::vector<std::byte> read_checked(const std::filesystem::path& path) {
+/// A file whose checksum has been compared.
+inline Safetensors read_checked(const std::filesystem::path& path) {
   RegularFile file(path);
+  const auto read = [&file](std::uint64_t begin, std::span<std::byte> into) {
+    file.read(begin, into);
+  };
   expect_of_file(file.size() <= kLargestFile,
                  "has more than " + std::to_string(kLargestFile) + " bytes");
-  std::vector<std::byte> bytes(
-      static_cast<std::size_t>(std::min<std::uint64_t>(file.size(), kChecksumEnd)));
-  file.read(bytes);
-  expect_of_file(bytes.size() == kChecksumEnd &&
-                     text_in(bytes, sizeof(std::uint64_t), kBeginning.size()) == kBeginning,
-                 "is not a file of sdnn, is damaged, or was written before files of sdnn had a "
-                 "checksum");
-  bytes.resize(static_cast<std::size_t>(file.size()));
-  file.read(std::span(bytes).subspan(kChecksumEnd));
-  expect_of_file(text_in(bytes, kChecksumBegin, 8) == checksum_of(bytes),
+  std::string beginning(file.size() < kChecksumEnd ? 0 : kChecksumEnd, ' ');
+  read(0, std::as_writable_bytes(std::span(beginning)));
+  expect_of_file(
+      !beginning.empty() && std::string_view(beginning).substr(8).starts_with(kBeginning),
+      "is not a file of sdnn, is damaged, or was written before files of sdnn had a "
+      "checksum");
+  expect_of_file(beginning.substr(kChecksumBegin) == checksum_of(file.size(), read),
                  "is damaged: its checksum does not fit its content");
-  return bytes;
+  return parse_safetensors(file.size(), read);
 }
 
 /// The place of a type in the order in which the format's own library stores tensors.
@@ -232,7 +245,7 @@ constexpr int storage_rank(TensorType type) noexcept {
 inline FileContent read_file(const std::filesystem::path& path,
                              std::initializer_list<std::string_view> kinds) {
   try {
-    detail::Safetensors parsed = detail::parse_safetensors(detail::read_checked(path));
+    detail::Safetensors parsed = detail::read_checked(path);
     nlohmann::json about = parse_json(parsed.about);
     const auto text_of = [&about](const char* key) { return about.value(key, std::string()); };
     const auto number = about.value("format", nlohmann::json());

@@ -191,16 +191,18 @@ class RegularFile {
 
   std::uint64_t size() const noexcept { return size_; }
 
-  /// Fills `into` with the bytes that follow.
-  void read(std::span<std::byte> into) {
+  /// Fills `into` with the bytes from `begin` on.
+  void read(std::uint64_t begin, std::span<std::byte> into) {
 #if SDNN_HAS_POSIX_FILES
     while (!into.empty()) {
-      const auto n = ::read(file_, into.data(), into.size());
+      const auto n = ::pread(file_, into.data(), into.size(), static_cast<off_t>(begin));
       if (n < 0 && errno == EINTR) continue;
       if (n <= 0) refuse("cannot be read to its end");
       into = into.subspan(static_cast<std::size_t>(n));
+      begin += static_cast<std::uint64_t>(n);
     }
 #else
+    file_.seekg(static_cast<std::streamoff>(begin));
     file_.read(reinterpret_cast<char*>(into.data()), static_cast<std::streamsize>(into.size()));
     if (!file_) refuse("cannot be read to its end");
 #endif
