@@ -25,7 +25,6 @@ from sdnn.reproduction import (
     AGENTS,
     EXPERIMENTS,
     DaskExecutor,
-    ProtocolConfig,
     ResultStore,
     ThreadExecutor,
     plan_trials,
@@ -98,7 +97,7 @@ def main():
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
     n_trials = options.trials // 2
-    plan = plan_trials(EXPERIMENTS[0].cases, n_trials, 0, ProtocolConfig())
+    plan = plan_trials(EXPERIMENTS[0].cases, n_trials, 0)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         scheduler = start(folder, "scheduler", "--port", "0")

@@ -29,7 +29,7 @@ from sdnn import _core
 from sdnn.agents import QLearningConfig
 from sdnn.approximators import RBFNetworkConfig
 from sdnn.environments import AcrobotConfig, GoalScheduleConfig, SensorConfig
-from sdnn.runs.trial_config import trial_seed
+from sdnn.runs.planned_trial import trial_seed
 
 ROWS = Path(__file__).parents[1] / "docs" / "rbf-tuning.csv"
 

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from sdnn import _core
-from sdnn.approximators import SDNNCConfig
 from sdnn.environments import SensorConfig
-from sdnn.runs.trial_config import TrialConfig, trial_seed
+from sdnn.runs import RunSpec
+from sdnn.runs.planned_trial import trial_seed
 
 CASES = (("s4", 4, 0.0), ("s6", 6, 0.0), ("s4-noise", 4, 0.02), ("s6-noise", 6, 0.02))
 ROWS = Path(__file__).parents[1] / "docs" / "whole-trials.csv"
@@ -32,11 +32,8 @@ def dense_microseconds(n_inputs: int) -> float:
 def run(task: tuple[str, int, float, int]) -> dict[str, object]:
     case, n_inputs, noise, number = task
     dense = dense_microseconds(n_inputs)
-    config = TrialConfig(
-        approximator=SDNNCConfig(n_inputs=n_inputs),
-        sensors=SensorConfig(n_sensors=n_inputs, noise=noise),
-    )
-    trial = config.make_trial(trial_seed(0, case, number))
+    sensors = SensorConfig(n_sensors=n_inputs, noise=noise)
+    trial = RunSpec(sensors=sensors).make_trial(trial_seed(0, case, number))
     start = time.thread_time()
     trial.advance(15_000)
     seconds = time.thread_time() - start

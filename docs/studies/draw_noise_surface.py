@@ -17,7 +17,7 @@ import numpy as np
 from sdnn.reproduction.studies import read_study
 from sdnn.runs.figures import figure_bytes, require_matplotlib
 from sdnn.runs.measures import SHARE_STABLE, final_share_solved
-from sdnn.runs.registry import agent_entry
+from sdnn.runs.registry import title_of
 from sdnn.runs.store import ResultStore
 from sdnn.runs.study import Study
 from sdnn.whole_files import write_whole
@@ -31,8 +31,8 @@ def shares(study: Study, store: ResultStore) -> dict[tuple[str, str, float], lis
     found: dict[tuple[str, str, float], list[float]] = {}
     for (case_id, variant_id), combination in study.combinations.items():
         keys = [key for key in study.keys(case_id, variant_id) if key in stored]
-        config = combination.config
-        cell = (case_id, config.agent, config.sensors.noise)  # type: ignore[attr-defined]
+        spec = combination.spec
+        cell = (case_id, spec.label, spec.sensors.noise)
         found[cell] = [final_share_solved(record.rows.solved) for record in store.load(keys)]
     return found
 
@@ -64,7 +64,7 @@ def main() -> None:
                     text = f"{np.median(trials):.2f}\n{n_solved}/{len(trials)}"
                     shade = "white" if np.median(trials) < 0.6 else "black"
                     axes.text(x, y, text, ha="center", va="center", fontsize=7, color=shade)
-        axes.set_title(agent_entry(agent).title, loc="left", fontsize=10.5)
+        axes.set_title(title_of(agent), loc="left", fontsize=10.5)
         axes.set_xticks(range(len(sigmas)), [f"{sigma:g}" for sigma in sigmas])
         axes.set_xlabel("standard deviation of the noise")
     panels[0].set_yticks(range(len(study.cases)), [case.title for case in study.cases])

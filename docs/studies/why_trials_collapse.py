@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.reproduction.cases import EXPERIMENTS
-from sdnn.reproduction.plan import case_config
+from sdnn.reproduction.plan import case_spec
 from sdnn.runs.measures import MeasureConfig, episode_of_collapse
-from sdnn.runs.trial_config import TrialConfig, trial_seed
+from sdnn.runs.planned_trial import trial_seed
+from sdnn.runs.spec import RunSpec
 from sdnn.whole_files import write_whole
 
 CASE = next(case for case in EXPERIMENTS[1].cases if case.id == "s4-noise")
@@ -39,19 +40,19 @@ RECOVERY_EPISODES = 3000
 Rows = dict[str, NDArray[Any]]
 
 
-def config_of(agent: str) -> TrialConfig:
+def spec_of(agent: str) -> RunSpec:
     """Return Case II of an agent."""
-    return case_config(replace(CASE, agents=(agent,)), agent)
+    return case_spec(replace(CASE, agents=(agent,)), agent)
 
 
 class Inspector:
     """What can be asked of an agent at work without changing what it does."""
 
-    def __init__(self, config: TrialConfig) -> None:
-        self._acrobot_config = config.acrobot
-        clean = replace(config.sensors, noise=0.0)
+    def __init__(self, spec: RunSpec) -> None:
+        self._acrobot_config = spec.acrobot
+        clean = replace(spec.sensors, noise=0.0)
         self._clean = _core.AcrobotSensors(clean, 0, _core.Stream.sensor_noise)
-        self._noisy = _core.AcrobotSensors(config.sensors, 12345, _core.Stream.sensor_noise)
+        self._noisy = _core.AcrobotSensors(spec.sensors, 12345, _core.Stream.sensor_noise)
 
     def greedy(self, agent: Any, observation: NDArray[np.float64]) -> tuple[float, float]:
         """Return the mean of the best torques, in N m, and their value."""
@@ -85,23 +86,23 @@ class Inspector:
 
 
 def look(
-    config: TrialConfig, number: int, episodes: Iterable[int]
+    spec: RunSpec, number: int, episodes: Iterable[int]
 ) -> Iterator[tuple[int, Any, Inspector, float]]:
     """Advance a trial, stopping after the given numbers of learning episodes."""
-    trial = config.make_trial(trial_seed(0, CASE.id, number))
-    goal = _core.GoalSchedule(config.goal)
-    inspector = Inspector(config)
+    trial = spec.make_trial(trial_seed(0, CASE.id, number))
+    goal = _core.GoalSchedule(spec.goal)
+    inspector = Inspector(spec)
     for episode in episodes:
         trial.advance(episode - trial.episode)
         yield episode, trial, inspector, goal(max(episode, 1))
 
 
-def whole_trial(config: TrialConfig, number: int, step: int = 50) -> Rows:
+def whole_trial(spec: RunSpec, number: int, step: int = 50) -> Rows:
     """Run a trial from end to end, looking into it every `step` episodes."""
-    last = config.protocol.n_learning_episodes
+    last = spec.budget.episodes or 0
     seen: dict[str, list[Any]] = {"episode": [], "q": [], "path": [], "torque": [], "spread": []}
     trial = None
-    for episode, trial, inspector, tolerance in look(config, number, range(step, last + 1, step)):
+    for episode, trial, inspector, tolerance in look(spec, number, range(step, last + 1, step)):
         torques, values, _ = inspector.path(trial.agent, tolerance)
         seen["episode"].append(episode)
         seen["q"].append(inspector.first_values(trial.agent).astype(np.float32))
@@ -116,11 +117,11 @@ def whole_trial(config: TrialConfig, number: int, step: int = 50) -> Rows:
     }
 
 
-def around(config: TrialConfig, number: int, middle: int) -> Rows:
+def around(spec: RunSpec, number: int, middle: int) -> Rows:
     """Look at the episodes around a collapse, one by one."""
     episodes = range(middle - WINDOW, middle + WINDOW + 1)
     seen: dict[str, list[Any]] = {"episode": [], "path": [], "torque": [], "clean": []}
-    for episode, trial, inspector, tolerance in look(config, number, episodes):
+    for episode, trial, inspector, tolerance in look(spec, number, episodes):
         torques, values, solved = inspector.path(trial.agent, tolerance)
         seen["episode"].append(episode)
         seen["path"].append(values + [np.nan] * (PATH - len(values)))
@@ -129,12 +130,12 @@ def around(config: TrialConfig, number: int, middle: int) -> Rows:
     return {name: np.array(values) for name, values in seen.items()}
 
 
-def begun_anew(config: TrialConfig, agent: Any, seed: int) -> NDArray[np.bool_]:
+def begun_anew(spec: RunSpec, agent: Any, seed: int) -> NDArray[np.bool_]:
     """Let an agent live through the schedule's first episodes; return which tests it solved."""
-    acrobot = _core.Acrobot(config.acrobot)
-    goal = _core.GoalSchedule(config.goal)
+    acrobot = _core.Acrobot(spec.acrobot)
+    goal = _core.GoalSchedule(spec.goal)
     sensors, test_sensors = (
-        _core.AcrobotSensors(config.sensors, seed, stream)
+        _core.AcrobotSensors(spec.sensors, seed, stream)
         for stream in (_core.Stream.sensor_noise, _core.Stream.evaluation_sensor_noise)
     )
     n_actions = agent.action_value.n_actions
@@ -197,10 +198,10 @@ class Kept:
 def measure(kept: Kept, n_trials: int) -> None:
     """Measure all that the figures need."""
     for agent in ("sdnn-c", "sdnn-c-robust"):
-        config = config_of(agent)
+        config = spec_of(agent)
         for number in range(n_trials):
             kept.rows(f"{agent}:{number}", lambda c=config, n=number: whole_trial(c, n))  # type: ignore[misc]
-    paper = config_of("sdnn-c")
+    paper = spec_of("sdnn-c")
     for number in range(n_trials):
         rows = kept.rows(f"sdnn-c:{number}")
         if not WINDOW < end_of_mastery(rows) < 14_000:
@@ -211,7 +212,7 @@ def measure(kept: Kept, n_trials: int) -> None:
         def recover(n: int = number) -> Rows:
             seed = trial_seed(0, CASE.id, n)
             old, new = paper.make_trial(seed), paper.make_trial(seed)
-            old.advance(paper.protocol.n_learning_episodes)
+            old.advance(paper.budget.episodes or 0)
             return {
                 "collapsed": begun_anew(paper, old.agent, seed),  # type: ignore[attr-defined]
                 "fresh": begun_anew(paper, new.agent, seed),  # type: ignore[attr-defined]

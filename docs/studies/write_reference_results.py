@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from sdnn.reproduction import ProtocolConfig, ResultStore, case_config, measure, plan_trials
+from sdnn.reproduction import ResultStore, case_spec, measure, plan_trials
 from sdnn.reproduction.cases import PAPER_CASES
 from sdnn.reproduction.reference_results import FILE_NAME, reference_csv, reference_results
 
@@ -24,7 +24,7 @@ def rekey() -> None:
     """Replace the hashes of configurations."""
     text = FILE.read_text()
     for one in reference_results():
-        new = case_config(PAPER_CASES[one.case_id], one.agent).config_hash
+        new = case_spec(PAPER_CASES[one.case_id], one.agent).config_hash
         start = f"{one.case_id},{one.agent},"
         text = text.replace(f"{start}{one.config_hash},", f"{start}{new},")
     FILE.write_text(text)
@@ -35,7 +35,7 @@ def write(store_folder: Path, n_trials: int, seed: int) -> None:
     results = []
     with ResultStore(store_folder, read_only=True) as store:
         stored = store.keys()
-        plan = plan_trials(PAPER_CASES.values(), n_trials, seed, ProtocolConfig())
+        plan = plan_trials(PAPER_CASES.values(), n_trials, seed)
         for case in PAPER_CASES.values():
             for agent in case.agents:
                 keys = [p.key for p in plan if p.key[:2] == (case.id, agent) and p.key in stored]

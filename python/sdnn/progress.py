@@ -86,7 +86,7 @@ class ProgressBars:
 
     def started(self, planned: Any) -> None:
         """Open a trial's bar."""
-        self.add(planned.key, planned.title, planned.config.length)
+        self.add(planned.key, planned.title, planned.spec.length)
 
     def advanced(self, planned: Any, done: int) -> None:
         """Move a trial's bar and the whole one."""
@@ -101,7 +101,7 @@ class ProgressBars:
 
     def finished(self, planned: Any) -> None:
         """Close a trial's bar and count its episodes as passed."""
-        self.advanced(planned, planned.config.length)
+        self.advanced(planned, planned.spec.length)
         self.remove(planned.key)
         self._n_open -= 1
         self.update("all", sum(self._done.values()), description=self._title())

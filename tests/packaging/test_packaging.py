@@ -37,7 +37,7 @@ def run_example(cmake, configure, build, *options, target="all"):
 
 def rows_of_trial():
     """What the example should print: a trial of the same length and seed."""
-    approximator, learning = _core.robust_preset(4)
+    approximator, learning = _core.presets()["robust"][1:]
     trial = _core.AcrobotTrial(
         approximator=approximator,
         learning=learning,

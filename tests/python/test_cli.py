@@ -71,7 +71,7 @@ def test_help_and_version(invoke):
         (["reproduce", "a", "--fast"], "--fast"),
         (
             ["reproduce", "a", "--agent", "dqn"],
-            "one of sdnn-c, fuzzy, rbf, sdnn-c-robust, sdnn-c-general, sdnn-c-small, got 'dqn'",
+            "one of sdnn-c, fuzzy, rbf, sdnn-c-general, sdnn-c-robust, sdnn-c-small, got 'dqn'",
         ),
         (["learn"], "learn"),
     ],
@@ -149,7 +149,7 @@ def test_the_most_episodes_make_a_trial(tmp_path):
     parts = {"experiments": select_experiments("a"), "out": tmp_path, "n_trials": 1}
     request = ReproduceRequest(**parts, n_episodes=MOST_EPISODES)
     planned = request.plan.trials[0]
-    planned.config.make_trial(planned.key.seed)
+    planned.spec.make_trial(planned.key.seed)
     with pytest.raises(ValueError, match="episodes must be at most 100000000, got 100000001"):
         _ = ReproduceRequest(**parts, n_episodes=MOST_EPISODES + 1).plan
 

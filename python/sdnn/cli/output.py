@@ -41,7 +41,7 @@ def _finite(value: Any) -> Any:
 
 def report_outcome(context: click.Context, outcome: RunOutcome, out: Path) -> str:
     """Tell what failed, exit if interrupted, and say how much is stored."""
-    from sdnn.runs.trial_config import describe
+    from sdnn.runs.planned_trial import describe
 
     n_stored = outcome.n_reused + outcome.n_run
     stored = f"{n_stored} of {outcome.n_planned} trials are stored in {out}"
@@ -75,11 +75,11 @@ def make_console() -> Console:
 @contextmanager
 def experiment_command(context: click.Context) -> Iterator[None]:
     """Make a line and an exit code of what can end a run of trials."""
-    from sdnn.runs.errors import RunError, StudyError
+    from sdnn.runs.errors import ConfigError, RunError
 
     try:
         yield
-    except StudyError as error:
+    except ConfigError as error:
         raise click.UsageError(str(error)) from error
     except RunError as error:
         raise click.ClickException(str(error)) from error

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sdnn._core import presets
 from sdnn.cli.executor_options import executor_options
 from sdnn.cli.output import (
     EXIT_FAILURE,
@@ -22,7 +23,6 @@ from sdnn.reproduction.cases import (
     includes_cost,
     select_experiments,
 )
-from sdnn.runs.preset_agents import PRESET_AGENTS
 
 if TYPE_CHECKING:
     from sdnn.reproduction.reproduce import ReproduceRequest
@@ -70,7 +70,7 @@ if TYPE_CHECKING:
 @click.option(
     "--preset",
     "presets",
-    type=click.Choice(tuple(PRESET_AGENTS)),
+    type=click.Choice(tuple(presets())),
     multiple=True,
     help="Draw SDNN-C under these settings beside the paper's; may be repeated.",
 )
@@ -129,7 +129,7 @@ def _print_plan(request: ReproduceRequest, as_json: bool) -> None:
     from sdnn.reproduction.reproduce import count_stored
 
     trials, (n_costs, n_costs_stored) = count_stored(request)
-    n_episodes = request.protocol.n_learning_episodes
+    n_episodes = request.n_learning_episodes
     if as_json:
         plan = {
             "n_learning_episodes": n_episodes,

@@ -68,7 +68,7 @@ def sweep(
     goes on where it stopped.
     """
     from sdnn.reproduction.studies import add_claims, read_study
-    from sdnn.runs.errors import StudyError
+    from sdnn.runs.errors import ConfigError
     from sdnn.runs.sweep import SweepRequest
     from sdnn.runs.sweep import sweep as run
 
@@ -82,7 +82,7 @@ def sweep(
             addition=add_claims,
         )
         _ = request.plan
-    except (StudyError, ValueError) as error:
+    except (ConfigError, ValueError) as error:
         raise click.UsageError(str(error)) from error
     with experiment_command(context):
         if dry_run:

@@ -15,21 +15,20 @@ if TYPE_CHECKING:
     from sdnn.reproduction.claims import CLAIMS, Claim
     from sdnn.reproduction.cost import CostConfig, CostRecord
     from sdnn.reproduction.figures import draw_cost, draw_experiment
-    from sdnn.reproduction.plan import case_config, plan_trials
+    from sdnn.reproduction.plan import case_spec, plan_trials
     from sdnn.reproduction.reproduce import ReproduceRequest, collect
     from sdnn.reproduction.verdicts import judge_claims
     from sdnn.runs.dask_executor import DaskExecutor
     from sdnn.runs.engine import Observer, run_trials
-    from sdnn.runs.environment_trial import EnvironmentConfig, EnvironmentTrialConfig
     from sdnn.runs.errors import (
         ClusterError,
         PlotUnavailableError,
         StoreError,
-        StudyError,
         WorkerLostError,
     )
     from sdnn.runs.executor import Executor
     from sdnn.runs.measures import MeasureConfig
+    from sdnn.runs.planned_trial import PlannedTrial, trial_seed
     from sdnn.runs.records import TrialKey, TrialRecord, TrialRows
     from sdnn.runs.registry import AGENTS, AgentEntry, CostSeries, agent_entry, register
     from sdnn.runs.results import CaseResult, measure
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
     from sdnn.runs.store import ResultStore
     from sdnn.runs.thread_executor import ThreadExecutor
     from sdnn.runs.trial import Trial
-    from sdnn.runs.trial_config import PlannedTrial, TrialConfig, TrialSettings, trial_seed
 
 __getattr__, __dir__ = attach(globals())
 
@@ -54,8 +52,6 @@ __all__ = [
     "CostRecord",
     "CostSeries",
     "DaskExecutor",
-    "EnvironmentConfig",
-    "EnvironmentTrialConfig",
     "Estimate",
     "Executor",
     "Experiment",
@@ -67,17 +63,14 @@ __all__ = [
     "ReproduceRequest",
     "ResultStore",
     "StoreError",
-    "StudyError",
     "ThreadExecutor",
     "Trial",
-    "TrialConfig",
     "TrialKey",
     "TrialRecord",
     "TrialRows",
-    "TrialSettings",
     "WorkerLostError",
     "agent_entry",
-    "case_config",
+    "case_spec",
     "collect",
     "draw_cost",
     "draw_experiment",

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from sdnn.runs.preset_agents import PRESET_AGENTS
-
 PAPER_TRIALS = 10
 """Trials per case in the paper; fewer support no conclusion."""
 
@@ -64,8 +62,8 @@ class Experiment:
         return replace(self, cases=cases)
 
     def with_presets(self, presets: Iterable[str]) -> Experiment:
-        """Return the experiment with SDNN-C under some of `PRESET_AGENTS` beside its agents."""
-        added = tuple(PRESET_AGENTS[name] for name in presets)
+        """Return the experiment with SDNN-C under some of its presets beside its agents."""
+        added = tuple("sdnn-c" if name == "paper" else f"sdnn-c-{name}" for name in presets)
         cases = tuple(
             replace(case, agents=tuple(dict.fromkeys((*case.agents, *added))))
             for case in self.cases

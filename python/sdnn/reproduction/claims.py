@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 from sdnn.reproduction.cases import EXPERIMENTS
 from sdnn.runs.measures import SHARE_STABLE, MeasureName
-from sdnn.runs.registry import agent_entry, cost_series
+from sdnn.runs.registry import cost_series, title_of
 
 EQUAL_STEPS = 2.0
 """Steps by which two agents that do "almost the same" may differ."""
@@ -31,7 +31,7 @@ class Subject:
         """Name of both for a reader."""
         case = next(c for e in EXPERIMENTS for c in e.cases if c.id == self.case_id)
         noisy = "noisy " if case.noise else ""
-        return f"{agent_entry(self.agent).title}, {case.n_sensors} {noisy}inputs"
+        return f"{title_of(self.agent)}, {case.n_sensors} {noisy}inputs"
 
 
 @dataclass(frozen=True)
@@ -200,7 +200,7 @@ def describe(quantity: Quantity) -> str:
         )
     words = quantity.measure.replace("_", " ")
     if isinstance(quantity, Difference):
-        title = agent_entry(quantity.subject.agent).title
+        title = title_of(quantity.subject.agent)
         fewer = str(quantity.other).removeprefix(f"{title}, ")
         return f"{words}: {quantity.subject} less {fewer}"
     return f"{words}: {quantity.subject}"

@@ -184,7 +184,7 @@ def _core_agent(entry: AgentEntry, series: CostSeries, approximator: Any) -> Any
         return series.core_agent(approximator=approximator, learning=learning, seed=SEED)
     states = Box(0.0, 1.0, (approximator.n_inputs,), np.float64)
     actions = Box(-1.0, 1.0, (1,), np.float64)
-    agent: Any = entry.make_agent(
+    agent: Any = entry.agent(
         states, actions, approximator=approximator, learning=learning, seed=SEED
     )
     return agent.core

@@ -28,7 +28,7 @@ from sdnn.reproduction.verdicts import (
     settle,
 )
 from sdnn.runs.measures import STEP_MEASURES
-from sdnn.runs.registry import agent_entry, cost_series
+from sdnn.runs.registry import cost_series, title_of
 from sdnn.runs.report import (
     MEASURE_END,
     Page,
@@ -140,7 +140,7 @@ class Report:
                 f" {PAPER_EPISODES:,} episodes): nothing is judged."
             )
         if self.agents:
-            titles = ", ".join(agent_entry(agent).title for agent in self.agents)
+            titles = ", ".join(title_of(agent) for agent in self.agents)
             warnings.append(
                 f"Not the paper's comparison: {titles} instead of the agents of its cases."
             )
@@ -183,7 +183,7 @@ class Report:
         header = ("case", "agent", "trials", *words, *MEASURE_END)
         for experiment, results in self.experiments:
             rows = [
-                (one.title, agent_entry(one.agent).title, str(one.n_trials),
+                (one.title, title_of(one.agent), str(one.n_trials),
                  *measure_cells(one, STEP_MEASURES))
                 for one in results
             ]  # fmt: skip
@@ -204,7 +204,7 @@ class Report:
             )
         if self.experiments:
             yield settings_section(
-                (f"{agent_entry(one.agent).title}, {one.title}", one) for one in self.results
+                (f"{title_of(one.agent)}, {one.title}", one) for one in self.results
             )
 
     def to_json(self) -> dict[str, Any]:

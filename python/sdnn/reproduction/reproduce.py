@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from sdnn.config import ProtocolConfig
 from sdnn.reproduction.cases import (
     EXPERIMENTS,
     MOST_EPISODES,
@@ -34,6 +33,7 @@ from sdnn.reproduction.report import Report
 from sdnn.runs.engine import Observer, run_trials
 from sdnn.runs.executor import Executor
 from sdnn.runs.figures import figure_bytes, require_matplotlib
+from sdnn.runs.planned_trial import PlannedTrial
 from sdnn.runs.records import (
     ROW_HEADER,
     TrialKey,
@@ -44,8 +44,8 @@ from sdnn.runs.records import (
 from sdnn.runs.registry import cost_series
 from sdnn.runs.report import Finished, describe_call, json_bytes, require_jinja
 from sdnn.runs.results import CaseResult, measure
+from sdnn.runs.spec import PAPER_INTERVAL
 from sdnn.runs.store import STORE_NAME, ResultStore
-from sdnn.runs.trial_config import PlannedTrial
 from sdnn.whole_files import csv_bytes, remove_abandoned_files, write_whole
 
 QUICK_TRIALS = 2
@@ -121,8 +121,8 @@ class ReproduceRequest:
         return quick if self.quick else paper
 
     @cached_property
-    def protocol(self) -> ProtocolConfig:
-        """How long a trial is.
+    def n_learning_episodes(self) -> int:
+        """Learning episodes of a trial.
 
         Raises
         ------
@@ -131,15 +131,14 @@ class ReproduceRequest:
             `MOST_EPISODES`.
         """
         n_episodes = self.n_episodes or self._defaults[1]
-        protocol = ProtocolConfig(n_learning_episodes=n_episodes)
-        if n_episodes < protocol.test_interval:
+        if n_episodes < PAPER_INTERVAL:
             raise ValueError(
-                f"episodes must be at least {protocol.test_interval}, the distance of test"
-                f" episodes, got {n_episodes}"
+                f"episodes must be at least {PAPER_INTERVAL}, the distance of test episodes, got"
+                f" {n_episodes}"
             )
         if n_episodes > MOST_EPISODES:
             raise ValueError(f"episodes must be at most {MOST_EPISODES}, got {n_episodes}")
-        return protocol
+        return n_episodes
 
     @cached_property
     def plan(self) -> Plan:
@@ -148,13 +147,15 @@ class ReproduceRequest:
         Raises
         ------
         ValueError
-            If the trials are too short or too long (see `protocol`), no agent has one of the ids,
-            or only costs are asked for, of agents that have none.
+            If the trials are too short or too long, no agent has one of the ids, or only costs are
+            asked for, of agents that have none.
         """
         by_id = {experiment.id: experiment for experiment in (*EXPERIMENTS, *self.experiments)}
         known = [e.with_agents(self.agents).with_presets(self.presets) for e in by_id.values()]
         cases = [case for experiment in known for case in experiment.cases]
-        planned = plan_trials(cases, self.n_trials or self._defaults[0], self.seed, self.protocol)
+        planned = plan_trials(
+            cases, self.n_trials or self._defaults[0], self.seed, self.n_learning_episodes
+        )
         asked = {experiment.id for experiment in self.experiments}
         wanted = {pair for e in known if e.id in asked for pair in e.pairs}
         costs = cost_keys(self.cost_config, self.agents or None) if self.cost else ()

@@ -12,13 +12,13 @@ from sdnn.reproduction.chances import TenTrials
 from sdnn.reproduction.claims import Claim, describe
 from sdnn.reproduction.report import RULE_NOTE, VERDICT_KINDS, chance_json, format_quantity
 from sdnn.reproduction.verdicts import ClaimOutcome, Verdict, judge_claims
-from sdnn.runs import study_reading
+from sdnn.runs import study
 from sdnn.runs.comparison import Comparison
-from sdnn.runs.environment_trial import EnvironmentTrialConfig
 from sdnn.runs.report import Folded, Section, Table, format_share
 from sdnn.runs.results import CaseResult
 from sdnn.runs.statistics import Estimate
 from sdnn.runs.study import Study
+from sdnn.runs.study_file import KnownCase
 from sdnn.runs.study_report import Addition
 
 MIN_TRIALS_TO_DRAW = 2 * PAPER_TRIALS
@@ -41,8 +41,14 @@ _KINDS = {
 
 
 def read_study(path: Path, *, n_trials: int | None = None, seed: int | None = None) -> Study:
-    """Read a study that may name the paper's cases; see `sdnn.runs.study_reading.read_study`."""
-    return study_reading.read_study(path, n_trials=n_trials, seed=seed, known_cases=PAPER_CASES)
+    """Read a study that may name the paper's cases; see `sdnn.runs.study.read_study`."""
+    known_cases = {
+        case.id: KnownCase(
+            case.title, {"sensors.n_sensors": case.n_sensors, "sensors.noise": case.noise}
+        )
+        for case in PAPER_CASES.values()
+    }
+    return study.read_study(path, n_trials=n_trials, seed=seed, known_cases=known_cases)
 
 
 @dataclass(frozen=True)
@@ -163,7 +169,7 @@ class StudyClaims:
             for (case, variant), measured in self.comparison.measured.items()
             if variant == variant_id
             and case in PAPER_CASES
-            and not isinstance(measured.combination.config, EnvironmentTrialConfig)
+            and measured.combination.spec.environment is None
         ]
 
     def _outcomes(self, variant_id: str) -> dict[int, ClaimOutcome]:

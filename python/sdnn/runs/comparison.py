@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.runs.environment_trial import EnvironmentTrialConfig
 from sdnn.runs.measures import RETURN_MEASURES, SHARE_STABLE, STEP_MEASURES, MeasureName
 from sdnn.runs.records import TrialRecord
 from sdnn.runs.results import CaseResult, measure, on_equal_terms
@@ -93,7 +92,7 @@ def compare(study: Study, records: Iterable[TrialRecord]) -> Comparison:
     for pair, combination in study.combinations.items():
         keys = study.keys(*pair)
         if by_key.keys() >= set(keys):
-            has_returns = isinstance(combination.config, EnvironmentTrialConfig)
+            has_returns = combination.spec.environment is not None
             names = RETURN_MEASURES if has_returns else STEP_MEASURES
             results[pair] = measure(combination.case.title, [by_key[key] for key in keys], names)
     return Comparison(

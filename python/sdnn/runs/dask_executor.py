@@ -39,7 +39,7 @@ from sdnn.runs.executor import (
     Noted,
     Started,
 )
-from sdnn.runs.trial_config import PlannedTrial
+from sdnn.runs.planned_trial import PlannedTrial
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -273,9 +273,9 @@ class _Run:
 
     def _make_probes(self) -> None:
         """Choose one trial of each agent and kind, with what it gives here."""
-        probed: set[tuple[str, type]] = set()
+        probed: set[tuple[str, bool]] = set()
         for planned in self.planned:
-            agent, kind = planned.key.agent, type(planned.config)
+            agent, kind = planned.key.agent, planned.spec.environment is None
             if (agent, kind) not in probed:
                 # A trial that raises here fails later, as everywhere.
                 with suppress(Exception):
@@ -497,7 +497,7 @@ class _Session:
         run, planned = self._run, self._run.planned[trial]
         run.messages.put(Started(planned))
         try:
-            settings, pickled = planned.config.canonical_json(), pickle.dumps(planned)
+            settings, pickled = planned.spec.canonical_json(), pickle.dumps(planned)
         except Exception as error:
             run.finish(Failed(planned, error))
             return
@@ -535,7 +535,7 @@ class _Session:
             if record is None:
                 run.put_back(trial)
             else:
-                run.messages.put(Advanced(planned, planned.config.length))
+                run.messages.put(Advanced(planned, planned.spec.length))
                 run.finish(Finished(planned, record))
         finally:
             del self._running[attempt]

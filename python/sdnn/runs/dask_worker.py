@@ -13,9 +13,9 @@ import time
 from sdnn import _core
 from sdnn.runs.errors import RunError
 from sdnn.runs.executor import run_to_end
+from sdnn.runs.planned_trial import PlannedTrial
 from sdnn.runs.records import TrialRecord, TrialRows
 from sdnn.runs.trial import opened
-from sdnn.runs.trial_config import PlannedTrial
 
 PROBE_EPISODES = 10
 """Learning episodes of a probe: few, but every part of agent and task takes part."""
@@ -35,12 +35,12 @@ def probe(planned: PlannedTrial) -> str:
     Exception
         Whatever the trial raises; an agent that is not registered is a ValueError.
     """
-    with opened(planned.config.make_trial(planned.key.seed)) as trial:
-        if not planned.config.is_compiled:
-            return planned.config.canonical_json()
+    with opened(planned.spec.make_trial(planned.key.seed)) as trial:
+        if not planned.spec.is_compiled:
+            return planned.spec.canonical_json()
         trial.advance(PROBE_EPISODES)
     rows = TrialRows.of_tests(**trial.test_rows())
-    return f"{planned.config.canonical_json()} {trial.n_decisions} {rows.digest()}"
+    return f"{planned.spec.canonical_json()} {trial.n_decisions} {rows.digest()}"
 
 
 def probe_worker(version: str, pickled: list[bytes]) -> tuple[str, list[str]]:
@@ -97,7 +97,7 @@ def run_on_worker(
     if _core.__version__ != version:
         raise MismatchError(f"it has sdnn {_core.__version__}, this is sdnn {version}")
     planned: PlannedTrial = pickle.loads(pickled)
-    if planned.config.canonical_json() != settings:
+    if planned.spec.canonical_json() != settings:
         raise MismatchError(
             f"its build of sdnn {version} does not know all settings of agent {planned.key.agent}"
         )

@@ -22,10 +22,10 @@ from sdnn.runs.executor import (
     Noted,
     Started,
 )
+from sdnn.runs.planned_trial import PlannedTrial
 from sdnn.runs.records import TrialKey
 from sdnn.runs.store import ResultStore
 from sdnn.runs.thread_executor import ThreadExecutor
-from sdnn.runs.trial_config import PlannedTrial
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ def run_trials(
     planned = tuple(plan)
     stored = store.keys()
     missing = tuple(p for p in planned if p.key not in stored)
-    n_episodes = sum(p.config.length for p in missing)
+    n_episodes = sum(p.spec.length for p in missing)
     watcher.begun(len(planned), len(planned) - len(missing), n_episodes)
     stop = threading.Event() if stop is None else stop
     failures: list[Failure] = []
@@ -163,7 +163,7 @@ def run_trials(
                     case Lost(trial):
                         watcher.lost(trial)
                     case Finished(trial, record):
-                        store.add(record, is_exact=trial.config.is_compiled)
+                        store.add(record, is_exact=trial.spec.is_compiled)
                         n_run += 1
                         watcher.finished(trial)
                     case Failed(trial, error):

@@ -11,7 +11,6 @@ __all__ = [
     "RunError",
     "RunTerminatedError",
     "StoreError",
-    "StudyError",
     "WorkerLostError",
     "command_line",
     "problem_of",
@@ -64,10 +63,6 @@ class ClusterError(RunError):
 
 class WorkerLostError(RunError):
     """A trial was given up because worker after worker was lost while running it."""
-
-
-class StudyError(RunError):
-    """A study file says something that cannot be run."""
 
 
 def problem_of(error: ValueError) -> str:

@@ -15,9 +15,9 @@ from datetime import datetime, timezone
 from typing import Protocol
 
 from sdnn import _core
+from sdnn.runs.planned_trial import PlannedTrial
 from sdnn.runs.records import TrialRecord, TrialRows
 from sdnn.runs.trial import TrainingTrial, Trial, opened
-from sdnn.runs.trial_config import PlannedTrial
 
 CHUNK_SECONDS = 0.1
 """A trial reports about this often; it is also how long an interruption waits."""
@@ -116,7 +116,7 @@ def run_to_end(
         Told the number of learning episodes done, after every piece.
     """
     begin = time.thread_time()
-    with opened(planned.config.make_trial(planned.key.seed)) as trial:
+    with opened(planned.spec.make_trial(planned.key.seed)) as trial:
         with closing(_pieces(trial)) as pieces:
             for _ in pieces:
                 advanced(trial.done if isinstance(trial, TrainingTrial) else int(trial.episode))
@@ -126,7 +126,7 @@ def run_to_end(
             return None
     return TrialRecord(
         key=planned.key,
-        config=planned.config.canonical_json(),
+        config=planned.spec.canonical_json(),
         version=_core.__version__,
         n_decisions=int(trial.n_decisions),
         seconds=time.thread_time() - begin,

@@ -20,7 +20,7 @@ from sdnn.runs.comparison import Comparison, Measured
 from sdnn.runs.curves import HEADER, Curve, csv_rows
 from sdnn.runs.errors import PlotUnavailableError, RunError
 from sdnn.runs.measures import CENSORED_MEASURES, MeasureName
-from sdnn.runs.registry import AGENTS, agent_entry
+from sdnn.runs.registry import labels, title_of
 from sdnn.runs.results import CaseResult
 from sdnn.runs.statistics import estimate_mean, running_median
 from sdnn.whole_files import csv_bytes, write_whole
@@ -83,7 +83,7 @@ def colors_of(places: Sequence[int]) -> list[str]:
 
 def agent_colors(agents: Iterable[str]) -> dict[str, str]:
     """Return the colors of agents, each once, by their places in the registry."""
-    shown, places = list(dict.fromkeys(agents)), list(AGENTS)
+    shown, places = list(dict.fromkeys(agents)), list(labels())
     return dict(zip(shown, colors_of([places.index(agent) for agent in shown]), strict=True))
 
 
@@ -134,7 +134,7 @@ def draw_steps(
 
     for depth, result in enumerate(reversed(results)):
         lower, middle, upper = result.quartiles
-        color, title = colors[result.agent], agent_entry(result.agent).title
+        color, title = colors[result.agent], title_of(result.agent)
         thin = {"linewidth": 0.4, "alpha": 0.45} if smooth else {"linewidth": 0.9, "label": title}
         axes.plot(result.episode, middle, color=color, zorder=2 + depth, **thin)
         if smooth:

@@ -9,12 +9,13 @@ from typing import Any
 
 from sdnn.machine import n_cores
 from sdnn.runs.errors import RunError
+from sdnn.runs.planned_trial import describe
 from sdnn.runs.records import TrialKey, TrialTime
 from sdnn.runs.report import duration_words
+from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.sweep import SweepRequest
 from sdnn.runs.trial import opened
-from sdnn.runs.trial_config import TrialSettings, describe
 
 PROBE_SECONDS = 0.3
 """Processor time of a probe, about."""
@@ -31,8 +32,8 @@ def forecast(request: SweepRequest) -> dict[str, Any]:
 
     Raises
     ------
-    StudyError
-        If the core refuses a configuration.
+    ConfigError
+        If a specification is refused.
     ValueError
         If there is no variant of that name.
     StoreError
@@ -56,26 +57,27 @@ def forecast(request: SweepRequest) -> dict[str, Any]:
     for (case, variant), combination in study.combinations.items():
         if request.only and variant not in request.only:
             continue
-        keys, config = study.keys(case, variant), combination.config
+        keys, spec = study.keys(case, variant), combination.spec
         n_stored = sum(key in stored for key in keys)
         if n_stored < len(keys):
-            seconds[case, config.config_hash] = durations.of_trial(keys[0], config)
+            seconds[case, spec.config_hash] = durations.of_trial(keys[0], spec)
         works.append(
             {
                 "case": case,
                 "variant": variant,
-                "agent": config.agent,
-                "n_learning_episodes": config.protocol.n_learning_episodes,
-                "config_hash": config.config_hash,
+                "agent": spec.label,
+                "steps": spec.budget.steps,
+                "episodes": spec.budget.episodes,
+                "config_hash": spec.config_hash,
                 "planned": len(keys),
                 "stored": n_stored,
-                "seconds_of_a_trial": seconds.get((case, config.config_hash)),
+                "seconds_of_a_trial": seconds.get((case, spec.config_hash)),
             }
         )
     missing = [planned for planned in plan if planned.key not in stored]
     found = [seconds[one.key.case_id, one.key.config_hash] for one in missing]
     lower = wall_seconds(
-        [(one["lower"], p.config.is_compiled) for one, p in zip(found, missing, strict=True)], jobs
+        [(one["lower"], p.spec.is_compiled) for one, p in zip(found, missing, strict=True)], jobs
     )
     return {
         "trials": works,
@@ -94,7 +96,8 @@ def forecast_lines(found: dict[str, Any], out: Path) -> Iterator[str]:
     for one in found["trials"]:
         text = (
             f"{one['case']} {one['variant']}: {one['planned']} trials x"
-            f" {one['n_learning_episodes']} episodes of {one['agent']}, {one['stored']} of them"
+            f" {one['episodes'] or one['steps']} {'episodes' if one['episodes'] else 'steps'} of"
+            f" {one['agent']}, {one['stored']} of them"
             f" stored in {out}"
         )
         seconds = one["seconds_of_a_trial"]
@@ -129,11 +132,10 @@ class Durations:
         self._times = [one for one in times if one.n_episodes]
         self._probes: dict[tuple[str, str], TrialTime] = {}
 
-    def of_trial(self, key: TrialKey, config: TrialSettings) -> dict[str, Any]:
+    def of_trial(self, key: TrialKey, spec: RunSpec) -> dict[str, Any]:
         """Estimate the time of a trial; a `RunError` if a probe fails."""
-        protocol = config.protocol
-        n_episodes = protocol.n_learning_episodes
-        last_test = n_episodes // protocol.test_interval * protocol.test_interval
+        every = spec.protocol.evaluate_every_episodes or 1
+        last_test = (spec.budget.episodes or 0) // every * every
         alike = [t for t in self._times if t.key[:2] == key[:2]]
         same = [t for t in alike if t.key.config_hash == key.config_hash]
         found = same or alike
@@ -142,9 +144,9 @@ class Durations:
         source = f"{len(found)} stored trial{'s' if len(found) > 1 else ''} of {words}"
         if not found:
             if key[:2] not in self._probes:
-                self._probes[key[:2]] = _probe(key, config)
+                self._probes[key[:2]] = _probe(key, spec)
             found, source = [self._probes[key[:2]]], "a probe"
-        seconds = n_episodes * sum(t.seconds for t in found) / sum(t.n_episodes for t in found)
+        seconds = sum(t.seconds for t in found) / sum(_amount(t, spec) for t in found) * spec.length
         shortest = min(t.n_episodes for t in found)
         if shortest < last_test:
             source += f": as in the first {shortest} episodes"
@@ -152,14 +154,19 @@ class Durations:
         return {"lower": seconds, "upper": upper, "source": source}
 
 
-def _probe(key: TrialKey, config: TrialSettings) -> TrialTime:
+def _amount(trial: TrialTime, spec: RunSpec) -> int:
+    """Return the episodes of a trial, or its decisions if the budget is in steps."""
+    return trial.n_episodes if spec.budget.steps is None else trial.n_decisions
+
+
+def _probe(key: TrialKey, spec: RunSpec) -> TrialTime:
     """Run the start of a trial."""
     try:
-        with opened(config.make_trial(key.seed)) as trial:
+        with opened(spec.make_trial(key.seed)) as trial:
             begin = time.thread_time()
             seconds = 0.0
             while seconds < PROBE_SECONDS and not trial.finished:
-                trial.advance(config.protocol.test_interval)
+                trial.advance(spec.protocol.evaluate_every_episodes or 1)
                 seconds = time.thread_time() - begin
             n_episodes, n_decisions = int(trial.episode), int(trial.n_decisions)
     except Exception as error:  # whatever a trial raises

@@ -13,8 +13,6 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import gymnasium as gym
-
 from sdnn import _core
 from sdnn.agents import (
     PRESETS,
@@ -27,7 +25,6 @@ from sdnn.agents import (
 )
 from sdnn.agents.transition import Learner
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
-from sdnn.runs.preset_agents import PRESET_AGENTS
 from sdnn.runs.trial import Trial
 
 _BYTES_OF_FLOAT, _BYTES_OF_DOUBLE = 4, 8
@@ -83,11 +80,8 @@ class AgentEntry:
         are those of the experiments; it has a field ``n_inputs``.
     learning
         Settings of how the agent learns and explores: another such dataclass.
-    preset
-        Settings of both that are not their defaults: an object with ``approximator`` and
-        ``learning``.
     presets
-        Such settings by their names, of which a run chooses one.
+        Settings of both by their names, of which a run chooses one; none: their defaults.
     agent
         The agent in Python, a `Learner`: made from an observation space, an action space and
         ``approximator=``, ``learning=``, ``seed=``.
@@ -105,7 +99,6 @@ class AgentEntry:
     learning: type[Any]
     agent: Callable[..., Learner]
     core_trial: Callable[..., Trial] | None = None
-    preset: Preset | None = None
     presets: Mapping[str, Preset] = field(default_factory=dict)
     costs: tuple[CostSeries, ...] = ()
     version: str = ""
@@ -115,34 +108,6 @@ class AgentEntry:
         if preset is None:
             return self.approximator(), self.learning()
         return self.presets[preset].approximator, self.presets[preset].learning
-
-    def approximator_settings(self, n_inputs: int) -> Any:
-        """Return the approximator's settings in experiments, for so many inputs."""
-        if self.preset is None:
-            return self.approximator(n_inputs=n_inputs)
-        return self.preset.approximator.replace(n_inputs=n_inputs)
-
-    def learning_settings(self) -> Any:
-        """Return the agent's settings in experiments."""
-        return self.learning() if self.preset is None else self.preset.learning
-
-    def make_agent(
-        self,
-        observation_space: gym.Space[Any],
-        action_space: gym.Space[Any],
-        *,
-        approximator: Any,
-        learning: Any,
-        seed: int,
-    ) -> Learner:
-        """Make the agent in Python."""
-        return self.agent(
-            observation_space,
-            action_space,
-            approximator=approximator,
-            learning=learning,
-            seed=seed,
-        )
 
 
 AGENTS: dict[str, AgentEntry] = {}
@@ -169,22 +134,71 @@ def register(entry: AgentEntry) -> None:
     AGENTS[entry.id] = entry
 
 
-def agent_entry(agent_id: str) -> AgentEntry:
-    """Look up an agent.
+def labels() -> tuple[str, ...]:
+    """Return the words for all agents: ids, and ``ID-PRESET`` for presets but ``"paper"``."""
+    presets = (f"{e.id}-{name}" for e in AGENTS.values() for name in e.presets if name != "paper")
+    return (*AGENTS, *presets)
+
+
+def label_of(agent_id: str, preset: str | None) -> str:
+    """Return the word for an agent with a preset.
+
+    Examples
+    --------
+    >>> label_of("sdnn-c", "robust"), label_of("sdnn-c", "paper")
+    ('sdnn-c-robust', 'sdnn-c')
+    """
+    return agent_id if preset in (None, "paper") else f"{agent_id}-{preset}"
+
+
+def split_label(label: str) -> tuple[str, str | None]:
+    """Return the agent and the preset that a word stands for; None: the default.
 
     Raises
     ------
     ValueError
-        If no agent has that id.
+        If there is no such agent.
 
     Examples
     --------
-    >>> agent_entry("sdnn-c").title
+    >>> split_label("sdnn-c-robust")
+    ('sdnn-c', 'robust')
+    """
+    if label in AGENTS:
+        return label, None
+    for entry in AGENTS.values():
+        for preset in entry.presets:
+            if label == f"{entry.id}-{preset}":
+                return entry.id, preset
+    raise ValueError(f"agent must be one of {', '.join(labels())}, got {label!r}")
+
+
+def agent_entry(label: str) -> AgentEntry:
+    """Look up an agent by its word.
+
+    Raises
+    ------
+    ValueError
+        If there is no such agent.
+
+    Examples
+    --------
+    >>> agent_entry("sdnn-c-robust").title
     'SDNN-C'
     """
-    if agent_id not in AGENTS:
-        raise ValueError(f"agent must be one of {', '.join(AGENTS)}, got {agent_id!r}")
-    return AGENTS[agent_id]
+    return AGENTS[split_label(label)[0]]
+
+
+def title_of(label: str) -> str:
+    """Return the title of an agent by its word; ValueError if there is no such agent.
+
+    Examples
+    --------
+    >>> title_of("sdnn-c-robust")
+    'SDNN-C, robust'
+    """
+    name, preset = split_label(label)
+    return AGENTS[name].title + (f", {preset}" if preset else "")
 
 
 def cost_series(agents: Iterable[str] | None = None) -> tuple[tuple[AgentEntry, CostSeries], ...]:
@@ -195,7 +209,8 @@ def cost_series(agents: Iterable[str] | None = None) -> tuple[tuple[AgentEntry, 
     ValueError
         If no agent has one of the ids.
     """
-    entries = AGENTS.values() if agents is None else map(agent_entry, agents)
+    words = AGENTS if agents is None else agents
+    entries = [agent_entry(word) for word in words if split_label(word)[1] is None]
     return tuple((entry, series) for entry in entries for series in entry.costs)
 
 
@@ -276,16 +291,3 @@ register(
         ),
     )
 )
-for _name, _id in PRESET_AGENTS.items():
-    if _id not in AGENTS:
-        register(
-            AgentEntry(
-                id=_id,
-                title=f"SDNN-C, {_name}",
-                approximator=SDNNCConfig,
-                learning=QLearningConfig,
-                agent=SDNNQLearning,
-                core_trial=_core.AcrobotTrial,
-                preset=PRESETS[_name],
-            )
-        )

@@ -31,6 +31,7 @@ from sdnn.runs.config import RunConfig, read_json
 from sdnn.runs.engine import run_trials
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line
+from sdnn.runs.planned_trial import PlannedTrial
 from sdnn.runs.records import TrialKey
 from sdnn.runs.run_training import (
     AGENT,
@@ -43,11 +44,12 @@ from sdnn.runs.run_training import (
 )
 from sdnn.runs.store import ResultStore
 from sdnn.runs.thread_executor import SerialExecutor
-from sdnn.runs.trial_config import PlannedTrial, TrialSettings
 from sdnn.whole_files import lock, remove_abandoned_files, write_whole
 
 if TYPE_CHECKING:
     from typing_extensions import Self
+
+    from sdnn.runs.spec import RunSpec
 
 __all__ = ["Goal", "Run", "RunEvaluation", "RunOutcome"]
 
@@ -186,7 +188,7 @@ class Run:
                 self, store, callbacks, repeat_episodes=repeat_episodes, steps=steps,
                 episodes=episodes, stop=stop,
             )  # fmt: skip
-            planned = PlannedTrial(self.key, cast("TrialSettings", task))
+            planned = PlannedTrial(self.key, cast("RunSpec", task))
             with Interrupts(stop.set, (signal.SIGTERM,)) as terminations:
                 done = run_trials([planned], store, executor=SerialExecutor(), stop=stop)
             for failure in done.failures:

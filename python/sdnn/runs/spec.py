@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-import zlib
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import gymnasium as gym
 import msgspec
-import numpy as np
 from msgspec import Meta
 
 from sdnn.agents import Agent
@@ -28,8 +26,9 @@ from sdnn.environments import (
 )
 from sdnn.runs.environment import EnvironmentSpec, Stream
 from sdnn.runs.errors import ConfigError
-from sdnn.runs.registry import agent_entry
+from sdnn.runs.registry import agent_entry, label_of, split_label
 from sdnn.runs.settings import Settings, argument_of, changed, kinds_of, read, values_of
+from sdnn.runs.spec_parts import AgentSpec, BudgetSpec, OutputSpec, ProtocolSpec
 from sdnn.runs.trial import TrainingTrial, Trial, training_trial
 
 __all__ = [
@@ -38,7 +37,6 @@ __all__ = [
     "OutputSpec",
     "ProtocolSpec",
     "RunSpec",
-    "trial_seed",
 ]
 
 HASH_DIGITS = 16
@@ -49,112 +47,6 @@ PAPER_EPISODES = 15_000
 PAPER_INTERVAL = 10
 
 _ACROBOT = {"acrobot": AcrobotConfig, "goal": GoalScheduleConfig, "sensors": SensorConfig}
-
-Count = Annotated[int, Meta(ge=1, le=2**53)]
-CountOrNone = Annotated[int, Meta(ge=0, le=2**53)]
-
-
-class AgentSpec(Settings, frozen=True):
-    """Who learns."""
-
-    name: Annotated[
-        str, Meta(description="The agent: `sdnn-c`, `rbf`, `fuzzy`, or one that was registered.")
-    ] = "sdnn-c"
-    preset: Annotated[
-        str | None,
-        Meta(
-            description="Named settings of the agent `sdnn-c`: `paper`, `general`, `robust` or"
-            " `small`. By default `paper` on the paper's acrobot, `general` in environments."
-        ),
-    ] = None
-    observation_range: Annotated[
-        Literal["seen"] | None,
-        Meta(description="`seen`: ranges of the observed variables come from a warm-up."),
-    ] = None
-    angles: Annotated[
-        tuple[Annotated[int, Meta(ge=0)], ...],
-        Meta(description="Observed variables, from 0, that are angles: their ranges wrap around."),
-    ] = ()
-    angle_pairs: Annotated[
-        Literal["none", "find"],
-        Meta(description="Whether cosine and sine of an angle become one input."),
-    ] = "none"
-    warm_up_steps: Annotated[
-        Annotated[int, Meta(ge=2, le=10**7)],
-        Meta(description="Random steps before learning, where ranges are not known."),
-    ] = 1000
-
-
-class ProtocolSpec(Settings, frozen=True):
-    """How it learns and is evaluated."""
-
-    n_envs: Annotated[
-        Annotated[int, Meta(ge=1, le=4096)],
-        Meta(description="Environments to learn in, in turn; steps are counted over all."),
-    ] = 1
-    evaluate_every: Annotated[
-        CountOrNone | None,
-        Meta(
-            description="Steps between evaluations; 0: none. By default 10,000, or none if"
-            " `evaluate_every_episodes` is given."
-        ),
-    ] = None
-    evaluate_every_episodes: Annotated[
-        Count | None,
-        Meta(
-            description="Learning episodes between evaluations, instead of steps. By default 10 on"
-            " the paper's acrobot."
-        ),
-    ] = None
-    evaluation_episodes: Annotated[
-        Annotated[int, Meta(ge=1, le=10**9)] | None,
-        Meta(
-            description="Greedy episodes in each evaluation. By default 10, on the paper's"
-            " acrobot 1."
-        ),
-    ] = None
-    limit_bootstraps: Annotated[
-        bool,
-        Meta(
-            description="Whether the last transition before a time limit bootstraps, as one that"
-            " goes on; else it counts as terminated."
-        ),
-    ] = True
-    noisy_evaluations: Annotated[
-        bool, Meta(description="Whether the sensors are as noisy in evaluations as in learning.")
-    ] = True
-
-
-class BudgetSpec(Settings, frozen=True):
-    """How long it learns."""
-
-    steps: Annotated[
-        Count | None, Meta(description="Steps to learn. By default 200,000 in environments.")
-    ] = None
-    episodes: Annotated[
-        Count | None,
-        Meta(
-            description="Episodes to learn, instead of steps. By default 15,000 on the paper's"
-            " acrobot."
-        ),
-    ] = None
-    target_return: Annotated[
-        float | None, Meta(description="Stop when an evaluation has this mean return.")
-    ] = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.steps is not None and self.episodes is not None:
-            raise ConfigError("episodes", "must not be given together with steps")
-
-
-class OutputSpec(Settings, frozen=True):
-    """What is written besides the rows; it changes none of them."""
-
-    checkpoint_every: Annotated[Count, Meta(description="Steps between checkpoints.")] = 10_000
-    tensorboard: Annotated[bool, Meta(description="Write the numbers for TensorBoard, too.")] = (
-        False
-    )
 
 
 class RunSpec(Settings, frozen=True):
@@ -220,7 +112,7 @@ class RunSpec(Settings, frozen=True):
             elif isinstance(value, Mapping) or value is None:
                 self._set(**{name: changed(kind(), value or {}, name)})
             elif not isinstance(value, kind):
-                raise ConfigError(name, f"must be a {kind.__name__}, got {value!r}")
+                raise ConfigError(name, f"must be a table or a {kind.__name__}, got {value!r}")
 
     def _fill_agent(self) -> None:
         try:
@@ -303,8 +195,7 @@ class RunSpec(Settings, frozen=True):
     @property
     def label(self) -> str:
         """The agent for a reader: ``"sdnn-c"``, with a preset ``"sdnn-c-robust"``."""
-        preset = self.agent.preset
-        return self.agent.name if preset in (None, "paper") else f"{self.agent.name}-{preset}"
+        return label_of(self.agent.name, self.agent.preset)
 
     @property
     def max_episode_steps(self) -> int | None:
@@ -432,8 +323,9 @@ class RunSpec(Settings, frozen=True):
         entry = agent_entry(self.agent.name)
         approximator = self.approximator
         shape = env.observation_space.shape
-        if shape is not None and len(shape) == 1:
-            approximator = changed_size(approximator, shape[0])
+        is_own = isinstance(entry.agent, type) and issubclass(entry.agent, Agent)
+        if not is_own and shape is not None and len(shape) == 1:
+            approximator = changed_size(approximator, shape[0])  # others find it out themselves
         try:
             agent = entry.agent(
                 env.observation_space,
@@ -444,7 +336,7 @@ class RunSpec(Settings, frozen=True):
                 **self._agent_options(env),
             )
         except (TypeError, ValueError, OverflowError, MemoryError) as error:
-            raise ConfigError(self._key_of(error), str(error)) from error
+            raise ConfigError(self.key_of(error), str(error)) from error
         if isinstance(agent, Agent) and self.environment is not None:
             agent.scaling = self.environment.scaling(env)
         return agent
@@ -464,7 +356,7 @@ class RunSpec(Settings, frozen=True):
             )
         return {**given, "observation_range": environment.ends(env)}
 
-    def _key_of(self, error: BaseException) -> str:
+    def key_of(self, error: BaseException) -> str:
         """Return the key of the setting that an error is about; else of the task."""
         name = argument_of(error)
         for section in ("approximator", "learning", "agent"):
@@ -484,7 +376,8 @@ class RunSpec(Settings, frozen=True):
     def from_values(cls, values: Mapping[str, Any]) -> RunSpec:
         """Make it of values as JSON or TOML has them.
 
-        ``environment`` may be the id of one, and ``agent`` the name of one.
+        ``environment`` may be the id of one, and ``agent`` the name of one, with its preset if
+        wanted: ``"sdnn-c-robust"``.
 
         Raises
         ------
@@ -492,9 +385,12 @@ class RunSpec(Settings, frozen=True):
             If a key is unknown or missing, or a value cannot be used.
         """
         given = dict(values)
-        for name, key in (("environment", "id"), ("agent", "name")):
-            if isinstance(given.get(name), str):
-                given[name] = {key: given[name]}
+        if isinstance(given.get("environment"), str):
+            given["environment"] = {"id": given["environment"]}
+        if isinstance(given.get("agent"), str):
+            given["agent"] = {"name": given["agent"]}
+        if isinstance(given.get("agent"), Mapping):
+            given["agent"] = _with_preset(given["agent"])
         return read(cls, given)
 
     def canonical_json(self) -> str:
@@ -519,6 +415,20 @@ class RunSpec(Settings, frozen=True):
         return hashlib.sha256(self.canonical_json().encode()).hexdigest()[:HASH_DIGITS]
 
 
+def _with_preset(agent: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Take the preset out of an agent's name, such as ``"sdnn-c-robust"``."""
+    name = agent.get("name")
+    try:
+        short, preset = split_label(name) if isinstance(name, str) else (name, None)
+    except ValueError:
+        return agent  # which is refused by its name
+    if preset is None:
+        return agent
+    if agent.get("preset", preset) != preset:
+        raise ConfigError("agent.preset", f"must be that of {name!r}, got {agent['preset']!r}")
+    return {**agent, "name": short, "preset": preset}
+
+
 def changed_size(approximator: Any, n_inputs: int) -> Any:
     """Return the settings of an approximator for so many inputs, if these are among them."""
     if "n_inputs" not in kinds_of(type(approximator)):
@@ -534,30 +444,3 @@ def _canonical(value: Any) -> Any:
     if isinstance(value, float) and value.is_integer():
         return int(value)
     return value
-
-
-def trial_seed(root_seed: int, case_id: str, trial: int) -> int:
-    """Return the seed of a trial, the same for every agent, order of execution and number of jobs.
-
-    All agents thus meet the same sensor noise in the same trial of a case.
-
-    It is the first 64-bit word of ``SeedSequence(root_seed, spawn_key=(crc32(case_id), trial))``
-    without its lowest bit, because the result file's integers have a sign.
-
-    Parameters
-    ----------
-    root_seed
-        The run's seed, not negative.
-    case_id
-        Id of the case.
-    trial
-        Number of the trial, from 0.
-
-    Examples
-    --------
-    >>> trial_seed(0, "s4", 0) == trial_seed(0, "s4", 1)
-    False
-    """
-    spawn_key = (zlib.crc32(case_id.encode()), trial)
-    word = np.random.SeedSequence(root_seed, spawn_key=spawn_key).generate_state(1, np.uint64)[0]
-    return int(word) >> 1

@@ -1,82 +1,24 @@
-"""A study: cases, variants, and the configuration of each variant in each case, from a file."""
+"""A study: cases, variants, and the specification of each variant in each case, from a file."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from pathlib import Path
 
-import gymnasium as gym
-
+from sdnn.runs.config_file import ConfigFile
+from sdnn.runs.errors import ConfigError
+from sdnn.runs.planned_trial import PlannedTrial, trial_seed
 from sdnn.runs.records import TrialKey
-from sdnn.runs.study_settings import Settings, StudyFile, blamed, place_of
+from sdnn.runs.settings import possible_words
+from sdnn.runs.spec import RunSpec
+from sdnn.runs.study_file import BASE, KnownCase, Layer, StudyCase, StudyReader, StudyVariant
 from sdnn.runs.trial import opened
-from sdnn.runs.trial_config import PlannedTrial, TrialSettings, trial_seed
-from sdnn.toml_lines import KeyPath
-from sdnn.typed_values import possible_words
 
+__all__ = ["Combination", "Study", "read_study"]
 
-class KnownCase(Protocol):
-    """A case of the acrobot that studies may name."""
-
-    @property
-    def title(self) -> str:
-        """For a reader."""
-
-    @property
-    def n_sensors(self) -> int:
-        """Number of observed variables."""
-
-    @property
-    def noise(self) -> float:
-        """Standard deviation of the sensor noise."""
-
-
-@dataclass(frozen=True)
-class StudyCase:
-    """What is observed, with settings of its own.
-
-    Parameters
-    ----------
-    id
-        The word used in the result file; seeds are derived from it.
-    title
-        For a reader.
-    settings
-        Override those of the base and of the agent.
-    where
-        Its place in the file.
-    """
-
-    id: str
-    title: str
-    settings: Settings
-    where: KeyPath
-
-
-@dataclass(frozen=True)
-class StudyVariant:
-    """A named set of overrides.
-
-    Parameters
-    ----------
-    id
-        Its name.
-    title
-        For a reader.
-    settings
-        Override all others.
-    case_settings
-        Override even these, in single cases, by their ids.
-    where
-        Its place in the file.
-    """
-
-    id: str
-    title: str
-    settings: Settings
-    case_settings: Mapping[str, Settings]
-    where: KeyPath
+DEFAULT = "default"
+"""The variant that others are compared with unless the file says otherwise, if there is one."""
 
 
 @dataclass(frozen=True)
@@ -87,16 +29,16 @@ class Combination:
     ----------
     case, variant
         Which.
-    config
-        What is run.
+    spec
+        What is run; the seeds of the trials are others.
     settings
         Those of the file that made it, with their places.
     """
 
     case: StudyCase
     variant: StudyVariant
-    config: TrialSettings
-    settings: Settings
+    spec: RunSpec
+    settings: Layer
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,8 +47,8 @@ class Study:
 
     Parameters
     ----------
-    file
-        Its text.
+    reader
+        Its file.
     title
         For a reader.
     n_trials
@@ -122,7 +64,7 @@ class Study:
         Every variant in every case, by their ids (case, variant).
     """
 
-    file: StudyFile
+    reader: StudyReader
     title: str
     n_trials: int
     seed: int
@@ -131,12 +73,17 @@ class Study:
     variants: tuple[StudyVariant, ...]
     combinations: Mapping[tuple[str, str], Combination]
 
+    @property
+    def file(self) -> ConfigFile:
+        """The file it was read from."""
+        return self.reader.file
+
     def keys(self, case_id: str, variant_id: str) -> tuple[TrialKey, ...]:
         """List the trials of a variant in a case."""
-        config = self.combinations[case_id, variant_id].config
-        config_hash = config.config_hash
+        spec = self.combinations[case_id, variant_id].spec
+        config_hash = spec.config_hash
         return tuple(
-            TrialKey(case_id, config.agent, n, trial_seed(self.seed, case_id, n), config_hash)
+            TrialKey(case_id, spec.label, n, trial_seed(self.seed, case_id, n), config_hash)
             for n in range(self.n_trials)
         )
 
@@ -155,62 +102,110 @@ class Study:
             if name not in known:
                 raise ValueError(f"no variant {name!r}; {possible_words(name, known)}")
         wanted = [
-            (self.combinations[case.id, variant.id].config, self.keys(case.id, variant.id))
+            (self.combinations[case.id, variant.id].spec, self.keys(case.id, variant.id))
             for case in self.cases
             for variant in self.variants
             if not only or variant.id in only
         ]
         plan: dict[TrialKey, PlannedTrial] = {}
         for number in range(self.n_trials):
-            for config, keys in wanted:
-                plan.setdefault(keys[number], PlannedTrial(keys[number], config))
+            for spec, keys in wanted:
+                key = keys[number]
+                if key not in plan:
+                    plan[key] = PlannedTrial(key, spec)
         return tuple(plan.values())
 
     def same_as(self, variant_id: str) -> str | None:
         """Return the first variant before another one that is the same in every case."""
-        mine = [self.combinations[case.id, variant_id].config for case in self.cases]
+
+        def hashes(variant: str) -> list[TrialKey]:
+            return [self.keys(case.id, variant)[0] for case in self.cases]
+
+        mine = hashes(variant_id)
         for variant in self.variants:
             if variant.id == variant_id:
                 return None
-            if [self.combinations[case.id, variant.id].config for case in self.cases] == mine:
+            if hashes(variant.id) == mine:
                 return variant.id
         return None
 
     def check(self, stored: Collection[TrialKey] = ()) -> None:
-        """Make a trial of every configuration once, so that nothing is run that could not be.
+        """Make a trial of every specification once, so that nothing is run that could not be.
 
         Parameters
         ----------
         stored
-            Trials that need not be run: configurations of which all are stored are not tried.
+            Trials that need not be run: specifications of which all are stored are not tried.
 
         Raises
         ------
-        StudyError
+        ConfigError
             If one is refused; it names the place of the setting.
         """
         tried: set[str] = set()
-        for (case_id, variant_id), combination in self.combinations.items():
-            config = combination.config
+        for (case_id, variant_id), one in self.combinations.items():
             keys = self.keys(case_id, variant_id)
-            if config.config_hash in tried or all(key in stored for key in keys):
+            if keys[0].config_hash in tried or all(key in stored for key in keys):
                 continue
-            tried.add(config.config_hash)
+            tried.add(keys[0].config_hash)
             try:
-                with opened(config.make_trial(keys[0].seed)):
+                with opened(one.spec.make_trial(keys[0].seed)):
                     pass
             except Exception as error:  # of whatever agent or environment
-                raise _refusal(self.file, combination, error) from error
+                if not isinstance(error, ConfigError):
+                    text = str(error) or type(error).__name__
+                    error = ConfigError(one.spec.key_of(error), text)
+                raise self.reader.refusal(one.settings, one.case, one.variant, error) from error
 
 
-def _refusal(file: StudyFile, combination: Combination, error: Exception) -> Exception:
-    """Make the error for a configuration that was refused, at the setting that its text names."""
-    text = str(error) or type(error).__name__
-    where = blamed(combination.settings, text)
-    if where is None and isinstance(error, gym.error.Error | ImportError):
-        where = place_of(combination.settings, "environment", "id")
-    return file.error(
-        combination.variant.where or combination.case.where if where is None else where,
-        f"{text} (case {combination.case.id}, variant {combination.variant.id},"
-        f" agent {combination.config.agent})",
+def read_study(
+    path: Path,
+    *,
+    known_cases: Mapping[str, KnownCase] | None = None,
+    n_trials: int | None = None,
+    seed: int | None = None,
+) -> Study:
+    """Read a study.
+
+    Modules that it imports are looked for beside the file, too.
+
+    Parameters
+    ----------
+    path
+        A TOML file; ``docs/sweep.md`` describes it.
+    known_cases
+        Cases that the file may name, by their ids.
+    n_trials, seed
+        Instead of the file's.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be read, or says something unknown or impossible; the message names
+        file, line and key. What only agents and environments refuse is found by `Study.check`.
+    """
+    reader = StudyReader(path, known_cases or {})
+    header = reader.header
+    known = [variant.id for variant in reader.variants]
+    reference = header.reference
+    if reference is None:
+        reference = next((name for name in (DEFAULT, BASE) if name in known), known[0])
+    if reference not in known:
+        raise reader.file.error(
+            ("study", "reference"), f"no variant {reference!r}; {possible_words(reference, known)}"
+        )
+    variants = tuple(sorted(reader.variants, key=lambda variant: variant.id != reference))
+    return Study(
+        reader=reader,
+        title=header.title or path.stem,
+        n_trials=header.trials if n_trials is None else n_trials,
+        seed=header.seed if seed is None else seed,
+        reference=reference,
+        cases=reader.cases,
+        variants=variants,
+        combinations={
+            (case.id, variant.id): Combination(case, variant, *reader.spec(case, variant))
+            for case in reader.cases
+            for variant in variants
+        },
     )

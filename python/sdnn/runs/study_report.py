@@ -9,7 +9,7 @@ from typing import Any
 from sdnn import _core
 from sdnn.runs.comparison import MIN_TRIALS_TO_DIFFER, Comparison, Measured
 from sdnn.runs.measures import DEFAULT_MEASURES, MEASURES, SHARE_STABLE, MeasureName
-from sdnn.runs.registry import agent_entry
+from sdnn.runs.registry import title_of
 from sdnn.runs.report import (
     MEASURE_END,
     PERCENT,
@@ -80,7 +80,7 @@ def study_page(comparison: Comparison, digest: str, addition: Addition, picture:
 
 
 def _title(measured: Measured) -> str:
-    return agent_entry(measured.result.agent).title
+    return title_of(measured.result.agent)
 
 
 def _case_sections(comparison: Comparison) -> Iterator[Section]:

@@ -13,12 +13,12 @@ from sdnn.runs.comparison import Comparison, compare
 from sdnn.runs.engine import Observer, run_trials
 from sdnn.runs.executor import Executor
 from sdnn.runs.figures import draw_study, figure_bytes, require_matplotlib
+from sdnn.runs.planned_trial import PlannedTrial
 from sdnn.runs.records import ROW_HEADER, records_digest, trial_rows
 from sdnn.runs.report import Finished, describe_call, json_bytes, require_jinja
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study import Study
 from sdnn.runs.study_report import Addition, study_json, study_page
-from sdnn.runs.trial_config import PlannedTrial
 from sdnn.whole_files import csv_pieces, gzip_pieces, remove_abandoned_files, write_whole
 
 
@@ -71,7 +71,7 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Finishe
 
     Raises
     ------
-    StudyError
+    ConfigError
         If the core refuses a configuration; no trial is run then.
     ValueError
         If there is no variant of that name.

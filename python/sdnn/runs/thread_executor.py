@@ -22,7 +22,7 @@ from sdnn.runs.executor import (
     Started,
     run_to_end,
 )
-from sdnn.runs.trial_config import PlannedTrial
+from sdnn.runs.planned_trial import PlannedTrial
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ trials = 1
 cases = ["s4"]
 
 [base]
-protocol.n_learning_episodes = 10
+budget.episodes = 10
 
 [axes]
 learning.tie_rule = ["lowest"]

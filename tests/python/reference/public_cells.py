@@ -6,7 +6,6 @@ import inspect
 import pickle
 import re
 
-import gymnasium as gym
 import numpy as np
 
 from bad_inputs import BAD, judged, parameters_of
@@ -19,13 +18,8 @@ from sdnn.environments import (
     SensorConfig,
 )
 from sdnn.estimators import SDNNClassifier, SDNNRegressor
-from sdnn.reproduction import (
-    EnvironmentConfig,
-    MeasureConfig,
-    ProtocolConfig,
-    TrialConfig,
-)
-from sdnn.runs import measures
+from sdnn.reproduction import MeasureConfig
+from sdnn.runs import BudgetSpec, ConfigError, EnvironmentSpec, ProtocolSpec, RunSpec, measures
 
 ROOMS = ("agents", "approximators", "coding", "environments", "estimators", "reproduction", "runs")
 
@@ -185,10 +179,11 @@ def _coding_fault(coding, bins):
 def experiment_cells():
     """Settings of trials and measures are refused when they are made, or work."""
     made = {
-        ProtocolConfig: _protocol_used,
-        EnvironmentConfig: _environment_used,
+        ProtocolSpec: _protocol_used,
+        BudgetSpec: _budget_used,
+        EnvironmentSpec: _environment_used,
         MeasureConfig: _measure_used,
-        TrialConfig: _trial_used,
+        RunSpec: _spec_used,
     }
     for config, used in made.items():
         for parameter in parameters_of(config.__init__):
@@ -204,16 +199,19 @@ def _experiment_cell(used, parameter, value):
 
 
 def _protocol_used(given):
-    short = {"n_learning_episodes": 2, "test_interval": 1}
-    TrialConfig(protocol=ProtocolConfig(**{**short, **given})).make_trial(1).advance(1)
+    RunSpec(protocol=ProtocolSpec(**given), budget=BudgetSpec(episodes=20)).make_trial(1).advance(1)
+    return ""
+
+
+def _budget_used(given):
+    RunSpec(budget=BudgetSpec(**given)).make_trial(1).advance(1)
     return ""
 
 
 def _environment_used(given):
-    bounds = {"observation_low": (-1.0, -1.0, -8.0), "observation_high": (1.0, 1.0, 8.0)}
-    config = EnvironmentConfig(**{"id": "Pendulum-v1", **bounds, **given})
-    with contextlib.suppress(gym.error.Error):  # of an id that nobody has registered
-        observation, _ = config.make().reset(seed=1)
+    environment = EnvironmentSpec(**{"id": "Pendulum-v1", **given})
+    with contextlib.suppress(ConfigError):  # of an id that nobody has registered
+        observation, _ = environment.make().reset(seed=1)
         return "" if np.isfinite(observation).all() else f"gave {observation}"
     return ""
 
@@ -224,8 +222,8 @@ def _measure_used(given):
     return "" if learned >= 0 else f"gave {learned}"
 
 
-def _trial_used(given):
-    TrialConfig(**given).make_trial(1)
+def _spec_used(given):
+    RunSpec(**given).make_trial(1)
     return ""
 
 

@@ -1,23 +1,21 @@
 import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from sdnn.agents import PRESETS, FuzzyQLearningConfig
-from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig
+from sdnn.agents import FuzzyQLearningConfig
+from sdnn.approximators import FuzzyRulesConfig
 from sdnn.environments import SensorConfig
 from sdnn.reproduction import (
     AGENTS,
     EXPERIMENTS,
-    ProtocolConfig,
-    TrialConfig,
-    case_config,
+    case_spec,
     plan_trials,
     select_experiments,
     trial_seed,
 )
-from sdnn.runs.preset_agents import PRESET_AGENTS
+from sdnn.runs import ProtocolSpec, RunSpec
 
 
 def test_experiment_a_is_the_one_of_the_paper():
@@ -73,15 +71,6 @@ def test_unknown_experiment_is_named():
         select_experiments("z")
 
 
-def test_every_preset_has_an_agent_of_its_settings():
-    assert PRESET_AGENTS.keys() == PRESETS.keys()
-    for name, agent in PRESET_AGENTS.items():
-        entry = AGENTS[agent]
-        settings = PRESETS[name]
-        assert entry.learning_settings() == settings.learning
-        assert entry.approximator_settings(6) == replace(settings.approximator, n_inputs=6)
-
-
 def test_presets_run_beside_the_agents_of_a_case():
     experiment = EXPERIMENTS[0]
     both = experiment.with_presets(["robust", "paper", "robust"])
@@ -89,79 +78,55 @@ def test_presets_run_beside_the_agents_of_a_case():
     assert experiment.with_presets([]) == experiment
 
 
-def test_protocol_defaults_are_the_papers_and_the_cores():
-    from sdnn import _core
-
-    core = _core.ProtocolConfig()
-    assert asdict(ProtocolConfig()) == {
-        "n_learning_episodes": 15000,
-        "test_interval": 10,
-        "limit_bootstraps": True,
-        "noisy_tests": True,
-    }
-    assert core.n_learning_episodes == 15000
-    assert core.test_interval == 10
-    assert ProtocolConfig(n_learning_episodes=20).n_learning_episodes == 20
-
-
 def test_canonical_json_is_sorted_and_does_not_depend_on_how_numbers_are_typed():
-    config = TrialConfig()
+    config = RunSpec()
     text = config.canonical_json()
     assert text == json.dumps(json.loads(text), sort_keys=True, separators=(",", ":"))
     noise_typed = [0, 0.0, -0.0, np.float64(0.0)]
     hashes = {
-        replace(config, sensors=replace(config.sensors, noise=n)).config_hash for n in noise_typed
+        config.replace(sensors=replace(config.sensors, noise=n)).config_hash for n in noise_typed
     }
     assert hashes == {config.config_hash}
 
 
 def test_changed_code_of_an_agent_is_another_version(monkeypatch):
-    config = TrialConfig()
+    config = RunSpec()
     before = config.config_hash
     monkeypatch.setitem(AGENTS, "sdnn-c", replace(AGENTS["sdnn-c"], version="2"))
-    assert '"agent_version":"2"' in config.canonical_json()
+    assert '"version":"2"' in config.canonical_json()
     assert config.config_hash != before
 
 
-def test_config_hash_sees_every_room():
-    base = TrialConfig()
+def test_the_hash_covers_every_table():
+    base = RunSpec()
     others = [
-        TrialConfig(agent="rbf", approximator=RBFNetworkConfig(), learning=base.learning),
-        replace(base, approximator=replace(base.approximator, n_inputs=5)),
-        replace(base, learning=replace(base.learning, discount=0.8)),
-        replace(base, acrobot=replace(base.acrobot, gravity=9.81)),
-        replace(base, goal=replace(base.goal, scale=50.0)),
-        replace(base, sensors=replace(base.sensors, noise=0.02)),
-        replace(base, protocol=replace(base.protocol, test_interval=5)),
+        RunSpec(agent={"name": "rbf"}),
+        base.replace(approximator=replace(base.approximator, lattice=2)),
+        base.replace(learning=replace(base.learning, discount=0.8)),
+        base.replace(acrobot=replace(base.acrobot, gravity=9.81)),
+        base.replace(goal=replace(base.goal, scale=50.0)),
+        base.replace(sensors=replace(base.sensors, noise=0.02)),
+        base.replace(protocol=ProtocolSpec(evaluate_every_episodes=5)),
     ]
-    assert len({config.config_hash for config in [base, *others]}) == 1 + len(others)
+    assert len({spec.config_hash for spec in [base, *others]}) == 1 + len(others)
     assert len(base.config_hash) == 16
 
 
-def test_case_config_fits_network_to_sensors():
+def test_a_case_fits_the_network_to_the_sensors():
     (experiment,) = select_experiments("a")
-    config = case_config(experiment.cases[1], "sdnn-c")
-    assert config.approximator.n_inputs == config.sensors.n_sensors == 6
-    assert config.protocol == ProtocolConfig()
+    spec = case_spec(experiment.cases[1], "sdnn-c")
+    assert spec.approximator.n_inputs == spec.sensors.n_sensors == 6
+    assert (spec.budget.episodes, spec.protocol.evaluate_every_episodes) == (15_000, 10)
     with pytest.raises(ValueError, match="'fuzzy'"):
-        case_config(experiment.cases[1], "fuzzy")
+        case_spec(experiment.cases[1], "fuzzy")
 
 
-def test_case_config_gives_every_agent_its_own_settings():
+def test_a_case_gives_every_agent_its_own_settings():
     (experiment,) = select_experiments("b")
-    config = case_config(experiment.cases[2], "fuzzy")
-    assert config.approximator == FuzzyRulesConfig(n_inputs=5)
-    assert config.learning == FuzzyQLearningConfig()
-    assert config.sensors == SensorConfig(n_sensors=5, noise=0.02)
-
-
-def test_settings_of_another_agent_are_refused():
-    with pytest.raises(ValueError, match="got 'dqn'"):
-        TrialConfig(agent="dqn")
-    with pytest.raises(TypeError, match="approximator of fuzzy must be a FuzzyRulesConfig"):
-        TrialConfig(agent="fuzzy")
-    with pytest.raises(TypeError, match="learning of fuzzy must be a FuzzyQLearningConfig"):
-        TrialConfig(agent="fuzzy", approximator=FuzzyRulesConfig())
+    spec = case_spec(experiment.cases[2], "fuzzy")
+    assert spec.approximator == FuzzyRulesConfig(n_inputs=5)
+    assert spec.learning == FuzzyQLearningConfig()
+    assert spec.sensors == SensorConfig(n_sensors=5, noise=0.02)
 
 
 def test_an_experiment_with_other_agents_differs_in_nothing_else():

@@ -13,7 +13,6 @@ import sdnn.reproduction.reproduce as reproduce_module
 from sdnn.reproduction import (
     AGENTS,
     PlotUnavailableError,
-    ProtocolConfig,
     ResultStore,
     collect,
     draw_experiment,
@@ -151,7 +150,7 @@ def test_a_run_plans_once_and_reads_its_trials_once(monkeypatch, tmp_path, fake,
 def test_a_colour_stands_for_an_agent_in_every_figure(tmp_path, fake, run):
     def colors(*agents):
         other = EXPERIMENT.with_agents(agents)
-        plan = plan_trials(other.cases, 1, 0, ProtocolConfig(n_learning_episodes=100))
+        plan = plan_trials(other.cases, 1, 0, 100)
         run(tmp_path, plan)
         with ResultStore(tmp_path) as store:
             results = collect(other, store.load(p.key for p in plan))

@@ -9,7 +9,6 @@ import sdnn.reproduction.reproduce as reproduce_module
 from sdnn.reproduction import (
     EXPERIMENTS,
     Estimate,
-    ProtocolConfig,
     ReproduceRequest,
     ResultStore,
     collect,
@@ -151,7 +150,7 @@ def test_claims_are_settled_by_trials_of_all_their_subjects():
 
 def test_the_reference_results_are_of_the_papers_settings():
     kept = reference_results()
-    plan = plan_trials(CASES.values(), 1, kept[0].root_seed, ProtocolConfig())
+    plan = plan_trials(CASES.values(), 1, kept[0].root_seed)
     planned = {(*p.key[:2], p.key.config_hash) for p in plan}
     assert {(one.case_id, one.agent, one.config_hash) for one in kept} == planned, (
         "if no row changed, run docs/studies/write_reference_results.py --rekey"
@@ -166,7 +165,7 @@ def test_the_reference_results_are_of_the_papers_settings():
 @pytest.mark.parametrize("agent", ["sdnn-c", "fuzzy"])
 def test_a_reference_result_is_what_running_it_gives(tmp_path, agent):
     kept = next(one for one in reference_results() if (one.case_id, one.agent) == ("s4", agent))
-    plan = plan_trials([CASES["s4"]], 1, kept.root_seed, ProtocolConfig())
+    plan = plan_trials([CASES["s4"]], 1, kept.root_seed)
     own = [planned for planned in plan if planned.key.agent == agent]
     with ResultStore(tmp_path) as store:
         run_trials(own, store)
@@ -180,7 +179,7 @@ def test_a_reference_result_is_what_running_it_gives(tmp_path, agent):
 @pytest.fixture
 def fake_results(tmp_path, fake, run):
     """Twelve fake trials of all episodes in each case of Experiment A."""
-    plan = plan_trials(EXPERIMENTS[0].cases, 12, 0, ProtocolConfig())
+    plan = plan_trials(EXPERIMENTS[0].cases, 12, 0)
     run(tmp_path, plan)
     with ResultStore(tmp_path) as store:
         return collect(EXPERIMENTS[0], store.load(p.key for p in plan))

@@ -28,7 +28,7 @@ def record(study, case, variant, number, steps, returns=None, interval=10):
     key = study.keys(case, variant)[number]
     return TrialRecord(
         key=key,
-        config=study.combinations[case, variant].config.canonical_json(),
+        config=study.combinations[case, variant].spec.canonical_json(),
         version="1",
         n_decisions=100,
         seconds=1.0,
@@ -98,10 +98,10 @@ trials = 6
 cases = ["s4", "s4-noise"]
 reference = "short"
 [base]
-protocol.n_learning_episodes = 1000
+budget.episodes = 1000
 [variants.short]
 [variants.long]
-protocol.n_learning_episodes = 3000
+budget.episodes = 3000
 """
 
 
@@ -132,7 +132,7 @@ def test_what_only_lasts_longer_does_not_differ(study):
 
 def test_claims_are_censored_where_their_own_trials_end(study):
     text = LENGTHS.replace('"s4", "s4-noise"', '"s4", "s4-noise", "s6"')
-    mine = study(text + "[variants.long.cases.s6]\nprotocol.n_learning_episodes = 5000\n")
+    mine = study(text + "[variants.long.cases.s6]\nbudget.episodes = 5000\n")
     n_tests = {"s4": 300, "s4-noise": 300, "s6": 500}
     records = [
         record(mine, case, "long", number, steps_of((n, 50)))

@@ -11,7 +11,6 @@ from sdnn.reproduction import (
     AGENTS,
     EXPERIMENTS,
     Observer,
-    ProtocolConfig,
     ResultStore,
     plan_trials,
     run_trials,
@@ -68,7 +67,7 @@ class _Speaker(Observer):
 
 
 def make_plan(n_trials=3, n_episodes=300, root_seed=0):
-    return plan_trials(CASES, n_trials, root_seed, ProtocolConfig(n_learning_episodes=n_episodes))
+    return plan_trials(CASES, n_trials, root_seed, n_episodes)
 
 
 def agents_with(core_trial):

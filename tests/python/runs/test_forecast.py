@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from sdnn.reproduction import AGENTS, ProtocolConfig, TrialConfig, TrialKey
-from sdnn.runs import forecast
+from sdnn.reproduction import AGENTS, TrialKey
+from sdnn.runs import BudgetSpec, RunSpec, forecast
 from sdnn.runs.forecast import Durations, wall_seconds
 from sdnn.runs.records import TrialTime
 
-CONFIG = TrialConfig(protocol=ProtocolConfig(n_learning_episodes=1005, test_interval=10))
+CONFIG = RunSpec(budget=BudgetSpec(episodes=1005))
 KEY = TrialKey("s4", "sdnn-c", 0, 1, "mine")
 
 
@@ -63,7 +63,7 @@ def test_a_probe_is_made_once_for_a_case_and_agent(fake, monkeypatch):
     assert found["lower"] == pytest.approx(10.05)
     assert found["upper"] is None
     assert found["source"].startswith("a probe: as in the first ")
-    whole = replace(CONFIG, protocol=ProtocolConfig(n_learning_episodes=20, test_interval=10))
+    whole = CONFIG.replace(budget=BudgetSpec(episodes=20))
     assert durations.of_trial(KEY._replace(config_hash="other"), whole) == {
         "lower": pytest.approx(0.2), "upper": pytest.approx(0.2), "source": "a probe",
     }  # fmt: skip

@@ -5,16 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from sdnn.reproduction import (
-    AGENTS,
-    EXPERIMENTS,
-    ProtocolConfig,
-    TrialConfig,
-    case_config,
-    plan_trials,
-)
-from sdnn.runs.environment_trial import EnvironmentTrialConfig
-from sdnn.runs.errors import StudyError
+from sdnn.reproduction import AGENTS, EXPERIMENTS, case_spec, plan_trials
+from sdnn.runs import ConfigError, RunSpec
 
 PAPER = """
 [study]
@@ -25,17 +17,17 @@ seed = 3
 
 
 def configs(study):
-    return {pair: combination.config for pair, combination in study.combinations.items()}
+    return {pair: combination.spec for pair, combination in study.combinations.items()}
 
 
 def test_a_study_of_nothing_is_the_paper_and_shares_its_trials(study):
     found = study(PAPER)
     cases = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
     assert configs(found) == {
-        (case_id, "base"): case_config(cases[case_id], "sdnn-c")
+        (case_id, "base"): case_spec(cases[case_id], "sdnn-c")
         for case_id in ("s4", "s4-noise", "s6")
     }
-    paper = {p.key for p in plan_trials(cases.values(), 2, 3, ProtocolConfig())}
+    paper = {p.key for p in plan_trials(cases.values(), 2, 3)}
     assert {p.key for p in found.plan()} < paper
     assert found.title == "mine"
     assert found.reference == "base"
@@ -114,15 +106,12 @@ def test_arrays_words_and_numbers_reach_the_configuration(study):
         """
     )
     config = configs(found)["s4", "x"]
-    expected = TrialConfig(
-        approximator=replace(
-            TrialConfig().approximator,
-            circular=(True, True, False, False),
-            initial_threshold=10.0,
-            u_low=7,
-        ),
-        goal=replace(TrialConfig().goal, kind="inverse_sqrt"),
-    )
+    expected = RunSpec(
+        approximator={
+            "circular": (True, True, False, False), "initial_threshold": 10.0, "u_low": 7
+        },
+        goal={"kind": "inverse_sqrt"},
+    )  # fmt: skip
     assert config == expected
     assert config.config_hash == expected.config_hash
     assert configs(found)["s6", "x"].approximator.circular == ()
@@ -146,7 +135,7 @@ def test_axes_vary_one_key_at_a_time(study):
     of_s6 = {variant: c for (case, variant), c in configs(found).items() if case == "s6"}
     assert of_s6["tie_rule=middle"].learning.tie_rule == "middle"
     assert of_s6["noise=0.01"].sensors.noise == 0.01
-    assert of_s6["scale=50"] == replace(of_s6["base"], goal=replace(of_s6["base"].goal, scale=50.0))
+    assert of_s6["scale=50"] == of_s6["base"].replace(goal=replace(of_s6["base"].goal, scale=50.0))
     assert found.same_as("tie_rule=uniform") == "base"
     assert found.same_as("tie_rule=middle") is None
     assert found.same_as("base") is None
@@ -174,7 +163,7 @@ def test_axes_combine_to_a_product(study):
     ]
     assert found.reference == "paper"
     last = configs(found)["s4", "agent=fuzzy, scale=100, integration_step=0.02"]
-    assert (last.agent, last.goal.scale) == ("fuzzy", 100.0)
+    assert (last.agent.name, last.goal.scale) == ("fuzzy", 100.0)
 
 
 def test_axes_of_the_same_last_word_have_whole_names(study):
@@ -194,13 +183,14 @@ def test_an_environment_is_a_case_of_its_own(study):
         """
         [base]
         environment = "Pendulum-v1"
-        protocol = { n_learning_episodes = 20, test_interval = 10 }
+        budget.episodes = 20
+protocol.evaluate_every_episodes = 10
         """
     )
     config = configs(found)["Pendulum-v1", "base"]
-    assert isinstance(config, EnvironmentTrialConfig)
-    assert config.approximator.n_inputs == 3
     assert config.environment.id == "Pendulum-v1"
+    assert (config.budget.episodes, config.protocol.evaluate_every_episodes) == (20, 10)
+    assert config.label == "sdnn-c-general"
 
 
 def test_both_kinds_of_tasks_fit_into_one_study(study):
@@ -209,14 +199,13 @@ def test_both_kinds_of_tasks_fit_into_one_study(study):
         [cases.s4]
         [cases.cart]
         environment.id = "CartPole-v1"
-        environment.observation_low = [-4.8, -4, -0.42, -4]
-        environment.observation_high = [4.8, 4, 0.42, 4]
+        environment.ranges.1 = [-4, 4]
+        environment.ranges.3 = [-4, 4]
         """
     )
-    assert isinstance(configs(found)["s4", "base"], TrialConfig)
+    assert configs(found)["s4", "base"].environment is None
     cart = configs(found)["cart", "base"]
-    assert cart.environment.observation_low == (-4.8, -4.0, -0.42, -4.0)
-    assert cart.approximator.n_inputs == 4
+    assert cart.environment.ranges == {"1": (-4.0, 4.0), "3": (-4.0, 4.0)}
     found.check()
 
 
@@ -228,7 +217,7 @@ def test_options_override_the_file(study):
 
 def test_some_variants_only(study):
     found = study(PAPER + "[axes]\nlearning.discount = [0.5, 0.7]\n")
-    assert {p.config.learning.discount for p in found.plan(["discount=0.5"])} == {0.5}
+    assert {p.spec.learning.discount for p in found.plan(["discount=0.5"])} == {0.5}
     with pytest.raises(ValueError, match=r"no variant 'discount=0.6'; possible: discount=0.[57]"):
         found.plan(["discount=0.6"])
 
@@ -255,11 +244,12 @@ def test_modules_beside_the_file_may_register_agents(study, tmp_path):
             [base]
             agent = "plugged"
             approximator.n_bases = 3
-            protocol = { n_learning_episodes = 2, test_interval = 2 }
+            budget.episodes = 2
+protocol.evaluate_every_episodes = 2
             """
         )
         config = configs(found)["s4", "base"]
-        assert (config.agent, config.approximator.n_bases) == ("plugged", 3)
+        assert (config.agent.name, config.approximator.n_bases) == ("plugged", 3)
         found.check()
     finally:
         AGENTS.pop("plugged", None)
@@ -289,7 +279,7 @@ def test_what_own_settings_refuse_is_told_with_its_place(study, tmp_path, error)
     (tmp_path / "strict_agents.py").write_text(STRICT.replace("ERROR", error))
     text = "[study]\nimports = ['strict_agents']\ncases = ['s4']\n[base]\nagent = 'strict'\n"
     try:
-        with pytest.raises(StudyError, match=r"mine\.toml:6: base\.approximator\.size: \w+"):
+        with pytest.raises(ConfigError, match=r"mine\.toml:6: base\.approximator\.size: \w+"):
             study(text + "approximator.size = 0\n")
     finally:
         AGENTS.pop("strict", None)
@@ -302,33 +292,33 @@ WRONG = {
     "top": ("[base]\n\n[axis]\n", 3, "axis: unknown key; possible: axes,"),
     "study key": ("[study]\nseeds = 3\n", 2, "study.seeds: unknown key; possible: seed,"),
     "study value": ("[study]\ntrials = 'x'\n", 2, "study.trials: must be a whole number, got 'x'"),
-    "trials": ("[study]\ntrials = 0\n", 2, "study.trials: must be at least 1, got 0"),
-    "seed": ("[study]\nseed = -1\n", 2, "study.seed: must be at least 0, got -1"),
-    "no cases": ("[base]\nagent = 'fuzzy'\n", None, "no cases: give some of s4, s6"),
+    "trials": ("[study]\ntrials = 0\n", 2, "study.trials: must be a whole number of at least"),
+    "seed": ("[study]\nseed = -1\n", 2, "study.seed: must be a whole number of at least 0, got -1"),
+    "no cases": ("[base]\nagent = 'fuzzy'\n", None, "no cases: give some of the paper's"),
     "case": (
-        "[study]\ncases = [\n 's4',\n 's5-nois',\n]\n", 4,
-        "study.cases[1]: no case 's5-nois': neither a table [cases.s5-nois] nor a known case"
-        "; possible: s5-noise,",
+        "[study]\ncases = [\n 's4',\n 's5-nois',\n]\n", 2,
+        "study.cases[1]: no case 's5-nois': neither a table [cases.s5-nois] nor a case of the"
+        " paper; possible: s5-noise,",
     ),
     "unlisted case": (
         "[study]\ncases = ['s4']\n[cases.x]\n", 3,
-        "cases.x: is not among the cases that [study] lists",
+        "cases.x: is not among the cases of [study]",
     ),
     "paper's case": (
         "[cases.s4-noise]\n[cases.s4]\nsensors.noise = 0.1\n", 3,
-        "cases.s4.sensors.noise: s4 is the known case of 4 sensors with noise 0:",
+        "cases.s4.sensors.noise: s4 is a case with sensors.n_sensors = 4,",
     ),
-    "no table of sensors": ("[cases.s4]\nsensors = 3\n", 2, "cases.s4.sensors: must be a table of"),
+    "no table of sensors": ("[cases.s4]\nsensors = 3\n", 2, "cases.s4.sensors: must be a table"),
     "paper's case elsewhere": (
         "[cases.s4]\nenvironment = 'Pendulum-v1'\n", 2,
-        "cases.s4.environment: s4 is the known case",
+        "cases.s4.environment: s4 is a case with",
     ),
     "reference": (
         "[study]\nreference = 'slo'\n[cases.s4]\n[variants.slow]\n[variants.b]\n", 2,
         "study.reference: no variant 'slo'; possible: slow, b",
     ),
     "import": (
-        "[study]\nimports = ['json',\n'not_there_at_all']\n", 3,
+        "[study]\nimports = ['json',\n'not_there_at_all']\n", 2,
         "study.imports[1]: importing not_there_at_all failed: ModuleNotFoundError",
     ),
     "agent": (
@@ -342,41 +332,40 @@ WRONG = {
     ),
     "section": (
         "[cases.s4]\n[base]\n\nlerning.discount = 0.5\n", 4,
-        "base.lerning.discount: no such setting; possible: learning,",
+        "base.lerning.discount: unknown key; possible: learning,",
     ),
     "setting": (
         "[cases.s4]\n[base]\nlearning = { epsilon = 0.1, discont = 2 }\n", 3,
-        "base.learning.discont: QLearningConfig has no such setting; possible: discount,",
+        "base.learning.discont: unknown key; possible: discount,",
     ),
     "setting of another agent": (
         "[cases.s4]\n[base]\nlearning.learning_rate = 0.1\n[variants.f]\nagent = 'fuzzy'\n", 3,
-        "base.learning.learning_rate: FuzzyQLearningConfig has no such setting; possible:"
-        " learning_coefficient,",
+        "base.learning.learning_rate: unknown key; possible: learning_coefficient,",
     ),
-    "no table": ("[cases.s4]\n[base]\nlearning = 3\n", 3, "base.learning: must be a table of"),
+    "no table": ("[cases.s4]\n[base]\nlearning = 3\n", 3, "base.learning: must be a table,"),
     "float": (
         "[cases.s4]\n[base.learning]\ndiscount = '0.5'\n", 3,
         "base.learning.discount: must be a number, got '0.5'",
     ),
     "infinite": (
         "[cases.s4]\n[base.acrobot]\ngravity = inf\n", 3,
-        "base.acrobot.gravity: must be a finite number, got inf",
+        "base.acrobot.gravity: must be finite, got inf",
     ),
     "int": (
-        "[cases.s4]\n[base.protocol]\ntest_interval = 10.0\n", 3,
-        "base.protocol.test_interval: must be a whole number, got 10.0",
+        "[cases.s4]\n[base.protocol]\nevaluate_every_episodes = 10.0\n", 3,
+        "base.protocol.evaluate_every_episodes: must be a whole number, got 10.0",
     ),
     "bool": (
         "[cases.s4]\n[base.approximator]\nbalanced_anchors = 1\n", 3,
         "base.approximator.balanced_anchors: must be true or false, got 1",
     ),
     "word": (
-        "[cases.s4]\n[axes]\n'learning.tie_rule' = ['uniform',\n'upper']\n", 4,
+        "[cases.s4]\n[axes]\n'learning.tie_rule' = ['uniform',\n'upper']\n", 3,
         "axes.\"learning.tie_rule\"[1]: must be one of 'uniform', 'lowest', 'middle', got 'upper'",
     ),
     "array": (
         "[cases.s4]\n[base]\napproximator.circular = [true, 1]\n", 3,
-        "base.approximator.circular: number 2 of the array must be true or false, got 1",
+        "base.approximator.circular: must be true or false, got [True, 1]",
     ),
     "optional": (
         "[cases.s4]\n[base]\napproximator.u_low = 'x'\n", 3,
@@ -384,7 +373,7 @@ WRONG = {
     ),
     "derived": (
         "[cases.s4]\n[base]\napproximator.n_inputs = 4\n", 3,
-        "base.approximator.n_inputs: follows from the observations (4): omit it",
+        "base.approximator.n_inputs: follows from the observations: omit it",
     ),
     "too deep": (
         "[cases.s4]\n[base]\nlearning.discount = 0.5\n'learning.discount.x' = 0.6\n", 4,
@@ -392,15 +381,15 @@ WRONG = {
     ),
     "infinite argument": (
         "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.kwargs.g = inf\n", 3,
-        "base.environment.kwargs.g: must be data that JSON has, numbers finite, got inf",
+        "base.environment.kwargs.g: must be data that JSON has",
     ),
     "twice": (
         "[cases.s4]\n[base]\nlearning.discount = 0.5\n'learning.discount' = 0.6\n", 4,
         'base."learning.discount": learning.discount is set twice',
     ),
     "short trials": (
-        "[cases.s4]\n[base]\nprotocol.n_learning_episodes = 9\n", 3,
-        "base.protocol.n_learning_episodes: n_learning_episodes must be at least test_interval",
+        "[cases.s4]\n[base]\nbudget.episodes = 9\n", 3,
+        "base.budget.episodes: must be at least evaluate_every_episodes (10), got 9",
     ),
     "axis": ("[cases.s4]\n[axes]\ngoal.scale = 5\n", 3, "axes.goal.scale: must be an array"),
     "axis twice": (
@@ -420,26 +409,29 @@ WRONG = {
     ),
     "environment and acrobot": (
         "[base]\nenvironment = 'Pendulum-v1'\ngoal.scale = 3\n", 3,
-        "base.goal.scale: goal is the acrobot's: it does not go with an environment",
+        "base.goal.scale: is the acrobot's: it does not go with an environment",
     ),
     "environment without id": (
         "[cases.x]\nenvironment.noise = 0.1\n", 2,
-        "cases.x.environment.noise: an environment needs an id",
+        "cases.x.environment.noise: must be given",
     ),
-    "unknown environment": (
-        "[base]\nenvironment = 'Pendulm-v1'\n", 2, "base.environment: Environment `Pendulm`"
+    "sensors": (
+        "[cases.x]\nsensors.n_sensors = 9\n", 2,
+        "cases.x.sensors.n_sensors: n_sensors must be in [4, 6], got 9",
     ),
-    "environment's argument": (
-        "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.kwargs = { gg = 3 }\n", 3,
-        "base.environment.kwargs.gg:",
+    "discount": (
+        "[cases.s4]\n[variants.ok]\n[variants.bad]\nlearning.discount = 2\n", 4,
+        "variants.bad.learning.discount: discount must be in [0, 1], got 2"
+        " (case s4, variant bad)",
     ),
-    "unbounded": (
-        "[base]\nenvironment.id = 'CartPole-v1'\n", 2,
-        "base.environment.id: observation_low must be given where observations are unbounded",
+    "range": (
+        "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.ranges.0 = [1, 0]\n", 3,
+        "base.environment.ranges.0: must be finite, low < high, got 1.0 and 0.0",
     ),
-    "ranges": (
-        "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.observation_low = [1]\n", 3,
-        "base.environment.observation_low: observation_low must have 3 numbers",
+    "seed of a trial": ("[base]\nseed = 3\n", 2, "base.seed: is no setting of a study"),
+    "presets": (
+        "[cases.s4]\n[variants.a]\nagent.preset = 'best'\n", 3,
+        "variants.a.agent.preset: must be one of 'paper', 'general', 'robust', 'small'",
     ),
 }  # fmt: skip
 
@@ -447,7 +439,7 @@ WRONG = {
 @pytest.mark.parametrize("name", WRONG)
 def test_errors_name_file_line_and_key(study, name, tmp_path):
     text, line, message = WRONG[name]
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(ConfigError) as caught:
         study(text)
     place = str(tmp_path / "mine.toml") + ("" if line is None else f":{line}")
     assert str(caught.value).startswith(f"{place}: {message}")
@@ -457,24 +449,33 @@ def test_errors_name_file_line_and_key(study, name, tmp_path):
     ("text", "line", "message"),
     [
         (
-            "[cases.s4]\n[axes]\nacrobot.integration_step = [\n0.02,\n0.3]\n", 5,
+            "[cases.s4]\n[axes]\nacrobot.integration_step = [\n0.02,\n0.3]\n", 3,
             "axes.acrobot.integration_step[1]: integration_step",
         ),
-        ("[cases.x]\nsensors.n_sensors = 9\n", 2, "cases.x.sensors.n_sensors: n_sensors"),
         (
-            "[base]\nenvironment = 'MountainCar-v0'\n[variants.f]\nagent = 'fuzzy'\n", 3,
-            "variants.f: action_space must be a Box, got Discrete (case MountainCar-v0,",
+            "[base]\nenvironment = 'MountainCar-v0'\n[variants.f]\nagent = 'fuzzy'\n", 2,
+            "base.environment: action_space must be a Box, got Discrete"
+            " (case MountainCar-v0, variant f)",
+        ),
+        ("[base]\nenvironment = 'Pendulm-v1'\n", 2, "base.environment: no environment"),
+        (
+            "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.kwargs = { gg = 3 }\n", 3,
+            "base.environment.kwargs.gg: Pendulum-v1 cannot be made",
         ),
         (
-            "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.noise = -1\n", 3,
-            "base.environment.noise: ",
+            "[base]\nenvironment.id = 'CartPole-v1'\nenvironment.noise = 0.1\n", 2,
+            "base.environment.id: noise and redundant need the range of every variable",
+        ),
+        (
+            "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.ranges.7 = [0, 1]\n", 3,
+            "base.environment.ranges.7: Pendulum-v1 has the variables 0 to 2, got 7",
         ),
     ],
 )  # fmt: skip
 def test_what_the_core_refuses_is_refused_before_anything_runs(
     study, tmp_path, text, line, message
 ):
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(ConfigError) as caught:
         study(text).check()
     assert str(caught.value).startswith(f"{tmp_path / 'mine.toml'}:{line}: {message}")
 
@@ -482,5 +483,5 @@ def test_what_the_core_refuses_is_refused_before_anything_runs(
 def test_what_is_stored_is_not_tried_again(study, monkeypatch):
     found = study("[cases.s4]\n[variants.a]\nacrobot.integration_step = 0.3\n", n_trials=2)
     found.check(stored=found.keys("s4", "a"))
-    with pytest.raises(StudyError):
+    with pytest.raises(ConfigError):
         found.check(stored=found.keys("s4", "a")[:1])

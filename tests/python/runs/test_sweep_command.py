@@ -17,7 +17,7 @@ title = "Mine"
 trials = 2
 cases = ["s4", "s6"]
 [base]
-protocol.n_learning_episodes = 300
+budget.episodes = 300
 [axes]
 learning.discount = [0.8, 0.9]
 """
@@ -237,7 +237,8 @@ gym.register("mine/Line-v0", entry_point=Line, max_episode_steps=30)
         trials = 2
         [base]
         environment = "my_line_world:mine/Line-v0"
-        protocol = { n_learning_episodes = 40, test_interval = 4 }
+        budget.episodes = 40
+        protocol.evaluate_every_episodes = 4
         [variants.exact]
         [variants.noisy]
         environment.noise = 0.05
@@ -249,6 +250,6 @@ gym.register("mine/Line-v0", entry_point=Line, max_episode_steps=30)
         ("my_line_world:mine/Line-v0", "exact"), ("my_line_world:mine/Line-v0", "noisy"),
     ]  # fmt: skip
     line = sys.modules["my_line_world"].Line
-    # Two variants: each is looked at and tried once, and then its two trials are run.
-    assert (line.n_made, line.n_open) == (2 * (1 + 2 + 2 * 2), 0)
+    # Two variants: each is tried once, in two environments, and then its two trials are run.
+    assert (line.n_made, line.n_open) == (2 * (2 + 2 * 2), 0)
     assert results[0]["measures"]["mean_return"]["median"]["value"] > 0.2
