@@ -251,7 +251,7 @@ class TrainingProgress(Callback):
 
     def on_end(self, training: Training) -> None:
         """Take the bar away."""
-        self._bars.__exit__(None, None, None)
+        self._bars.__exit__()
 
 
 class TensorBoard(Callback):

@@ -12,7 +12,6 @@ import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -126,12 +125,7 @@ class ResultStore:
     def __enter__(self) -> ResultStore:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -247,22 +241,12 @@ class ResultStore:
             return tuple(self._load_one(key) for key in wanted)
 
     def _load_one(self, key: TrialKey) -> TrialRecord:
-        columns = "id, config, version, n_decisions, seconds, finished_at, checksum"
-        run_id, config, version, n_decisions, seconds, finished_at, checksum = self._find(
-            key, columns
-        )
+        names = ("config", "version", "n_decisions", "seconds", "finished_at")
+        run_id, checksum, *values = self._find(key, ", ".join(("id", "checksum", *names)))
         rows = self._rows(run_id)
         if rows.checksum() != checksum:
             raise StoreError(f"{self.path} is damaged: the rows of {key} have changed")
-        return TrialRecord(
-            key=key,
-            config=config,
-            version=version,
-            n_decisions=n_decisions,
-            seconds=seconds,
-            finished_at=finished_at,
-            rows=rows,
-        )
+        return TrialRecord(key=key, rows=rows, **dict(zip(names, values, strict=True)))
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
