@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sdnn.runs.report import Table
 from sdnn.runs.statistics import Estimate
 from sdnn.whole_files import write_whole
 
@@ -15,9 +16,8 @@ END = "<!-- end of table -->"
 
 
 def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Give a table."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "".join("| " + " | ".join(cells) + " |\n" for cells in lines)
+    """Return a table."""
+    return Table("", tuple(header), [tuple(row) for row in rows]).to_markdown()
 
 
 def interval(estimate: Estimate, digits: int) -> str:

@@ -47,6 +47,12 @@ class Table:
     rows: Sequence[tuple[str, ...]]
     kinds: Mapping[str, str] = field(default_factory=dict)
 
+    def to_markdown(self) -> str:
+        """Write header and rows as lines of Markdown."""
+        rows = [self.header, ("---",) * len(self.header), *self.rows]
+        texts = (" | ".join(cell.replace("|", "\\|") for cell in row) for row in rows)
+        return "".join(f"| {text} |\n" for text in texts)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Folded:
@@ -137,9 +143,7 @@ class Page:
         for warning in self.warnings:
             lines += [f"**{warning}**", ""]
         for table in self.tables:
-            rows = [table.header, ("---",) * len(table.header), *table.rows]
-            texts = (" | ".join(cell.replace("|", "\\|") for cell in row) for row in rows)
-            lines += [f"## {table.title}", "", *(f"| {text} |" for text in texts), ""]
+            lines += [f"## {table.title}", "", table.to_markdown()]
         return "\n".join([*lines, *(f"- {note}" for note in self.notes), "", self.source, ""])
 
     def to_html(self, call: str) -> str:
