@@ -1,22 +1,30 @@
-"""Learning curves: the numbers of runs' rows."""
+"""Learning curves: the numbers of runs' rows, and a figure of them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.interrupts import stay_interrupts
 from sdnn.runs.errors import RunError
+from sdnn.runs.figures import draw_curves
 from sdnn.runs.groups import Group, groups_of
 from sdnn.runs.run import Run
+from sdnn.whole_files import csv_bytes, write_whole
 
-__all__ = ["HEADER", "Curve", "csv_rows", "curves_of"]
+__all__ = ["SUFFIXES", "Curve", "curves_of", "write_curves"]
 
 WINDOW = 20
 """Episodes in the running median of the returns, or all so far where they are fewer."""
+
+SUFFIXES = (".png", ".svg", ".pdf")
+"""Kinds of figures that the curves of runs may be written as."""
 
 HEADER = ("task", "agent", "kind", "n_runs", "run", "step", "value", "low", "high")
 
@@ -64,6 +72,24 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
     if not curves:
         raise RunError("; ".join(notes) + ": nothing to draw")
     return curves, notes
+
+
+def write_curves(curves: Sequence[Curve], path: Path) -> tuple[Path, Path]:
+    """Draw the curves of runs into a file, and write their numbers beside it as CSV; return both.
+
+    A RunError says that the name has another ending than those of `SUFFIXES`.
+    """
+    if path.suffix not in SUFFIXES:
+        raise RunError(f"out must end in one of {', '.join(SUFFIXES)}, got {path}")
+    content = BytesIO()
+    figure = draw_curves(curves)
+    with stay_interrupts():
+        figure.savefig(content, format=path.suffix[1:], dpi=150)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    numbers = path.with_suffix(".csv")
+    write_whole(path, content.getvalue())
+    write_whole(numbers, csv_bytes(HEADER, _csv_rows(curves)))
+    return path, numbers
 
 
 def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
@@ -145,7 +171,7 @@ def _running_median(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([np.median(values[max(0, i + 1 - WINDOW) : i + 1]) for i in range(len(values))])
 
 
-def csv_rows(curves: Sequence[Curve]) -> Iterable[tuple[object, ...]]:
+def _csv_rows(curves: Sequence[Curve]) -> Iterable[tuple[object, ...]]:
     """Numbers of curves under `HEADER`."""
     for curve in curves:
         names = (curve.task, curve.agent, curve.kind, curve.n_runs, curve.run)

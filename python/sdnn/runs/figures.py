@@ -9,25 +9,24 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from importlib.util import find_spec
 from io import BytesIO
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.interrupts import stay_interrupts
-from sdnn.runs.comparison import Comparison, Measured
-from sdnn.runs.curves import HEADER, Curve, csv_rows
-from sdnn.runs.errors import PlotUnavailableError, RunError
+from sdnn.runs.errors import PlotUnavailableError
 from sdnn.runs.measures import CENSORED_MEASURES, MeasureName
 from sdnn.runs.registry import labels, title_of
 from sdnn.runs.results import CaseResult
 from sdnn.runs.statistics import estimate_mean, running_median
-from sdnn.whole_files import csv_bytes, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from sdnn.runs.comparison import Comparison, Measured
+    from sdnn.runs.curves import Curve
 
 COLORS = (
     "#1f5a96", "#c2542d", "#3c7d4b", "#7a5195", "#8a6d1d", "#4a4a4a",
@@ -36,9 +35,6 @@ COLORS = (
 INK = "#2b2b2b"
 FAINT = "#6f6f6f"
 GRID = "#e4e4e4"
-
-SUFFIXES = (".png", ".svg", ".pdf")
-"""Kinds of figures that the curves of runs may be written as."""
 
 SMOOTHED_TESTS = 25
 """Test episodes in the running median of a long run, which lies over the thin median curve."""
@@ -169,24 +165,6 @@ def draw_curves(curves: Sequence[Curve]) -> Figure:
         axes.grid(alpha=0.25)
         axes.legend(fontsize=8, frameon=False)
     return figure
-
-
-def write_curves(curves: Sequence[Curve], path: Path) -> tuple[Path, Path]:
-    """Draw the curves of runs into a file, and write their numbers beside it as CSV; return both.
-
-    A RunError says that the name has another ending than those of `SUFFIXES`.
-    """
-    if path.suffix not in SUFFIXES:
-        raise RunError(f"out must end in one of {', '.join(SUFFIXES)}, got {path}")
-    content = BytesIO()
-    figure = draw_curves(curves)
-    with stay_interrupts():
-        figure.savefig(content, format=path.suffix[1:], dpi=150)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    numbers = path.with_suffix(".csv")
-    write_whole(path, content.getvalue())
-    write_whole(numbers, csv_bytes(HEADER, csv_rows(curves)))
-    return path, numbers
 
 
 def _draw_curve(axes: Axes, curve: Curve, color: str) -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sdnn.runs import EnvironmentSpec, Goal, Run, RunConfig, RunError
-from sdnn.runs.curves import curves_of
-from sdnn.runs.figures import draw_curves, write_curves
+from sdnn.runs.curves import curves_of, write_curves
+from sdnn.runs.figures import draw_curves
 from sdnn.runs.groups import groups_of
 from sdnn.runs.records import TrialRows
 from sdnn.runs.store import ResultStore
