@@ -26,7 +26,7 @@ if TYPE_CHECKING:
         StoreError,
         WorkerLostError,
     )
-    from sdnn.runs.executor import Executor
+    from sdnn.runs.executor import Executor, ThreadExecutor
     from sdnn.runs.measures import MeasureConfig
     from sdnn.runs.planned_trial import PlannedTrial, trial_seed
     from sdnn.runs.records import TrialKey, TrialRecord, TrialRows
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from sdnn.runs.results import CaseResult, measure
     from sdnn.runs.statistics import Estimate
     from sdnn.runs.store import ResultStore
-    from sdnn.runs.thread_executor import ThreadExecutor
     from sdnn.runs.trial import Trial
 
 __getattr__, __dir__ = attach(globals())

@@ -21,11 +21,11 @@ from sdnn.runs.executor import (
     Lost,
     Noted,
     Started,
+    ThreadExecutor,
 )
 from sdnn.runs.planned_trial import PlannedTrial
 from sdnn.runs.records import TrialKey
 from sdnn.runs.store import ResultStore
-from sdnn.runs.thread_executor import ThreadExecutor
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ from sdnn.runs.config import RunConfig, read_json
 from sdnn.runs.engine import run_trials
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line
+from sdnn.runs.executor import SerialExecutor
 from sdnn.runs.planned_trial import PlannedTrial
 from sdnn.runs.records import TrialKey
 from sdnn.runs.run_training import (
@@ -43,7 +44,6 @@ from sdnn.runs.run_training import (
     tensorboard_in,
 )
 from sdnn.runs.store import ResultStore
-from sdnn.runs.thread_executor import SerialExecutor
 from sdnn.whole_files import lock, remove_abandoned_files, write_whole
 
 if TYPE_CHECKING:

@@ -8,8 +8,7 @@ from rich.console import Console
 
 from sdnn.progress import ProgressBars
 from sdnn.reproduction import Observer, ResultStore, StoreError, WorkerLostError
-from sdnn.runs.executor import Advanced, Failed, Finished, Lost, Noted, Started
-from sdnn.runs.thread_executor import ThreadExecutor
+from sdnn.runs.executor import Advanced, Failed, Finished, Lost, Noted, Started, ThreadExecutor
 
 
 class Recorder(Observer):
