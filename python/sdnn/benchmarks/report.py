@@ -16,7 +16,7 @@ _DENSE_TITLES = {"numpy": "NumPy, 1 thread", "core": "sdnn's own kernel"}
 
 
 def describe_run(results: Mapping[str, Any]) -> list[str]:
-    """Say on what was measured, and when: a few lines."""
+    """Describe machine, version and date in a few lines."""
     machine = results["machine"]
     caches = ", ".join(f"{name} {_size(size)}" for name, size in machine["caches"].items())
     in_use, best = results["instruction_set"], results["best_instruction_set"]

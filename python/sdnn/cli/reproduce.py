@@ -95,8 +95,8 @@ def reproduce(
     a: redundant inputs. b: noisy inputs, against fuzzy Q-learning. cost: time of a step against the
     number of inputs. all: everything, which is the default.
 
-    Finished trials are kept in OUT/results.sqlite; the same command goes on where it stopped. Files
-    of other agents, trials, episodes or seeds than the paper's have these in their names.
+    Finished trials are stored in OUT/results.sqlite; the same command continues where it stopped.
+    Files of other agents, trials, episodes or seeds than the paper's have these in their names.
     """
     from sdnn.reproduction.reproduce import ReproduceRequest
     from sdnn.reproduction.reproduce import reproduce as run

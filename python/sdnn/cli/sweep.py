@@ -65,7 +65,7 @@ def sweep(
     the name of the file.
 
     Finished trials are kept in OUT/results.sqlite, which `reproduce` may share; the same command
-    goes on where it stopped.
+    continues where it stopped.
     """
     from sdnn.reproduction.studies import add_claims, read_study
     from sdnn.runs.errors import ConfigError

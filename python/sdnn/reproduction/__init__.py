@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from sdnn.reproduction.claims import CLAIMS, Claim
     from sdnn.reproduction.cost import CostConfig, CostRecord
     from sdnn.reproduction.figures import draw_cost, draw_experiment
-    from sdnn.reproduction.plan import case_spec, plan_trials
-    from sdnn.reproduction.reproduce import ReproduceRequest, collect
+    from sdnn.reproduction.reproduce import ReproduceRequest, case_spec, collect, plan_trials
     from sdnn.reproduction.verdicts import judge_claims
     from sdnn.runs.dask_executor import DaskExecutor
     from sdnn.runs.engine import Observer, run_trials

@@ -24,7 +24,7 @@ N_DRAWS = 10_000
 _N_RESAMPLES, _N_DRAWS_OF_EACH = 200, 250
 
 MULTIPLES = (2, 4, 8, 16, 32)
-"""Numbers of trials whose power is told, as multiples of those that are there."""
+"""Numbers of trials whose power is estimated, as multiples of those that are there."""
 
 N_POWER_DRAWS = 200
 _N_MEDIANS = 1000

@@ -187,7 +187,7 @@ CLAIMS = (
 
 
 def describe(quantity: Quantity) -> str:
-    """Say for a reader what is measured on whom.
+    """Describe for a reader what is measured on whom.
 
     >>> describe(Growth("rbf", 8, 4))
     'time per step, 8 inputs / 4 inputs: RBFN, factored'

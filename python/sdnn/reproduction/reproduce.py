@@ -9,11 +9,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from sdnn.config import SensorConfig
 from sdnn.reproduction.cases import (
     EXPERIMENTS,
     MOST_EPISODES,
     PAPER_EPISODES,
     PAPER_TRIALS,
+    Case,
     Experiment,
 )
 from sdnn.reproduction.cost import (
@@ -27,13 +29,12 @@ from sdnn.reproduction.cost import (
     round_rows,
 )
 from sdnn.reproduction.figures import draw_cost, draw_experiment
-from sdnn.reproduction.plan import plan_trials
 from sdnn.reproduction.reference_results import reference_results
 from sdnn.reproduction.report import Report
 from sdnn.runs.engine import Observer, run_trials
 from sdnn.runs.executor import Executor
 from sdnn.runs.figures import figure_bytes, require_matplotlib
-from sdnn.runs.planned_trial import PlannedTrial
+from sdnn.runs.planned_trial import PlannedTrial, trial_seed
 from sdnn.runs.records import (
     ROW_HEADER,
     TrialKey,
@@ -41,10 +42,10 @@ from sdnn.runs.records import (
     records_digest,
     trial_rows,
 )
-from sdnn.runs.registry import cost_series
+from sdnn.runs.registry import cost_series, label_of, split_label
 from sdnn.runs.report import Finished, describe_call, json_bytes, require_jinja
 from sdnn.runs.results import CaseResult, measure
-from sdnn.runs.spec import PAPER_INTERVAL
+from sdnn.runs.spec import PAPER_INTERVAL, AgentSpec, BudgetSpec, RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.whole_files import csv_bytes, remove_abandoned_files, write_whole
 
@@ -322,3 +323,39 @@ def collect(experiment: Experiment, records: Iterable[TrialRecord]) -> tuple[Cas
         for case in experiment.cases
         for agent in case.agents
     )
+
+
+def case_spec(case: Case, agent: str, n_episodes: int = PAPER_EPISODES) -> RunSpec:
+    """Return the specification of an agent in a case: its defaults, the case's sensors.
+
+    A ValueError says that the agent takes no part in the case, or that there is no such agent.
+    """
+    if agent not in case.agents:
+        raise ValueError(f"agent must be one of {case.agents} in case {case.id}, got {agent!r}")
+    name, preset = split_label(agent)
+    return RunSpec(
+        agent=AgentSpec(name=name, preset=preset),
+        sensors=SensorConfig(n_sensors=case.n_sensors, noise=case.noise),
+        budget=BudgetSpec(episodes=n_episodes),
+    )
+
+
+def plan_trials(
+    cases: Iterable[Case], n_trials: int, root_seed: int, n_episodes: int = PAPER_EPISODES
+) -> tuple[PlannedTrial, ...]:
+    """List the trials of all agents in the given cases, each once.
+
+    The first trial of every case comes first, so an interrupted run covers all cases evenly.
+    Experiments share the trials of cases that have the same id.
+    """
+    plan: dict[TrialKey, PlannedTrial] = {}
+    pairs = [
+        (case, agent, case_spec(case, agent, n_episodes)) for case in cases for agent in case.agents
+    ]
+    hashes = [spec.config_hash for _, _, spec in pairs]
+    for trial in range(n_trials):
+        for (case, agent, spec), config_hash in zip(pairs, hashes, strict=True):
+            seed = trial_seed(root_seed, case.id, trial)
+            key = TrialKey(case.id, label_of(*split_label(agent)), trial, seed, config_hash)
+            plan.setdefault(key, PlannedTrial(key, spec))
+    return tuple(plan.values())

@@ -12,7 +12,8 @@ from sdnn.runs.measures import RETURN_MEASURES, SHARE_STABLE, STEP_MEASURES, Mea
 from sdnn.runs.records import TrialRecord
 from sdnn.runs.results import CaseResult, measure, on_equal_terms
 from sdnn.runs.statistics import Estimate, estimate_mean
-from sdnn.runs.study import Combination, Study, StudyCase, StudyVariant
+from sdnn.runs.study import Combination, Study
+from sdnn.runs.study_file import StudyCase, StudyVariant
 
 MIN_TRIALS_TO_DIFFER = 6
 """Fewer paired trials are all on one side by chance more often than once in twenty times."""
