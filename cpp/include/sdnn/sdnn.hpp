@@ -9,6 +9,7 @@
 #include "sdnn/agents/observation_scale.hpp"
 #include "sdnn/agents/presets.hpp"
 #include "sdnn/agents/q_learning.hpp"
+#include "sdnn/agents/q_learning_config.hpp"
 #include "sdnn/agents/return_range.hpp"
 #include "sdnn/agents/vector_fuzzy_q_learning.hpp"
 #include "sdnn/agents/waiting_steps.hpp"

@@ -10,28 +10,15 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "agents/lives.hpp"
-#include "allocation_count.hpp"
-#include "approximators/lookup_table.hpp"
-#include "sdnn/approximators/decoupled.hpp"
-#include "sdnn/approximators/rbf_network.hpp"
-#include "sdnn/approximators/sdnn_c.hpp"
+#include "agents/small_q_learning.hpp"
 #include "sdnn/core/random.hpp"
 #include "states.hpp"
-#include "threads.hpp"
 
-namespace sdnn::agents {
+namespace sdnn::agents::small_q_learning {
 namespace {
-
-using testing::LookupTable;
-using Agent = QLearning<LookupTable>;
-using Position = std::array<double, 1>;
-
-/// The middle of cell `i` of five.
-Position cell(int i) { return {(i + 0.5) / 5.0}; }
 
 TEST(QLearning, EquationOneByHand) {
   Agent agent(LookupTable(1, 5, 2), {}, 1);  // alpha = 0.5, gamma = 0.9
@@ -211,22 +198,6 @@ TEST(QLearning, EvaluationDoesNotDisturbLearning) {
   EXPECT_EQ(alone.action_value(), evaluated.action_value());
 }
 
-std::string message(const QLearningConfig& config) {
-  try {
-    Agent(LookupTable(1, 5, 2), config, 1);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
-TEST(QLearning, NamesWhatIsImpossible) {
-  EXPECT_EQ(message({.learning_rate = 0.0}), "learning_rate must be in (0, 1], got 0");
-  EXPECT_EQ(message({.learning_rate = std::nan("")}), "learning_rate must be in (0, 1], got nan");
-  EXPECT_EQ(message({.discount = 1.01}), "discount must be in [0, 1], got 1.01");
-  EXPECT_EQ(message({.policy = {.epsilon = -1.0}}), "epsilon must be in [0, 1], got -1");
-}
-
 TEST(QLearning, ABadTransitionTeachesNothing) {
   Agent agent(LookupTable(1, 5, 2), {}, 1);
   const LookupTable before = agent.action_value();
@@ -239,11 +210,6 @@ TEST(QLearning, ABadTransitionTeachesNothing) {
                std::invalid_argument);
   EXPECT_EQ(agent.action_value(), before);
 }
-
-using approximators::Decoupled;
-using approximators::RBFNetwork;
-using approximators::SDNNC;
-using Indices = std::vector<std::size_t>;
 
 TEST(QLearning, ABadTransitionLeavesTheWholeStateAsItWas) {
   using Vectors = QLearning<Decoupled<RBFNetwork>>;
@@ -353,59 +319,6 @@ TEST(QLearning, WithoutRepetitionsTheirStreamIsNotTouched) {
   EXPECT_NE(after.at("policy.exploration.words"), before.at("policy.exploration.words"));
 }
 
-TEST(QLearning, RatesGoInAStraightLineWithProgress) {
-  Agent agent(LookupTable(1, 5, 2),
-              {.learning_rate = 0.5,
-               .policy = {.epsilon = 0.75},
-               .final_learning_rate = 0.25,
-               .final_epsilon = 0.0},
-              1);
-  EXPECT_EQ(agent.progress(), 0.0);
-  EXPECT_EQ(agent.learning_rate(), 0.5);
-  EXPECT_EQ(agent.epsilon(), 0.75);
-  agent.set_progress(0.25);
-  EXPECT_EQ(agent.learning_rate(), 0.4375);
-  EXPECT_EQ(agent.epsilon(), 0.5625);
-  agent.learn(cell(0), 0, 16.0, cell(1), true);
-  EXPECT_EQ(agent.action_value().value(cell(0), 0), 7.0);
-  agent.set_progress(1.0);
-  EXPECT_EQ(agent.learning_rate(), 0.25);
-  EXPECT_EQ(agent.epsilon(), 0.0);
-  for (const double bad : {-1e-9, 1.0000001, testing::kNaN}) {
-    EXPECT_THROW(agent.set_progress(bad), std::invalid_argument);
-  }
-  EXPECT_EQ(agent.progress(), 1.0);
-  agent.set_progress(0.0);  // nothing is left of what was
-  EXPECT_EQ(agent.learning_rate(), 0.5);
-  Agent steady(LookupTable(1, 5, 2), {}, 1);
-  steady.set_progress(0.9);
-  EXPECT_EQ(steady.learning_rate(), 0.5);
-  EXPECT_EQ(steady.epsilon(), 0.1);
-}
-
-TEST(QLearning, NamesWhatIsImpossibleOfWhatIsNotInThePaper) {
-  EXPECT_EQ(message({.max_repetitions = 0}), "max_repetitions must be in [1, 1000000], got 0");
-  EXPECT_EQ(message({.final_learning_rate = 0.0}), "final_learning_rate must be in (0, 1], got 0");
-  EXPECT_EQ(message({.final_learning_rate = testing::kNaN}),
-            "final_learning_rate must be in (0, 1], got nan");
-  EXPECT_EQ(message({.final_epsilon = 1.5}), "final_epsilon must be in [0, 1], got 1.5");
-}
-
-/// A network of which counts from 4 to 36 stand for values from -16 to 16: all whole numbers.
-approximators::SDNNCConfig network() {
-  return {.n_inputs = 2,
-          .n_pattern_units = 16,
-          .n_anchor_patterns = 3,
-          .n_interpolated = 3,
-          .n_hidden_units = 60,
-          .n_active_units = 40,
-          .n_actions = 7,
-          .q_low = -16.0,
-          .q_high = 16.0,
-          .u_low = 4,
-          .u_high = 36};
-}
-
 // gamma = 1/2: the first sum is 8, so the range is 8 and a quarter more.
 TEST(QLearning, TheRangeOfValuesFollowsTheRewards) {
   QLearning<SDNNC> agent(SDNNC(network(), 1), {.discount = 0.5, .value_range = ValueRange::seen},
@@ -430,37 +343,6 @@ TEST(QLearning, TheRangeOfValuesFollowsTheRewards) {
   QLearning<SDNNC> given(SDNNC(network(), 1), {.discount = 0.5}, 1);
   given.learn(state, 0, 1000.0, state, false);
   EXPECT_EQ(given.action_value().output_scale().q_high(), 16.0);
-}
-
-QLearningConfig everything() {
-  return {.policy = {.epsilon = 0.3, .n_greedy_steps = 2},
-          .n_steps = 4,
-          .max_repetitions = 5,
-          .final_learning_rate = 0.25,
-          .final_epsilon = 0.0,
-          .value_range = ValueRange::seen,
-          .n_random_steps = 20};
-}
-
-QLearning<SDNNC> sdnn_agent() {
-  approximators::SDNNCConfig config = network();
-  config.rounding = approximators::Rounding::random;
-  config.averaging_interval = 9;
-  return {SDNNC(config, 3), everything(), 3};
-}
-
-QLearning<RBFNetwork> rbf_agent() {
-  return {RBFNetwork({.n_inputs = 2, .n_bases = 3, .n_actions = 7, .gradient_rate = 0.5}),
-          everything(), 3};
-}
-
-QLearning<Decoupled<SDNNC>> vector_agent() {
-  approximators::SDNNCConfig config = network();
-  config.rounding = approximators::Rounding::random;
-  std::vector<SDNNC> parts = {SDNNC(config, 3)};
-  config.n_actions = 5;
-  parts.emplace_back(config, approximators::seed_of_dimension(3, 1));
-  return {Decoupled<SDNNC>(std::move(parts)), everything(), 3};
 }
 
 TEST(QLearning, GreedyActionsFollowTheAverageWhereThereIsOne) {
@@ -488,30 +370,6 @@ TEST(QLearning, GreedyActionsFollowTheAverageWhereThereIsOne) {
   EXPECT_GT(n_other, 0);
 }
 
-// Between two updates many threads may choose greedy actions; equal ties streams, equal actions.
-TEST(QLearning, ManyThreadsMayChooseGreedyActions) {
-  auto agent = vector_agent();
-  testing::World<decltype(agent)> world(agent.n_inputs(), 7);
-  for (int t = 0; t < 300; ++t) world.tick(agent);
-  const auto greedy_actions = [](const auto& learned) {
-    core::Random random(5, core::Stream::sensor_noise), ties(1, core::Stream::evaluation_ties);
-    auto workspace = learned.workspace();
-    std::vector<double> state(learned.n_inputs());
-    std::vector<std::vector<std::size_t>> actions;
-    for (int i = 0; i < 50; ++i) {
-      for (double& x : state) x = random.uniform();
-      actions.push_back(learned.best_action(state, workspace, ties));
-    }
-    return actions;
-  };
-  const auto alone = agent;
-  const auto expected = greedy_actions(alone);
-  for (const auto& actions :
-       testing::in_threads(4, [&](std::size_t) { return greedy_actions(agent); })) {
-    EXPECT_EQ(actions, expected);
-  }
-}
-
 TEST(QLearning, BestActionIsThatOfActWithoutExploring) {
   approximators::SDNNCConfig config = network();
   config.averaging_interval = 5;
@@ -529,230 +387,6 @@ TEST(QLearning, BestActionIsThatOfActWithoutExploring) {
     taken.insert(action);
   }
   EXPECT_GT(taken.size(), 1U);
-}
-
-TEST(QLearning, ALifeCanBeCutAnywhere) {
-  testing::expect_that_a_life_can_be_cut(sdnn_agent);
-  testing::expect_that_a_life_can_be_cut(rbf_agent);
-  testing::expect_that_a_life_can_be_cut(vector_agent);
-}
-
-TEST(QLearning, ALifeInSeveralEnvironmentsCanBeCutAnywhere) {
-  testing::expect_that_a_life_can_be_cut(rbf_agent, 2);
-  testing::expect_that_a_life_can_be_cut(vector_agent, 3);
-}
-
-// As OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown, while another environment goes its
-// way.
-TEST(QLearning, EachEnvironmentHasStepsThatWait) {
-  LookupTable table(2, 5, 2);
-  Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 2}, 1);
-  agent.set_n_environments(2);
-  EXPECT_EQ(agent.n_environments(), 2U);
-  const auto at = [](int i, int environment) {
-    return std::array{(i + 0.5) / 5.0, environment == 0 ? 0.1 : 0.9};
-  };
-  const auto q = [&](int i, int environment) {
-    return agent.action_value().value(at(i, environment), 0);
-  };
-  for (int i = 0; i < 2; ++i) {
-    for (const int e : {0, 1}) {
-      agent.learn(at(i, e), 0, e == 0 ? i + 1.0 : 8.0, at(i + 1, e), false,
-                  static_cast<std::size_t>(e));
-    }
-  }
-  EXPECT_EQ(q(0, 0), 1.0 + 0.5 * 2.0);
-  EXPECT_EQ(q(0, 1), 8.0 + 0.5 * 8.0);
-  EXPECT_EQ(q(1, 0), 0.0);
-  agent.begin_episode(1);  // of the other nothing is learned
-  EXPECT_EQ(q(1, 0), 0.0);
-  EXPECT_EQ(q(1, 1), 8.0);
-  agent.set_n_environments(1);
-  EXPECT_EQ(q(1, 0), 0.0);
-  agent.begin_episode();
-  EXPECT_EQ(q(1, 0), 2.0);
-}
-
-TEST(QLearning, WhatWaitsOfEnvironmentsThatAreNoMoreIsLearned) {
-  Agent agent(LookupTable(1, 5, 2), {.learning_rate = 1.0, .n_steps = 5}, 1);
-  agent.set_n_environments(3);
-  agent.learn(cell(2), 1, 4.0, cell(3), false, 2);
-  EXPECT_EQ(agent.action_value().value(cell(2), 1), 0.0);
-  agent.set_n_environments(2);
-  EXPECT_EQ(agent.action_value().value(cell(2), 1), 4.0);
-}
-
-// All that other environments share with it is drawn and learned here, and in nobody's name.
-TEST(QLearning, AnyOneOfSeveralEnvironmentsIsLikeTheOnlyOne) {
-  auto alone = vector_agent();
-  testing::World<decltype(alone)> world(2, 9);
-  for (int t = 0; t < 300; ++t) world.tick(alone);
-  for (const std::size_t environment : {0U, 2U}) {
-    auto one_of_four = vector_agent();
-    one_of_four.set_n_environments(4);
-    testing::World<decltype(alone)> same_world(2, 9, environment);
-    for (int t = 0; t < 300; ++t) same_world.tick(one_of_four);
-    const core::State state = core::state_of(one_of_four);
-    const std::string before =
-        environment == 0 ? "" : "environment." + std::to_string(environment) + ".";
-    for (const auto& [name, tensor] : core::state_of(alone)) {
-      const bool is_shared = !state.contains("environment.1." + name);
-      EXPECT_EQ(state.at(is_shared ? name : before + name), tensor) << name;
-    }
-    EXPECT_NE(state.at(before + "waiting.next_state"),
-              state.at("environment.1.waiting.next_state"));
-  }
-}
-
-TEST(QLearning, RefusesEnvironmentsThatAreNone) {
-  Agent agent(LookupTable(1, 5, 2), {}, 1);
-  agent.set_n_environments(2);
-  EXPECT_THROW((void)agent.act(cell(0), true, 2), std::invalid_argument);
-  EXPECT_THROW((void)agent.act(cell(0), false, 2), std::invalid_argument);
-  EXPECT_THROW(agent.begin_episode(2), std::invalid_argument);
-  EXPECT_THROW(agent.learn(cell(0), 0, 1.0, cell(1), false, 2), std::invalid_argument);
-  EXPECT_THROW(agent.set_n_environments(0), std::invalid_argument);
-  EXPECT_THROW(agent.set_n_environments((1U << 20U) + 1U), std::invalid_argument);
-  EXPECT_EQ(agent.n_environments(), 2U);
-  EXPECT_EQ(agent.action_value(), LookupTable(1, 5, 2));
-}
-
-TEST(QLearning, RefusesAStateOfEnvironmentsThatDoesNotFit) {
-  auto agent = rbf_agent();
-  agent.set_n_environments(3);
-  for (int t = 0; t < 20; ++t) (void)agent.act(std::vector{0.5, 0.5});  // until none is left
-  testing::expect_that_damage_is_refused(agent);
-  const core::State good = core::state_of(agent);
-  const auto refused = [&](const core::State& bad, const std::string& message) {
-    testing::expect_refused(agent, bad, "state: environment.2." + message);
-  };
-  refused(testing::with_number(good, "environment.2.step", -1), "step must be 0 or more");
-  refused(testing::with_number(good, "environment.2.kept_action", std::int64_t{7}),
-          "kept_action must be an action");
-  refused(testing::with_number(good, "environment.2.range.sum", testing::kNaN),
-          "range.sum must be a finite sum");
-  core::State bad = good;  // a second one is missing
-  std::erase_if(bad, [](const auto& item) { return item.first.starts_with("environment.1."); });
-  testing::expect_refused(agent, bad, "state: environment.2.kept_action must not be there");
-}
-
-TEST(QLearning, RatesFallByEqualFactorsWithAnExponentialSchedule) {
-  const QLearningConfig config{.learning_rate = 1.0,
-                               .policy = {.epsilon = 0.5},
-                               .final_learning_rate = 0.0625,
-                               .final_epsilon = 0.125,
-                               .schedule = Schedule::exponential};
-  Agent agent(LookupTable(1, 5, 2), config, 1);
-  EXPECT_EQ(agent.learning_rate(), 1.0);
-  agent.set_progress(0.5);
-  EXPECT_DOUBLE_EQ(agent.learning_rate(), 0.25);
-  EXPECT_DOUBLE_EQ(agent.epsilon(), 0.25);
-  agent.set_progress(0.75);
-  EXPECT_DOUBLE_EQ(agent.learning_rate(), 0.125);
-  EXPECT_EQ(config.learning_rate_at(0.75), agent.learning_rate());
-  EXPECT_EQ(config.epsilon_at(0.75), agent.epsilon());
-  agent.set_progress(1.0);
-  EXPECT_EQ(agent.learning_rate(), 0.0625);
-  EXPECT_EQ(agent.epsilon(), 0.125);
-  const Agent steady(LookupTable(1, 5, 2), {.schedule = Schedule::exponential}, 1);
-  EXPECT_EQ(steady.config().learning_rate_at(0.7), 0.5);
-}
-
-TEST(QLearning, AnExponentialScheduleStaysBetweenItsEnds) {
-  core::Random random(3, core::Stream::weights);
-  for (int i = 0; i < 2000; ++i) {
-    const double first = 1.0 - random.uniform();
-    const double last = i % 3 == 0 ? first : 1e-300 + random.uniform() * random.uniform();
-    const QLearningConfig config{
-        .learning_rate = first, .final_learning_rate = last, .schedule = Schedule::exponential};
-    const double progress = random.uniform();
-    const double rate = config.learning_rate_at(progress);
-    ASSERT_GE(rate, std::min(first, last));
-    ASSERT_LE(rate, std::max(first, last));
-    ASSERT_NEAR(std::log(rate), (1.0 - progress) * std::log(first) + progress * std::log(last),
-                1e-11);
-    ASSERT_EQ(config.learning_rate_at(0.0), first);
-    ASSERT_EQ(config.learning_rate_at(1.0), last);
-  }
-}
-
-TEST(QLearning, EpsilonMayReachItsFinalValueBeforeTheEnd) {
-  const QLearningConfig config{.learning_rate = 1.0,
-                               .policy = {.epsilon = 0.5},
-                               .final_learning_rate = 0.5,
-                               .final_epsilon = 0.125,
-                               .exploration_fraction = 0.25};
-  Agent agent(LookupTable(1, 5, 2), config, 1);
-  EXPECT_EQ(agent.epsilon(), 0.5);
-  agent.set_progress(0.125);
-  EXPECT_EQ(agent.epsilon(), 0.3125);
-  EXPECT_EQ(agent.learning_rate(), 0.9375);
-  for (const double progress : {0.25, 0.3, 1.0}) {
-    agent.set_progress(progress);
-    EXPECT_EQ(agent.epsilon(), 0.125);
-  }
-  QLearningConfig exponential = config;
-  exponential.schedule = Schedule::exponential;
-  EXPECT_DOUBLE_EQ(exponential.epsilon_at(0.125), 0.25);
-  EXPECT_EQ(exponential.epsilon_at(0.3), 0.125);
-  EXPECT_EQ(message({.exploration_fraction = 0.0}),
-            "exploration_fraction must be in (0, 1], got 0");
-  EXPECT_EQ(message({.exploration_fraction = 1.5}),
-            "exploration_fraction must be in (0, 1], got 1.5");
-  const Agent steady(LookupTable(1, 5, 2), {.exploration_fraction = 0.25}, 1);
-  EXPECT_EQ(steady.config().epsilon_at(0.1), 0.1);
-}
-
-TEST(QLearning, AnExponentialScheduleHasNoEndAtZero) {
-  EXPECT_EQ(message({.final_epsilon = 0.0, .schedule = Schedule::exponential}),
-            "final_epsilon must be greater than 0 where the schedule is exponential, got 0");
-  EXPECT_EQ(
-      message(
-          {.policy = {.epsilon = 0.0}, .final_epsilon = 0.5, .schedule = Schedule::exponential}),
-      "epsilon must be greater than 0 where the schedule is exponential, got 0");
-  EXPECT_EQ(message({.policy = {.epsilon = 0.0}, .schedule = Schedule::exponential}), "no error");
-}
-
-TEST(QLearning, RatesThatAreSetStayWhateverTheProgress) {
-  Agent agent(LookupTable(1, 5, 2),
-              {.learning_rate = 0.5, .final_learning_rate = 0.25, .final_epsilon = 0.0}, 1);
-  agent.set_learning_rate(0.75);
-  EXPECT_EQ(agent.learning_rate(), 0.75);
-  agent.set_progress(1.0);
-  EXPECT_EQ(agent.learning_rate(), 0.75);
-  EXPECT_EQ(agent.epsilon(), 0.0);
-  agent.learn(cell(0), 0, 16.0, cell(1), true);
-  EXPECT_EQ(agent.action_value().value(cell(0), 0), 12.0);
-  agent.set_epsilon(1.0);
-  agent.set_learning_rate(std::nullopt);
-  EXPECT_EQ(agent.learning_rate(), 0.25);
-  EXPECT_EQ(agent.epsilon(), 1.0);
-  for (const double bad : {-0.1, 1.1, testing::kNaN}) {
-    EXPECT_THROW(agent.set_learning_rate(bad), std::invalid_argument);
-    EXPECT_THROW(agent.set_epsilon(bad), std::invalid_argument);
-  }
-  EXPECT_THROW(agent.set_learning_rate(0.0), std::invalid_argument);
-  EXPECT_EQ(agent.epsilon(), 1.0);
-  auto saved = rbf_agent();
-  EXPECT_FALSE(core::state_of(saved).contains("learning_rate"));
-  saved.set_learning_rate(0.75);
-  saved.set_epsilon(0.5);
-  const core::State good = core::state_of(saved);
-  for (const double bad : {0.0, 1.1, testing::kNaN}) {
-    testing::expect_refused(saved, testing::with_number(good, "learning_rate", bad),
-                            "state: learning_rate must be in (0, 1]");
-  }
-  testing::expect_refused(saved, testing::with_number(good, "epsilon", -0.1),
-                          "state: epsilon must be in [0, 1]");
-  auto other = rbf_agent();
-  core::restore(other, good);
-  EXPECT_EQ(other.learning_rate(), 0.75);
-  EXPECT_EQ(other.epsilon(), 0.5);
-}
-
-TEST(QLearning, ARestoredAgentAllocatesNothing) {
-  testing::expect_that_a_restored_agent_allocates_nothing(sdnn_agent, testing::allocation_count);
-  testing::expect_that_a_restored_agent_allocates_nothing(rbf_agent, testing::allocation_count);
 }
 
 // All numbers are multiples of 1/4: the errors of one dimension have no rounding.
@@ -778,55 +412,5 @@ TEST(QLearning, OfOneDimensionDoesWhatAnAgentWithoutDimensionsDoes) {
   EXPECT_EQ(core::state_of(plain), state);
 }
 
-TEST(QLearning, RefusesAStateThatDoesNotFit) {
-  auto agent = sdnn_agent();
-  testing::World<QLearning<SDNNC>> world(2, 7);
-  const core::State young = core::state_of(agent);
-  while (core::state_of(agent).contains("n_random_left")) world.tick(agent);
-  while (testing::number_of<std::int32_t>(core::state_of(agent), "n_kept") == 0 ||
-         core::state_of(agent).at("waiting.rewards").size() < 2) {
-    world.tick(agent);
-  }
-  agent.set_learning_rate(std::nullopt);  // what may be missing
-  agent.set_epsilon(std::nullopt);
-  testing::expect_that_damage_is_refused(agent);
-  const core::State good = core::state_of(agent);
-  using testing::with_number;
-  const auto refused = [&](const core::State& bad, const std::string& message) {
-    testing::expect_refused(agent, bad, "state: " + message);
-  };
-  for (const std::int64_t bad : {-1, 7}) {
-    refused(with_number(good, "waiting.actions", bad, 1), "waiting.actions must be of actions");
-    refused(with_number(good, "kept_action", bad), "kept_action must be an action");
-  }
-  refused(with_number(good, "waiting.rewards", testing::kNaN, 1), "waiting.rewards must be finite");
-  refused(with_number(good, "waiting.states", testing::kNaN, 3),
-          "waiting.states must be in [0, 1]");
-  for (const int bad : {-1, 21}) {
-    refused(with_number(young, "n_random_left", bad),
-            "n_random_left must be in [0, n_random_steps]");
-  }
-  refused(with_number(good, "step", -1), "step must be 0 or more");
-  refused(with_number(good, "n_kept", -1), "n_kept must be in [0, max_repetitions)");
-  refused(with_number(good, "n_kept", 5), "n_kept must be in [0, max_repetitions)");
-  for (const double bad : {testing::kNaN, -0.1, 1.1}) {
-    refused(with_number(good, "progress", bad), "progress must be in [0, 1]");
-  }
-  refused(with_number(good, "range.low", testing::kNaN), "range.low must be finite");
-  core::State bad = good;
-  bad["kept_action"] = testing::tensor_of<std::int64_t>({0, 0});
-  refused(bad, "kept_action must be one per dimension");
-  bad = good;  // as many as the ring has places: the next would have none
-  bad["waiting.rewards"] = testing::tensor_of(std::vector<double>(4, 0.0));
-  bad["waiting.actions"] = testing::tensor_of(std::vector<std::int64_t>(4, 0));
-  bad["waiting.states"] = testing::tensor_of(std::vector<double>(8, 0.0));
-  refused(bad, "waiting.rewards must be fewer than n_steps");
-  bad = good;
-  for (std::size_t i = 0; i < 4; ++i) {
-    bad = with_number(bad, "policy.ties.words", std::uint64_t{0}, i);
-  }
-  refused(bad, "policy.ties.words must be not all 0");
-}
-
 }  // namespace
-}  // namespace sdnn::agents
+}  // namespace sdnn::agents::small_q_learning

@@ -87,7 +87,6 @@ class ParallelPerceptron {
   }
 
   const Code& code() const noexcept { return *code_; }
-  std::shared_ptr<const Code> shared_code() const noexcept { return code_; }
   std::size_t n_units() const noexcept { return weights_.n_units(); }
   std::size_t n_padded_units() const noexcept { return weights_.n_padded_units(); }
   std::int32_t weight(std::size_t unit, std::size_t column) const noexcept {

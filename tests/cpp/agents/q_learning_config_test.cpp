@@ -1,0 +1,177 @@
+#include "sdnn/agents/q_learning_config.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "agents/small_q_learning.hpp"
+#include "sdnn/core/random.hpp"
+#include "states.hpp"
+
+namespace sdnn::agents::small_q_learning {
+namespace {
+
+TEST(QLearning, NamesWhatIsImpossible) {
+  EXPECT_EQ(message({.learning_rate = 0.0}), "learning_rate must be in (0, 1], got 0");
+  EXPECT_EQ(message({.learning_rate = std::nan("")}), "learning_rate must be in (0, 1], got nan");
+  EXPECT_EQ(message({.discount = 1.01}), "discount must be in [0, 1], got 1.01");
+  EXPECT_EQ(message({.policy = {.epsilon = -1.0}}), "epsilon must be in [0, 1], got -1");
+}
+
+TEST(QLearning, RatesGoInAStraightLineWithProgress) {
+  Agent agent(LookupTable(1, 5, 2),
+              {.learning_rate = 0.5,
+               .policy = {.epsilon = 0.75},
+               .final_learning_rate = 0.25,
+               .final_epsilon = 0.0},
+              1);
+  EXPECT_EQ(agent.progress(), 0.0);
+  EXPECT_EQ(agent.learning_rate(), 0.5);
+  EXPECT_EQ(agent.epsilon(), 0.75);
+  agent.set_progress(0.25);
+  EXPECT_EQ(agent.learning_rate(), 0.4375);
+  EXPECT_EQ(agent.epsilon(), 0.5625);
+  agent.learn(cell(0), 0, 16.0, cell(1), true);
+  EXPECT_EQ(agent.action_value().value(cell(0), 0), 7.0);
+  agent.set_progress(1.0);
+  EXPECT_EQ(agent.learning_rate(), 0.25);
+  EXPECT_EQ(agent.epsilon(), 0.0);
+  for (const double bad : {-1e-9, 1.0000001, testing::kNaN}) {
+    EXPECT_THROW(agent.set_progress(bad), std::invalid_argument);
+  }
+  EXPECT_EQ(agent.progress(), 1.0);
+  agent.set_progress(0.0);  // nothing is left of what was
+  EXPECT_EQ(agent.learning_rate(), 0.5);
+  Agent steady(LookupTable(1, 5, 2), {}, 1);
+  steady.set_progress(0.9);
+  EXPECT_EQ(steady.learning_rate(), 0.5);
+  EXPECT_EQ(steady.epsilon(), 0.1);
+}
+
+TEST(QLearning, NamesWhatIsImpossibleOfWhatIsNotInThePaper) {
+  EXPECT_EQ(message({.max_repetitions = 0}), "max_repetitions must be in [1, 1000000], got 0");
+  EXPECT_EQ(message({.final_learning_rate = 0.0}), "final_learning_rate must be in (0, 1], got 0");
+  EXPECT_EQ(message({.final_learning_rate = testing::kNaN}),
+            "final_learning_rate must be in (0, 1], got nan");
+  EXPECT_EQ(message({.final_epsilon = 1.5}), "final_epsilon must be in [0, 1], got 1.5");
+}
+
+TEST(QLearning, RatesFallByEqualFactorsWithAnExponentialSchedule) {
+  const QLearningConfig config{.learning_rate = 1.0,
+                               .policy = {.epsilon = 0.5},
+                               .final_learning_rate = 0.0625,
+                               .final_epsilon = 0.125,
+                               .schedule = Schedule::exponential};
+  Agent agent(LookupTable(1, 5, 2), config, 1);
+  EXPECT_EQ(agent.learning_rate(), 1.0);
+  agent.set_progress(0.5);
+  EXPECT_DOUBLE_EQ(agent.learning_rate(), 0.25);
+  EXPECT_DOUBLE_EQ(agent.epsilon(), 0.25);
+  agent.set_progress(0.75);
+  EXPECT_DOUBLE_EQ(agent.learning_rate(), 0.125);
+  EXPECT_EQ(config.learning_rate_at(0.75), agent.learning_rate());
+  EXPECT_EQ(config.epsilon_at(0.75), agent.epsilon());
+  agent.set_progress(1.0);
+  EXPECT_EQ(agent.learning_rate(), 0.0625);
+  EXPECT_EQ(agent.epsilon(), 0.125);
+  const Agent steady(LookupTable(1, 5, 2), {.schedule = Schedule::exponential}, 1);
+  EXPECT_EQ(steady.config().learning_rate_at(0.7), 0.5);
+}
+
+TEST(QLearning, AnExponentialScheduleStaysBetweenItsEnds) {
+  core::Random random(3, core::Stream::weights);
+  for (int i = 0; i < 2000; ++i) {
+    const double first = 1.0 - random.uniform();
+    const double last = i % 3 == 0 ? first : 1e-300 + random.uniform() * random.uniform();
+    const QLearningConfig config{
+        .learning_rate = first, .final_learning_rate = last, .schedule = Schedule::exponential};
+    const double progress = random.uniform();
+    const double rate = config.learning_rate_at(progress);
+    ASSERT_GE(rate, std::min(first, last));
+    ASSERT_LE(rate, std::max(first, last));
+    ASSERT_NEAR(std::log(rate), (1.0 - progress) * std::log(first) + progress * std::log(last),
+                1e-11);
+    ASSERT_EQ(config.learning_rate_at(0.0), first);
+    ASSERT_EQ(config.learning_rate_at(1.0), last);
+  }
+}
+
+TEST(QLearning, EpsilonMayReachItsFinalValueBeforeTheEnd) {
+  const QLearningConfig config{.learning_rate = 1.0,
+                               .policy = {.epsilon = 0.5},
+                               .final_learning_rate = 0.5,
+                               .final_epsilon = 0.125,
+                               .exploration_fraction = 0.25};
+  Agent agent(LookupTable(1, 5, 2), config, 1);
+  EXPECT_EQ(agent.epsilon(), 0.5);
+  agent.set_progress(0.125);
+  EXPECT_EQ(agent.epsilon(), 0.3125);
+  EXPECT_EQ(agent.learning_rate(), 0.9375);
+  for (const double progress : {0.25, 0.3, 1.0}) {
+    agent.set_progress(progress);
+    EXPECT_EQ(agent.epsilon(), 0.125);
+  }
+  QLearningConfig exponential = config;
+  exponential.schedule = Schedule::exponential;
+  EXPECT_DOUBLE_EQ(exponential.epsilon_at(0.125), 0.25);
+  EXPECT_EQ(exponential.epsilon_at(0.3), 0.125);
+  EXPECT_EQ(message({.exploration_fraction = 0.0}),
+            "exploration_fraction must be in (0, 1], got 0");
+  EXPECT_EQ(message({.exploration_fraction = 1.5}),
+            "exploration_fraction must be in (0, 1], got 1.5");
+  const Agent steady(LookupTable(1, 5, 2), {.exploration_fraction = 0.25}, 1);
+  EXPECT_EQ(steady.config().epsilon_at(0.1), 0.1);
+}
+
+TEST(QLearning, AnExponentialScheduleHasNoEndAtZero) {
+  EXPECT_EQ(message({.final_epsilon = 0.0, .schedule = Schedule::exponential}),
+            "final_epsilon must be greater than 0 where the schedule is exponential, got 0");
+  EXPECT_EQ(
+      message(
+          {.policy = {.epsilon = 0.0}, .final_epsilon = 0.5, .schedule = Schedule::exponential}),
+      "epsilon must be greater than 0 where the schedule is exponential, got 0");
+  EXPECT_EQ(message({.policy = {.epsilon = 0.0}, .schedule = Schedule::exponential}), "no error");
+}
+
+TEST(QLearning, RatesThatAreSetStayWhateverTheProgress) {
+  Agent agent(LookupTable(1, 5, 2),
+              {.learning_rate = 0.5, .final_learning_rate = 0.25, .final_epsilon = 0.0}, 1);
+  agent.set_learning_rate(0.75);
+  EXPECT_EQ(agent.learning_rate(), 0.75);
+  agent.set_progress(1.0);
+  EXPECT_EQ(agent.learning_rate(), 0.75);
+  EXPECT_EQ(agent.epsilon(), 0.0);
+  agent.learn(cell(0), 0, 16.0, cell(1), true);
+  EXPECT_EQ(agent.action_value().value(cell(0), 0), 12.0);
+  agent.set_epsilon(1.0);
+  agent.set_learning_rate(std::nullopt);
+  EXPECT_EQ(agent.learning_rate(), 0.25);
+  EXPECT_EQ(agent.epsilon(), 1.0);
+  for (const double bad : {-0.1, 1.1, testing::kNaN}) {
+    EXPECT_THROW(agent.set_learning_rate(bad), std::invalid_argument);
+    EXPECT_THROW(agent.set_epsilon(bad), std::invalid_argument);
+  }
+  EXPECT_THROW(agent.set_learning_rate(0.0), std::invalid_argument);
+  EXPECT_EQ(agent.epsilon(), 1.0);
+  auto saved = rbf_agent();
+  EXPECT_FALSE(core::state_of(saved).contains("learning_rate"));
+  saved.set_learning_rate(0.75);
+  saved.set_epsilon(0.5);
+  const core::State good = core::state_of(saved);
+  for (const double bad : {0.0, 1.1, testing::kNaN}) {
+    testing::expect_refused(saved, testing::with_number(good, "learning_rate", bad),
+                            "state: learning_rate must be in (0, 1]");
+  }
+  testing::expect_refused(saved, testing::with_number(good, "epsilon", -0.1),
+                          "state: epsilon must be in [0, 1]");
+  auto other = rbf_agent();
+  core::restore(other, good);
+  EXPECT_EQ(other.learning_rate(), 0.75);
+  EXPECT_EQ(other.epsilon(), 0.5);
+}
+
+}  // namespace
+}  // namespace sdnn::agents::small_q_learning

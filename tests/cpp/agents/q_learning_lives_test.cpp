@@ -1,0 +1,206 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "agents/lives.hpp"
+#include "agents/small_q_learning.hpp"
+#include "allocation_count.hpp"
+#include "sdnn/agents/q_learning.hpp"
+#include "sdnn/core/random.hpp"
+#include "states.hpp"
+#include "threads.hpp"
+
+namespace sdnn::agents::small_q_learning {
+namespace {
+
+// Between two updates many threads may choose greedy actions; equal ties streams, equal actions.
+TEST(QLearning, ManyThreadsMayChooseGreedyActions) {
+  auto agent = vector_agent();
+  testing::World<decltype(agent)> world(agent.n_inputs(), 7);
+  for (int t = 0; t < 300; ++t) world.tick(agent);
+  const auto greedy_actions = [](const auto& learned) {
+    core::Random random(5, core::Stream::sensor_noise), ties(1, core::Stream::evaluation_ties);
+    auto workspace = learned.workspace();
+    std::vector<double> state(learned.n_inputs());
+    std::vector<std::vector<std::size_t>> actions;
+    for (int i = 0; i < 50; ++i) {
+      for (double& x : state) x = random.uniform();
+      actions.push_back(learned.best_action(state, workspace, ties));
+    }
+    return actions;
+  };
+  const auto alone = agent;
+  const auto expected = greedy_actions(alone);
+  for (const auto& actions :
+       testing::in_threads(4, [&](std::size_t) { return greedy_actions(agent); })) {
+    EXPECT_EQ(actions, expected);
+  }
+}
+
+TEST(QLearning, ALifeCanBeCutAnywhere) {
+  testing::expect_that_a_life_can_be_cut(sdnn_agent);
+  testing::expect_that_a_life_can_be_cut(rbf_agent);
+  testing::expect_that_a_life_can_be_cut(vector_agent);
+}
+
+TEST(QLearning, ALifeInSeveralEnvironmentsCanBeCutAnywhere) {
+  testing::expect_that_a_life_can_be_cut(rbf_agent, 2);
+  testing::expect_that_a_life_can_be_cut(vector_agent, 3);
+}
+
+// As OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown, while another environment goes its
+// way.
+TEST(QLearning, EachEnvironmentHasStepsThatWait) {
+  LookupTable table(2, 5, 2);
+  Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 2}, 1);
+  agent.set_n_environments(2);
+  EXPECT_EQ(agent.n_environments(), 2U);
+  const auto at = [](int i, int environment) {
+    return std::array{(i + 0.5) / 5.0, environment == 0 ? 0.1 : 0.9};
+  };
+  const auto q = [&](int i, int environment) {
+    return agent.action_value().value(at(i, environment), 0);
+  };
+  for (int i = 0; i < 2; ++i) {
+    for (const int e : {0, 1}) {
+      agent.learn(at(i, e), 0, e == 0 ? i + 1.0 : 8.0, at(i + 1, e), false,
+                  static_cast<std::size_t>(e));
+    }
+  }
+  EXPECT_EQ(q(0, 0), 1.0 + 0.5 * 2.0);
+  EXPECT_EQ(q(0, 1), 8.0 + 0.5 * 8.0);
+  EXPECT_EQ(q(1, 0), 0.0);
+  agent.begin_episode(1);  // of the other nothing is learned
+  EXPECT_EQ(q(1, 0), 0.0);
+  EXPECT_EQ(q(1, 1), 8.0);
+  agent.set_n_environments(1);
+  EXPECT_EQ(q(1, 0), 0.0);
+  agent.begin_episode();
+  EXPECT_EQ(q(1, 0), 2.0);
+}
+
+TEST(QLearning, WhatWaitsOfEnvironmentsThatAreNoMoreIsLearned) {
+  Agent agent(LookupTable(1, 5, 2), {.learning_rate = 1.0, .n_steps = 5}, 1);
+  agent.set_n_environments(3);
+  agent.learn(cell(2), 1, 4.0, cell(3), false, 2);
+  EXPECT_EQ(agent.action_value().value(cell(2), 1), 0.0);
+  agent.set_n_environments(2);
+  EXPECT_EQ(agent.action_value().value(cell(2), 1), 4.0);
+}
+
+// All that other environments share with it is drawn and learned here, and in nobody's name.
+TEST(QLearning, AnyOneOfSeveralEnvironmentsIsLikeTheOnlyOne) {
+  auto alone = vector_agent();
+  testing::World<decltype(alone)> world(2, 9);
+  for (int t = 0; t < 300; ++t) world.tick(alone);
+  for (const std::size_t environment : {0U, 2U}) {
+    auto one_of_four = vector_agent();
+    one_of_four.set_n_environments(4);
+    testing::World<decltype(alone)> same_world(2, 9, environment);
+    for (int t = 0; t < 300; ++t) same_world.tick(one_of_four);
+    const core::State state = core::state_of(one_of_four);
+    const std::string before =
+        environment == 0 ? "" : "environment." + std::to_string(environment) + ".";
+    for (const auto& [name, tensor] : core::state_of(alone)) {
+      const bool is_shared = !state.contains("environment.1." + name);
+      EXPECT_EQ(state.at(is_shared ? name : before + name), tensor) << name;
+    }
+    EXPECT_NE(state.at(before + "waiting.next_state"),
+              state.at("environment.1.waiting.next_state"));
+  }
+}
+
+TEST(QLearning, RefusesEnvironmentsThatAreNone) {
+  Agent agent(LookupTable(1, 5, 2), {}, 1);
+  agent.set_n_environments(2);
+  EXPECT_THROW((void)agent.act(cell(0), true, 2), std::invalid_argument);
+  EXPECT_THROW((void)agent.act(cell(0), false, 2), std::invalid_argument);
+  EXPECT_THROW(agent.begin_episode(2), std::invalid_argument);
+  EXPECT_THROW(agent.learn(cell(0), 0, 1.0, cell(1), false, 2), std::invalid_argument);
+  EXPECT_THROW(agent.set_n_environments(0), std::invalid_argument);
+  EXPECT_THROW(agent.set_n_environments((1U << 20U) + 1U), std::invalid_argument);
+  EXPECT_EQ(agent.n_environments(), 2U);
+  EXPECT_EQ(agent.action_value(), LookupTable(1, 5, 2));
+}
+
+TEST(QLearning, RefusesAStateOfEnvironmentsThatDoesNotFit) {
+  auto agent = rbf_agent();
+  agent.set_n_environments(3);
+  for (int t = 0; t < 20; ++t) (void)agent.act(std::vector{0.5, 0.5});  // until none is left
+  testing::expect_that_damage_is_refused(agent);
+  const core::State good = core::state_of(agent);
+  const auto refused = [&](const core::State& bad, const std::string& message) {
+    testing::expect_refused(agent, bad, "state: environment.2." + message);
+  };
+  refused(testing::with_number(good, "environment.2.step", -1), "step must be 0 or more");
+  refused(testing::with_number(good, "environment.2.kept_action", std::int64_t{7}),
+          "kept_action must be an action");
+  refused(testing::with_number(good, "environment.2.range.sum", testing::kNaN),
+          "range.sum must be a finite sum");
+  core::State bad = good;  // a second one is missing
+  std::erase_if(bad, [](const auto& item) { return item.first.starts_with("environment.1."); });
+  testing::expect_refused(agent, bad, "state: environment.2.kept_action must not be there");
+}
+
+TEST(QLearning, ARestoredAgentAllocatesNothing) {
+  testing::expect_that_a_restored_agent_allocates_nothing(sdnn_agent, testing::allocation_count);
+  testing::expect_that_a_restored_agent_allocates_nothing(rbf_agent, testing::allocation_count);
+}
+
+TEST(QLearning, RefusesAStateThatDoesNotFit) {
+  auto agent = sdnn_agent();
+  testing::World<QLearning<SDNNC>> world(2, 7);
+  const core::State young = core::state_of(agent);
+  while (core::state_of(agent).contains("n_random_left")) world.tick(agent);
+  while (testing::number_of<std::int32_t>(core::state_of(agent), "n_kept") == 0 ||
+         core::state_of(agent).at("waiting.rewards").size() < 2) {
+    world.tick(agent);
+  }
+  agent.set_learning_rate(std::nullopt);  // what may be missing
+  agent.set_epsilon(std::nullopt);
+  testing::expect_that_damage_is_refused(agent);
+  const core::State good = core::state_of(agent);
+  using testing::with_number;
+  const auto refused = [&](const core::State& bad, const std::string& message) {
+    testing::expect_refused(agent, bad, "state: " + message);
+  };
+  for (const std::int64_t bad : {-1, 7}) {
+    refused(with_number(good, "waiting.actions", bad, 1), "waiting.actions must be of actions");
+    refused(with_number(good, "kept_action", bad), "kept_action must be an action");
+  }
+  refused(with_number(good, "waiting.rewards", testing::kNaN, 1), "waiting.rewards must be finite");
+  refused(with_number(good, "waiting.states", testing::kNaN, 3),
+          "waiting.states must be in [0, 1]");
+  for (const int bad : {-1, 21}) {
+    refused(with_number(young, "n_random_left", bad),
+            "n_random_left must be in [0, n_random_steps]");
+  }
+  refused(with_number(good, "step", -1), "step must be 0 or more");
+  refused(with_number(good, "n_kept", -1), "n_kept must be in [0, max_repetitions)");
+  refused(with_number(good, "n_kept", 5), "n_kept must be in [0, max_repetitions)");
+  for (const double bad : {testing::kNaN, -0.1, 1.1}) {
+    refused(with_number(good, "progress", bad), "progress must be in [0, 1]");
+  }
+  refused(with_number(good, "range.low", testing::kNaN), "range.low must be finite");
+  core::State bad = good;
+  bad["kept_action"] = testing::tensor_of<std::int64_t>({0, 0});
+  refused(bad, "kept_action must be one per dimension");
+  bad = good;  // as many as the ring has places: the next would have none
+  bad["waiting.rewards"] = testing::tensor_of(std::vector<double>(4, 0.0));
+  bad["waiting.actions"] = testing::tensor_of(std::vector<std::int64_t>(4, 0));
+  bad["waiting.states"] = testing::tensor_of(std::vector<double>(8, 0.0));
+  refused(bad, "waiting.rewards must be fewer than n_steps");
+  bad = good;
+  for (std::size_t i = 0; i < 4; ++i) {
+    bad = with_number(bad, "policy.ties.words", std::uint64_t{0}, i);
+  }
+  refused(bad, "policy.ties.words must be not all 0");
+}
+
+}  // namespace
+}  // namespace sdnn::agents::small_q_learning

@@ -1,0 +1,84 @@
+/// Small agents that learn by Q-learning.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "approximators/lookup_table.hpp"
+#include "sdnn/agents/q_learning.hpp"
+#include "sdnn/approximators/decoupled.hpp"
+#include "sdnn/approximators/rbf_network.hpp"
+#include "sdnn/approximators/sdnn_c.hpp"
+
+namespace sdnn::agents::small_q_learning {
+
+using approximators::Decoupled;
+using approximators::RBFNetwork;
+using approximators::SDNNC;
+using testing::LookupTable;
+using Agent = QLearning<LookupTable>;
+using Indices = std::vector<std::size_t>;
+using Position = std::array<double, 1>;
+
+/// The middle of cell `i` of five.
+inline Position cell(int i) { return {(i + 0.5) / 5.0}; }
+
+inline std::string message(const QLearningConfig& config) {
+  try {
+    Agent(LookupTable(1, 5, 2), config, 1);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+/// A network of which counts from 4 to 36 stand for values from -16 to 16: all whole numbers.
+inline approximators::SDNNCConfig network() {
+  return {.n_inputs = 2,
+          .n_pattern_units = 16,
+          .n_anchor_patterns = 3,
+          .n_interpolated = 3,
+          .n_hidden_units = 60,
+          .n_active_units = 40,
+          .n_actions = 7,
+          .q_low = -16.0,
+          .q_high = 16.0,
+          .u_low = 4,
+          .u_high = 36};
+}
+
+inline QLearningConfig everything() {
+  return {.policy = {.epsilon = 0.3, .n_greedy_steps = 2},
+          .n_steps = 4,
+          .max_repetitions = 5,
+          .final_learning_rate = 0.25,
+          .final_epsilon = 0.0,
+          .value_range = ValueRange::seen,
+          .n_random_steps = 20};
+}
+
+inline QLearning<SDNNC> sdnn_agent() {
+  approximators::SDNNCConfig config = network();
+  config.rounding = approximators::Rounding::random;
+  config.averaging_interval = 9;
+  return {SDNNC(config, 3), everything(), 3};
+}
+
+inline QLearning<RBFNetwork> rbf_agent() {
+  return {RBFNetwork({.n_inputs = 2, .n_bases = 3, .n_actions = 7, .gradient_rate = 0.5}),
+          everything(), 3};
+}
+
+inline QLearning<Decoupled<SDNNC>> vector_agent() {
+  approximators::SDNNCConfig config = network();
+  config.rounding = approximators::Rounding::random;
+  std::vector<SDNNC> parts = {SDNNC(config, 3)};
+  config.n_actions = 5;
+  parts.emplace_back(config, approximators::seed_of_dimension(3, 1));
+  return {Decoupled<SDNNC>(std::move(parts)), everything(), 3};
+}
+
+}  // namespace sdnn::agents::small_q_learning

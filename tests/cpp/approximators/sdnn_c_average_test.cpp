@@ -1,0 +1,113 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "allocation_count.hpp"
+#include "approximators/small_sdnn_c.hpp"
+#include "sdnn/approximators/sdnn_c.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::approximators::small_sdnn_c {
+namespace {
+
+SDNNCConfig averaging() {
+  SDNNCConfig config = small();
+  config.averaging_interval = 7;
+  return config;
+}
+
+std::vector<double> averaged_values(Network& network, const State& state) {
+  std::vector<double> out(network.n_actions());
+  network.averaged_values(state, out);
+  return out;
+}
+
+TEST(SDNNC, AveragingDoesNotTouchLearning) {
+  Network network(small(), 5), averaging_one(averaging(), 5);
+  core::Random random(1, core::Stream::weights);
+  for (int t = 0; t < 400; ++t) {
+    const State state = random_state(3, random);
+    const std::size_t action = random.below(network.n_actions());
+    const double target = 40.0 * random.uniform() - 20.0;
+    network.update(state, action, target);
+    averaging_one.update(state, action, target);
+    if (t % 10 == 0) (void)averaged_values(averaging_one, state);
+    ASSERT_EQ(values(averaging_one, state), values(network, state)) << t;
+  }
+  EXPECT_FALSE(network.has_average());
+  EXPECT_TRUE(averaging_one.has_average());
+  const State state = random_state(3, random);
+  EXPECT_EQ(averaged_values(network, state), values(network, state));  // as there is none
+  EXPECT_NE(averaged_values(averaging_one, state), values(network, state));
+}
+
+TEST(SDNNC, AveragedValuesAreThoseOfTheAveragedWeights) {
+  Network network(averaging(), 5), other(small(), 5);
+  core::Random random(1, core::Stream::weights);
+  const std::size_t n_columns = network.state_code().n_columns();
+  for (int t = 0; t < 300; ++t) {
+    const State state = random_state(3, random);
+    EXPECT_EQ(network.has_average(), t >= 7);
+    network.update(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
+    if (t % 20 != 8) continue;
+    std::vector<std::int32_t> weights, thresholds;
+    for (std::size_t unit = 0; unit < 200; ++unit) {
+      thresholds.push_back(network.averaged_threshold(unit));
+      for (std::size_t j = 0; j < n_columns; ++j) {
+        weights.push_back(network.averaged_weight(unit, j));
+      }
+    }
+    other.set_parameters(weights, thresholds);
+    for (int i = 0; i < 5; ++i) {
+      const State asked = random_state(3, random);
+      ASSERT_EQ(averaged_values(network, asked), values(other, asked)) << t;
+    }
+  }
+}
+
+// Random targets from -5 to 15: the value is the last one, that of the average near their median.
+TEST(SDNNC, TheAverageStillsWhatSwings) {
+  Network network(averaging(), 5);
+  core::Random random(2, core::Stream::weights);
+  const State state = {0.2, 0.7, 0.4};
+  double furthest = 0.0;
+  for (int t = 0; t < 6000; ++t) {
+    network.update(state, 30, 20.0 * random.uniform() - 5.0);
+    if (t < 1000 || t % 50 != 0) continue;
+    furthest = std::max(furthest, std::abs(network.value(state, 30) - 5.0));
+    ASSERT_LT(std::abs(averaged_values(network, state)[30] - 5.0), 5.0) << t;
+  }
+  EXPECT_GT(furthest, 9.0);
+}
+
+TEST(SDNNC, OtherParametersBeginAnotherAverage) {
+  Network network(averaging(), 5);
+  const State state = {0.2, 0.7, 0.4};
+  for (int t = 0; t < 50; ++t) network.update(state, 30, 10.0);
+  EXPECT_TRUE(network.has_average());
+  const std::size_t n_units = 200, n_columns = network.state_code().n_columns();
+  network.set_parameters(std::vector<std::int32_t>(n_units * n_columns),
+                         std::vector<std::int32_t>(n_units));
+  EXPECT_FALSE(network.has_average());
+  EXPECT_EQ(averaged_values(network, state), values(network, state));
+}
+
+TEST(SDNNC, AveragingAllocatesNothingWhileItLearns) {
+  Network network(averaging(), 5);
+  core::Random random(1, core::Stream::weights);
+  State state = random_state(3, random);
+  for (int t = 0; t < 20; ++t) network.update(state, 3, 5.0);
+  (void)averaged_values(network, state);
+  std::vector<double> out(network.n_actions());
+  const std::size_t before = testing::allocation_count();
+  for (int t = 0; t < 100; ++t) {
+    for (double& x : state) x = random.uniform();
+    network.values(state, out);
+    network.update(state, 3, 5.0);
+  }
+  EXPECT_EQ(testing::allocation_count(), before);
+}
+
+}  // namespace
+}  // namespace sdnn::approximators::small_sdnn_c
