@@ -11,7 +11,7 @@ trials = 2
 cases = ["s4"]
 
 [base]
-protocol.n_learning_episodes = 20
+budget.episodes = 20
 
 [axes]
 learning.tie_rule = ["lowest", "uniform"]
