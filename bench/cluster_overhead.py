@@ -21,15 +21,8 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from sdnn.reproduction import (
-    AGENTS,
-    EXPERIMENTS,
-    DaskExecutor,
-    ResultStore,
-    ThreadExecutor,
-    plan_trials,
-    run_trials,
-)
+from sdnn.reproduction import EXPERIMENTS, plan_trials
+from sdnn.runs import AGENTS, DaskExecutor, ResultStore, ThreadExecutor, run_trials
 
 
 class InstantTrial:

@@ -80,7 +80,7 @@ def fake():
 @pytest.fixture
 def use_trial(monkeypatch, fake):
     """Let every agent run in trials of another kind."""
-    from sdnn.reproduction import AGENTS
+    from sdnn.runs import AGENTS
 
     def _use(core_trial):
         for name, entry in fake.agents_with(core_trial).items():
@@ -92,7 +92,7 @@ def use_trial(monkeypatch, fake):
 @pytest.fixture
 def run(fake, use_trial):
     """Run a plan into the store of a folder, with fake trials; returns outcome and digest."""
-    from sdnn.reproduction import ResultStore, run_trials
+    from sdnn.runs import ResultStore, run_trials
     from sdnn.runs.records import records_digest
 
     def _run(folder, plan=None, trial=fake.FakeTrial, **options):

@@ -13,9 +13,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from sdnn.reproduction import ResultStore, case_spec, measure, plan_trials
+from sdnn.reproduction import case_spec, plan_trials
 from sdnn.reproduction.cases import PAPER_CASES
 from sdnn.reproduction.reference_results import FILE_NAME, reference_csv, reference_results
+from sdnn.runs import ResultStore, measure
 
 FILE = Path(__file__).parents[2] / "python" / "sdnn" / "reproduction" / FILE_NAME
 

@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 from sdnn.cli import main
-from sdnn.reproduction import AGENTS
 from sdnn.reproduction.studies import read_study
+from sdnn.runs import AGENTS
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "sweep.md").read_text()

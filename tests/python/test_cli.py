@@ -17,9 +17,9 @@ from click.testing import CliRunner
 
 import sdnn
 from sdnn.cli import main
-from sdnn.reproduction import AGENTS, AgentEntry, register
 from sdnn.reproduction.cases import MOST_EPISODES, select_experiments
 from sdnn.reproduction.reproduce import ReproduceRequest
+from sdnn.runs import AGENTS, AgentEntry, register
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,6 @@
-"""Runs: one agent that learns in one environment, in a folder of its own, which can be resumed.
+"""The engine: runs, trials, studies, their store and reports.
+
+A run is one agent that learns in one environment, in a folder of its own, and can be resumed.
 
 A folder holds ``config.json`` (all that defines the run), ``results.sqlite`` (its episodes and
 evaluations), ``checkpoint.safetensors`` (where it goes on) and, once it is finished,
@@ -11,23 +13,54 @@ from typing import TYPE_CHECKING
 from sdnn.lazy import attach
 
 if TYPE_CHECKING:
-    from sdnn.runs.config import AGENTS, RunConfig
+    from sdnn.runs.config import RunConfig
+    from sdnn.runs.dask_executor import DaskExecutor
+    from sdnn.runs.engine import Observer, run_trials
     from sdnn.runs.environment import EnvironmentSpec
-    from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
+    from sdnn.runs.errors import (
+        ClusterError,
+        ConfigError,
+        PlotUnavailableError,
+        RunError,
+        RunTerminatedError,
+        StoreError,
+        WorkerLostError,
+    )
+    from sdnn.runs.executor import Executor, ThreadExecutor
+    from sdnn.runs.measures import MeasureConfig
+    from sdnn.runs.planned_trial import PlannedTrial, trial_seed
+    from sdnn.runs.records import TrialKey, TrialRecord, TrialRows
+    from sdnn.runs.registry import AGENTS, AgentEntry, CostSeries, agent_entry, register
+    from sdnn.runs.results import CaseResult, measure
     from sdnn.runs.run import Goal, Run, RunEvaluation, RunOutcome
     from sdnn.runs.spec import AgentSpec, BudgetSpec, OutputSpec, ProtocolSpec, RunSpec
+    from sdnn.runs.statistics import Estimate
+    from sdnn.runs.store import ResultStore
+    from sdnn.runs.trial import Trial
 
 __getattr__, __dir__ = attach(globals())
 
 __all__ = [
     "AGENTS",
+    "AgentEntry",
     "AgentSpec",
     "BudgetSpec",
+    "CaseResult",
+    "ClusterError",
     "ConfigError",
+    "CostSeries",
+    "DaskExecutor",
     "EnvironmentSpec",
+    "Estimate",
+    "Executor",
     "Goal",
+    "MeasureConfig",
+    "Observer",
     "OutputSpec",
+    "PlannedTrial",
+    "PlotUnavailableError",
     "ProtocolSpec",
+    "ResultStore",
     "Run",
     "RunConfig",
     "RunError",
@@ -35,4 +68,16 @@ __all__ = [
     "RunOutcome",
     "RunSpec",
     "RunTerminatedError",
+    "StoreError",
+    "ThreadExecutor",
+    "Trial",
+    "TrialKey",
+    "TrialRecord",
+    "TrialRows",
+    "WorkerLostError",
+    "agent_entry",
+    "measure",
+    "register",
+    "run_trials",
+    "trial_seed",
 ]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sdnn.reproduction import TrialKey, TrialRecord, TrialRows
+from sdnn.runs import TrialKey, TrialRecord, TrialRows
 
 
 def make_record(trial=0, config_hash="aa", steps=(50, 7), **changes):

@@ -18,8 +18,8 @@ from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.agents.agent import load_agent
 from sdnn.coding import Symbolic, WithMissing
 from sdnn.estimators import libsdnn
-from sdnn.reproduction import ResultStore, StoreError
 from sdnn.reproduction.studies import read_study
+from sdnn.runs import ResultStore, StoreError
 from sdnn.runs.config import RunConfig
 from sdnn.runs.errors import RunError
 

@@ -18,8 +18,15 @@ from sdnn.environments import (
     SensorConfig,
 )
 from sdnn.estimators import SDNNClassifier, SDNNRegressor
-from sdnn.reproduction import MeasureConfig
-from sdnn.runs import BudgetSpec, ConfigError, EnvironmentSpec, ProtocolSpec, RunSpec, measures
+from sdnn.runs import (
+    BudgetSpec,
+    ConfigError,
+    EnvironmentSpec,
+    MeasureConfig,
+    ProtocolSpec,
+    RunSpec,
+    measures,
+)
 
 ROOMS = ("agents", "approximators", "coding", "environments", "estimators", "reproduction", "runs")
 

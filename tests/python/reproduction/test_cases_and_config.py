@@ -7,15 +7,8 @@ import pytest
 from sdnn.agents import FuzzyQLearningConfig
 from sdnn.approximators import FuzzyRulesConfig
 from sdnn.environments import SensorConfig
-from sdnn.reproduction import (
-    AGENTS,
-    EXPERIMENTS,
-    case_spec,
-    plan_trials,
-    select_experiments,
-    trial_seed,
-)
-from sdnn.runs import ProtocolSpec, RunSpec
+from sdnn.reproduction import EXPERIMENTS, case_spec, plan_trials, select_experiments
+from sdnn.runs import AGENTS, ProtocolSpec, RunSpec, trial_seed
 
 
 def test_experiment_a_is_the_one_of_the_paper():

@@ -4,7 +4,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sdnn.reproduction import Estimate, TrialKey, TrialRecord, TrialRows, measure
 from sdnn.reproduction.cases import EXPERIMENTS
 from sdnn.reproduction.chances import MULTIPLES, Power, drawn_medians, powers
 from sdnn.reproduction.claims import (
@@ -27,6 +26,7 @@ from sdnn.reproduction.verdicts import (
     judge_claims,
     verdict_of,
 )
+from sdnn.runs import Estimate, TrialKey, TrialRecord, TrialRows, measure
 from sdnn.runs.registry import cost_series
 from sdnn.runs.statistics import estimate_contrast, estimate_median
 

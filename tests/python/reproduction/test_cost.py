@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sdnn import _core, machine
-from sdnn.reproduction import AGENTS, CostConfig, Observer, ResultStore, StoreError, draw_cost
+from sdnn.reproduction import CostConfig, draw_cost
 from sdnn.reproduction.cost import (
     QUICK_COST,
     cost_keys,
@@ -15,6 +15,7 @@ from sdnn.reproduction.cost import (
     measure_steps,
 )
 from sdnn.reproduction.report import cost_table
+from sdnn.runs import AGENTS, Observer, ResultStore, StoreError
 from sdnn.runs.records import records_digest
 from sdnn.runs.registry import cost_series
 

@@ -10,18 +10,10 @@ import numpy as np
 import pytest
 
 import sdnn.reproduction.reproduce as reproduce_module
-from sdnn.reproduction import (
-    AGENTS,
-    PlotUnavailableError,
-    ResultStore,
-    collect,
-    draw_experiment,
-    measure,
-    plan_trials,
-    select_experiments,
-)
+from sdnn.reproduction import collect, draw_experiment, plan_trials, select_experiments
 from sdnn.reproduction.report import Report
 from sdnn.reproduction.reproduce import ReproduceRequest, reproduce
+from sdnn.runs import AGENTS, PlotUnavailableError, ResultStore, measure
 from sdnn.runs.engine import RunOutcome
 from sdnn.runs.figures import COLORS, SMOOTHED_TESTS, agent_colors, colors_of, figure_bytes
 from sdnn.runs.records import ROW_HEADER, records_digest, trial_rows

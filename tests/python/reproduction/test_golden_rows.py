@@ -2,8 +2,9 @@
 
 import hashlib
 
-from sdnn.reproduction import ResultStore, run_trials, select_experiments
+from sdnn.reproduction import select_experiments
 from sdnn.reproduction.reproduce import ReproduceRequest
+from sdnn.runs import ResultStore, run_trials
 
 GOLDEN = "daeab97b4c3adff9796000959c2049d42692378a7d55dc3816a4010ef08760b4"
 

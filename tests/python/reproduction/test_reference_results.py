@@ -8,13 +8,9 @@ import sdnn.reproduction.reference_results as reference_module
 import sdnn.reproduction.reproduce as reproduce_module
 from sdnn.reproduction import (
     EXPERIMENTS,
-    Estimate,
     ReproduceRequest,
-    ResultStore,
     collect,
-    measure,
     plan_trials,
-    run_trials,
     select_experiments,
 )
 from sdnn.reproduction.cases import PAPER_EPISODES
@@ -37,6 +33,7 @@ from sdnn.reproduction.verdicts import (
     judge_claims,
     settle,
 )
+from sdnn.runs import Estimate, ResultStore, measure, run_trials
 from sdnn.runs.measures import STEP_MEASURES
 from sdnn.runs.results import TrialMeasures
 

@@ -7,14 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sdnn.reproduction import (
-    AGENTS,
-    EXPERIMENTS,
-    Observer,
-    ResultStore,
-    plan_trials,
-    run_trials,
-)
+from sdnn.reproduction import EXPERIMENTS, plan_trials
+from sdnn.runs import AGENTS, Observer, ResultStore, run_trials
 
 CASES = EXPERIMENTS[0].cases
 

@@ -29,7 +29,8 @@ from sdnn.cli.train import AGENTS as AGENT_WORDS
 from sdnn.cli.train import PRESETS as PRESET_WORDS
 from sdnn.environments import UnitSensors
 from sdnn.export import c_header
-from sdnn.runs import AGENTS, Run, RunConfig
+from sdnn.runs import Run, RunConfig
+from sdnn.runs.config import AGENTS
 
 SMALL = (
     "--set", "approximator.n_hidden_units=60", "--set", "approximator.n_active_units=20",

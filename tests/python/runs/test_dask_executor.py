@@ -18,8 +18,11 @@ from rich.console import Console
 import sdnn
 from sdnn.approximators import SDNNCConfig
 from sdnn.cli import main
+from sdnn.config import ProtocolConfig
 from sdnn.progress import ProgressBars
-from sdnn.reproduction import (
+from sdnn.reproduction import plan_trials
+from sdnn.reproduction.cases import EXPERIMENTS
+from sdnn.runs import (
     AGENTS,
     ClusterError,
     DaskExecutor,
@@ -27,14 +30,11 @@ from sdnn.reproduction import (
     EnvironmentTrialConfig,
     Observer,
     PlannedTrial,
-    ProtocolConfig,
     ResultStore,
     TrialKey,
     WorkerLostError,
-    plan_trials,
     run_trials,
 )
-from sdnn.reproduction.cases import EXPERIMENTS
 from sdnn.runs.dask_worker import probe
 from sdnn.runs.records import records_digest
 
@@ -257,7 +257,7 @@ from sdnn import _core
 _core.__version__ = "0.0.9"
 """
 OTHER_BITS = """
-from sdnn.reproduction import TrialRows
+from sdnn.runs import TrialRows
 TrialRows.digest = lambda rows: "other"
 """
 NO_SDNN = """
@@ -295,7 +295,7 @@ def test_workers_that_do_not_fit_get_no_trials(cluster, preload, tmp_path, monke
 
 LACKS_A_SETTING = """
 import re
-from sdnn.reproduction import TrialConfig
+from sdnn.runs import TrialConfig
 
 TrialConfig.whole = getattr(TrialConfig, "whole", TrialConfig.canonical_json)
 TrialConfig.canonical_json = lambda self: re.sub('"discount":0.8,', "", self.whole())
@@ -322,7 +322,7 @@ POISON = """
 import os
 from dataclasses import replace
 from sdnn import _core
-from sdnn.reproduction import AGENTS
+from sdnn.runs import AGENTS
 
 class Poison:
     def __init__(self, *, seed, **parts):
@@ -374,7 +374,7 @@ def test_an_interruption_frees_the_workers(pair, tmp_path):
 
 
 def test_an_unwritable_store_ends_the_run(pair, tmp_path):
-    from sdnn.reproduction import StoreError
+    from sdnn.runs import StoreError
 
     class Full(ResultStore):
         def add(self, record, *, is_exact=True):

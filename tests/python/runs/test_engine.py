@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from sdnn.progress import ProgressBars
-from sdnn.reproduction import Observer, ResultStore, StoreError, WorkerLostError
+from sdnn.runs import Observer, ResultStore, StoreError, WorkerLostError
 from sdnn.runs.executor import Advanced, Failed, Finished, Lost, Noted, Started, ThreadExecutor
 
 
@@ -140,7 +140,7 @@ def test_interruption_keeps_what_is_finished(tmp_path, fake, run):
 
 
 def test_unwritable_store_stops_the_run(tmp_path, fake, use_trial):
-    from sdnn.reproduction import run_trials
+    from sdnn.runs import run_trials
 
     class Full(ResultStore):
         def add(self, record, *, is_exact=True):

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from sdnn.reproduction import AGENTS, TrialKey
-from sdnn.runs import BudgetSpec, RunSpec, forecast
+from sdnn.runs import AGENTS, BudgetSpec, RunSpec, TrialKey, forecast
 from sdnn.runs.forecast import Durations, wall_seconds
 from sdnn.runs.records import TrialTime
 

@@ -3,7 +3,8 @@ import json
 import pytest
 
 from sdnn.agents import PRESETS, FuzzyQLearning, RBFQLearning, SDNNQLearning
-from sdnn.runs import AGENTS, ConfigError, EnvironmentSpec, RunConfig
+from sdnn.runs import ConfigError, EnvironmentSpec, RunConfig
+from sdnn.runs.config import AGENTS
 
 CART_POLE = EnvironmentSpec(id="CartPole-v1")
 

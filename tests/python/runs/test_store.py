@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from made_records import make_record
-from sdnn.reproduction import ResultStore, StoreError, TrialRows
+from sdnn.runs import ResultStore, StoreError, TrialRows
 from sdnn.runs.records import records_digest
 
 
@@ -90,7 +90,7 @@ def test_a_folder_that_is_only_looked_at_stays_as_it_is(tmp_path):
 
 READING = """
 import sys
-from sdnn.reproduction import ResultStore
+from sdnn.runs import ResultStore
 with ResultStore(sys.argv[1], read_only=True) as store:
     print(len(store.keys()), len(store.load()))
 """

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from sdnn.reproduction import AGENTS, EXPERIMENTS, case_spec, plan_trials
-from sdnn.runs import ConfigError, RunSpec
+from sdnn.reproduction import EXPERIMENTS, case_spec, plan_trials
+from sdnn.runs import AGENTS, ConfigError, RunSpec
 
 PAPER = """
 [study]
@@ -226,7 +226,7 @@ PLUGIN = """
 from dataclasses import dataclass
 from sdnn.agents import QLearningConfig, RBFQLearning
 from sdnn.approximators import RBFNetworkConfig
-from sdnn.reproduction import AGENTS, AgentEntry, register
+from sdnn.runs import AGENTS, AgentEntry, register
 
 register(AgentEntry(id="plugged", title="Plugged", approximator=RBFNetworkConfig,
                     learning=QLearningConfig, agent=RBFQLearning))
@@ -260,7 +260,7 @@ STRICT = """
 from dataclasses import dataclass
 
 from sdnn.agents import QLearningConfig, RBFQLearning
-from sdnn.reproduction import AgentEntry, register
+from sdnn.runs import AgentEntry, register
 
 @dataclass(frozen=True, kw_only=True)
 class Strict:

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from sdnn.cli import main
-from sdnn.reproduction import AGENTS
+from sdnn.runs import AGENTS
 
 STUDY = """
 [study]

@@ -7,16 +7,19 @@ import pytest
 
 from sdnn import _core
 from sdnn.agents import PRESETS
-from sdnn.reproduction import (
+from sdnn.reproduction import Case, case_spec
+from sdnn.runs import (
     AGENTS,
     AgentEntry,
-    Case,
+    AgentSpec,
+    BudgetSpec,
     CostSeries,
+    EnvironmentSpec,
+    ProtocolSpec,
+    RunSpec,
     agent_entry,
-    case_spec,
     register,
 )
-from sdnn.runs import AgentSpec, BudgetSpec, EnvironmentSpec, ProtocolSpec, RunSpec
 from sdnn.runs.records import TrialRows
 from sdnn.runs.registry import labels, title_of
 from sdnn.runs.trial import TrainingTrial, training_trial
