@@ -1,5 +1,5 @@
 # sdnn::agent_files is sdnn::sdnn and nlohmann/json, which the headers of saved agents include
-# (core/safetensors.hpp, agents/agent_file.hpp, agents/controller.hpp): there if that library is.
+# (core/safetensors.hpp, agents/agent_file.hpp): there if that library is.
 find_package(nlohmann_json 3.9 CONFIG QUIET)
 if(TARGET nlohmann_json::nlohmann_json AND NOT TARGET sdnn::agent_files)
   add_library(sdnn::agent_files INTERFACE IMPORTED GLOBAL)

@@ -6,14 +6,16 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
-#include <tuple>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "arrays.hpp"
 #include "bind_config.hpp"
 #include "bindings.hpp"
+#include "sdnn/agents/controller.hpp"
 #include "sdnn/agents/fixed_rate.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/observation_scale.hpp"
@@ -188,38 +190,155 @@ void bind_decoupled_q_learning(py::module_& module, const char* name, const char
   def_q_learning(agent);
 }
 
-void bind_observation_scale(py::module_& module) {
-  using agents::ObservationScale;
-  using Input = std::tuple<std::string, std::size_t, std::size_t>;
-  py::class_<ObservationScale>(module, "ObservationScale", "From what is observed to [0, 1]")
-      .def(py::init([](std::vector<double> low, std::vector<double> high,
-                       const std::vector<Input>& inputs) {
-             std::vector<agents::ObservedInput> observed;
-             for (const auto& [name, first, second] : inputs) {
-               const auto kind = agents::observed_kind(name);
-               core::require(kind.has_value(), "inputs", "of kinds that there are", name);
-               observed.push_back({*kind, first, second});
-             }
-             return ObservationScale(std::move(low), std::move(high), std::move(observed));
+/// Where an input of a state comes from: its kind, and the numbers that belong to it.
+std::pair<std::string, std::vector<std::size_t>> described(const agents::ObservedInput& input) {
+  switch (input.kind) {
+    case agents::ObservedKind::variable:
+      return {"variable", {input.first}};
+    case agents::ObservedKind::angle:
+      return {"angle", {input.first, input.second}};
+    case agents::ObservedKind::circular:
+      return {"circular", {input.first}};
+    case agents::ObservedKind::symbol:
+      return {"symbol", {input.first, input.second}};
+  }
+  return {};
+}
+
+/// Lets readers of the agent in other threads finish before it changes.
+void wait_for_readers_of(agents::Controller& controller) {
+  if (controller.is_warming_up()) return;
+  std::visit([](auto& agent) { bindings::wait_for_readers(agent); }, controller.agent());
+}
+
+void bind_controller(py::module_& module) {
+  using agents::Controller;
+  using agents::ControllerConfig;
+  bindings::bind_config<agents::ObservationConfig>(module, "ObservationConfig",
+                                                   "The observed variables of a task.");
+  bindings::bind_config<agents::ActionConfig>(module, "ActionConfig", "The actions of a task.");
+  const auto config_of = [](const agents::AnyApproximatorConfig& approximator,
+                            const agents::AnyLearningConfig& learning, std::uint64_t seed,
+                            const agents::ObservationConfig& observation,
+                            const agents::ActionConfig& action, int warm_up_steps) {
+    return ControllerConfig{approximator, learning, seed, observation, action, warm_up_steps};
+  };
+  const auto array_of = [](std::span<const double> values) {
+    return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
+  };
+  const auto ends_of = [array_of](const Controller& self) {
+    return std::pair(array_of(self.observations().low()), array_of(self.observations().high()));
+  };
+  py::class_<Controller>(module, "Controller", "An agent in the units of its task")
+      .def(py::init([config_of](const agents::AnyApproximatorConfig& approximator,
+                                const agents::AnyLearningConfig& learning, std::uint64_t seed,
+                                const agents::ObservationConfig& observation,
+                                const agents::ActionConfig& action, int warm_up_steps,
+                                const std::vector<ArrayArgument<std::int8_t>>& tables,
+                                const std::optional<py::dict>& state) {
+             auto config =
+                 config_of(approximator, learning, seed, observation, action, warm_up_steps);
+             if (state)
+               return Controller::restored(std::move(config), bindings::state_from(*state));
+             return Controller(std::move(config), bindings::tables_of(tables));
            }),
-           py::arg("low"), py::arg("high"), py::arg("inputs"))
-      .def(
-          "__call__",
-          [](const ObservationScale& self,
-             const ArrayArgument<double>& observation) -> std::optional<py::array_t<double>> {
-            const auto observed = bindings::vector(observation, "observation");
-            if (!self.has_state_of(observed)) return std::nullopt;
-            py::array_t<double> state(static_cast<py::ssize_t>(self.n_inputs()));
-            self(observed, {state.mutable_data(), self.n_inputs()});
-            return state;
+           py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"),
+           py::arg("observation"), py::arg("action"), py::arg("warm_up_steps") = 1000,
+           py::arg("tables") = std::vector<ArrayArgument<std::int8_t>>(),
+           py::arg("state") = py::none(), "New, or as it was when `state` was taken")
+      .def_property_readonly("approximator", &Controller::approximator)
+      .def_property_readonly("is_warming_up", &Controller::is_warming_up)
+      .def_property_readonly("n_variables", &Controller::n_variables)
+      .def_property_readonly("n_actions",
+                             [](const Controller& self) { return self.actions().n_actions(); })
+      .def_property_readonly("ranges", ends_of, "Lowest and highest values, (n_variables,) each")
+      .def_property_readonly(
+          "inputs",
+          [](const Controller& self) {
+            std::vector<std::pair<std::string, std::vector<std::size_t>>> inputs;
+            for (const auto& input : self.observations().inputs()) {
+              inputs.push_back(described(input));
+            }
+            return inputs;
           },
-          py::arg("observation"), "The state, shape (n_inputs,); None where there is none");
+          "Of a state: kinds, and the variables that they are made of")
+      .def_property_readonly(
+          "agent",
+          [](py::object& self) {
+            auto& controller = self.cast<Controller&>();
+            if (controller.is_warming_up()) throw std::runtime_error("agent is still warming up");
+            return std::visit(
+                [&self](auto& agent) {
+                  return py::cast(agent, py::return_value_policy::reference_internal, self);
+                },
+                controller.agent());
+          },
+          "The agent in itself, with states in [0, 1]")
+      .def_property("n_environments", &Controller::n_environments,
+                    [](Controller& self, std::size_t n) {
+                      wait_for_readers_of(self);
+                      self.set_n_environments(n);
+                    })
+      .def_property("progress", &Controller::progress, &Controller::set_progress)
+      .def_property("learning_rate", &Controller::learning_rate, &Controller::set_learning_rate)
+      .def_property("epsilon", &Controller::epsilon, &Controller::set_epsilon)
+      .def(
+          "begin_episode",
+          [](Controller& self, std::size_t environment) {
+            wait_for_readers_of(self);
+            self.begin_episode(environment);
+          },
+          py::arg("environment") = 0)
+      .def(
+          "act",
+          [array_of](Controller& self, const ArrayArgument<double>& observation, bool explore,
+                     std::size_t environment) {
+            return array_of(self.act(bindings::flat(observation), explore, environment));
+          },
+          py::arg("observation"), py::arg("explore") = true, py::arg("environment") = 0)
+      .def(
+          "learn",
+          [](Controller& self, const ArrayArgument<double>& observation,
+             const ArrayArgument<double>& action, double reward,
+             const ArrayArgument<double>& next_observation, bool terminated,
+             std::size_t environment) {
+            wait_for_readers_of(self);
+            self.learn(bindings::flat(observation), bindings::flat(action), reward,
+                       bindings::flat(next_observation), terminated, environment);
+          },
+          py::arg("observation"), py::arg("action"), py::arg("reward"), py::arg("next_observation"),
+          py::arg("terminated"), py::arg("environment") = 0)
+      .def(
+          "state_of",
+          [array_of](Controller& self, const ArrayArgument<double>& observation) {
+            return array_of(self.state_of(bindings::flat(observation)));
+          },
+          py::arg("observation"), "The agent's state, shape (n_inputs,)")
+      .def(
+          "action_of",
+          [](const Controller& self, std::size_t index, std::size_t dimension) {
+            return self.actions().of_index(index, dimension);
+          },
+          py::arg("index"), py::arg("dimension"))
+      .def(
+          "range_use",
+          [](const Controller& self) {
+            std::vector<std::optional<std::pair<double, double>>> use;
+            for (const auto& one : self.range_use()) {
+              use.push_back(one ? std::optional(std::pair(one->share_used, one->share_beyond))
+                                : std::nullopt);
+            }
+            return use;
+          },
+          "Of each variable: the share of its range that it used, and how often it was beyond")
+      .def(
+          "state", [](const Controller& self) { return bindings::arrays_of(core::state_of(self)); },
+          "What it remembers: arrays by name");
 }
 
 }  // namespace
 
 void bind_agents(py::module_& module) {
-  bind_observation_scale(module);
   bindings::bind_config<agents::EpsilonGreedyConfig>(
       module, "EpsilonGreedyConfig",
       "The parameters of the policy; the defaults are the paper's (section 4.2).");
@@ -316,4 +435,5 @@ void bind_agents(py::module_& module) {
           },
           py::arg("dimension"), py::return_value_policy::reference_internal);
   def_fuzzy(vector_fuzzy_agent);
+  bind_controller(module);
 }

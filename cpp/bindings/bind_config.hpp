@@ -175,7 +175,11 @@ bool read_value(pybind11::handle source, Value& value, const FieldInfo& field) {
 template <class Value>
 pybind11::object python_value(const Value& value) {
   if constexpr (kIsList<Value>) {
-    return pybind11::tuple(pybind11::cast(value));
+    pybind11::tuple items(value.size());
+    for (std::size_t i = 0; i < value.size(); ++i) {
+      items[i] = python_value<typename Value::value_type>(value[i]);
+    }
+    return items;
   } else {
     return pybind11::cast(value);
   }

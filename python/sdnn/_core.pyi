@@ -994,16 +994,6 @@ class PerceptronTrainer:
         """
         Bytes beside the layer
         """
-class ObservationScale:
-    """
-    From what is observed to [0, 1]
-    """
-    def __call__(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64] | None:
-        """
-        The state, shape (n_inputs,); None where there is none
-        """
-    def __init__(self, low: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], high: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], inputs: collections.abc.Sequence[tuple[str, typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]]) -> None:
-        ...
 class EpsilonGreedyConfig:
     """
     The parameters of the policy; the defaults are the paper's (section 4.2).
@@ -1568,6 +1558,226 @@ class VectorFuzzyQLearning:
     @property
     def n_environments(self) -> int:
         ...
+class ObservationConfig:
+    """
+    The observed variables of a task.
+    
+    Parameters
+    ----------
+    low : tuple[float | None, ...]
+        Lowest value of each variable; none: not known.
+    high : tuple[float | None, ...]
+        Highest value of each variable; none: not known.
+    adaptive : bool
+        Whether ranges of numbers are fitted, within low and high.
+    angles : tuple[int, ...]
+        Variables that wrap around in their ranges.
+    angle_pairs : tuple[tuple[int, ...], ...]
+        Variables that are the cosine and the sine of an angle.
+    find_angle_pairs : bool
+        Whether angle_pairs are those that observations have.
+    symbols : tuple[tuple[int, ...], ...]
+        First variables, and how many there are, of which one is 1.
+    
+    Raises
+    ------
+    TypeError, ValueError
+        For a value of another type or out of its bounds; ``argument`` is its name.
+    """
+    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
+    fields: typing.ClassVar[tuple[typing.Any, ...]]
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, low: collections.abc.Sequence[float | None] = ..., high: collections.abc.Sequence[float | None] = ..., adaptive: bool = ..., angles: collections.abc.Sequence[int] = ..., angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., find_angle_pairs: bool = ..., symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> ObservationConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
+    def replace(self, **changes: typing.Any) -> ObservationConfig:
+        """
+        Return a copy with other values of some fields.
+        """
+    @property
+    def adaptive(self) -> bool:
+        """
+        Whether ranges of numbers are fitted, within low and high.
+        """
+    @property
+    def angle_pairs(self) -> tuple[tuple[int, ...], ...]:
+        """
+        Variables that are the cosine and the sine of an angle.
+        """
+    @property
+    def angles(self) -> tuple[int, ...]:
+        """
+        Variables that wrap around in their ranges.
+        """
+    @property
+    def find_angle_pairs(self) -> bool:
+        """
+        Whether angle_pairs are those that observations have.
+        """
+    @property
+    def high(self) -> tuple[float | None, ...]:
+        """
+        Highest value of each variable; none: not known.
+        """
+    @property
+    def low(self) -> tuple[float | None, ...]:
+        """
+        Lowest value of each variable; none: not known.
+        """
+    @property
+    def symbols(self) -> tuple[tuple[int, ...], ...]:
+        """
+        First variables, and how many there are, of which one is 1.
+        """
+class ActionConfig:
+    """
+    The actions of a task.
+    
+    Parameters
+    ----------
+    low : tuple[float, ...]
+        Lowest action of each dimension.
+    high : tuple[float, ...]
+        Highest action of each dimension.
+    discrete : bool
+        Every whole number from low to high is an action of its own.
+    number : {'float64', 'float32', 'float16', 'whole'}
+        To what numbers actions are rounded.
+    
+    Raises
+    ------
+    TypeError, ValueError
+        For a value of another type or out of its bounds; ``argument`` is its name.
+    """
+    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
+    fields: typing.ClassVar[tuple[typing.Any, ...]]
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, low: collections.abc.Sequence[float] = ..., high: collections.abc.Sequence[float] = ..., discrete: bool = ..., number: typing.Literal['float64', 'float32', 'float16', 'whole'] = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> ActionConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
+    def replace(self, **changes: typing.Any) -> ActionConfig:
+        """
+        Return a copy with other values of some fields.
+        """
+    @property
+    def discrete(self) -> bool:
+        """
+        Every whole number from low to high is an action of its own.
+        """
+    @property
+    def high(self) -> tuple[float, ...]:
+        """
+        Highest action of each dimension.
+        """
+    @property
+    def low(self) -> tuple[float, ...]:
+        """
+        Lowest action of each dimension.
+        """
+    @property
+    def number(self) -> typing.Literal['float64', 'float32', 'float16', 'whole']:
+        """
+        To what numbers actions are rounded.
+        """
+class Controller:
+    """
+    An agent in the units of its task
+    """
+    def __init__(self, *, approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig, learning: QLearningConfig | FuzzyQLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex, observation: ObservationConfig, action: ActionConfig, warm_up_steps: typing.SupportsInt | typing.SupportsIndex = 1000, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = [], state: dict | None = None) -> None:
+        """
+        New, or as it was when `state` was taken
+        """
+    def act(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def action_of(self, index: typing.SupportsInt | typing.SupportsIndex, dimension: typing.SupportsInt | typing.SupportsIndex) -> float:
+        ...
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def learn(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reward: typing.SupportsFloat | typing.SupportsIndex, next_observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def range_use(self) -> list[tuple[float, float] | None]:
+        """
+        Of each variable: the share of its range that it used, and how often it was beyond
+        """
+    def state(self) -> dict:
+        """
+        What it remembers: arrays by name
+        """
+    def state_of(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The agent's state, shape (n_inputs,)
+        """
+    @property
+    def agent(self) -> typing.Any:
+        """
+        The agent in itself, with states in [0, 1]
+        """
+    @property
+    def approximator(self) -> SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig:
+        ...
+    @property
+    def epsilon(self) -> float:
+        ...
+    @epsilon.setter
+    def epsilon(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def inputs(self) -> list[tuple[str, list[int]]]:
+        """
+        Of a state: kinds, and the variables that they are made of
+        """
+    @property
+    def is_warming_up(self) -> bool:
+        ...
+    @property
+    def learning_rate(self) -> float:
+        ...
+    @learning_rate.setter
+    def learning_rate(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def n_actions(self) -> list[int]:
+        ...
+    @property
+    def n_environments(self) -> int:
+        ...
+    @n_environments.setter
+    def n_environments(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def n_variables(self) -> int:
+        ...
+    @property
+    def progress(self) -> float:
+        ...
+    @progress.setter
+    def progress(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def ranges(self) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        Lowest and highest values, (n_variables,) each
+        """
 class ProtocolConfig:
     """
     Learning protocol of a trial; the defaults are the paper's (section 4.2).

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "input.hpp"
-#include "sdnn/agents/controller.hpp"
+#include "sdnn/agents/agent_file.hpp"
 
 namespace {
 
@@ -23,8 +23,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace sdnn;
   fuzz::accepted([&] {
     const fuzz::MemoryFile file(with_checksum({data, data + size}));
-    agents::Controller controller(file.path());
-    const std::vector<double> observation(controller.n_observed(), 0.25);
+    agents::AgentFile saved(file.path());
+    agents::Controller& controller = saved.controller;
+    const std::vector<double> observation(controller.n_variables(), 0.25);
     controller.begin_episode();
     for (int step = 0; step < 3; ++step) {
       const auto chosen = controller.act(observation);
@@ -35,8 +36,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       controller.learn(observation, action, 1.0, observation, step == 2);
     }
     const std::string copy = "/dev/shm/sdnn_fuzz_" + std::to_string(::getpid());
-    controller.write(copy);
-    const agents::Controller again(copy);
+    saved.write(copy);
+    const agents::AgentFile again(copy);
     ::unlink(copy.c_str());
   });
   return 0;

@@ -15,8 +15,7 @@ LAYERS = {
 """Packages may include those of smaller numbers, and environments core only."""
 
 NOT_IN_UMBRELLA = {
-    "agents/agent_file.hpp", "agents/controller.hpp", "core/safetensors.hpp",
-    "estimators/libsdnn.hpp",
+    "agents/agent_file.hpp", "core/safetensors.hpp", "estimators/libsdnn.hpp",
 }  # fmt: skip
 """The reader of LIBSDNN's files, and what needs a library for JSON."""
 

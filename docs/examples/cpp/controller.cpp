@@ -4,7 +4,7 @@
 // Usage: controller FILE [n_episodes] [seed] [rate]. Learns, saves, loads, and runs one greedy
 // episode with `rate` decisions a second (0: as fast as it goes). Prints the decisions that the
 // loaded agent used, whether it reached the goal, and how many came too late.
-#include "sdnn/agents/controller.hpp"
+#include "sdnn/agents/agent_file.hpp"
 
 #include <array>
 #include <cstdint>
@@ -29,18 +29,14 @@ std::array<double, 4> observe(const environments::Acrobot& acrobot) {
 }
 
 agents::Controller new_controller(double max_torque, std::uint64_t seed) {
-  auto preset = agents::robust_preset(4);
-  preset.approximator.circular = {true, true, false, false};
-  const agents::QLearning agent(approximators::SDNNC(preset.approximator, seed), preset.learning,
-                                seed);
-  agents::AgentFile file = agents::agent_file_of(agent, seed);
-  file.settings["observation"] = {
-      {"low", {-core::kPi, -core::kPi, -kSpeed, -kSpeed}},
-      {"high", {core::kPi, core::kPi, kSpeed, kSpeed}},
-      {"inputs", {{{"circular", 0}}, {{"circular", 1}}, {{"variable", 2}}, {{"variable", 3}}}}};
-  file.settings["action"] = {
-      {"kind", "box"}, {"low", {-max_torque}}, {"high", {max_torque}}, {"shape", {1}}};
-  return agents::Controller(file);
+  const auto preset = agents::robust_preset(4);
+  return agents::Controller({.approximator = preset.approximator,
+                             .learning = preset.learning,
+                             .seed = seed,
+                             .observation = {.low = {-core::kPi, -core::kPi, -kSpeed, -kSpeed},
+                                             .high = {core::kPi, core::kPi, kSpeed, kSpeed},
+                                             .angles = {0, 1}},
+                             .action = {.low = {-max_torque}, .high = {max_torque}}});
 }
 
 struct Outcome {
@@ -85,15 +81,15 @@ int main(int argc, char** argv) try {
   const double rate = argc > 4 ? std::stod(argv[4]) : 0.0;
 
   environments::Acrobot acrobot;
-  sdnn::agents::Controller learner = new_controller(acrobot.config().max_torque, seed);
+  agents::AgentFile file(new_controller(acrobot.config().max_torque, seed));
   const environments::GoalSchedule lambda;
   for (int episode = 1; episode <= n_episodes; ++episode) {
-    run_episode(learner, acrobot, lambda(episode), true, 0.0);
+    run_episode(file.controller, acrobot, lambda(episode), true, 0.0);
   }
-  learner.write(path);
+  file.write(path);
 
-  sdnn::agents::Controller controller(path);
-  const Outcome test = run_episode(controller, acrobot, lambda(n_episodes), false, rate);
+  agents::AgentFile again(path);
+  const Outcome test = run_episode(again.controller, acrobot, lambda(n_episodes), false, rate);
   std::printf("%d %s %lld\n", test.n_decisions, test.solved ? "solved" : "-",
               static_cast<long long>(test.n_late));
 } catch (const std::exception& error) {

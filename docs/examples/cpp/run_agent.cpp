@@ -4,19 +4,21 @@
 // an observation, its numbers parted by blanks; each line of the output is the best action for it.
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <sstream>
 #include <string>
 #include <vector>
 
-#include "sdnn/agents/controller.hpp"
+#include "sdnn/agents/agent_file.hpp"
 
 int main(int argc, char** argv) try {
   if (argc != 2) {
     std::fprintf(stderr, "usage: run_agent FILE < observations\n");
     return 2;
   }
-  sdnn::agents::Controller controller(argv[1]);
+  sdnn::agents::AgentFile file(std::filesystem::path{argv[1]});
+  sdnn::agents::Controller& controller = file.controller;
   controller.begin_episode();
   for (std::string line; std::getline(std::cin, line);) {
     std::istringstream numbers(line);

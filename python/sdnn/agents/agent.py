@@ -1,9 +1,8 @@
-"""What all agents have in common: observations in, actions out, whatever the spaces are."""
+"""What all agents have in common: Gymnasium's spaces around the core's controller."""
 
 from __future__ import annotations
 
 import abc
-import copy
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -13,14 +12,14 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn import _core
 from sdnn.agents.actions import Actions
-from sdnn.agents.files import completed, read_agent, register
-from sdnn.agents.observations import AnglePairs, Ranges, UnitObservations, without_repeats
+from sdnn.agents.files import read_agent, register
+from sdnn.agents.observations import AnglePairs, Observations, Ranges
 from sdnn.agents.scaling import Scaling
-from sdnn.agents.spaces import space_data, space_of
+from sdnn.agents.spaces import action_space_of, observation_space_of, space_data, space_of
 from sdnn.agents.training import Training, TrainingResult
 from sdnn.agents.transition import Transition, reward_of
-from sdnn.agents.warm_up import MOST_ENVIRONMENTS, WarmUp
 from sdnn.arguments import flag, path_of, real, seed_of, whole
 from sdnn.files import Arrays, Description, write_file
 
@@ -29,16 +28,11 @@ if TYPE_CHECKING:
 
     from sdnn.agents.callbacks import Callback
 
-__all__ = ["Agent", "check_shape", "load_agent"]
+__all__ = ["Agent", "load_agent"]
 
-_LARGEST_REWARD = 1e300
-
-# Beginnings of the names of arrays that are saved.
-_CORE = "agent."
-_WARM_UP = "warm_up."
-_TABLE = "table."
-_RATE = "rate."
-_TAKEN = "taken."
+_MOST_ENVIRONMENTS = 2**14
+_OF_TRAINING = "training."
+"""Arrays in an agent's file that are not the agent's."""
 
 Approximator = TypeVar("Approximator")
 Learning = TypeVar("Learning")
@@ -92,28 +86,19 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     seed : int
     """
 
-    learns_any_transition: ClassVar[bool] = True
-    """Whether transitions can be learned that do not begin with the last exploring `act`."""
-
-    least_inputs: ClassVar[int] = 1
-    """Inputs that its approximator needs."""
-
-    codes_symbols: ClassVar[bool] = False
-    """Whether a Discrete of the observations is one input of the approximator."""
+    kind: ClassVar[str]
+    """What files call agents with this approximator and learning rule, of whatever class."""
 
     approximator_type: ClassVar[type[Any]]
     learning_type: ClassVar[type[Any]]
     """Of the settings."""
 
-    approximator: Approximator
     learning: Learning
-    _actions: Actions
+    _approximator: Approximator
+    _controller: _core.Controller
     _scaling: Scaling | None = None
     _next_episode: int = 0
     """Of a `train` without a seed of its own."""
-    _tables: list[NDArray[np.int8]] | None = None
-    _rates: dict[str, float]
-    """That were set during the warm-up: by name."""
 
     def __init__(
         self,
@@ -127,7 +112,25 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         angles: Sequence[int] = (),
         angle_pairs: AnglePairs = "none",
         warm_up_steps: int = 1000,
+        tables: Sequence[NDArray[np.int8]] = (),
     ) -> None:
+        self._take_spaces(observation_space, action_space)
+        try:
+            space_data(observation_space)  # what could not be saved had better not be learned
+        except TypeError as error:
+            raise TypeError(f"observation_space {error}") from None
+        self._take_settings(approximator, learning, seed, warm_up_steps)
+        self._observation = self._observations.config(observation_range, angles, angle_pairs)
+        self._action = self._actions.config
+        self._make(tables=list(tables))
+
+    def _take_spaces(self, observations: gym.Space[Any], actions: gym.Space[Any]) -> None:
+        self.observation_space = observations
+        self.action_space = actions
+        self._observations = Observations(observations)
+        self._actions = Actions(actions)
+
+    def _take_settings(self, approximator: Any, learning: Any, seed: Any, steps: Any) -> None:
         settings: tuple[tuple[str, Any, type[Any]], ...] = (
             ("approximator", approximator, self.approximator_type),
             ("learning", learning, self.learning_type),
@@ -135,114 +138,50 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         for name, part, kind in settings:
             if not isinstance(part, kind):
                 raise TypeError(f"{name} must be a {kind.__name__}, got {part!r}")
-        self.observation_space = observation_space
-        self.action_space = action_space
-        self.approximator = approximator
-        self.learning = learning
+        self._approximator, self.learning = approximator, learning
         self.seed = seed_of(seed)
-        self._warm_up_steps = whole("warm_up_steps", warm_up_steps, 2, 10**7)
-        self._observations = UnitObservations(
-            observation_space,
-            ranges=observation_range,
-            angles=angles,
-            angle_pairs=angle_pairs,
-            symbols=self.codes_symbols,
-            least_inputs=self.least_inputs,
-        )
+        self._warm_up_steps = whole("warm_up_steps", steps, 2, 10**7)
+
+    def _make(self, **made_of: Any) -> None:
+        """Make the core's controller; an error about sizes says which space they follow from."""
+        approximator: Any = self._approximator
+        learning: Any = self.learning
         try:
-            space_data(observation_space)  # what could not be saved had better not be learned
-        except TypeError as error:
-            raise TypeError(f"observation_space {error}") from None
-        self._actions = self._make_actions(action_space)
-        self._progress = 0.0
-        self._rates = {}
-        self._compiled: Any = None
-        self._warm_up: WarmUp | None = None
-        if self._observations.is_settled:
-            self._compiled = self._checked()
-        else:
-            self._check_settings()
-            self._warm_up = self._new_warm_up()
-
-    def _new_warm_up(self) -> WarmUp:
-        return WarmUp(
-            self._observations.n_variables,
-            self._actions.n_dimensions,
-            self._warm_up_steps,
-            self.seed,
-            learns_any_transition=self.learns_any_transition,
-        )
-
-    # What the kinds of agents differ in.
-
-    @abc.abstractmethod
-    def _make_actions(self, space: gym.Space[Any]) -> Actions:
-        """Make the conversion of actions; ``approximator`` is known."""
-
-    @abc.abstractmethod
-    def _make(self) -> Any:
-        """Make the compiled agent; the observations are settled. Fills in ``approximator``."""
-
-    def _remember_actions(self, taken: Mapping[str, NDArray[Any]]) -> None:
-        """Take up the actions that the restored agent took last, where it must know them.
-
-        ``taken`` has those that only the agent's file knows, by the environments' numbers.
-        """
-
-    def _check_settings(self) -> None:
-        """Find impossible ones before the warm-up: make an agent for as many variables."""
-        trial = object.__new__(type(self))
-        trial.__dict__.update(self.__dict__)
-        trial._observations = copy.deepcopy(self._observations)
-        trial._observations.settle(np.zeros((1, trial._observations.n_variables)))
-        trial._checked()
-
-    def _core_approximator(self) -> Any:
-        """Give the core's settings of one dimension, of the memory's limit its share."""
-        settings: Any = self.approximator
-        n_dimensions = self._actions.n_dimensions
-        if n_dimensions == 1:
-            return settings
-        share = settings.max_table_bytes // n_dimensions
-        return settings.replace(max_table_bytes=share)
-
-    def _checked(self) -> Any:
-        """Make the compiled agent; an error about sizes says which space they follow from."""
-        try:
-            return self._make()
+            self._controller = _core.Controller(
+                approximator=approximator,
+                learning=learning,
+                seed=self.seed,
+                observation=_core.ObservationConfig(**self._observation),
+                action=_core.ActionConfig(**self._action),
+                warm_up_steps=self._warm_up_steps,
+                **made_of,
+            )
         except ValueError as error:
             reasons = {"n_inputs": "n_inputs follows from observation_space"}
             if not self._actions.is_box:
                 reasons["n_actions"] = "n_actions follows from action_space"
-            if self._actions.n_dimensions > 1:
+            if len(self._action["low"]) > 1:
                 reasons["max_table_bytes"] = "for each dimension of action_space"
             found = [reason for word, reason in reasons.items() if word in str(error)]
+            if str(error).startswith(("action.", "low ", "high ")):
+                found = [
+                    "of action_space; where a Box has no finite bounds, gymnasium's RescaleAction"
+                    " or ClipAction gives it some"
+                ]
             if not found:
                 raise
             raise ValueError(f"{error} ({', '.join(found)})") from error
 
-    @abc.abstractmethod
-    def _act(self, state: NDArray[np.float64], explore: bool, environment: int) -> list[Any]:
-        """Choose the numbers of an action."""
-
-    @abc.abstractmethod
-    def _learn(
-        self,
-        state: NDArray[np.float64],
-        numbers: list[Any],
-        reward: float,
-        following: NDArray[np.float64],
-        terminated: bool,
-        environment: int,
-    ) -> None:
-        """Learn a transition."""
-
-    # What users call.
+    @property
+    def approximator(self) -> Approximator:
+        """Settings as used; sizes that follow from the spaces are known after the warm-up."""
+        used: Any = self._controller.approximator
+        return used  # type: ignore[no-any-return]
 
     @property
     def is_warming_up(self) -> bool:
         """Whether the agent still acts at random to see the ranges of its observations."""
-        return self._warm_up is not None
+        return self._controller.is_warming_up
 
     @property
     def observation_range(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -253,8 +192,17 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         RuntimeError
             If the warm-up has not found them yet.
         """
-        self._born()
-        return self._observations.low.copy(), self._observations.high.copy()
+        self._require_warm()
+        return self._controller.ranges
+
+    @property
+    def inputs(self) -> list[tuple[str, list[int]]]:
+        """What the inputs of a state are made of: kinds, and numbers of observed variables.
+
+        ``("variable", [i])``, ``("circular", [i])``, ``("angle", [cosine, sine])`` or
+        ``("symbol", [first, n])``. Empty until a warm-up is over.
+        """
+        return self._controller.inputs
 
     @property
     def scaling(self) -> Scaling | None:
@@ -282,20 +230,11 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
         Settings such as ``final_epsilon`` follow it; ``train`` sets it.
         """
-        # Where an agent that is compiled knows it, a file may have come from C++.
-        return float(getattr(self._compiled, "progress", self._progress))
+        return self._controller.progress
 
     @progress.setter
     def progress(self, progress: float) -> None:
-        value = real("progress", progress)
-        if not 0.0 <= value <= 1.0:
-            raise ValueError(f"progress must be in [0, 1], got {progress!r}")
-        self._progress = value
-        self._apply_progress()
-
-    def _apply_progress(self) -> None:
-        if hasattr(self._compiled, "set_progress"):
-            self._compiled.set_progress(self._progress)
+        self._controller.progress = real("progress", progress)
 
     @property
     def n_environments(self) -> int:
@@ -305,18 +244,11 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         steps counted, the random action that is kept. All else is shared. Where there are fewer
         than before, what waits in the others is learned. `train` sets it.
         """
-        one: Any = self._warm_up or self._compiled
-        n: int = one.n_environments
-        return n
+        return self._controller.n_environments
 
     @n_environments.setter
     def n_environments(self, n: int) -> None:
-        number = whole("n_environments", n, 1, MOST_ENVIRONMENTS)
-        if self._warm_up is not None:
-            self._warm_up.n_environments = number
-        else:
-            self._compiled.set_n_environments(number)
-        self._actions.forget(number)
+        self._controller.n_environments = whole("n_environments", n, 1, _MOST_ENVIRONMENTS)
 
     def _check_environment(self, environment: int) -> None:
         if type(environment) is int and environment == 0:  # most agents have no other
@@ -334,10 +266,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             If there is no such environment.
         """
         self._check_environment(environment)
-        if self._warm_up is not None:
-            self._warm_up.begin_episode(environment)
-        else:
-            self._compiled.begin_episode(environment)
+        self._controller.begin_episode(environment)
 
     def act(self, observation: Any, explore: bool = True, environment: int = 0) -> Any:
         """Choose the action to take, an element of the action space.
@@ -360,14 +289,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         if explore is not True and explore is not False:
             explore = flag("explore", explore)
         self._check_environment(environment)
-        if self._warm_up is not None:
-            self._observations.flat("observation", observation)
-            numbers = self._warm_up.act(self._actions.random, explore, environment)
-            return self._actions.element(numbers)
-        numbers = self._act(self._observations("observation", observation), explore, environment)
-        return (
-            self._actions.take(numbers, environment) if explore else self._actions.element(numbers)
-        )
+        variables = self._observations.vector("observation", observation)
+        return self._actions.element(self._controller.act(variables, explore, environment))
 
     def flat_observation(self, observation: Any) -> NDArray[np.float64]:
         """Give the observed variables as a vector, shape (n_variables,), in their own units.
@@ -377,7 +300,10 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         ValueError
             If the observation has another shape or holds NaN.
         """
-        return self._observations.flat("observation", observation)
+        vector = self._observations.vector("observation", observation)
+        if np.isnan(vector).any():
+            raise ValueError(f"observation must not hold NaN, got {vector}")
+        return vector.astype(np.float64).reshape(-1)
 
     def learn(self, transition: Transition, environment: int = 0) -> None:
         """Learn one transition.
@@ -401,70 +327,38 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         self._check_environment(environment)
         if not isinstance(transition, Transition):
             raise TypeError(f"transition must be a Transition, got {transition!r}")
-        reward, terminated = transition.reward, transition.terminated
+        observation, action, reward, next_observation, terminated = transition
         if type(reward) is not float:
             reward = reward_of(reward)
         if terminated is not True and terminated is not False:
             terminated = flag("terminated", terminated)
-        if self._warm_up is None:
-            self._learn(
-                self._observations("observation", transition.observation),
-                self._actions.numbers(transition.action, environment),
-                reward,
-                self._observations("next_observation", transition.next_observation),
-                terminated,
-                environment,
-            )
-            return
-        observation = self._observations.flat("observation", transition.observation)
-        following = self._observations.flat("next_observation", transition.next_observation)
-        if not abs(reward) <= _LARGEST_REWARD:
-            raise ValueError(f"reward must be finite and within 1e300, got {reward}")
-        values = self._actions.vector(transition.action)
-        self._warm_up.learn(observation, values, reward, following, terminated, environment)
-        if self._warm_up.is_over:
-            self._end_warm_up(self._warm_up)
+        self._controller.learn(
+            self._observations.vector("observation", observation),
+            self._actions.numbers(action),
+            reward,
+            self._observations.vector("next_observation", next_observation),
+            terminated,
+            environment,
+        )
 
-    def _end_warm_up(self, warm_up: WarmUp) -> None:
-        self._observations.settle(warm_up.observations())
-        self._compiled = self._make()
-        self._apply_progress()
-        self._warm_up = None
-        self._rates = {}
-        self.n_environments = warm_up.n_in_all
-        if self.learns_any_transition:
-            for begins, environment, step in warm_up.transitions():
-                observation, action, reward, following, terminated = step
-                if begins:
-                    self.begin_episode(environment)
-                self._learn(
-                    self._observations.unit(observation),
-                    self._actions.numbers(action, environment),
-                    reward,
-                    self._observations.unit(following),
-                    terminated,
-                    environment,
-                )
-        else:
-            for environment in range(self.n_environments):
-                self.begin_episode(environment)
-        self.n_environments = warm_up.n_environments
+    @property
+    @abc.abstractmethod
+    def core(self) -> Any:
+        """The compiled agent, which shares all that is learned: states are in [0, 1]."""
 
-    def _born(self) -> Any:
-        """Give the compiled agent; RuntimeError while there is none."""
-        if self._warm_up is not None:
+    def _require_warm(self) -> _core.Controller:
+        """Return the controller; RuntimeError while it is warming up."""
+        if self.is_warming_up:
             raise RuntimeError(
                 "the agent is still warming up: it knows no ranges of its observations until it has"
                 f" learned {self._warm_up_steps} transitions, or is given observation_range"
             )
-        return self._compiled
+        return self._controller
 
-    def _state(self, name: str, observation: Any) -> NDArray[np.float64]:
-        """Convert an observation for the compiled agents."""
-        self._born()
-        return self._observations(name, observation)
-
-    # Loops.
+    def _state(self, observation: Any) -> NDArray[np.float64]:
+        """Return the compiled agent's state for an observation."""
+        controller = self._require_warm()
+        return controller.state_of(self._observations.vector("observation", observation))
 
     def train(
         self,
@@ -521,8 +415,6 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             if seed is None:
                 self._next_episode = training.next_episode
 
-    # Files.
-
     def save(self, path: str | Path) -> None:
         """Write the agent, with all that it needs to go on exactly as it would have.
 
@@ -544,7 +436,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         OSError
             If the file cannot be read.
         ValueError
-            If it is damaged, from a newer version, or holds another kind of agent.
+            If it is damaged, from another version of the format, or holds another kind of agent.
         """
         agent = load_agent(path)
         if not isinstance(agent, cls):
@@ -552,55 +444,33 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         return agent
 
     def description(self) -> Description:
-        """Say all that is needed to make an agent like this one, as data that JSON can hold.
+        """Return the settings, of which `rebuild` makes an agent like this one.
 
         Raises
         ------
         TypeError
             If a space cannot be written down.
         """
-        actions = self._actions
-        if actions.is_box:
-            shape = list(self.action_space.shape or ())
-            ends = {"low": actions.low.tolist(), "high": actions.high.tolist()}
-            action = {"kind": "box", **ends, "shape": shape}
-            if actions.is_whole:
-                action["whole"] = True
-        else:
-            action = {"kind": "discrete", "start": actions.start.tolist()}
-        observations = self._observations
         more: Description = {} if self.scaling is None else {"scaling": self.scaling.values()}
         if self._next_episode:
             more["next_episode"] = self._next_episode
         return {
             "class": type(self).__name__,
+            "kind": self.kind,
             "seed": self.seed,
-            "progress": self.progress,
-            "approximator": dataclasses.asdict(self.approximator),  # type: ignore[call-overload]
+            "approximator": dataclasses.asdict(self._approximator),  # type: ignore[call-overload]
             "learning": dataclasses.asdict(self.learning),  # type: ignore[call-overload]
+            "observation": self._observation,
+            "action": self._action,
+            "warm_up_steps": self._warm_up_steps,
             "observation_space": space_data(self.observation_space),
             "action_space": space_data(self.action_space),
-            "n_actions": list(getattr(actions, "n_actions", [])),
-            "action": action,
-            "warm_up_steps": self._warm_up_steps,
-            "asked": observations.asked(),
-            "observation": observations.description() if observations.is_settled else None,
-            "n_tables": len(self._tables or ()),
             **more,
         }
 
     def state(self) -> Arrays:
-        """Give all that the agent remembers, as arrays by name; with `description` all of it."""
-        arrays: Arrays = {}
-        if self._compiled is not None:
-            arrays |= {_CORE + name: array for name, array in self._compiled.state().items()}
-        if self._warm_up is not None:
-            arrays |= {_WARM_UP + name: array for name, array in self._warm_up.state().items()}
-            arrays |= {_RATE + name: np.array(value) for name, value in self._rates.items()}
-        unclear = self._actions.unclear().items()
-        arrays |= {f"{_TAKEN}{i}": np.array(numbers, np.uint64) for i, numbers in unclear}
-        arrays |= {f"{_TABLE}{i}": table for i, table in enumerate(self._tables or ())}
-        return arrays
+        """Return all that the agent remembers, as arrays by name."""
+        return self._controller.state()
 
     @classmethod
     def rebuild(cls, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Self:
@@ -611,78 +481,41 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         ValueError
             If they do not fit; before much memory is asked for.
         """
-
-        def part(prefix: str) -> Arrays:
-            return {n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)}
-
-        description = completed(description)
         agent = cls.__new__(cls)
+        agent._observation, agent._action = description["observation"], description["action"]
+        if "observation_space" in description:
+            spaces = (space_of(description[f"{name}_space"]) for name in ("observation", "action"))
+        else:  # it was made in C++
+            spaces = (observation_space_of(agent._observation), action_space_of(agent._action))
+        agent._take_spaces(*spaces)
         approximator = dict(description["approximator"])
         for name in {"circular", "n_symbols"} & approximator.keys():
             approximator[name] = tuple(approximator[name])
-        agent.approximator = cls.approximator_type(**approximator)
-        agent.learning = cls.learning_type(**description["learning"])
-        if description["n_tables"]:
-            agent._tables = [arrays[f"{_TABLE}{i}"] for i in range(description["n_tables"])]
-        agent.observation_space = space_of(description["observation_space"])
-        agent.action_space = space_of(description["action_space"])
-        agent.seed = seed_of(description["seed"])
-        agent._warm_up_steps = whole("warm_up_steps", description["warm_up_steps"], 2, 10**7)
-        asked = description["asked"]
-        low, high = ([np.nan if x is None else x for x in asked[end]] for end in ("low", "high"))
-        pairs: Any = asked["angle_pairs"]
-        agent._observations = UnitObservations(
-            agent.observation_space,
-            ranges="seen" if asked.get("sees_ranges") else (low, high),
-            angles=without_repeats(asked["angles"]),  # files of loaded agents had some
-            angle_pairs=pairs if pairs == "find" else without_repeats(pairs),
-            symbols=bool(asked.get("symbols", False)),
-            least_inputs=cls.least_inputs,
+        agent._take_settings(
+            cls.approximator_type(**approximator),
+            cls.learning_type(**description["learning"]),
+            description["seed"],
+            description["warm_up_steps"],
         )
+        own = {name: a for name, a in arrays.items() if not name.startswith(_OF_TRAINING)}
+        agent._make(state=own)
+        n_variables = agent._observations.n_variables
+        if agent._controller.n_variables != n_variables:
+            raise ValueError(f"observation must be of {n_variables} variables")
+        if "action_space" in description and agent._action != agent._actions.config:
+            raise ValueError(f"action must be of {agent.action_space}, got {agent._action}")
         if "scaling" in description:
-            n_variables = agent._observations.n_variables
             agent.scaling = Scaling.of_values(description["scaling"], n_variables)
         agent._next_episode = whole("next_episode", description.get("next_episode", 0), 0, 2**53)
-        agent._actions = agent._make_actions(agent.action_space)
-        agent._compiled, agent._warm_up, agent._rates = None, None, {}
-        agent.progress = float(description["progress"])
-        if description["observation"] is None:
-            agent._warm_up = agent._new_warm_up()
-            agent._warm_up.restore(part(_WARM_UP), agent._actions.check)
-            for name in ("learning_rate", "epsilon"):
-                if _RATE + name in arrays:
-                    setattr(agent, name, float(arrays[_RATE + name]))
-        else:
-            agent._observations.settled_as(description["observation"])
-            agent._check_state(part(_CORE))
-            agent._compiled = agent._make()
-            agent._compiled.restore(part(_CORE))
-            agent._remember_actions(part(_TAKEN))
         return agent
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Make the kind known to files, by its name."""
+        """Make the class known to files, by its name."""
         super().__init_subclass__(**kwargs)
         register(cls)
 
-    @abc.abstractmethod
-    def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Compare sizes with the settings before memory is asked for; ValueError."""
-
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
         return type(self).rebuild, (self.description(), self.state())
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        copied = self.rebuild(self.description(), self.state())
-        memo[id(self)] = copied
-        return copied
-
-
-def check_shape(state: Mapping[str, NDArray[Any]], name: str, shape: tuple[int, ...]) -> None:
-    """Compare the shape of an array with what settings make of it; ValueError."""
-    if name not in state or state[name].shape != shape:
-        came = state[name].shape if name in state else "none"
-        raise ValueError(f"{name} must have shape {shape}, got {came}")
 
 
 def load_agent(path: str | Path) -> Agent[Any, Any]:

@@ -1,14 +1,13 @@
-"""Agents of any class in files: which class rebuilds one, and what C++ leaves out."""
+"""Agents of any class in files: which class rebuilds one."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from sdnn.files import Arrays, Description, read_file
 
-__all__ = ["completed", "read_agent", "register"]
+__all__ = ["read_agent", "register"]
 
 _CLASSES: dict[str, type[Any]] = {}
 
@@ -52,41 +51,3 @@ def read_agent(path: Path, *kinds: str) -> tuple[Any, Description, Arrays]:
         return _CLASSES[str(name)].rebuild(description, arrays), description, arrays
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is damaged: {error}") from error
-
-
-def completed(description: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Add to a description that was begun in C++ what C++ does not ask for: spaces, mostly.
-
-    Observations are of real numbers, and an action is a Box or a button or several.
-    """
-    if "observation_space" in description:
-        return description
-    observation, action = description["observation"], description["action"]
-    ends = [observation["low"], observation["high"]]
-    space = {"box": ends, "shape": [len(ends[0])], "dtype": "<f8"}
-    if action["kind"] == "box":
-        box = [action["low"], action["high"]]
-        shape = action.get("shape", [len(box[0])])
-        actions = {"box": box, "shape": shape, "dtype": "<i8" if action.get("whole") else "<f8"}
-    elif len(action["start"]) == 1:
-        actions = {"discrete": description["n_actions"][0], "start": int(action["start"][0])}
-    else:
-        start = [int(first) for first in action["start"]]
-        actions = {"multi_discrete": description["n_actions"], "start": start, "dtype": "<i8"}
-    inputs = observation["inputs"]
-    asked = {
-        "angles": [one["circular"] for one in inputs if "circular" in one],
-        "angle_pairs": [one["angle"] for one in inputs if "angle" in one],
-        "symbols": False,
-        "low": observation["low"],
-        "high": observation["high"],
-    }
-    return {
-        "progress": 0.0,
-        "warm_up_steps": 1000,
-        "n_tables": 0,
-        **description,
-        "observation_space": space,
-        "action_space": actions,
-        "asked": asked,
-    }

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sdnn import _core
-from sdnn.agents.actions import Actions, ContinuousActions
-from sdnn.agents.agent import Agent, check_shape
+from sdnn.agents.agent import Agent
 from sdnn.agents.observations import AnglePairs, Ranges
 from sdnn.arguments import whole
 from sdnn.config import FuzzyQLearningConfig, FuzzyRulesConfig
@@ -75,9 +73,9 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     6561
     """
 
+    kind = "fuzzy"
     approximator_type = FuzzyRulesConfig
     learning_type = FuzzyQLearningConfig
-    learns_any_transition = False
 
     def __init__(
         self,
@@ -92,6 +90,8 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
         angle_pairs: AnglePairs = "none",
         warm_up_steps: int = 1000,
     ) -> None:
+        if not isinstance(action_space, gym.spaces.Box):
+            raise TypeError(f"action_space must be a Box, got {type(action_space).__name__}")
         super().__init__(
             observation_space,
             action_space,
@@ -104,62 +104,6 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
             warm_up_steps=warm_up_steps,
         )
 
-    def _make_actions(self, space: gym.Space[Any]) -> Actions:
-        return ContinuousActions(space)
-
-    def _make(self) -> Any:
-        self.approximator = self.approximator.replace(n_inputs=self._observations.n_inputs)
-        approximator, learning = self._core_approximator(), self.learning
-        if self._is_scalar:
-            return _core.FuzzyQLearning(
-                approximator=approximator, learning=learning, seed=self.seed
-            )
-        return _core.VectorFuzzyQLearning(
-            approximator=approximator,
-            n_dimensions=self._actions.n_dimensions,
-            learning=learning,
-            seed=self.seed,
-        )
-
-    @property
-    def _is_scalar(self) -> bool:
-        return self._actions.n_dimensions == 1
-
-    def _remember_actions(self, taken: Mapping[str, NDArray[Any]]) -> None:
-        for environment in range(self.n_environments):
-            last = self._compiled.last_action(environment)
-            self._actions.take([last] if self._is_scalar else last, environment)
-
-    def _act(self, state: NDArray[np.float64], explore: bool, environment: int) -> list[Any]:
-        chosen: Any = self._compiled.act(state, explore, environment)
-        return [chosen] if self._is_scalar else chosen
-
-    def _learn(
-        self,
-        state: NDArray[np.float64],
-        numbers: list[Any],
-        reward: float,
-        following: NDArray[np.float64],
-        terminated: bool,
-        environment: int,
-    ) -> None:
-        action = numbers[0] if self._is_scalar else numbers
-        try:
-            self._compiled.learn(state, action, reward, following, terminated, environment)
-        except ValueError as error:
-            if "exploring act" not in str(error):
-                raise
-            raise ValueError(
-                f"observation and action must be those of the last exploring act: {error}"
-            ) from error
-
-    def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
-        sizes = self.approximator
-        shape = (sizes.n_sets**self._observations.n_inputs, sizes.n_actions)
-        n = self._actions.n_dimensions
-        for prefix in [""] if n == 1 else [f"{dimension}." for dimension in range(n)]:
-            check_shape(state, f"{prefix}rules.values", shape)
-
     @property
     def core(self) -> Any:
         """The compiled agent, which shares all that is learned: states [0, 1], actions [-1, 1].
@@ -171,8 +115,8 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
         RuntimeError
             While the agent is warming up.
         """
-        compiled = self._born()
-        return compiled if self._is_scalar else compiled.part(0)
+        agent: Any = self._require_warm().agent
+        return agent.part(0) if len(self._action["low"]) > 1 else agent
 
     @property
     def n_rules(self) -> int:
@@ -185,8 +129,8 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
 
         The mean over the dimensions, where there are several.
         """
-        state = self._state("observation", observation)
-        return float(self._compiled.value(state))
+        state = self._state(observation)
+        return float(self._controller.agent.value(state))
 
     def rule_values(self, rule: int) -> NDArray[np.float32]:
         """v(rule, a) of every discrete action, shape (n_actions,); of the first dimension."""

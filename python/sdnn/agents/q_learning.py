@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import abc
-import math
-from collections.abc import Mapping, Sequence
-from typing import Any, Generic, TypeAlias, TypeVar
+from collections.abc import Sequence
+from typing import Any, Generic, TypeVar
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sdnn import _core
-from sdnn.agents.actions import Actions, IndexedActions
-from sdnn.agents.agent import Agent, check_shape
+from sdnn.agents.agent import Agent
 from sdnn.agents.observations import AnglePairs, Ranges
 from sdnn.agents.presets import PRESETS
 from sdnn.approximators.sdnn_c import pattern_tables
@@ -22,16 +19,6 @@ from sdnn.config import QLearningConfig, RBFNetworkConfig, SDNNCConfig
 
 __all__ = ["RBFQLearning", "SDNNQLearning"]
 
-_MOST_CODE_BYTES = 2**30
-"""Of an agent in a file, whose weights may be few."""
-
-
-CoreAgent: TypeAlias = _core.SDNNQLearning | _core.RBFQLearning
-"""The agents of the C++ core whose actions have one dimension."""
-
-CoreVectorAgent: TypeAlias = _core.DecoupledSDNNQLearning | _core.DecoupledRBFQLearning
-"""Those whose actions have several."""
-
 Approximator = TypeVar("Approximator", SDNNCConfig, RBFNetworkConfig)
 
 
@@ -39,49 +26,6 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
     """What Q-learning with any approximator has in common: spaces in, spaces out."""
 
     learning_type = QLearningConfig
-    _actions: IndexedActions
-
-    def _make_actions(self, space: gym.Space[Any]) -> Actions:
-        return IndexedActions(space, self._n_actions_of_a_box())
-
-    def _n_actions_of_a_box(self) -> int:
-        return self.approximator.n_actions
-
-    def _make(self) -> Any:
-        n_actions = self._actions.n_actions
-        sizes: dict[str, Any] = {"n_inputs": self._observations.n_inputs}
-        if len(n_actions) == 1 and not self._actions.is_box:
-            sizes["n_actions"] = n_actions[0]
-        self.approximator = self.approximator.replace(**sizes)
-        core = self._make_core()
-        for name, value in self._rates.items():
-            getattr(core, f"set_{name}")(value)
-        return core
-
-    @abc.abstractmethod
-    def _make_core(self) -> CoreAgent | CoreVectorAgent:
-        """Make the compiled agent; the approximator's sizes are known."""
-
-    def _remember_actions(self, taken: Mapping[str, NDArray[Any]]) -> None:
-        for environment in range(self.n_environments):
-            if str(environment) in taken:
-                self._actions.remember(environment, taken[str(environment)])
-
-    def _act(self, state: NDArray[np.float64], explore: bool, environment: int) -> list[Any]:
-        chosen = self._compiled.act(state, explore, environment)
-        return chosen if self._actions.n_dimensions > 1 else [chosen]
-
-    def _learn(
-        self,
-        state: NDArray[np.float64],
-        numbers: list[Any],
-        reward: float,
-        following: NDArray[np.float64],
-        terminated: bool,
-        environment: int,
-    ) -> None:
-        action = numbers if self._actions.n_dimensions > 1 else numbers[0]
-        self._compiled.learn(state, action, reward, following, terminated, environment)
 
     @property
     def learning_rate(self) -> float:
@@ -95,38 +39,24 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
         ValueError
             If it is set to anything else.
         """
-        return self._rate("learning_rate")
+        return self._controller.learning_rate
 
     @learning_rate.setter
     def learning_rate(self, rate: float | None) -> None:
         if rate is not None and not 0.0 < real("learning_rate", rate) <= 1.0:
             raise ValueError(f"learning_rate must be in (0, 1], or None, got {rate!r}")
-        self._set_rate("learning_rate", rate)
+        self._controller.learning_rate = rate
 
     @property
     def epsilon(self) -> float:
         """The probability of a random action as it is now; may be set, like `learning_rate`."""
-        return self._rate("epsilon")
+        return self._controller.epsilon
 
     @epsilon.setter
     def epsilon(self, epsilon: float | None) -> None:
         if epsilon is not None and not 0.0 <= real("epsilon", epsilon) <= 1.0:
             raise ValueError(f"epsilon must be in [0, 1], or None, got {epsilon!r}")
-        self._set_rate("epsilon", epsilon)
-
-    def _rate(self, name: str) -> float:
-        if self._compiled is not None:
-            return float(getattr(self._compiled, name))
-        at_progress: float = getattr(self.learning, f"{name}_at")(self.progress)
-        return self._rates.get(name, at_progress)
-
-    def _set_rate(self, name: str, value: float | None) -> None:
-        if self._compiled is not None:
-            getattr(self._compiled, f"set_{name}")(value)
-        elif value is None:
-            self._rates.pop(name, None)
-        else:
-            self._rates[name] = float(value)
+        self._controller.epsilon = epsilon
 
     @property
     def core(self) -> Any:
@@ -140,18 +70,18 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
         RuntimeError
             While the agent is warming up.
         """
-        return self._born()
+        return self._require_warm().agent
 
     @property
     def n_dimensions(self) -> int:
         """Dimensions of an action."""
-        return self._actions.n_dimensions
+        return len(self._action["low"])
 
     @property
     def n_actions(self) -> int | list[int]:
         """Number of actions the agent chooses from, of each dimension where there are several."""
-        n_actions = self._actions.n_actions
-        return n_actions[0] if len(n_actions) == 1 else list(n_actions)
+        n_actions = self._controller.n_actions
+        return n_actions[0] if len(n_actions) == 1 else n_actions
 
     @property
     def actions(self) -> NDArray[Any]:
@@ -159,11 +89,13 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
 
         Those of the first dimension, where there are several: see `actions_of`.
         """
-        return self._actions.values(0)
+        return self.actions_of(0)
 
     def actions_of(self, dimension: int) -> NDArray[Any]:
         """Give the actions of a dimension in order, shape (n_actions[dimension],)."""
-        return self._actions.values(self._dimension(dimension))
+        n = self._controller.n_actions[self._dimension(dimension)]
+        values = [self._controller.action_of(index, dimension) for index in range(n)]
+        return np.array(values, np.float64 if self._actions.is_box else np.int64)
 
     def q_values(self, observation: ArrayLike, dimension: int = 0) -> NDArray[np.float64]:
         """Q(observation, a) of every action of a dimension, shape (n_actions[dimension],).
@@ -178,8 +110,8 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
         ValueError
             If the observation is not usable, or there is no such dimension.
         """
-        state = self._state("observation", observation)
-        values: NDArray[np.float64] = self._born().q_values(state, self._dimension(dimension))
+        state = self._state(observation)
+        values: NDArray[np.float64] = self.core.q_values(state, self._dimension(dimension))
         return values
 
     def _dimension(self, dimension: int) -> int:
@@ -190,12 +122,6 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
         return (
             self.core.action_value if self.n_dimensions == 1 else self.core.action_value(dimension)
         )
-
-    def _prefixes(self) -> list[str]:
-        """Names of the approximators' parts in the state, one per dimension."""
-        if self.n_dimensions == 1:
-            return ["action_value."]
-        return [f"action_value.{dimension}." for dimension in range(self.n_dimensions)]
 
 
 class SDNNQLearning(_QLearning[SDNNCConfig]):
@@ -258,9 +184,8 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
     (5,)
     """
 
+    kind = "sdnn-c"
     approximator_type = SDNNCConfig
-    least_inputs = 2
-    codes_symbols = True
 
     def __init__(
         self,
@@ -277,7 +202,6 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         angle_pairs: AnglePairs = "none",
         warm_up_steps: int = 1000,
     ) -> None:
-        self._tables = None if tables is None else pattern_tables(tables)
         chosen = choice("preset", preset, PRESETS)
         super().__init__(
             observation_space,
@@ -289,58 +213,8 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
             angles=angles,
             angle_pairs=angle_pairs,
             warm_up_steps=warm_up_steps,
+            tables=() if tables is None else pattern_tables(tables),
         )
-
-    def _n_actions_of_a_box(self) -> int:
-        sizes = self.approximator
-        return sizes.n_actions or max(sizes.n_hidden_units - sizes.n_active_units + 1, 1)
-
-    def _make_core(self) -> CoreAgent | CoreVectorAgent:
-        for name in ("circular", "n_symbols"):
-            follows = getattr(self._observations, name)
-            if any(follows) and not getattr(self.approximator, name):
-                self.approximator = self.approximator.replace(**{name: follows})
-        config, learning = self._core_approximator(), self.learning
-        if self.n_dimensions > 1:
-            if self._tables is not None:
-                raise ValueError("tables must be None where actions have several dimensions")
-            return _core.DecoupledSDNNQLearning(
-                approximator=config,
-                n_actions=self._actions.n_actions,
-                learning=learning,
-                seed=self.seed,
-            )
-        given = {} if self._tables is None else {"tables": self._tables_for_symbols()}
-        core = _core.SDNNQLearning(approximator=config, learning=learning, seed=self.seed, **given)
-        self.approximator = self.approximator.replace(n_actions=core.action_value.n_actions)
-        return core
-
-    def _tables_for_symbols(self) -> list[NDArray[np.int8]]:
-        """Compare the given tables, which the core counts, with the symbols that they stand for."""
-        tables = self._tables or []
-        for number, (table, n) in enumerate(
-            zip(tables, self._observations.n_symbols, strict=False)
-        ):
-            if n > 0 and len(table) != n:
-                raise ValueError(
-                    f"tables[{number}] must have a row for each of {n} symbols, got {len(table)}"
-                )
-        return tables
-
-    def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
-        sizes = self.approximator
-        shape = (sizes.n_hidden_units, sizes.n_pairs * sizes.n_pattern_units)
-        # Code books are in no array. Those of agents take less than their weights.
-        most_code_bytes = max(_MOST_CODE_BYTES // self.n_dimensions, 2 * math.prod(shape))
-        if self._tables is None and sizes.n_code_bytes > most_code_bytes:
-            raise ValueError(
-                "n_interpolated or n_symbols must be smaller: code books would not fit, got"
-                f" {sizes.n_code_bytes} bytes"
-            )
-        for prefix in self._prefixes():
-            check_shape(state, prefix + "weights", shape)
-            if sizes.averaging_interval > 0:
-                check_shape(state, prefix + "average.weights", shape)
 
     def learning_report(self) -> dict[str, Any]:
         """Say what became of the corrections so far, to find settings that cannot work.
@@ -366,7 +240,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
             While the agent is warming up.
         """
         networks = [self._network(dimension) for dimension in range(self.n_dimensions)]
-        use = self._observations.range_use()
+        use = self._controller.range_use()
         changed, rounded_away, out_of_range, asked = np.sum(
             [network.correction_counts for network in networks], axis=0
         ).tolist()
@@ -376,8 +250,8 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
             "share_rounded_away": rounded_away / max(asked, 1),
             "share_out_of_range": out_of_range / max(asked, 1),
             "q_range": networks[0].output_range,
-            "share_of_range": [one and one.share_used for one in use],
-            "share_beyond_range": [one and one.share_beyond for one in use],
+            "share_of_range": [one and one[0] for one in use],
+            "share_beyond_range": [one and one[1] for one in use],
         }
 
 
@@ -432,6 +306,7 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
     (601,)
     """
 
+    kind = "rbf"
     approximator_type = RBFNetworkConfig
 
     def __init__(
@@ -458,19 +333,3 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
             angle_pairs=angle_pairs,
             warm_up_steps=warm_up_steps,
         )
-
-    def _make_core(self) -> CoreAgent | CoreVectorAgent:
-        config, learning = self._core_approximator(), self.learning
-        if self.n_dimensions > 1:
-            return _core.DecoupledRBFQLearning(
-                approximator=config,
-                n_actions=self._actions.n_actions,
-                learning=learning,
-                seed=self.seed,
-            )
-        return _core.RBFQLearning(approximator=config, learning=learning, seed=self.seed)
-
-    def _check_state(self, state: Mapping[str, NDArray[Any]]) -> None:
-        n_weights = self.approximator.n_bases ** (self._observations.n_inputs + 1)
-        for prefix in self._prefixes():
-            check_shape(state, prefix + "weights", (n_weights,))

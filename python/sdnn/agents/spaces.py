@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from sdnn.arguments import has_methods
 
-__all__ = ["require_same_kind", "require_single", "space_data", "space_of"]
+__all__ = [
+    "action_space_of",
+    "observation_space_of",
+    "require_same_kind",
+    "require_single",
+    "space_data",
+    "space_of",
+]
 
 
 def require_single(name: str, env: Any) -> None:
@@ -174,7 +181,7 @@ def space_of(data: Mapping[str, Any]) -> gym.Space[Any]:
         low, high = low.reshape(data["shape"]), high.reshape(data["shape"])
         return gym.spaces.Box(low, high, dtype=dtype.type)
     if "discrete" in data:
-        dtype = np.dtype(data.get("dtype", np.int64))  # C++ does not say it
+        dtype = np.dtype(data["dtype"])
         if dtype == np.int64:
             return gym.spaces.Discrete(data["discrete"], start=data["start"])
         return gym.spaces.Discrete(data["discrete"], start=data["start"], dtype=dtype.type)
@@ -189,3 +196,22 @@ def space_of(data: Mapping[str, Any]) -> gym.Space[Any]:
     if "dict" in data:
         return gym.spaces.Dict([(key, space_of(part)) for key, part in data["dict"]])
     return gym.spaces.Tuple([space_of(part) for part in data["tuple"]])
+
+
+def observation_space_of(config: Mapping[str, Any]) -> gym.Space[Any]:
+    """Make the space of an agent that was made in C++, which observes real numbers."""
+    low = np.array([-np.inf if x is None else x for x in config["low"]], np.float64)
+    high = np.array([np.inf if x is None else x for x in config["high"]], np.float64)
+    return gym.spaces.Box(low, high, dtype=np.float64)
+
+
+def action_space_of(config: Mapping[str, Any]) -> gym.Space[Any]:
+    """Make the space of an agent that was made in C++: a Box, a button or several."""
+    low, high = np.array(config["low"], np.float64), np.array(config["high"], np.float64)
+    if not config["discrete"]:
+        dtype = np.int64 if config["number"] == "whole" else np.dtype(config["number"]).type
+        return gym.spaces.Box(low.astype(dtype), high.astype(dtype), dtype=dtype)
+    start, n = low.astype(np.int64), (high - low + 1).astype(np.int64)
+    if start.size == 1:
+        return gym.spaces.Discrete(int(n[0]), start=int(start[0]))
+    return gym.spaces.MultiDiscrete(n, start=start)

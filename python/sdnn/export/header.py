@@ -165,23 +165,21 @@ class _Writer:
         )
         self.is_vector = len(self.networks) > 1
         self.sizes, self.learning = agent.approximator, agent.learning
-        description = agent.description()
-        self.start: list[int] = description["action"].get("start", [])
-        self.inputs = self._inputs(description["observation"])
-        self.n_observed = len(description["observation"]["low"])
+        self.box = self._box()
+        first = [agent.actions_of(d)[0] for d in range(agent.n_dimensions)]
+        self.start: list[int] = [] if self.box is not None else [int(one) for one in first]
+        self.inputs = self._inputs()
+        self.n_observed = len(agent.observation_range[0])
         self.n_columns = self.sizes.n_pairs * self.sizes.n_pattern_units
         self.index_type = "uint8_t" if self.sizes.n_pattern_units <= 256 else "uint16_t"
         self._check_sizes()
-        self.box = self._box()
         self.fraction_bits = self._checked_fraction_bits(fraction_bits)
 
-    def _inputs(self, observation: dict[str, Any]) -> list[Input]:
+    def _inputs(self) -> list[Input]:
         inputs = []
-        for i, one in enumerate(observation["inputs"]):
-            ((kind, at),) = one.items()
-            at = [at] if isinstance(at, int) else at
-            low, high = (observation[end][at[0]] for end in ("low", "high"))
-            inputs.append(Input(kind, at, low, high, len(self.networks[0].table(i))))
+        for i, (kind, at) in enumerate(self.agent.inputs):
+            low, high = (float(end[at[0]]) for end in self.agent.observation_range)
+            inputs.append(Input(kind, list(at), low, high, len(self.networks[0].table(i))))
         return inputs
 
     def _check_sizes(self) -> None:
@@ -203,9 +201,8 @@ class _Writer:
         """Take the actions of a Box as `act` gives them, shape (n_actions, n_dimensions)."""
         if not isinstance(self.agent.action_space, gym.spaces.Box):
             return None
-        actions = self.agent._actions
-        n_actions = range(self.networks[0].n_actions)
-        return np.stack([np.ravel(actions.element([i] * len(self.networks))) for i in n_actions])
+        actions = [self.agent.actions_of(d) for d in range(self.agent.n_dimensions)]
+        return np.stack(actions, axis=1).astype(self.agent.action_space.dtype)
 
     def _checked_fraction_bits(self, given: int | None) -> int:
         ranges = [one for one in self.inputs if one.kind in ("variable", "circular")]

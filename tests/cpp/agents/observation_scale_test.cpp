@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -82,11 +81,9 @@ TEST(ObservationScale, InfinityIsAnEndOfARangeButNoAngle) {
                                {{ObservedKind::variable, 1, 0}, {ObservedKind::variable, 0, 0}});
   EXPECT_EQ(scaled(plain, {testing::kInfinity, -testing::kInfinity}), (Numbers{0.0, 1.0}));
   EXPECT_FALSE(std::signbit(scaled(plain, {-0.0, 0.0})[1]));
-  EXPECT_FALSE(plain.has_state_of(Numbers{0.0, testing::kNaN}));
   const ObservationScale angles = scale_of_angles();
   for (const double bad : {testing::kNaN, testing::kInfinity}) {
     const Numbers observed{1.0, 2.0, bad, 3.0};
-    EXPECT_FALSE(angles.has_state_of(observed));
     Numbers state(3, 7.0);
     EXPECT_THROW(angles(observed, state), std::invalid_argument);
     EXPECT_EQ(state, Numbers(3, 7.0));
@@ -116,12 +113,6 @@ TEST(ObservationScale, NamesWhatDoesNotFit) {
   EXPECT_EQ(error_of({0.0, 0.0}, {1.0, 1.0}, {ObservedKind::symbol, 1, 2}),
             "observation.inputs[0] must be of 1 to 1 variables, got 2");
   EXPECT_EQ(error_of({0.0}, {1.0}, first), "no error");
-}
-
-TEST(ObservedKind, ByName) {
-  EXPECT_EQ(observed_kind("symbol"), ObservedKind::symbol);
-  EXPECT_EQ(observed_kind("variable"), ObservedKind::variable);
-  EXPECT_EQ(observed_kind("circle"), std::nullopt);
 }
 
 }  // namespace

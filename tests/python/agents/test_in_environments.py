@@ -9,7 +9,6 @@ from sdnn.agents import (
     RBFQLearning,
     SDNNQLearning,
     Transition,
-    load_agent,
 )
 from sdnn.approximators import SDNNCConfig
 
@@ -111,21 +110,3 @@ def test_of_many_variables_only_some_pairs_are_formed():
     seen = random.uniform(-1, 1, (300, 30))
     greedy = [agent.act(one, explore=False) for one in seen]
     assert np.mean(greedy == (seen[:, 5] > 0)) > 0.9
-
-
-def test_files_of_agents_without_symbols_go_on_as_they_were(monkeypatch, tmp_path):
-    places = gym.spaces.Dict({"at": gym.spaces.Box(0, 1, (1,)), "room": gym.spaces.Discrete(3)})
-    monkeypatch.setattr(SDNNQLearning, "codes_symbols", False)
-    born = SDNNQLearning(places, gym.spaces.Discrete(2), approximator=SMALL, seed=1)
-    born.save(tmp_path / "agent")
-    monkeypatch.undo()
-    read = load_agent(tmp_path / "agent")
-    for step in range(50):
-        where = {"at": [step % 7 / 7], "room": step % 3}
-        actions = [agent.act(where) for agent in (born, read)]
-        assert actions[0] == actions[1]
-        for agent in (born, read):
-            agent.learn(Transition(where, actions[0], float(step % 4), where, step % 5 == 0))
-    weights = [agent.core.action_value.weights() for agent in (born, read)]
-    assert np.array_equal(*weights)
-    assert weights[0].shape == (120, 4 * 3 * 40)

@@ -190,9 +190,9 @@ BROKEN = [
     ({"reward": np.inf}, "step 3", "got inf"),
     ({"reward": 10**400}, "step 3", "reward must be a number of less than 1.8e308, got more"),
     ({"reward": "much"}, "step 3", "reward must be a number, got 'much'"),
-    ({"seen": np.array([np.nan])}, "step 3", "observation must not hold NaN"),
+    ({"seen": np.array([np.nan])}, "step 3", "observation[0] must be a number"),
     ({"seen": np.zeros(2)}, "step 3", "observation must have shape (1,), got (2,)"),
-    ({"first": np.array([np.nan])}, "the reset", "observation must not hold NaN"),
+    ({"first": np.array([np.nan])}, "the reset", "observation[0] must be a number"),
 ]
 
 

@@ -233,7 +233,10 @@ def expected_of(agent, kind, given, observations):
     tied, chosen = [], []
     tolerance = agent.learning.tie_tolerance
     for observation in observations:
-        chosen.append(agent._actions.numbers(agent.act(observation, explore=False)))
+        action = np.ravel(agent.act(observation, explore=False))
+        chosen.append(
+            [np.abs(agent.actions_of(d) - one).argmin().item() for d, one in enumerate(action)]
+        )
         values = [agent.q_values(observation, d) for d in range(agent.n_dimensions)]
         tied.append([set(np.flatnonzero(q >= q.max() - tolerance).tolist()) for q in values])
     return Expected(kind, given, tied, chosen)
@@ -412,7 +415,7 @@ def test_the_angle_of_a_pair_is_in_the_agents_bin(agents, needs, tmp_path):
     run("gcc", "-std=c99", tmp_path / "bins.c", "-o", tmp_path / "bins")
     text = "".join(f"{c!r} {s!r}\n" for c, s in points)
     found = np.array(run(tmp_path / "bins", input=text.encode()).split(), int).reshape(-1, 2)
-    unit = [agent._observations.unit(np.array([c, s, 0.0]))[0] for c, s in points]
+    unit = [agent._controller.state_of([c, s, 0.0])[0] for c, s in points]
     expected = np.minimum((np.array(unit) * n_bins).astype(int), n_bins - 1)
     assert expected[: bounds.size].tolist() == list(range(n_bins - 1))
     np.testing.assert_array_equal(found, np.column_stack([expected, expected]))

@@ -102,8 +102,10 @@ GOOD = {
         "approximator": core.FuzzyRulesConfig(), "n_dimensions": 2,
         "learning": learning(core.FuzzyQLearningConfig), "seed": 1,
     },
-    "ObservationScale": lambda: {
-        "low": [0.0, -1.0], "high": [1.0, 1.0], "inputs": [("variable", 0, 0), ("angle", 0, 1)]
+    "Controller": lambda: {
+        "approximator": core.RBFNetworkConfig(), "learning": learning(), "seed": 1,
+        "observation": core.ObservationConfig(low=[0.0], high=[1.0]),
+        "action": core.ActionConfig(low=[0.0], high=[1.0]),
     },
     "AcrobotTrial": lambda: {"approximator": network_config(n_inputs=4), **trial_settings()},
     "FuzzyAcrobotTrial": lambda: {

@@ -1,401 +1,480 @@
-/// A saved agent at work: observations in, actions in the units of the task out. Needs the library
-/// nlohmann/json.
+/// An agent in the units of its task: observations in, actions out.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <exception>
-#include <filesystem>
 #include <optional>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <utility>
 #include <variant>
 #include <vector>
 
-#include "sdnn/agents/agent_file.hpp"
-#include "sdnn/agents/observation_scale.hpp"
-#include "sdnn/coding/action_code.hpp"
+#include "sdnn/agents/actions.hpp"
+#include "sdnn/agents/any_agent.hpp"
+#include "sdnn/agents/detail/saved_tables.hpp"
+#include "sdnn/agents/detail/taken_actions.hpp"
+#include "sdnn/agents/observations.hpp"
+#include "sdnn/agents/range_use.hpp"
+#include "sdnn/agents/warm_up.hpp"
+#include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/state.hpp"
 
 namespace sdnn::agents {
 
-namespace detail {
-
-/// What an input of the agent is, as the file's "observation" says it.
-inline ObservedInput observed_input(const nlohmann::json& input, const std::string& name) {
-  const auto number = [&name](const nlohmann::json& value) {
-    return static_cast<std::size_t>(value_from<std::uint64_t>(value, name));
-  };
-  if (input.is_object() && input.size() == 1) {
-    const auto kind = observed_kind(input.begin().key());
-    const nlohmann::json& value = input.begin().value();
-    const bool has_two = kind == ObservedKind::angle || kind == ObservedKind::symbol;
-    if (kind && !has_two) return {*kind, number(value), 0};
-    if (kind && value.is_array() && value.size() == 2) {
-      return {*kind, number(value[0]), number(value[1])};
-    }
-  }
-  refuse(name, "a variable, an angle of two, circular, or a symbol of some", input);
-}
-
-}  // namespace detail
-
-/// The scale of a file's "observation": {"low": [..], "high": [..], "inputs": [..]}, where an input
-/// is {"variable": i}, {"angle": [i, j]}, {"circular": i} or {"symbol": [i, n]}. Throws
-/// std::invalid_argument naming the member that does not fit.
-inline ObservationScale observation_scale(const nlohmann::json& observation) {
-  const auto numbers = [&observation](const char* key) {
-    return detail::value_from<std::vector<double>>(detail::member(observation, key, "observation"),
-                                                   std::string("observation.") + key);
-  };
-  auto low = numbers("low"), high = numbers("high");
-  const auto& listed = detail::member(observation, "inputs", "observation");
-  if (!listed.is_array()) detail::refuse("observation.inputs", "a list", listed);
-  std::vector<ObservedInput> inputs;
-  for (const auto& input : listed) {
-    inputs.push_back(
-        detail::observed_input(input, "observation.inputs[" + std::to_string(inputs.size()) + "]"));
-  }
-  return {std::move(low), std::move(high), std::move(inputs)};
-}
-
-/// From an agent's actions to those of the task, and back.
-///
-/// As the file's "action" says it: {"kind": "box", "low": [..], "high": [..], "shape": [..]}, where
-/// dimension d has n_actions[d] values evenly from low to high (coding::action_value), or an action
-/// a in [-1, 1] is (low + high) / 2 + (high - low) / 2 a; or {"kind": "discrete", "start": [..]},
-/// where it is start and the index. With "whole": true a box has the nearest whole numbers.
-class ActionScale {
- public:
-  /// For an agent with so many actions in each dimension; 0: any number in [-1, 1]. Throws
-  /// std::invalid_argument naming the member that does not fit.
-  ActionScale(const nlohmann::json& action, std::vector<std::size_t> n_actions)
-      : n_actions_(std::move(n_actions)) {
-    const auto kind =
-        detail::value_from<std::string>(detail::member(action, "kind", "action"), "action.kind");
-    const auto numbers = [&](const char* key) {
-      auto values = detail::value_from<std::vector<double>>(detail::member(action, key, "action"),
-                                                            std::string("action.") + key);
-      core::require(values.size() == n_dimensions(), std::string("action.") + key,
-                    std::to_string(n_dimensions()) + " numbers", values.size());
-      for (const double value : values) {
-        core::require_finite(std::string("action.") + key, value);
-      }
-      return values;
-    };
-    if (kind == "discrete" && std::ranges::find(n_actions_, 0U) == n_actions_.end()) {
-      is_discrete_ = true;
-      low_ = numbers("start");
-      return;
-    }
-    if (kind != "box") detail::refuse("action.kind", R"("box" or "discrete")", kind);
-    low_ = numbers("low");
-    high_ = numbers("high");
-    if (action.contains("whole")) {
-      is_whole_ = detail::value_from<bool>(action["whole"], "action.whole");
-    }
-    for (std::size_t d = 0; d < low_.size(); ++d) {
-      core::require_in_range("action.low", low_[d], -kFurthest, kFurthest);
-      core::require_in_range("action.high", high_[d], -kFurthest, kFurthest);
-      core::require(low_[d] <= high_[d], "action.high", "at least action.low", high_[d]);
-    }
-  }
-
-  std::size_t n_dimensions() const noexcept { return n_actions_.size(); }
-  /// Whether several numbers of actions may stand for one action.
-  bool is_whole() const noexcept { return is_whole_; }
-
-  /// Whether these are the numbers of an action, one in each dimension.
-  bool has(std::span<const std::uint64_t> indices) const noexcept {
-    return std::ranges::equal(indices, n_actions_, std::ranges::less());
-  }
-
-  /// Of action number `index` in dimension d.
-  double of_index(std::size_t index, std::size_t d) const noexcept {
-    if (is_discrete_) return low_[d] + static_cast<double>(index);
-    return rounded(coding::action_value(index, n_actions_[d], low_[d], high_[d]));
-  }
-  /// Of a number in [-1, 1] in dimension d.
-  double of_normalized(double action, std::size_t d) const noexcept {
-    const double middle = 0.5 * (low_[d] + high_[d]);
-    const double half = 0.5 * (high_[d] - low_[d]);
-    return std::clamp(rounded(std::clamp(middle + half * action, low_[d], high_[d])), low_[d],
-                      high_[d]);
-  }
-  /// The number of an action. Throws std::invalid_argument if there is none like it.
-  std::size_t index_of(double action, std::size_t d) const {
-    const std::size_t first = nearest(action, d);
-    for (std::size_t index = first, end = std::min(first + 2, n_actions_[d]); index < end;
-         ++index) {
-      if (of_index(index, d) == action) return index;
-    }
-    if (first > 0 && of_index(first - 1, d) == action) return first - 1;
-    core::require(false, "action[" + std::to_string(d) + "]", "one that the agent can take",
-                  action);
-    return 0;
-  }
-
- private:
-  double rounded(double action) const noexcept {
-    return is_whole_ ? std::floor(action + 0.5) : action;
-  }
-
-  /// The number of the action that is the next one below, or about that.
-  std::size_t nearest(double action, std::size_t d) const noexcept {
-    const double step = is_discrete_
-                            ? 1.0
-                            : (high_[d] - low_[d]) /
-                                  static_cast<double>(std::max<std::size_t>(n_actions_[d] - 1, 1));
-    const double place = (action - low_[d]) / step;
-    // Of whole numbers, which may be beside an even place, the nearest as Python has it.
-    const double position = is_whole_ ? std::nearbyint(place) : std::floor(place + 0.25);
-    const double last = static_cast<double>(n_actions_[d] - 1);
-    return position > 0.0 ? static_cast<std::size_t>(std::min(position, last)) : 0;
-  }
-
-  static constexpr double kFurthest = 1e300;  // of bounds: what lies between them stays finite
-
-  bool is_discrete_ = false;
-  bool is_whole_ = false;
-  std::vector<std::size_t> n_actions_;
-  std::vector<double> low_, high_;  ///< low_ is where discrete actions start
+/// Everything that defines a controller.
+struct ControllerConfig {
+  AnyApproximatorConfig approximator = {};  ///< sizes that follow from the task are filled in
+  AnyLearningConfig learning = {};
+  std::uint64_t seed = 0;
+  ObservationConfig observation = {};
+  ActionConfig action = {};
+  int warm_up_steps = 1000;  ///< transitions, where ranges are not known; in [2, 10^7]
 };
 
-/// An agent of any kind, in the units of its task: read from a file, at work, saved again.
+/// An agent of any kind that observes variables and chooses actions in the units of its task.
 ///
-/// What its file has besides the agent's state is kept. An object must not be used by two threads
-/// at once.
+/// Where ranges of observations are not known it begins with a *warm-up*: it acts at random for a
+/// while, takes the ranges from what it observed, and then learns what it did, in order; fuzzy
+/// Q-learning, which can learn its own actions only, begins anew. From then on the ranges stay.
+///
+/// An object must not be used by two threads at once.
 class Controller {
  public:
-  /// Throws std::runtime_error naming the file and what is wrong with it.
-  explicit Controller(const std::filesystem::path& path)
-      : Controller(read_agent_file(path), path.string() + ": ") {}
-  /// Throws std::runtime_error saying what is wrong with the file.
-  explicit Controller(AgentFile file) : Controller(std::move(file), "") {}
+  /// With SDNN-C, `tables` are patterns of each input. Throws std::invalid_argument naming the
+  /// field that is impossible; std::length_error as the approximator does.
+  explicit Controller(ControllerConfig config, std::vector<coding::PatternTable> tables = {})
+      : Controller(std::move(config), std::move(tables), Unborn()) {
+    if (observations_.is_fitted()) {
+      settle();
+      return;
+    }
+    Controller trial = *this;  // finds impossible settings before the warm-up
+    trial.observations_.fit(std::vector<double>(n_variables()));
+    trial.settle();
+    warm_up_.emplace(new_warm_up());
+  }
 
-  /// The agent in itself: whatever it is, with states in [0, 1].
-  AnyAgent& agent() noexcept { return parts_.agent; }
-  const AnyAgent& agent() const noexcept { return parts_.agent; }
-  /// What else the file says.
-  const nlohmann::json& settings() const noexcept { return file_.settings; }
+  /// A controller as it was when core::state_of wrote `state`. Throws std::invalid_argument naming
+  /// what does not fit, before much memory is asked for; and as the constructor does.
+  static Controller restored(ControllerConfig config, const core::State& state) {
+    core::StateReader reader(state);
+    Controller controller(std::move(config), detail::tables_in(state), Unborn());
+    serialize(controller, reader);
+    reader.finish();
+    return controller;
+  }
 
-  /// Numbers of an observation, and of an action.
-  std::size_t n_observed() const noexcept { return parts_.observation.n_observed(); }
-  std::size_t n_dimensions() const noexcept { return parts_.action.n_dimensions(); }
+  const ControllerConfig& config() const noexcept { return config_; }
+  /// As it is used: sizes that follow from the task are known once the warm-up is over.
+  const AnyApproximatorConfig& approximator() const noexcept { return approximator_; }
+  const Observations& observations() const noexcept { return observations_; }
+  const Actions& actions() const noexcept { return actions_; }
+  std::size_t n_variables() const noexcept { return observations_.n_variables(); }
+  std::size_t n_dimensions() const noexcept { return actions_.n_dimensions(); }
+
+  /// Whether it still acts at random to find the ranges of its observations.
+  bool is_warming_up() const noexcept { return warm_up_.has_value(); }
+
+  /// The agent in itself, with states in [0, 1]. Requires that the warm-up is over.
+  AnyAgent& agent() { return agent_.value(); }
+  const AnyAgent& agent() const { return agent_.value(); }
+
+  /// How much of the learning is done, in [0, 1]. Throws std::invalid_argument outside.
+  void set_progress(double progress) {
+    core::require_in_range("progress", progress, 0.0, 1.0);
+    progress_ = progress;
+    with_q_learning([progress](auto& agent) { agent.set_progress(progress); });
+  }
+  double progress() const {
+    return of_q_learning([](const auto& agent) { return agent.progress(); }, progress_);
+  }
+  /// Sets alpha or epsilon of Q-learning; see QLearning.
+  void set_learning_rate(std::optional<double> rate) {
+    const double tried = rate.value_or(1.0);
+    core::require(tried > 0.0 && tried <= 1.0, "learning_rate", "in (0, 1], or None", tried);
+    learning_rate_ = rate;
+    with_q_learning([rate](auto& agent) { agent.set_learning_rate(rate); });
+  }
+  void set_epsilon(std::optional<double> epsilon) {
+    const double tried = epsilon.value_or(0.0);
+    core::require(tried >= 0.0 && tried <= 1.0, "epsilon", "in [0, 1], or None", tried);
+    epsilon_ = epsilon;
+    with_q_learning([epsilon](auto& agent) { agent.set_epsilon(epsilon); });
+  }
+  /// As they are now. Require Q-learning.
+  double learning_rate() const {
+    const double planned = learning_rate_.value_or(
+        std::get<QLearningConfig>(config_.learning).learning_rate_at(progress_));
+    return of_q_learning([](const auto& agent) { return agent.learning_rate(); }, planned);
+  }
+  double epsilon() const {
+    const double planned =
+        epsilon_.value_or(std::get<QLearningConfig>(config_.learning).epsilon_at(progress_));
+    return of_q_learning([](const auto& agent) { return agent.epsilon(); }, planned);
+  }
 
   /// How many robots, or environments, the agent learns from at once: each has an episode of its
   /// own, and a number from 0. Throws as the agent does.
   void set_n_environments(std::size_t n) {
-    std::visit([n](auto& agent) { agent.set_n_environments(n); }, parts_.agent);
-    if (taken_.size() > n) taken_.resize(n);  // others may come later
+    if (warm_up_) {
+      warm_up_->set_n_environments(n);
+    } else {
+      std::visit([n](auto& agent) { agent.set_n_environments(n); }, *agent_);
+    }
+    taken_.forget_from(n);
   }
   std::size_t n_environments() const {
-    return std::visit([](const auto& agent) { return agent.n_environments(); }, parts_.agent);
+    if (warm_up_) return warm_up_->n_environments();
+    return std::visit([](const auto& agent) { return agent.n_environments(); }, *agent_);
   }
 
-  /// The next act in the environment is an episode's first.
+  /// The next act in the environment is an episode's first. Throws as the agent does.
   void begin_episode(std::size_t environment = 0) {
-    std::visit([environment](auto& agent) { agent.begin_episode(environment); }, parts_.agent);
+    if (warm_up_) {
+      warm_up_->begin_episode(environment);
+    } else {
+      std::visit([environment](auto& agent) { agent.begin_episode(environment); }, *agent_);
+    }
   }
 
-  /// The action to take, in the units of the task; without `explore` a best one. The span is valid
-  /// until the next act. Shapes: observation (n_observed,), the action (n_dimensions,). Throws
-  /// std::invalid_argument naming a number that has no state (see ObservationScale), or if there is
-  /// no such environment; then nothing has changed.
+  /// The action to take; without `explore` a best one. The span is valid until the next act.
+  /// Shapes: observation (n_variables,), the action (n_dimensions,). Throws std::invalid_argument
+  /// naming a number that has no state (see ObservationScale), or if there is no such environment;
+  /// then nothing has changed.
   std::span<const double> act(std::span<const double> observation, bool explore = true,
                               std::size_t environment = 0) {
-    parts_.observation(observation, state_);
-    std::visit(
-        [&](auto& agent) {
-          const auto action = agent.act(state_, explore, environment);
-          if constexpr (std::is_same_v<decltype(action), const double>) {
-            action_[0] = parts_.action.of_normalized(action, 0);
-          } else if constexpr (std::is_same_v<decltype(action), const std::vector<double>>) {
-            for (std::size_t d = 0; d < action_.size(); ++d) {
-              action_[d] = parts_.action.of_normalized(action[d], d);
-            }
-          } else if constexpr (std::is_same_v<decltype(action), const std::size_t>) {
-            action_[0] = parts_.action.of_index(action, 0);
-            indices_[0] = action;
-          } else {
-            for (std::size_t d = 0; d < action_.size(); ++d) {
-              action_[d] = parts_.action.of_index(action[d], d);
-              indices_[d] = action[d];
-            }
-          }
-        },
-        parts_.agent);
-    if (explore && parts_.action.is_whole() && !is_fuzzy()) {
-      if (taken_.size() <= environment) taken_.resize(environment + 1);
-      taken_[environment] = {action_, {indices_.begin(), indices_.end()}};
+    if (warm_up_) {
+      require_numbers("observation", observation);
+      const auto draw = [this](core::Pcg64& random, std::vector<double>& action) {
+        draw_action(random, action);
+      };
+      take(warm_up_->act(draw, explore, environment));
+      return action_;
+    }
+    observations_.scale(observation, state_);
+    std::visit([&](auto& agent) { take(agent.act(state_, explore, environment)); }, *agent_);
+    if (explore && !is_fuzzy(approximator_)) {
+      taken_.note(environment, action_, indices_);
     }
     return action_;
   }
 
-  /// Learns a transition. The action is one that act gave; of fuzzy Q-learning, the last one with
-  /// `explore` in the environment. Shapes as in act. Throws std::invalid_argument for others and
-  /// for numbers that have no state, and then nothing has changed; as the agent does.
+  /// Learns a transition. The action is any of the task's, of a box the nearest one that can be
+  /// taken; of fuzzy Q-learning, that of the last act with `explore` in the environment. Shapes as
+  /// in act. Throws std::invalid_argument for others and for numbers that have no state, and then
+  /// nothing has changed; as the agent does.
   void learn(std::span<const double> observation, std::span<const double> action, double reward,
              std::span<const double> next_observation, bool terminated,
              std::size_t environment = 0) {
-    parts_.observation(observation, state_);
-    parts_.observation(next_observation, next_state_);
-    if (action.size() != n_dimensions()) {
-      core::require(false, "action", std::to_string(n_dimensions()) + " numbers", action.size());
+    if (warm_up_) {
+      require_numbers("observation", observation);
+      actions_.require_action(action);
+      core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
+      require_numbers("next_observation", next_observation);
+      warm_up_->learn(
+          {false, environment, observation, action, reward, next_observation, terminated});
+      if (warm_up_->is_over()) end_warm_up();
+      return;
     }
-    std::visit(
-        [&](auto& agent) {
-          using Agent = std::remove_cvref_t<decltype(agent)>;
-          if constexpr (kIsFuzzy<Agent>) {
-            const auto last = agent.last_action(environment);
-            for (std::size_t d = 0; d < action.size(); ++d) {
-              core::require(action[d] == parts_.action.of_normalized(number(last, d), d),
-                            "action[" + std::to_string(d) + "]", "that of the last exploring act",
-                            action[d]);
-            }
-            agent.learn(state_, last, reward, next_state_, terminated, environment);
-          } else if constexpr (Agent::kDecoupled) {
-            for (std::size_t d = 0; d < action.size(); ++d) {
-              indices_[d] = index_of(action, d, environment);
-            }
-            agent.learn(state_, indices_, reward, next_state_, terminated, environment);
-          } else {
-            agent.learn(state_, index_of(action, 0, environment), reward, next_state_, terminated,
-                        environment);
-          }
-        },
-        parts_.agent);
+    observations_.scale(observation, state_);
+    find_indices(action, environment);
+    observations_.scale(next_observation, next_state_, "next_observation");
+    learn_states(reward, terminated, environment);
+    notes_.note(observation);
   }
 
-  /// Saves it as it is now, whole or not at all. Throws std::runtime_error naming the file.
-  void write(const std::filesystem::path& path) const {
-    AgentFile file = file_;
-    std::visit([&file](const auto& agent) { update_state(file, agent); }, parts_.agent);
-    for (std::size_t i = 0; i < taken_.size(); ++i) {
-      if (!is_unclear(taken_[i])) continue;
-      core::StateWriter writer;
-      writer.numbers(kTaken + std::to_string(i), taken_[i].indices);
-      file.tensors.merge(writer.state);
+  /// The state that the agent has for an observation. Valid until the next call. Throws as act.
+  std::span<const double> state_of(std::span<const double> observation) {
+    observations_.scale(observation, state_);
+    return state_;
+  }
+
+  /// How each variable used its range in the last 2,048 transitions or so.
+  std::vector<std::optional<RangeUse>> range_use() const { return notes_.use(observations_); }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive) {
+    detail::serialize_tables(self.tables_, archive);
+    bool is_warming_up = self.is_warming_up();
+    archive.number("is_warming_up", is_warming_up);
+    archive.number("progress", self.progress_);
+    archive.number("learning_rate", self.learning_rate_);
+    archive.number("epsilon", self.epsilon_);
+    if constexpr (Archive::kReads) self.begin_reading(is_warming_up, archive);
+    if (is_warming_up) {
+      archive.part("warm_up", *self.warm_up_);
+    } else {
+      archive.part("observations", self.observations_);
+      if constexpr (Archive::kReads) self.settle(&archive);
+      std::visit([&archive](auto& agent) { archive.part("agent", agent); }, *self.agent_);
     }
-    write_agent_file(path, file);
+    archive.part("taken", self.taken_);
+    if constexpr (Archive::kReads) self.end_reading(archive);
   }
 
  private:
-  /// What was explored last in an environment, where several numbers stand for one action.
-  struct Taken {
-    std::vector<double> action;
-    std::vector<std::uint64_t> indices;
-  };
-  static constexpr const char* kTaken = "taken.";
+  struct Unborn {};
 
-  /// Whether the action does not tell its numbers.
-  bool is_unclear(const Taken& taken) const {
-    for (std::size_t d = 0; d < taken.action.size(); ++d) {
-      if (parts_.action.index_of(taken.action[d], d) != taken.indices[d]) return true;
-    }
-    return false;
-  }
+  static constexpr double kLargestReward = 1e300;
 
-  /// Takes up what `write` wrote.
-  void restore_taken(const std::string& name) {
-    core::StateReader reader(file_.tensors);
-    for (std::size_t i = 0, n = n_environments(); i < n; ++i) {
-      const std::string key = kTaken + std::to_string(i);
-      if (!file_.tensors.contains(key)) continue;
-      Taken taken;
-      try {
-        reader.numbers(key, taken.indices);
-        reader.expect(parts_.action.has(taken.indices), key, "the numbers of an action");
-      } catch (const std::invalid_argument& error) {
-        throw std::runtime_error(name + error.what());
-      }
-      for (std::size_t d = 0; d < taken.indices.size(); ++d) {
-        taken.action.push_back(parts_.action.of_index(taken.indices[d], d));
-      }
-      taken_.resize(std::max(taken_.size(), i + 1));
-      taken_[i] = std::move(taken);
-    }
-    std::erase_if(file_.tensors, [](const auto& item) { return item.first.starts_with(kTaken); });
-  }
-
-  /// The number of an action: that of the last exploring act where it is the same one.
-  std::size_t index_of(std::span<const double> action, std::size_t d,
-                       std::size_t environment) const {
-    if (environment < taken_.size() && std::ranges::equal(taken_[environment].action, action)) {
-      return taken_[environment].indices[d];
-    }
-    return parts_.action.index_of(action[d], d);
-  }
-
-  struct Parts {
-    AnyAgent agent;
-    ObservationScale observation;
-    ActionScale action;
-  };
-
-  Controller(AgentFile file, const std::string& name)
-      : file_(std::move(file)), parts_(parts_of(file_, name)) {
-    state_.resize(parts_.observation.n_inputs());
-    next_state_.resize(state_.size());
+  Controller(ControllerConfig config, std::vector<coding::PatternTable> tables, Unborn)
+      : config_(std::move(config)),
+        tables_(std::move(tables)),
+        approximator_(config_.approximator),
+        observations_(config_.observation, is_sdnn(approximator_), is_sdnn(approximator_) ? 2 : 1),
+        actions_(config_.action, n_actions_in_box(approximator_)),
+        notes_(n_variables()),
+        taken_(n_dimensions()) {
+    core::require_in_range("warm_up_steps", config_.warm_up_steps, 2, 10'000'000);
     action_.resize(n_dimensions());
     indices_.resize(n_dimensions());
-    std::erase_if(file_.tensors, [](const auto& item) {  // the agent has them
-      return item.first.starts_with(detail::kStatePrefix);
+  }
+
+  WarmUp new_warm_up() const {
+    return {n_variables(), n_dimensions(), static_cast<std::size_t>(config_.warm_up_steps),
+            config_.seed, !is_fuzzy(approximator_)};
+  }
+
+  /// Makes the agent: all ranges are known. Of a state that is read, sizes are compared first.
+  void settle(const core::StateReader* reader = nullptr) {
+    approximator_ = config_.approximator;
+    std::visit(
+        [this](auto& config) {
+          config.n_inputs = static_cast<int>(observations_.n_inputs());
+          if (config_.action.discrete && n_dimensions() == 1 && !is_fuzzy(approximator_)) {
+            config.n_actions = static_cast<int>(actions_.n_actions().front());
+          }
+        },
+        approximator_);
+    if (auto* const sdnn = std::get_if<approximators::SDNNCConfig>(&approximator_)) {
+      const auto circular = observations_.circular();
+      const auto n_symbols = observations_.n_symbols();
+      const auto has = [](const auto& list) {
+        return std::ranges::any_of(list, [](auto one) { return one != 0; });
+      };
+      if (has(circular) && sdnn->circular.empty()) sdnn->circular = circular;
+      if (has(n_symbols) && sdnn->n_symbols.empty()) sdnn->n_symbols = n_symbols;
+      check_tables(n_symbols);
+    }
+    if (reader != nullptr) {
+      expect_sizes(*reader, approximator_, n_dimensions(), !tables_.empty());
+    }
+    agent_.emplace(
+        make_agent(approximator_, config_.learning, actions_.n_actions(), config_.seed, tables_));
+    if (auto* const sdnn = std::get_if<approximators::SDNNCConfig>(&approximator_)) {
+      if (n_dimensions() == 1) sdnn->n_actions = static_cast<int>(actions_.n_actions().front());
+    }
+    with_q_learning([this](auto& agent) {
+      agent.set_learning_rate(learning_rate_);
+      agent.set_epsilon(epsilon_);
+      agent.set_progress(progress_);
     });
-    restore_taken(name);
+    state_.resize(observations_.n_inputs());
+    next_state_.resize(state_.size());
   }
 
-  bool is_fuzzy() const {
-    return std::visit(
-        [](const auto& agent) { return kIsFuzzy<std::remove_cvref_t<decltype(agent)>>; },
-        parts_.agent);
-  }
-
-  static double number(double action, std::size_t) noexcept { return action; }
-  static double number(const std::vector<double>& action, std::size_t d) noexcept {
-    return action[d];
-  }
-
-  static Parts parts_of(const AgentFile& file, const std::string& name) {
-    try {
-      AnyAgent agent = make_agent(file);
-      ObservationScale observation =
-          observation_scale(detail::member(file.settings, "observation", "sdnn"));
-      std::vector<std::size_t> n_actions;
-      std::visit(
-          [&](const auto& known) {
-            core::require(observation.n_inputs() == known.n_inputs(), "observation.inputs",
-                          std::to_string(known.n_inputs()) + ", as the agent's",
-                          observation.n_inputs());
-            using Agent = std::remove_cvref_t<decltype(known)>;
-            if constexpr (std::is_same_v<Agent, FuzzyQLearning>) {
-              n_actions.assign(1, 0);
-            } else if constexpr (std::is_same_v<Agent, VectorFuzzyQLearning>) {
-              n_actions.assign(known.n_dimensions(), 0);
-            } else {
-              for (std::size_t d = 0; d < known.n_dimensions(); ++d) {
-                n_actions.push_back(known.n_actions(d));
-              }
-            }
-          },
-          agent);
-      ActionScale action(detail::member(file.settings, "action", "sdnn"), std::move(n_actions));
-      return {std::move(agent), std::move(observation), std::move(action)};
-    } catch (const std::exception& error) {
-      throw std::runtime_error(name + error.what());
+  void check_tables(const std::vector<int>& n_symbols) const {
+    for (std::size_t i = 0; i < std::min(tables_.size(), n_symbols.size()); ++i) {
+      const auto n = static_cast<std::size_t>(n_symbols[i]);
+      core::require(n == 0 || tables_[i].n_bins() == n, "tables[" + std::to_string(i) + "]",
+                    "of a row for each of " + std::to_string(n) + " symbols", tables_[i].n_bins());
     }
   }
 
-  AgentFile file_;  ///< all of it but the agent's state
-  Parts parts_;
+  /// Calls what Q-learning is changed by, where there is such an agent.
+  template <class Call>
+  void with_q_learning(const Call& call) {
+    if (!agent_) return;
+    std::visit(
+        [&call](auto& agent) {
+          if constexpr (!kIsFuzzy<std::remove_cvref_t<decltype(agent)>>) call(agent);
+        },
+        *agent_);
+  }
+  /// What Q-learning says; `otherwise` where there is no such agent.
+  template <class Call>
+  double of_q_learning(const Call& call, double otherwise) const {
+    if (!agent_) return otherwise;
+    return std::visit(
+        [&](const auto& agent) {
+          if constexpr (kIsFuzzy<std::remove_cvref_t<decltype(agent)>>)
+            return otherwise;
+          else
+            return call(agent);
+        },
+        *agent_);
+  }
+
+  void require_numbers(const char* name, std::span<const double> values) const {
+    if (values.size() != n_variables()) {
+      core::require(false, name, std::to_string(n_variables()) + " numbers", values.size());
+    }
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (!std::isnan(values[i])) continue;
+      core::require(false, name + ("[" + std::to_string(i) + "]"), "a number", values[i]);
+    }
+  }
+
+  void draw_action(core::Pcg64& random, std::vector<double>& action) const {
+    for (std::size_t d = 0; d < action.size(); ++d) {
+      const std::size_t n = actions_.n_actions()[d];
+      action[d] = n == 0 ? -1.0 + 2.0 * random.uniform()
+                         : static_cast<double>(random.below(static_cast<std::uint32_t>(n)));
+    }
+  }
+
+  /// Takes an agent's action: an index, or a number in [-1, 1], for each dimension.
+  template <class Action>
+  void take(const Action& action) {
+    for (std::size_t d = 0; d < action_.size(); ++d) {
+      const auto number = [&] {
+        if constexpr (std::is_arithmetic_v<Action>)
+          return action;
+        else
+          return action[d];
+      }();
+      if (actions_.n_actions()[d] == 0) {
+        action_[d] = actions_.of_normalized(static_cast<double>(number), d);
+      } else {
+        indices_[d] = static_cast<std::size_t>(number);
+        action_[d] = actions_.of_index(indices_[d], d);
+      }
+    }
+  }
+
+  /// Finds the indices of an action: those of the last exploring act where it is the same one. A
+  /// fuzzy agent knows that one only.
+  void find_indices(std::span<const double> action, std::size_t environment) {
+    actions_.require_action(action);
+    if (is_fuzzy(approximator_)) {
+      require_last(action, environment);
+      return;
+    }
+    if (taken_.find(environment, action, indices_)) return;
+    for (std::size_t d = 0; d < action.size(); ++d) indices_[d] = actions_.index_of(action[d], d);
+  }
+
+  /// Learns state_, indices_ and next_state_; of a fuzzy agent, its last action.
+  void learn_states(double reward, bool terminated, std::size_t environment) {
+    std::visit(
+        [&](auto& agent) {
+          using Agent = std::remove_cvref_t<decltype(agent)>;
+          const auto& action = [&] {
+            if constexpr (kIsFuzzy<Agent>)
+              return agent.last_action(environment);
+            else if constexpr (Agent::kDecoupled)
+              return indices_;
+            else
+              return indices_[0];
+          }();
+          agent.learn(state_, action, reward, next_state_, terminated, environment);
+        },
+        *agent_);
+  }
+
+  /// Throws unless a fuzzy agent chose the action in state_ when it explored last.
+  void require_last(std::span<const double> action, std::size_t environment) {
+    std::visit(
+        [&](auto& agent) {
+          if constexpr (kIsFuzzy<std::remove_cvref_t<decltype(agent)>>) {
+            take(agent.last_action(environment));
+            core::require(
+                agent.explored_in(state_, environment) && std::ranges::equal(action, action_),
+                "observation and action", "those of the last exploring act", "others");
+          }
+        },
+        *agent_);
+  }
+
+  void end_warm_up() {
+    Observations fitted = observations_;
+    fitted.fit(warm_up_->seen());
+    observations_ = std::move(fitted);
+    settle();
+    const WarmUp warm_up = std::move(*warm_up_);
+    warm_up_.reset();
+    set_n_environments(warm_up.n_in_all());
+    if (is_fuzzy(approximator_)) {
+      for (std::size_t i = 0; i < n_environments(); ++i) begin_episode(i);
+    } else {
+      for (std::size_t t = 0; t < warm_up.size(); ++t) relive(warm_up.step(t));
+    }
+    set_n_environments(warm_up.n_environments());
+  }
+
+  void relive(const WarmUp::Step& step) {
+    if (step.begins) begin_episode(step.environment);
+    observations_.scale(step.observation, state_);
+    observations_.scale(step.next_observation, next_state_, "next_observation");
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      indices_[d] = actions_.index_of(step.action[d], d);
+    }
+    learn_states(step.reward, step.terminated, step.environment);
+  }
+
+  template <class Archive>
+  void begin_reading(bool is_warming_up, const Archive& archive) {
+    archive.expect(!is_warming_up || observations_.needs_fit(), "is_warming_up",
+                   "0, as all ranges are known");
+    archive.taking("progress", [this] {
+      set_progress(progress_);
+      set_learning_rate(learning_rate_);
+      set_epsilon(epsilon_);
+    });
+    agent_.reset();
+    warm_up_.reset();
+    if (is_warming_up) warm_up_.emplace(new_warm_up());
+  }
+
+  template <class Archive>
+  void end_reading(const Archive& archive) {
+    archive.expect(taken_.fits(n_environments(), actions_), "taken.indices",
+                   "of actions and environments");
+    if (agent_) {
+      progress_ = progress();
+      return;
+    }
+    const auto is_number = [](double x) { return !std::isnan(x); };
+    const auto can_be_learned = [&](const WarmUp::Step& step) {
+      actions_.require_action(step.action);
+      return std::abs(step.reward) <= kLargestReward &&
+             std::ranges::all_of(step.observation, is_number) &&
+             std::ranges::all_of(step.next_observation, is_number);
+    };
+    const auto is_action = [this](const std::vector<double>& kept) {
+      for (std::size_t d = 0; d < kept.size(); ++d) {
+        const std::size_t n = actions_.n_actions()[d];
+        const bool fits = n == 0 ? kept[d] >= -1.0 && kept[d] <= 1.0
+                                 : kept[d] >= 0.0 && kept[d] < static_cast<double>(n);
+        if (!fits) return false;
+      }
+      return true;
+    };
+    archive.taking("warm_up.actions", [&] {
+      archive.expect(warm_up_->each_is(can_be_learned, is_action), "warm_up",
+                     "of transitions and actions");
+    });
+  }
+
+  ControllerConfig config_;
+  std::vector<coding::PatternTable> tables_;
+  AnyApproximatorConfig approximator_;  ///< as used
+  Observations observations_;
+  Actions actions_;
+  RangeNotes notes_;
+  std::optional<WarmUp> warm_up_;
+  std::optional<AnyAgent> agent_;  ///< once the warm-up is over
+  double progress_ = 0.0;
+  std::optional<double> learning_rate_, epsilon_;
   std::vector<double> state_, next_state_, action_;
   std::vector<std::size_t> indices_;
-  std::vector<Taken> taken_;  ///< for each environment
+  detail::TakenActions taken_;
 };
 
 }  // namespace sdnn::agents

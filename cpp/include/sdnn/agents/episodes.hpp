@@ -20,6 +20,8 @@ class Episodes {
   explicit Episodes(Episode first) { episodes_.push_back(std::move(first)); }
 
   std::size_t size() const noexcept { return episodes_.size(); }
+  auto begin() const noexcept { return episodes_.begin(); }
+  auto end() const noexcept { return episodes_.end(); }
 
   /// That of an environment, from 0. Throws std::invalid_argument if there is none.
   Episode& of(std::size_t environment) {

@@ -110,6 +110,11 @@ class FuzzyQLearning {
   }
   /// The action that came of it.
   double last_action(std::size_t environment = 0) const { return episodes_.of(environment).action; }
+  /// Whether the last exploring act in an environment was in this state.
+  bool explored_in(std::span<const double> state, std::size_t environment = 0) const {
+    const Episode& episode = episodes_.of(environment);
+    return !episode.picked.empty() && std::ranges::equal(state, episode.state);
+  }
 
   /// Starts counting the steps of an episode anew and forgets the traces. The caller says when:
   /// learning a terminated transition ends the traces only. Throws std::invalid_argument if there
@@ -178,9 +183,8 @@ class FuzzyQLearning {
   void learn(std::span<const double> state, double action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
-    core::require(!episode.picked.empty() && std::equal(state.begin(), state.end(),
-                                                        episode.state.begin(), episode.state.end()),
-                  "state", "that of the last exploring act", "another");
+    core::require(explored_in(state, environment), "state", "that of the last exploring act",
+                  "another");
     core::require(action == episode.action, "action", "that of the last exploring act", action);
     core::require_finite("reward", reward);
     const double target =

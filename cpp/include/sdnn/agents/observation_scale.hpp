@@ -2,13 +2,10 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -34,19 +31,11 @@ struct ObservedInput {
   std::size_t second;  ///< of an angle; how many variables tell a symbol
 };
 
-/// The kind of this name, as files have it; none if there is none.
-inline std::optional<ObservedKind> observed_kind(std::string_view name) {
-  constexpr std::array<std::string_view, 4> kNames{"variable", "angle", "circular", "symbol"};
-  const auto at = std::ranges::find(kNames, name);
-  if (at == kNames.end()) return std::nullopt;
-  return static_cast<ObservedKind>(at - kNames.begin());
-}
-
 /// Scales what is observed, with a range for each observed variable.
 class ObservationScale {
  public:
-  /// Shapes: low and high (n_observed,). Throws std::invalid_argument naming the member of a file's
-  /// "observation" that does not fit.
+  /// Shapes: low and high (n_observed,). Throws std::invalid_argument naming what does not
+  /// fit.
   ObservationScale(std::vector<double> low, std::vector<double> high,
                    std::vector<ObservedInput> inputs)
       : low_(std::move(low)), high_(std::move(high)), inputs_(std::move(inputs)) {
@@ -66,23 +55,18 @@ class ObservationScale {
   std::size_t n_observed() const noexcept { return low_.size(); }
   std::size_t n_inputs() const noexcept { return inputs_.size(); }
 
-  /// Whether there is a state for these numbers: none may be NaN, nor infinite where there are
-  /// angles. A variable that is infinite is at an end of its range. Shape: (n_observed,).
-  bool has_state_of(std::span<const double> observation) const noexcept {
-    return std::ranges::all_of(observation, [this](double x) { return can_scale(x); });
-  }
-
-  /// Shapes: observation (n_observed,), state (n_inputs,). Throws std::invalid_argument naming what
-  /// there is no state for; then nothing has changed.
-  void operator()(std::span<const double> observation, std::span<double> state) const {
+  /// Shapes: observation (n_observed,), state (n_inputs,). Throws std::invalid_argument naming the
+  /// number of the observation, called `name`, that has no state: none may be NaN, nor infinite
+  /// where there are angles. A variable that is infinite is at an end of its range.
+  void operator()(std::span<const double> observation, std::span<double> state,
+                  const char* name = "observation") const {
     if (observation.size() != n_observed()) {
-      core::require(false, "observation", std::to_string(n_observed()) + " numbers",
-                    observation.size());
+      core::require(false, name, std::to_string(n_observed()) + " numbers", observation.size());
     }
     for (std::size_t i = 0; i < observation.size(); ++i) {
       if (can_scale(observation[i])) continue;
-      core::require(false, "observation[" + std::to_string(i) + "]",
-                    has_angles_ ? "finite, as there are angles" : "no NaN", observation[i]);
+      core::require(false, name + ("[" + std::to_string(i) + "]"),
+                    has_angles_ ? "finite, as there are angles" : "a number", observation[i]);
     }
     for (std::size_t k = 0; k < inputs_.size(); ++k) state[k] = value(inputs_[k], observation);
   }

@@ -77,6 +77,11 @@ class VectorFuzzyQLearning {
     return action;
   }
 
+  /// Whether that act was in this state.
+  bool explored_in(std::span<const double> state, std::size_t environment = 0) const {
+    return parts_.front().explored_in(state, environment);
+  }
+
   /// What one reader needs, as of a part: one for each.
   using Workspace = std::vector<FuzzyQLearning::Workspace>;
   Workspace workspace() const {

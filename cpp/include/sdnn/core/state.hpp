@@ -202,6 +202,14 @@ class StateReader {
     }
   }
 
+  /// Throws unless there is a tensor of so many numbers: before memory for them is asked for.
+  void expect_size(std::string_view name, double size) const {
+    const auto found = state_.find(prefix + std::string(name));
+    expect(found != state_.end(), name, "there");
+    expect(static_cast<double>(found->second.size()) == size, name,
+           "as large as the approximator's");
+  }
+
   /// Throws unless `holds`, naming the tensor and what it must be.
   void expect(bool holds, std::string_view name, std::string_view what) const {
     if (holds) return;

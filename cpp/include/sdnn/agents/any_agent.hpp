@@ -1,0 +1,150 @@
+/// Agents of every kind, made of their settings.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/q_learning.hpp"
+#include "sdnn/agents/vector_fuzzy_q_learning.hpp"
+#include "sdnn/approximators/decoupled.hpp"
+#include "sdnn/approximators/fuzzy_rules.hpp"
+#include "sdnn/approximators/rbf_network.hpp"
+#include "sdnn/approximators/sdnn_c.hpp"
+#include "sdnn/coding/pattern_table.hpp"
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/grid_cells.hpp"
+
+namespace sdnn::agents {
+
+/// An agent of any kind.
+using AnyAgent = std::variant<QLearning<approximators::SDNNC>,
+                              QLearning<approximators::Decoupled<approximators::SDNNC>>,
+                              QLearning<approximators::RBFNetwork>,
+                              QLearning<approximators::Decoupled<approximators::RBFNetwork>>,
+                              FuzzyQLearning, VectorFuzzyQLearning>;
+
+/// The settings of its parts. Fuzzy rules belong to fuzzy Q-learning.
+using AnyApproximatorConfig =
+    std::variant<approximators::SDNNCConfig, approximators::RBFNetworkConfig,
+                 approximators::FuzzyRulesConfig>;
+using AnyLearningConfig = std::variant<QLearningConfig, FuzzyQLearningConfig>;
+
+/// Whether it is one of the two that learn by fuzzy rules.
+template <class Agent>
+inline constexpr bool kIsFuzzy =
+    std::is_same_v<Agent, FuzzyQLearning> || std::is_same_v<Agent, VectorFuzzyQLearning>;
+
+inline bool is_fuzzy(const AnyApproximatorConfig& config) noexcept {
+  return std::holds_alternative<approximators::FuzzyRulesConfig>(config);
+}
+inline bool is_sdnn(const AnyApproximatorConfig& config) noexcept {
+  return std::holds_alternative<approximators::SDNNCConfig>(config);
+}
+
+/// How many actions of a box there are in each dimension; 0: any.
+inline std::size_t n_actions_in_box(const AnyApproximatorConfig& config) {
+  if (is_fuzzy(config)) return 0;
+  int n = 1;
+  if (const auto* const sdnn = std::get_if<approximators::SDNNCConfig>(&config)) {
+    n = sdnn->n_actions;
+    if (n == 0) n = sdnn->n_hidden_units - sdnn->n_active_units + 1;
+  } else {
+    n = std::get<approximators::RBFNetworkConfig>(config).n_actions;
+  }
+  return static_cast<std::size_t>(std::max(n, 1));
+}
+
+namespace detail {
+
+inline double power(int base, int exponent) {
+  double product = 1.0;
+  for (int i = 0; i < exponent && product < 1e300; ++i) product *= base;
+  return product;
+}
+
+}  // namespace detail
+
+/// Throws std::invalid_argument unless an agent's arrays in a state, called "agent." and so on, are
+/// as large as the settings make them: before memory is asked for.
+template <class Reader>
+void expect_sizes(const Reader& reader, const AnyApproximatorConfig& config,
+                  std::size_t n_dimensions, bool has_tables) {
+  for (std::size_t d = 0; d < n_dimensions; ++d) {
+    const std::string number = n_dimensions > 1 ? std::to_string(d) + "." : "";
+    if (const auto* const rules = std::get_if<approximators::FuzzyRulesConfig>(&config)) {
+      reader.expect_size("agent." + number + "rules.values",
+                         detail::power(rules->n_sets, rules->n_inputs) * rules->n_actions);
+      continue;
+    }
+    const std::string name = "agent.action_value." + number + "weights";
+    if (const auto* const rbf = std::get_if<approximators::RBFNetworkConfig>(&config)) {
+      reader.expect_size(name, detail::power(rbf->n_bases, rbf->n_inputs + 1));
+      continue;
+    }
+    const auto& sdnn = std::get<approximators::SDNNCConfig>(config);
+    const double n_weights =
+        1.0 * sdnn.n_hidden_units * sdnn.n_pattern_units * sdnn.n_inputs * sdnn.n_partners();
+    reader.expect_size(name, n_weights);
+    if (has_tables) continue;
+    // Code books are in no array. Those of agents take less than their weights.
+    const double n_code_bytes = sdnn.pattern_bytes(sdnn.n_bins());
+    const double most = static_cast<double>(core::kDefaultMaxTableBytes / n_dimensions);
+    core::require(n_code_bytes <= std::max(most, 2.0 * n_weights), "n_interpolated or n_symbols",
+                  "smaller: code books would not fit", n_code_bytes);
+  }
+}
+
+namespace detail {
+
+template <class Config, class Make>
+AnyAgent make_q_learning(Config config, const QLearningConfig& learning,
+                         const std::vector<std::size_t>& n_actions, std::uint64_t seed,
+                         const Make& make) {
+  if (n_actions.size() == 1) return QLearning(make(config, seed), learning, seed);
+  config.max_table_bytes /= n_actions.size();
+  const std::vector<int> numbers(n_actions.begin(), n_actions.end());
+  return QLearning(approximators::make_decoupled(config, numbers, seed, make), learning, seed);
+}
+
+}  // namespace detail
+
+/// Makes an agent with so many actions in each dimension, and, with SDNN-C and actions of one
+/// dimension, patterns of its own for each input. Throws as the parts do.
+inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearningConfig& learning,
+                           const std::vector<std::size_t>& n_actions, std::uint64_t seed,
+                           const std::vector<coding::PatternTable>& tables = {}) {
+  using namespace approximators;
+  core::require(is_fuzzy(config) == std::holds_alternative<FuzzyQLearningConfig>(learning),
+                "learning", "that of Q-learning, or of fuzzy Q-learning with fuzzy rules",
+                "the other");
+  core::require(tables.empty() || (is_sdnn(config) && n_actions.size() == 1), "tables",
+                "None where actions have several dimensions", tables.size());
+  if (const auto* const rules = std::get_if<FuzzyRulesConfig>(&config)) {
+    const auto& rule = std::get<FuzzyQLearningConfig>(learning);
+    if (n_actions.size() == 1) return FuzzyQLearning(FuzzyRules(*rules), rule, seed);
+    FuzzyRulesConfig of_dimension = *rules;
+    of_dimension.max_table_bytes /= n_actions.size();
+    return VectorFuzzyQLearning(of_dimension, n_actions.size(), rule, seed);
+  }
+  const auto& rule = std::get<QLearningConfig>(learning);
+  if (const auto* const rbf = std::get_if<RBFNetworkConfig>(&config)) {
+    return detail::make_q_learning(
+        *rbf, rule, n_actions, seed,
+        [](const RBFNetworkConfig& one, std::uint64_t) { return RBFNetwork(one); });
+  }
+  return detail::make_q_learning(std::get<SDNNCConfig>(config), rule, n_actions, seed,
+                                 [&tables](const SDNNCConfig& one, std::uint64_t seed_of_part) {
+                                   return tables.empty() ? SDNNC(one, seed_of_part)
+                                                         : SDNNC(one, tables, seed_of_part);
+                                 });
+}
+
+}  // namespace sdnn::agents

@@ -1,0 +1,310 @@
+/// How observations become states: which ranges are known, and how the others are found.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "sdnn/agents/observation_scale.hpp"
+#include "sdnn/core/config_fields.hpp"
+#include "sdnn/core/detail/check.hpp"
+
+namespace sdnn::agents {
+
+/// The observed variables of a task.
+struct ObservationConfig {
+  std::vector<std::optional<double>> low = {};
+  std::vector<std::optional<double>> high = {};
+  bool adaptive = false;
+  std::vector<int> angles = {};
+  std::vector<std::vector<int>> angle_pairs = {};
+  bool find_angle_pairs = false;
+  std::vector<std::vector<int>> symbols = {};
+
+  static constexpr auto fields() noexcept {
+    return std::tuple(core::field("low", &ObservationConfig::low,
+                                  "Lowest value of each variable; none: not known."),
+                      core::field("high", &ObservationConfig::high,
+                                  "Highest value of each variable; none: not known."),
+                      core::field("adaptive", &ObservationConfig::adaptive,
+                                  "Whether ranges of numbers are fitted, within low and high."),
+                      core::field("angles", &ObservationConfig::angles,
+                                  "Variables that wrap around in their ranges."),
+                      core::field("angle_pairs", &ObservationConfig::angle_pairs,
+                                  "Variables that are the cosine and the sine of an angle."),
+                      core::field("find_angle_pairs", &ObservationConfig::find_angle_pairs,
+                                  "Whether angle_pairs are those that observations have."),
+                      core::field("symbols", &ObservationConfig::symbols,
+                                  "First variables, and how many there are, of which one is 1."));
+  }
+  bool operator==(const ObservationConfig&) const = default;
+};
+
+/// Scales observations to states in [0, 1]; see ObservationScale.
+///
+/// A number's range is the fixed one, or fitted to observations: from the lowest to the highest,
+/// and a quarter more at each end. Adaptive ranges leave out one in twenty observations at each
+/// end and stay within the fixed range. Pairs of neighbouring variables that lie and move on the
+/// unit circle can be found.
+class Observations {
+ public:
+  /// Symbols are inputs of their own where the approximator codes symbols; it gets `least_inputs`
+  /// inputs at least, the last one repeated. Throws std::invalid_argument naming the field.
+  Observations(ObservationConfig config, bool codes_symbols, std::size_t least_inputs)
+      : config_(std::move(config)), least_inputs_(least_inputs) {
+    core::require(!config_.low.empty(), "observation.low", "of one variable at least", 0);
+    core::require(config_.high.size() == n_variables(), "observation.high",
+                  "as long as observation.low", config_.high.size());
+    if (!codes_symbols) config_.symbols.clear();
+    roles_.resize(n_variables());
+    for (const auto& symbol : config_.symbols) {
+      const bool fits = symbol.size() == 2 && is_variable(symbol[0]) && symbol[1] >= 1 &&
+                        is_variable(symbol[0] + std::int64_t{symbol[1]} - 1);
+      core::require(fits, "observation.symbols", "pairs of a variable and a number of variables",
+                    symbol.size());
+      for (int k = 0; k < symbol[1]; ++k) claim(Role::symbol, symbol[0] + k, "symbols");
+    }
+    for (const int variable : config_.angles) claim(Role::circular, variable, "angles");
+    for (const auto& pair : config_.angle_pairs) {
+      core::require(pair.size() == 2, "angle_pairs", "pairs of variables", pair.size());
+      for (const int variable : pair) claim(Role::pair, variable, "angle_pairs");
+    }
+    const Ranges fixed = fixed_ranges(config_.angle_pairs);
+    needs_fit_ = config_.find_angle_pairs || std::ranges::any_of(fixed.low, is_unknown);
+    if (!needs_fit_) take(fixed, config_.angle_pairs);
+  }
+
+  std::size_t n_variables() const noexcept { return config_.low.size(); }
+  /// Whether ranges or pairs follow from observations.
+  bool needs_fit() const noexcept { return needs_fit_; }
+  /// Whether all ranges are known. Only then there are inputs and states.
+  bool is_fitted() const noexcept { return scale_.has_value(); }
+
+  /// Shapes: (n_variables,).
+  std::span<const double> low() const noexcept { return ranges_.low; }
+  std::span<const double> high() const noexcept { return ranges_.high; }
+  std::span<const ObservedInput> inputs() const noexcept { return inputs_; }
+  std::size_t n_inputs() const noexcept { return inputs_.size(); }
+  /// Which inputs are angles.
+  std::vector<bool> circular() const {
+    std::vector<bool> circular;
+    for (const ObservedInput& input : inputs_) {
+      circular.push_back(input.kind == ObservedKind::angle || input.kind == ObservedKind::circular);
+    }
+    return circular;
+  }
+  /// How many symbols each input may be; 0: it is a number.
+  std::vector<int> n_symbols() const {
+    std::vector<int> n_symbols;
+    for (const ObservedInput& input : inputs_) {
+      n_symbols.push_back(input.kind == ObservedKind::symbol ? static_cast<int>(input.second) : 0);
+    }
+    return n_symbols;
+  }
+
+  /// Shapes: observation (n_variables,), state (n_inputs,). Throws std::invalid_argument naming the
+  /// number of the observation, called `name`, that has no state. Requires that it is fitted.
+  void scale(std::span<const double> observation, std::span<double> state,
+             const char* name = "observation") const {
+    (*scale_)(observation, state, name);
+  }
+
+  /// Takes unknown ranges and pairs from observations. Shape: (n, n_variables), row by row.
+  /// Throws std::invalid_argument where there is no range, and then nothing has changed.
+  void fit(std::span<const double> seen) {
+    const auto pairs = config_.find_angle_pairs ? pairs_in(seen) : config_.angle_pairs;
+    Ranges ranges = fixed_ranges(pairs);
+    for (std::size_t i = 0; i < n_variables(); ++i) {
+      if (is_unknown(ranges.low[i])) {
+        std::tie(ranges.low[i], ranges.high[i]) = fitted_range(column(seen, i), i);
+      }
+    }
+    take(ranges, pairs);
+  }
+
+  /// Lists what was fitted; see core/state.hpp.
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive) {
+    if (!self.needs_fit_) return;
+    Ranges ranges = self.ranges_;
+    std::vector<std::int32_t> listed;
+    for (const auto& pair : self.pairs_) listed.insert(listed.end(), pair.begin(), pair.end());
+    archive.numbers("low", ranges.low);
+    archive.numbers("high", ranges.high);
+    archive.numbers("angle_pairs", listed);
+    if constexpr (Archive::kReads) {
+      archive.expect(ranges.low.size() == self.n_variables(), "low", "one for each variable");
+      archive.expect(listed.size() % 2 == 0, "angle_pairs", "pairs");
+      std::vector<std::vector<int>> pairs;
+      for (std::size_t k = 0; k < listed.size(); k += 2) {
+        archive.expect(self.is_variable(listed[k]) && self.is_variable(listed[k + 1]),
+                       "angle_pairs", "of variables");
+        pairs.push_back({listed[k], listed[k + 1]});
+      }
+      archive.taking("low", [&] { self.take(ranges, pairs); });
+    }
+  }
+
+ private:
+  enum class Role { number, symbol, circular, pair };
+  struct Ranges {
+    std::vector<double> low, high;  ///< NaN: not known
+  };
+  using Pairs = std::vector<std::vector<int>>;
+
+  static constexpr double kHeadroom = 0.25;
+  static constexpr std::size_t kRare = 20;
+  static constexpr double kNearCircle = 1e-3;  // single precision and some rounding
+  static constexpr double kLargest = 1e300;
+
+  static bool is_unknown(double x) noexcept { return std::isnan(x); }
+  bool is_variable(std::int64_t i) const noexcept {
+    return i >= 0 && static_cast<std::uint64_t>(i) < n_variables();
+  }
+  static std::size_t index(int variable) noexcept { return static_cast<std::size_t>(variable); }
+
+  /// Gives a variable a role; each has one only.
+  void claim(Role role, int variable, const char* name) {
+    core::require(is_variable(variable), name,
+                  "of variables below " + std::to_string(n_variables()), variable);
+    Role& present = roles_[index(variable)];
+    core::require(present != Role::symbol, name, "of numbers, not of variables of a symbol",
+                  variable);
+    core::require(present == Role::number, name,
+                  "of variables that angles and angle_pairs name once", variable);
+    present = role;
+  }
+
+  Ranges fixed_ranges(const Pairs& pairs) const {
+    const double unknown = std::numeric_limits<double>::quiet_NaN();
+    Ranges ranges{std::vector<double>(n_variables(), unknown),
+                  std::vector<double>(n_variables(), unknown)};
+    for (std::size_t i = 0; i < n_variables(); ++i) {
+      const auto bounds = fixed_range(i);
+      const bool is_fixed =
+          !config_.adaptive || roles_[i] == Role::symbol || roles_[i] == Role::circular;
+      if (bounds && is_fixed) std::tie(ranges.low[i], ranges.high[i]) = *bounds;
+    }
+    for (const auto& pair : pairs) {
+      for (const int variable : pair) {
+        ranges.low[index(variable)] = -1.0;
+        ranges.high[index(variable)] = 1.0;
+      }
+    }
+    for (const int variable : config_.angles) {
+      core::require(!is_unknown(ranges.low[index(variable)]), "angles",
+                    "of variables with a range (observation_range: -pi to pi, for example)",
+                    variable);
+    }
+    return ranges;
+  }
+
+  std::optional<std::pair<double, double>> fixed_range(std::size_t i) const {
+    const double infinity = std::numeric_limits<double>::infinity();
+    const double low = config_.low[i].value_or(-infinity);
+    const double high = config_.high[i].value_or(infinity);
+    if (!std::isfinite(low) || !std::isfinite(high)) return std::nullopt;
+    return std::pair(low, high);
+  }
+
+  static std::pair<double, double> widened(double low, double high) noexcept {
+    low = std::clamp(low, -kLargest, kLargest);
+    high = std::clamp(high, -kLargest, kLargest);
+    const double width = high > low ? high - low : std::max(std::abs(high), 1.0);
+    return {low - kHeadroom * width, high + kHeadroom * width};
+  }
+
+  /// What is rarely observed is left out of adaptive ranges; a variable that hardly moves has its
+  /// fixed range.
+  std::pair<double, double> fitted_range(std::vector<double> seen, std::size_t i) const {
+    std::ranges::sort(seen);
+    auto [low, high] = widened(seen.front(), seen.back());
+    if (!config_.adaptive) return {low, high};
+    const std::size_t n_rare = seen.size() / kRare;
+    const double first = seen[n_rare], last = seen[seen.size() - 1 - n_rare];
+    if (const auto bounds = fixed_range(i)) std::tie(low, high) = *bounds;
+    if (!(last > first)) return {low, high};
+    const auto [wide_low, wide_high] = widened(first, last);
+    return {std::max(wide_low, std::min(low, first)), std::min(wide_high, std::max(high, last))};
+  }
+
+  std::vector<double> column(std::span<const double> seen, std::size_t i) const {
+    std::vector<double> values;
+    for (; i < seen.size(); i += n_variables()) values.push_back(seen[i]);
+    return values;
+  }
+
+  Pairs pairs_in(std::span<const double> seen) const {
+    Pairs pairs;
+    for (std::size_t i = 0; i + 1 < n_variables(); ++i) {
+      if (roles_[i] != Role::number || roles_[i + 1] != Role::number) continue;
+      if (!is_on_circle(column(seen, i), column(seen, i + 1))) continue;
+      pairs.push_back({static_cast<int>(i), static_cast<int>(i + 1)});
+      ++i;
+    }
+    return pairs;
+  }
+
+  static bool is_on_circle(const std::vector<double>& cosines, const std::vector<double>& sines) {
+    for (std::size_t t = 0; t < cosines.size(); ++t) {
+      const double distance = cosines[t] * cosines[t] + sines[t] * sines[t] - 1.0;
+      if (!(std::abs(distance) < kNearCircle)) return false;
+    }
+    const auto moves = [](const std::vector<double>& values) {
+      const auto [least, most] = std::ranges::minmax(values);
+      return most - least > kNearCircle;
+    };
+    return moves(cosines) && moves(sines);
+  }
+
+  std::vector<ObservedInput> inputs_with(const Pairs& pairs) const {
+    std::vector<ObservedInput> of_variable(n_variables());
+    std::vector<bool> is_part(n_variables());
+    for (std::size_t i = 0; i < n_variables(); ++i) {
+      is_part[i] = roles_[i] == Role::symbol;
+      const bool wraps = roles_[i] == Role::circular;
+      of_variable[i] = {wraps ? ObservedKind::circular : ObservedKind::variable, i, 0};
+    }
+    for (const auto& pair : pairs) {
+      of_variable[index(pair[0])] = {ObservedKind::angle, index(pair[0]), index(pair[1])};
+      is_part[index(pair[1])] = true;
+    }
+    for (const auto& symbol : config_.symbols) {
+      of_variable[index(symbol[0])] = {ObservedKind::symbol, index(symbol[0]), index(symbol[1])};
+      is_part[index(symbol[0])] = false;
+    }
+    std::vector<ObservedInput> inputs;
+    for (std::size_t i = 0; i < n_variables(); ++i) {
+      if (!is_part[i]) inputs.push_back(of_variable[i]);
+    }
+    while (!inputs.empty() && inputs.size() < least_inputs_) inputs.push_back(inputs.back());
+    return inputs;
+  }
+
+  void take(const Ranges& ranges, const Pairs& pairs) {
+    auto inputs = inputs_with(pairs);
+    scale_.emplace(ranges.low, ranges.high, inputs);
+    ranges_ = ranges;
+    pairs_ = pairs;
+    inputs_ = std::move(inputs);
+  }
+
+  ObservationConfig config_;
+  std::size_t least_inputs_;
+  std::vector<Role> roles_;  ///< as the configuration has them
+  bool needs_fit_ = false;
+  Ranges ranges_;
+  Pairs pairs_;
+  std::vector<ObservedInput> inputs_;
+  std::optional<ObservationScale> scale_;
+};
+
+}  // namespace sdnn::agents

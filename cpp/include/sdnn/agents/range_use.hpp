@@ -1,0 +1,83 @@
+/// How observed variables use their ranges.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "sdnn/agents/observation_scale.hpp"
+#include "sdnn/agents/observations.hpp"
+#include "sdnn/core/pcg64.hpp"
+
+namespace sdnn::agents {
+
+/// How much of its range an observed variable has used of late.
+struct RangeUse {
+  double share_used;    ///< the part of the range in which it was for nine tenths of the time
+  double share_beyond;  ///< how often it was outside the range
+};
+
+/// Notes one in eight observations in the mean, of these the last 256 or so.
+class RangeNotes {
+ public:
+  explicit RangeNotes(std::size_t n_variables)
+      : n_variables_(n_variables),
+        most_(std::clamp(kMostValues / n_variables, kRare, kMostNoted)),
+        n_until_noted_(gap()) {}
+
+  /// Shape: (n_variables,).
+  void note(std::span<const double> observation) {
+    if (--n_until_noted_ > 0) return;
+    n_until_noted_ = gap();
+    if (notes_.size() < most_ * n_variables_) {
+      notes_.insert(notes_.end(), observation.begin(), observation.end());
+    } else {
+      std::ranges::copy(observation,
+                        notes_.begin() + static_cast<std::ptrdiff_t>(oldest_ * n_variables_));
+      oldest_ = (oldest_ + 1) % most_;
+    }
+  }
+
+  /// Of each variable; none for parts of angles and symbols, and before there are enough notes.
+  std::vector<std::optional<RangeUse>> use(const Observations& observations) const {
+    std::vector<std::optional<RangeUse>> use(n_variables_);
+    const std::size_t n = notes_.size() / n_variables_;
+    if (n < kRare) return use;
+    for (const ObservedInput& input : observations.inputs()) {
+      if (input.kind != ObservedKind::variable) continue;
+      const std::size_t i = input.first;
+      const double low = observations.low()[i], high = observations.high()[i];
+      std::vector<double> noted;
+      std::size_t n_beyond = 0;
+      for (std::size_t k = i; k < notes_.size(); k += n_variables_) {
+        if (notes_[k] < low || notes_[k] > high) ++n_beyond;
+        noted.push_back(std::clamp(notes_[k], low, high));
+      }
+      std::ranges::sort(noted);
+      const std::size_t n_rare = n / kRare;
+      use[i] = {(noted[n - 1 - n_rare] - noted[n_rare]) / (high - low),
+                static_cast<double>(n_beyond) / static_cast<double>(n)};
+    }
+    return use;
+  }
+
+ private:
+  static constexpr std::size_t kRare = 20;
+  static constexpr std::size_t kMostNoted = 256;
+  static constexpr std::size_t kMostValues = 1 << 20;
+
+  /// Of random lengths: even gaps meet episodes in step.
+  std::uint32_t gap() noexcept { return 1 + gaps_.below(15); }
+
+  std::size_t n_variables_, most_;
+  core::Pcg64 gaps_{std::array<std::uint64_t, 1>{0}};
+  std::uint32_t n_until_noted_;
+  std::vector<double> notes_;
+  std::size_t oldest_ = 0;
+};
+
+}  // namespace sdnn::agents

@@ -1,0 +1,204 @@
+/// The first steps of an agent that does not know the ranges of its observations yet.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <set>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/agents/episodes.hpp"
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/pcg64.hpp"
+
+namespace sdnn::agents {
+
+/// Acts at random and remembers transitions, which the agent learns when the warm-up is over.
+///
+/// A random action is kept for at least k steps with probability 1 / k, so that more is observed
+/// than by trembling around the start. Each environment has an action of its own.
+class WarmUp {
+ public:
+  /// A transition as it came: observation and action in the units of the task.
+  struct Step {
+    bool begins;  ///< an episode
+    std::size_t environment;
+    std::span<const double> observation, action;
+    double reward;
+    std::span<const double> next_observation;
+    bool terminated;
+  };
+
+  /// Where an agent cannot learn any transition, a warm-up is not over between acting and learning.
+  WarmUp(std::size_t n_variables, std::size_t n_dimensions, std::size_t n_steps, std::uint64_t seed,
+         bool learns_any_transition)
+      : n_variables_(n_variables),
+        n_dimensions_(n_dimensions),
+        n_steps_(n_steps),
+        learns_any_transition_(learns_any_transition),
+        random_(std::array{seed, kStream}),
+        evaluation_(std::array{seed, kStream + 1}),
+        episodes_({Episode(n_dimensions)}) {}
+
+  std::size_t n_environments() const noexcept { return episodes_.size(); }
+  /// Throws std::invalid_argument outside [1, 2^14].
+  void set_n_environments(std::size_t n) {
+    episodes_.resize(n, [this] { return Episode(n_dimensions_); });
+  }
+  /// How many environments there are, or were when a transition was remembered.
+  std::size_t n_in_all() const {
+    std::size_t n = n_environments();
+    for (const std::int64_t i : environments_) n = std::max(n, static_cast<std::size_t>(i) + 1);
+    return n;
+  }
+  std::size_t size() const noexcept { return rewards_.size(); }
+  bool is_over() const {
+    return size() >= n_steps_ && std::ranges::none_of(episodes_, &Episode::acted);
+  }
+
+  /// Throws std::invalid_argument if there is no such environment.
+  void begin_episode(std::size_t environment) {
+    Episode& episode = episodes_.of(environment);
+    episode.begins = true;
+    episode.n_kept = 0;
+    episode.acted = false;
+  }
+
+  /// A random action: what `draw(generator, action)` writes. Without `explore` from a stream of its
+  /// own. Throws std::invalid_argument if there is no such environment.
+  template <class Draw>
+  std::vector<double> act(const Draw& draw, bool explore, std::size_t environment) {
+    Episode& episode = episodes_.of(environment);
+    if (!explore) {
+      std::vector<double> action(n_dimensions_);
+      draw(evaluation_, action);
+      return action;
+    }
+    if (episode.n_kept == 0) {
+      draw(random_, episode.kept);
+      episode.n_kept =
+          static_cast<std::int64_t>(std::min(1.0 / (1.0 - random_.uniform()), kMostRepetitions));
+    }
+    --episode.n_kept;
+    episode.acted = !learns_any_transition_;
+    return episode.kept;
+  }
+
+  /// Remembers a transition. Throws std::invalid_argument if there is no such environment.
+  void learn(const Step& step) {
+    Episode& episode = episodes_.of(step.environment);
+    const auto append = [](auto& list, const auto& values) {
+      list.insert(list.end(), values.begin(), values.end());
+    };
+    append(observations_, step.observation);
+    append(next_observations_, step.next_observation);
+    append(actions_, step.action);
+    rewards_.push_back(step.reward);
+    terminated_.push_back(step.terminated ? 1 : 0);
+    begins_.push_back(episode.begins ? 1 : 0);
+    environments_.push_back(static_cast<std::int64_t>(step.environment));
+    episode.begins = episode.acted = false;
+  }
+
+  /// All that was observed. Shape: (n, n_variables), row by row.
+  std::vector<double> seen() const {
+    std::vector<double> seen = observations_;
+    seen.insert(seen.end(), next_observations_.begin(), next_observations_.end());
+    return seen;
+  }
+  /// Transition number t, in the order in which they came.
+  Step step(std::size_t t) const {
+    const auto row = [t](const std::vector<double>& values, std::size_t n) {
+      return std::span(values).subspan(t * n, n);
+    };
+    return {begins_[t] != 0,
+            static_cast<std::size_t>(environments_[t]),
+            row(observations_, n_variables_),
+            row(actions_, n_dimensions_),
+            rewards_[t],
+            row(next_observations_, n_variables_),
+            terminated_[t] != 0};
+  }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive) {
+    archive.numbers("observations", self.observations_);
+    archive.numbers("actions", self.actions_);
+    archive.numbers("rewards", self.rewards_);
+    archive.numbers("next_observations", self.next_observations_);
+    archive.numbers("terminated", self.terminated_);
+    archive.numbers("begins", self.begins_);
+    archive.numbers("environments", self.environments_);
+    archive.part("random", self.random_);
+    archive.part("evaluation", self.evaluation_);
+    Episodes<Episode>::serialize(
+        self.episodes_, archive, [&self] { return Episode(self.n_dimensions_); },
+        [&](auto& episode) {
+          archive.number("episode.begins", episode.begins);
+          archive.number("episode.acted", episode.acted);
+          archive.number("episode.n_kept", episode.n_kept);
+          archive.numbers("episode.kept", episode.kept);
+          if constexpr (Archive::kReads) {
+            archive.expect(episode.kept.size() == self.n_dimensions_, "episode.kept", "an action");
+            archive.expect(episode.n_kept >= 0 && episode.n_kept <= 100, "episode.n_kept",
+                           "in [0, 100]");
+          }
+        });
+    if constexpr (Archive::kReads) self.check(archive);
+  }
+
+  /// Whether `holds(step)` of every transition, and `is_action(kept)` of every action kept.
+  template <class Holds, class IsAction>
+  bool each_is(const Holds& holds, const IsAction& is_action) const {
+    for (std::size_t t = 0; t < size(); ++t) {
+      if (!holds(step(t))) return false;
+    }
+    return std::ranges::all_of(episodes_, is_action, &Episode::kept);
+  }
+
+ private:
+  /// What belongs to the present episode in one environment.
+  struct Episode {
+    explicit Episode(std::size_t n_dimensions) : kept(n_dimensions) {}
+    bool begins = true;        ///< with its next transition
+    bool acted = false;        ///< and must learn of it
+    std::vector<double> kept;  ///< the random action
+    std::int64_t n_kept = 0;   ///< steps that it will still last
+  };
+
+  static constexpr std::uint64_t kStream = std::uint64_t{1} << 32U;
+  static constexpr double kMostRepetitions = 100.0;
+
+  template <class Archive>
+  void check(Archive& archive) const {
+    const std::size_t n = size();
+    archive.expect(observations_.size() == n * n_variables_, "observations", "one per reward");
+    archive.expect(next_observations_.size() == n * n_variables_, "next_observations",
+                   "one per reward");
+    archive.expect(actions_.size() == n * n_dimensions_, "actions", "one per reward");
+    archive.expect(terminated_.size() == n, "terminated", "one per reward");
+    archive.expect(begins_.size() == n, "begins", "one per reward");
+    archive.expect(environments_.size() == n, "environments", "one per reward");
+    archive.expect(!is_over(), "rewards", "fewer than the warm-up's steps");
+    const auto is_environment = [](std::int64_t i) {
+      return i >= 0 && i < static_cast<std::int64_t>(Episodes<Episode>::kMost);
+    };
+    archive.expect(std::ranges::all_of(environments_, is_environment), "environments",
+                   "numbers of environments");
+  }
+
+  std::size_t n_variables_, n_dimensions_, n_steps_;
+  bool learns_any_transition_;
+  core::Pcg64 random_, evaluation_;
+  std::vector<double> observations_, next_observations_, actions_, rewards_;
+  std::vector<std::uint8_t> terminated_, begins_;
+  std::vector<std::int64_t> environments_;
+  Episodes<Episode> episodes_;
+};
+
+}  // namespace sdnn::agents

@@ -1,0 +1,109 @@
+#include "sdnn/agents/actions.hpp"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "states.hpp"
+
+namespace sdnn::agents {
+namespace {
+
+using Numbers = std::vector<double>;
+
+std::string error_of(const ActionConfig& config, std::size_t n_in_box) {
+  try {
+    const Actions actions(config, n_in_box);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Actions, OfABoxCutItsRangesEvenly) {
+  const Actions actions({.low = {-2.0, 0.0}, .high = {2.0, 0.3}}, 5);
+  EXPECT_EQ(actions.n_dimensions(), 2U);
+  EXPECT_EQ(actions.of_index(1, 0), -1.0);
+  EXPECT_EQ(actions.of_index(4, 1), 0.3);
+  for (const std::size_t d : {0U, 1U}) {
+    for (std::size_t a = 0; a < 5; ++a) EXPECT_EQ(actions.index_of(actions.of_index(a, d), d), a);
+  }
+  EXPECT_EQ(actions.index_of(-0.6, 0), 1U);  // the nearest one
+  EXPECT_EQ(actions.index_of(0.4, 0), 2U);
+  EXPECT_EQ(Actions({.low = {-2.0}, .high = {2.0}}, 1).index_of(1.0, 0), 0U);
+}
+
+TEST(Actions, OfANumberAreThePlaceInTheRange) {
+  const Actions actions({.low = {-2.0, 0.0}, .high = {6.0, 1.0}}, 0);
+  EXPECT_EQ(actions.of_normalized(-1.0, 0), -2.0);
+  EXPECT_EQ(actions.of_normalized(-0.5, 0), 0.0);
+  EXPECT_EQ(actions.of_normalized(1.0, 0), 6.0);
+  EXPECT_EQ(actions.of_normalized(-0.5, 1), 0.25);
+}
+
+TEST(Actions, OfWholeNumbersAreTheNearest) {
+  const ActionConfig bytes{.low = {0.0}, .high = {255.0}, .number = ActionNumber::whole};
+  const Actions actions(bytes, 5);
+  const Numbers expected = {0.0, 64.0, 128.0, 191.0, 255.0};
+  for (std::size_t index = 0; index < 5; ++index) {
+    EXPECT_EQ(actions.of_index(index, 0), expected[index]);
+    EXPECT_EQ(actions.index_of(expected[index], 0), index);
+  }
+  EXPECT_EQ(Actions(bytes, 0).of_normalized(0.001, 0), 128.0);
+  EXPECT_EQ(Actions(bytes, 0).of_normalized(1.0, 0), 255.0);
+}
+
+// The numbers are numpy.float32(0.1) and so on.
+TEST(Actions, AreRoundedToTheNumbersOfTheTask) {
+  const auto middle = [](double low, double high, ActionNumber number) {
+    return Actions({.low = {low}, .high = {high}, .number = number}, 3).of_index(1, 0);
+  };
+  EXPECT_EQ(middle(0.0, 0.2, ActionNumber::float64), 0.1);
+  EXPECT_EQ(middle(0.0, 0.2, ActionNumber::float32), 0.10000000149011612);
+  EXPECT_EQ(middle(0.0, 0.2, ActionNumber::float16), 0.0999755859375);
+  EXPECT_EQ(middle(60000.0, 60002.0, ActionNumber::float16), 60000.0);
+  EXPECT_EQ(middle(0.0, 0x1.8p-23, ActionNumber::float16), 0x1.0p-23);  // a tie goes to the even
+}
+
+TEST(Actions, OfADiscreteSpaceAreItsFirstAndTheIndex) {
+  const Actions actions({.low = {-1.0, 10.0}, .high = {1.0, 10.0}, .discrete = true}, 99);
+  EXPECT_EQ(actions.n_actions(), (std::vector<std::size_t>{3, 1}));
+  EXPECT_EQ(actions.of_index(2, 0), 1.0);
+  EXPECT_EQ(actions.of_index(0, 1), 10.0);
+  EXPECT_EQ(actions.index_of(1.0, 0), 2U);
+}
+
+TEST(Actions, OfAnotherTaskAreRefused) {
+  const Actions box({.low = {-2.0, 0.0}, .high = {2.0, 1.0}}, 5);
+  const Actions buttons({.low = {2.0}, .high = {4.0}, .discrete = true}, 1);
+  EXPECT_NO_THROW(box.require_action(Numbers{0.123, 1.0}));
+  EXPECT_NO_THROW(buttons.require_action(Numbers{3.0}));
+  for (const Numbers& bad : {Numbers{}, {0.0}, {0.0, 1.1}, {testing::kNaN, 0.0}, {-3.0, 0.0}}) {
+    EXPECT_THROW(box.require_action(bad), std::invalid_argument);
+  }
+  for (const double bad : {1.0, 5.0, 2.5, testing::kNaN, testing::kInfinity}) {
+    EXPECT_THROW(buttons.require_action(Numbers{bad}), std::invalid_argument);
+  }
+}
+
+TEST(Actions, NameTheFieldThatDoesNotFit) {
+  EXPECT_EQ(error_of({.low = {0.0}, .high = {1.0}}, 3), "no error");
+  EXPECT_NE(error_of({}, 3).find("action.low"), std::string::npos);
+  for (const ActionConfig& bad :
+       {ActionConfig{.low = {0.0}, .high = {1.0, 2.0}}, ActionConfig{.low = {0.0}, .high = {0.0}},
+        ActionConfig{.low = {0.0}, .high = {testing::kInfinity}},
+        ActionConfig{.low = {0.0}, .high = {1e17}, .number = ActionNumber::whole},
+        ActionConfig{.low = {0.0}, .high = {1048576.0}, .discrete = true},
+        ActionConfig{.low = {0.0}, .high = {-1.0}, .discrete = true},
+        ActionConfig{.low = {0.0}, .high = {0.5}, .discrete = true}}) {
+    EXPECT_NE(error_of(bad, 3).find("action.high"), std::string::npos) << error_of(bad, 3);
+  }
+  EXPECT_NE(error_of({.low = {0.0}, .high = {1.0}, .discrete = true}, 0).find("action.discrete"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace sdnn::agents

@@ -1,0 +1,171 @@
+#include "sdnn/agents/observations.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "states.hpp"
+
+namespace sdnn::agents {
+namespace {
+
+using Numbers = std::vector<double>;
+using Ends = std::vector<std::optional<double>>;
+
+ObservationConfig unbounded(std::size_t n) { return {.low = Ends(n), .high = Ends(n)}; }
+
+Observations fitted(const ObservationConfig& config, const Numbers& seen,
+                    bool codes_symbols = true) {
+  Observations observations(config, codes_symbols, 1);
+  observations.fit(seen);
+  return observations;
+}
+
+Numbers low_of(const Observations& one) { return {one.low().begin(), one.low().end()}; }
+Numbers high_of(const Observations& one) { return {one.high().begin(), one.high().end()}; }
+
+std::vector<ObservedKind> kinds_of(const Observations& one) {
+  std::vector<ObservedKind> kinds;
+  for (const ObservedInput& input : one.inputs()) kinds.push_back(input.kind);
+  return kinds;
+}
+
+std::string error_of(const ObservationConfig& config) {
+  try {
+    const Observations observations(config, true, 1);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Observations, WithFixedRangesNeedNoFit) {
+  const Observations observations({.low = {-1.0, 0.0}, .high = {3.0, 10.0}}, false, 1);
+  EXPECT_FALSE(observations.needs_fit());
+  Numbers state(2);
+  observations.scale(Numbers{1.0, 2.5}, state);
+  EXPECT_EQ(state, (Numbers{0.5, 0.25}));
+}
+
+TEST(Observations, AreFittedWithAQuarterMoreAtEachEnd) {
+  const auto observations = fitted(unbounded(3), {0.0, -5.0, 7.0, 4.0, 5.0, 7.0});
+  EXPECT_EQ(low_of(observations), (Numbers{-1.0, -7.5, 5.25}));  // a constant: a quarter of itself
+  EXPECT_EQ(high_of(observations), (Numbers{5.0, 7.5, 8.75}));
+  const ObservationConfig half_known{.low = {{}, 0.0}, .high = {{}, 1.0}};
+  EXPECT_EQ(low_of(fitted(half_known, {0.0, 0.4, 4.0, 0.6})), (Numbers{-1.0, 0.0}));
+}
+
+TEST(Observations, ThatAreInfiniteGiveFiniteRanges) {
+  const double end = testing::kInfinity;
+  const auto observations = fitted(unbounded(2), {0.0, end, end, end});
+  for (const double x : {observations.high()[0], observations.low()[1], observations.high()[1]}) {
+    EXPECT_TRUE(std::isfinite(x));
+  }
+}
+
+TEST(Observations, AdaptiveRangesLeaveOutWhatIsRareAndStayWithinTheFixedOnes) {
+  const double pi = std::numbers::pi;
+  const ObservationConfig config{.low = {-100.0, 0.0, 0.0, {}, -pi, -1.0},
+                                 .high = {100.0, 4.0, 1.0, {}, pi, 1.0},
+                                 .adaptive = true,
+                                 .angles = {4}};
+  Numbers seen;
+  for (int t = 0; t < 40; ++t) {  // 2 of 40 at each end are rare
+    const double part = static_cast<double>(t - 2) / 35.0;
+    const bool is_first = t < 2, is_last = t > 37;
+    seen.push_back(is_first ? -90.0 + t : is_last ? 70.0 + t : 2.0 + 4.0 * part);
+    seen.push_back(0.1 * t);             // a quarter more is over the ends
+    seen.push_back(t == 0 ? 1.0 : 0.0);  // hardly moves
+    seen.push_back(is_first ? -1e9 : is_last ? testing::kInfinity : 8.0 * part);
+    seen.push_back(0.1);                 // an angle
+    seen.push_back(t < 20 ? 0.0 : 3.0);  // beyond its bounds
+  }
+  const auto observations = fitted(config, seen);
+  EXPECT_EQ(low_of(observations), (Numbers{1.0, 0.0, 0.0, -2.0, -pi, -0.75}));
+  EXPECT_EQ(high_of(observations), (Numbers{7.0, 4.0, 1.0, 10.0, pi, 3.0}));
+}
+
+TEST(Observations, PairsOnTheCircleAreFound) {
+  ObservationConfig config{.low = Ends(4, -10.0), .high = Ends(4, 10.0), .find_angle_pairs = true};
+  Numbers seen, standing;
+  for (int t = 0; t < 40; ++t) {
+    const double angle = 5.0 * t / 39.0;
+    for (const double x : {angle, std::cos(angle), std::sin(angle), std::cos(angle)}) {
+      seen.push_back(x);
+    }
+    for (const double x : {1.0, 0.0, 1.0, 0.0}) standing.push_back(x);
+  }
+  const auto observations = fitted(config, seen);
+  EXPECT_EQ(kinds_of(observations),
+            (std::vector{ObservedKind::variable, ObservedKind::angle, ObservedKind::variable}));
+  EXPECT_EQ(observations.circular(), (std::vector<bool>{false, true, false}));
+  EXPECT_EQ(low_of(observations), (Numbers{-10.0, -1.0, -1.0, -10.0}));
+  EXPECT_EQ(fitted(config, standing).n_inputs(), 4U);
+  config.angles = {2};  // is no part of a pair then
+  EXPECT_EQ(fitted(config, seen).n_inputs(), 4U);
+}
+
+TEST(Observations, SymbolsAreInputsWhereTheyAreCoded) {
+  const ObservationConfig config{.low = {0.0, 0.0, -2.0, 0.0, 0.0},
+                                 .high = {1.0, 1.0, 2.0, 1.0, 1.0},
+                                 .adaptive = false,
+                                 .symbols = {{0, 2}, {3, 2}}};
+  const Observations coded(config, true, 1), plain(config, false, 1);
+  EXPECT_EQ(coded.n_symbols(), (std::vector<int>{2, 0, 2}));
+  EXPECT_EQ(plain.n_inputs(), 5U);
+  ObservationConfig adaptive = config;
+  adaptive.adaptive = true;  // symbols have no range to adapt
+  EXPECT_EQ(fitted(adaptive, Numbers(10, 0.5)).n_symbols(), coded.n_symbols());
+  const Observations lone({.low = Ends(2, 0.0), .high = Ends(2, 1.0), .symbols = {{0, 2}}}, true,
+                          2);
+  EXPECT_EQ(lone.n_symbols(), (std::vector<int>{2, 2}));  // repeated, as two are needed
+}
+
+TEST(Observations, ContinueFromTheirState) {
+  ObservationConfig config = unbounded(2);
+  config.find_angle_pairs = true;
+  Observations first(config, true, 1), second = first;
+  first.fit(Numbers{1.0, 0.0, 0.0, 1.0, -1.0, 0.0});
+  EXPECT_EQ(first.n_inputs(), 1U);
+  core::restore(second, core::state_of(first));
+  EXPECT_EQ(low_of(second), low_of(first));
+  EXPECT_EQ(kinds_of(second), kinds_of(first));
+  const auto good = core::state_of(first);
+  testing::expect_refused(first, testing::with_number(good, "low", 9.0), "state: low must be");
+  testing::expect_refused(first, testing::with_number(good, "angle_pairs", 7),
+                          "state: angle_pairs");
+}
+
+TEST(Observations, NameTheFieldThatDoesNotFit) {
+  const ObservationConfig good{.low = Ends(3, 0.0), .high = Ends(3, 1.0), .symbols = {{1, 2}}};
+  EXPECT_EQ(error_of(good), "no error");
+  const auto names = [&good](const char* name, auto change) {
+    ObservationConfig bad = good;
+    change(bad);
+    EXPECT_NE(error_of(bad).find(name), std::string::npos) << error_of(bad);
+  };
+  names("observation.low", [](auto& bad) { bad = {}; });
+  names("observation.high", [](auto& bad) { bad.high.pop_back(); });
+  names("observation.high", [](auto& bad) { bad.high[0] = -1.0; });
+  names("angles", [](auto& bad) { bad.angles = {3}; });
+  names("angles", [](auto& bad) { bad.angles = {-1}; });
+  names("angles", [](auto& bad) { bad.angles = {2}; });  // of a symbol
+  names("angles", [](auto& bad) { bad.angles = {0, 0}; });
+  names("angles", [](auto& bad) {
+    bad.angles = {0};
+    bad.high[0] = std::nullopt;
+  });
+  names("angle_pairs", [](auto& bad) { bad.angle_pairs = {{0, 3}}; });
+  names("angle_pairs", [](auto& bad) { bad.angle_pairs = {{0}}; });
+  names("symbols", [](auto& bad) { bad.symbols = {{2, 2}}; });
+  names("symbols", [](auto& bad) { bad.symbols = {{0, 2}, {1, 2}}; });
+}
+
+}  // namespace
+}  // namespace sdnn::agents

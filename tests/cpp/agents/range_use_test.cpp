@@ -1,0 +1,43 @@
+#include "sdnn/agents/range_use.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <vector>
+
+namespace sdnn::agents {
+namespace {
+
+using Numbers = std::vector<double>;
+
+TEST(RangeNotes, TellHowRangesAreUsed) {
+  const double pi = std::numbers::pi;
+  const Observations observations(
+      {.low = {0.0, -1.0, -pi, 0.0}, .high = {100.0, 1.0, pi, 1.0}, .angles = {2}}, false, 1);
+  RangeNotes notes(4);
+  for (int t = 0; t < 4000; ++t) {  // one in eight is noted in the mean, of these the last 256
+    notes.note(Numbers{20.0 + t / 100.0, t % 4 == 0 ? 3.0 : 0.0, 1.0 * t, 0.5});
+    if (t == 80) {
+      EXPECT_FALSE(notes.use(observations)[0]);
+    }
+  }
+  const auto use = notes.use(observations);
+  EXPECT_NEAR(use[0]->share_used, 0.9 * 20.48 / 100, 0.02);
+  EXPECT_EQ(use[1]->share_used, 0.5);
+  EXPECT_NEAR(use[1]->share_beyond, 0.25, 0.08);
+  EXPECT_FALSE(use[2]);
+  EXPECT_EQ(use[3]->share_used, 0.0);
+  EXPECT_EQ(use[0]->share_beyond, 0.0);
+}
+
+TEST(RangeNotes, AreOfAllStepsOfRegularEpisodes) {
+  const Observations observations({.low = {0.0}, .high = {1.0}}, false, 1);
+  for (const int period : {3, 4, 5, 8, 16, 24}) {
+    RangeNotes notes(1);
+    for (int t = 0; t < 4000; ++t) notes.note(Numbers{(t % period) / (period - 1.0)});
+    EXPECT_GT(notes.use(observations)[0]->share_used, 0.8) << period;
+  }
+}
+
+}  // namespace
+}  // namespace sdnn::agents

@@ -1,0 +1,100 @@
+#include "sdnn/agents/warm_up.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <set>
+#include <stdexcept>
+#include <vector>
+
+#include "sdnn/core/pcg64.hpp"
+#include "states.hpp"
+
+namespace sdnn::agents {
+namespace {
+
+using Numbers = std::vector<double>;
+
+void draw(core::Pcg64& random, Numbers& action) {
+  for (double& x : action) x = random.below(5);
+}
+
+void learn(WarmUp& warm_up, std::size_t environment, const Numbers& action) {
+  const Numbers observation{0.5, 1.5}, next{1.5, 2.5};
+  warm_up.learn({false, environment, observation, action, 1.0, next, false});
+}
+
+void step(WarmUp& warm_up, std::size_t environment = 0) {
+  learn(warm_up, environment, warm_up.act(draw, true, environment));
+}
+
+TEST(WarmUp, KeepsActionsForSomeStepsAndReachesAll) {
+  WarmUp warm_up(2, 1, 1000, 3, true);
+  std::set<double> taken;
+  int n_changes = 0;
+  double last = -1.0;
+  for (int t = 0; t < 400; ++t) {
+    const double action = warm_up.act(draw, true, 0)[0];
+    taken.insert(action);
+    n_changes += action != last ? 1 : 0;
+    last = action;
+  }
+  EXPECT_EQ(taken.size(), 5U);
+  EXPECT_LT(n_changes, 200);
+  EXPECT_GT(n_changes, 20);
+}
+
+TEST(WarmUp, EvaluationChangesNothing) {
+  WarmUp one(2, 1, 100, 3, true), other = one;
+  for (int t = 0; t < 50; ++t) {
+    (void)one.act(draw, false, 0);
+    EXPECT_EQ(one.act(draw, true, 0), other.act(draw, true, 0));
+  }
+}
+
+TEST(WarmUp, RemembersTransitionsInTheirOrder) {
+  WarmUp warm_up(2, 1, 3, 3, true);
+  warm_up.set_n_environments(2);
+  learn(warm_up, 1, {2.0});
+  learn(warm_up, 0, {3.0});
+  EXPECT_FALSE(warm_up.is_over());
+  learn(warm_up, 1, {4.0});
+  EXPECT_TRUE(warm_up.is_over());
+  EXPECT_EQ(warm_up.step(0).environment, 1U);
+  EXPECT_TRUE(warm_up.step(0).begins);
+  EXPECT_TRUE(warm_up.step(1).begins);
+  EXPECT_FALSE(warm_up.step(2).begins);
+  EXPECT_EQ(warm_up.step(2).action[0], 4.0);
+  EXPECT_EQ(warm_up.step(2).next_observation[1], 2.5);
+  EXPECT_EQ(warm_up.seen().size(), 12U);
+  warm_up.set_n_environments(1);
+  EXPECT_EQ(warm_up.n_in_all(), 2U);
+  EXPECT_THROW((void)warm_up.act(draw, true, 1), std::invalid_argument);
+}
+
+TEST(WarmUp, WaitsForWhatWasActedWhereOnlyOwnActionsAreLearned) {
+  WarmUp warm_up(2, 1, 2, 3, false);
+  warm_up.set_n_environments(2);
+  step(warm_up, 0);
+  const Numbers waits = warm_up.act(draw, true, 1);
+  step(warm_up, 0);
+  EXPECT_FALSE(warm_up.is_over());
+  learn(warm_up, 1, waits);
+  EXPECT_TRUE(warm_up.is_over());
+}
+
+TEST(WarmUp, ContinuesFromItsState) {
+  WarmUp whole(2, 1, 100, 3, true);
+  whole.set_n_environments(2);
+  for (int t = 0; t < 20; ++t) step(whole, static_cast<std::size_t>(t % 2));
+  WarmUp again(2, 1, 100, 9, true);
+  core::restore(again, core::state_of(whole));
+  for (int t = 0; t < 20; ++t) {
+    for (WarmUp* const one : {&whole, &again}) step(*one, 1);
+  }
+  EXPECT_EQ(core::state_of(whole), core::state_of(again));
+  testing::expect_that_damage_is_refused(whole);
+}
+
+}  // namespace
+}  // namespace sdnn::agents

@@ -1,0 +1,53 @@
+#include "sdnn/core/pcg64.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "states.hpp"
+
+namespace sdnn::core {
+namespace {
+
+using Seeds = std::vector<std::uint64_t>;
+
+struct Drawn {
+  Seeds seeds;
+  std::array<std::uint32_t, 5> below_7;
+  double uniform;
+  std::uint32_t below_2_20;
+  std::uint64_t bits;
+};
+
+// As numpy.random.Generator(PCG64(SeedSequence(seeds))) draws: integers, random, integers, raw.
+TEST(Pcg64, DrawsAsNumPy) {
+  const std::vector<Drawn> drawn = {
+      {{0}, {5, 4, 3, 1, 2}, 0.016527635528529094, 42963, 15002187965291974971U},
+      {{5, 4294967296}, {6, 5, 3, 2, 6}, 0.4106650053839328, 718495, 17808439220834274975U},
+      {{9223372036854775813U, 4294967297},
+       {1, 4, 2, 2, 2},
+       0.15769863079913804,
+       739458,
+       3353183172323727852U}};
+  for (const Drawn& expected : drawn) {
+    Pcg64 random(expected.seeds);
+    for (const std::uint32_t number : expected.below_7) EXPECT_EQ(random.below(7), number);
+    EXPECT_EQ(random.uniform(), expected.uniform);
+    EXPECT_EQ(random.below(1 << 20), expected.below_2_20);
+    EXPECT_EQ(random.below(1), 0U);
+    EXPECT_EQ(random.bits(), expected.bits);
+  }
+}
+
+TEST(Pcg64, ContinuesFromItsState) {
+  Pcg64 random(Seeds{1, 2}), other(Seeds{3});
+  (void)random.below(5);  // half of 64 bits is left
+  restore(other, state_of(random));
+  for (int i = 0; i < 9; ++i) EXPECT_EQ(random.below(1000), other.below(1000));
+  testing::expect_that_damage_is_refused(random);
+}
+
+}  // namespace
+}  // namespace sdnn::core
