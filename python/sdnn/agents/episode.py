@@ -11,12 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.evaluation import episode_seed
-from sdnn.agents.rounds import Outcome, rounds_in
+from sdnn.agents.rounds import OneEnvironment, Outcome, rounds_in
 from sdnn.agents.saved_training import SavedEpisode
 
 __all__ = ["Actions", "Episode", "Episodes", "UnrepeatedEpisodeError"]
 
 _LEARNING = 0
+
+_PART = 1024
+"""Actions in an array."""
 
 
 class UnrepeatedEpisodeError(ValueError):
@@ -24,7 +27,7 @@ class UnrepeatedEpisodeError(ValueError):
 
 
 class Actions:
-    """The actions of an episode in one array, which grows: an episode may have millions of them.
+    """The actions of an episode, which may have millions of them, in arrays of many each.
 
     Parameters
     ----------
@@ -33,26 +36,22 @@ class Actions:
     """
 
     def __init__(self, taken: NDArray[Any] | None = None) -> None:
-        self._n = 0 if taken is None else len(taken)
-        self._array = taken if self._n else None
-
-    def __len__(self) -> int:
-        return self._n
+        self._old = [] if taken is None or not len(taken) else [taken]
+        self._recent: list[Any] = []
 
     @property
     def taken(self) -> NDArray[Any]:
         """All of them, shape (n, ...)."""
-        return np.empty(0) if self._array is None else self._array[: self._n]
+        recent = [np.array(self._recent)] if self._recent else []
+        parts = self._old + recent
+        return np.concatenate(parts) if parts else np.empty(0)
 
     def append(self, action: Any) -> None:
         """Add one, of the shape and type of the others."""
-        if self._array is None:
-            one = np.asarray(action)
-            self._array = np.empty((16, *one.shape), one.dtype)
-        elif self._n == len(self._array):
-            self._array = np.concatenate([self._array, np.empty_like(self._array)])
-        self._array[self._n] = action
-        self._n += 1
+        self._recent.append(action)
+        if len(self._recent) == _PART:
+            self._old.append(np.array(self._recent))
+            self._recent.clear()
 
 
 @dataclass(slots=True, eq=False)
@@ -147,6 +146,8 @@ class Episodes:
         act
             Gives the action in an environment.
         """
+        if isinstance(self._rounds, OneEnvironment):
+            yield from self._outcomes_of_one(self._rounds, begin, act)
         present, has_seeds = self.present, self._seed is not None
         while True:
             for i in range(self._first_left, self.n_environments):
@@ -171,6 +172,28 @@ class Episodes:
                 episode.n_steps += 1
                 if has_seeds:
                     episode.actions.append(actions[i])
+
+    def _outcomes_of_one(
+        self,
+        env: OneEnvironment,
+        begin: Callable[[int], None],
+        act: Callable[[int, Episode], Any],
+    ) -> Iterator[tuple[int, Episode, Outcome]]:
+        """Give the same of a single environment, where a round is as short as can be."""
+        present, has_seeds, step = self.present, self._seed is not None, env.step_one
+        while True:
+            episode = present[0]
+            if episode is None:
+                self._begin_episodes(begin)
+                episode = present[0]
+                assert episode is not None
+            if episode.outcome is None:
+                action = act(0, episode)
+                episode.outcome, episode.action = step(action), action
+                episode.n_steps += 1
+                if has_seeds:
+                    episode.actions.append(action)
+            yield 0, episode, episode.outcome
 
     def _begin_episodes(self, begin: Callable[[int], None]) -> dict[int, int]:
         """Begin an episode where the last one is over; return their numbers."""
@@ -222,10 +245,10 @@ class Episodes:
         self._require_repeatable(len(saved))
         for i, one in enumerate(saved):
             if one is not None:
-                taken = Actions(one.actions)
-                last = one.actions[-1] if len(taken) else None
+                n = len(one.actions)
+                last = one.actions[-1] if n else None
                 self.present[i] = Episode(
-                    one.number, None, taken, len(taken), last, one.sum_of_rewards
+                    one.number, None, Actions(one.actions), n, last, one.sum_of_rewards
                 )
         self._replay({i for i, one in enumerate(saved) if one is not None and one.waits})
         for now, then in zip(self.present, saved, strict=True):
@@ -262,22 +285,23 @@ class Episodes:
         Until its own episode begins, an environment does anything.
         """
         present = {i: episode for i, episode in enumerate(self.present) if episode is not None}
-        n_rounds = max((len(episode.actions) for episode in present.values()), default=0)
-        longest = next((e for e in present.values() if len(e.actions) == n_rounds), None)
+        taken = {i: episode.actions.taken for i, episode in present.items()}
+        n_rounds = max(map(len, taken.values()), default=0)
+        longest = next((one for one in taken.values() if len(one) == n_rounds), None)
         every = range(self.n_environments)
         numbers = {i: present[i].number if i in present else 0 for i in every}
         ended = set(every)
         for t in range(n_rounds):
             assert longest is not None
-            starts = {i for i, e in present.items() if n_rounds - len(e.actions) == t}
+            starts = {i for i, own in taken.items() if n_rounds - len(own) == t}
             if starts | ended:
                 seen = self._reset({i: numbers[i] for i in sorted(starts | ended)})
             for i in starts:
                 present[i].observation = seen[i]
             actions = [
-                present[i].actions.taken[t - n_rounds]
-                if i in present and t >= n_rounds - len(present[i].actions)
-                else longest.actions.taken[t]
+                taken[i][t - n_rounds]
+                if i in taken and t >= n_rounds - len(taken[i])
+                else longest[t]
                 for i in every
             ]
             outcomes = self._rounds.step(actions)

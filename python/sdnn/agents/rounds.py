@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 import gymnasium as gym
 import numpy as np
 
-__all__ = ["Outcome", "Rounds", "rounds_in"]
+__all__ = ["OneEnvironment", "Outcome", "Rounds", "rounds_in"]
 
 Seeds: TypeAlias = Mapping[int, int | None]
 Options: TypeAlias = dict[str, Any] | None
@@ -70,13 +70,15 @@ class Rounds(abc.ABC):
 def rounds_in(env: gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any]) -> Rounds:
     """Find out how to go around an environment, or a vector of them."""
     if not isinstance(env, gym.vector.VectorEnv):
-        return _OneEnvironment(env)
+        return OneEnvironment(env)
     if _resets_each(env):
         return _SeparateResets(env)
     return _OwnResets(env)
 
 
-class _OneEnvironment(Rounds):
+class OneEnvironment(Rounds):
+    """A single environment."""
+
     n_environments = 1
     can_repeat = True
 
@@ -84,13 +86,21 @@ class _OneEnvironment(Rounds):
         self._env = env
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
+        """Begin its episode."""
         return {
             i: own_copy(self._env.reset(seed=seed, options=options)[0]) for i, seed in seeds.items()
         }
 
     def step(self, actions: Sequence[Any]) -> list[Outcome]:
-        seen, reward, terminated, truncated, _ = self._env.step(own_copy(actions[0]))
-        return [Outcome(own_copy(seen), reward, bool(terminated), bool(truncated))]
+        """Take the only action."""
+        return [self.step_one(actions[0])]
+
+    def step_one(self, action: Any) -> Outcome:
+        """Take an action."""
+        taken = action.copy() if type(action) is np.ndarray else own_copy(action)
+        seen, reward, terminated, truncated, _ = self._env.step(taken)
+        seen = seen.copy() if type(seen) is np.ndarray else own_copy(seen)
+        return Outcome(seen, reward, bool(terminated), bool(truncated))
 
 
 class _Vector(Rounds, abc.ABC):
