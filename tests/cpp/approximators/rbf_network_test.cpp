@@ -209,8 +209,9 @@ TEST(RBFNetwork, NamesWhatIsImpossible) {
   EXPECT_EQ(message<Error>({.n_actions = 0}), "n_actions must be in [1, 1048576], got 0");
   EXPECT_EQ(message<Error>({.width = 0.0}), "width must be in [0.1, 100], got 0");
   EXPECT_EQ(message<Error>({.gradient_rate = -1.0}),
-            "gradient_rate must be a finite number greater than 0, got -1");
-  EXPECT_EQ(message<Error>({.gradient_rate = 1e7}), "gradient_rate must be at most 1e6, got 1e+07");
+            "gradient_rate must be in (0, 1000000], got -1");
+  EXPECT_EQ(message<Error>({.gradient_rate = 1e7}),
+            "gradient_rate must be in (0, 1000000], got 1e+07");
   EXPECT_EQ(
       message<std::length_error>({.n_inputs = 1, .n_bases = 8000, .n_actions = 1 << 20}),
       "n_actions or n_bases must be smaller: the bases of all actions need 67108864000 bytes, "
