@@ -177,7 +177,7 @@ def test_the_type_stub_is_up_to_date():
 
 SHIPPED = (
     r"PKG-INFO|CMakeLists\.txt|pyproject\.toml|LICENSE|CITATION\.cff|[A-Z]+\.md",
-    r"CMakePresets\.json|mkdocs\.yml|\.gitignore|\.clang-(format|tidy)|docs/site/Doxyfile",
+    r"CMakePresets\.json|noxfile\.py|mkdocs\.yml|\.gitignore|\.clang-(format|tidy)|docs/site/Doxyfile",
     r"cmake/(toolchains/)?[^/]+\.cmake(\.in)?",
     r"cpp/include/sdnn/([a-z_]+/){0,2}[a-z0-9_]+\.hpp",
     r"cpp/tools/[a-z_]+\.hpp|cpp/bindings/([a-z_]+\.[ch]pp|CMakeLists\.txt)",
