@@ -7,7 +7,7 @@ import gymnasium as gym
 
 from sdnn.agents import PRESETS
 from sdnn.cli import main
-from sdnn.runs import RunConfig
+from sdnn.runs.spec_file import read_spec
 
 TEXT = (Path(__file__).parents[2] / "docs" / "agents.md").read_text()
 
@@ -41,9 +41,8 @@ def test_the_commands_and_options_exist():
 def test_the_configuration_file_is_one(tmp_path):
     (text,) = blocks("toml")
     (tmp_path / "mine.toml").write_text(text)
-    config = RunConfig.read(tmp_path / "mine.toml")
-    env = config.environment.make()
-    assert config.make_agent(env).approximator.rounding == "random"
+    spec = read_spec(tmp_path / "mine.toml")
+    assert spec.make_agent(spec.make_env()).approximator.rounding == "random"
 
 
 def test_the_table_of_presets_is_right():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -35,69 +34,11 @@ seed_option = click.option(
     help="Root of the episodes' seeds.  [default: others than those of the training]",
 )
 
-_OPTIONS = {"environment.noise": "--noise", "environment.redundant": "--redundant"}
-
-
-def option_of(key: str) -> str:
-    """Find the option that sets a key of a run's configuration."""
-    words = key.split(".")
-    if words[0] == "settings":
-        return f"--set {'.'.join(words[1:])}"
-    if key.startswith("environment.kwargs"):
-        return " ".join(["--env-arg", *words[2:]])
-    if key.startswith("environment.ranges"):
-        return "--range"
-    if words[0] == "environment":
-        return _OPTIONS.get(key, "ENV_ID")
-    return "--" + key.replace("_", "-")
-
-
-_CAUSES = {"environment.ranges": ("environment.noise", "environment.redundant")}
-"""Of what is missing: what asks for it."""
-
-
-class Origins:
-    """Where the values of a configuration come from: options, and a file before them."""
-
-    def __init__(self) -> None:
-        self._places: dict[str, str] = {}
-
-    def add_file(self, path: Path) -> None:
-        """Note the values of a file; ConfigError if it cannot be read."""
-        from sdnn.runs.config import places_in
-
-        self._places |= places_in(path)
-
-    def add_option(self, key: str) -> None:
-        """Note that an option gave a value, whatever a file says."""
-        self._places[key] = ""
-
-    def words(self, error: ConfigError) -> str:
-        """Tell an error with the option, or with file, line and key."""
-        place = self._place(error.key, error.problem)
-        return f"{place}: {error.key}: {error.problem}" if place else option_words(error)
-
-    def _place(self, key: str, problem: str) -> str:
-        if key in self._places:
-            return self._places[key]
-        near = [one for one in self._places if _is_in(one, key) or _is_in(key, one)]
-        near = near or [one for one in _CAUSES.get(key, ()) if one in self._places]
-        near = near or [one for one in self._places if _is_in(one, _table_of(key))]
-        words = set(re.findall(r"\w+", problem))
-        near.sort(key=lambda one: one.rpartition(".")[2] not in words)
-        return self._places[near[0]] if near else ""
-
-
-def _is_in(key: str, table: str) -> bool:
-    return key.startswith(f"{table}.")
-
-
-def _table_of(key: str) -> str:
-    return key.rpartition(".")[0]
-
 
 def option_words(error: ConfigError) -> str:
-    """Tell an error in what options gave."""
+    """Tell an error in the option that gave the value."""
+    from sdnn.cli.spec_options import option_of
+
     return f"{option_of(error.key)}: {error.problem}"
 
 
@@ -220,7 +161,7 @@ def train_run(
 
         from sdnn.agents.callbacks import TrainingProgress
 
-        callbacks.append(TrainingProgress(Console(stderr=True), run.config.environment.id))
+        callbacks.append(TrainingProgress(Console(stderr=True), run.spec.task))
     outcome = run.train(
         steps=steps, episodes=episodes, callbacks=callbacks, repeat_episodes=repeat_episodes
     )
@@ -271,7 +212,7 @@ def _lines_of_scaling(run: Run, scaling: Scaling | None) -> Iterator[str]:
     if scaling is not None:
         yield (
             f"the agent observes variables scaled to [0, 1], {scaling.words()}: elsewhere it needs"
-            f" the same, as sdnn.runs.Run.open({str(run.folder)!r}).config.environment.make()"
+            f" the same, as sdnn.runs.Run.open({str(run.folder)!r}).spec.make_env()"
             " gives it"
         )
 
@@ -293,7 +234,7 @@ def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
     yield f"{run.folder}: {outcome.n_steps} steps, {outcome.n_episodes} episodes{why}"
     if outcome.is_warming_up:
         yield (
-            f"{WARMING_UP}; that takes {run.config.warm_up_steps} steps:"
+            f"{WARMING_UP}; that takes {run.spec.agent.warm_up_steps} steps:"
             f" {command_line('sdnn', 'resume', run.folder, '--steps', 'N')} goes on"
         )
     row = outcome.last_evaluation

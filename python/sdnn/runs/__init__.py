@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from sdnn.lazy import attach
 
 if TYPE_CHECKING:
-    from sdnn.runs.config import RunConfig
     from sdnn.runs.dask_executor import DaskExecutor
     from sdnn.runs.engine import Observer, run_trials
     from sdnn.runs.environment import EnvironmentSpec
@@ -62,7 +61,6 @@ __all__ = [
     "ProtocolSpec",
     "ResultStore",
     "Run",
-    "RunConfig",
     "RunError",
     "RunEvaluation",
     "RunOutcome",

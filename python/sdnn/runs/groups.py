@@ -12,7 +12,7 @@ from sdnn.runs.run import Run
 
 __all__ = ["Group", "groups_of"]
 
-_CHANGES_NOTHING = ("format", "seed", "checkpoint_every", "tensorboard")
+_CHANGES_NOTHING = ("seed", "output")
 """Of a configuration: what may differ within a group."""
 
 _NOT_NAMED = ("0", "0.0", "none", "false", "null")
@@ -33,7 +33,7 @@ def groups_of(runs: Sequence[Run]) -> list[Group]:
     groups: dict[tuple[tuple[str, str], ...], list[Run]] = {}
     for run in runs:
         groups.setdefault(tuple(sorted(_definition(run).items())), []).append(run)
-    names = [_names(_definition(members[0])) for members in groups.values()]
+    names = [_names(dict(_flat(members[0].spec.values()))) for members in groups.values()]
     names = _told_apart(names, [dict(definition) for definition in groups])
     names = _told_apart(names, [{"folder": str(own[0].folder)} for own in groups.values()])
     return [
@@ -58,7 +58,7 @@ def _told_apart(
 
 def _definition(run: Run) -> dict[str, str]:
     """Return what defines what a run learns, but for its seed, as texts by dotted keys."""
-    values = {k: v for k, v in run.config.values().items() if k not in _CHANGES_NOTHING}
+    values = {k: v for k, v in run.spec.full_values().items() if k not in _CHANGES_NOTHING}
     return dict(_flat(values)) | {"goals": ", then ".join(_goals(run))}
 
 
@@ -66,19 +66,19 @@ def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, st
     for name, value in values.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{prefix}{name}.")
-        elif prefix or name not in ("steps", "episodes"):
+        elif f"{prefix}{name}" not in ("budget.steps", "budget.episodes"):
             yield f"{prefix}{name}", value if isinstance(value, str) else json.dumps(value)
 
 
 def _names(values: Mapping[str, str]) -> tuple[str, str]:
     """Return the name of the task and that of the agent."""
-    task, agent = [values["environment.id"]], [values["agent"]]
-    if "preset" in values:
-        agent[0] += f" {values['preset']}"
+    task = [values.get("environment.id", "acrobot")]
+    agent = [" ".join(values[key] for key in ("agent.name", "agent.preset") if key in values)]
     for key, value in values.items():
-        if key.startswith("environment.") and key != "environment.id" and value not in _NOT_NAMED:
-            task.append(_word(key, value))
-        if key.startswith("settings.") or (key == "angle_pairs" and value not in _NOT_NAMED):
+        table, _, name = key.partition(".")
+        if table in ("environment", "acrobot", "goal", "sensors") and name != "id":
+            task += [_word(key, value)] * (value not in _NOT_NAMED)
+        if table in ("agent", "approximator", "learning") and name not in ("name", "preset"):
             agent.append(_word(key, value))
     return ", ".join(task), ", ".join(agent)
 
@@ -89,9 +89,9 @@ def _word(key: str, value: str) -> str:
 
 def _goals(run: Run) -> list[str]:
     """Write its goals, each after the step where it was given, if that was the user's choice."""
-    config = run.config
-    words = [f"{config.episodes} episodes" if config.steps is None else f"{config.steps} steps"]
-    due = None if config.target_return is not None else config.steps
+    budget = run.spec.budget
+    words = [f"{budget.episodes} episodes" if budget.steps is None else f"{budget.steps} steps"]
+    due = None if budget.target_return is not None else budget.steps
     for goal in run.goals:
         text = f"{goal.episodes} episodes" if goal.steps is None else f"{goal.steps} steps"
         is_early = due is not None and goal.at_step < due

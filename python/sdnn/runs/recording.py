@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from sdnn.agents import Agent, UnusableStepError
 from sdnn.agents.evaluation import greedy_episode
-from sdnn.runs.environment import EnvironmentSpec, render_modes
+from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
+from sdnn.runs.spec import RunSpec
 from sdnn.whole_files import whole_file, write_whole
 
 __all__ = ["SUFFIXES", "Recording", "record"]
@@ -134,8 +135,7 @@ def record(
         raise RunError(f'{path} needs {package}, which is missing: pip install "sdnn[render]"')
     agent = run.agent()
     root = run.fresh_seed if seed is None else seed
-    environment = run.config.environment
-    with closing(_filmed(environment)) as env:
+    with closing(_filmed(run.spec)) as env:
         run.check_spaces(agent, env)
         recording = Recording(agent, env, root, max_steps)
         rate = float((env.metadata or {}).get("render_fps") or FRAMES_PER_SECOND)
@@ -144,16 +144,16 @@ def record(
         try:
             write(path, recording.frames(), rate)
         except UnusableStepError as error:
-            raise RunError(f"{environment.id}: {error}") from error
+            raise RunError(f"{run.spec.task}: {error}") from error
     return recording
 
 
-def _filmed(environment: EnvironmentSpec) -> gym.Env[Any, Any]:
-    env = environment.make("evaluation_sensor_noise", render_mode="rgb_array")
+def _filmed(spec: RunSpec) -> gym.Env[Any, Any]:
+    env = spec.make_env("evaluation_sensor_noise", render_mode="rgb_array")
     if "rgb_array_list" not in render_modes(env):
         return env
     env.close()
-    return environment.make("evaluation_sensor_noise", render_mode="rgb_array_list")
+    return spec.make_env("evaluation_sensor_noise", render_mode="rgb_array_list")
 
 
 def _write_gif(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> None:

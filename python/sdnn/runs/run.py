@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium as gym
 
+from sdnn._core import __version__
 from sdnn.agents import (
     Agent,
     Callback,
@@ -27,7 +28,7 @@ from sdnn.agents import (
 from sdnn.agents.callbacks import Row
 from sdnn.agents.spaces import require_same_kind
 from sdnn.interrupts import Interrupts
-from sdnn.runs.config import RunConfig, read_json
+from sdnn.runs.config_file import ConfigFile
 from sdnn.runs.engine import run_trials
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line
@@ -43,13 +44,13 @@ from sdnn.runs.run_training import (
     one_of,
     tensorboard_in,
 )
+from sdnn.runs.spec import BudgetSpec, RunSpec
+from sdnn.runs.spec_file import FORMAT, read_spec
 from sdnn.runs.store import ResultStore
 from sdnn.whole_files import lock, remove_abandoned_files, write_whole
 
 if TYPE_CHECKING:
     from typing_extensions import Self
-
-    from sdnn.runs.spec import RunSpec
 
 __all__ = ["Goal", "Run", "RunEvaluation", "RunOutcome"]
 
@@ -80,19 +81,19 @@ class Run:
     Attributes
     ----------
     folder : Path
-    config : RunConfig
+    spec : RunSpec
         As it was begun.
     goals : tuple of Goal
         Goals it was given later, in order.
     """
 
-    def __init__(self, folder: Path, config: RunConfig, goals: Iterable[Goal] = ()) -> None:
+    def __init__(self, folder: Path, spec: RunSpec, goals: Iterable[Goal] = ()) -> None:
         self.folder = folder
-        self.config = config
+        self.spec = spec
         self.goals = tuple(goals)
 
     @classmethod
-    def create(cls, folder: str | Path, config: RunConfig) -> Self:
+    def create(cls, folder: str | Path, spec: RunSpec) -> Self:
         """Begin a run: make its folder with its configuration, once all is known to work.
 
         Raises
@@ -110,9 +111,9 @@ class Run:
             raise RunError(f"{place} holds a run already: {goes_on} goes on with it")
         if place.exists() and (not place.is_dir() or any(place.iterdir())):
             raise RunError(f"{place} is there already, and no run: take another folder")
-        cls(place, config).check()
+        cls(place, spec).check()
         place.mkdir(parents=True, exist_ok=True)
-        run = cls(place, config)
+        run = cls(place, spec)
         run.write_config()
         return run
 
@@ -129,18 +130,18 @@ class Run:
         path = place / CONFIG
         if not path.exists():
             raise RunError(f"{place} holds no run: there is no {path}")
-        goals = read_json(path).pop("goals", [])
+        goals = ConfigFile.read(path).values.get("goals", [])
         try:
             read = [Goal(**goal) for goal in goals]
         except (TypeError, ValueError) as error:
             raise ConfigError("goals", f"must be a list of goals: {error}", str(path)) from error
-        return cls(place, RunConfig.read(path), read)
+        return cls(place, read_spec(path), read)
 
     def check(self) -> None:
         """Make all that is needed once, to see that it works; ConfigError if not."""
-        with closing(self.config.environment.make()) as env, self.evaluation_env():
-            self.config.make_agent(env)
-        if self.config.tensorboard:
+        with closing(self.spec.make_env()) as env, self.evaluation_env():
+            self.spec.make_agent(env)
+        if self.spec.output.tensorboard:
             tensorboard_in(self.folder)
 
     def train(
@@ -246,12 +247,12 @@ class Run:
         """
         root = self.fresh_seed if seed is None else seed
         agent = self.agent()
-        with closing(self.config.environment.make("evaluation_sensor_noise")) as env:
+        with closing(self.spec.make_env("evaluation_sensor_noise")) as env:
             self.check_spaces(agent, env)
             try:
                 found = evaluate(agent, env, episodes, seed=root)
             except UnusableStepError as error:
-                raise RunError(f"{self.config.environment.id}: {error}") from error
+                raise RunError(f"{self.spec.task}: {error}") from error
         return RunEvaluation(
             returns=found.returns,
             lengths=found.lengths,
@@ -264,20 +265,18 @@ class Run:
         try:
             require_same_kind(agent, env)
         except ValueError as error:
-            raise RunError(f"{self.config.environment.id} has changed: {error}") from error
+            raise RunError(f"{self.spec.task} has changed: {error}") from error
 
     @property
     def fresh_seed(self) -> int:
         """A root of episodes that the run itself does not have."""
-        return (self.config.seed + 2**63) % 2**64
+        return (self.spec.seed + 2**63) % 2**64
 
     @property
     def key(self) -> TrialKey:
         """Where its rows are stored."""
-        return TrialKey(
-            self.config.environment.id, self.config.agent, 0, self.config.seed,
-            self.config.config_hash,
-        )  # fmt: skip
+        spec = self.spec
+        return TrialKey(spec.task, spec.label, 0, spec.seed, spec.config_hash)
 
     def rows(self) -> list[Row]:
         """Read the rows: episodes and evaluations, in order.
@@ -295,21 +294,21 @@ class Run:
     @contextmanager
     def evaluation_env(self) -> Iterator[gym.Env[Any, Any] | None]:
         """Make an environment for evaluations where there are any; there may be one robot only."""
-        if not self.config.evaluate_every:
+        if not self.spec.is_evaluated:
             yield None
             return
         try:
-            env = self.config.environment.make("evaluation_sensor_noise")
+            env = self.spec.make_env("evaluation_sensor_noise")
         except ConfigError as error:
             problem = f"needs a second environment, or must be 0: {error.problem}"
-            raise ConfigError("evaluate_every", problem) from error
+            raise ConfigError("protocol.evaluate_every", problem) from error
         with closing(env):
             yield env
 
     @property
-    def goal(self) -> Goal | RunConfig:
+    def goal(self) -> Goal | BudgetSpec:
         """How many steps or episodes it is to learn in all."""
-        return self.goals[-1] if self.goals else self.config
+        return self.goals[-1] if self.goals else self.spec.budget
 
     def add_goal(self, at_step: int, steps: int | None, episodes: int | None) -> None:
         """Note a new goal in the configuration."""
@@ -318,7 +317,7 @@ class Run:
 
     def write_config(self) -> None:
         """Write the configuration and the goals."""
-        values = self.config.values()
+        values: dict[str, Any] = {"format": FORMAT, "version": __version__, **self.spec.values()}
         if self.goals:
             values["goals"] = [
                 {

@@ -26,8 +26,9 @@ from sdnn.agents.scaling import Scaling
 from sdnn.arguments import whole
 from sdnn.runs.errors import ConfigError, RunError, command_line, problem_of
 from sdnn.runs.records import TrialRows
+from sdnn.runs.spec import BudgetSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
-from sdnn.runs.trial import Reason, TrainingTrial
+from sdnn.runs.trial import Reason, TrainingTrial, reset_options, training_of
 
 if TYPE_CHECKING:
     from sdnn.runs.run import Run
@@ -126,7 +127,7 @@ class _StoredCheckpoints(Checkpoints):
     """Stores the rows of a run before each checkpoint that counts them."""
 
     def __init__(self, run: Run, store: ResultStore) -> None:
-        super().__init__(run.folder / CHECKPOINT, run.config.checkpoint_every)
+        super().__init__(run.folder / CHECKPOINT, run.spec.output.checkpoint_every)
         self._run, self._results = run, store
         self._rows: list[Row] = []
 
@@ -144,7 +145,7 @@ class _StoredCheckpoints(Checkpoints):
 
     def _store(self, training: Training) -> None:
         first = training.n_rows - len(self._rows)
-        config = self._run.config.canonical_json()
+        config = self._run.spec.canonical_json()
         rows = TrialRows.from_training(self._rows, first)
         self._results.extend(self._run.key, rows, first, config=config, version=__version__)
         self._rows = []
@@ -212,20 +213,20 @@ class RunTask:
 
     def canonical_json(self) -> str:
         """Return what defines the run."""
-        return self._run.config.canonical_json()
+        return self._run.spec.canonical_json()
 
     def make_trial(self, seed: int) -> RunTrial:
         """Make the training, from the checkpoint if there is one; the run has a seed already."""
-        run, config = self._run, self._run.config
+        run, spec = self._run, self._run.spec
         has_goal = self._goal != (None, None)
         with ExitStack() as stack:
-            env: Any = stack.enter_context(closing(config.make_training_env()))
+            env: Any = stack.enter_context(closing(spec.make_training_env()))
             evaluation_env = stack.enter_context(run.evaluation_env())
             target = None
-            if config.target_return is not None and not (run.goals or has_goal):
-                target = _Target(config.target_return)
+            if spec.budget.target_return is not None and not (run.goals or has_goal):
+                target = _Target(spec.budget.target_return)
             told = [self._stop, target, self._checkpoints, *self._given]
-            if config.tensorboard:
+            if spec.output.tensorboard:
                 told.append(tensorboard_in(run.folder))
             callbacks = [one for one in told if one is not None]
             if (run.folder / CHECKPOINT).exists():
@@ -249,25 +250,16 @@ class RunTask:
         saved = f"the first {n_steps} steps are saved: {goes_on} goes on there with a new episode"
         if n_steps == 0:
             saved = f"nothing is learned yet: {goes_on} begins again once the environment is mended"
-        told = RunError(f"{self._run.config.environment.id}: {error}; {saved}")
+        told = RunError(f"{self._run.spec.task}: {error}; {saved}")
         told.__cause__ = error
         return told
 
     def _begun(
         self, env: Any, evaluation_env: gym.Env[Any, Any] | None, callbacks: list[Callback]
     ) -> Training:
-        config, goal = self._run.config, self._run.goal
-        return Training(
-            config.make_agent(one_of(env)),
-            env,
-            steps=goal.steps,
-            episodes=goal.episodes,
-            seed=config.seed,
-            callbacks=callbacks,
-            evaluate_every=config.evaluate_every or None,
-            evaluation_env=evaluation_env,
-            evaluation_episodes=config.evaluation_episodes,
-        )
+        goal = self._run.goal
+        budget = BudgetSpec(steps=goal.steps, episodes=goal.episodes)
+        return training_of(self._run.spec.replace(budget=budget), env, evaluation_env, callbacks)
 
     def _loaded(
         self, env: Any, evaluation_env: gym.Env[Any, Any] | None, callbacks: list[Callback]
@@ -280,6 +272,7 @@ class RunTask:
                 callbacks=callbacks,
                 evaluation_env=evaluation_env,
                 repeat_episodes=self._repeats,
+                reset_options=reset_options(self._run.spec),
             )
         except UnrepeatedEpisodeError as error:
             begins = command_line("sdnn", "resume", folder, "--new-episode")
@@ -319,7 +312,7 @@ def tensorboard_in(folder: Path) -> TensorBoard:
     try:
         return TensorBoard(folder / TENSORBOARD)
     except ImportError as error:
-        raise ConfigError("tensorboard", str(error)) from error
+        raise ConfigError("output.tensorboard", str(error)) from error
 
 
 def one_of(env: Any) -> gym.Env[Any, Any]:

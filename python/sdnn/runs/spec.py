@@ -46,6 +46,9 @@ DEFAULT_STEPS = 200_000
 PAPER_EPISODES = 15_000
 PAPER_INTERVAL = 10
 
+_ALWAYS = ("id", "name", "preset", "steps", "episodes")
+"""Settings that are written also where they are the default."""
+
 _ACROBOT = {"acrobot": AcrobotConfig, "goal": GoalScheduleConfig, "sensors": SensorConfig}
 
 
@@ -191,6 +194,11 @@ class RunSpec(Settings, frozen=True):
     def is_evaluated(self) -> bool:
         """Whether there are evaluations."""
         return bool(self.protocol.evaluate_every or self.protocol.evaluate_every_episodes)
+
+    @property
+    def task(self) -> str:
+        """The environment's id, or ``"acrobot"`` for the paper's."""
+        return "acrobot" if self.environment is None else self.environment.id
 
     @property
     def label(self) -> str:
@@ -367,7 +375,29 @@ class RunSpec(Settings, frozen=True):
     # Files and stores.
 
     def values(self) -> dict[str, Any]:
-        """Return all values as JSON has them; `from_values` reads them."""
+        """Return what is not the default as JSON has it; `from_values` reads it.
+
+        The settings of the agent's parts are those that differ from its preset.
+        """
+        environment = None if self.environment is None else EnvironmentSpec(id=self.task)
+        agent = AgentSpec(name=self.agent.name, preset=self.agent.preset)
+        defaults = RunSpec(environment=environment, agent=agent).full_values()
+        values: dict[str, Any] = {}
+        for name, value in self.full_values().items():
+            if isinstance(value, Mapping):
+                value = {
+                    key: one
+                    for key, one in value.items()
+                    if key in _ALWAYS or one != defaults[name].get(key)
+                }
+                if name in ("agent", "budget", "protocol"):  # None: as it follows from others
+                    value = {key: one for key, one in value.items() if one is not None}
+            if value not in ({}, defaults[name]):
+                values[name] = value
+        return values
+
+    def full_values(self) -> dict[str, Any]:
+        """Return all values as JSON has them."""
         values = {name: value for name, value in values_of(self).items() if value is not None}
         values["approximator"].pop("n_inputs", None)
         return values
@@ -399,7 +429,7 @@ class RunSpec(Settings, frozen=True):
         Presets are resolved, so equal settings give equal text however they were typed. With the
         agent's version, where its entry has one.
         """
-        values = self.values()
+        values = self.full_values()
         for name in ("seed", "output"):
             del values[name]
         values["agent"].pop("preset")

@@ -6,7 +6,7 @@ siblings), by the same protocol, bit for bit.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypeVar
 
@@ -186,5 +186,14 @@ def training_of(
         evaluation_env=evaluation_env,
         evaluation_episodes=spec.protocol.evaluation_episodes or 1,
         limit_bootstraps=spec.protocol.limit_bootstraps,
-        reset_options=(lambda episode: {"episode": episode}) if is_acrobot else None,
+        reset_options=reset_options(spec),
     )
+
+
+def reset_options(spec: RunSpec) -> Callable[[int], dict[str, Any]] | None:
+    """Return what resets are told on the paper's acrobot: the number of the episode."""
+    return _episode_number if spec.environment is None else None
+
+
+def _episode_number(episode: int) -> dict[str, Any]:
+    return {"episode": episode}

@@ -20,8 +20,8 @@ from sdnn.coding import Symbolic, WithMissing
 from sdnn.estimators import libsdnn
 from sdnn.reproduction.studies import read_study
 from sdnn.runs import ResultStore, StoreError
-from sdnn.runs.config import RunConfig
 from sdnn.runs.errors import RunError
+from sdnn.runs.spec_file import read_spec
 
 ROOT = Path(__file__).parents[3]
 X = np.random.RandomState(0).uniform(size=(40, 2))
@@ -104,15 +104,14 @@ def read_store(path):
         results.measurements("cost")
 
 
-RUN = b"""steps = 1000
+RUN = b"""budget.steps = 1000
 seed = 3
-agent = "sdnn-c"
-preset = "general"
+agent = "sdnn-c-general"
 [environment]
 id = "Pendulum-v1"
-[settings.approximator]
+[approximator]
 n_pattern_units = 40
-[settings.learning]
+[learning]
 discount = 0.95
 """
 
@@ -137,7 +136,7 @@ READERS = {
         read_study,
         (RunError,),
     ),
-    "run": Reader("run.toml", lambda: [RUN], RunConfig.read, (RunError,)),
+    "run": Reader("run.toml", lambda: [RUN], read_spec, (RunError,)),
 }
 
 

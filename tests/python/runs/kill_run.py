@@ -13,12 +13,13 @@ from pathlib import Path
 
 import drifting_env  # noqa: F401
 from sdnn.agents import Training
-from sdnn.runs import Run, RunConfig
+from sdnn.runs import Run
+from sdnn.runs.spec_file import read_spec
 
 
 def steps_done(run):
     try:
-        env, evaluation_env = (run.config.environment.make() for _ in range(2))
+        env, evaluation_env = (run.spec.environment.make() for _ in range(2))
         path = run.folder / "checkpoint.safetensors"
         return Training.load(path, env, evaluation_env=evaluation_env).n_steps
     except FileNotFoundError:
@@ -26,7 +27,7 @@ def steps_done(run):
 
 
 def main(folder, config, n_kills, seed):
-    run = Run.create(folder, RunConfig.read(config))
+    run = Run.create(folder, read_spec(config))
     chance = random.Random(seed)
     began = time.perf_counter()
     longest = 0.02  # seconds that a process has, at most; more where that is too little

@@ -1,18 +1,18 @@
 import csv
-import dataclasses
 import json
 
 import numpy as np
 import pytest
 
-from sdnn.runs import EnvironmentSpec, Goal, Run, RunConfig, RunError
+from run_specs import run_spec
+from sdnn.runs import EnvironmentSpec, Goal, Run, RunError
 from sdnn.runs.curves import curves_of, write_curves
 from sdnn.runs.figures import draw_curves
 from sdnn.runs.groups import groups_of
 from sdnn.runs.records import TrialRows
 from sdnn.runs.store import ResultStore
 
-CONFIG = RunConfig(environment=EnvironmentSpec(id="CartPole-v1"))
+CONFIG = run_spec(environment=EnvironmentSpec(id="CartPole-v1"))
 
 
 def make(folder, config, returns=(), evaluations=(), every=20):
@@ -70,7 +70,7 @@ def test_several_runs_of_one_task_are_one_curve(tmp_path):
     runs = [
         make(
             tmp_path / str(seed),
-            dataclasses.replace(CONFIG, seed=seed),
+            run_spec(CONFIG, seed=seed),
             [7],
             [[value] for value in means[seed]],
         )
@@ -87,17 +87,14 @@ def test_several_runs_of_one_task_are_one_curve(tmp_path):
 
 
 def test_several_runs_without_evaluations_have_the_median_of_running_medians(tmp_path):
-    runs = [
-        make(tmp_path / str(n), dataclasses.replace(CONFIG, seed=n), [n] * (5 + n))
-        for n in range(2)
-    ]
+    runs = [make(tmp_path / str(n), run_spec(CONFIG, seed=n), [n] * (5 + n)) for n in range(2)]
     (curve,) = curves_of(runs)[0]
     assert (curve.kind, curve.steps[0], curve.steps[-1]) == ("running median", 10, 50)
     assert set(curve.values.tolist()) == {0.5}
 
 
 def test_tasks_and_agents_are_parted(tmp_path):
-    noisy = dataclasses.replace(
+    noisy = run_spec(
         CONFIG,
         environment=EnvironmentSpec(
             id="CartPole-v1",
@@ -106,7 +103,7 @@ def test_tasks_and_agents_are_parted(tmp_path):
             kwargs={"max_episode_steps": 9},
         ),
     )
-    set_otherwise = dataclasses.replace(CONFIG, settings={"learning": {"discount": 0.9}})
+    set_otherwise = run_spec(CONFIG, settings={"learning": {"discount": 0.9}})
     runs = [
         make(tmp_path / str(n), config, [1])
         for n, config in enumerate((CONFIG, noisy, set_otherwise))
@@ -130,13 +127,12 @@ def configs_that_differ():
         {"evaluate_every": 0},
         {"evaluation_episodes": 3},
         {"target_return": 400.0},
-        {"version": "0.0.1"},
         {"angle_pairs": "find"},
         {"settings": {"learning": {"discount": 0.5}}},
         {"environment": EnvironmentSpec(id="CartPole-v1", kwargs={"sutton_barto_reward": True})},
         {"environment": EnvironmentSpec(id="CartPole-v1", kwargs={"sutton_barto_reward": 1})},
     ):
-        yield dataclasses.replace(CONFIG, **change)
+        yield run_spec(CONFIG, **change)
 
 
 def test_only_runs_that_differ_in_their_seeds_are_put_together(tmp_path):
@@ -148,7 +144,7 @@ def test_only_runs_that_differ_in_their_seeds_are_put_together(tmp_path):
             Run(folder, config).folder.mkdir()
             (folder / "config.json").write_text(
                 json.dumps(
-                    dataclasses.replace(
+                    run_spec(
                         config, seed=seed, checkpoint_every=seed, tensorboard=seed == 2
                     ).values()
                 )
@@ -162,14 +158,14 @@ def test_only_runs_that_differ_in_their_seeds_are_put_together(tmp_path):
 
 
 def test_names_say_in_what_runs_differ(tmp_path):
-    long = dataclasses.replace(CONFIG, steps=600)
-    short = dataclasses.replace(CONFIG, steps=300)
+    long = run_spec(CONFIG, steps=600)
+    short = run_spec(CONFIG, steps=300)
     goals = {
         "a": (long, []),
         "b": (short, []),
         "c": (short, [Goal(at_step=300, steps=600)]),
         "d": (short, [Goal(at_step=150, steps=600)]),
-        "e": (dataclasses.replace(short, n_envs=4), []),
+        "e": (run_spec(short, n_envs=4), []),
     }
     groups = groups_of([Run(tmp_path / name, *parts) for name, parts in goals.items()])
     assert [group.agent.removeprefix("sdnn-c general, ") for group in groups] == [
@@ -182,14 +178,14 @@ def test_names_say_in_what_runs_differ(tmp_path):
 
 
 def test_goals_that_follow_from_the_seed_keep_runs_together(tmp_path):
-    of_episodes = dataclasses.replace(CONFIG, steps=None, episodes=30)
-    targeted = dataclasses.replace(CONFIG, target_return=5.0)
+    of_episodes = run_spec(CONFIG, steps=None, episodes=30)
+    targeted = run_spec(CONFIG, target_return=5.0)
     for config, one, other in (
         (of_episodes, Goal(at_step=271, episodes=60), Goal(at_step=300, episodes=60)),
         (targeted, Goal(at_step=271, steps=600), Goal(at_step=300, steps=600)),
     ):
         runs = [
-            Run(tmp_path / str(goal.at_step), dataclasses.replace(config, seed=goal.at_step), goals)
+            Run(tmp_path / str(goal.at_step), run_spec(config, seed=goal.at_step), goals)
             for goal in (one, other)
             for goals in [[goal]]
         ]
@@ -200,14 +196,14 @@ def test_runs_that_are_evaluated_at_other_steps_are_both_drawn(tmp_path):
     runs = [
         make(
             tmp_path / str(every),
-            dataclasses.replace(CONFIG, evaluate_every=every),
+            run_spec(CONFIG, evaluate_every=every),
             [1, 2],
             [[3]],
             every=every,
         )
         for every in (500, 700)
     ]
-    third = dataclasses.replace(CONFIG, environment=EnvironmentSpec(id="Acrobot-v1"))
+    third = run_spec(CONFIG, environment=EnvironmentSpec(id="Acrobot-v1"))
     runs.append(make(tmp_path / "other", third, [1]))
     curves, notes = curves_of(runs)
     assert notes == []
@@ -221,15 +217,12 @@ def test_runs_that_are_evaluated_at_other_steps_are_both_drawn(tmp_path):
 
 
 def test_runs_of_other_lengths_are_not_cut(tmp_path):
-    runs = [
-        make(tmp_path / str(n), dataclasses.replace(CONFIG, steps=20 * n), [], [[3]] * n)
-        for n in (2, 5)
-    ]
+    runs = [make(tmp_path / str(n), run_spec(CONFIG, steps=20 * n), [], [[3]] * n) for n in (2, 5)]
     assert [curve.steps[-1] for curve in curves_of(runs)[0]] == [40, 100]
 
 
 def test_what_is_left_out_of_several_runs_is_told(tmp_path):
-    seeds = [dataclasses.replace(CONFIG, seed=seed) for seed in range(4)]
+    seeds = [run_spec(CONFIG, seed=seed) for seed in range(4)]
     whole = make(tmp_path / "whole", seeds[0], [1], [[2], [4], [6]])
     short = make(tmp_path / "short", seeds[1], [1], [[0], [2]])
     begun = make(tmp_path / "begun", seeds[2], [1])
@@ -246,7 +239,7 @@ def test_what_is_left_out_of_several_runs_is_told(tmp_path):
         (kind, str(whole.folder)) for kind in ("return", "running median", "evaluation")
     ]
     assert notes == [f"{begun.folder}: no evaluation is whole yet"]
-    late = make(tmp_path / "late", dataclasses.replace(CONFIG, seed=9), [], [[1]], every=30)
+    late = make(tmp_path / "late", run_spec(CONFIG, seed=9), [], [[1]], every=30)
     with pytest.raises(RunError) as caught:
         curves_of([short, late])
     folders = f"{short.folder}, {late.folder}"

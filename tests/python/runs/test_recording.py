@@ -8,14 +8,15 @@ import pytest
 from PIL import Image
 
 import drifting_env
+from run_specs import run_spec
 from sdnn.agents.evaluation import EVALUATION, episode_seed
-from sdnn.runs import EnvironmentSpec, Run, RunConfig, RunError
+from sdnn.runs import EnvironmentSpec, Run, RunError
 from sdnn.runs.recording import record
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    config = RunConfig(
+    config = run_spec(
         environment=EnvironmentSpec(
             id="tests/Drifting-v0", ranges={"all": (-4.0, 4.0)}, noise=0.01
         ),
@@ -72,7 +73,7 @@ def test_an_environment_need_not_say_how_it_is_rendered(run, tmp_path, monkeypat
 
 
 def test_what_moves_between_decisions_is_filmed(tmp_path):
-    config = RunConfig(
+    config = run_spec(
         environment=EnvironmentSpec(id="sdnn/AcrobotSwingUp-v0"), agent="rbf", steps=60
     )
     run = Run.create(tmp_path / "run", config)

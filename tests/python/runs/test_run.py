@@ -1,4 +1,3 @@
-import dataclasses
 import errno
 import json
 import os
@@ -11,8 +10,9 @@ import numpy as np
 import pytest
 
 import drifting_env  # noqa: F401
+from run_specs import run_spec
 from sdnn.agents import Callback, Training, load_agent
-from sdnn.runs import ConfigError, EnvironmentSpec, Run, RunConfig, RunError
+from sdnn.runs import ConfigError, EnvironmentSpec, Run, RunError
 from sdnn.runs.records import TrialRows
 from sdnn.runs.store import ResultStore
 
@@ -21,7 +21,7 @@ SMALL = {
     "agent": {"warm_up_steps": 60},
 }
 
-CONFIG = RunConfig(
+CONFIG = run_spec(
     environment=EnvironmentSpec(
         id="tests/Drifting-v0", ranges={"all": (-4.0, 4.0)}, noise=0.02, redundant=1
     ),
@@ -33,7 +33,7 @@ CONFIG = RunConfig(
     checkpoint_every=70,
 )
 
-WARMING_UP = dataclasses.replace(CONFIG, environment=EnvironmentSpec(id="tests/Drifting-v0"))
+WARMING_UP = run_spec(CONFIG, environment=EnvironmentSpec(id="tests/Drifting-v0"))
 
 
 def contents(run):
@@ -51,7 +51,7 @@ def whole(tmp_path_factory):
     done = []
 
     def _whole(config):
-        found = next((run for run in done if run.config == config), None)
+        found = next((run for run in done if run.spec == config), None)
         if found is None:
             found = Run.create(folder / str(len(done)), config)
             found.train()
@@ -93,7 +93,7 @@ def test_a_run_is_the_training_that_its_configuration_says(whole, tmp_path):
     }  # fmt: skip
 
 
-SEVERAL = dataclasses.replace(WARMING_UP, n_envs=3)
+SEVERAL = run_spec(WARMING_UP, n_envs=3)
 
 
 @pytest.mark.parametrize(
@@ -142,7 +142,7 @@ def test_after_an_error_a_run_goes_on_from_the_last_checkpoint(whole, tmp_path):
 
 
 def test_killed_at_any_instant_a_run_goes_on_exactly(whole, tmp_path):
-    config = dataclasses.replace(CONFIG, steps=1500, checkpoint_every=13)
+    config = run_spec(CONFIG, steps=1500, checkpoint_every=13)
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(config.values()))
     script = Path(__file__).with_name("kill_run.py")
@@ -157,7 +157,7 @@ def test_killed_at_any_instant_a_run_goes_on_exactly(whole, tmp_path):
 
 
 def test_a_target_stops_the_run_and_a_new_goal_drops_it(tmp_path):
-    config = dataclasses.replace(CONFIG, target_return=-1e9)
+    config = run_spec(CONFIG, target_return=-1e9)
     run = Run.create(tmp_path / "run", config)
     outcome = run.train()
     assert (outcome.n_steps, outcome.reason) == (90, "target")
@@ -168,11 +168,11 @@ def test_a_target_stops_the_run_and_a_new_goal_drops_it(tmp_path):
     assert (outcome.n_steps, outcome.reason) == (200, "done")
     reopened = Run.open(run.folder)
     assert [(goal.at_step, goal.steps) for goal in reopened.goals] == [(90, 200)]
-    assert reopened.config == config
+    assert reopened.spec == config
 
 
 def test_a_new_goal_is_kept_when_the_run_is_stopped_again(tmp_path):
-    run = Run.create(tmp_path / "run", dataclasses.replace(CONFIG, steps=50))
+    run = Run.create(tmp_path / "run", run_spec(CONFIG, steps=50))
     run.train()
     run.train(steps=120, callbacks=[StopAt(80)])
     assert Run.open(run.folder).train().n_steps == 120
@@ -215,10 +215,10 @@ def test_what_was_learned_is_not_written_over_by_a_new_beginning(tmp_path):
 
 
 def test_nothing_is_written_for_what_cannot_work(tmp_path):
-    wrong = dataclasses.replace(CONFIG, environment=EnvironmentSpec(id="Nothing-v0"))
+    wrong = run_spec(CONFIG, environment=EnvironmentSpec(id="Nothing-v0"))
     with pytest.raises(ConfigError):
         Run.create(tmp_path / "run", wrong)
-    wrong = dataclasses.replace(CONFIG, settings={"learning": {"discount": 2}})
+    wrong = run_spec(CONFIG, settings={"agent": {"angles": [99]}})
     with pytest.raises(ConfigError):
         Run.create(tmp_path / "run", wrong)
     assert list(tmp_path.iterdir()) == []
@@ -283,5 +283,5 @@ def test_folders_that_hold_no_run_or_a_damaged_one(whole, tmp_path):
             Run.open(run.folder)
     config.write_text(json.dumps(told, indent=2))
     config.write_text(config.read_text().replace('"steps": 400', '"steps": "many"', 1))
-    with pytest.raises(ConfigError, match=r"config\.json: steps: must be a whole number"):
+    with pytest.raises(ConfigError, match=r"config\.json: budget\.steps: must be a whole number"):
         Run.open(run.folder)

@@ -1,0 +1,59 @@
+"""Write docs/settings.md from the declarations of the settings: python docs/write_settings.py."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from sdnn.runs.spec_schema import CORE, spec_schema
+
+PAGE = Path(__file__).parent / "settings.md"
+
+HEAD = """# Settings of a run
+
+<!-- Written by docs/write_settings.py from the declarations of the settings. -->
+
+The keys of files for `sdnn train --config FILE`, of `--set KEY=VALUE`, and of [studies](sweep.md).
+`approximator.*` and `learning.*` are those of the agent; defaults are the paper's, before the
+agent's preset. `sdnn train --schema` prints the same as JSON Schema.
+"""
+
+
+def page() -> str:
+    """Return the page."""
+    definitions = spec_schema()["$defs"]
+    text = HEAD
+    for table, found in definitions["RunSpec"]["properties"].items():
+        text += f"\n## {table}\n\n{found['description']}\n"
+        names = [kind.__name__ for kind in CORE.get(table, ())]
+        names = names or [
+            one["$ref"].rpartition("/")[2] for one in found.get("anyOf", [found]) if "$ref" in one
+        ]
+        for name in names:
+            text += f"\n`{name}`:\n\n| setting | type | default | meaning |\n|---|---|---|---|\n"
+            text += "".join(rows(table, definitions[name]["properties"]))
+    return text
+
+
+def rows(table: str, properties: dict[str, Any]) -> Iterator[str]:
+    """Write the rows of a table."""
+    for name, found in properties.items():
+        default = "" if found.get("default") in (None, (), {}) else f"`{found.get('default')}`"
+        text = found.get("description", "").replace("|", "\\|")
+        yield f"| `{table}.{name}` | {words(found)} | {default} | {text} |\n"
+
+
+def words(found: dict[str, Any]) -> str:
+    """Write a type with its bounds."""
+    if "anyOf" in found:
+        return ", ".join(words(one) for one in found["anyOf"] if one.get("type") != "null")
+    if "enum" in found:
+        return ", ".join(f"`{word}`" for word in found["enum"] if word is not None)
+    text: str = found.get("type", "")
+    limits = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<="}
+    return text + "".join(f" {sign} {found[key]:g}" for key, sign in limits.items() if key in found)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), "utf-8")

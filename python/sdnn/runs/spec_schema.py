@@ -1,0 +1,90 @@
+"""The JSON Schema of a run's specification: for editors, command-line options and documentation."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+import msgspec
+
+from sdnn.config import (
+    AcrobotConfig,
+    Field,
+    FuzzyQLearningConfig,
+    FuzzyRulesConfig,
+    GoalScheduleConfig,
+    QLearningConfig,
+    RBFNetworkConfig,
+    SDNNCConfig,
+    SensorConfig,
+    fields_of,
+)
+from sdnn.runs.spec import RunSpec
+
+__all__ = ["property_of", "spec_schema"]
+
+CORE = {
+    "acrobot": (AcrobotConfig,),
+    "goal": (GoalScheduleConfig,),
+    "sensors": (SensorConfig,),
+    "approximator": (SDNNCConfig, RBFNetworkConfig, FuzzyRulesConfig),
+    "learning": (QLearningConfig, FuzzyQLearningConfig),
+}
+"""The core's settings in a specification, by their tables."""
+
+
+def spec_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a specification.
+
+    Examples
+    --------
+    >>> spec_schema()["$defs"]["QLearningConfig"]["properties"]["epsilon"]["maximum"]
+    1.0
+    """
+    structs = [_struct(kind) for kinds in CORE.values() for kind in kinds]
+    (top, *_), components = msgspec.json.schema_components(
+        [RunSpec, *structs], ref_template="#/$defs/{name}"
+    )
+    properties = components["RunSpec"]["properties"]
+    for table, core in CORE.items():
+        properties[table]["anyOf"] = [{"$ref": f"#/$defs/{kind.__name__}"} for kind in core]
+    for table in ("approximator", "learning"):
+        properties[table]["anyOf"].append({"type": "object"})  # of an agent from elsewhere
+    for table in ("environment", "agent"):
+        inner = {
+            name: properties[table].pop(name)
+            for name in ("anyOf", "$ref")
+            if name in properties[table]
+        }
+        properties[table]["anyOf"] = [*inner.get("anyOf", [inner]), {"type": "string"}]
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **top, "$defs": components}
+
+
+def property_of(schema: dict[str, Any], key: str) -> dict[str, Any]:
+    """Return the schema of a setting by its key, such as ``"budget.steps"``."""
+    made = schema["$defs"]["RunSpec"]
+    for name in key.split("."):
+        found = made["properties"][name]
+        refs = [one["$ref"] for one in (found, *found.get("anyOf", ())) if "$ref" in one]
+        made = schema["$defs"][refs[0].rpartition("/")[2]] if refs else found
+    return dict(made)
+
+
+def _struct(kind: Any) -> Any:
+    """Make a class of the fields of the core's settings, without the number of inputs."""
+    return msgspec.defstruct(
+        kind.__name__,
+        [(one.name, _type(one), one.default) for one in fields_of(kind) if one.name != "n_inputs"],
+        forbid_unknown_fields=True,
+    )
+
+
+def _type(field: Field) -> Any:
+    limits: dict[str, Any] = {}
+    if field.hint in ("int", "float"):
+        number = int if field.hint == "int" else float
+        if math.isfinite(field.low):
+            limits["gt" if field.excludes_low else "ge"] = number(field.low)
+        if math.isfinite(field.high):
+            limits["le"] = number(field.high)
+    return Annotated[field.type, msgspec.Meta(description=field.doc, **limits)]

@@ -1,0 +1,38 @@
+"""The page of settings, and the JSON Schema that it is made of."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from sdnn.cli import main
+from sdnn.config import fields_of
+from sdnn.runs.spec_schema import CORE, spec_schema
+
+SCRIPT = Path(__file__).parents[2] / "docs" / "write_settings.py"
+
+
+def test_the_page_is_that_of_the_declarations():
+    spec = importlib.util.spec_from_file_location("write_settings", SCRIPT)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.PAGE.read_text("utf-8") == module.page(), "run docs/write_settings.py"
+
+
+def test_the_schema_has_every_setting_and_is_printed():
+    schema = spec_schema()
+    for kind in (kind for kinds in CORE.values() for kind in kinds):
+        names = {field.name for field in fields_of(kind)} - {"n_inputs"}
+        assert set(schema["$defs"][kind.__name__]["properties"]) == names
+    printed = CliRunner().invoke(main, ["train", "--schema"])
+    assert json.loads(printed.stdout) == json.loads(json.dumps(schema))
+
+
+def test_the_schema_tells_good_files_from_bad_ones():
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = json.loads(json.dumps(spec_schema()))
+    jsonschema.validate({"environment": "CartPole-v1", "budget": {"steps": 5}}, schema)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({"budget": {"steps": 0}}, schema)
