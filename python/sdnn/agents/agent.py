@@ -484,10 +484,12 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         agent = cls.__new__(cls)
         agent._observation, agent._action = description["observation"], description["action"]
         if "observation_space" in description:
-            spaces = (space_of(description[f"{name}_space"]) for name in ("observation", "action"))
+            observations = space_of(description["observation_space"])
+            actions = space_of(description["action_space"])
         else:  # it was made in C++
-            spaces = (observation_space_of(agent._observation), action_space_of(agent._action))
-        agent._take_spaces(*spaces)
+            observations = observation_space_of(agent._observation)
+            actions = action_space_of(agent._action)
+        agent._take_spaces(observations, actions)
         approximator = dict(description["approximator"])
         for name in {"circular", "n_symbols"} & approximator.keys():
             approximator[name] = tuple(approximator[name])
