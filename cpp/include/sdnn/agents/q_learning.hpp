@@ -15,9 +15,9 @@
 
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/epsilon_greedy.hpp"
+#include "sdnn/agents/n_step_buffer.hpp"
 #include "sdnn/agents/q_learning_config.hpp"
 #include "sdnn/agents/return_range.hpp"
-#include "sdnn/agents/waiting_steps.hpp"
 #include "sdnn/approximators/action_value.hpp"
 #include "sdnn/approximators/decoupled.hpp"
 #include "sdnn/coding/action_code.hpp"
@@ -145,8 +145,8 @@ class QLearning {
     episode.step = 0;
     episode.n_kept = 0;
     episode.sum = 0.0;
-    WaitingSteps& waiting = episode.waiting;
-    if (waiting.size() > 0) learn_all(waiting, state_value(waiting.next_state()));
+    NStepBuffer& buffer = episode.buffer;
+    if (buffer.size() > 0) learn_all(buffer, state_value(buffer.next_state()));
   }
 
   /// Lets the approximator write to the memory that it will need, where it knows how.
@@ -232,13 +232,13 @@ class QLearning {
     }
     // The next state first: the network then remembers it, corrected, for the next decision.
     const double next_value = terminated ? 0.0 : state_value(next_state);
-    WaitingSteps& waiting = episode.waiting;
-    if (!waiting.is_continued_by(state)) learn_all(waiting, state_value(waiting.next_state()));
-    waiting.add(state, indices(action), reward, next_state);
+    NStepBuffer& buffer = episode.buffer;
+    if (!buffer.is_continued_by(state)) learn_all(buffer, state_value(buffer.next_state()));
+    buffer.add(state, indices(action), reward, next_state);
     if (terminated) {
-      learn_all(waiting, 0.0);
-    } else if (waiting.is_full()) {
-      learn_oldest(waiting, next_value);
+      learn_all(buffer, 0.0);
+    } else if (buffer.is_full()) {
+      learn_oldest(buffer, next_value);
     }
   }
 
@@ -278,7 +278,7 @@ class QLearning {
 
   /// What belongs to the present episode in one environment.
   struct Episode {
-    WaitingSteps waiting;
+    NStepBuffer buffer;
     std::vector<std::size_t> kept;  ///< the random action
     int n_kept = 0;                 ///< steps that it will still last
     int step = 0;
@@ -286,13 +286,13 @@ class QLearning {
   };
 
   Episode new_episode() const {
-    return {WaitingSteps(static_cast<std::size_t>(config_.n_steps), n_inputs(), n_dimensions()),
+    return {NStepBuffer(static_cast<std::size_t>(config_.n_steps), n_inputs(), n_dimensions()),
             std::vector<std::size_t>(n_dimensions())};
   }
 
   template <class Self, class Listed, class Archive>
   static void serialize_episode(Self& self, Listed& episode, Archive& archive) {
-    archive.part("waiting", episode.waiting);
+    archive.part("waiting", episode.buffer);
     archive.number("range.sum", episode.sum);
     archive.number("step", episode.step);
     std::vector<std::int64_t> kept(episode.kept.begin(), episode.kept.end());
@@ -304,14 +304,14 @@ class QLearning {
         archive.expect(self.has_action(d, kept[d]), "kept_action", "an action");
         episode.kept[d] = static_cast<std::size_t>(kept[d]);
       }
-      const auto is_of_actions = [&self](const WaitingSteps::Step& step) {
+      const auto is_of_actions = [&self](const NStepBuffer::Step& step) {
         for (std::size_t d = 0; d < step.action.size(); ++d) {
           if (step.action[d] >= self.n_actions(d)) return false;
         }
         return true;
       };
-      archive.expect(episode.waiting.each_is(is_of_actions), "waiting.actions", "of actions");
-      archive.expect(!episode.waiting.is_full(), "waiting.rewards", "fewer than n_steps");
+      archive.expect(episode.buffer.each_is(is_of_actions), "waiting.actions", "of actions");
+      archive.expect(!episode.buffer.is_full(), "waiting.rewards", "fewer than n_steps");
       archive.expect(ReturnRange::is_sum(episode.sum), "range.sum", "a finite sum");
       archive.expect(episode.step >= 0, "step", "0 or more");
       archive.expect(episode.n_kept >= 0 && episode.n_kept < self.config_.max_repetitions, "n_kept",
@@ -426,9 +426,9 @@ class QLearning {
     return sum;
   }
 
-  void learn_oldest(WaitingSteps& waiting, double value) {
-    const double target = waiting.return_of_oldest(value, config_.discount);
-    const WaitingSteps::Step& oldest = waiting.take_oldest();
+  void learn_oldest(NStepBuffer& buffer, double value) {
+    const double target = buffer.return_of_oldest(value, config_.discount);
+    const NStepBuffer::Step& oldest = buffer.take_oldest();
     typename Q::Workspace& workspace = workspace_.approximator;
     if constexpr (kDecoupled) {
       action_value_.update(oldest.state, workspace, oldest.action, target, learning_rate_);
@@ -437,8 +437,8 @@ class QLearning {
     }
   }
 
-  void learn_all(WaitingSteps& waiting, double value) {
-    while (waiting.size() > 0) learn_oldest(waiting, value);
+  void learn_all(NStepBuffer& buffer, double value) {
+    while (buffer.size() > 0) learn_oldest(buffer, value);
   }
 
   QLearningConfig config_;

@@ -124,16 +124,6 @@ class SDNNC {
   std::size_t n_inputs() const noexcept { return code_->n_inputs(); }
   std::size_t n_actions() const noexcept { return actions_.n_actions(); }
 
-  /// Whether config and this seed give its code books, so that they make it anew: not those of a
-  /// network that was given tables. Makes them. Throws as the constructor.
-  bool is_wired_by(std::uint64_t seed) const {
-    const auto tables = code_books_of(config_, seed);
-    for (std::size_t i = 0; i < tables.size(); ++i) {
-      if (tables[i] != code_->table(i)) return false;
-    }
-    return true;
-  }
-
   /// The weight of a hidden unit for a unit of x_SD, in the paper's order, in lattice steps.
   std::int32_t weight(std::size_t unit, std::size_t j) const {
     return paired_weight(hidden_layer_, unit, code_->columns_of(j));

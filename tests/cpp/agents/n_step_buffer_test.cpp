@@ -1,4 +1,4 @@
-#include "sdnn/agents/waiting_steps.hpp"
+#include "sdnn/agents/n_step_buffer.hpp"
 
 #include <gtest/gtest.h>
 
@@ -15,22 +15,22 @@ using Numbers = std::vector<double>;
 using Indices = std::vector<std::size_t>;
 
 /// Step number i of a path: from i / 16 to (i + 1) / 16, action (i, 2 i), reward 2^i.
-void add(WaitingSteps& steps, int i) {
+void add(NStepBuffer& steps, int i) {
   const auto n = static_cast<std::size_t>(i);
   steps.add(Numbers{i / 16.0}, Indices{n, 2 * n}, static_cast<double>(1 << i),
             Numbers{(i + 1) / 16.0});
 }
 
-void expect_oldest(WaitingSteps& steps, int i) {
+void expect_oldest(NStepBuffer& steps, int i) {
   const auto n = static_cast<std::size_t>(i);
-  const WaitingSteps::Step& oldest = steps.take_oldest();
+  const NStepBuffer::Step& oldest = steps.take_oldest();
   EXPECT_EQ(oldest.state, Numbers{i / 16.0});
   EXPECT_EQ(oldest.action, (Indices{n, 2 * n}));
   EXPECT_EQ(oldest.reward, static_cast<double>(1 << i));
 }
 
-TEST(WaitingSteps, GiveTheOldestFirstWhileTheRingWraps) {
-  WaitingSteps steps(3, 1, 2);
+TEST(NStepBuffer, GiveTheOldestFirstWhileTheRingWraps) {
+  NStepBuffer steps(3, 1, 2);
   EXPECT_EQ(steps.size(), 0U);
   add(steps, 0);
   add(steps, 1);
@@ -46,8 +46,8 @@ TEST(WaitingSteps, GiveTheOldestFirstWhileTheRingWraps) {
 }
 
 // Rewards 1, 2, 4, then 8, 16; gamma = 1/2: every number is exact.
-TEST(WaitingSteps, TheReturnOfTheOldestDiscountsWhatCameSince) {
-  WaitingSteps steps(3, 1, 2);
+TEST(NStepBuffer, TheReturnOfTheOldestDiscountsWhatCameSince) {
+  NStepBuffer steps(3, 1, 2);
   EXPECT_EQ(steps.return_of_oldest(5.0, 0.5), 5.0);
   for (int i = 0; i < 3; ++i) add(steps, i);
   EXPECT_EQ(steps.return_of_oldest(16.0, 0.5), 1.0 + 1.0 + 1.0 + 2.0);
@@ -61,8 +61,8 @@ TEST(WaitingSteps, TheReturnOfTheOldestDiscountsWhatCameSince) {
   EXPECT_EQ(steps.return_of_oldest(-8.0, 0.5), 8.0 + 8.0 - 2.0);
 }
 
-TEST(WaitingSteps, KnowWhereTheNewestLed) {
-  WaitingSteps steps(2, 1, 2);
+TEST(NStepBuffer, KnowWhereTheNewestLed) {
+  NStepBuffer steps(2, 1, 2);
   EXPECT_TRUE(steps.is_continued_by(Numbers{0.9}));  // nothing waits
   add(steps, 3);
   EXPECT_TRUE(steps.is_continued_by(Numbers{0.25}));
@@ -71,21 +71,21 @@ TEST(WaitingSteps, KnowWhereTheNewestLed) {
   EXPECT_TRUE(steps.is_continued_by(Numbers{0.26}));
 }
 
-TEST(WaitingSteps, EachIsAskedOnceAndOnlyThoseThatWait) {
-  WaitingSteps steps(3, 1, 2);
+TEST(NStepBuffer, EachIsAskedOnceAndOnlyThoseThatWait) {
+  NStepBuffer steps(3, 1, 2);
   for (int i = 0; i < 3; ++i) add(steps, i);
   steps.take_oldest();
   Numbers rewards;
-  EXPECT_TRUE(steps.each_is([&](const WaitingSteps::Step& step) {
+  EXPECT_TRUE(steps.each_is([&](const NStepBuffer::Step& step) {
     rewards.push_back(step.reward);
     return true;
   }));
   EXPECT_EQ(rewards, (Numbers{2.0, 4.0}));
-  EXPECT_FALSE(steps.each_is([](const WaitingSteps::Step& step) { return step.reward < 4.0; }));
+  EXPECT_FALSE(steps.each_is([](const NStepBuffer::Step& step) { return step.reward < 4.0; }));
 }
 
-TEST(WaitingSteps, AreRestoredInTheMiddleOfTheRing) {
-  WaitingSteps steps(4, 1, 2);
+TEST(NStepBuffer, AreRestoredInTheMiddleOfTheRing) {
+  NStepBuffer steps(4, 1, 2);
   for (int i = 0; i < 4; ++i) add(steps, i);
   for (int i = 4; i < 7; ++i) {
     steps.take_oldest();
@@ -93,7 +93,7 @@ TEST(WaitingSteps, AreRestoredInTheMiddleOfTheRing) {
   }
   steps.take_oldest();  // 4, 5, 6 wait; the oldest is at place 0 of the ring, now at place 1
   steps.take_oldest();
-  WaitingSteps other(4, 1, 2);
+  NStepBuffer other(4, 1, 2);
   add(other, 9);
   core::restore(other, core::state_of(steps));
   EXPECT_EQ(other.size(), 2U);
@@ -106,8 +106,8 @@ TEST(WaitingSteps, AreRestoredInTheMiddleOfTheRing) {
   for (int i = 5; i < 9; ++i) expect_oldest(other, i);
 }
 
-TEST(WaitingSteps, RefuseWhatCannotWait) {
-  WaitingSteps steps(3, 1, 2);
+TEST(NStepBuffer, RefuseWhatCannotWait) {
+  NStepBuffer steps(3, 1, 2);
   for (int i = 0; i < 2; ++i) add(steps, i);
   testing::expect_that_damage_is_refused(steps);
   using testing::with_number;

@@ -16,7 +16,7 @@ namespace sdnn::agents {
 
 /// Up to n steps (state, action, reward) of an episode, the oldest first. Allocates nothing after
 /// it is made. An action is one number or several: `n_dimensions`.
-class WaitingSteps {
+class NStepBuffer {
  public:
   struct Step {
     std::vector<double> state;
@@ -24,7 +24,7 @@ class WaitingSteps {
     double reward = 0.0;
   };
 
-  WaitingSteps(std::size_t n_steps, std::size_t n_inputs, std::size_t n_dimensions)
+  NStepBuffer(std::size_t n_steps, std::size_t n_inputs, std::size_t n_dimensions)
       : steps_(n_steps), next_state_(n_inputs) {
     for (Step& step : steps_) {
       step.state.resize(n_inputs);
@@ -32,30 +32,30 @@ class WaitingSteps {
     }
   }
 
-  std::size_t size() const noexcept { return n_waiting_; }
-  bool is_full() const noexcept { return n_waiting_ == steps_.size(); }
+  std::size_t size() const noexcept { return n_steps_; }
+  bool is_full() const noexcept { return n_steps_ == steps_.size(); }
   /// Where the newest step led.
   std::span<const double> next_state() const noexcept { return next_state_; }
-  /// Whether a step from `state` goes on where the newest one led.
+  /// Whether `state` is where the newest step led, or there is none.
   bool is_continued_by(std::span<const double> state) const noexcept {
-    return n_waiting_ == 0 || std::ranges::equal(state, next_state_);
+    return n_steps_ == 0 || std::ranges::equal(state, next_state_);
   }
 
   /// Requires room for it, and shapes as in the constructor.
   void add(std::span<const double> state, std::span<const std::size_t> action, double reward,
            std::span<const double> next_state) noexcept {
     assert(!is_full());
-    Step& newest = steps_[(first_ + n_waiting_) % steps_.size()];
+    Step& newest = steps_[(first_ + n_steps_) % steps_.size()];
     std::ranges::copy(state, newest.state.begin());
     std::ranges::copy(action, newest.action.begin());
     newest.reward = reward;
     std::ranges::copy(next_state, next_state_.begin());
-    ++n_waiting_;
+    ++n_steps_;
   }
 
   /// The return of the oldest step: all rewards since, discounted, then `value`.
   double return_of_oldest(double value, double discount) const noexcept {
-    for (std::size_t i = n_waiting_; i-- > 0;) {
+    for (std::size_t i = n_steps_; i-- > 0;) {
       value = steps_[(first_ + i) % steps_.size()].reward + discount * value;
     }
     return value;
@@ -63,17 +63,17 @@ class WaitingSteps {
 
   /// Takes the oldest one out; valid until the next add. Requires one.
   const Step& take_oldest() noexcept {
-    assert(n_waiting_ > 0);
+    assert(n_steps_ > 0);
     const Step& oldest = steps_[first_];
     first_ = (first_ + 1) % steps_.size();
-    --n_waiting_;
+    --n_steps_;
     return oldest;
   }
 
   /// Whether all of them, the oldest first, satisfy a condition.
   template <class Condition>
   bool each_is(const Condition& condition) const {
-    for (std::size_t i = 0; i < n_waiting_; ++i) {
+    for (std::size_t i = 0; i < n_steps_; ++i) {
       if (!condition(steps_[(first_ + i) % steps_.size()])) return false;
     }
     return true;
@@ -85,7 +85,7 @@ class WaitingSteps {
     std::vector<double> states;
     std::vector<std::int64_t> actions;
     std::vector<double> rewards;
-    for (std::size_t i = 0; i < self.n_waiting_; ++i) {
+    for (std::size_t i = 0; i < self.n_steps_; ++i) {
       const Step& step = self.steps_[(self.first_ + i) % self.steps_.size()];
       states.insert(states.end(), step.state.begin(), step.state.end());
       for (const std::size_t a : step.action) actions.push_back(static_cast<std::int64_t>(a));
@@ -108,7 +108,7 @@ class WaitingSteps {
       archive.expect(std::ranges::all_of(states, is_unit), "states", "in [0, 1]");
       archive.expect(std::ranges::all_of(self.next_state_, is_unit), "next_state", "in [0, 1]");
       self.first_ = 0;
-      self.n_waiting_ = n;
+      self.n_steps_ = n;
       for (std::size_t i = 0; i < n; ++i) {
         std::copy_n(states.begin() + static_cast<std::ptrdiff_t>(i * n_inputs), n_inputs,
                     self.steps_[i].state.begin());
@@ -123,7 +123,7 @@ class WaitingSteps {
  private:
   std::vector<Step> steps_;
   std::size_t first_ = 0;
-  std::size_t n_waiting_ = 0;
+  std::size_t n_steps_ = 0;
   std::vector<double> next_state_;
 };
 
