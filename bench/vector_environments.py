@@ -1,130 +1,89 @@
 """What several environments at once do to learning, per transition and per second.
 
-    python bench/vector_environments.py [--seeds 10] [--tasks CartPole-v1,...] [--folder DIR]
+    python bench/vector_environments.py [--seeds 10] [--tasks CartPole-v1,...] [--folder docs]
 
-Each trial is a training with evaluations of 10 greedy episodes; its rows go to
-docs/vector-environments.csv when it is done, and is not run again. At the end a table is printed
-from the rows.
+Each trial is a training with evaluations of 10 greedy episodes; it goes to the store
+docs/benchmarks.sqlite.xz when it is done, and is not run again. At the end a table is printed.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
-import resource
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
+from looks import Looks
+from measured import DOCS, Work, measure_missing, measured
+from page import markdown
 
-from sdnn.agents import Callback, SDNNQLearning, Training, evaluate
+from sdnn.agents import Training
+from sdnn.runs import BudgetSpec, EnvironmentSpec, ProtocolSpec, RunSpec
 from sdnn.runs.statistics import estimate_median
 
-DOCS = Path(__file__).parents[1] / "docs"
-FIELDS = ("task", "n_environments", "seed", "step", "mean_return", "us_per_step")
+KIND = "vector environments"
 TASKS = ("CartPole-v1", "Pendulum-v1")
 SIZES = (1, 4, 16)
 STEPS, EVERY = 15_000, 5_000
+DUE = range(EVERY, STEPS + 1, EVERY)
 
 
-def cpu_seconds() -> float:
-    """Processor time of this process."""
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    return used.ru_utime + used.ru_stime
+class Returns(Looks):
+    """Mean returns, and the time of a step until the last of them."""
+
+    def look(self, training: Training, seconds: float) -> None:
+        """Note one."""
+        self.found.setdefault("step", []).append(training.n_steps)
+        self.found.setdefault("mean_return", []).append(self.mean_return(training, 10))
+        self.found["us_per_step"] = round(1e6 * seconds / training.n_steps, 1)
 
 
-class Evaluations(Callback):
-    """Greedy episodes now and then, whose time is not counted."""
-
-    def __init__(self, env: gym.Env[Any, Any]) -> None:
-        self._env = env
-        self.seconds = 0.0
-        self.returns: dict[int, float] = {}
-
-    def on_step(self, training: Training) -> None:
-        """Evaluate where it is due."""
-        if training.n_steps % EVERY == 0:
-            began = cpu_seconds()
-            self.returns[training.n_steps] = evaluate(training.agent, self._env, 10).mean_return
-            self.seconds += cpu_seconds() - began
+def measure(work: Work) -> dict[str, Any]:
+    """Train with so many environments."""
+    task, n_environments, seed = work
+    spec = RunSpec(
+        environment=EnvironmentSpec(id=task),
+        protocol=ProtocolSpec(n_envs=int(n_environments), evaluate_every=0),
+        budget=BudgetSpec(steps=STEPS),
+        seed=seed,
+    )
+    return Returns(spec, DUE).learn()
 
 
-def trial(task: str, n: int, seed: int) -> list[dict[str, Any]]:
-    """Train with so many environments; rows of the evaluations, and the time of a step."""
-    envs = gym.vector.SyncVectorEnv([lambda: gym.make(task)] * n)
-    agent = SDNNQLearning(envs.single_observation_space, envs.single_action_space, seed=seed)
-    evaluations = Evaluations(gym.make(task))
-    began = cpu_seconds()
-    agent.train(envs, steps=STEPS, callbacks=[evaluations])
-    used = cpu_seconds() - began - evaluations.seconds
-    return [
-        {
-            "task": task,
-            "n_environments": n,
-            "seed": seed,
-            "step": step,
-            "mean_return": round(mean_return, 2),
-            "us_per_step": round(1e6 * used / STEPS, 1),
-        }
-        for step, mean_return in evaluations.returns.items()
-    ]
-
-
-def read_rows(path: Path) -> list[dict[str, str]]:
-    """Rows of trials that are done."""
-    if not path.exists():
-        return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def table(rows: list[dict[str, str]]) -> str:
+def table_rows(folder: Path) -> Iterator[Sequence[str]]:
     """Medians over the seeds, with 95 % bootstrap intervals."""
-    steps = range(EVERY, STEPS + 1, EVERY)
-    heads = [f"after {step:,} steps" for step in steps]
-    lines = [
-        "| task | environments | seeds | " + " | ".join(heads) + " | us per step |",
-        "|---" * (len(heads) + 4) + "|",
-    ]
+    trials = measured(KIND, folder)
     for task in TASKS:
-        for n in SIZES:
-            own = [r for r in rows if (r["task"], r["n_environments"]) == (task, str(n))]
-            if not own:
-                continue
-            cells = []
-            for step in steps:
-                found = [float(r["mean_return"]) for r in own if r["step"] == str(step)]
-                middle = estimate_median(np.array(found))
-                cells.append(f"{middle.value:.0f} ({middle.lower:.0f} to {middle.upper:.0f})")
-            seeds = {row["seed"] for row in own}
-            cost = float(np.median([float(row["us_per_step"]) for row in own]))
-            lines.append(f"| {task} | {n} | {len(seeds)} | {' | '.join(cells)} | {cost:.0f} |")
-    return "\n".join(lines)
+        for n in map(str, SIZES):
+            own = [found for (*which, _), found in trials.items() if which == [task, n]]
+            if own:
+                middles = map(estimate_median, np.array([t["mean_return"] for t in own]).T)
+                returns = (f"{m.value:.0f} ({m.lower:.0f} to {m.upper:.0f})" for m in middles)
+                cost = np.median([trial["us_per_step"] for trial in own])
+                yield task, n, str(len(own)), *returns, f"{cost:.0f}"
 
 
 def main() -> None:
     """Run what is missing, then print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--tasks", default=",".join(TASKS))
     parser.add_argument("--folder", type=Path, default=DOCS)
     options = parser.parse_args()
-    path = options.folder / "vector-environments.csv"
-    done = {(r["task"], r["n_environments"], r["seed"]) for r in read_rows(path)}
-    for seed in range(options.seeds):
-        for task in options.tasks.split(","):
-            for n in SIZES:
-                if (task, str(n), str(seed)) in done:
-                    continue
-                rows = trial(task, n, seed)
-                is_new = not path.exists()
-                with path.open("a", newline="") as file:
-                    writer = csv.DictWriter(file, FIELDS)
-                    if is_new:
-                        writer.writeheader()
-                    writer.writerows(rows)
-    print(table(read_rows(path)))
+    asked = [
+        (task, str(n), seed)
+        for seed in range(options.seeds)
+        for task in options.tasks.split(",")
+        for n in SIZES
+    ]
+    measure_missing(KIND, measure, asked, options.folder)
+    heads = (f"after {step:,} steps" for step in DUE)
+    print(
+        markdown(
+            ("task", "environments", "seeds", *heads, "us per step"), table_rows(options.folder)
+        )
+    )
 
 
 if __name__ == "__main__":

@@ -1,111 +1,28 @@
-"""Our agents and the rivals, each as a function that learns a task.
-
-A contender's ``learn(name, condition, steps, seed, after_step)`` learns the task of this name for a
-number of steps and calls ``after_step(n_steps, policy, memory)`` after each, or after each step of
-all its environments: ``policy`` gives an observation's greedy action, ``memory()`` the bytes kept.
-"""
+"""Our agents and the rivals: what is specified of each on a task, and plug-ins made of ours."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Protocol
+from types import MappingProxyType
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
-import stable_baselines
-import stream_ac
+import stream_ac  # noqa: F401, registers its agent
 from numpy.typing import NDArray
-from rows import Work
+from stable_baselines import N_ENVS, SETTINGS, STEPS
 from tasks import TASKS, Task
-from tile_coding import N_VALUES, TileCodingSarsa, listed_actions
+from tile_coding import N_VALUES, listed_actions
 
-from sdnn.agents import Callback, RBFQLearning, SDNNQLearning
-from sdnn.agents.presets import PRESETS
-from sdnn.approximators import RBFNetworkConfig
-from sdnn.bounds import flat_bounds
+from sdnn.agents import PRESETS, QLearningConfig, SDNNQLearning
+from sdnn.approximators import SDNNCConfig
+from sdnn.runs import AgentSpec, BudgetSpec, EnvironmentSpec, ProtocolSpec, RunSpec
+from sdnn.runs.registry import AgentEntry, register
 
-AfterStep = Callable[[int, Callable[[Any], Any], Callable[[], int]], None]
-
-
-class Learn(Protocol):
-    """See the module."""
-
-    def __call__(
-        self, name: str, condition: str, steps: int, seed: int, after_step: AfterStep
-    ) -> None:
-        """Learn."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Contender:
-    """A method of learning.
-
-    Parameters
-    ----------
-    title
-        For a reader.
-    learn
-        See the module.
-    tasks
-        It is run on.
-    steps
-        By task, where it was published with a shorter or longer training than the task's.
-    make
-        Makes the environment as it sees it: ``make(task, condition, evaluation)``.
-    """
-
-    title: str
-    learn: Learn
-    tasks: tuple[str, ...]
-    steps: Mapping[str, int] = field(default_factory=dict)
-    make: Callable[[Task, str, bool], gym.Env[Any, Any]] = Task.make
-
-
-class _Report(Callback):
-    def __init__(self, after_step: AfterStep) -> None:
-        self._after_step = after_step
-
-    def on_step(self, training) -> None:
-        agent = training.agent
-
-        def memory():
-            return sum(array.nbytes for array in agent.state().values())
-
-        self._after_step(training.n_steps, partial(agent.act, explore=False), memory)
-
-
-class ListedActions(gym.ActionWrapper):
-    """All joint actions of a Box, 5 values in each dimension, as a Discrete space."""
-
-    def __init__(self, env) -> None:
-        super().__init__(env)
-        self._actions = listed_actions(env.action_space)
-        self.action_space = gym.spaces.Discrete(len(self._actions))
-
-    def action(self, action):
-        """Give the Box's element."""
-        return self._actions[int(action)]
-
-
-def _learn_ours(make, name, condition, steps, seed, after_step):
-    _learn_in(_environment(TASKS[name], condition), make, name, condition, steps, seed, after_step)
-
-
-def _environment(task: Task, condition: str, evaluation: bool = False):
-    """Make it as our agents see it: what is said of variables is said of them in their units."""
-    make = task.make_unscaled if task.options else task.make
-    return make(condition, evaluation)
-
-
-def _learn_joint(name, condition, steps, seed, after_step):
-    env = ListedActions(_environment(TASKS[name], condition))
-
-    def after(n_steps, policy, memory):
-        after_step(n_steps, lambda observation: env.action(policy(observation)), memory)
-
-    _learn_in(env, SDNNQLearning, name, condition, steps, seed, after)
+Trial = tuple[str, str, str, int]
+"""Task, condition, contender, seed."""
 
 
 def ascend(values: NDArray[np.float64]) -> tuple[int, ...]:
@@ -124,48 +41,119 @@ def ascend(values: NDArray[np.float64]) -> tuple[int, ...]:
     return tuple(at)
 
 
-def _learn_joint_ascending(name, condition, steps, seed, after_step):
-    """Learn as the joint one does, and look at what its network is worth when it is searched so."""
-    env = ListedActions(_environment(TASKS[name], condition))
-    agent = _agent(env, SDNNQLearning, name, condition, seed)
-    shape = (N_VALUES,) * env.unwrapped.action_space.shape[0]
+class JointActions:
+    """SDNN-C with one value for each joint action of a Box, 5 values in each dimension.
 
-    def policy(observation):
-        values = agent.q_values(observation).reshape(shape)
-        return env.action(np.ravel_multi_index(ascend(values), shape))
+    ``ascends`` says whether greedy actions are searched by `ascend`.
+    """
 
-    report = _Report(lambda n_steps, _, memory: after_step(n_steps, policy, memory))
-    agent.train(env, steps=steps, callbacks=[report])
+    def __init__(self, observation_space, action_space, *, ascends, approximator, **options):
+        self._actions = listed_actions(action_space)
+        self._shape = (N_VALUES,) * action_space.shape[0]
+        self._ascends = ascends
+        # How many inputs there are, the agent finds out.
+        approximator = replace(approximator, n_inputs=SDNNCConfig().n_inputs)
+        listed = gym.spaces.Discrete(len(self._actions))
+        self._agent = SDNNQLearning(observation_space, listed, approximator=approximator, **options)
+        self.state, self.begin_episode = self._agent.state, self._agent.begin_episode
+
+    @property
+    def progress(self) -> float:
+        """How much of the training is done."""
+        return self._agent.progress
+
+    @progress.setter
+    def progress(self, value: float) -> None:
+        self._agent.progress = value
+
+    def act(self, observation, explore=True):
+        """Choose the Box's element."""
+        if self._ascends and not explore:
+            values = self._agent.q_values(observation).reshape(self._shape)
+            return self._actions[np.ravel_multi_index(ascend(values), self._shape)]
+        chosen = self._agent.act(observation, explore=explore)
+        if explore:
+            self._chosen = chosen
+        return self._actions[int(chosen)]
+
+    def learn(self, transition) -> None:
+        """Learn it as a step with the listed action."""
+        self._agent.learn(transition._replace(action=self._chosen))
 
 
-def _learn_in(env, make, name, condition, steps, seed, after_step):
-    agent = _agent(env, make, name, condition, seed)
-    agent.train(env, steps=steps, callbacks=[_Report(after_step)])
+for name, ascends in (("sdnn-c-joint", False), ("sdnn-c-joint-ascent", True)):
+    register(
+        AgentEntry(
+            id=name,
+            title="SDNN-C, joint actions" + (", by ascent" if ascends else ""),
+            approximator=SDNNCConfig,
+            learning=QLearningConfig,
+            agent=partial(JointActions, ascends=ascends),
+            presets=PRESETS,
+        )
+    )
 
 
-def _agent(env, make, name, condition, seed):
-    options = dict(TASKS[name].options)
-    if condition != "clean":
-        options.pop("observation_range", None)  # the space has it
-    return make(env.observation_space, env.action_space, seed=seed, **options)
+@dataclass(frozen=True, kw_only=True)
+class Contender:
+    """A method of learning.
+
+    Parameters
+    ----------
+    title
+        For a reader.
+    tasks
+        It is run on.
+    environment
+        The environment as it sees it, of a task and a condition.
+    settings
+        Agent and other parts of its specification, of a task.
+    """
+
+    title: str
+    tasks: Sequence[str] = tuple(TASKS)
+    environment: Callable[[Task, str], EnvironmentSpec]
+    settings: Callable[[str], Mapping[str, Any]]
+
+    def spec(self, name: str, condition: str, seed: int) -> RunSpec:
+        """Specify its run on a task."""
+        task = TASKS[name]
+        settings = {
+            "budget": BudgetSpec(steps=task.steps),
+            "protocol": ProtocolSpec(evaluate_every=0),
+            **self.settings(name),
+        }
+        return RunSpec(environment=self.environment(task, condition), seed=seed, **settings)
 
 
-def _brief(*spaces, **options):
-    learning = replace(PRESETS["general"].learning, max_repetitions=1)
-    return SDNNQLearning(*spaces, learning=learning, **options)
+def _seen_by_ours(task: Task, condition: str) -> EnvironmentSpec:
+    """Give what is said of variables, which is said of them in their units."""
+    own_units = bool(task.angle_pairs or task.declares_ranges)
+    return task.environment(condition, own_units=own_units, with_ranges=task.declares_ranges)
 
 
-def _with_bounds(*spaces, observation_range=None, **options):
-    return SDNNQLearning(*spaces, **options)
+def _own_units(task: Task, condition: str) -> EnvironmentSpec:
+    return task.environment(condition, own_units=True, with_ranges=False)
 
 
-def _with_ranges_seen(*spaces, observation_range=None, **options):
-    return SDNNQLearning(*spaces, observation_range="seen", **options)
+def _ours(
+    variant: str = "",
+    *,
+    name: str = "sdnn-c",
+    agent: Mapping[str, Any] = MappingProxyType({}),
+    tasks: Sequence[str] = tuple(TASKS),
+    environment: Callable[[Task, str], EnvironmentSpec] = _seen_by_ours,
+    **parts: Any,
+) -> Contender:
+    """Specify a variant of ours; ``agent`` and ``parts`` are what it changes."""
 
+    def settings(task: str) -> dict[str, Any]:
+        pairs = TASKS[task].angle_pairs or "none"
+        return {"agent": AgentSpec(**{"name": name, "angle_pairs": pairs, **agent}), **parts}
 
-def _with_fewer_pairs(*spaces, **options):
-    sizes = replace(PRESETS["general"].approximator, max_pairs=24)
-    return SDNNQLearning(*spaces, approximator=sizes, **options)
+    return Contender(
+        title=f"SDNN-C{variant}", tasks=tasks, environment=environment, settings=settings
+    )
 
 
 RBF_SETTINGS = {
@@ -178,124 +166,100 @@ RBF_SETTINGS = {
 """Bases of a dimension and steps of a target; the best of a few on one or two seeds each."""
 
 
-def _rbf(*spaces, angle_pairs=(), **options):
+def _rbf_settings(name: str) -> dict[str, Any]:
     """Its bases know no circle: cosines and sines serve it better than the angles."""
-    return RBFQLearning(*spaces, **options)
+    general, own = PRESETS["general"], RBF_SETTINGS[name]
+    return {
+        "agent": AgentSpec(name="rbf"),
+        "approximator": {
+            "n_actions": general.approximator.n_actions,
+            "n_bases": own["n_bases"],
+        },
+        "learning": replace(general.learning, n_steps=own["n_steps"]),
+    }
 
 
-def _learn_rbf(name, condition, steps, seed, after_step):
-    general, settings = PRESETS["general"], RBF_SETTINGS[name]
-    n_actions = general.approximator.n_actions
-    make = partial(
-        _rbf,
-        approximator=RBFNetworkConfig(n_actions=n_actions, n_bases=settings["n_bases"]),
-        learning=replace(general.learning, n_steps=settings["n_steps"]),
-    )
-    _learn_ours(make, name, condition, steps, seed, after_step)
-
-
-TILINGS = {
-    "CartPole": {"n_bins": 6, "n_tilings": 16},
-    "Pendulum": {"n_bins": 8, "n_tilings": 16},
-    "MountainCar": {"n_bins": 8, "n_tilings": 8, "discount": 1.0, "epsilon": 0.0},
-    "MountainCarContinuous": {"n_bins": 8, "n_tilings": 8},
-    "Acrobot": {"n_bins": 4, "n_tilings": 16, "discount": 1.0, "epsilon": 0.0},
-    "LunarLanderContinuous": {"n_bins": 3, "n_tilings": 16},
-    "Reaching": {"n_bins": 2, "n_tilings": 16, "discount": 0.9},
-    "Wheels": {"n_bins": 3, "n_tilings": 16},
+_OF_UNIT_COST = {"discount": 1.0, "epsilon": 0.0}
+TILINGS: dict[str, tuple[dict[str, int], dict[str, float]]] = {
+    "CartPole": ({"n_bins": 6, "n_tilings": 16}, {}),
+    "Pendulum": ({"n_bins": 8, "n_tilings": 16}, {}),
+    "MountainCar": ({"n_bins": 8, "n_tilings": 8}, _OF_UNIT_COST),
+    "MountainCarContinuous": ({"n_bins": 8, "n_tilings": 8}, {}),
+    "Acrobot": ({"n_bins": 4, "n_tilings": 16}, _OF_UNIT_COST),
+    "LunarLanderContinuous": ({"n_bins": 3, "n_tilings": 16}, {}),
+    "Reaching": ({"n_bins": 2, "n_tilings": 16}, {"discount": 0.9}),
+    "Wheels": ({"n_bins": 3, "n_tilings": 16}, {}),
 }
 """Finer grids for fewer variables; tasks of -1 a step need no chance, as in the book."""
 
 
-def _learn_tiles(name, condition, steps, seed, after_step):
-    task = TASKS[name]
-    env = task.make(condition)
-    low, high = task.ends() if condition == "clean" else flat_bounds(env.observation_space)
-    agent = TileCodingSarsa(env.action_space, (low, high), seed=seed, **TILINGS[name])
-    agent.learn(
-        env, steps, seed, lambda n: after_step(n, agent.greedy, lambda: agent.weights.nbytes)
-    )
+def _tile_settings(name: str) -> dict[str, Any]:
+    tiles, learning = TILINGS[name]
+    return {"agent": AgentSpec(name="tiles"), "approximator": tiles, "learning": learning}
 
 
-def _learn_stable(algorithm, name, condition, steps, seed, after_step):
-    make = partial(TASKS[name].make_unscaled, condition)
-    stable_baselines.learn(algorithm, name, make, steps, seed, after_step)
+def _stable(algorithm: str) -> Contender:
+    def settings(name: str) -> dict[str, Any]:
+        published = SETTINGS[algorithm][name]
+        return {
+            "agent": AgentSpec(name=algorithm.lower()),
+            "learning": {"task": name},
+            "budget": BudgetSpec(steps=published[STEPS]),
+            "protocol": ProtocolSpec(evaluate_every=0, n_envs=published.get(N_ENVS, 1)),
+        }
 
-
-def _learn_stream_ac(name, condition, steps, seed, after_step):
-    stream_ac.learn(TASKS[name].make_unscaled(condition), steps, seed, after_step)
-
-
-def _stable(algorithm):
     return Contender(
         title=f"{algorithm}, Stable-Baselines3",
-        learn=partial(_learn_stable, algorithm),
-        tasks=tuple(stable_baselines.SETTINGS[algorithm]),
-        steps=stable_baselines.steps_of(algorithm),
-        make=Task.make_unscaled,
+        tasks=tuple(SETTINGS[algorithm]),
+        environment=_own_units,
+        settings=settings,
     )
 
 
-def _ours(**options):
-    return Contender(make=_environment, **options)
-
+_LANDER, _TORQUES = ("LunarLanderContinuous",), ("Reaching", "Wheels")
 
 CONTENDERS = {
-    "sdnn": _ours(title="SDNN-C", learn=partial(_learn_ours, SDNNQLearning), tasks=tuple(TASKS)),
-    "sdnn-small": _ours(
-        title="SDNN-C, small",
-        learn=partial(_learn_ours, partial(SDNNQLearning, preset="small")),
+    "sdnn-c": _ours(),
+    "sdnn-c-small": _ours(
+        ", small",
+        agent={"preset": "small"},
         tasks=("CartPole", "Pendulum", "MountainCarContinuous"),
     ),
-    "sdnn-brief": _ours(
-        title="SDNN-C, brief random actions", learn=partial(_learn_ours, _brief), tasks=tuple(TASKS)
+    "sdnn-c-brief": _ours(", brief random actions", learning={"max_repetitions": 1}),
+    "sdnn-c-bounds": _ours(", bounds of the space", environment=_own_units, tasks=_LANDER),
+    "sdnn-c-seen": _ours(
+        ", ranges seen", agent={"observation_range": "seen"}, environment=_own_units, tasks=_LANDER
     ),
-    "sdnn-bounds": _ours(
-        title="SDNN-C, bounds of the space",
-        learn=partial(_learn_ours, _with_bounds),
-        tasks=("LunarLanderContinuous",),
+    "sdnn-c-fewer-pairs": _ours(
+        ", 24 pairs of inputs", approximator={"max_pairs": 24}, tasks=_LANDER
     ),
-    "sdnn-seen": _ours(
-        title="SDNN-C, ranges seen",
-        learn=partial(_learn_ours, _with_ranges_seen),
-        tasks=("LunarLanderContinuous",),
+    "sdnn-c-joint": _ours(", joint actions", name="sdnn-c-joint", tasks=_TORQUES),
+    "sdnn-c-joint-ascent": _ours(
+        ", joint actions, by ascent", name="sdnn-c-joint-ascent", tasks=_TORQUES
     ),
-    "sdnn-fewer-pairs": _ours(
-        title="SDNN-C, 24 pairs of inputs",
-        learn=partial(_learn_ours, _with_fewer_pairs),
-        tasks=("LunarLanderContinuous",),
-    ),
-    "sdnn-joint": _ours(
-        title="SDNN-C, joint actions", learn=_learn_joint, tasks=("Reaching", "Wheels")
-    ),
-    "sdnn-joint-ascent": _ours(
-        title="SDNN-C, joint actions, by ascent",
-        learn=_learn_joint_ascending,
-        tasks=("Reaching", "Wheels"),
-    ),
-    "rbf": _ours(
+    "rbf": Contender(
         title="RBFN",
-        learn=_learn_rbf,
         tasks=tuple(RBF_SETTINGS),
+        environment=_seen_by_ours,
+        settings=_rbf_settings,
     ),
     "tiles": Contender(
-        title="Sarsa(lambda), tile coding", learn=_learn_tiles, tasks=tuple(TILINGS)
+        title="Sarsa(lambda), tile coding",
+        environment=Task.environment,
+        settings=_tile_settings,
     ),
     "stream-ac": Contender(
         title="stream AC",
-        learn=_learn_stream_ac,
-        tasks=stream_ac.TASKS,
-        make=Task.make_unscaled,
+        environment=_own_units,
+        settings=lambda name: {"agent": AgentSpec(name="stream-ac")},
     ),
-    "sac": _stable("SAC"),
-    "td3": _stable("TD3"),
-    "ppo": _stable("PPO"),
+    **{algorithm.lower(): _stable(algorithm) for algorithm in SETTINGS},
 }
 
 
-def work_for(
+def trials_of(
     n_seeds: int, conditions: Sequence[str], names: Sequence[str], kinds: Sequence[str]
-) -> list[Work]:
+) -> list[Trial]:
     """List the trials there are, the contenders of a task and seed one after the other."""
     return [
         (name, condition, kind, seed)
@@ -305,12 +269,3 @@ def work_for(
         for kind in kinds
         if name in CONTENDERS[kind].tasks
     ]
-
-
-def train(work: Work, make_looks: Callable[[gym.Env, Task, int, int], AfterStep]) -> None:
-    """Let a contender learn, under the eyes of ``make_looks(env, task, steps, seed)``."""
-    name, condition, kind, seed = work
-    task, contender = TASKS[name], CONTENDERS[kind]
-    steps = contender.steps.get(name, task.steps)
-    looks = make_looks(contender.make(task, condition, True), task, steps, seed)
-    contender.learn(name, condition, steps, seed, looks)

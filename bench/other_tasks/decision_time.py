@@ -13,18 +13,18 @@ import argparse
 import time
 
 import numpy as np
-from tasks import TASKS
+from agents import CONTENDERS
 
-from sdnn.agents import SDNNQLearning, Transition
+from sdnn.agents import Transition
 
 NANOSECONDS_A_MICROSECOND = 1000.0
 
 
 def decision_times(name: str, steps: int) -> tuple[np.ndarray, np.ndarray]:
     """Microseconds of each step's acting and learning, and of the environment: shapes (steps,)."""
-    task = TASKS[name]
-    env = task.make("clean")
-    agent = SDNNQLearning(env.observation_space, env.action_space, seed=0, **task.options)
+    spec = CONTENDERS["sdnn-c"].spec(name, "clean", 0)
+    env = spec.make_env()
+    agent = spec.make_agent(env)
     clock = time.perf_counter_ns
     decisions = np.empty(steps)
     environment_steps = np.empty(steps)

@@ -1,4 +1,4 @@
-"""The figure of the stored rows."""
+"""The figure of the stored trials."""
 
 from __future__ import annotations
 
@@ -54,10 +54,10 @@ def _draw_task(panels, trials: Trials, name: str) -> None:
         looks = trials.get((name, "clean", kind))
         if not looks:
             continue
-        returns = np.array([[float(r["mean_return"]) for r in trial] for trial in looks])
+        returns = np.array([trial["mean_return"] for trial in looks])
         lower, median, upper = np.percentile(returns, (25, 50, 75), axis=0)
         for panel, field in zip(panels, ("steps", "cpu_seconds"), strict=True):
-            x = np.median([[float(r[field]) for r in trial] for trial in looks], axis=0)
+            x = np.median([trial[field] for trial in looks], axis=0)
             (line,) = panel.plot(
                 x, median, "-" if x.size > 1 else "o", color=color,
                 label=contender.title, lw=1.6,

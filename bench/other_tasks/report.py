@@ -1,52 +1,52 @@
-"""Tables from the stored rows."""
+"""Tables from the stored trials."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from agents import CONTENDERS
 from numpy.typing import NDArray
 from page import interval, markdown
-from rows import Row
 from scipy.stats import trim_mean
 from tasks import CONDITIONS, TASKS
 
 from sdnn.runs.statistics import Estimate, estimate_median
 
-Trials = Mapping[tuple[str, str, str], Sequence[Sequence[Row]]]
-"""Looks of each trial, in their order, by task, condition and agent, then by seed."""
+Trials = Mapping[tuple[str, str, str], Sequence[Mapping[str, Any]]]
+"""What was seen in each trial by task, condition and contender, then by seed."""
 
 CONFIDENCE, N_RESAMPLES = 0.95, 2000
-OURS = "sdnn"
+OURS = "sdnn-c"
 
 
-def by_trial(rows: Iterable[Row]) -> Trials:
-    """Sort looks into trials, and those by seed."""
-    looks: dict[tuple[str, str, str, int], list[Row]] = {}
-    for row in rows:
-        key = (row["task"], row["condition"], row["agent"], int(row["seed"]))
-        looks.setdefault(key, []).append(row)
-    trials: dict[tuple[str, str, str], list[list[Row]]] = {}
-    for key in sorted(looks):
-        trials.setdefault(key[:3], []).append(looks[key])
+def by_kind(measured: Mapping[tuple[Any, ...], Mapping[str, Any]]) -> Trials:
+    """Put the trials of one kind together, sorted by seed as they are."""
+    trials: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
+    for (name, condition, kind, _), found in measured.items():
+        trials.setdefault((name, condition, kind), []).append(found)
     return trials
 
 
-def last_returns(looks: Iterable[Sequence[Row]]) -> NDArray[np.float64]:
+def last_returns(trials: Iterable[Mapping[str, Any]]) -> NDArray[np.float64]:
     """Mean returns at the end, shape (n_trials,)."""
-    return np.array([float(trial[-1]["mean_return"]) for trial in looks])
+    return np.array([trial["mean_return"][-1] for trial in trials])
 
 
-def seconds_to_solve(looks: Iterable[Sequence[Row]], solved: float) -> NDArray[np.float64]:
+def seconds_to_solve(trials: Iterable[Mapping[str, Any]], solved: float) -> NDArray[np.float64]:
     """Processor seconds until a look first finds the task solved, infinite if none does."""
     return np.array(
         [
             next(
-                (float(r["cpu_seconds"]) for r in trial if float(r["mean_return"]) >= solved),
+                (
+                    seconds
+                    for seconds, found in zip(t["cpu_seconds"], t["mean_return"], strict=True)
+                    if found >= solved
+                ),
                 np.inf,
             )
-            for trial in looks
+            for t in trials
         ]
     )
 
@@ -118,16 +118,16 @@ def _task_rows(trials: Trials) -> Iterator[Sequence[str]]:
                     continue
                 returns = last_returns(looks)
                 seconds = np.median(seconds_to_solve(looks, task.solved))
-                n_bytes = np.median([float(trial[-1]["bytes"]) for trial in looks])
+                n_bytes = np.median([trial["bytes"] for trial in looks])
                 yield (
                     name,
                     condition,
                     contender.title,
                     str(len(looks)),
-                    f"{int(looks[0][-1]['steps']):,}",
+                    f"{looks[0]['steps'][-1]:,}",
                     interval(estimate_median(returns), 1),
                     str(int((returns >= task.solved).sum())),
-                    f"{np.median([float(trial[-1]['cpu_seconds']) for trial in looks]):.1f} s",
+                    f"{np.median([trial['cpu_seconds'][-1] for trial in looks]):.1f} s",
                     f"{seconds:.1f} s" if np.isfinite(seconds) else "not reached",
                     f"{n_bytes / 2**20:.2f} MiB",
                 )

@@ -1,39 +1,39 @@
 """How the agents and their rivals do on Gymnasium's tasks: clean, with noise, with more sensors.
 
-    python bench/other_tasks/run.py [--seeds 10] [--tasks CartPole,...] [--agents sdnn,...]
+    python bench/other_tasks/run.py [--seeds 10] [--tasks CartPole,...] [--agents sdnn-c,...]
         [--conditions clean,...] [--jobs 2] [--folder docs] [--only-table]
 
 A trial is a training that is looked at 20 times: 20 greedy episodes each time, 100 at the end. They
-take no part in its processor time. Its rows go to docs/other-tasks.csv when it is done, and it is
-not run again. At the end the tables are printed and put into docs/benchmarks.md, and
-docs/other-tasks.png is drawn, all from the rows. In another --folder nothing of docs/ changes.
+take no part in its processor time. It goes to the store docs/benchmarks.sqlite.xz when it is done,
+and is not run again. At the end the tables are printed and put into docs/benchmarks.md, and
+docs/other-tasks.png is drawn, all from the store. In another --folder nothing of docs/ changes.
 SAC, TD3 and PPO need `pip install stable-baselines3`, LunarLanderContinuous `box2d`.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any
 
-from agents import CONTENDERS, train, work_for
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from agents import CONTENDERS, Trial, trials_of
 from figure import draw
-from looks import Looks
+from looks import Curve
+from measured import DOCS, measure_missing, measured
 from page import show
-from report import by_trial, tables
-from rows import Work, read_rows, run_missing
+from report import by_kind, tables
 from tasks import CONDITIONS, TASKS
 
-DOCS = Path(__file__).parents[2] / "docs"
-FIELDS = ("task", "condition", "agent", "seed", "steps", "cpu_seconds", "mean_return", "bytes")
+KIND = "other tasks"
 
 
-def trial(work: Work) -> list[dict[str, Any]]:
+def measure(trial: Trial) -> dict[str, Any]:
     """Train and look."""
-    rows: list[dict[str, Any]] = []
-    train(work, lambda env, _, steps, seed: Looks(env, steps, seed, rows))
-    own = dict(zip(FIELDS, work, strict=False))
-    return [{**own, **row} for row in rows]
+    name, condition, kind, seed = trial
+    return Curve(CONTENDERS[kind].spec(name, condition, seed)).learn()
 
 
 def main() -> None:
@@ -47,16 +47,11 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=DOCS)
     parser.add_argument("--only-table", action="store_true")
     options = parser.parse_args()
-    path = options.folder / "other-tasks.csv"
     if not options.only_table:
-        asked = work_for(
-            options.seeds,
-            options.conditions.split(","),
-            options.tasks.split(","),
-            options.agents.split(","),
-        )
-        run_missing(trial, asked, path, FIELDS, options.jobs)
-    trials = by_trial(read_rows(path))
+        lists = (getattr(options, name).split(",") for name in ("conditions", "tasks", "agents"))
+        asked = trials_of(options.seeds, *lists)
+        measure_missing(KIND, measure, asked, options.folder, options.jobs)
+    trials = by_kind(measured(KIND, options.folder))
     show(tables(trials), options.folder)
     draw(trials, options.folder / "other-tasks.png")
 

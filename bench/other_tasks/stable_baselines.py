@@ -6,11 +6,17 @@ an older Pendulum only, which are used.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-STEPS = "n_timesteps"
+from sdnn.agents import Training
+from sdnn.runs.registry import AgentEntry, register
+
+STEPS, N_ENVS = "n_timesteps", "n_envs"
 
 SETTINGS: dict[str, dict[str, dict[str, Any]]] = {
     "SAC": {
@@ -36,7 +42,7 @@ SETTINGS: dict[str, dict[str, dict[str, Any]]] = {
     "PPO": {
         "Pendulum": {
             STEPS: 100_000,
-            "n_envs": 4,
+            N_ENVS: 4,
             "n_steps": 1024,
             "gae_lambda": 0.95,
             "gamma": 0.9,
@@ -49,7 +55,7 @@ SETTINGS: dict[str, dict[str, dict[str, Any]]] = {
         },
         "CartPole": {
             STEPS: 100_000,
-            "n_envs": 8,
+            N_ENVS: 8,
             "n_steps": 32,
             "batch_size": 256,
             "gae_lambda": 0.8,
@@ -78,7 +84,7 @@ SETTINGS: dict[str, dict[str, dict[str, Any]]] = {
         "MountainCar": {
             STEPS: 1_000_000,
             "normalize": True,
-            "n_envs": 16,
+            N_ENVS: 16,
             "n_steps": 16,
             "gae_lambda": 0.98,
             "gamma": 0.99,
@@ -88,7 +94,7 @@ SETTINGS: dict[str, dict[str, dict[str, Any]]] = {
         "Acrobot": {
             STEPS: 1_000_000,
             "normalize": True,
-            "n_envs": 16,
+            N_ENVS: 16,
             "n_steps": 256,
             "gae_lambda": 0.94,
             "gamma": 0.99,
@@ -99,62 +105,115 @@ SETTINGS: dict[str, dict[str, dict[str, Any]]] = {
 }
 
 
-def steps_of(algorithm: str) -> dict[str, int]:
-    """Steps of the published training, by task."""
-    return {task: settings[STEPS] for task, settings in SETTINGS[algorithm].items()}
+@dataclass(frozen=True, kw_only=True)
+class PolicyConfig:
+    """Settings of the networks: those of ``MlpPolicy``."""
+
+    n_inputs: int = 1
 
 
-def learn(algorithm, name, make_env, steps, seed, after_step) -> None:
-    """Learn a task, on one thread.
+@dataclass(frozen=True, kw_only=True)
+class PublishedConfig:
+    """Settings of the learning.
 
     Parameters
     ----------
-    algorithm, name
-        Of `SETTINGS`.
-    make_env
-        Makes the environment.
-    steps, seed, after_step
-        As of every contender.
+    task
+        Those that were published for this one.
     """
-    import stable_baselines3 as sb3
-    import torch
-    from stable_baselines3.common.callbacks import BaseCallback
-    from stable_baselines3.common.noise import NormalActionNoise
-    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
-    torch.set_num_threads(1)
-    settings = {key: value for key, value in SETTINGS[algorithm][name].items() if key != STEPS}
-    env = DummyVecEnv([make_env] * settings.pop("n_envs", 1))
-    if settings.pop("normalize", False):
-        env = VecNormalize(env, gamma=settings["gamma"])
-    for key, value in settings.items():
-        if isinstance(value, tuple) and value[0] == "falling":
-            settings[key] = _falling(value[1])
-    if noise := settings.pop("noise", None):
-        n_actions = env.action_space.shape[0]
-        settings["action_noise"] = NormalActionNoise(
-            np.zeros(n_actions), np.full(n_actions, noise[1])
-        )
-    model = getattr(sb3, algorithm)("MlpPolicy", env, seed=seed, device="cpu", **settings)
+    task: str = "Pendulum"
 
-    def policy(observation):
-        if isinstance(env, VecNormalize):
-            observation = env.normalize_obs(observation)
-        return model.predict(observation, deterministic=True)[0]
 
-    def memory():
+class StableBaselines:
+    """A model of Stable-Baselines3, which `StableBaselinesTraining` makes."""
+
+    model: Any = None
+    normalize: Callable[[Any], Any] = staticmethod(lambda observation: observation)
+
+    def __init__(self, *_spaces, approximator, learning, seed, algorithm) -> None:
+        self.algorithm, self.seed = algorithm, seed
+        self.settings = dict(SETTINGS[algorithm][learning.task])
+
+    def begin_episode(self) -> None:
+        """Do nothing."""
+
+    def act(self, observation, explore=False):
+        """Give the policy's action."""
+        observation = self.normalize(observation)
+        return self.model.predict(observation, deterministic=not explore)[0]
+
+    def learn(self, transition) -> None:
+        """Refuse: its own training learns."""
+        raise NotImplementedError
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of the policy and of what is kept to learn from."""
+        model = self.model
         tensors = sum(p.numel() * p.element_size() for p in model.policy.state_dict().values())
         buffer = getattr(model, "replay_buffer", None) or getattr(model, "rollout_buffer", None)
         arrays = [a for a in vars(buffer).values() if isinstance(a, np.ndarray)]
         return tensors + sum(array.nbytes for array in arrays)
 
-    class Report(BaseCallback):
-        def _on_step(self) -> bool:
-            after_step(self.num_timesteps, policy, memory)
-            return True
 
-    model.learn(steps, callback=Report())
+class StableBaselinesTraining(Training):
+    """Learns as the library does, on one thread, in its vector of the environments."""
+
+    def pieces(self, seconds: float) -> Generator[None, None, None]:
+        """Learn all in one piece."""
+        import stable_baselines3 as sb3
+        import torch
+        from stable_baselines3.common.callbacks import BaseCallback
+        from stable_baselines3.common.noise import NormalActionNoise
+        from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+        torch.set_num_threads(1)
+        agent, training = self.agent, self
+        settings = {key: v for key, v in agent.settings.items() if key not in (STEPS, N_ENVS)}
+        envs = getattr(self.env, "envs", [self.env])
+        env = DummyVecEnv([lambda one=one: one for one in envs])
+        if settings.pop("normalize", False):
+            env = VecNormalize(env, gamma=settings["gamma"])
+            agent.normalize = env.normalize_obs
+        for key, value in settings.items():
+            if isinstance(value, tuple) and value[0] == "falling":
+                settings[key] = _falling(value[1])
+        if noise := settings.pop("noise", None):
+            n_actions = env.action_space.shape[0]
+            settings["action_noise"] = NormalActionNoise(
+                np.zeros(n_actions), np.full(n_actions, noise[1])
+            )
+        make = getattr(sb3, agent.algorithm)
+        agent.model = make("MlpPolicy", env, seed=agent.seed, device="cpu", **settings)
+
+        class Report(BaseCallback):
+            def _on_step(self) -> bool:
+                return training.after_step(self.num_timesteps)
+
+        agent.model.learn(self.steps, callback=Report())
+        yield
+
+    def after_step(self, n_steps: int) -> bool:
+        """Tell the callbacks; return whether to go on."""
+        self.n_steps = n_steps
+        for callback in self.callbacks:
+            callback.on_step(self)
+        return not self._stops
 
 
 def _falling(first):
     return lambda left: left * first
+
+
+for name in SETTINGS:
+    register(
+        AgentEntry(
+            id=name.lower(),
+            title=f"{name}, Stable-Baselines3",
+            approximator=PolicyConfig,
+            learning=PublishedConfig,
+            agent=partial(StableBaselines, algorithm=name),
+            training=StableBaselinesTraining,
+        )
+    )

@@ -11,14 +11,12 @@ episode for the critic; actions are in parts of half their range, as the paper's
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import gymnasium as gym
 import numpy as np
 
-TASKS = (
-    "CartPole", "Pendulum", "MountainCar", "MountainCarContinuous", "Acrobot",
-    "LunarLanderContinuous", "Reaching", "Wheels",
-)  # fmt: skip
+from sdnn.runs.registry import AgentEntry, register
 
 DISCOUNT, TRACE_DECAY = 0.99, 0.8
 ENTROPY = 0.01
@@ -177,49 +175,89 @@ class Normal:
         return np.clip(middle + half * parts, self._low, self._high).astype(np.float32)
 
 
-def learn(env, steps, seed, after_step) -> None:
-    """Learn a task; see `agents`."""
-    generator = np.random.default_rng(seed)
-    space = env.action_space
-    choice = Softmax(space) if isinstance(space, gym.spaces.Discrete) else Normal(space)
-    n_inputs = env.observation_space.shape[0]
-    actor = Network(n_inputs, choice.n_outputs, KAPPA_ACTOR, generator)
-    critic = Network(n_inputs, 1, KAPPA_CRITIC, generator)
-    seen, returns, discounted = Moments((n_inputs,)), Moments(), 0.0
+@dataclass(frozen=True, kw_only=True)
+class NetworksConfig:
+    """Settings of actor and critic: the paper's, which is why there is nothing to set."""
 
-    def normalized(observation):
-        return ((observation - seen.mean) / seen.deviation).astype(np.float32)
+    n_inputs: int = 1
 
-    def policy(observation):
-        return choice.greedy(actor.outputs(normalized(observation)))
 
-    def memory():
-        return 2 * (actor.parameters.nbytes + critic.parameters.nbytes)  # and as many traces
+@dataclass(frozen=True, kw_only=True)
+class StreamACConfig:
+    """Settings of the learning: the paper's."""
 
-    is_over = True
-    for step in range(steps):
-        if is_over:
-            observation, _ = env.reset(seed=seed if step == 0 else None)
-            seen.update(observation)
-            state = normalized(observation)
-        action = choice.sample(actor.outputs(state, keep=True), generator)
-        observation, reward, terminated, truncated, _ = env.step(action)
-        is_over = terminated or truncated
-        discounted = DISCOUNT * discounted * (not is_over) + float(reward)
-        returns.update(discounted)
-        seen.update(observation)
-        next_state = normalized(observation)
-        value = float(critic.outputs(state, keep=True)[0])
-        target = float(reward) / float(returns.deviation)
+
+class StreamAC:
+    """Learns a step when it is known whether the episode ended with it: before the next one."""
+
+    def __init__(self, observation_space, action_space, *, approximator, learning, seed) -> None:
+        self._rng = np.random.default_rng(seed)
+        is_listed = isinstance(action_space, gym.spaces.Discrete)
+        self._choice = Softmax(action_space) if is_listed else Normal(action_space)
+        n_inputs = observation_space.shape[0]
+        self._actor = Network(n_inputs, self._choice.n_outputs, KAPPA_ACTOR, self._rng)
+        self._critic = Network(n_inputs, 1, KAPPA_CRITIC, self._rng)
+        self._seen, self._returns, self._discounted = Moments((n_inputs,)), Moments(), 0.0
+        self._state = self._step = None
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of weights, and of as many traces."""
+        return 2 * (self._actor.parameters.nbytes + self._critic.parameters.nbytes)
+
+    def _normalized(self, observation):
+        return ((observation - self._seen.mean) / self._seen.deviation).astype(np.float32)
+
+    def _see(self, observation):
+        self._seen.update(observation)
+        return self._normalized(observation)
+
+    def begin_episode(self) -> None:
+        """Learn the last step of the one before, and forget the traces."""
+        self._learn_waiting(is_over=True)
+        self._actor.end_episode()
+        self._critic.end_episode()
+        self._state = None
+
+    def act(self, observation, explore=True):
+        """Draw an action; without `explore` the likeliest one."""
+        if not explore:
+            return self._choice.greedy(self._actor.outputs(self._normalized(observation)))
+        self._learn_waiting(is_over=False)
+        if self._state is None:
+            self._state = self._see(observation)
+        return self._choice.sample(self._actor.outputs(self._state, keep=True), self._rng)
+
+    def learn(self, transition) -> None:
+        """Keep a step."""
+        self._step = transition
+
+    def _learn_waiting(self, is_over: bool) -> None:
+        if self._step is None:
+            return
+        (_, _, reward, observation, terminated), self._step = self._step, None
+        self._discounted = DISCOUNT * self._discounted * (not is_over) + reward
+        self._returns.update(self._discounted)
+        next_state = self._see(observation)
+        value = float(self._critic.outputs(self._state, keep=True)[0])
+        target = reward / float(self._returns.deviation)
         if not terminated:
-            target += DISCOUNT * float(critic.outputs(next_state)[0])
+            target += DISCOUNT * float(self._critic.outputs(next_state)[0])
         error = target - value
-        critic.add_gradient(np.ones(1, np.float32))
-        actor.add_gradient(choice.slopes(ENTROPY * np.sign(error)).astype(np.float32))
-        critic.follow_trace(error)
-        actor.follow_trace(error)
-        if is_over:
-            actor.end_episode()
-            critic.end_episode()
-        state = next_state
-        after_step(step + 1, policy, memory)
+        self._critic.add_gradient(np.ones(1, np.float32))
+        slopes = self._choice.slopes(ENTROPY * np.sign(error))
+        self._actor.add_gradient(slopes.astype(np.float32))
+        self._critic.follow_trace(error)
+        self._actor.follow_trace(error)
+        self._state = next_state
+
+
+register(
+    AgentEntry(
+        id="stream-ac",
+        title="stream AC",
+        approximator=NetworksConfig,
+        learning=StreamACConfig,
+        agent=StreamAC,
+    )
+)

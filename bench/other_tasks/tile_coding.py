@@ -8,9 +8,13 @@ from __future__ import annotations
 
 import itertools
 from collections import deque
+from dataclasses import dataclass
 
 import gymnasium as gym
 import numpy as np
+
+from sdnn.bounds import flat_bounds
+from sdnn.runs.registry import AgentEntry, register
 
 
 class TileCoding:
@@ -51,36 +55,53 @@ def listed_actions(space):
     return [np.array(action) for action in itertools.product(*values)]
 
 
+@dataclass(frozen=True, kw_only=True)
+class TilesConfig:
+    """Settings of the tiles; see `TileCoding`."""
+
+    n_inputs: int = 1
+    n_bins: int = 8
+    n_tilings: int = 16
+
+
+@dataclass(frozen=True, kw_only=True)
+class SarsaConfig:
+    """Settings of the learning."""
+
+    step_size: float = 0.5
+    trace_decay: float = 0.9
+    discount: float = 0.99
+    epsilon: float = 0.1
+    final_epsilon: float = 0.0
+
+
 class TileCodingSarsa:
     """Sarsa(lambda) with replacing traces; a Box is cut into 5 actions in each dimension."""
 
     def __init__(
-        self,
-        action_space,
-        ranges,
-        *,
-        n_bins,
-        n_tilings,
-        step_size=0.5,
-        trace_decay=0.9,
-        discount=0.99,
-        epsilon=0.1,
-        final_epsilon=0.0,
-        seed=0,
-    ) -> None:
-        self._low, self._high = ranges
-        self._code = TileCoding(self._low.size, n_bins, n_tilings)
+        self, observation_space, action_space, *, approximator, learning, seed,
+        observation_range=None,
+    ) -> None:  # fmt: skip
+        ends = flat_bounds(observation_space) if observation_range is None else observation_range
+        self._low, self._high = ends
+        self._code = TileCoding(self._low.size, approximator.n_bins, approximator.n_tilings)
         self._actions = listed_actions(action_space)
         self.weights = np.zeros((len(self._actions), self._code.n_tiles))
-        self._step_size = step_size / n_tilings
-        self._fade = discount * trace_decay
-        self._discount = discount
-        self._epsilons = epsilon, final_epsilon
+        self._step_size = learning.step_size / approximator.n_tilings
+        self._fade = learning.discount * learning.trace_decay
+        self._discount = learning.discount
+        self._epsilons = learning.epsilon, learning.final_epsilon
+        self.progress = 0.0
         self._rng = np.random.default_rng(seed)
         # Traces below a hundredth are forgotten.
         n_kept = 1 if self._fade == 0 else int(np.ceil(np.log(0.01) / np.log(self._fade)))
         self._recent: deque[tuple[int, np.ndarray]] = deque(maxlen=n_kept)
         self._fades = self._fade ** np.arange(n_kept)
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of what is learned."""
+        return self.weights.nbytes
 
     def tiles(self, observation):
         """The active tiles of an observation."""
@@ -90,36 +111,38 @@ class TileCodingSarsa:
         """Q of every action."""
         return self.weights[:, tiles].sum(axis=1)
 
-    def greedy(self, observation):
-        """A best action."""
-        return self._actions[int(np.argmax(self.values(self.tiles(observation))))]
+    def begin_episode(self) -> None:
+        """Forget the traces."""
+        self._recent.clear()
+        self._next = None
 
-    def _choose(self, values, progress):
+    def act(self, observation, explore=True):
+        """Choose an action, a best one or the one that was learned with."""
+        if not explore:
+            return self._actions[int(np.argmax(self.values(self.tiles(observation))))]
+        if self._next is None:
+            self._next = self._choose_at(self.tiles(observation))
+        return self._actions[self._next[0]]
+
+    def _choose_at(self, tiles):
+        """Choose an action, with its tiles and its value."""
+        values = self.values(tiles)
         first, last = self._epsilons
-        if self._rng.random() < first + progress * (last - first):
-            return int(self._rng.integers(len(self._actions)))
-        return int(self._rng.choice(np.flatnonzero(values == values.max())))
+        if self._rng.random() < first + self.progress * (last - first):
+            action = int(self._rng.integers(len(self._actions)))
+        else:
+            action = int(self._rng.choice(np.flatnonzero(values == values.max())))
+        return action, tiles, values[action]
 
-    def learn(self, env, steps, seed, after_step) -> None:
-        """Learn for a number of steps; `after_step` is called after each."""
-        is_over = True
-        for step in range(steps):
-            if is_over:
-                observation, _ = env.reset(seed=seed if step == 0 else None)
-                self._recent.clear()
-                tiles = self.tiles(observation)
-                action = self._choose(self.values(tiles), step / steps)
-            observation, reward, terminated, truncated, _ = env.step(self._actions[action])
-            is_over = terminated or truncated
-            error = reward - self.weights[action, tiles].sum()
-            self._recent.appendleft((action, tiles))
-            if not terminated:
-                tiles = self.tiles(observation)
-                values = self.values(tiles)
-                action = self._choose(values, step / steps)
-                error += self._discount * values[action]
-            self._correct(self._step_size * error)
-            after_step(step + 1)
+    def learn(self, transition) -> None:
+        """Learn a step, with the action that follows it."""
+        action, tiles, _ = self._next
+        error = transition.reward - self.weights[action, tiles].sum()
+        self._recent.appendleft((action, tiles))
+        if not transition.terminated:
+            self._next = self._choose_at(self.tiles(transition.next_observation))
+            error += self._discount * self._next[2]
+        self._correct(self._step_size * error)
 
     def _correct(self, change) -> None:
         actions = np.concatenate([np.full(tiles.size, a) for a, tiles in self._recent])
@@ -130,3 +153,14 @@ class TileCodingSarsa:
         flat = actions * self.weights.shape[1] + tiles
         _, latest = np.unique(flat, return_index=True)
         self.weights.ravel()[flat[latest]] += change * traces[latest]
+
+
+register(
+    AgentEntry(
+        id="tiles",
+        title="Sarsa(lambda), tile coding",
+        approximator=TilesConfig,
+        learning=SarsaConfig,
+        agent=TileCodingSarsa,
+    )
+)

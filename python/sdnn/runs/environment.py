@@ -48,8 +48,8 @@ class MeanOfNeighbours:
 class EnvironmentSpec(Settings, frozen=True):
     """A Gymnasium environment and what the agent observes of it.
 
-    With noise or redundant variables, observations are flattened and scaled to [0, 1]; values
-    outside their ranges saturate. Without, the agent gets them as they are.
+    With noise or redundant variables, observations are flattened and, but for ``own_units``, scaled
+    to [0, 1]; values outside their ranges saturate. Without, the agent gets them as they are.
     """
 
     id: Annotated[
@@ -87,6 +87,13 @@ class EnvironmentSpec(Settings, frozen=True):
             " the noise: of 0 and 1, of 1 and 2, ..., of the last and 0, and so on in a circle."
         ),
     ] = 0
+    own_units: Annotated[
+        bool,
+        Meta(
+            description="Whether noisy and redundant variables are given in the variables' own"
+            " units, not scaled to [0, 1]; a redundant one is the mean of two in [-1, 1]."
+        ),
+    ] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -107,6 +114,11 @@ class EnvironmentSpec(Settings, frozen=True):
 
     @property
     def changes_observations(self) -> bool:
+        """Whether the agent observes variables that are scaled to [0, 1]."""
+        return self.has_other_sensors and not self.own_units
+
+    @property
+    def has_other_sensors(self) -> bool:
         """Whether the agent observes something else than what the environment gives."""
         return self.noise > 0.0 or self.redundant > 0
 
@@ -139,7 +151,7 @@ class EnvironmentSpec(Settings, frozen=True):
             if render_mode is not None and env.render_mode != render_mode:
                 raise RunError(_no_pictures(self.id, render_mode))
             low, high = self.ends(env)
-            if not self.changes_observations:
+            if not self.has_other_sensors:
                 return env
             if not isinstance(env.observation_space, gym.spaces.Box) or low.shape != (
                 env.observation_space.shape
@@ -165,7 +177,7 @@ class EnvironmentSpec(Settings, frozen=True):
                     seed=0 if seed is None else seed,
                     stream=stream,
                 )
-            return env
+            return _in_own_units(env, low, high) if self.own_units else env
         except BaseException:
             env.close()
             raise
@@ -260,6 +272,18 @@ class EnvironmentSpec(Settings, frozen=True):
             raise ConfigError(
                 key, f"{self.id} cannot be made: {type(error).__name__}: {error}"
             ) from error
+
+
+def _in_own_units(
+    env: gym.Env[Any, Any], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> gym.Env[Any, Any]:
+    n_redundant = env.observation_space.shape[0] - low.size  # type: ignore[index]
+    low = np.append(low, np.full(n_redundant, -1.0))
+    high = np.append(high, np.full(n_redundant, 1.0))
+    space = gym.spaces.Box(low.astype(np.float32), high.astype(np.float32))
+    return gym.wrappers.TransformObservation(
+        env, lambda unit: (low + unit * (high - low)).astype(np.float32), space
+    )
 
 
 def _scaled_from(env: gym.Env[Any, Any]) -> Ends:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sdnn import _core
 from sdnn.agents import (
@@ -22,10 +22,13 @@ from sdnn.agents import (
     QLearningConfig,
     RBFQLearning,
     SDNNQLearning,
+    Training,
 )
 from sdnn.agents.transition import Learner
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
-from sdnn.runs.trial import Trial
+
+if TYPE_CHECKING:
+    from sdnn.runs.trial import Trial
 
 _BYTES_OF_FLOAT, _BYTES_OF_DOUBLE = 4, 8
 
@@ -85,9 +88,12 @@ class AgentEntry:
     agent
         The agent in Python, a `Learner`: made from an observation space, an action space and
         ``approximator=``, ``learning=``, ``seed=``.
+    training
+        What it learns in, with the arguments of `sdnn.agents.Training`: a subclass for an agent
+        that brings its own loop.
     core_trial
         The trial in C++, made from the core's structs of the settings; an agent without one runs in
-        a `Training`.
+        its training.
     costs
         Its curves in the figure of costs, for agents of the core: the time of a Python agent would
         be the interpreter's.
@@ -98,6 +104,7 @@ class AgentEntry:
     approximator: type[Any]
     learning: type[Any]
     agent: Callable[..., Learner]
+    training: Callable[..., Training] = Training
     core_trial: Callable[..., Trial] | None = None
     presets: Mapping[str, Preset] = field(default_factory=dict)
     costs: tuple[CostSeries, ...] = ()

@@ -356,7 +356,7 @@ class RunSpec(Settings, frozen=True):
         given = {name: getattr(self.agent, name) for name in names}
         given = {name: v for name, v in given.items() if v != getattr(defaults, name)}
         environment = self.environment
-        if environment is None or not environment.ranges or environment.changes_observations:
+        if environment is None or not environment.ranges or environment.has_other_sensors:
             return given
         if "observation_range" in given:
             raise ConfigError(

@@ -12,6 +12,7 @@ from sdnn.runs.settings import Settings
 __all__ = ["AgentSpec", "BudgetSpec", "OutputSpec", "ProtocolSpec"]
 
 Count = Annotated[int, Meta(ge=1, le=2**53)]
+Index = Annotated[int, Meta(ge=0)]
 CountOrNone = Annotated[int, Meta(ge=0, le=2**53)]
 
 
@@ -33,12 +34,15 @@ class AgentSpec(Settings, frozen=True):
         Meta(description="`seen`: ranges of the observed variables come from a warm-up."),
     ] = None
     angles: Annotated[
-        tuple[Annotated[int, Meta(ge=0)], ...],
+        tuple[Index, ...],
         Meta(description="Observed variables, from 0, that are angles: their ranges wrap around."),
     ] = ()
     angle_pairs: Annotated[
-        Literal["none", "find"],
-        Meta(description="Whether cosine and sine of an angle become one input."),
+        Literal["none", "find"] | tuple[tuple[Index, Index], ...],
+        Meta(
+            description="Which cosines and sines of an angle become one input: pairs of observed"
+            " variables, from 0, or those that the warm-up finds."
+        ),
     ] = "none"
     warm_up_steps: Annotated[
         Annotated[int, Meta(ge=2, le=10**7)],

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from sdnn.agents import Callback, EarlyStop, Training
 from sdnn.arguments import whole
 from sdnn.runs.records import TrialRows
+from sdnn.runs.registry import agent_entry
 
 if TYPE_CHECKING:
     from sdnn.runs.spec import RunSpec
@@ -174,7 +175,7 @@ def training_of(
     seed of its own.
     """
     is_acrobot = spec.environment is None
-    return Training(
+    return agent_entry(spec.agent.name).training(
         spec.make_agent(env.envs[0] if isinstance(env, gym.vector.SyncVectorEnv) else env),
         env,
         steps=spec.budget.steps,

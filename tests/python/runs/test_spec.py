@@ -1,9 +1,11 @@
 import json
 import pickle
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from sdnn.agents import PRESETS, FuzzyQLearning, RBFQLearning, SDNNQLearning
+from sdnn.agents import PRESETS, FuzzyQLearning, RBFQLearning, SDNNQLearning, Training
 from sdnn.approximators import RBFNetworkConfig, SDNNCConfig
 from sdnn.runs import (
     AgentSpec,
@@ -14,6 +16,7 @@ from sdnn.runs import (
     ProtocolSpec,
     RunSpec,
 )
+from sdnn.runs.registry import AGENTS, agent_entry, register
 
 CART_POLE = EnvironmentSpec(id="CartPole-v1")
 
@@ -119,6 +122,40 @@ def test_parts_of_another_agent_are_refused():
 def test_angle_pairs_are_not_found_in_scaled_observations():
     with pytest.raises(ConfigError, match="not together with noise"):
         RunSpec(environment=CART_POLE.replace(noise=0.1), agent=AgentSpec(angle_pairs="find"))
+
+
+def test_pairs_are_declared_in_own_units_of_noisy_sensors():
+    environment = EnvironmentSpec(id="Pendulum-v1", noise=0.02, redundant=1, own_units=True)
+    spec = RunSpec(environment=environment, agent=AgentSpec(angle_pairs=((0, 1),)))
+    assert RunSpec.from_values(spec.values()) == spec
+    env = spec.make_env()
+    np.testing.assert_array_equal(env.observation_space.low, [-1, -1, -8, -1])
+    np.testing.assert_array_equal(env.observation_space.high, [1, 1, 8, 1])
+    agent = spec.make_agent(env)
+    assert agent.scaling is None
+    assert agent.approximator.n_inputs == 3  # an angle, its speed, and the redundant one
+    with pytest.raises(ConfigError) as caught:
+        AgentSpec(angle_pairs=((0, 1, 2),))
+    assert caught.value.key.startswith("angle_pairs")
+
+
+def test_an_agent_brings_its_own_training():
+    class Told(Training):
+        def pieces(self, seconds):
+            self.n_steps = self.steps
+            yield
+
+    entry = replace(agent_entry("sdnn-c"), id="told", costs=(), training=Told)
+    register(entry)
+    try:
+        spec = RunSpec(environment=CART_POLE, agent=AgentSpec(name="told"))
+        trial = spec.make_trial(0)
+        trial.training.run()
+        assert isinstance(trial.training, Told)
+        assert trial.finished
+        trial.close()
+    finally:
+        del AGENTS["told"]
 
 
 def test_ranges_are_given_or_seen():
