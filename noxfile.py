@@ -101,6 +101,18 @@ def docs(session):
 
 
 @quick()
+def robustness(session):
+    """Try bad values of every argument, option and file; end commands at random instants."""
+    pytest(session, "tests/robustness")
+
+
+@quick()
+def emulation(session):
+    """Compile the C headers of agents for Arm too; run them in an emulator."""
+    pytest(session, "tests/emulation")
+
+
+@quick()
 def packaging(session):
     """Check the source distribution, the wheel and the C++ library as others use it."""
     pytest(session, "tests/packaging")

@@ -30,6 +30,18 @@ def skip_unless_ci():
     return _skip
 
 
+@pytest.fixture(scope="session")
+def needs(skip_unless_ci):
+    """Skips where a tool is missing."""
+
+    def _needs(*tools):
+        for tool in tools:
+            if shutil.which(tool) is None:
+                skip_unless_ci(f"needs {tool}")
+
+    return _needs
+
+
 def _tool(name):
     beside = Path(sys.executable).with_name(name)
     return shutil.which(name) or (str(beside) if beside.exists() else None)

@@ -93,8 +93,8 @@ def checked(kind: Any, value: Any, key: str = "") -> Any:
     ConfigError
         If it does not fit.
     """
-    if isinstance(value, np.generic):
-        value = value.item()
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
     try:
         made = msgspec.convert(value, kind)
     except msgspec.ValidationError as error:

@@ -13,6 +13,7 @@ __all__ = ["AgentSpec", "BudgetSpec", "OutputSpec", "ProtocolSpec"]
 
 Count = Annotated[int, Meta(ge=1, le=2**53)]
 Index = Annotated[int, Meta(ge=0)]
+EpisodeCount = Annotated[int, Meta(ge=1, le=2**30)]
 CountOrNone = Annotated[int, Meta(ge=0, le=2**53)]
 
 
@@ -97,7 +98,7 @@ class BudgetSpec(Settings, frozen=True):
         Count | None, Meta(description="Steps to learn. By default 200,000 in environments.")
     ] = None
     episodes: Annotated[
-        Count | None,
+        EpisodeCount | None,
         Meta(
             description="Episodes to learn, instead of steps. By default 15,000 on the paper's"
             " acrobot."

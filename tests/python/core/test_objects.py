@@ -13,38 +13,10 @@ import numpy as np
 import pytest
 
 import core_cells
-import public_cells
 import sdnn._core as core
-from watched_cells import failures
 
 BINDINGS = Path(__file__).parents[3] / "cpp" / "bindings"
 IN_USE = "in use by a call in another thread"
-
-
-@pytest.mark.parametrize(
-    "make_cells",
-    [
-        core_cells.never_made_cells,
-        core_cells.argument_cells,
-        public_cells.never_initialised_cells,
-        public_cells.estimator_cells,
-        public_cells.coding_cells,
-        public_cells.environment_cells,
-        public_cells.experiment_cells,
-    ],
-)
-def test_bad_use_is_refused(make_cells):
-    n_cells, failed = failures(make_cells)
-    assert n_cells > 700
-    assert not failed, "\n".join(failed[:20])
-
-
-def test_good_arguments_are_known_of_everything_that_takes_some():
-    configs = {cls.__name__ for cls in core_cells.CLASSES if cls.__name__.endswith("Config")}
-    classes = {cls.__name__ for cls in core_cells.CLASSES}
-    assert classes - configs <= set(core_cells.GOOD)
-    for name in core_cells.GOOD:
-        core_cells.made(name)
 
 
 def test_a_made_object_cannot_be_pickled_by_any_protocol():

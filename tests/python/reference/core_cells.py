@@ -66,7 +66,7 @@ GOOD = {
     "Acrobot": lambda: {"config": core.AcrobotConfig()},
     "AcrobotBatch": lambda: {"config": core.AcrobotConfig(), "n_acrobots": 3},
     "SensorNoise": lambda: {
-        "sigma": 0.1, "edges": [core.SensorEdge.wrap], "seed": 1, "stream": core.Stream.sensor_noise
+        "sigma": 0.1, "edges": ["wrap"], "seed": 1, "stream": core.Stream.sensor_noise
     },
     "AcrobotSensors": lambda: {
         "config": core.SensorConfig(), "seed": 1, "stream": core.Stream.sensor_noise

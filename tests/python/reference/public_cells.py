@@ -193,7 +193,7 @@ def experiment_cells():
         RunSpec: _spec_used,
     }
     for config, used in made.items():
-        for parameter in parameters_of(config.__init__):
+        for parameter in parameters_of(config):
             for word, value in BAD.items():
                 yield (
                     f"{config.__name__}({parameter}={word})",
@@ -202,7 +202,13 @@ def experiment_cells():
 
 
 def _experiment_cell(used, parameter, value):
-    return lambda: judged(parameter, lambda: used({parameter: value()}))
+    def call():
+        try:
+            return used({parameter: value()})
+        except ConfigError as error:
+            raise ValueError(str(error)) from error
+
+    return lambda: judged(parameter, call)
 
 
 def _protocol_used(given):
@@ -244,7 +250,7 @@ def environment_cells():
             for word, value in BAD.items():
                 yield f"{name}({parameter}={word})", _env_cell(maker, parameter, value)
     for config in (AcrobotConfig, SensorConfig):
-        for parameter in parameters_of(config.__init__):
+        for parameter in parameters_of(config):
             for word, value in BAD.items():
                 yield (
                     f"{config.__name__}({parameter}={word})",

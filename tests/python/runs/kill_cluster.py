@@ -116,7 +116,7 @@ class Campaign:
         self.random = random.Random(seed)
         self.done = dict.fromkeys(("worker", "frozen", "scheduler"), 0)
         self.rounds = 0
-        path = Path(__file__).with_name("kill_and_resume.py")
+        path = Path(__file__).parents[2] / "robustness" / "kill_and_resume.py"
         spec = importlib.util.spec_from_file_location("kill_and_resume", path)
         self.single = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(self.single)

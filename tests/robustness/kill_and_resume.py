@@ -1,7 +1,7 @@
 """Kill ``sdnn reproduce`` or ``sdnn sweep`` at random instants; it must resume to the same rows.
 
-    python tests/python/runs/kill_and_resume.py --kills 200
-    python tests/python/runs/kill_and_resume.py --kills 50 -- sweep STUDY.toml
+    python tests/robustness/kill_and_resume.py --kills 200
+    python tests/robustness/kill_and_resume.py --kills 50 -- sweep STUDY.toml
 
 The instants are spread over the whole command: start, trials, costs, figures and files. A round
 runs the command in one folder, stopping it again and again by one of `WAYS`, until it ends by

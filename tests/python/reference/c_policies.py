@@ -1,0 +1,372 @@
+"""Agents whose policy becomes a C header, and programs that compile and ask it."""
+
+import functools
+import subprocess
+from dataclasses import dataclass, replace
+
+import gymnasium as gym
+import numpy as np
+
+from sdnn.agents import PRESETS, SDNNQLearning, Transition
+from sdnn.approximators import SDNNCConfig
+from sdnn.coding import RandomInverse
+from sdnn.export import c_header, export_c_header
+
+Box, Discrete = gym.spaces.Box, gym.spaces.Discrete
+STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")
+ALONE = ("-ffreestanding", "-nostdlib")
+N_STATES = 10_000
+SMALL = SDNNCConfig(n_pattern_units=24, n_hidden_units=60, n_active_units=20, n_actions=5)
+
+
+@dataclass(frozen=True)
+class Target:
+    """A compiler of a kind of processor, and what runs its programs here."""
+
+    compiler: str
+    runner: str | None = None
+    options: tuple[str, ...] = ()
+    prefix: str = ""
+
+
+TARGETS = {
+    "x86-64": Target("gcc"),
+    "clang": Target("clang"),
+    "aarch64": Target("aarch64-linux-gnu-gcc", "qemu-aarch64", (), "aarch64-linux-gnu-"),
+    "arm": Target("arm-linux-gnueabihf-gcc", "qemu-arm", ("-mthumb",), "arm-linux-gnueabihf-"),
+}
+
+
+def run(*command, **options):
+    done = subprocess.run([str(word) for word in command], capture_output=True, **options)
+    assert done.returncode == 0, done.stderr.decode()
+    return done.stdout
+
+
+def learned(agent, n_steps=300, seed=1):
+    """The agent after some random transitions."""
+    random = np.random.default_rng(seed)
+    space = agent.observation_space
+    low, high = np.maximum(space.low, -5.0), np.minimum(space.high, 5.0)
+    agent.action_space.seed(seed)
+    agent.begin_episode()
+    observation = random.uniform(low, high)
+    for _ in range(n_steps):
+        following = random.uniform(low, high)
+        reward = float(np.sin(observation.sum()) + random.normal())
+        action = agent.action_space.sample()
+        agent.learn(Transition(observation, action, reward, following, bool(random.random() < 0.1)))
+        observation = following
+    return agent
+
+
+def learning(**changes):
+    return replace(PRESETS["general"].learning, **changes)
+
+
+def box(*sizes):
+    return Box(-np.array(sizes, np.float32), np.array(sizes, np.float32))
+
+
+def discrete_agent():
+    """Windows that leave hidden units unused, and bounds that are no round numbers."""
+    return SDNNQLearning(
+        Box(np.array([-4.8, -3.3, -0.418, -0.07]), np.array([4.8, 3.1, 0.418, 0.6]), dtype=float),
+        Discrete(2, start=-1),
+        approximator=SMALL,
+        seed=1,
+    )
+
+
+def circular_agent():
+    """An angle, ties within a tolerance, actions in double precision, averaged weights."""
+    return SDNNQLearning(
+        box(np.pi, 8.0, 1.0),
+        Box(-2.0, 2.0, (1,), np.float64),
+        approximator=replace(SMALL, n_actions=11, averaging_interval=20),
+        learning=learning(tie_rule="middle", tie_tolerance=0.3),
+        angles=[0],
+        seed=2,
+    )
+
+
+def several_agent():
+    return SDNNQLearning(
+        box(2.0, 3.0), gym.spaces.MultiDiscrete([3, 4, 2]), approximator=SMALL, seed=3
+    )
+
+
+def pairs_agent():
+    """A cosine and a sine, two torques, averaged weights."""
+    return SDNNQLearning(
+        box(1.0, 1.0, 8.0),
+        box(1.0, 3.0),
+        approximator=replace(SMALL, n_interpolated=8, n_anchor_patterns=6, averaging_interval=30),
+        learning=learning(tie_rule="lowest"),
+        angle_pairs=[(0, 1)],
+        seed=4,
+    )
+
+
+def lone_agent():
+    """One variable, which is two inputs, all windows, and a range of values given."""
+    approximator = replace(SMALL, n_actions=0, u_low=3, q_low=-0.3, q_high=0.1)
+    own = learning(tie_rule="lowest", value_range="given")
+    return SDNNQLearning(box(3.0), box(1.0), approximator=approximator, learning=own, seed=5)
+
+
+def tables_agent():
+    """Codes of its own, wide patterns, and weights of more than a byte."""
+    tables = [RandomInverse(n_bins=n, n_flipped=9).patterns(300, seed=n) for n in (40, 7)]
+    agent = SDNNQLearning(
+        box(1.0, 1.0), box(2.0), approximator=replace(SMALL, n_pattern_units=300),
+        learning=learning(tie_rule="middle"), tables=tables, seed=6,
+    )  # fmt: skip
+    for step in range(800):
+        where = [0.9, -0.9]
+        agent.learn(Transition(where, [[2.0], [-2.0]][step % 2], step % 4 // 2, where, True))
+    return agent
+
+
+def symbols_agent():
+    """A number between two symbols, as Gymnasium flattens a Tuple."""
+    space = gym.spaces.Tuple([Discrete(3), box(2.0), Discrete(4, start=1)])
+    agent = SDNNQLearning(
+        space, box(1.0), approximator=replace(SMALL, averaging_interval=20), seed=7
+    )
+    random = np.random.default_rng(7)
+    space.seed(7)
+    agent.action_space.seed(7)
+    for _ in range(300):
+        seen, action = space.sample(), agent.action_space.sample()
+        reward = float(np.sin(2.0 * seen[0] + seen[1][0] + seen[2]) + random.normal())
+        agent.learn(Transition(seen, action, reward, space.sample(), True))
+    return agent
+
+
+def partners_agent():
+    """Five variables, of which each is paired with two, in another way in each dimension."""
+    return SDNNQLearning(
+        box(1.0, 2.0, 3.0, 4.0, 5.0), box(1.0, 2.0), approximator=replace(SMALL, max_pairs=10),
+        learning=learning(tie_rule="lowest"), seed=8,
+    )  # fmt: skip
+
+
+AGENTS = {
+    "discrete": discrete_agent,
+    "partners": partners_agent,
+    "circular": circular_agent,
+    "several": several_agent,
+    "pairs": pairs_agent,
+    "lone": lone_agent,
+    "tables": tables_agent,
+}
+
+
+@functools.cache
+def agents():
+    """One of each kind, which has learned."""
+    return {name: learned(make()) for name, make in AGENTS.items()}
+
+
+def observations_of(agent, n, seed=0):
+    """Random ones, some outside the ranges, many where a bin begins or next to it."""
+    random = np.random.default_rng(seed)
+    low, high = agent.observation_space.low, agent.observation_space.high
+    low, high = low.astype(float), high.astype(float)
+    values = random.uniform(low - 0.2 * (high - low), high + 0.2 * (high - low), (n, low.size))
+    on_bounds = low + random.integers(0, 361, values.shape) / 360 * (high - low)
+    towards = random.choice([-np.inf, np.inf], values.shape)
+    on_bounds = np.where(random.random(values.shape) < 0.3, on_bounds, values)
+    nudged = np.nextafter(on_bounds, towards)
+    values = np.where(random.random(values.shape) < 0.5, on_bounds, nudged)
+    values[0] = 0.0
+    values[1], values[2] = low, high
+    return values
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What is asked, and in each dimension the actions that tie and the agent's own."""
+
+    kind: str
+    given: np.ndarray
+    tied: list[list[set[int]]]
+    chosen: list[list[int]]
+
+
+def expected_of(agent, kind, given, observations):
+    tied, chosen = [], []
+    tolerance = agent.learning.tie_tolerance
+    for observation in observations:
+        action = np.ravel(agent.act(observation, explore=False))
+        chosen.append(
+            [np.abs(agent.actions_of(d) - one).argmin().item() for d, one in enumerate(action)]
+        )
+        values = [agent.q_values(observation, d) for d in range(agent.n_dimensions)]
+        tied.append([set(np.flatnonzero(q >= q.max() - tolerance).tolist()) for q in values])
+    return Expected(kind, given, tied, chosen)
+
+
+def all_expected(name, agent):
+    """10,000 observations, in double and single precision and in fixed point."""
+    values = observations_of(agent, N_STATES)
+    if name == "pairs":  # whose bins differ right beside bounds: tested below
+        values = np.random.default_rng(0).uniform(-1.2, 1.2, values.shape)
+    doubles, floats, fixed = np.split(values, [N_STATES // 3, N_STATES // 3 * 2])
+    floats = floats.astype(np.float32)
+    scale = 2.0 ** c_header(agent, "policy").fraction_bits
+    fixed = np.round(fixed * scale).astype(np.int32)
+    return [
+        expected_of(agent, "double", doubles, doubles),
+        expected_of(agent, "float", floats, floats.astype(np.float64)),
+        expected_of(agent, "fixed", fixed, fixed / scale),
+    ]
+
+
+def check_actions(agent, expected, actions):
+    """Each one the agent's, or one of those among which it draws."""
+    n_unique = 0
+    for tied, chosen, came in zip(expected.tied, expected.chosen, actions, strict=True):
+        for among, own, action in zip(tied, chosen, came, strict=True):
+            assert action in among
+            if len(among) == 1 or agent.learning.tie_rule != "uniform":
+                assert action == own
+                n_unique += 1
+    assert n_unique > len(actions) / 4
+    assert len({tuple(action) for action in actions}) > 1
+
+
+POLICY = """
+#include "declarations.h"
+{define}
+#include "policy.h"
+uint32_t policy_n_observed(void) {{ return POLICY_N_OBSERVED; }}
+uint32_t policy_n_dimensions(void) {{ return POLICY_N_DIMENSIONS; }}
+void policy_fixed(const int32_t *x, uint32_t *a) {{ {fixed} }}
+#ifdef POLICY_USE_FLOAT
+void policy_double(const double *x, uint32_t *a) {{ {double} }}
+void policy_float(const float *x, uint32_t *a) {{ {float} }}
+#endif
+"""
+
+DECLARATIONS = """
+#include <stdint.h>
+uint32_t policy_n_observed(void);
+uint32_t policy_n_dimensions(void);
+void policy_fixed(const int32_t *x, uint32_t *a);
+void policy_double(const double *x, uint32_t *a);
+void policy_float(const float *x, uint32_t *a);
+"""
+
+DRIVER = """
+#include <stdio.h>
+#include <string.h>
+#include "declarations.h"
+#define RUN(type, act) \\
+  { type x[64]; \\
+    while (fread(x, sizeof *x, policy_n_observed(), stdin) == policy_n_observed()) { \\
+      act(x, action); \\
+      fwrite(action, sizeof *action, policy_n_dimensions(), stdout); } }
+int main(int argc, char **argv) {
+  uint32_t action[64];
+  if (argc != 2) return 2;
+  if (!strcmp(argv[1], "fixed")) RUN(int32_t, policy_fixed)
+  if (!strcmp(argv[1], "double")) RUN(double, policy_double)
+  if (!strcmp(argv[1], "float")) RUN(float, policy_float)
+  return 0;
+}
+"""
+
+
+def write_policy(folder, agent, *, floats=True, **options):
+    """The header, and a source file that makes its functions callable from others."""
+    header = export_c_header(agent, folder / "policy.h", **options)
+    one = agent.n_dimensions == 1
+    calls = {
+        kind: f"a[0] = policy_act_{kind}(x);" if one else f"policy_act_{kind}(x, a);"
+        for kind in ("fixed", "double", "float")
+    }
+    define = "#define POLICY_USE_FLOAT" if floats else ""
+    (folder / "policy.c").write_text(POLICY.format(define=define, **calls))
+    (folder / "declarations.h").write_text(DECLARATIONS)
+    (folder / "driver.c").write_text(DRIVER)
+    return header
+
+
+def compile_policy(folder, target, *options):
+    """The policy's object, compiled on its own, without a C library."""
+    done = folder / "policy.o"
+    alone = (*STRICT, *ALONE, *target.options, *options)
+    run(target.compiler, *alone, "-c", folder / "policy.c", "-o", done)
+    return done
+
+
+def build(folder, target):
+    """The program that answers observations with actions, as a command."""
+    program = folder / "program"
+    run(
+        # Static: an emulated program finds no shared libraries.
+        target.compiler, "-O1", *target.options, "-static", folder / "driver.c",
+        compile_policy(folder, target, "-O2"), "-o", program,
+    )  # fmt: skip
+    return [target.runner, program] if target.runner else [program]
+
+
+def actions_of(command, kind, observations, n_dimensions):
+    raw = run(*command, kind, input=np.ascontiguousarray(observations).tobytes())
+    return np.frombuffer(raw, "<u4").reshape(-1, n_dimensions).tolist()
+
+
+@functools.cache
+def expectations(name):
+    """What an agent does, asked once for all targets."""
+    return all_expected(name, agents()[name])
+
+
+def check_all_actions(name, target, folder):
+    """A policy answers as its agent, compiled by and run on the target."""
+    agent = agents()[name]
+    write_policy(folder, agent)
+    command = build(folder, target)
+    for expected in expectations(name):
+        came = actions_of(command, expected.kind, expected.given, agent.n_dimensions)
+        check_actions(agent, expected, came)
+
+
+def check_symbols(target, folder):
+    """Symbols are told by readings of one and zero."""
+    agent = symbols_agent()
+    header = write_policy(folder, agent)
+    command = build(folder, target)
+    agent.observation_space.seed(3)
+    seen = [agent.observation_space.sample() for _ in range(1000)]
+    told = np.array([agent.flat_observation(one) for one in seen])
+    for kind, given in (
+        ("double", told),
+        ("float", told.astype(np.float32)),
+        ("fixed", np.round(told * 2.0**header.fraction_bits).astype(np.int32)),
+    ):
+        check_actions(
+            agent, expected_of(agent, kind, given, seen), actions_of(command, kind, given, 1)
+        )
+    assert "input 2: which of observation[4] to observation[7] is 1" in header.text
+
+
+def check_integer_path(name, target, folder):
+    """It needs no library, no floating point and no memory of its own."""
+    agent = agents()[name]
+    write_policy(folder, agent, floats=False)
+    options = {
+        "aarch64-linux-gnu-gcc": ["-mgeneral-regs-only"],
+        "arm-linux-gnueabihf-gcc": ["-mcpu=cortex-m4", "-mfloat-abi=soft"],
+    }.get(target.compiler, ["-mno-sse", "-mno-80387"])
+    done = compile_policy(folder, target, "-O2", *options)
+    assert run(target.prefix + "nm", "-u", done) == b""
+    sections = run(target.prefix + "objdump", "-h", done).decode()
+    sizes = {
+        words[1]: int(words[2], 16)
+        for words in map(str.split, sections.splitlines())
+        if len(words) > 3 and words[0].isdigit()
+    }
+    assert sizes.get(".data", 0) == sizes.get(".bss", 0) == 0

@@ -1,0 +1,51 @@
+"""All matrices of bad values: tests/robustness tries every cell, the ordinary tests a sample.
+
+A row is a function that makes cells and its arguments; `watched_cells.failures` runs it.
+"""
+
+import bad_inputs
+import bad_options
+import core_cells
+import mutated_files
+import public_cells
+
+AGENTS = [kind.__name__ for kind in bad_inputs.SETTINGS]
+N_MUTATIONS = 300
+"""Of each kind of file."""
+
+MATRICES = {
+    "agents": [
+        *((bad_inputs.constructor_cells, name) for name in AGENTS),
+        *((bad_inputs.setting_cells, name) for name in AGENTS),
+        *((bad_inputs.transition_cells, kind) for kind in bad_inputs.KINDS),
+        *((bad_inputs.method_cells, kind) for kind in bad_inputs.KINDS),
+        *((bad_inputs.file_cells, kind) for kind in AGENTS),
+        (bad_inputs.loop_cells,),
+    ],
+    "core": [(core_cells.never_made_cells,), (core_cells.argument_cells,)],
+    "classes": [
+        (public_cells.never_initialised_cells,),
+        (public_cells.estimator_cells,),
+        (public_cells.coding_cells,),
+        (public_cells.environment_cells,),
+        (public_cells.experiment_cells,),
+    ],
+    "commands": [(bad_options.command_cells, name) for name in bad_options.COMMANDS],
+    "files": [(mutated_files.mutation_cells, name, N_MUTATIONS) for name in mutated_files.READERS],
+}
+ROWS = [row for rows in MATRICES.values() for row in rows]
+
+
+def name_of(row):
+    """The name of a row, as tests are called."""
+    return "-".join([row[0].__name__, *map(str, row[1:])])
+
+
+def sample_cells(matrix, every):
+    """Some cells of all rows of a matrix, spread over parameters and values alike."""
+    number = 0
+    for make_cells, *arguments in MATRICES[matrix]:
+        for cell in make_cells(*arguments):
+            if number % every == 0:
+                yield cell
+            number += 1

@@ -1,0 +1,54 @@
+"""Bad values of every argument, setting, option and file: refused by name, or taken and at work.
+
+This is a sample; ``nox -s robustness`` tries all.
+"""
+
+import pytest
+
+import bad_inputs
+import bad_options
+import core_cells
+from matrices import MATRICES, sample_cells
+from sdnn.cli import main
+from watched_cells import failures, faulty_cells
+
+EVERY = {"agents": 41, "core": 41, "classes": 41, "commands": 29, "files": 41}
+"""Primes, so that the sample has all parameters and all values; a few thousand cells in all."""
+
+
+@pytest.mark.parametrize("matrix", MATRICES)
+def test_bad_values_are_refused_by_name_or_work(matrix, monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    n_cells, failed = failures(sample_cells, matrix, EVERY[matrix])
+    assert failed == []
+    assert n_cells >= 40
+
+
+def test_crashes_and_hangs_are_failed_cells(monkeypatch):
+    monkeypatch.setattr("watched_cells.HANG_SECONDS", 5.0)
+    n_cells, failed = failures(faulty_cells)
+    assert n_cells == 7
+    assert failed[:2] == ["wrong: was wrong", "raising: ZeroDivisionError: division by zero"]
+    assert failed[2] == "hanging: hangs for more than 5.0 s"
+    assert failed[3].startswith("crashing: ended the process with exit code -6")
+    assert failed[4].startswith("eating: MemoryError")
+    assert failed[5:] == ["last: was last"]
+
+
+def test_a_new_parameter_is_covered_by_itself():
+    cells = [name for name, _ in bad_inputs.constructor_cells("SDNNQLearning")]
+    for parameter in bad_inputs.parameters_of(bad_inputs.SDNNQLearning.__init__):
+        assert sum(f"({parameter}=" in name for name in cells) >= len(bad_inputs.BAD)
+
+
+def test_every_command_has_its_row():
+    assert set(main.commands) == set(bad_options.COMMANDS) | bad_options.LEFT_OUT
+
+
+def test_good_arguments_are_known_of_everything_that_takes_some():
+    configs = {cls.__name__ for cls in core_cells.CLASSES if cls.__name__.endswith("Config")}
+    classes = {cls.__name__ for cls in core_cells.CLASSES}
+    assert classes - configs <= set(core_cells.GOOD)
+    for name in core_cells.GOOD:
+        core_cells.made(name)
