@@ -29,21 +29,25 @@ def interval(estimate: Estimate, digits: int) -> str:
     return f"{value} [{lower}, {upper}]"
 
 
-def with_tables(page: str, tables: Mapping[str, str]) -> str:
-    """Replace each table, which stands in the page between a mark with its name and an end.
+def replaced(page: str, begin: str, text: str, end: str = END) -> str:
+    """Replace what stands between a mark and the next end.
 
     Raises
     ------
     ValueError
-        If a mark or its end is missing.
+        If the mark or its end is missing.
     """
+    before, begun, rest = page.partition(begin)
+    _, ended, after = rest.partition(end)
+    if not begun or not ended:
+        raise ValueError(f"the page must have the lines {begin} and {end}")
+    return f"{before}{begin}\n\n{text}\n{end}{after}"
+
+
+def with_tables(page: str, tables: Mapping[str, str]) -> str:
+    """Replace each table by its name."""
     for name, table in tables.items():
-        begin = f"<!-- table: {name} -->"
-        before, begun, rest = page.partition(begin)
-        _, ended, after = rest.partition(END)
-        if not begun or not ended:
-            raise ValueError(f"{PAGE} must have the lines {begin} and {END}")
-        page = f"{before}{begin}\n\n{table}\n{END}{after}"
+        page = replaced(page, f"<!-- table: {name} -->", table)
     return page
 
 

@@ -12,6 +12,8 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
+from page import replaced
+
 from sdnn.benchmarks.report import describe_run, tables
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -59,21 +61,12 @@ def profile_table(profile: dict[str, dict[str, float]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def replaced(page: str, begin: str, text: str) -> str:
-    """The page with what stands between a mark and the next end replaced."""
-    before, begun, rest = page.partition(begin)
-    _, ended, after = rest.partition(END)
-    if not begun or not ended:
-        raise SystemExit(f"{PAGE} must hold the lines {begin} and {END}")
-    return f"{before}{begin}\n\n{text}\n{END}{after}"
-
-
 def with_tables(
     page: str, results: dict, profile: dict[str, dict[str, float]], avx512: dict
 ) -> str:
     """The page with what stands between its marks replaced."""
-    page = replaced(page, BEGIN, f"{to_markdown(results)}\n{profile_table(profile)}")
-    return replaced(page, BEGIN_AVX512, to_markdown(avx512, N_OF_PASSES))
+    page = replaced(page, BEGIN, f"{to_markdown(results)}\n{profile_table(profile)}", END)
+    return replaced(page, BEGIN_AVX512, to_markdown(avx512, N_OF_PASSES), END)
 
 
 if __name__ == "__main__":

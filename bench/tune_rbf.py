@@ -25,10 +25,9 @@ from pathlib import Path
 
 import numpy as np
 
-from sdnn import _core
 from sdnn.agents import QLearningConfig
 from sdnn.approximators import RBFNetworkConfig
-from sdnn.environments import AcrobotConfig, GoalScheduleConfig, SensorConfig
+from sdnn.runs import AgentSpec, BudgetSpec, ProtocolSpec, RunSpec
 from sdnn.runs.planned_trial import trial_seed
 
 ROWS = Path(__file__).parents[1] / "docs" / "rbf-tuning.csv"
@@ -83,17 +82,16 @@ BEFORE = Setting(1.0, 3.0)
 def run(task: tuple[str, Setting, int]) -> dict[str, object]:
     """One trial: a row."""
     stage, setting, seed = task
-    trial = _core.RBFAcrobotTrial(
+    spec = RunSpec(
+        agent=AgentSpec(name="rbf"),
         approximator=RBFNetworkConfig(
             n_bases=setting.n_bases, width=setting.width, gradient_rate=setting.gradient_rate
         ),
         learning=QLearningConfig(tie_rule=setting.tie_rule),
-        acrobot=AcrobotConfig(),
-        goal=GoalScheduleConfig(),
-        sensors=SensorConfig(),
-        protocol=_core.ProtocolConfig(n_learning_episodes=N_EPISODES, test_interval=TEST_INTERVAL),
-        seed=seed,
+        protocol=ProtocolSpec(evaluate_every_episodes=TEST_INTERVAL),
+        budget=BudgetSpec(episodes=N_EPISODES),
     )
+    trial = spec.make_trial(seed)
     start = time.thread_time()
     diverged = False
     try:

@@ -15,10 +15,13 @@ import warnings
 from collections import defaultdict
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
 import numpy as np
 from compare import Rows
 from demonstration import target, training_points
 from matplotlib.figure import Figure
+from page import with_tables
 from rivals import gaussian_process, scaled
 from river import datasets
 from sklearn.datasets import (
@@ -356,17 +359,11 @@ def main(folder, n_seeds):
     measure_all(folder / "problems.csv", n_seeds)
     found = read(folder / "problems.csv")
     draw(found, folder / "problems.png")
-    page = PAGE.read_text(encoding="utf-8")
-    for unit, (problems, models) in TABLES.items():
-        begin, end = (
-            f"<!-- table: {unit}, bench/estimators/problems.py -->\n",
-            "<!-- end of table -->",
-        )
-        before, _, rest = page.partition(begin)
-        _, _, after = rest.partition(end)
-        told = table(found, problems, models)
-        page = f"{before}{begin}\n{told}\n\n{end}{after}"
-    PAGE.write_text(page, encoding="utf-8")
+    told = {
+        f"{unit}, bench/estimators/problems.py": table(found, problems, models) + "\n"
+        for unit, (problems, models) in TABLES.items()
+    }
+    PAGE.write_text(with_tables(PAGE.read_text(), told))
 
 
 if __name__ == "__main__":

@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import csv
 import itertools
-import re
 import sys
 import time
 import warnings
 from collections import defaultdict
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
 import numpy as np
 from compare import Rows
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+from page import with_tables
 from river import datasets, dummy, forest, linear_model, neighbors, preprocessing, stats, tree
 from river.datasets import synth
 from sklearn.exceptions import ConvergenceWarning
@@ -223,14 +225,8 @@ def main(folder, n_seeds):
     measure_all(folder / "streams.csv", n_seeds)
     found = read(folder / "streams.csv")
     draw(found, folder / "streams.png")
-    begin, end = "<!-- table: bench/estimators/streams.py -->", "<!-- end of table -->"
-    page = re.sub(
-        f"(?<={begin}\n).*?(?={end})",
-        lambda _: f"\n{tables(found)}\n\n",
-        PAGE.read_text(encoding="utf-8"),
-        flags=re.DOTALL,
-    )
-    PAGE.write_text(page, encoding="utf-8")
+    page = with_tables(PAGE.read_text(), {"bench/estimators/streams.py": tables(found) + "\n"})
+    PAGE.write_text(page)
 
 
 if __name__ == "__main__":

@@ -32,7 +32,9 @@ def performance_tables():
     path = ROOT / "bench" / "performance_tables.py"
     spec = importlib.util.spec_from_file_location("performance_tables", path)
     module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(path.parent)
+        spec.loader.exec_module(module)
     return module
 
 
