@@ -100,6 +100,12 @@ def docs(session):
     pytest(session, "tests/docs")
 
 
+@weekly()
+def cluster(session):
+    """Run trials on a Dask cluster whose parts are killed and frozen."""
+    pytest(session, "tests/cluster")
+
+
 @quick()
 def robustness(session):
     """Try bad values of every argument, option and file; end commands at random instants."""

@@ -40,19 +40,8 @@ _OPTIONS = (
         metavar="SECONDS",
         help="Wait so long for the scheduler and for a worker that fits.  [default: 300]",
     ),
-    click.option(
-        "--worker-timeout",
-        type=click.FloatRange(min=0, min_open=True),
-        metavar="SECONDS",
-        help="Count a worker as lost after so long without a heartbeat.  [default: 60]",
-    ),
-    click.option(
-        "--attempts",
-        type=click.IntRange(min=1),
-        help="Give a trial up when so many workers were lost while they had it.  [default: 5]",
-    ),
 )
-_OF_DASK = ("scheduler", "scheduler_timeout", "worker_timeout", "attempts")
+_OF_DASK = ("scheduler", "scheduler_timeout")
 
 
 def executor_options(command: Function) -> Function:

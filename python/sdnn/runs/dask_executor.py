@@ -1,89 +1,57 @@
 """Runs trials on a Dask cluster that others have started.
 
-Dask carries tasks to workers and results back; what runs where is decided here, one trial for each
-thread of each worker. So it is known which trial a lost worker had, how often a trial was lost, and
-nothing depends on how the scheduler is configured. What Dask says about a task is never believed
-beyond "here is its result": a trial without a result is simply submitted again.
+Dask places trials and runs them again when a worker is lost. This module admits workers whose
+build gives the same rows, submits as many trials as those have threads, and collects results.
 """
 
 from __future__ import annotations
 
-import asyncio
 import importlib.util
 import json
 import logging
 import pickle
-import re
 import threading
 import time
-import uuid
-from collections import Counter
-from collections.abc import Callable, Coroutine, Generator, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
-from itertools import count
+from collections import Counter, deque
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from sdnn import _core
-from sdnn.runs.dask_worker import PROBE_WORKER, MismatchError, probe, run_on_worker
+from sdnn.runs.dask_worker import PROBE_CALL, PROGRESS_TOPIC, probe, run_on_worker
 from sdnn.runs.errors import ClusterError, WorkerLostError
-from sdnn.runs.executor import (
-    POLL_SECONDS,
-    Advanced,
-    Failed,
-    Finished,
-    Lost,
-    Message,
-    Noted,
-    Started,
-)
+from sdnn.runs.executor import Advanced, Failed, Finished, Lost, Message, Noted, Started
 from sdnn.runs.planned_trial import PlannedTrial
+from sdnn.runs.records import TrialKey
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, Future
 
 SCHEDULER_TIMEOUT = 300.0
-WORKER_TIMEOUT = 60.0
-ATTEMPTS = 5
-
-CONNECT_SECONDS = 5.0
-"""Longest try to connect; then the address is looked up again."""
-RETRY_SECONDS = 1.0
 ANSWER_SECONDS = 30.0
 """A scheduler that leaves a question unanswered for so long counts as lost."""
-PATIENCE_SECONDS = 5.0
+CONNECT_SECONDS = 5.0
+NOTE_SECONDS = 5.0
 """How long to wait for a worker before saying so."""
-REFUSAL_SECONDS = 10.0
-"""How long to wait for a fitting worker after the last refusal, where none has fitted yet."""
-LOOK_SECONDS = 1.0
-"""How often the list of workers is asked for ..."""
-LOOK_SECONDS_PER_WORKER = 0.01
-"""... and how much less often for each of them, because the answer grows."""
-PROGRESS_SECONDS = 1.0
-"""How often a trial tells its progress ..."""
-PROGRESS_EVENTS_PER_SECOND = 100
-"""... unless all of them would tell more than this, which the driver has to read."""
+WORKERS_SECONDS = 1.0
+"""How often the list of workers is read."""
+RESULTS_SECONDS = 0.02
+"""How often results are collected."""
+RESUME = "finished trials are stored, the same command continues from there"
 
 
 class DaskExecutor:
     """Runs trials on the workers of a Dask scheduler.
 
-    Workers may come and go. One with another version of this library, or whose build gives other
-    bits, gets no trials. The scheduler may die and come back.
-
     Parameters
     ----------
     scheduler
-        Its address, such as ``tcp://10.0.0.1:8786``, or the path of its scheduler file, which is
-        read again whenever the scheduler was lost.
+        Its address, such as ``tcp://10.0.0.1:8786``, or the path of its scheduler file.
     scheduler_timeout
         Seconds to wait for the scheduler, and for a worker that fits, before the run fails.
-    worker_timeout
-        Seconds without a heartbeat after which a worker counts as lost.
-    attempts
-        A trial fails when so many workers were lost while they had it.
 
     Raises
     ------
@@ -93,32 +61,19 @@ class DaskExecutor:
         If a value is out of its range.
     """
 
-    def __init__(
-        self,
-        scheduler: str,
-        *,
-        scheduler_timeout: float = SCHEDULER_TIMEOUT,
-        worker_timeout: float = WORKER_TIMEOUT,
-        attempts: int = ATTEMPTS,
-    ) -> None:
+    def __init__(self, scheduler: str, *, scheduler_timeout: float = SCHEDULER_TIMEOUT) -> None:
         if not scheduler:
             raise ValueError("scheduler must be an address or a scheduler file, got ''")
-        for name, seconds in (
-            ("scheduler_timeout", scheduler_timeout),
-            ("worker_timeout", worker_timeout),
-        ):
-            if not 0 < seconds < float("inf"):
-                raise ValueError(f"{name} must be finite and above 0, got {seconds}")
-        if attempts < 1:
-            raise ValueError(f"attempts must be at least 1, got {attempts}")
+        if not 0 < scheduler_timeout < float("inf"):
+            raise ValueError(
+                f"scheduler_timeout must be finite and above 0, got {scheduler_timeout}"
+            )
         if importlib.util.find_spec("distributed") is None:
             raise ClusterError(
                 'trials on a cluster need Dask, which is not installed: pip install "sdnn[dask]"'
             )
         self.scheduler = scheduler
         self.scheduler_timeout = scheduler_timeout
-        self.worker_timeout = worker_timeout
-        self.attempts = attempts
 
     def run(
         self, planned: Sequence[PlannedTrial], stop: threading.Event
@@ -128,456 +83,222 @@ class DaskExecutor:
         Raises
         ------
         ClusterError
-            If there was no scheduler or no fitting worker for too long.
+            If the scheduler is lost, or there is no fitting worker for too long.
         """
-        import distributed  # noqa: F401  (before `_quiet`, for it sets up logging)
-
-        run = _Run(self, planned)
-        thread = threading.Thread(target=run.in_thread, name="dask driver", daemon=True)
         with _quiet():
-            thread.start()
+            client = yield from self._connect(stop)
+            if client is None:
+                return
             try:
-                while thread.is_alive() or not run.messages.empty():
-                    if stop.is_set():
-                        run.give_up()
-                    with suppress(Empty):
-                        yield run.messages.get(timeout=POLL_SECONDS)
+                yield from _Run(self, client, planned).messages(stop)
+            except (OSError, TimeoutError) as error:
+                raise ClusterError(
+                    f"lost the scheduler at {self.scheduler} ({error}); {RESUME}"
+                ) from error
             finally:
-                run.give_up()
-                thread.join(2 * CONNECT_SECONDS)
-        if run.error is not None:
-            raise run.error
+                client.close(timeout=CONNECT_SECONDS)
+
+    def _connect(self, stop: threading.Event) -> Generator[Message, None, Client | None]:
+        from distributed import Client
+
+        is_noted = False
+        deadline = time.monotonic() + self.scheduler_timeout
+        while not stop.is_set():
+            try:
+                address, path = self.scheduler, Path(self.scheduler)
+                if path.suffix == ".json" or path.is_file():
+                    address = json.loads(path.read_text())["address"]
+                left = max(0.1, deadline - time.monotonic())
+                return Client(address, timeout=min(CONNECT_SECONDS, left), set_as_default=False)
+            except OSError as error:
+                if time.monotonic() > deadline:
+                    raise ClusterError(
+                        f"no scheduler at {self.scheduler}: {error}; waited"
+                        f" {self.scheduler_timeout:g} s; {RESUME}"
+                    ) from error
+                if not is_noted:
+                    is_noted = True
+                    yield Noted(f"waiting for the scheduler at {self.scheduler}")
+                stop.wait(WORKERS_SECONDS)
+            except (ValueError, KeyError, TypeError) as error:
+                raise ClusterError(
+                    f"scheduler must be an address or a scheduler file, got {self.scheduler}"
+                    f" ({type(error).__name__}: {error})"
+                ) from error
+        return None
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Silence Dask's own words on lost connections: the run tells of them once, in its own."""
+    """Silence what Dask logs about lost connections: the run ends with one message about them."""
+    import distributed  # noqa: F401  (its import sets the levels)
+
     loggers = [logging.getLogger(f"distributed{part}") for part in ("", ".client", ".core")]
     levels = [logger.level for logger in loggers]
-    for logger in loggers:
-        logger.setLevel(logging.CRITICAL)
     try:
+        for logger in loggers:
+            logger.setLevel(logging.CRITICAL)
         yield
     finally:
         for logger, level in zip(loggers, levels, strict=True):
             logger.setLevel(level)
 
 
-class _SchedulerLostError(Exception):
-    """The connection to the scheduler is gone, or what it knew of this run."""
-
-
-class _WorkerDiedError(Exception):
-    """Dask says that a worker died of a task."""
-
-
-class _TaskError(Exception):
-    """A task raised an error."""
-
-    def __init__(self, error: Exception) -> None:
-        super().__init__(str(error))
-        self.error = error
+@dataclass(frozen=True)
+class _Task:
+    planned: PlannedTrial
+    future: Future
+    workers: frozenset[str]
+    is_alone: bool
 
 
 class _Run:
-    """One run of trials, in a thread with an event loop; trials are numbers in the plan."""
+    """The trials of one run."""
 
-    def __init__(self, executor: DaskExecutor, planned: Sequence[PlannedTrial]) -> None:
-        self.executor = executor
-        self.planned = planned
-        self.messages: SimpleQueue[Message] = SimpleQueue()
-        self.error: Exception | None = None
-        self.name = f"sdnn-{uuid.uuid4().hex[:8]}"
-        self.n_open = len(planned)
-        self.waiting: asyncio.Queue[int] = asyncio.Queue()
-        for trial in range(len(planned)):
-            self.waiting.put_nowait(trial)
-        self.woken = asyncio.Event()
-        self.attempts = count()
-        self.probes: list[tuple[str, bytes, str]] = []
-        self.served_at = time.monotonic()
-        self.has_served = False
-        self._n_lost: Counter[int] = Counter()
-        self._stopping = False
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._main: asyncio.Task[None] | None = None
+    def __init__(
+        self, executor: DaskExecutor, client: Client, planned: Sequence[PlannedTrial]
+    ) -> None:
+        from distributed import as_completed
 
-    # Called from other threads.
+        self._executor, self._client = executor, client
+        self._waiting, self._suspects = deque(planned), deque[PlannedTrial]()
+        self._running: dict[str, _Task] = {}
+        self._n_submitted: Counter[TrialKey] = Counter()
+        self._completed = as_completed(loop=client.loop, with_results=True, raise_errors=False)
+        self._progress: SimpleQueue[tuple[str, int]] = SimpleQueue()
+        self._threads: dict[str, int] = {}  # of the workers that fit
+        self._refused: dict[str, str] = {}
+        self._served = time.monotonic()
+        self._is_noted = False
+        self._probes: list[tuple[bytes, str]] = []
+        probed = set()
+        for one in planned:
+            kind = (one.key.agent, one.spec.is_compiled)
+            if kind not in probed:
+                try:
+                    self._probes.append((pickle.dumps(one), probe(one)))
+                except Exception:  # it fails when it is run, as with every executor
+                    continue
+                probed.add(kind)
 
-    def in_thread(self) -> None:
-        """Run until every trial is finished or failed, or the run is given up."""
-        try:
-            asyncio.run(self._drive())
-        except asyncio.CancelledError:
-            pass
-        except Exception as error:
-            self.error = error
-
-    def give_up(self) -> None:
-        """Stop as soon as possible; further calls change nothing."""
-        if not self._stopping:
-            self._stopping = True
-            if self._loop is not None and self._main is not None:
-                with suppress(RuntimeError):  # the loop is closed: the run has ended
-                    self._loop.call_soon_threadsafe(self._main.cancel)
-
-    # What becomes of trials.
-
-    def note(self, text: str) -> None:
-        """Tell the user."""
-        self.messages.put(Noted(text))
-
-    def finish(self, message: Finished | Failed) -> None:
-        """Close a trial with its last message."""
-        self.messages.put(message)
-        self.n_open -= 1
-        if not self.n_open:
-            self.woken.set()
-
-    def put_back(self, trial: int, lost_with: str | None = None) -> None:
-        """Let a trial start again, unless too many workers were lost with it."""
-        planned = self.planned[trial]
-        self._n_lost[trial] += lost_with is not None
-        if self._n_lost[trial] < self.executor.attempts:
-            self.messages.put(Lost(planned))
-            self.waiting.put_nowait(trial)
-            return
-        error = WorkerLostError(
-            f"workers lost while they had it: {self._n_lost[trial]}, the last one {lost_with}"
+    def messages(self, stop: threading.Event) -> Generator[Message, None, None]:
+        """Run until every trial is finished or failed, or `stop` is set."""
+        self._client.subscribe_topic(
+            PROGRESS_TOPIC, lambda event: self._progress.put(tuple(event[1]))
         )
-        self.finish(Failed(planned, error))
-
-    def be_patient(self, reason: str, since: float, seconds: float) -> None:
-        """Raise the error that ends a run, if `since` is more than so many seconds ago."""
-        if time.monotonic() - since > seconds:
-            raise ClusterError(
-                f"{reason}; waited {seconds:g} s. What was finished is stored,"
-                " the same command goes on from there"
-            )
-
-    # The connection.
-
-    async def _drive(self) -> None:
-        self._loop, self._main = asyncio.get_running_loop(), asyncio.current_task()
-        self._make_probes()
-        self.served_at = time.monotonic()
-        while self.n_open and not self._stopping:
-            client = await self._connect()
-            try:
-                await _Session(self, client).serve()
-            except (_SchedulerLostError, OSError, asyncio.TimeoutError) as error:
-                self.note(f"lost the scheduler at {self.executor.scheduler} ({_in_words(error)})")
-                await asyncio.sleep(RETRY_SECONDS)
-            finally:
-                await _close(client)
-
-    def _make_probes(self) -> None:
-        """Choose one trial of each agent and kind, with what it gives here."""
-        probed: set[tuple[str, bool]] = set()
-        for planned in self.planned:
-            agent, kind = planned.key.agent, planned.spec.environment is None
-            if (agent, kind) not in probed:
-                # A trial that raises here fails later, as everywhere.
-                with suppress(Exception):
-                    self.probes.append((agent, pickle.dumps(planned), probe(planned)))
-                    probed.add((agent, kind))
-
-    async def _connect(self) -> Client:
-        noted = False
-        while True:
-            where = self.executor.scheduler
-            try:
-                return await self._try_to_connect()
-            except ValueError as error:
-                raise ClusterError(f"cannot use {where} as scheduler: {error}") from error
-            except Exception as error:
-                reason = f"no scheduler at {where}: {_in_words(error)}"
-                self.be_patient(reason, self.served_at, self.executor.scheduler_timeout)
-                if not noted:
-                    left = self.executor.scheduler_timeout - (time.monotonic() - self.served_at)
-                    self.note(f"{reason}; waiting for up to {left:.0f} s")
-                    noted = True
-                await asyncio.sleep(RETRY_SECONDS)
-
-    async def _try_to_connect(self) -> Client:
-        from distributed import Client
-
-        client = Client(
-            self._address(), asynchronous=True, set_as_default=False, name=self.name,
-            timeout=min(CONNECT_SECONDS, self.executor.scheduler_timeout),
-        )  # fmt: skip
-        try:
-            return await client
-        except BaseException:
-            await _close(client)
-            raise
-
-    def _address(self) -> str:
-        text = self.executor.scheduler
-        if re.fullmatch(r"[\w.+-]+://.+|[^/\\]+:\d+", text):
-            return text
-        try:
-            return str(json.loads(Path(text).read_text())["address"])
-        except (ValueError, KeyError, TypeError) as error:
-            raise OSError(f"{text} is not (yet) a scheduler file") from error
-
-
-async def _close(client: Client) -> None:
-    """Close a connection to its end, or Dask complains when it is collected."""
-    closing = asyncio.ensure_future(asyncio.wait_for(client.close(), CONNECT_SECONDS))
-    with suppress(Exception):  # what cannot be closed is lost already
-        try:
-            await asyncio.shield(closing)
-        except asyncio.CancelledError:
-            with suppress(Exception):
-                await closing
-            raise
-
-
-@dataclass(eq=False)
-class _Worker:
-    """A worker as the driver sees it, from its joining to its loss."""
-
-    address: str
-    n_threads: int
-    last_seen: float
-    heard_at: float
-    refused: str = ""
-    refused_at: float = 0.0
-    serves: bool = False
-    given_up: bool = False
-    available: asyncio.Event = field(default_factory=asyncio.Event)
-    tasks: list[asyncio.Task[None]] = field(default_factory=list)
-
-    def give_up(self) -> None:
-        """Take its trials away: they count as lost with it."""
-        self.serves = False
-        self.given_up = True
-        for task in self.tasks:
-            task.cancel()
-
-
-class _Session:
-    """One connection to a scheduler: finds workers, and keeps each of their threads busy."""
-
-    def __init__(self, run: _Run, client: Client) -> None:
-        self._run = run
-        self._client = client
-        self._workers: dict[tuple[str, str], _Worker] = {}
-        self._running: dict[int, PlannedTrial] = {}
-        self._broken: Exception | None = None
-        self._noted = False
-
-    async def serve(self) -> None:
-        """Run trials until none is open.
-
-        Raises
-        ------
-        _SchedulerLostError, OSError
-            If the connection broke.
-        ClusterError
-            If there was no fitting worker for too long.
-        """
-        self._client.subscribe_topic(self._run.name, self._on_progress)
-        try:
-            while self._run.n_open:
-                info = await asyncio.wait_for(self._client.scheduler.identity(), ANSWER_SECONDS)
-                self._look_at(info["workers"])
-                pause = LOOK_SECONDS + LOOK_SECONDS_PER_WORKER * len(self._workers)
-                with suppress(asyncio.TimeoutError):
-                    await asyncio.wait_for(self._run.woken.wait(), pause)
-                if self._broken is not None:
-                    raise self._broken
-        finally:
-            self._run.woken.clear()
-            tasks = [task for worker in self._workers.values() for task in worker.tasks]
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
-
-    def _look_at(self, workers: Mapping[str, Mapping[str, Any]]) -> None:
-        """Note who came, who went and who is silent."""
-        now = time.monotonic()
-        # A worker started again at the same port has another folder.
-        found = {(a, str(info.get("local_directory"))): info for a, info in workers.items()}
-        for key in self._workers.keys() - found.keys():
-            self._workers.pop(key).give_up()
-        for key, info in found.items():
-            worker = self._workers.get(key)
-            if worker is not None and info["last_seen"] != worker.last_seen:
-                worker.last_seen, worker.heard_at = info["last_seen"], now
-                if worker.given_up and not worker.refused:
-                    worker = None  # it was frozen, and is back
-            if worker is None:
-                worker = _Worker(key[0], info["nthreads"], info["last_seen"], now)
-                self._workers[key] = worker
-                worker.tasks.append(self._task(self._admit, worker))
-            elif now - worker.heard_at > self._run.executor.worker_timeout and not worker.given_up:
-                self._run.note(
-                    f"worker {worker.address} has sent nothing for"
-                    f" {self._run.executor.worker_timeout:g} s; its trials start elsewhere"
-                )
-                worker.give_up()
-            if info.get("status", "running") == "running":
-                worker.available.set()
-            else:
-                worker.available.clear()
-        self._be_patient(now)
-
-    def _be_patient(self, now: float) -> None:
-        """Raise an error if there was no fitting worker for too long."""
-        run, seconds = self._run, self._run.executor.scheduler_timeout
-        if any(worker.serves for worker in self._workers.values()):
-            run.served_at, run.has_served = now, True
-            return
-        where = run.executor.scheduler
-        refused = [worker for worker in self._workers.values() if worker.refused]
-        if not refused:
-            run.be_patient(f"no worker at {where}", run.served_at, seconds)
-            if not self._noted and now - run.served_at > PATIENCE_SECONDS:
-                run.note(f"waiting for workers at {where}")
-                self._noted = True
-            return
-        reason = f"no worker at {where} fits: {refused[-1].refused}"
-        run.be_patient(reason, run.served_at, seconds)
-        if not run.has_served and len(refused) == len(self._workers):
-            since = max(worker.refused_at for worker in refused)
-            run.be_patient(reason, since, REFUSAL_SECONDS)
-
-    def _task(
-        self, function: Callable[[_Worker], Coroutine[Any, Any, None]], worker: _Worker
-    ) -> asyncio.Task[None]:
-        async def guarded() -> None:
-            try:
-                await function(worker)
-            except Exception as error:
-                self._broken = error
-                self._run.woken.set()
-
-        return asyncio.create_task(guarded())
-
-    async def _admit(self, worker: _Worker) -> None:
-        """Let a worker serve if it computes as this process does."""
-        try:
-            version, found = await self._result(
-                worker, "probe", eval, PROBE_WORKER,
-                {"arguments": (_core.__version__, [trial for _, trial, _ in self._run.probes])},
-            )  # fmt: skip
-        except _WorkerDiedError:
-            return
-        except _TaskError as raised:
-            self._refuse(worker, f"it cannot run these trials: {_in_words(raised.error)}")
-            return
-        if version != _core.__version__:
-            self._refuse(worker, f"it has sdnn {version}, this is sdnn {_core.__version__}")
-            return
-        for (agent, _, ours), theirs in zip(self._run.probes, found, strict=True):
-            if ours != theirs:
-                self._refuse(
-                    worker,
-                    f"its build of sdnn {version} does not give the rows of this one for agent"
-                    f" {agent}",
-                )
+        looked = float("-inf")
+        while self._waiting or self._suspects or self._running:
+            if time.monotonic() - looked > WORKERS_SECONDS:
+                yield from self._look_at_workers()
+                looked = time.monotonic()
+            yield from self._submit()
+            if stop.wait(RESULTS_SECONDS):
                 return
-        worker.serves = True
-        worker.tasks.extend(self._task(self._keep_busy, worker) for _ in range(worker.n_threads))
+            while not self._progress.empty():
+                key, episode = self._progress.get()
+                if key in self._running:
+                    yield Advanced(self._running[key].planned, episode)
+            for future, result in self._completed.next_batch(block=False):
+                if future.key in self._running:
+                    yield from self._complete(self._running.pop(future.key), result)
 
-    def _refuse(self, worker: _Worker, reason: str) -> None:
-        worker.refused = f"worker {worker.address} was refused, {reason}"
-        worker.refused_at = time.monotonic()
-        self._run.note(worker.refused)
-
-    async def _keep_busy(self, worker: _Worker) -> None:
-        """Give one thread of a worker one trial after another."""
-        while True:
-            await worker.available.wait()
-            await self._run_trial(worker, await self._run.waiting.get())
-
-    async def _run_trial(self, worker: _Worker, trial: int) -> None:
-        run, planned = self._run, self._run.planned[trial]
-        run.messages.put(Started(planned))
-        try:
-            settings, pickled = planned.spec.canonical_json(), pickle.dumps(planned)
-        except Exception as error:
-            run.finish(Failed(planned, error))
+    def _look_at_workers(self) -> Generator[Message, None, None]:
+        """Admit new workers that fit, and submit again what waits for lost ones only."""
+        client = self._client
+        threads = client.sync(client.scheduler.ncores, callback_timeout=ANSWER_SECONDS)
+        new = [one for one in threads if one not in self._threads and one not in self._refused]
+        found: dict[str, Any] = {}
+        if new:
+            given = {"trials": [trial for trial, _ in self._probes]}
+            found = client.run(eval, PROBE_CALL, given, workers=new, on_error="return")
+        self._threads = {one: threads[one] for one in threads if one in self._threads}
+        for worker, answer in found.items():
+            if isinstance(answer, OSError):
+                continue  # it was lost meanwhile
+            reason = self._mismatch(answer)
+            if reason:
+                self._refused[worker] = f"worker {worker} was refused, {reason}"
+                yield Noted(self._refused[worker])
+            else:
+                self._threads[worker] = threads[worker]
+        for key, task in list(self._running.items()):
+            if task.workers.isdisjoint(self._threads):
+                del self._running[key]
+                task.future.cancel()
+                yield Lost(task.planned)
+                (self._suspects if task.is_alone else self._waiting).appendleft(task.planned)
+        if self._threads:
+            self._served = time.monotonic()
+            self._is_noted = False
             return
-        attempt = next(run.attempts)
-        self._running[attempt] = planned
-        key = planned.key
-        try:
-            record = await self._result(
-                worker,
-                f"{key.case_id}-{key.agent}-{key.trial}-{key.config_hash}-{attempt}",
-                run_on_worker,
-                _core.__version__,
-                settings,
-                pickled,
-                run.name,
-                attempt,
-                self._progress_seconds(),
+        waited = time.monotonic() - self._served
+        if waited > NOTE_SECONDS and not self._is_noted:
+            self._is_noted = True
+            yield Noted(f"waiting for workers at {self._executor.scheduler}")
+        if waited > self._executor.scheduler_timeout:
+            refusals = [text for one, text in self._refused.items() if one in threads]
+            raise ClusterError(
+                f"no worker at {self._executor.scheduler}{' fits: ' * bool(refusals)}"
+                f"{'; '.join(refusals)}; waited {self._executor.scheduler_timeout:g} s; {RESUME}"
             )
-        except asyncio.CancelledError:
-            run.put_back(trial, worker.address if worker.given_up else None)
-            raise
-        except _WorkerDiedError:
-            run.put_back(trial, worker.address)
-        except _TaskError as raised:
-            if isinstance(raised.error, MismatchError):
-                self._refuse(worker, str(raised.error))
-                run.put_back(trial)
-                worker.give_up()
-            else:
-                run.finish(Failed(planned, raised.error))
-        except Exception:
-            run.put_back(trial)
-            raise
-        else:
-            if record is None:
-                run.put_back(trial)
-            else:
-                run.messages.put(Advanced(planned, planned.spec.length))
-                run.finish(Finished(planned, record))
-        finally:
-            del self._running[attempt]
 
-    async def _result(
-        self, worker: _Worker, name: str, function: Callable[..., Any], *arguments: object
-    ) -> Any:
-        """Run a function on a worker and nowhere else.
+    def _mismatch(self, answer: Any) -> str:
+        """Return why a worker gets no trials, or nothing if it fits."""
+        if isinstance(answer, BaseException):
+            return f"it cannot run these trials: {type(answer).__name__}: {answer}"
+        version, probes = answer
+        if version != _core.__version__:
+            return f"it has sdnn {version}, this is sdnn {_core.__version__}"
+        if isinstance(probes, str):
+            return f"it cannot run these trials: {probes}"
+        if probes != [ours for _, ours in self._probes]:
+            return f"its build of sdnn {version} does not give the rows of this one"
+        return ""
 
-        Its key is used once: Dask must never take it for another task, of this run or another.
-        """
+    def _submit(self) -> Generator[Message, None, None]:
+        """Submit a trial for each free thread; suspects one by one, when all others are done."""
+        is_alone = not self._waiting and not self._running
+        trials = self._suspects if is_alone else self._waiting
+        n_free = sum(self._threads.values()) - len(self._running)
+        for _ in range(min(n_free, 1 if is_alone else n_free, len(trials))):
+            planned = trials.popleft()
+            yield Started(planned)
+            try:
+                settings, trial = planned.spec.canonical_json(), pickle.dumps(planned)
+            except Exception as error:
+                yield Failed(planned, error)
+                continue
+            # The identity of a trial is its key: drivers with the same trial share its result. A
+            # trial that is submitted again has a number, because Dask remembers how a key ended.
+            again = self._n_submitted[planned.key]
+            self._n_submitted[planned.key] += 1
+            key = "-".join(map(str, ("trial", _core.__version__, *planned.key, again)))
+            future = self._client.submit(
+                run_on_worker, _core.__version__, settings, trial,
+                key=key, workers=list(self._threads), allow_other_workers=False,
+            )  # fmt: skip
+            self._running[key] = _Task(planned, future, frozenset(self._threads), is_alone)
+            self._completed.add(future)
+
+    def _complete(self, task: _Task, result: Any) -> Generator[Message, None, None]:
+        """Tell how a trial ended."""
         from distributed.scheduler import KilledWorker
 
-        future = self._client.submit(
-            function, *arguments, key=f"{self._run.name}-{name}-{uuid.uuid4().hex[:8]}",
-            workers=[worker.address], allow_other_workers=False, pure=False,
-        )  # fmt: skip
-        try:
-            return await future
-        except KilledWorker as error:
-            raise _WorkerDiedError from error
-        except Exception as error:
-            if future.status == "error":
-                raise _TaskError(error) from error
-            raise _SchedulerLostError from error
-        finally:
-            future.release()
-
-    def _progress_seconds(self) -> float:
-        n_threads = sum(worker.n_threads for worker in self._workers.values() if worker.serves)
-        return max(PROGRESS_SECONDS, n_threads / PROGRESS_EVENTS_PER_SECOND)
-
-    def _on_progress(self, event: tuple[float, dict[str, int]]) -> None:
-        _, content = event
-        planned = self._running.get(content["attempt"])
-        if planned is not None:
-            self._run.messages.put(Advanced(planned, content["episode"]))
-
-
-def _in_words(error: BaseException) -> str:
-    """One line about an error."""
-    if isinstance(error, _SchedulerLostError):
-        return "it does not know the trials any more"
-    text = str(error).partition("\n")[0]
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+        planned, status = task.planned, task.future.status
+        task.future.release()
+        if status == "error" and not isinstance(result[1], KilledWorker):
+            yield Failed(planned, result[1])
+        elif status == "error" and task.is_alone:
+            lost = f"worker after worker was lost with this trial: {result[1]}"
+            yield Failed(planned, WorkerLostError(lost))
+        elif status == "error":
+            yield Lost(planned)
+            self._suspects.append(planned)
+        elif status != "finished":
+            raise OSError("it does not know the trials any more")
+        elif result is None:  # another driver cancelled it
+            yield Lost(planned)
+            self._waiting.append(planned)
+        else:
+            yield Advanced(planned, planned.spec.length)
+            yield Finished(planned, result)

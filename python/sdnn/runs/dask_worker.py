@@ -1,8 +1,7 @@
-"""What a Dask worker is asked to do: prove that it computes the same, and run trials.
+"""The functions that Dask workers call: compare a build with the driver's, and run a trial.
 
-A worker that cannot unpickle a task falls silent instead of reporting an error. So trials come as
-bytes and are unpickled by the task itself; then an agent that the worker cannot import, or a
-missing library, is an error like any other.
+A worker that cannot unpickle a task falls silent instead of reporting an error. So trials are sent
+as bytes and unpickled inside the task: a missing module is then an error like any other.
 """
 
 from __future__ import annotations
@@ -11,110 +10,72 @@ import pickle
 import time
 
 from sdnn import _core
-from sdnn.runs.errors import RunError
+from sdnn.runs.errors import ClusterError
 from sdnn.runs.executor import run_to_end
 from sdnn.runs.planned_trial import PlannedTrial
 from sdnn.runs.records import TrialRecord, TrialRows
 from sdnn.runs.trial import opened
 
 PROBE_EPISODES = 10
-"""Learning episodes of a probe: few, but every part of agent and task takes part."""
+"""Learning episodes of a probe: few, but they use every part of the agent and the task."""
 
-PROBE_WORKER = f"__import__('importlib').import_module({__name__!r}).probe_worker(*arguments)"
-"""To be evaluated where the library may be missing, with `arguments` for `probe_worker`."""
+PROBE_CALL = f"__import__({__name__!r}, fromlist=['probe']).probe_all(trials)"
+"""An expression for `eval`, which workers without this library have, too."""
+
+PROGRESS_TOPIC = "sdnn-progress"
+PROGRESS_SECONDS = 2.0
+"""Least time between two reports of a trial's progress."""
 
 
 def probe(planned: PlannedTrial) -> str:
-    """Run the beginning of a trial and return what must be the same on every machine.
+    """Return version, settings and first rows of a trial: equal where all its rows are equal.
 
-    A trial in C++ gives the same bits everywhere, so its settings and first rows are returned. One
-    in Python may be long and owes nobody the same bits: it is only made.
-
-    Raises
-    ------
-    Exception
-        Whatever the trial raises; an agent that is not registered is a ValueError.
+    A trial in Python is only made: it may be long, and its libraries may round differently.
     """
     with opened(planned.spec.make_trial(planned.key.seed)) as trial:
-        if not planned.spec.is_compiled:
-            return planned.spec.canonical_json()
-        trial.advance(PROBE_EPISODES)
-    rows = TrialRows.of_tests(**trial.test_rows())
-    return f"{planned.spec.canonical_json()} {trial.n_decisions} {rows.digest()}"
+        digest = ""
+        if planned.spec.is_compiled:
+            trial.advance(PROBE_EPISODES)
+            digest = TrialRows.of_tests(**trial.test_rows()).digest()
+    return f"sdnn {_core.__version__}, {planned.spec.canonical_json()}, {digest}"
 
 
-def probe_worker(version: str, pickled: list[bytes]) -> tuple[str, list[str]]:
-    """Return the worker's version and, if it is the asked one, what its probes give.
-
-    Parameters
-    ----------
-    version
-        The driver's version.
-    pickled
-        The trials to probe, one by one.
-    """
-    own: str = _core.__version__
-    if own != version:
-        return own, []
-    return own, [probe(pickle.loads(one)) for one in pickled]
+def probe_all(trials: list[bytes]) -> tuple[str, list[str] | str]:
+    """Return the version of this build, and the results of the probes or what one raised."""
+    try:
+        return _core.__version__, [probe(pickle.loads(trial)) for trial in trials]
+    except Exception as error:
+        return _core.__version__, f"{type(error).__name__}: {error}"
 
 
-class MismatchError(RunError):
-    """A worker has another version, or reads other settings out of a trial."""
-
-
-def run_on_worker(
-    version: str, settings: str, pickled: bytes, topic: str, attempt: int, progress_seconds: float
-) -> TrialRecord | None:
-    """Run one trial; there is no record if it is not wanted any more.
-
-    Parameters
-    ----------
-    version
-        The driver's version.
-    settings
-        The trial's settings as the driver writes them.
-    pickled
-        The trial.
-    topic
-        Topic of the events that tell its progress.
-    attempt
-        Number that the events carry.
-    progress_seconds
-        Least time between two of them.
+def run_on_worker(version: str, settings: str, trial: bytes) -> TrialRecord | None:
+    """Run a trial; None if it was cancelled.
 
     Raises
     ------
-    MismatchError
-        If version or settings are not the driver's: a build that lacks a setting would ignore it.
-
-    Notes
-    -----
-    The GIL is free while a trial in C++ advances, so the worker's heartbeat goes on.
+    ClusterError
+        If this worker's version, or the settings it reads, are not the driver's.
     """
     from distributed import get_worker
 
-    if _core.__version__ != version:
-        raise MismatchError(f"it has sdnn {_core.__version__}, this is sdnn {version}")
-    planned: PlannedTrial = pickle.loads(pickled)
-    if planned.spec.canonical_json() != settings:
-        raise MismatchError(
-            f"its build of sdnn {version} does not know all settings of agent {planned.key.agent}"
-        )
     worker = get_worker()
+    planned: PlannedTrial = pickle.loads(trial)
+    if (_core.__version__, planned.spec.canonical_json()) != (version, settings):
+        raise ClusterError(
+            f"worker {worker.address} (sdnn {_core.__version__}) does not read the settings of"
+            f" this trial as the driver (sdnn {version}) does; install the same build on both"
+        )
     key = worker.get_current_task()
     reported = time.monotonic()
 
     def wanted() -> bool:
-        # A task whose driver gave it up, or is gone, is no longer "executing".
         task = worker.state.tasks.get(key)
         return task is not None and task.state == "executing"
 
     def advanced(episode: int) -> None:
         nonlocal reported
-        now = time.monotonic()
-        if now - reported >= progress_seconds:
-            reported = now
-            worker.log_event(topic, {"attempt": attempt, "episode": episode})
+        if time.monotonic() - reported >= PROGRESS_SECONDS:
+            reported = time.monotonic()
+            worker.log_event(PROGRESS_TOPIC, (key, episode))
 
     return run_to_end(planned, wanted=wanted, advanced=advanced)

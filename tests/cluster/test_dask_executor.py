@@ -1,0 +1,295 @@
+"""Trials on a real cluster: the rows of a local run, whatever is lost meanwhile."""
+
+import json
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import replace
+
+import pytest
+from click.testing import CliRunner
+
+import sdnn
+from sdnn.cli import main
+from sdnn.reproduction import EXPERIMENTS, plan_trials
+from sdnn.runs import (
+    AGENTS,
+    AgentSpec,
+    BudgetSpec,
+    ClusterError,
+    DaskExecutor,
+    EnvironmentSpec,
+    Observer,
+    PlannedTrial,
+    ResultStore,
+    RunSpec,
+    StoreError,
+    TrialKey,
+    WorkerLostError,
+    run_trials,
+)
+from sdnn.runs.records import records_digest
+
+
+class Recorder(Observer):
+    def __init__(self, on_finished=None):
+        self.notes = []
+        self.events = []
+        self.on_finished = on_finished
+
+    def noted(self, text):
+        self.notes.append(text)
+
+    def started(self, planned):
+        self.events.append(("started", planned.key))
+
+    def advanced(self, planned, episode):
+        self.events.append(("advanced", planned.key, episode))
+
+    def finished(self, planned):
+        self.events.append(("finished", planned.key))
+        if self.on_finished and self.count("finished") == 2:
+            self.on_finished()
+
+    def count(self, name):
+        return sum(event[0] == name for event in self.events)
+
+
+def make_plan(n_trials=2, n_episodes=30):
+    return plan_trials(EXPERIMENTS[0].cases, n_trials, 0, n_episodes)
+
+
+def run(folder, plan, cluster=None, observer=None, timeout=60.0):
+    """Run a plan, on a cluster or here; returns outcome and digest."""
+    executor = cluster and DaskExecutor(str(cluster.file), scheduler_timeout=timeout)
+    with ResultStore(folder) as store:
+        outcome = run_trials(plan, store, executor=executor, observer=observer)
+        return outcome, records_digest(store.load())
+
+
+def test_rows_are_those_of_a_local_run(pair, tmp_path):
+    recorder, plan = Recorder(), make_plan(3)
+    outcome, digest = run(tmp_path / "cluster", plan, pair, recorder)
+    assert outcome.n_run == 6
+    assert digest == run(tmp_path / "here", plan)[1]
+    for planned in plan:
+        mine = [event for event in recorder.events if event[1] == planned.key]
+        assert mine[0][0] == "started"
+        assert mine[-2:] == [("advanced", planned.key, 30), ("finished", planned.key)]
+    again, _ = run(tmp_path / "cluster", plan, pair)
+    assert (again.n_reused, again.n_run) == (6, 0)
+
+
+def test_two_drivers_may_run_the_same_trials(pair, tmp_path):
+    plan, digests = make_plan(4, 500), {}
+
+    def drive(name):
+        digests[name] = run(tmp_path / name, plan, pair)[1]
+
+    drivers = [threading.Thread(target=drive, args=(name,)) for name in ("a", "b")]
+    for driver in drivers:
+        driver.start()
+    for driver in drivers:
+        driver.join()
+    assert digests["a"] == digests["b"] == run(tmp_path / "here", plan)[1]
+
+
+def test_the_command_prints_the_same_table(pair, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments = ["reproduce", "a", "--trials", "1", "--episodes", "10", "--json"]
+    dask = ["--executor", "dask", "--scheduler", str(pair.file)]
+    here = CliRunner().invoke(main, [*arguments, "--out", "here"])
+    there = CliRunner().invoke(main, [*arguments, "--out", "there", *dask])
+    assert there.exit_code == 0, there.output
+    assert there.stderr == ""
+    assert json.loads(there.stdout)["digest"] == json.loads(here.stdout)["digest"]
+
+
+def test_a_gymnasium_environment_runs_there_too(pair, tmp_path):
+    env = EnvironmentSpec(id="Pendulum-v1", kwargs={"max_episode_steps": 20})
+    spec = RunSpec(environment=env, budget=BudgetSpec(episodes=2))
+    plan = [
+        PlannedTrial(TrialKey("pendulum", "sdnn-c", trial, trial, spec.config_hash), spec)
+        for trial in range(2)
+    ]
+    recorder = Recorder()
+    outcome, digest = run(tmp_path / "there", plan, pair, recorder)
+    assert outcome.n_run == 2
+    assert digest == run(tmp_path / "here", plan)[1]
+
+
+def test_a_long_trial_reports_its_progress(pair, tmp_path):
+    stop = threading.Event()
+    plan = make_plan(1, 100_000)
+    messages = []
+    for message in DaskExecutor(str(pair.file)).run(plan, stop):
+        messages.append(message)
+        if type(message).__name__ == "Advanced":
+            stop.set()
+    assert 0 < messages[-1].episode < 100_000
+    # An interruption frees the workers: the trials would take minutes.
+    begin = time.monotonic()
+    assert run(tmp_path, make_plan(1, 10), pair)[0].n_run == 2
+    assert time.monotonic() - begin < 20
+
+
+def test_a_trial_that_raises_or_cannot_be_sent_fails_and_the_others_are_done(pair, tmp_path):
+    plan = list(make_plan(2))
+    plan[1] = PlannedTrial(plan[1].key._replace(seed=-1), plan[1].spec)
+    object.__setattr__(plan[-1], "lock", threading.Lock())
+    outcome, _ = run(tmp_path, plan, pair)
+    assert outcome.n_run == 2
+    failed = {failure.key: str(failure.error) for failure in outcome.failures}
+    assert "seed" in failed[plan[1].key]
+    assert "lock" in failed[plan[-1].key]
+
+
+def test_an_unwritable_store_ends_the_run(pair, tmp_path):
+    class Full(ResultStore):
+        def add(self, record, *, is_exact=True):
+            raise StoreError("disk full")
+
+    with Full(tmp_path) as store, pytest.raises(StoreError, match="disk full"):
+        run_trials(make_plan(4), store, executor=DaskExecutor(str(pair.file)))
+
+
+def test_an_agent_that_workers_do_not_know_is_named(pair, tmp_path, monkeypatch):
+    entry = replace(AGENTS["sdnn-c"], id="mine", core_trial=None, costs=())
+    monkeypatch.setitem(AGENTS, "mine", entry)
+    plan = []
+    for key, spec in ((one.key, one.spec) for one in make_plan(1, 10)):
+        other = spec.replace(agent=AgentSpec(name="mine", preset=spec.agent.preset))
+        plan.append(PlannedTrial(key._replace(agent="mine", config_hash=other.config_hash), other))
+    with pytest.raises(ClusterError, match=r"cannot run these trials: .*mine"):
+        run(tmp_path, plan, pair, timeout=3.0)
+
+
+UNFIT = {
+    f"it has sdnn 0.0.9, this is sdnn {sdnn.__version__}": """
+        from sdnn import _core
+        _core.__version__ = "0.0.9"
+    """,
+    "does not give the rows of this one": """
+        from sdnn.runs.records import TrialRows
+        TrialRows.digest = lambda rows: "other"
+    """,
+    "it cannot run these trials: ModuleNotFoundError": """
+        import sys
+        class Blocker:
+            def find_spec(self, name, path=None, target=None):
+                if name.partition(".")[0] == "sdnn":
+                    raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+        sys.meta_path.insert(0, Blocker())
+    """,
+}
+
+
+def test_workers_that_do_not_fit_get_no_trials(cluster, tmp_path):
+    """Where there are only such workers the run fails; beside them a fitting one runs all."""
+    for code in UNFIT.values():
+        cluster.add_worker(code)
+    recorder = Recorder()
+    with pytest.raises(ClusterError, match=r"^no worker at .* fits: worker tcp://.*same command"):
+        run(tmp_path / "out", make_plan(), cluster, recorder, timeout=8.0)
+    for words in UNFIT:
+        assert any(words in note for note in recorder.notes), (words, recorder.notes)
+    cluster.add_worker()
+    outcome, digest = run(tmp_path / "out", make_plan(6), cluster)
+    assert outcome.n_run == 12
+    assert not outcome.failures
+    assert digest == run(tmp_path / "here", make_plan(6))[1]
+
+
+POISON = """
+import os
+from dataclasses import replace
+from sdnn import _core
+from sdnn.runs import AGENTS
+
+class Poison:
+    def __init__(self, *, seed, **parts):
+        self.trial = core_trial(seed=seed, **parts)
+        self.kills = seed == {seed}
+        self.calls = 0
+    def __getattr__(self, name):
+        return getattr(self.trial, name)
+    def advance(self, n):
+        self.trial.advance(n)
+        self.calls += 1
+        if self.kills and self.calls > 1:  # the probe calls once
+            os._exit(1)
+
+core_trial = _core.AcrobotTrial
+AGENTS["sdnn-c"] = replace(AGENTS["sdnn-c"], core_trial=Poison)
+"""
+
+
+def test_a_trial_that_kills_its_workers_fails_and_the_others_are_done(cluster, tmp_path):
+    plan = make_plan(3)
+    for _ in range(2):
+        cluster.add_worker(POISON.format(seed=plan[1].key.seed))
+    outcome, _ = run(tmp_path, plan, cluster)
+    assert outcome.n_run == 5
+    (failure,) = outcome.failures
+    assert failure.key == plan[1].key
+    assert isinstance(failure.error, WorkerLostError)
+
+
+@pytest.mark.parametrize("way", [signal.SIGKILL, signal.SIGSTOP])
+def test_workers_may_be_killed_or_frozen(cluster, tmp_path, way):
+    plan = make_plan(4, 600)
+    hurt = []
+
+    def hurt_one():
+        process = random.choice(cluster.computing())
+        process.send_signal(way)
+        hurt.append(process)
+
+    cluster.add_worker()
+    cluster.add_worker()
+    outcome, digest = run(tmp_path / "out", plan, cluster, Recorder(hurt_one))
+    assert hurt
+    assert (outcome.n_run, outcome.failures) == (8, ())
+    assert digest == run(tmp_path / "here", plan)[1]
+
+
+def test_after_a_lost_scheduler_the_same_command_continues(cluster, tmp_path):
+    arguments = ["a", "--trials", "3", "--episodes", "600", "--json"]
+    command = [sys.executable, "-m", "sdnn", "reproduce", *arguments]
+    command += ["--out", str(tmp_path / "out"), "--executor", "dask"]
+    command += ["--scheduler", str(cluster.file), "--scheduler-timeout", "60"]
+    cluster.add_worker()
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as driver:
+        wait_for_rows(tmp_path / "out")
+        cluster.kill(cluster.scheduler)
+        _, words = driver.communicate(timeout=60)
+    assert driver.returncode == 1
+    assert "lost the scheduler" in words
+    assert "the same command continues" in words
+    assert "Traceback" not in words
+    cluster.start_scheduler()
+    cluster.add_worker()
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    here = CliRunner().invoke(main, ["reproduce", *arguments, "--out", str(tmp_path / "here")])
+    assert json.loads(done.stdout)["digest"] == json.loads(here.stdout)["digest"]
+
+
+def wait_for_rows(folder):
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        time.sleep(0.1)
+        if (folder / "results.sqlite").exists():
+            with ResultStore(folder) as store:
+                if store.keys():
+                    return
+    raise AssertionError("no trial was stored")
+
+
+def test_no_worker_is_a_clear_error_in_time(cluster, tmp_path):
+    with pytest.raises(ClusterError, match=r"^no worker at .*; waited 2 s"):
+        run(tmp_path / "out", make_plan(1), cluster, timeout=2.0)
