@@ -6,13 +6,7 @@ Gymnasium knows the acrobot once this package is imported. An id can import it:
 >>> gym.make("sdnn.environments:sdnn/AcrobotSwingUp-v0").observation_space.shape
 (4,)
 
-Many of them step side by side in vector registers:
-
->>> gym.make_vec("sdnn/AcrobotSwingUp-v0", num_envs=16).observation_space.shape
-(16, 4)
-
-How hard it is, is one number, ``goal_tolerance``; `TighteningGoal` lets it fall while the agent
-learns, as in the paper.
+`goal_tolerance` sets the difficulty; `TighteningGoal` reduces it during training, as in the paper.
 """
 
 import gymnasium as gym

@@ -26,52 +26,46 @@ _DTYPES: dict[str, type[np.float32] | type[np.float64]] = {
 
 
 class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
-    r"""Swing a two-link pendulum up with a motor at its elbow, as gently as asked for.
+    r"""Swing up a two-link pendulum with a motor at its elbow.
 
-    Two links hang from a fixed joint. A motor at the joint between them is the only drive. The
-    tip must pass 1.5 m above the fixed joint, at speeds below the limits times `goal_tolerance`: at
-    1 it may fly past, at 0.01 it has to come almost to rest there. An episode starts at rest,
-    hanging down; the agent decides once a second and has 50 decisions. Nothing is random.
+    The tip must pass 1.5 m above the fixed joint, at speeds below limits times `goal_tolerance`.
+    An episode starts at rest, hanging down, and has 50 decisions, one a second. Nothing is random.
     docs/explanation/method.md, section 2, has the dynamics.
 
     ## Action space
 
-    `Box(-1, 1, (1,), float32)`: the torque as a share of `max_torque`, 10 N m, held until the next
-    decision. An action outside the range or NaN raises ValueError.
+    `Box(-1, 1, (1,), float32)`: the torque divided by `max_torque` (10 N m), held until the next
+    decision.
 
     ## Observation space
 
-    `Box(0, 1, (4,), float32)`: the state, normalized. `sat` clips to [0, 1].
+    `Box(0, 1, (4,), float32)`: the normalized state. `sat` clips to [0, 1].
 
-    | Num | Observation                       | 0 stands for | 1 stands for | Unit  |
+    | Num | Observation                       | at 0         | at 1         | Unit  |
     |-----|-----------------------------------|--------------|--------------|-------|
     | 0   | s1 = theta1 / (2 pi) + 1/2        | -pi          | pi           | rad   |
     | 1   | s2 = theta2 / (2 pi) + 1/2        | -pi          | pi           | rad   |
     | 2   | s3 = sat(theta1' / (6 pi) + 1/2)  | -3 pi        | 3 pi         | rad/s |
     | 3   | s4 = sat(theta2' / (10 pi) + 1/2) | -5 pi        | 5 pi         | rad/s |
 
-    `theta1` is the angle of link 1, 0 where it hangs down; `theta2` that of link 2 relative to
-    link 1. Redundant and noisy sensors are wrappers: `RedundantSensors`, then `NoisySensors`.
+    `theta1` is the angle of link 1, 0 where it hangs down; `theta2` that of link 2 relative to it.
+    For redundant and noisy sensors, wrap in `RedundantSensors`, then `NoisySensors`.
 
     ## Rewards and episode end
 
-    +10 at the goal, which terminates the episode at that instant: the tip is at least 1.5 m above
-    joint 1, with \|theta1'\| < 3 pi `goal_tolerance` and \|theta2'\| < 5 pi `goal_tolerance`. Else
-    -5 if \|theta1\| < 5 degrees, \|theta1'\| > 3 pi or \|theta2'\| > 5 pi at the decision instant,
-    or 0. The environment truncates after 50 decisions.
+    +10 at the goal, which terminates the episode: the tip at least 1.5 m above joint 1, with
+    \|theta1'\| < 3 pi `goal_tolerance` and \|theta2'\| < 5 pi `goal_tolerance`. Otherwise -5 if
+    \|theta1\| < 5 degrees, \|theta1'\| > 3 pi or \|theta2'\| > 5 pi at the decision, else 0.
+    The environment truncates after 50 decisions.
 
     ## Arguments
 
-    - `config`: an `AcrobotConfig`, all the numbers above and the alternatives where the paper is
-      silent;
-    - `goal_tolerance`: the factor of the goal's speed limits, >= 0, the task's one difficulty.
-      `reset(options={"goal_tolerance": ...})` gives another, as does the attribute of the
-      unwrapped environment from the next reset on; `TighteningGoal` follows the paper's schedule;
-    - `render_mode`: `"human"`, a window in real time; `"rgb_array"`, a picture at each decision;
-      `"rgb_array_list"`, all pictures since the last `render()`, 25 a second; or None. Pictures
-      need pygame-ce;
-    - `dtype`: `"float32"`, or `"float64"` for actions and observations without rounding: then a
-      loop in Python meets the compiled trial bit for bit.
+    - `config`: an `AcrobotConfig`, with all the numbers above;
+    - `goal_tolerance`: factor of the goal's speed limits, >= 0. The reset option and the attribute
+      of the same name change it; `TighteningGoal` follows the paper's schedule;
+    - `render_mode`: `"human"`, a window in real time; `"rgb_array"`, a picture per decision;
+      `"rgb_array_list"`, all pictures since the last `render()`, 25 a second. Needs pygame-ce;
+    - `dtype`: of actions and observations; with `"float64"` they equal the compiled trial's.
 
     `info` holds the true `state` (theta1, theta2, theta1', theta2'), `tip_height` in m, the
     episode's `goal_tolerance`, and `is_success`.
@@ -112,10 +106,9 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         self.goal_tolerance = goal_tolerance
         self.render_mode = render_mode
         self._acrobot = _core.Acrobot(self.config)
-        self._was_reset = False
+        self._was_reset = self._success = False
         self._tolerance = self.goal_tolerance
         self._torque = 0.0
-        self._success = False
         self._picture: AcrobotPicture | None = None
         self._pictures: list[RenderFrame] = []
         self._motion: AcrobotMotion | None = None
@@ -140,11 +133,7 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[Any], dict[str, Any]]:
-        """Begin an episode at rest, hanging down; the seed changes nothing.
-
-        The option ``"goal_tolerance"`` holds for this episode and later ones. ValueError for an
-        unknown option or a tolerance below 0.
-        """
+        """Begin an episode; the option ``"goal_tolerance"`` holds for it and later ones."""
         super().reset(seed=seed)
         options = options or {}
         unknown = sorted(set(options) - {"goal_tolerance"})
@@ -164,9 +153,10 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         return self._observation(), self._info()
 
     def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
-        """Hold a torque, a share of ``config.max_torque``, for one decision interval.
+        """Hold a torque for one decision interval.
 
-        ValueError unless the action is one number in [-1, 1], RuntimeError if the episode is over.
+        Raises ValueError unless the action is one number in [-1, 1], and RuntimeError if the
+        episode is over.
         """
         if not self._was_reset:
             raise gym.error.ResetNeeded("call reset before step")
@@ -187,11 +177,7 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         return self._acrobot.state()
 
     def render(self) -> RenderFrame | list[RenderFrame] | None:
-        """Return a picture of the present state, shape (500, 500, 3).
-
-        With ``"rgb_array_list"``, those of all states since the last call, a ``"render_fps"``-th
-        second apart; with ``"human"``, None.
-        """
+        """Return a picture, shape (500, 500, 3), those since the last call, or None in a window."""
         if self.render_mode is None:
             gym.logger.warn("render() needs a render_mode: 'human', 'rgb_array', 'rgb_array_list'")
             return None
@@ -201,7 +187,7 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         return self._draw(self.state, self._success)
 
     def _show(self, states: Iterable[NDArray[np.float64]]) -> None:
-        """Draw states and the present one; keep the pictures for `render`, unless in a window."""
+        """Draw states and the current one, and keep the pictures for `render`."""
         pictures = [self._draw(state, solved=False) for state in states]
         pictures.append(self._draw(self.state, self._success))
         self._pictures += [picture for picture in pictures if picture is not None]
@@ -210,9 +196,7 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         if self._picture is None:
             fps = self.metadata["render_fps"] if self.render_mode == "human" else None
             self._picture = AcrobotPicture(self.config, fps)
-        return self._picture.draw(
-            state=state, torque=self._torque, decision=self._acrobot.decisions(), solved=solved
-        )
+        return self._picture.draw(state, self._torque, self._acrobot.decisions(), solved)
 
     def close(self) -> None:
         """Close the window, if there is one."""

@@ -36,13 +36,9 @@ _LONGEST = 0.04  # seconds between pictures that look like one movement
 
 
 class AcrobotMotion:
-    """Follows the acrobot from one decision to the next, for pictures that move.
+    """The acrobot's states between two decisions, ``interval`` seconds apart, for moving pictures.
 
-    Attributes
-    ----------
-    interval : float
-        s from state to state: at most 0.04 where the integration step is not longer, and a whole
-        fraction of the decision interval.
+    The interval is at most 0.04 s (or one integration step) and divides the decision interval.
     """
 
     def __init__(self, config: AcrobotConfig) -> None:
@@ -60,10 +56,7 @@ class AcrobotMotion:
     def between(
         self, state: NDArray[np.float64], torque: float, goal_tolerance: float
     ) -> Iterator[NDArray[np.float64]]:
-        """Yield the states, shape (4,), after ``state`` and before the next decision or the goal.
-
-        The torque (N m) is held; the goal tolerance is that of the episode.
-        """
+        """Yield the states, shape (4,), after ``state`` until the next decision or the goal."""
         self._acrobot.set_state(state)
         for _ in range(self._n_intervals - 1):
             _, reached, _ = self._acrobot.step(torque, goal_tolerance * self._tests_goal)
@@ -73,13 +66,7 @@ class AcrobotMotion:
 
 
 class AcrobotPicture:
-    """Draws states of the acrobot, into a window if ``window_fps`` is given.
-
-    Raises
-    ------
-    gymnasium.error.DependencyNotInstalled
-        If pygame is missing.
-    """
+    """Draws states of the acrobot, into a window if ``window_fps`` is given; needs pygame."""
 
     def __init__(self, config: AcrobotConfig, window_fps: int | None) -> None:
         try:
@@ -90,13 +77,13 @@ class AcrobotPicture:
             ) from error
         self._pygame = pygame
         self._config = config
-        self._fps = window_fps
+        self._fps = window_fps or 0
         pygame.font.init()
         self._font = pygame.font.Font(None, 17 * _FINE)
         self._large_font = pygame.font.Font(None, 24 * _FINE)
         self._canvas = pygame.Surface((_SIZE * _FINE, _SIZE * _FINE))
-        reach = config.link_length_1 + config.link_length_2
-        self._scale = 0.42 * _SIZE * _FINE / max(reach, abs(config.goal_height))
+        self._reach = config.link_length_1 + config.link_length_2
+        self._scale = 0.42 * _SIZE * _FINE / max(self._reach, abs(config.goal_height))
         self._window: pygame.Surface | None = None
         if window_fps is not None:
             pygame.display.init()
@@ -105,12 +92,11 @@ class AcrobotPicture:
             self._clock = pygame.time.Clock()
 
     def draw(
-        self, *, state: NDArray[np.float64], torque: float, decision: int, solved: bool
+        self, state: NDArray[np.float64], torque: float, decision: int, solved: bool
     ) -> NDArray[np.uint8] | None:
         """Return the picture, shape (500, 500, 3), or None if it went to the window.
 
-        It shows a state, shape (4,), the torque held until now (N m), the decisions made, and
-        whether the goal is reached.
+        The torque (N m) is the last one held, ``decision`` the number of decisions made.
         """
         pygame = self._pygame
         hanging = state[0] - math.pi / 2, state[0] + state[1] - math.pi / 2
@@ -135,7 +121,6 @@ class AcrobotPicture:
             return np.ascontiguousarray(pixels.transpose(1, 0, 2))
         self._window.blit(picture, (0, 0))
         pygame.event.pump()
-        assert self._fps is not None
         self._clock.tick(self._fps)
         pygame.display.flip()
         return None
@@ -159,19 +144,19 @@ class AcrobotPicture:
         self._pygame.draw.polygon(self._canvas, colour, [self._pixel(point) for point in corners])
 
     def _write(self, x: int, y: float, text: str, font: Any = None, colour: Colour = _INK) -> None:
-        """Write from the left, or to the right border if x is negative."""
+        """Write text at x, which counts from the right border if negative."""
         drawn = (font or self._font).render(text, True, colour)
         left = x * _FINE if x >= 0 else (_SIZE + x) * _FINE - drawn.get_width()
         self._canvas.blit(drawn, (left, y * _FINE))
 
     def _draw_background(self, solved: bool) -> None:
-        pygame, reach = self._pygame, self._config.link_length_1 + self._config.link_length_2
-        pygame.draw.circle(self._canvas, _FAINT, self._pixel(0j), reach * self._scale, _FINE)
+        draw = self._pygame.draw
+        draw.circle(self._canvas, _FAINT, self._pixel(0j), self._reach * self._scale, _FINE)
         y = self._pixel(self._config.goal_height * 1j)[1]
         dash = 10 * _FINE
         for left in range(0, _SIZE * _FINE, 2 * dash):
             width = (3 if solved else 2) * _FINE
-            pygame.draw.line(self._canvas, _GOAL, (left, y), (left + dash, y), width)
+            draw.line(self._canvas, _GOAL, (left, y), (left + dash, y), width)
         self._write(-16, y / _FINE + 7, f"goal {self._config.goal_height:g} m", colour=_GOAL)
         if solved:
             self._write(-16, 16, "goal reached", self._large_font, _GOAL)

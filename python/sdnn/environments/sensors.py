@@ -1,4 +1,4 @@
-"""Other sensors for any environment: scaled, redundant, noisy; and all sensors of the acrobot."""
+"""Sensors for any environment: scaled, redundant or noisy; and all sensors of the acrobot."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _NAMED: dict[str, SensorFunction] = {
 class _Sensors(
     gym.ObservationWrapper[Observation, Any, Observation], gym.utils.RecordConstructorArgs
 ):
-    """A wrapper of an environment that observes a vector of numbers."""
+    """Wrapper of an environment whose observations are a one-dimensional ``Box``."""
 
     def __init__(self, env: gym.Env[Observation, Any], **arguments: Any) -> None:
         gym.utils.RecordConstructorArgs.__init__(self, **arguments)
@@ -45,20 +45,12 @@ class _Sensors(
 class UnitSensors(_Sensors):
     """Scales every observed variable to [0, 1]; values outside its range are clipped.
 
-    With it, `NoisySensors` fits any environment: its sigma then is in parts of each range.
-
     Parameters
     ----------
     env : gymnasium.Env
         With a one-dimensional ``Box`` of observations, shape (l,).
     observation_low, observation_high : array_like, shape (l,), optional
-        The ranges, also attributes; by default the bounds of the observation space.
-
-    Raises
-    ------
-    ValueError
-        For observations of another kind, ranges of another length or without an extent, and
-        infinite bounds for which no range is given.
+        The ranges; by default the bounds of the observation space, which must then be finite.
 
     Examples
     --------
@@ -98,16 +90,10 @@ class RedundantSensors(_Sensors):
     env : gymnasium.Env
         With a one-dimensional ``Box`` of observations, shape (l,).
     functions : sequence of {"energy", "height"} or callable
-        ``"energy"`` is the paper's s5 = 2 ((s3 - 1/2)^2 + (s4 - 1/2)^2); ``"height"`` its s6 =
-        (2 + cos 2 pi s1 - cos 2 pi (s1 + s2)) / 4. A callable receives the wrapped environment's
-        observation, shape (l,), and returns a number.
+        ``"energy"`` is the paper's s5 = 2 ((s3 - 1/2)^2 + (s4 - 1/2)^2), ``"height"`` its s6 =
+        (2 + cos 2 pi s1 - cos 2 pi (s1 + s2)) / 4. A callable maps the observation to a number.
     bounds : sequence of (low, high), optional
-        Of each function's values; by default (0, 1).
-
-    Raises
-    ------
-    ValueError
-        For an unknown name, or bounds that do not match the functions.
+        Bounds of each function's values, by default (0, 1).
 
     Examples
     --------
@@ -129,16 +115,15 @@ class RedundantSensors(_Sensors):
             function if callable(function) else choice("functions", function, _NAMED)
             for function in functions
         )
-        ends = [(0.0, 1.0)] * len(self._functions) if bounds is None else bounds
-        if len(ends) != len(self._functions):
-            raise ValueError(
-                f"bounds must have {len(self._functions)} entries, one per function, "
-                f"got {len(ends)}"
-            )
+        n = len(self._functions)
+        ends = [(0.0, 1.0)] * n if bounds is None else bounds
+        if len(ends) != n:
+            raise ValueError(f"bounds must have {n} entries, one per function, got {len(ends)}")
         low: NDArray[Any] = np.append(self._space.low, [low for low, _ in ends])
         high: NDArray[Any] = np.append(self._space.high, [high for _, high in ends])
-        low, high = low.astype(self._float), high.astype(self._float)
-        self.observation_space = gym.spaces.Box(low, high, dtype=self._float)
+        self.observation_space = gym.spaces.Box(
+            low.astype(self._float), high.astype(self._float), dtype=self._float
+        )
 
     def observation(self, observation: Observation) -> Observation:
         """Append the functions' values, shape (l + n_functions,)."""
@@ -147,20 +132,19 @@ class RedundantSensors(_Sensors):
 
 
 class _RandomSensors(_Sensors):
-    """Sensors with a random stream of their own, which `_restart` starts anew."""
+    """Sensors with a random stream of their own, which ``_restart(seed)`` starts."""
 
     def __init__(
         self, env: gym.Env[Observation, Any], *, seed: int, stream: str, **arguments: Any
     ) -> None:
         super().__init__(env, seed=seed, stream=stream, **arguments)
-        streams = ("sensor_noise", "evaluation_sensor_noise")
-        known = {name: _core.Stream.__members__[name] for name in streams}
-        self._stream = choice("stream", stream, known)
+        one_of("stream", stream, ("sensor_noise", "evaluation_sensor_noise"))
+        self._stream = _core.Stream.__members__[stream]
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Reset the environment; a ``seed`` also restarts what the sensors draw at random."""
+        """Reset the environment; a ``seed`` also restarts the random stream."""
         if seed is not None:
             self._restart(seed)
         return super().reset(seed=seed, options=options)
@@ -172,8 +156,8 @@ class _RandomSensors(_Sensors):
 class NoisySensors(_RandomSensors):
     """Adds independent Gaussian noise to every channel of every observation.
 
-    The numbers come from a stream of their own, the same as in a compiled trial with the same
-    seed: over ``AcrobotSwingUpEnv(dtype="float64")`` the observations agree bit for bit.
+    Over ``AcrobotSwingUpEnv(dtype="float64")`` the observations are those of a compiled trial with
+    the same seed, bit for bit.
 
     Parameters
     ----------
@@ -182,17 +166,12 @@ class NoisySensors(_RandomSensors):
     sigma : float
         Standard deviation, >= 0; 0 changes nothing and draws nothing.
     edge : {"wrap", "saturate"} or sequence of them, shape (l,), optional
-        What happens at the ends of [0, 1], for all channels or for each: an angle wraps to
-        [0, 1), anything else saturates. By default right for the acrobot: two angles come first.
+        Treatment of values outside [0, 1]. By default the first two channels (the acrobot's angles)
+        wrap and the others saturate.
     seed : int
-        Where the noise starts; ``reset(seed=...)`` with a number starts it anew from that number.
+        Seed of the noise; ``reset(seed=...)`` restarts it.
     stream : {"sensor_noise", "evaluation_sensor_noise"}
-        Which of the core's streams: that of a trial's learning episodes or of its test episodes.
-
-    Raises
-    ------
-    ValueError
-        For an unknown word, a wrong number of edges, bounds beyond [0, 1] or a bad sigma.
+        The core's random stream, of learning or of test episodes.
 
     Examples
     --------
@@ -234,23 +213,17 @@ class NoisySensors(_RandomSensors):
 
 
 class AcrobotSensors(_RandomSensors):
-    """The sensors of a `SensorConfig` on the acrobot: what a compiled trial observes.
+    """The sensors of a `SensorConfig` on the acrobot, as a compiled trial observes them.
 
-    The same numbers as `NoisySensors` over `RedundantSensors`, and the inputs and the entry of
-    noise that these do not know. Observations have the order s1..s6, constant, random.
+    They include constant and random inputs; observations have the order s1..s6, constant, random.
 
     Parameters
     ----------
     env : gymnasium.Env
-        An `AcrobotSwingUpEnv`, in wrappers or not: the state is read from it.
+        An `AcrobotSwingUpEnv`, possibly wrapped; the state is read from it.
     config : SensorConfig
     seed, stream
-        As those of `NoisySensors`, of noise and of random inputs.
-
-    Raises
-    ------
-    ValueError
-        For numbers out of range or an unknown word.
+        As for `NoisySensors`, for the noise and the random inputs.
 
     Examples
     --------
@@ -273,7 +246,7 @@ class AcrobotSensors(_RandomSensors):
         self.observation_space = gym.spaces.Box(0.0, 1.0, (config.n_inputs,), self._float)
 
     def observation(self, observation: Observation) -> Observation:
-        """Observe the environment's state, shape (n_inputs,); the observation is not used."""
+        """Observe the environment's state, shape (n_inputs,)."""
         seen: Observation = self._sensors.observe(cast(Any, self.unwrapped).state)
         return seen.astype(self._float)
 
@@ -282,7 +255,7 @@ class AcrobotSensors(_RandomSensors):
 
 
 def _float_of(observation: Observation) -> np.dtype[Any]:
-    """Return the type of an observation, or that of fractions if it has whole numbers."""
+    """Return the dtype of a float observation, else float32."""
     dtype = np.asarray(observation).dtype
     return dtype if dtype.kind == "f" else np.dtype(np.float32)
 

@@ -18,42 +18,29 @@ from sdnn.environments.picture import AcrobotPicture
 
 __all__ = ["AcrobotSwingUpVectorEnv"]
 
-MAX_ENVS = 2**20
-
 # Gymnasium 1.0 knows this mode only and has no name for it.
 _AUTORESET = getattr(getattr(gym.vector, "AutoresetMode", None), "NEXT_STEP", "NextStep")
 
 
 class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDArray[Any]]):
-    """N acrobots in step, with the bits of N `AcrobotSwingUpEnv`, much faster.
+    """A vector environment with the bits of N `AcrobotSwingUpEnv`, in vector registers.
 
     ``gymnasium.make_vec("sdnn.environments:sdnn/AcrobotSwingUp-v0", num_envs=N)`` makes one.
-    Observations, rewards, ends and infos are those of ``gymnasium.vector.SyncVectorEnv`` over N
-    single environments, whose page describes the task. The dynamics run in the lanes of vector
-    registers, without Python's global lock.
-
-    An environment whose episode has ended is reset by the next step (``AutoresetMode.NEXT_STEP``):
-    its action is ignored, its reward is 0, and its next episode begins, with the goal tolerance
-    that it had or that was set since. To tighten the goal while an agent learns, set it:
-    ``envs.goal_tolerance = GoalSchedule()(k)``.
+    Observations, rewards, ends and infos are those of a ``SyncVectorEnv``. The next step resets
+    an environment whose episode has ended (``AutoresetMode.NEXT_STEP``).
 
     Parameters
     ----------
     num_envs : int
         N, from 1 to 2**20.
     config : AcrobotConfig, optional
-        The same for all.
+        For all environments.
     goal_tolerance : float or array_like, shape (num_envs,)
-        Factor of the goal's speed limits, >= 0, for all or for each.
+        Factor of the goal's speed limits, >= 0; may be set later, to tighten the goal.
     render_mode : {"rgb_array"}, optional
         Needs pygame-ce.
     dtype : {"float32", "float64"}
         Of actions and observations.
-
-    Raises
-    ------
-    ValueError
-        If an argument is outside its range.
 
     Examples
     --------
@@ -85,7 +72,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         dtype: Literal["float32", "float64"] = "float32",
     ) -> None:
         super().__init__()
-        self.num_envs = whole("num_envs", num_envs, 1, MAX_ENVS)
+        self.num_envs = whole("num_envs", num_envs, 1, 2**20)
         if render_mode is not None:
             one_of("render_mode", render_mode, tuple(self.metadata["render_modes"]))
         single = AcrobotSwingUpEnv(config=config, dtype=dtype)
@@ -99,18 +86,13 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         self._dtype = single.observation_space.dtype
         self._batch = _core.AcrobotBatch(self.config, self.num_envs)
         self._tolerances = self._goal_tolerance.copy()
-        self._was_reset = np.zeros(self.num_envs, np.bool_)
         self._torques = np.zeros(self.num_envs)
-        self._success = np.zeros(self.num_envs, np.bool_)
-        self._ended = np.zeros(self.num_envs, np.bool_)
+        self._was_reset, self._success, self._ended = np.zeros((3, self.num_envs), np.bool_)
         self._picture: AcrobotPicture | None = None
 
     @property
     def goal_tolerance(self) -> NDArray[np.float64]:
-        """Factors of the goals' speed limits, shape (num_envs,), from each one's next reset on.
-
-        May be set, to a number for all or an array.
-        """
+        """Factors of the speed limits, shape (num_envs,), from each environment's next reset on."""
         return self._goal_tolerance.copy()
 
     @goal_tolerance.setter
@@ -123,12 +105,10 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[NDArray[Any], dict[str, Any]]:
-        """Begin an episode in every environment, at rest, hanging down; seeds change nothing.
+        """Begin an episode in every environment, or in those of the option ``"reset_mask"``.
 
-        The option ``"goal_tolerance"``, a number or an array of shape (num_envs,), holds for this
-        episode and later ones. ``"reset_mask"``, bools of shape (num_envs,), has the environments
-        to reset, the only ones whose tolerance changes. ValueError for an unknown option, a
-        tolerance below 0 or a wrong number of seeds.
+        The option ``"goal_tolerance"``, a number or shape (num_envs,), holds for the environments
+        reset, from this episode on. Seeds change nothing.
         """
         options = dict(options or {})
         mask = self._reset_mask(options.pop("reset_mask", None))
@@ -151,11 +131,9 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
     ) -> tuple[
         NDArray[Any], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
     ]:
-        """Hold torques for one decision interval in every environment; reset those that ended.
+        """Hold torques, shape (num_envs, 1), for one decision interval; reset what has ended.
 
-        Actions have the shape (num_envs, 1), shares of ``config.max_torque``; what is returned has
-        an item for each environment. ValueError unless each action is one number in [-1, 1]; then
-        nothing has moved.
+        Raises ValueError unless each action is in [-1, 1]; then nothing has moved.
         """
         if not self._was_reset.all():
             raise gym.error.ResetNeeded("call reset before step")
@@ -177,8 +155,8 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         rewards, terminated, truncated = self._batch.step(self._torques, self._tolerances, moving)
         self._success = terminated.copy()
         self._ended = terminated | truncated
-        every = np.ones(self.num_envs, np.bool_)
-        return self._observations(), rewards, terminated, truncated, self._infos(every)
+        infos = self._infos(np.ones(self.num_envs, np.bool_))
+        return self._observations(), rewards, terminated, truncated, infos
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Draw the present states: one picture (500, 500, 3) for each environment."""
@@ -186,19 +164,15 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
             gym.logger.warn("render() needs a render_mode: 'rgb_array'")
             return None
         picture = self._picture = self._picture or AcrobotPicture(self.config, None)
+        torques, successes = self._torques.tolist(), self._success.tolist()
         pictures = (
-            picture.draw(
-                state=state,
-                torque=float(self._torques[i]),
-                decision=self._batch.decisions(i),
-                solved=bool(self._success[i]),
-            )
+            picture.draw(state, torques[i], self._batch.decisions(i), successes[i])
             for i, state in enumerate(self._batch.states())
         )
         return tuple(pixels for pixels in pictures if pixels is not None)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Let go of the pictures."""
+        """Release the pictures."""
         self._picture = None
 
     def _reset_mask(self, mask: Any) -> NDArray[np.bool_]:
@@ -227,7 +201,6 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         return np.full(self.num_envs, given, np.float64)
 
     def _begin(self, mask: NDArray[np.bool_]) -> None:
-        """Begin an episode wherever the mask is set."""
         self._tolerances[mask] = self._goal_tolerance[mask]
         self._was_reset |= mask
         self._torques[mask] = 0.0
@@ -239,7 +212,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         return self._batch.observations().astype(self._dtype)
 
     def _infos(self, mask: NDArray[np.bool_]) -> dict[str, Any]:
-        """Return arrays over the environments, 0 where the mask is not set, and the masks."""
+        """Return arrays over the environments, 0 outside the mask, and the masks."""
         infos: dict[str, Any] = {
             "state": self._batch.states(),
             "tip_height": self._batch.tip_heights(),

@@ -112,13 +112,11 @@ def test_it_is_part_of_the_spec():
 
 def test_bad_arguments_change_nothing():
     env = TighteningGoal(AcrobotSwingUpEnv())
-    for bad in (0, -1):
-        with pytest.raises(ValueError, match=f"episode must be at least 1, got {bad}"):
+    for bad in (0, -1, 1.5):
+        with pytest.raises(ValueError, match=f"episode must be .*, got {bad}"):
             env.reset(options={"episode": bad})
-        with pytest.raises(ValueError, match=f"episode must be at least 1, got {bad}"):
+        with pytest.raises(ValueError, match=f"episode must be .*, got {bad}"):
             env.episode = bad
-    with pytest.raises(TypeError):
-        env.reset(options={"episode": 1.5})
     with pytest.raises(ValueError, match="'episode' in place of 'goal_tolerance'"):
         env.reset(options={"goal_tolerance": 0.5})
     with pytest.raises(ValueError, match="got 'epsiode'"):
