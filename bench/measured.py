@@ -22,7 +22,8 @@ DOCS = Path(__file__).parents[1] / "docs"
 PACKED = "benchmarks.sqlite.xz"
 
 Work = tuple[Any, ...]
-"""Which trial it is: words and, at the end, a seed."""
+"""Which trial it is: words and, at the end, a seed or a number."""
+Trials = dict[Work, dict[str, Any]]
 
 
 def _unpack(folder: Path, into: Path) -> None:
@@ -30,7 +31,7 @@ def _unpack(folder: Path, into: Path) -> None:
         write_whole(into / STORE_NAME, lzma.decompress((folder / PACKED).read_bytes()))
 
 
-def measured(kind: str, folder: Path) -> dict[Work, dict[str, Any]]:
+def measured(kind: str, folder: Path) -> Trials:
     """Read the trials of a benchmark, sorted; also while it runs."""
     with tempfile.TemporaryDirectory() as unpacked:
         place = folder if (folder / STORE_NAME).exists() else Path(unpacked)

@@ -1,7 +1,7 @@
 """How Q-learning with the RBF network was tuned on the noise-free acrobot with 4 inputs.
 
-python bench/tune_rbf.py [stage ...], all stages without names; rows go to docs/rbf-tuning.csv,
-where those of a stage that is run replace its old ones. Trials of 15,000 learning episodes.
+python bench/tune_rbf.py [stage ...], all stages without names; trials go to the store
+docs/benchmarks.sqlite.xz, and what is there is not run again. Trials of 15,000 learning episodes.
 
 The criterion was fixed before any trial of this file was run: a trial's score is the mean of two
 shares of solved test episodes, EARLY and END, and a setting's is the median over its trials. The
@@ -14,24 +14,23 @@ The learning rate alpha is not varied: it only ever multiplies the gradient rate
 
 from __future__ import annotations
 
-import csv
 import itertools
 import sys
 import time
 from collections import defaultdict
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
+from measured import DOCS, Trials, Work, measure_missing, measured
+from page import markdown
 
 from sdnn.agents import QLearningConfig
 from sdnn.approximators import RBFNetworkConfig
 from sdnn.runs import AgentSpec, BudgetSpec, ProtocolSpec, RunSpec
 from sdnn.runs.planned_trial import trial_seed
 
-ROWS = Path(__file__).parents[1] / "docs" / "rbf-tuning.csv"
-
+KIND = "rbf tuning"
 STAGES = ("grid", "fine", "ties", "bases", "report")
 N_EPISODES = 15_000
 TEST_INTERVAL = 10
@@ -79,9 +78,9 @@ FINE_RATES = (2.0, 5.0)
 BEFORE = Setting(1.0, 3.0)
 
 
-def run(task: tuple[str, Setting, int]) -> dict[str, object]:
-    """One trial: a row."""
-    stage, setting, seed = task
+def measure(work: Work) -> dict[str, Any]:
+    """One trial."""
+    setting, seed = setting_of(work), work[-1]
     spec = RunSpec(
         agent=AgentSpec(name="rbf"),
         approximator=RBFNetworkConfig(
@@ -104,98 +103,82 @@ def run(task: tuple[str, Setting, int]) -> dict[str, object]:
     for name, (after, last) in WINDOWS.items():
         solved = tests["solved"][(tests["episode"] > after) & (tests["episode"] <= last)]
         shares[name] = round(int(solved.sum()) / ((last - after) // TEST_INTERVAL), 4)
-    row = {
-        "stage": stage,
-        "n_bases": setting.n_bases,
-        "width": setting.width,
-        "gradient_rate": setting.gradient_rate,
-        "tie_rule": setting.tie_rule,
-        "seed": seed,
+    return {
         **shares,
         "score": round((shares["early"] + shares["end"]) / 2, 4),
         "diverged": int(diverged),
         "decisions": trial.n_decisions,
         "seconds": round(time.thread_time() - start, 1),
     }
-    print(*row.values(), flush=True)
-    return row
 
 
-def setting_of(row: dict[str, object]) -> Setting:
-    return Setting(
-        float(row["width"]), float(row["gradient_rate"]), str(row["tie_rule"]), int(row["n_bases"])
-    )
+def setting_of(work: Work) -> Setting:
+    _, n_bases, width, gradient_rate, tie_rule, _ = work
+    return Setting(float(width), float(gradient_rate), tie_rule, int(n_bases))
 
 
-def medians(rows: list[dict[str, object]], stage: str) -> dict[Setting, dict[str, float]]:
+def work_of(stage: str, setting: Setting, seed: int) -> Work:
+    numbers = setting.n_bases, setting.width, setting.gradient_rate
+    return (stage, *map(str, numbers), setting.tie_rule, seed)
+
+
+def medians(trials: Trials, stage: str) -> dict[Setting, dict[str, float]]:
     """Per setting the medians over trials, the best score first."""
     groups = defaultdict(list)
-    for row in rows:
-        if row["stage"] == stage:
-            groups[setting_of(row)].append(row)
+    for work, found in trials.items():
+        if work[0] == stage:
+            groups[setting_of(work)].append(found)
     found = {
-        setting: {
-            name: float(np.median([float(row[name]) for row in of])) for name in (*WINDOWS, "score")
-        }
+        setting: {name: float(np.median([one[name] for one in of])) for name in (*WINDOWS, "score")}
         for setting, of in groups.items()
     }
     return dict(sorted(found.items(), key=lambda item: -item[1]["score"]))
 
 
-def chosen(rows: list[dict[str, object]]) -> Setting:
+def chosen(trials: Trials) -> Setting:
     """The best of the grid; the paper's 4 bases."""
-    return next(iter(medians(rows, "grid")))
+    return next(iter(medians(trials, "grid")))
 
 
-def tasks_of(stage: str, rows: list[dict[str, object]]) -> list[tuple[str, Setting, int]]:
+def asked(stage: str, trials: Trials) -> list[Work]:
     if stage == "grid":
         settings, seeds = GRID, SEARCH_SEEDS
     elif stage == "fine":
-        best = chosen(rows)
+        best = chosen(trials)
         settings = [Setting(width, best.gradient_rate) for width in FINE_WIDTHS]
         settings += [Setting(best.width, rate) for rate in FINE_RATES]
         seeds = SEARCH_SEEDS
     elif stage == "ties":
-        best = chosen(rows)
+        best = chosen(trials)
         settings, seeds = (
             [Setting(best.width, best.gradient_rate, rule) for rule in ("lowest", "middle")],
             SEARCH_SEEDS,
         )
     elif stage == "bases":
-        best = chosen(rows)
+        best = chosen(trials)
         settings, seeds = (
             [Setting(best.width, best.gradient_rate, n_bases=n) for n in (3, 5, 6, 8)],
             SEARCH_SEEDS,
         )
     elif stage == "report":
-        settings, seeds = list(dict.fromkeys((BEFORE, chosen(rows)))), REPORT_SEEDS
+        settings, seeds = list(dict.fromkeys((BEFORE, chosen(trials)))), REPORT_SEEDS
     else:
         raise SystemExit(f"no stage {stage}: it is one of {', '.join(STAGES)}")
-    return [(stage, setting, seed) for setting in settings for seed in seeds]
+    return [work_of(stage, setting, seed) for setting in settings for seed in seeds]
 
 
 def main(stages: list[str]) -> None:
-    rows: list[dict[str, object]] = []
-    if ROWS.exists():
-        with ROWS.open() as file:
-            rows = list(csv.DictReader(file))
     for stage in stages or STAGES:
-        tasks = tasks_of(stage, rows)
-        rows = [row for row in rows if row["stage"] != stage]
-        with ThreadPoolExecutor(2) as pool:
-            rows += pool.map(run, tasks)
-        with ROWS.open("w", newline="") as file:
-            writer = csv.DictWriter(file, rows[0], lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
-        print(f"\n| {stage}: bases | width | rate | ties |", *WINDOWS, "score |", sep=" | ")
-        for setting, of in medians(rows, stage).items():
-            print(
-                f"| {setting.n_bases} | {setting.width} | {setting.gradient_rate} |",
-                f"{setting.tie_rule} |",
-                " | ".join(f"{100 * share:.1f} %" for share in of.values()),
-                "|",
+        measure_missing(KIND, measure, asked(stage, measured(KIND, DOCS)), DOCS, 2)
+        rows = [
+            (
+                *map(str, (setting.n_bases, setting.width, setting.gradient_rate)),
+                setting.tie_rule,
+                *(f"{100 * share:.1f} %" for share in of.values()),
             )
+            for setting, of in medians(measured(KIND, DOCS), stage).items()
+        ]
+        print(markdown((f"{stage}: bases", "width", "rate", "ties", *WINDOWS, "score"), rows))
 
 
 if __name__ == "__main__":

@@ -1,27 +1,27 @@
 """Whole trials of 15,000 episodes against dense products: the table in docs/performance.md.
 
-python bench/whole_trials.py [trials per case], about five minutes for 10; rows go to
-docs/whole-trials.csv. Processor time of the trial's own thread, two trials at a time; the dense
+python bench/whole_trials.py [trials per case], about five minutes for 10; they go to
+the store docs/benchmarks.sqlite.xz, and what is there is not run again. Processor time of the
+trial's own thread, two trials at a time; the dense
 product of each network's size is measured between the trials, in the same process.
 """
 
 from __future__ import annotations
 
-import csv
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
+from typing import Any
 
 import numpy as np
+from measured import DOCS, Work, measure_missing, measured
 
 from sdnn import _core
 from sdnn.environments import SensorConfig
 from sdnn.runs import RunSpec
 from sdnn.runs.planned_trial import trial_seed
 
-CASES = (("s4", 4, 0.0), ("s6", 6, 0.0), ("s4-noise", 4, 0.02), ("s6-noise", 6, 0.02))
-ROWS = Path(__file__).parents[1] / "docs" / "whole-trials.csv"
+KIND = "whole trials"
+CASES = {"s4": (4, 0.0), "s6": (6, 0.0), "s4-noise": (4, 0.02), "s6-noise": (6, 0.02)}
 
 
 def dense_microseconds(n_inputs: int) -> float:
@@ -29,8 +29,9 @@ def dense_microseconds(n_inputs: int) -> float:
     return float(np.median(product.run(40)[10:])) / 1000
 
 
-def run(task: tuple[str, int, float, int]) -> dict[str, object]:
-    case, n_inputs, noise, number = task
+def measure(work: Work) -> dict[str, Any]:
+    case, number = work
+    n_inputs, noise = CASES[case]
     dense = dense_microseconds(n_inputs)
     sensors = SensorConfig(n_sensors=n_inputs, noise=noise)
     trial = RunSpec(sensors=sensors).make_trial(trial_seed(0, case, number))
@@ -41,8 +42,6 @@ def run(task: tuple[str, int, float, int]) -> dict[str, object]:
     counts = trial.cache_counts()
     n = trial.n_decisions
     return {
-        "case": case,
-        "trial": number,
         "decisions": n,
         "seconds": round(seconds, 3),
         "us_per_decision": round(seconds / n * 1e6, 2),
@@ -55,16 +54,11 @@ def run(task: tuple[str, int, float, int]) -> dict[str, object]:
 
 
 def main(n_trials: int) -> None:
-    tasks = [(*case, number) for number in range(n_trials) for case in CASES]
-    with ThreadPoolExecutor(2) as pool:
-        rows = list(pool.map(run, tasks))
-    rows.sort(key=lambda row: ([case[0] for case in CASES].index(row["case"]), row["trial"]))
-    with ROWS.open("w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0])
-        writer.writeheader()
-        writer.writerows(rows)
-    for case, *_ in CASES:
-        of = [row for row in rows if row["case"] == case]
+    asked = [(case, number) for number in range(n_trials) for case in CASES]
+    measure_missing(KIND, measure, asked, DOCS, 2)
+    trials = measured(KIND, DOCS)
+    for case in CASES:
+        of = [found for (name, _), found in trials.items() if name == case]
         ratio = [row["dense_over_decision"] for row in of]
         seconds = [row["seconds"] for row in of]
         per_decision = {
