@@ -1,10 +1,9 @@
-"""What generalizes to what: the kernel of an infinitely long code, and pictures of it.
+"""The kernel that the network's code approaches, and similarity plots of codings.
 
-After training on one sample, the network's answer to another one changes with the inner product
-of their codes. For long codes it approaches a kernel that follows from the codings alone: for each
-pair, ``(1 + rho_modifier) / 2 * rho_modified``, where rho is the correlation of the patterns of
-two values, averaged over the pairs. A plain pattern has no modifier and counts twice, because
-all of its units are active. The kernel of a sample with itself is 1.
+The inner product of two samples' codes decides how training on one changes the answer to the
+other. For long codes it approaches the mean of ``(1 + rho_modifier) / 2 * rho_modified`` over the
+pairs, where rho is the correlation of the patterns of two values. A plain pattern has no modifier
+and counts twice.
 
 >>> import numpy as np
 >>> from sdnn import kernel
@@ -29,24 +28,21 @@ if TYPE_CHECKING:
 
 __all__ = ["AnalyticKernel", "correlations", "plot_similarity", "similarity"]
 
-N_UNITS = 2000
-"""Units per pattern where none are named."""
-
-ENTRIES_AT_ONCE = 2**18
-"""Entries of a kernel matrix, each the sum over all inputs, that are computed at a time."""
+N_UNITS = 2000  # default number of units per pattern
+ENTRIES_AT_ONCE = 2**18  # entries of a kernel matrix computed at a time
 
 
 def fitted(coding: str | Coding, n_units: int) -> Coding:
-    """Return a coding that knows its bins; on [0, 1] where it has not learned a range."""
+    """Return a fitted coding, on [0, 1] unless it has a range."""
     one = coding_named(coding)
     ends = None if one.learns else one.ends()
-    # Where all values were equal the range is one point, which only such a column fits again.
+    # The range of a constant column is one point, which only such a column fits again.
     is_constant = ends is not None and ends[0] == ends[1]
     return one.fit(np.array(ends if is_constant else [0.0, 1.0]), n_units)
 
 
 def shared(matrices: Iterable[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
-    """Return the matrices, equal ones as one in memory."""
+    """Return the matrices, equal ones as one object."""
     found: list[NDArray[np.float64]] = []
     for matrix in matrices:
         found.append(next((same for same in found if np.array_equal(same, matrix)), matrix))
@@ -54,17 +50,8 @@ def shared(matrices: Iterable[NDArray[np.float64]]) -> list[NDArray[np.float64]]
 
 
 def correlations(coding: str | Coding, n_units: int = N_UNITS) -> NDArray[np.float64]:
-    """Return the expected correlation of the patterns of each two bins, shape (n_bins, n_bins).
+    """Return the expected correlations of a coding's patterns, shape (n_bins, n_bins).
 
-    Parameters
-    ----------
-    coding : str or Coding
-        On the range [0, 1] unless it names or has learned another one.
-    n_units : int
-        Units per pattern.
-
-    Examples
-    --------
     >>> correlations("anchor").shape
     (360, 360)
     """
@@ -72,7 +59,7 @@ def correlations(coding: str | Coding, n_units: int = N_UNITS) -> NDArray[np.flo
 
 
 def similarity(coding: str | Coding, n_units: int = N_UNITS, seed: int = 0) -> NDArray[np.float64]:
-    """Return the correlation of the patterns drawn from a seed; scattered about `correlations`."""
+    """Return the correlations of patterns drawn with a seed, shape (n_bins, n_bins)."""
     patterns = fitted(coding, n_units).patterns(n_units, seed).astype(np.float64)
     return patterns @ patterns.T / n_units
 
@@ -80,20 +67,19 @@ def similarity(coding: str | Coding, n_units: int = N_UNITS, seed: int = 0) -> N
 class AnalyticKernel:
     """The kernel of selective desensitization with infinitely many units per pattern.
 
-    Give its matrix to any kernel method (``KernelRidge(kernel="precomputed")``).
+    Its matrix suits any kernel method (``KernelRidge(kernel="precomputed")``).
 
     Parameters
     ----------
     coding : str, Coding or sequence of Coding
-        Of all inputs, or of each. Give them with ranges, or learned (as ``model.codings_`` are):
-        one without a range is taken to be on [0, 1].
+        Of all inputs, or of each; on [0, 1] without a given or learned range.
     n_inputs : int, optional
-        Number of inputs; needed where there is one coding for all.
+        Needed with one coding for all inputs.
     pairs : list of (int, int), optional
-        Pairs (modified, modifier), equal numbers for a plain pattern (as ``model.pairs_`` are);
-        every pair of different inputs where None.
+        Pairs (modified, modifier), equal numbers for a plain pattern; by default every pair of
+        different inputs.
     n_units : int
-        Units per pattern, which decide how far a flip of one unit goes.
+        Units per pattern, which decide how much one flipped unit changes.
     """
 
     def __init__(
@@ -115,22 +101,10 @@ class AnalyticKernel:
         self._correlations = shared(one.correlations(n_units) for one in self.codings)
 
     def __call__(self, X: ArrayLike, Y: ArrayLike | None = None) -> NDArray[np.float64]:
-        """Compute the kernel of each two samples.
+        """Compute the kernel of X, shape (n_samples, n_inputs), and Y (X where None).
 
-        Parameters
-        ----------
-        X : array_like, shape (n_samples, n_inputs)
-        Y : array_like, shape (n_others, n_inputs), optional
-            X itself where None.
-
-        Returns
-        -------
-        ndarray, shape (n_samples, n_others)
-
-        Raises
-        ------
-        ValueError
-            For another number of inputs, NaN, or a category that no coding knows.
+        Returns shape (n_samples, n_others). Raises ValueError for another number of inputs, NaN, or
+        an unknown category.
         """
         one = np.asarray(X)
         other = one if Y is None else np.asarray(Y)
@@ -157,7 +131,7 @@ class AnalyticKernel:
     def _of_correlations(
         self, of_inputs: Iterator[NDArray[np.float64]], total: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return the kernel by the correlations of each input; ``total`` is zeros to work in."""
+        """Return the kernel from each input's correlations; ``total`` is a zeroed buffer."""
         if self._every and len(self.codings) > 2:  # the sum over nu != mu by the sums over all
             squares = np.zeros_like(total)
             for of_input in of_inputs:
@@ -174,9 +148,9 @@ class AnalyticKernel:
 def plot_similarity(
     coding: str | Coding, n_units: int = N_UNITS, seed: int = 0, title: str | None = None
 ) -> Figure:
-    """Draw the `similarity` of a coding's patterns, and that of one bin as a curve.
+    """Plot the `similarity` of a coding's patterns, and that of one bin as a curve.
 
-    The title is the coding's name where None. Needs matplotlib (``pip install "sdnn[plot]"``).
+    Needs matplotlib (``pip install "sdnn[plot]"``).
     """
     from matplotlib.figure import Figure
 

@@ -1,7 +1,6 @@
 """How the values of one input become binary patterns.
 
-A coding is a small frozen object. As it is made it says what the user wants; ``fit`` returns a
-copy in which everything is known (range, categories, number of bins).
+A coding is a frozen dataclass; ``fit`` returns a copy with range, categories and bins known.
 
 >>> import numpy as np
 >>> from sdnn.coding import RandomInverse

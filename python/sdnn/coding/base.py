@@ -1,4 +1,4 @@
-"""What every coding can do, and codings by name and as plain data for files."""
+"""The interface of codings; codings by name and as plain data for files."""
 
 from __future__ import annotations
 
@@ -19,14 +19,9 @@ CODINGS: dict[str, type[Coding]] = {}
 
 
 class Coding(abc.ABC):
-    """How the values of one input become balanced patterns of +1 and -1.
+    """Maps the values of one input to balanced patterns of +1 and -1.
 
-    Attributes
-    ----------
-    name : str
-        What the coding is called where a name is enough.
-    is_numeric : bool
-        Whether values are numbers; otherwise they are categories.
+    Subclasses are frozen dataclasses with a ``name``; ``is_numeric`` is False for categories.
     """
 
     name: ClassVar[str]
@@ -46,32 +41,29 @@ class Coding(abc.ABC):
         Raises
         ------
         ValueError
-            If an argument of the coding is impossible; the message names it.
+            For an impossible field or value; the message names it.
         """
 
     @property
     @abc.abstractmethod
     def learns(self) -> bool:
-        """Whether ``fit`` learns something from the sample: a range or the categories."""
+        """Whether ``fit`` learns a range or categories from the sample."""
 
     @property
     @abc.abstractmethod
     def size(self) -> int:
-        """The number of bins, and of patterns, of a fitted coding."""
+        """Number of bins, and of patterns, of a fitted coding."""
 
     @abc.abstractmethod
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        """Return the bin of each value of a column, shape (n_samples,), for a fitted coding."""
+        """Return the bin of each value, shape (n_samples,); the coding must be fitted."""
 
     def ends(self) -> tuple[float, float] | None:
-        """Return the smallest and largest number within a fitted coding's range.
-
-        Values beyond it are clipped. None: every value is within, or there is no order.
-        """
+        """Return the range (low, high) outside which values are clipped; None without one."""
         return None
 
     def even_range(self) -> tuple[float, float] | None:
-        """Return the range of a fitted coding whose bins are equal parts of it, else None."""
+        """Return the range if all bins are equal parts of it, else None."""
         return None
 
     @abc.abstractmethod
@@ -84,22 +76,15 @@ class Coding(abc.ABC):
 
 
 def known(value: Value | None) -> Value:
-    """Return the value of an attribute that ``fit`` fills in; ValueError if it is still None."""
+    """Return an attribute that ``fit`` fills in; ValueError if it is still None."""
     if value is None:
         raise ValueError("this coding is not fitted yet: call fit first")
     return value
 
 
 def coding_named(coding: str | Coding) -> Coding:
-    """Return a coding given as such, or by its name with its default values.
+    """Return the coding itself, or the one of this name with default values.
 
-    Raises
-    ------
-    ValueError
-        If there is none of that name, or it cannot be made from a name alone.
-
-    Examples
-    --------
     >>> coding_named("anchor").n_anchor_patterns
     9
     """
@@ -114,16 +99,11 @@ def coding_named(coding: str | Coding) -> Coding:
 
 
 def to_dict(coding: Coding) -> dict[str, Any]:
-    """Describe a coding in plain data that JSON can hold.
+    """Describe a coding of this package in plain data that JSON can hold.
 
     >>> from sdnn.coding import Symbolic
     >>> to_dict(Symbolic(categories=("a", "b")))
     {'coding': 'symbolic', 'categories': ('a', 'b')}
-
-    Raises
-    ------
-    TypeError
-        If the coding is not one of this package.
     """
     if type(coding) is not CODINGS.get(coding.name):
         raise TypeError(f"only codings of sdnn.coding can be described, got {coding!r}")
@@ -132,7 +112,7 @@ def to_dict(coding: Coding) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Replace codings by their descriptions and NumPy's numbers by Python's, in tuples too."""
+    """Replace codings by descriptions and NumPy numbers by Python's, also in tuples."""
     if isinstance(value, Coding):
         return to_dict(value)
     if isinstance(value, tuple):
@@ -141,7 +121,7 @@ def plain(value: Any) -> Any:
 
 
 def from_dict(data: Mapping[str, Any]) -> Coding:
-    """Make the coding that `to_dict` described; lists count as tuples.
+    """Make the coding that `to_dict` described; lists become tuples.
 
     >>> from_dict({"coding": "circular", "period": 24.0}).period
     24.0
@@ -151,7 +131,7 @@ def from_dict(data: Mapping[str, Any]) -> Coding:
 
 
 def tupled(value: Any) -> Any:
-    """Replace lists by tuples and descriptions of codings by codings, all the way down."""
+    """Undo `plain`; lists become tuples."""
     if isinstance(value, Mapping):
         return from_dict(value)
     return tuple(map(tupled, value)) if isinstance(value, list | tuple) else value

@@ -1,4 +1,4 @@
-"""Codings of numbers: random-inverse, anchor interpolation, and its circular form for angles."""
+"""Codings of numbers."""
 
 from __future__ import annotations
 
@@ -17,23 +17,20 @@ from sdnn.coding.base import Coding, known
 __all__ = ["Anchor", "Circular", "CoarseCodeWarning", "RandomInverse"]
 
 MAX_BINS = 65535
-FINE = 1000
-"""Bins from which on more of them make no visible difference."""
-LONGEST = 1000.0
-"""The largest length_scale: all values would look alike beyond."""
+FINE = 1000  # bins; more make no visible difference
+LONGEST = 1000.0  # the largest length_scale
 FEW_BINS = 8
-MAX_KNOTS = 129
-"""Knots that hold a column's distribution; beyond so many the codes hardly differ."""
+MAX_KNOTS = 129  # of a column's distribution; more hardly change the codes
 
 Knots = tuple[tuple[float, float], ...]
 
 
 class CoarseCodeWarning(UserWarning):
-    """A length scale leaves few bins, because neighbouring patterns differ in a unit at least."""
+    """A length scale leaves few bins: neighbouring patterns differ in at least one unit."""
 
 
 def numbers(column: NDArray[Any]) -> NDArray[np.float64]:
-    """Return the column as numbers; ValueError if a value is none, or NaN."""
+    """Return the column as floats; ValueError for NaN or complex numbers."""
     if np.iscomplexobj(column):
         raise ValueError("Complex data not supported")
     values = np.asarray(column, dtype=np.float64)
@@ -43,12 +40,12 @@ def numbers(column: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def bins_of_positions(where: NDArray[np.float64], n_bins: int) -> NDArray[np.int32]:
-    """Return the bin among equal half-open parts of [0, 1]; 1 falls into the last."""
+    """Return the bin among equal half-open parts of [0, 1]; 1 is in the last."""
     return np.minimum((where * n_bins).astype(np.int32), np.int32(n_bins - 1))
 
 
 def quantile_knots(column: NDArray[np.float64]) -> Knots:
-    """Values and their mean ranks, scaled to [0, 1]: at most `MAX_KNOTS` of them.
+    """Return at most `MAX_KNOTS` values with their mean ranks, scaled to [0, 1].
 
     >>> quantile_knots(np.array([1.0, 2.0, 2.0, 50.0]))
     ((1.0, 0.0), (2.0, 0.5), (50.0, 1.0))
@@ -65,7 +62,7 @@ def quantile_knots(column: NDArray[np.float64]) -> Knots:
 
 
 def checked_knots(knots: Any, low: float, high: float) -> Knots:
-    """Return knots that an earlier fit has learned; they rise from (low, 0) to (high, 1)."""
+    """Return given knots, which must rise from (low, 0) to (high, 1)."""
     ends: tuple[float, ...] = ()
     is_rising = False
     try:
@@ -83,7 +80,7 @@ def checked_knots(knots: Any, low: float, high: float) -> Knots:
 
 
 class Ranged(Coding):
-    """A coding of numbers within a range, which is given or learned."""
+    """Coding of numbers within a range, given or learned."""
 
     low: float | None
     high: float | None
@@ -91,19 +88,15 @@ class Ranged(Coding):
 
     @property
     def learns(self) -> bool:
-        """Whether ``fit`` learns from the sample."""
         return self.low is None or self.high is None
 
     def ends(self) -> tuple[float, float]:
-        """Return the range; see `Coding.ends`."""
         return known(self.low), known(self.high)
 
     def even_range(self) -> tuple[float, float] | None:
-        """Return the range unless bins are quantiles; see `Coding.even_range`."""
         return self.ends() if self.knots is None else None
 
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        """Return the bin of each value; see `Coding.bins`."""
         values, (low, high) = numbers(column), self.ends()
         if not low < high:  # of a column that had one value only
             where = np.zeros(len(values))
@@ -114,7 +107,7 @@ class Ranged(Coding):
         return bins_of_positions(where, self.size)
 
     def _learned_range(self, column: NDArray[np.float64]) -> tuple[float, float]:
-        """Return the given ends, or the column's; equal ones are those of a constant column."""
+        """Return the given ends, or the column's."""
         low = float(np.min(column)) if self.low is None else real("low", self.low)
         high = float(np.max(column)) if self.high is None else real("high", self.high)
         is_constant = low == high and bool(np.all(column == low))
@@ -126,25 +119,24 @@ class Ranged(Coding):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class RandomInverse(Ranged):
-    """The first pattern is random; each next one flips a few units of each sign of its neighbour.
+    """Random first pattern; each next one flips a few units of each sign.
 
-    The correlation of two patterns falls exponentially with the distance of their bins,
+    The correlation falls exponentially with the distance of the bins,
     ``(1 - 4 * n_flipped / n_units) ** distance``.
 
     Attributes
     ----------
     length_scale : float
-        Distance, as a share of the range, at which the correlation has fallen to 1/e. It sets
-        what is None of ``n_bins`` and ``n_flipped``.
+        Share of the range over which the correlation falls to 1/e; used where ``n_bins`` or
+        ``n_flipped`` is None.
     n_bins, n_flipped : int, optional
-        q and r of the method: number of bins, and units of each sign that flip from bin to bin.
+        q and r of the method: number of bins, and units of each sign flipped from bin to bin.
     spacing : {"even", "quantile"}
-        Bins of equal width, or of equal share of the training sample (robust to outliers and
-        skew; a range cannot be given then, but with knots).
+        Bins of equal width, or with equal numbers of training samples (robust to outliers).
     low, high : float, optional
-        The range; values beyond it are clipped. Learned from the sample where None.
+        The range, learned where None; values outside are clipped. Not with "quantile".
     knots : tuple of (value, position), optional
-        Learned by ``spacing="quantile"``; learned with the range, or given with it.
+        Learned by ``spacing="quantile"``; if given, then together with the range.
     """
 
     name: ClassVar[str] = "random-inverse"
@@ -157,7 +149,6 @@ class RandomInverse(Ranged):
     knots: Knots | None = None
 
     def fit(self, column: NDArray[Any], n_units: int) -> RandomInverse:
-        """Return a copy with range, ``n_bins`` and ``n_flipped`` known; see `Coding.fit`."""
         one_of("spacing", self.spacing, ("even", "quantile"))
         is_learned = self.knots is not None and not self.learns
         has_range = not (self.low is None and self.high is None)
@@ -205,21 +196,18 @@ class RandomInverse(Ranged):
 
     @property
     def size(self) -> int:
-        """The number of bins."""
         return known(self.n_bins)
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
-        """Draw the patterns; see `Coding.patterns`."""
         return _core.random_inverse_patterns(n_units, self.size, known(self.n_flipped), seed)
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
-        """``(1 - 4 r / n) ** |i - j|``; see `Coding.correlations`."""
         distance = np.abs(np.subtract.outer(np.arange(self.size), np.arange(self.size)))
         return np.power(1 - 4 * known(self.n_flipped) / n_units, distance)
 
 
 class Anchored(Coding):
-    """Patterns interpolated between independent random anchors, on a line or on a circle."""
+    """Patterns interpolated between independent random anchors."""
 
     n_anchor_patterns: int
     n_interpolated: int
@@ -232,21 +220,16 @@ class Anchored(Coding):
 
     @property
     def size(self) -> int:
-        """The number of bins."""
         return (self.n_anchor_patterns - 1) * (self.n_interpolated + 1)
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
-        """Draw the patterns; see `Coding.patterns`."""
         return _core.anchor_patterns(
             n_units, self.n_anchor_patterns, self.n_interpolated, self.is_circular, seed
         )
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
-        """Piecewise linear and bilinear; see `Coding.correlations`.
-
-        Within a stretch between two anchors they fall linearly; in neighbouring stretches they are
-        the product of the shares that both patterns have of the anchor between them.
-        """
+        # Linear within a stretch between two anchors; in neighbouring ones the product of both
+        # patterns' shares of the anchor between them.
         n_stretches, n_portions = self.n_anchor_patterns - 1, self.n_interpolated + 1
         stretch, portion = np.divmod(np.arange(self.size), n_portions)
         share = portion / n_portions
@@ -262,10 +245,9 @@ class Anchored(Coding):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Anchor(Anchored, Ranged):
-    """Independent random anchor patterns at even distances, interpolated between.
+    """Independent random anchor patterns at equal distances, interpolated between.
 
-    The correlation of two patterns falls about linearly with their distance and is zero beyond
-    two stretches.
+    The correlation falls about linearly with the distance and is zero beyond two stretches.
 
     Attributes
     ----------
@@ -273,7 +255,7 @@ class Anchor(Anchored, Ranged):
         Anchors, and patterns between neighbouring ones;
         ``(n_anchor_patterns - 1) * (n_interpolated + 1)`` bins.
     low, high : float, optional
-        The range; values beyond it are clipped. Learned from the sample where None.
+        The range, learned where None; values outside are clipped.
     """
 
     name: ClassVar[str] = "anchor"
@@ -284,7 +266,6 @@ class Anchor(Anchored, Ranged):
     high: float | None = None
 
     def fit(self, column: NDArray[Any], n_units: int) -> Anchor:
-        """Return a copy with the range known; see `Coding.fit`."""
         self._check_anchors()
         low, high = self._learned_range(numbers(column))
         return dataclasses.replace(self, low=low, high=high)
@@ -297,9 +278,9 @@ class Circular(Anchored):
     Attributes
     ----------
     period, origin : float
-        Values a period apart are the same; bins begin at the origin.
+        Values a period apart are equal; bins begin at the origin.
     n_anchor_patterns, n_interpolated : int
-        As of `Anchor`; the last anchor, which is the first again, counts.
+        As for `Anchor`; the repeated first anchor counts.
     """
 
     name: ClassVar[str] = "circular"
@@ -311,7 +292,6 @@ class Circular(Anchored):
     learns: ClassVar[bool] = False
 
     def fit(self, column: NDArray[Any], n_units: int) -> Circular:
-        """Return itself, checked: nothing is learned; see `Coding.fit`."""
         self._check_anchors()
         numbers(column)
         if not 0 < real("period", self.period) < math.inf:
@@ -321,7 +301,6 @@ class Circular(Anchored):
         return self
 
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        """Return the bin of each value; see `Coding.bins`."""
         values = numbers(column)
         if np.isinf(values).any():
             raise ValueError("Input contains infinity, which has no place on a circle")

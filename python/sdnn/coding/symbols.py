@@ -1,4 +1,4 @@
-"""Codings of categories, unrelated or of known similarity, and of values that may be missing."""
+"""Codings of categories and of values that may be missing."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Category = str | float | int | bool
 
 
 def is_missing(value: Any) -> bool:
-    """Return whether a value is None, NaN or pandas.NA, which is not even unlike itself."""
+    """Return whether a value is None, NaN or pandas.NA."""
     try:
         return value is None or bool(value != value)
     except TypeError:
@@ -28,7 +28,7 @@ def is_missing(value: Any) -> bool:
 
 
 def missing_as_nan(values: NDArray[Any]) -> NDArray[np.float64]:
-    """Return numbers of any type as floats, missing ones as NaN; the shape is kept.
+    """Return numbers of any type as floats, missing ones as NaN.
 
     >>> missing_as_nan(np.array([1, None, "2.5"], dtype=object))
     array([1. , nan, 2.5])
@@ -38,13 +38,12 @@ def missing_as_nan(values: NDArray[Any]) -> NDArray[np.float64]:
 
 
 class Categorical(Coding):
-    """A coding of categories, which are given or learned from the sample in sorted order."""
+    """Coding of categories, given or learned in sorted order."""
 
     is_numeric: ClassVar[bool] = False
     categories: tuple[Category, ...] | None
 
     def __post_init__(self) -> None:
-        """Keep given categories as a tuple."""
         given: Any = self.categories
         if given is None:
             return
@@ -56,16 +55,13 @@ class Categorical(Coding):
 
     @property
     def learns(self) -> bool:
-        """Whether ``fit`` learns from the sample."""
         return self.categories is None
 
     @property
     def size(self) -> int:
-        """The number of categories."""
         return len(known(self.categories))
 
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        """Return the place of each category; ValueError for an unknown one."""
         places = {category: place for place, category in enumerate(known(self.categories))}
         try:
             return np.array([places[value] for value in column.tolist()], dtype=np.int32)
@@ -75,7 +71,7 @@ class Categorical(Coding):
             raise ValueError(f"Found unknown categories [{', '.join(names)}]") from None
 
     def knows(self, column: NDArray[Any]) -> NDArray[np.bool_]:
-        """Return whether each value is one of the categories; what cannot be hashed is none."""
+        """Return whether each value is one of the categories."""
         categories = set(known(self.categories))
 
         def is_known(value: Any) -> bool:
@@ -87,7 +83,7 @@ class Categorical(Coding):
         return np.array([is_known(value) for value in column.tolist()], dtype=bool)
 
     def _learned(self, column: NDArray[Any]) -> tuple[Category, ...]:
-        """Return the given categories, or the different values of a column in order."""
+        """Return the given categories, or the sorted distinct values of a column."""
         if self.categories is not None:
             return self.categories
         values = column.tolist()
@@ -96,55 +92,49 @@ class Categorical(Coding):
         try:
             return tuple(sorted(set(values)))
         except TypeError:
-            raise ValueError(
-                "the categories of an input must be all words or all numbers"
-            ) from None
+            message = "the categories of an input must be all words or all numbers"
+            raise ValueError(message) from None
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Symbolic(Categorical):
-    """Categories without any order or likeness: a random pattern each.
+    """Categories without order or similarity: an independent random pattern each.
 
     Attributes
     ----------
     categories : tuple, optional
-        All categories; learned from the sample, in sorted order, where None.
+        All categories; learned in sorted order where None.
     """
 
     name: ClassVar[str] = "symbolic"
     categories: tuple[Category, ...] | None = None
 
     def fit(self, column: NDArray[Any], n_units: int) -> Symbolic:
-        """Return a copy with the categories known; see `Coding.fit`."""
         given = self.categories
         if given is not None and (not given or len(set(given)) < len(given)):
             raise ValueError(f"categories must be different and at least one, got {given!r}")
         return dataclasses.replace(self, categories=self._learned(column))
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
-        """Draw the patterns; see `Coding.patterns`."""
         return _core.symbol_patterns(self.size, n_units, seed)
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
-        """Zero but for a category with itself; see `Coding.correlations`."""
         return np.eye(self.size)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class CorrelationMatrix(Categorical):
-    """Categories whose likeness is given: pattern correlations approach a given matrix.
+    """Categories of known similarity: pattern correlations approach a given matrix.
 
     Attributes
     ----------
     matrix : array_like, shape (n_categories, n_categories)
         Symmetric, ones on the diagonal, entries in [-1, 1].
     categories : tuple, optional
-        The category of each row; those of the sample in sorted order where None.
+        The category of each row; the sample's in sorted order where None.
 
     Examples
     --------
-    Weekdays, of which Sunday is as near to Monday as Monday to Tuesday:
-
     >>> away = np.abs(np.subtract.outer(np.arange(7), np.arange(7)))
     >>> week = CorrelationMatrix(
     ...     matrix=0.8 ** np.minimum(away, 7 - away),
@@ -159,7 +149,6 @@ class CorrelationMatrix(Categorical):
     categories: tuple[Category, ...] | None = None
 
     def __post_init__(self) -> None:
-        """Keep the rows of the matrix as tuples."""
         super().__post_init__()
         try:
             given = np.asarray(self.matrix)
@@ -171,7 +160,6 @@ class CorrelationMatrix(Categorical):
         object.__setattr__(self, "matrix", tuple(map(tuple, rows.tolist())))
 
     def fit(self, column: NDArray[Any], n_units: int) -> CorrelationMatrix:
-        """Return a copy with the categories known; see `Coding.fit`."""
         matrix = np.array(self.matrix)
         is_square = matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1]
         if not is_square or not np.array_equal(matrix, matrix.T):
@@ -190,26 +178,22 @@ class CorrelationMatrix(Categorical):
         return dataclasses.replace(self, categories=names)
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
-        """Draw the patterns; see `Coding.patterns`."""
         return _core.correlation_matrix_patterns(n_units, np.array(self.matrix), seed)
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
-        """Return the matrix itself; see `Coding.correlations`."""
         return np.array(self.matrix)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class WithMissing(Coding):
-    """Another coding, and one pattern more, like no other, for values that are missing.
-
-    Missing are None, NaN and pandas.NA.
+    """Another coding with one more, unrelated pattern for None, NaN and pandas.NA.
 
     Attributes
     ----------
     base : Coding
-        Of the values that are there; it learns from them alone.
+        Coding of the other values; it learns from them alone.
     unknown : {"missing", "error"}
-        Whether a category that was not there in training counts as missing, or is an error.
+        Whether a category that was not in the training sample counts as missing.
 
     Examples
     --------
@@ -219,12 +203,11 @@ class WithMissing(Coding):
     """
 
     name: ClassVar[str] = "with-missing"
-    is_numeric: ClassVar[bool] = False  # as scikit-learn lets words through, so it does NaN
+    is_numeric: ClassVar[bool] = False  # so that scikit-learn lets NaN through
     base: Coding = dataclasses.field(default_factory=RandomInverse)
     unknown: Literal["missing", "error"] = "missing"
 
     def fit(self, column: NDArray[Any], n_units: int) -> WithMissing:
-        """Return a copy whose coding is fitted to the values that are there; see `Coding.fit`."""
         one_of("unknown", self.unknown, ("missing", "error"))
         learns = self.learns  # first, because it refuses a base that is no coding
         there = self._values(column[self._is_there(column)])
@@ -234,22 +217,18 @@ class WithMissing(Coding):
 
     @property
     def learns(self) -> bool:
-        """Whether ``fit`` learns from the sample."""
         if not isinstance(self.base, Coding) or isinstance(self.base, WithMissing):
             raise ValueError(f"base must be a Coding without missing values, got {self.base!r}")
         return self.base.learns
 
     @property
     def size(self) -> int:
-        """The number of bins; the last is that of what is missing."""
         return self.base.size + 1
 
     def ends(self) -> tuple[float, float] | None:
-        """Return the range of the values that are there; see `Coding.ends`."""
         return self.base.ends()
 
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        """Return the bin of each value; see `Coding.bins`."""
         is_there = self._is_there(column)
         if isinstance(self.base, Categorical) and self.unknown == "missing":
             is_there &= self.base.knows(column)
@@ -258,14 +237,11 @@ class WithMissing(Coding):
         return found
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
-        """Draw the patterns; see `Coding.patterns`."""
         own = int(np.random.SeedSequence(seed).generate_state(1, np.uint64)[0])
-        return np.vstack(
-            [self.base.patterns(n_units, seed), _core.symbol_patterns(1, n_units, own)]
-        )
+        missing = _core.symbol_patterns(1, n_units, own)
+        return np.vstack([self.base.patterns(n_units, seed), missing])
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
-        """Return those of the coding; what is missing has none with them; see `Coding`."""
         every = np.eye(self.size)
         every[:-1, :-1] = self.base.correlations(n_units)
         return every
@@ -274,7 +250,7 @@ class WithMissing(Coding):
         return np.array([not is_missing(value) for value in column.tolist()], dtype=bool)
 
     def _values(self, there: NDArray[Any]) -> NDArray[Any]:
-        """Return values as the coding wants them; ValueError for numbers that are not finite."""
+        """Return values as the base coding wants them; numbers must be finite."""
         if not self.base.is_numeric:
             return there
         values = missing_as_nan(there)
