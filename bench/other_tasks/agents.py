@@ -225,7 +225,7 @@ CONTENDERS = {
         agent={"preset": "small"},
         tasks=("CartPole", "Pendulum", "MountainCarContinuous"),
     ),
-    "sdnn-c-brief": _ours(", brief random actions", learning={"max_repetitions": 1}),
+    "sdnn-c-brief": _ours(", brief random actions", learning={"max_action_repeat": 1}),
     "sdnn-c-bounds": _ours(", bounds of the space", environment=_own_units, tasks=_LANDER),
     "sdnn-c-seen": _ours(
         ", ranges seen", agent={"observation_range": "seen"}, environment=_own_units, tasks=_LANDER

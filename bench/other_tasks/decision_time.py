@@ -34,13 +34,13 @@ def decision_times(name: str, steps: int) -> tuple[np.ndarray, np.ndarray]:
         began = clock()
         action = agent.act(observation)
         acted = clock()
-        following, reward, terminated, truncated, _ = env.step(action)
+        next_observation, reward, terminated, truncated, _ = env.step(action)
         stepped = clock()
-        agent.learn(Transition(observation, action, float(reward), following, terminated))
+        agent.learn(Transition(observation, action, float(reward), next_observation, terminated))
         learned = clock()
         decisions[step] = (acted - began) + (learned - stepped)
         environment_steps[step] = stepped - acted
-        observation = following
+        observation = next_observation
         if terminated or truncated:
             observation, _ = env.reset()
             agent.begin_episode()

@@ -148,12 +148,12 @@ def begun_anew(spec: RunSpec, agent: Any, seed: int) -> NDArray[np.bool_]:
             action = agent.act(state, learning)
             torque = _core.action_value(action, n_actions, -10.0, 10.0)
             reward, terminated, truncated = acrobot.step(torque, tolerance)
-            following = eyes.observe(acrobot.state())
+            next_observation = eyes.observe(acrobot.state())
             if learning:
-                agent.learn(state, action, reward, following, terminated)
+                agent.learn(state, action, reward, next_observation, terminated)
             if terminated or truncated:
                 return bool(terminated)
-            state = following
+            state = next_observation
 
     solved = []
     for episode in range(1, RECOVERY_EPISODES + 1):

@@ -1082,19 +1082,19 @@ class QLearningConfig:
         Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau. Must be finite and at least 0.
     n_steps : int
         Rewards in a target before it bootstraps. Not in the paper, which has 1: with more, a transition is learned, once, when so many steps are known or the episode ends. Must be in [1, 1000].
-    max_repetitions : int
+    max_action_repeat : int
         Steps that a random action may last. Not in the paper, which has 1: with more, it is kept for at least k steps with probability 1 / k. Must be in [1, 1000000].
     final_learning_rate : float | None
         What alpha becomes as the agent's progress goes from 0 to 1; by default it stays. Not in the paper. Must be in (0, 1].
     final_epsilon : float | None
         What epsilon becomes as the agent's progress goes from 0 to 1; by default it stays. Not in the paper. Must be in [0, 1].
-    value_range : {'given', 'seen'}
-        Whether Q has the approximator's range, q_low to q_high (`given`), or one that grows with the discounted sums of the rewards that come (`seen`). Not in the paper.
+    value_range : {'fixed', 'adaptive'}
+        Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that grows with the discounted sums of the rewards that come (`adaptive`). Not in the paper.
     schedule : {'linear', 'exponential'}
         How alpha and epsilon go to their final values: `linear`: in a straight line; `exponential`: by the same factor in equal parts of the progress, first * (final / first) ** progress. A constant rate is the common choice where the task itself changes; a line is what most libraries of deep Q-learning take for epsilon; an exponential spends more of the training near a small final value, which must not be 0. Any other function of the progress: `sdnn.agents.Schedule`.
     exploration_fraction : float
         Part of the progress in which epsilon goes to final_epsilon, where it then stays. Not in the paper. Must be in (0, 1].
-    n_random_steps : int
+    start_steps : int
         First steps of the agent's life in which every action is random, whatever epsilon. Not in the paper, which has 0: a rare success is found before the greedy actions have learned to do nothing. Must be in [0, 1073741824].
     
     Raises
@@ -1110,7 +1110,7 @@ class QLearningConfig:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, learning_rate: float = ..., discount: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ..., n_steps: int = ..., max_repetitions: int = ..., final_learning_rate: float | None = ..., final_epsilon: float | None = ..., value_range: typing.Literal['given', 'seen'] = ..., schedule: typing.Literal['linear', 'exponential'] = ..., exploration_fraction: float = ..., n_random_steps: int = ...) -> None:
+    def __init__(self, *, learning_rate: float = ..., discount: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ..., n_steps: int = ..., max_action_repeat: int = ..., final_learning_rate: float | None = ..., final_epsilon: float | None = ..., value_range: typing.Literal['fixed', 'adaptive'] = ..., schedule: typing.Literal['linear', 'exponential'] = ..., exploration_fraction: float = ..., start_steps: int = ...) -> None:
         ...
     def __replace__(self, **changes: typing.Any) -> QLearningConfig:
         ...
@@ -1157,7 +1157,7 @@ class QLearningConfig:
         alpha.
         """
     @property
-    def max_repetitions(self) -> int:
+    def max_action_repeat(self) -> int:
         """
         Steps that a random action may last. Not in the paper, which has 1: with more, it is kept for at least k steps with probability 1 / k.
         """
@@ -1165,11 +1165,6 @@ class QLearningConfig:
     def n_greedy_steps(self) -> int:
         """
         First steps of an episode in which epsilon is 0.
-        """
-    @property
-    def n_random_steps(self) -> int:
-        """
-        First steps of the agent's life in which every action is random, whatever epsilon. Not in the paper, which has 0: a rare success is found before the greedy actions have learned to do nothing.
         """
     @property
     def n_steps(self) -> int:
@@ -1182,6 +1177,11 @@ class QLearningConfig:
         How alpha and epsilon go to their final values: `linear`: in a straight line; `exponential`: by the same factor in equal parts of the progress, first * (final / first) ** progress. A constant rate is the common choice where the task itself changes; a line is what most libraries of deep Q-learning take for epsilon; an exponential spends more of the training near a small final value, which must not be 0. Any other function of the progress: `sdnn.agents.Schedule`.
         """
     @property
+    def start_steps(self) -> int:
+        """
+        First steps of the agent's life in which every action is random, whatever epsilon. Not in the paper, which has 0: a rare success is found before the greedy actions have learned to do nothing.
+        """
+    @property
     def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
         """
         Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. A reading.
@@ -1192,9 +1192,9 @@ class QLearningConfig:
         Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau.
         """
     @property
-    def value_range(self) -> typing.Literal['given', 'seen']:
+    def value_range(self) -> typing.Literal['fixed', 'adaptive']:
         """
-        Whether Q has the approximator's range, q_low to q_high (`given`), or one that grows with the discounted sums of the rewards that come (`seen`). Not in the paper.
+        Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that grows with the discounted sums of the rewards that come (`adaptive`). Not in the paper.
         """
 class FuzzyQLearningConfig:
     """

@@ -55,7 +55,7 @@ def test_the_table_of_presets_is_right():
             value = getattr(getattr(chosen, section), name)
             final = getattr(getattr(chosen, section), f"final_{name}", None)
             if name == "q_low":
-                shown = "not used" if chosen.learning.value_range == "seen" else "-20, 20"
+                shown = "not used" if chosen.learning.value_range == "adaptive" else "-20, 20"
             elif name == "n_actions":
                 sizes = chosen.approximator
                 shown = f"{value or sizes.n_hidden_units - sizes.n_active_units + 1}"

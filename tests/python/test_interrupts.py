@@ -6,7 +6,7 @@ from contextlib import suppress
 import gymnasium as gym
 import pytest
 
-from sdnn.agents import Callback, Checkpoints, JSONLines, SDNNQLearning, Training
+from sdnn.agents import Callback, CheckpointCallback, JSONLines, SDNNQLearning, Training
 from sdnn.interrupts import Interrupts, stay_interrupts
 
 
@@ -80,7 +80,7 @@ def test_an_interrupted_training_goes_on_exactly(tmp_path, times, saved_at):
 
     def callbacks(name):
         rows = JSONLines(tmp_path / f"{name}.jsonl")
-        return [rows, Checkpoints(tmp_path / name, every=30), Count()]
+        return [rows, CheckpointCallback(tmp_path / name, every=30), Count()]
 
     make(gym.make("CartPole-v1"), "whole").run()
     training = make(InterruptIn(gym.make("CartPole-v1"), 47, times), "cut")

@@ -4,8 +4,6 @@
 // Usage: controller FILE [n_episodes] [seed] [rate]. Learns, saves, loads, and runs one greedy
 // episode with `rate` decisions a second (0: as fast as it goes). Prints the decisions that the
 // loaded agent used, whether it reached the goal, and how many came too late.
-#include "sdnn/agents/agent_file.hpp"
-
 #include <array>
 #include <cstdint>
 #include <cstdio>
@@ -15,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "sdnn/agents/agent_file.hpp"
 #include "sdnn/sdnn.hpp"
 
 namespace {

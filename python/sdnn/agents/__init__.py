@@ -3,10 +3,10 @@
 from sdnn.agents.agent import Agent, load_agent
 from sdnn.agents.callbacks import (
     Callback,
-    Checkpoints,
-    EarlyStop,
+    CheckpointCallback,
     JSONLines,
     Schedule,
+    StopTrainingOnRewardThreshold,
     TensorBoard,
 )
 from sdnn.agents.episode import UnrepeatedEpisodeError
@@ -24,8 +24,7 @@ __all__ = [
     "PRESETS",
     "Agent",
     "Callback",
-    "Checkpoints",
-    "EarlyStop",
+    "CheckpointCallback",
     "Evaluation",
     "FixedRate",
     "FuzzyQLearning",
@@ -37,6 +36,7 @@ __all__ = [
     "SDNNQLearning",
     "Scaling",
     "Schedule",
+    "StopTrainingOnRewardThreshold",
     "TensorBoard",
     "Training",
     "TrainingResult",

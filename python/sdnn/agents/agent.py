@@ -58,9 +58,9 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         Settings of the agent's parts.
     seed : int
         The root of every random stream of the agent.
-    observation_range : (low, high) or "seen", optional
+    observation_range : (low, high) or "adaptive", optional
         Of the observed variables, two numbers or two for each; values outside saturate. By default
-        the bounds of the space, and what the warm-up sees where these are infinite. ``"seen"``:
+        the bounds of the space, and what the warm-up sees where these are infinite. ``"adaptive"``:
         from the warm-up for all numbers but angles, a twentieth of what it sees left out at each
         end, for spaces whose bounds are much wider than what a policy meets.
     angles : sequence of int
@@ -394,9 +394,9 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         if flag("progress", progress):
             from rich.console import Console
 
-            from sdnn.agents.callbacks import TrainingProgress
+            from sdnn.agents.callbacks import ProgressBarCallback
 
-            own = [*callbacks, TrainingProgress(Console(stderr=True), "learning")]
+            own = [*callbacks, ProgressBarCallback(Console(stderr=True), "learning")]
         training = Training(
             self,
             env,

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Callback",
-    "Checkpoints",
-    "EarlyStop",
+    "CheckpointCallback",
     "JSONLines",
+    "ProgressBarCallback",
     "Row",
     "Schedule",
+    "StopTrainingOnRewardThreshold",
     "TensorBoard",
-    "TrainingProgress",
 ]
 
 _STEPS_BETWEEN = 64
@@ -90,7 +90,7 @@ class JSONLines(Callback):
         self._file.close()
 
 
-class Checkpoints(Callback):
+class CheckpointCallback(Callback):
     """Saves the training, agent and all, from where `Training.load` goes on exactly.
 
     Parameters
@@ -126,7 +126,7 @@ class Checkpoints(Callback):
         self.n_saved = training.n_steps
 
 
-class EarlyStop(Callback):
+class StopTrainingOnRewardThreshold(Callback):
     """Stops when evaluations are good enough.
 
     Parameters
@@ -212,7 +212,7 @@ class Schedule(Callback):
             setattr(training.agent, name, function(training.agent.progress))
 
 
-class TrainingProgress(Callback):
+class ProgressBarCallback(Callback):
     """Shows the bar of one training, with its last returns and evaluation.
 
     Parameters

@@ -10,8 +10,8 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.agents.environment_adapter import OneEnvironment, StepResult, adapter_for
 from sdnn.agents.evaluation import episode_seed
-from sdnn.agents.rounds import OneEnvironment, Outcome, rounds_in
 from sdnn.agents.saved_training import SavedEpisode
 
 __all__ = ["Actions", "Episode", "Episodes", "UnrepeatedEpisodeError"]
@@ -82,7 +82,7 @@ class Episode:
     n_steps: int = 0
     action: Any = None
     sum_of_rewards: float = 0.0
-    outcome: Outcome | None = None
+    outcome: StepResult | None = None
 
     @property
     def last_observation(self) -> Any:
@@ -121,20 +121,20 @@ class Episodes:
         options: Callable[[int], dict[str, Any] | None],
     ) -> None:
         self._env, self._seed, self._options = env, seed, options
-        self._rounds = rounds_in(env)
-        self.n_environments = self._rounds.n_environments
+        self._adapter = adapter_for(env)
+        self.n_environments = self._adapter.n_environments
         self.next_number = first
         self.present: list[Episode | None] = [None] * self.n_environments
         self._first_left = 0  # the environments before it have learned this round's step
 
     def leave(self) -> None:
         """Begin anew in every environment with the next round, with other seeds."""
-        self._rounds = rounds_in(self._env)
+        self._adapter = adapter_for(self._env)
         self.present[:] = [None] * self.n_environments
 
     def outcomes(
         self, begin: Callable[[int], None], act: Callable[[int, Episode], Any]
-    ) -> Iterator[tuple[int, Episode, Outcome]]:
+    ) -> Iterator[tuple[int, Episode, StepResult]]:
         """Give the outcomes of steps, in the order of environments; each is to be learned.
 
         When those of a round are learned, a step is taken in every environment.
@@ -146,8 +146,8 @@ class Episodes:
         act
             Gives the action in an environment.
         """
-        if isinstance(self._rounds, OneEnvironment):
-            yield from self._outcomes_of_one(self._rounds, begin, act)
+        if isinstance(self._adapter, OneEnvironment):
+            yield from self._outcomes_of_one(self._adapter, begin, act)
         present, has_seeds = self.present, self._seed is not None
         while True:
             for i in range(self._first_left, self.n_environments):
@@ -162,7 +162,7 @@ class Episodes:
             actions = []
             for i, episode in enumerate(present):
                 actions.append(None if episode is None else act(i, episode))
-            for i, outcome in enumerate(self._rounds.step(actions)):
+            for i, outcome in enumerate(self._adapter.step(actions)):
                 episode = present[i]
                 if episode is None:
                     present[i] = Episode(numbers[i], outcome.observation)
@@ -178,7 +178,7 @@ class Episodes:
         env: OneEnvironment,
         begin: Callable[[int], None],
         act: Callable[[int, Episode], Any],
-    ) -> Iterator[tuple[int, Episode, Outcome]]:
+    ) -> Iterator[tuple[int, Episode, StepResult]]:
         """Give the same of a single environment, where a round is as short as can be."""
         present, has_seeds, step = self.present, self._seed is not None, env.step_one
         while True:
@@ -211,7 +211,7 @@ class Episodes:
             i: None if self._seed is None else episode_seed(self._seed, _LEARNING, number)
             for i, number in numbers.items()
         }
-        return self._rounds.reset(seeds, self._options(1 + max(numbers.values())))
+        return self._adapter.reset(seeds, self._options(1 + max(numbers.values())))
 
     def saved(
         self, shape: tuple[int, ...], flat: Callable[[Any], NDArray[np.float64]]
@@ -270,7 +270,7 @@ class Episodes:
             raise ValueError(
                 "repeat_episodes must be False for a training whose episodes had no seeds, got True"
             )
-        if not self._rounds.can_repeat:
+        if not self._adapter.can_repeat:
             raise ValueError(
                 "env must reset each of its environments with a seed of its own where episodes are"
                 f" repeated, got {type(self._env.unwrapped).__name__}: repeat_episodes=False begins"
@@ -304,7 +304,7 @@ class Episodes:
                 else longest[t]
                 for i in every
             ]
-            outcomes = self._rounds.step(actions)
+            outcomes = self._adapter.step(actions)
             ended = {i for i, outcome in enumerate(outcomes) if outcome.ends}
             for i, episode in present.items():
                 if t < n_rounds - 1 or i not in waiting:

@@ -66,9 +66,9 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     >>> agent.begin_episode()
     >>> for _ in range(3):
     ...     action = agent.act(observation)
-    ...     following, reward, terminated, truncated, _ = env.step(action)
-    ...     agent.learn(Transition(observation, action, reward, following, terminated))
-    ...     observation = following
+    ...     next_observation, reward, terminated, truncated, _ = env.step(action)
+    ...     agent.learn(Transition(observation, action, reward, next_observation, terminated))
+    ...     observation = next_observation
     >>> agent.n_rules
     6561
     """

@@ -17,7 +17,7 @@ __all__ = ["AnglePairs", "Observations", "Ranges"]
 AnglePairs: TypeAlias = Literal["none", "find"] | Sequence[tuple[int, int]]
 """Which variables are the cosine and the sine of one angle."""
 
-Ranges: TypeAlias = Literal["seen"] | tuple[ArrayLike, ArrayLike]
+Ranges: TypeAlias = Literal["adaptive"] | tuple[ArrayLike, ArrayLike]
 """Lowest and highest values, a number for all variables or one for each; or adaptive ones."""
 
 
@@ -58,7 +58,7 @@ class Observations:
         TypeError, ValueError
             For ranges, angles or pairs that do not fit.
         """
-        is_adaptive = isinstance(ranges, str) and ranges == "seen"
+        is_adaptive = isinstance(ranges, str) and ranges == "adaptive"
         low, high = _ranges(self._low, self._high, None if is_adaptive else ranges)
         finds_pairs = isinstance(angle_pairs, str) and angle_pairs == "find"
         if isinstance(angle_pairs, str) and angle_pairs not in ("none", "find"):
@@ -166,7 +166,7 @@ def _ranges(
     """Lowest and highest values of each variable, those given or the bounds; NaN: not known."""
     if ranges is not None:
         if not isinstance(ranges, Sequence) or isinstance(ranges, str) or len(ranges) != 2:
-            raise ValueError(f"observation_range must be (low, high) or 'seen', got {ranges!r}")
+            raise ValueError(f"observation_range must be (low, high) or 'adaptive', got {ranges!r}")
         try:
             low, high = (
                 with_infinities(

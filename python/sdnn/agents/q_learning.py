@@ -177,9 +177,9 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
     >>> agent.begin_episode()
     >>> for _ in range(3):
     ...     action = agent.act(observation)
-    ...     following, reward, terminated, truncated, _ = env.step(action)
-    ...     agent.learn(Transition(observation, action, reward, following, terminated))
-    ...     observation = following
+    ...     next_observation, reward, terminated, truncated, _ = env.step(action)
+    ...     agent.learn(Transition(observation, action, reward, next_observation, terminated))
+    ...     observation = next_observation
     >>> agent.q_values(observation).shape
     (5,)
     """
@@ -227,7 +227,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
             value between two that the network can give, nearer to the one it gave (a larger
             ``learning_rate``, more units or another ``rounding`` help);
             ``share_out_of_range``: those that wanted a value outside ``q_range`` (a wider range, or
-            ``value_range="seen"``); ``q_range``: (low, high) as it is; ``share_of_range`` and
+            ``value_range="adaptive"``); ``q_range``: (low, high) as it is; ``share_of_range`` and
             ``share_beyond_range``: for each observed variable the part of its range in which it was
             for nine tenths of the last 2,048 observations or so (a small one: ranges are too wide,
             the network hardly tells values apart), and how often it was outside (a large one: too
@@ -299,9 +299,9 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
     >>> agent.begin_episode()
     >>> for _ in range(3):
     ...     action = agent.act(observation)
-    ...     following, reward, terminated, truncated, _ = env.step(action)
-    ...     agent.learn(Transition(observation, action, reward, following, terminated))
-    ...     observation = following
+    ...     next_observation, reward, terminated, truncated, _ = env.step(action)
+    ...     agent.learn(Transition(observation, action, reward, next_observation, terminated))
+    ...     observation = next_observation
     >>> agent.q_values(observation).shape
     (601,)
     """

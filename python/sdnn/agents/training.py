@@ -14,9 +14,9 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.agents.environment_adapter import StepResult
 from sdnn.agents.episode import Episode, Episodes
 from sdnn.agents.evaluation import evaluate
-from sdnn.agents.rounds import Outcome
 from sdnn.agents.saved_training import SavedTraining, read_training, write_training
 from sdnn.agents.spaces import require_same_kind, require_single
 from sdnn.agents.transition import Learner, Transition, UnusableStepError, reward_of
@@ -398,20 +398,20 @@ class Training:
             f" {episode.number}{whose}): {error}"
         )
 
-    def _learn_step(self, i: int, episode: Episode, outcome: Outcome) -> None:
-        following, told, terminated, truncated = outcome
+    def _learn_step(self, i: int, episode: Episode, outcome: StepResult) -> None:
+        next_observation, told, terminated, truncated = outcome
         ends = terminated or (truncated and not self.limit_bootstraps)
         try:
             reward = reward_of(told)
-            step = Transition(episode.observation, episode.action, reward, following, ends)
+            step = Transition(episode.observation, episode.action, reward, next_observation, ends)
             self.agent.learn(step, **self._place[i])
         except (ValueError, OverflowError) as error:
             raise self._unusable(error, i, episode) from error
-        episode.observation, episode.outcome = following, None
+        episode.observation, episode.outcome = next_observation, None
         episode.sum_of_rewards += reward
         self.n_steps += 1
 
-    def _note_step(self, i: int, episode: Episode, outcome: Outcome) -> Exception | None:
+    def _note_step(self, i: int, episode: Episode, outcome: StepResult) -> Exception | None:
         """Count what ends with the step, evaluate where it is due, and tell the callbacks.
 
         Returns the error of an evaluation, without which the step is whole.

@@ -159,9 +159,9 @@ def train_run(
     if sys.stderr.isatty():
         from rich.console import Console
 
-        from sdnn.agents.callbacks import TrainingProgress
+        from sdnn.agents.callbacks import ProgressBarCallback
 
-        callbacks.append(TrainingProgress(Console(stderr=True), run.spec.task))
+        callbacks.append(ProgressBarCallback(Console(stderr=True), run.spec.task))
     outcome = run.train(
         steps=steps, episodes=episodes, callbacks=callbacks, repeat_episodes=repeat_episodes
     )
@@ -196,7 +196,7 @@ def _lines_of_ranges(report: Mapping[str, Any]) -> Iterator[str]:
     if narrow:
         yield (
             f"{_variables(narrow)} moved within {_LITTLE_OF_A_RANGE:.0%} of the range:"
-            " the network can hardly tell such values apart; --range seen narrows ranges"
+            " the network can hardly tell such values apart; --range adaptive narrows ranges"
         )
     shares = enumerate(report["share_beyond_range"])
     clipped = [i for i, share in shares if share is not None and share > _OFTEN_BEYOND_A_RANGE]

@@ -41,9 +41,9 @@ if TYPE_CHECKING:
 @click.option(
     "--range",
     "ranges",
-    metavar="[VARIABLE=]LOW:HIGH|seen",
+    metavar="[VARIABLE=]LOW:HIGH|adaptive",
     multiple=True,
-    help="Range of an observed variable, from 0, or of all; may be repeated. seen: from a warm-up.",
+    help="Range of an observed variable, from 0, or of all; repeatable. adaptive: from a warm-up.",
 )
 @click.option(
     "--set",
@@ -127,8 +127,8 @@ def _source(env_id: str | None, file: Path | None, options: dict[str, Any]) -> S
     for name, text in named_values("--env-arg", options["kwargs"]):
         given[f"environment.kwargs.{name}"] = value_of(text)
     for text in options["ranges"]:
-        if text == "seen":
-            given["agent.observation_range"] = "seen"
+        if text == "adaptive":
+            given["agent.observation_range"] = "adaptive"
         else:
             name, ends = _range(text)
             given[f"environment.ranges.{name}"] = ends
@@ -146,7 +146,7 @@ def _range(text: str) -> tuple[str, list[float]]:
         return name or "all", [float(low), float(high)]
     except ValueError:
         raise click.UsageError(
-            f"--range must be [VARIABLE=]LOW:HIGH or seen, got {text!r}"
+            f"--range must be [VARIABLE=]LOW:HIGH or adaptive, got {text!r}"
         ) from None
 
 

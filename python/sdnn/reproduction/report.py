@@ -23,9 +23,9 @@ from sdnn.reproduction.verdicts import (
     CheckOutcome,
     SettledClaim,
     Verdict,
+    decide,
     is_paper_scale,
     judge_claims,
-    settle,
 )
 from sdnn.runs.measures import STEP_MEASURES
 from sdnn.runs.registry import cost_series, title_of
@@ -117,7 +117,7 @@ class Report:
     @cached_property
     def claims(self) -> tuple[SettledClaim, ...]:
         """The claims that these results speak about, with what reference results say of them."""
-        return settle(judge_claims(self.results, self.costs), self.reference)
+        return decide(judge_claims(self.results, self.costs), self.reference)
 
     @cached_property
     def powers(self) -> tuple[tuple[Claim, CheckOutcome, tuple[Power, ...]], ...]:
@@ -232,7 +232,7 @@ class Report:
                     **one.own.to_json(),
                     "with_more_trials": None if one.more is None else one.more.to_json(),
                     "ten_trials_show_it": chance_json(one.chance),
-                    "settled": one.verdict.value,
+                    "decided": one.verdict.value,
                 }
                 for one in self.claims
             ],

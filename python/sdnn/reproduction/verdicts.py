@@ -149,7 +149,7 @@ class SettledClaim:
         return Verdict.FAILS if self.chance.value <= NEVER else Verdict.CHANCE
 
 
-def settle(
+def decide(
     outcomes: Iterable[ClaimOutcome], more: Iterable[TrialMeasures]
 ) -> tuple[SettledClaim, ...]:
     """Put beside each claim what more trials of the same settings say of it.

@@ -14,8 +14,8 @@ import gymnasium as gym
 from sdnn._core import __version__
 from sdnn.agents import (
     Callback,
-    Checkpoints,
-    EarlyStop,
+    CheckpointCallback,
+    StopTrainingOnRewardThreshold,
     TensorBoard,
     Training,
     UnrepeatedEpisodeError,
@@ -102,7 +102,7 @@ class RunOutcome:
     scaling: Scaling | None
 
 
-class _Target(EarlyStop):
+class _Target(StopTrainingOnRewardThreshold):
     """Stops where the target was reached, also if that was just before the run was killed."""
 
     def on_start(self, training: Training) -> None:
@@ -123,7 +123,7 @@ class _StopAsked(Callback):
             training.stop()
 
 
-class _StoredCheckpoints(Checkpoints):
+class _StoredCheckpoints(CheckpointCallback):
     """Stores the rows of a run before each checkpoint that counts them."""
 
     def __init__(self, run: Run, store: ResultStore) -> None:

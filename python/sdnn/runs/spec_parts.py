@@ -31,8 +31,8 @@ class AgentSpec(Settings, frozen=True):
         ),
     ] = None
     observation_range: Annotated[
-        Literal["seen"] | None,
-        Meta(description="`seen`: ranges of the observed variables come from a warm-up."),
+        Literal["adaptive"] | None,
+        Meta(description="`adaptive`: ranges of the observed variables come from a warm-up."),
     ] = None
     angles: Annotated[
         tuple[Index, ...],

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypeVar
 import gymnasium as gym
 from numpy.typing import NDArray
 
-from sdnn.agents import Callback, EarlyStop, Training
+from sdnn.agents import Callback, StopTrainingOnRewardThreshold, Training
 from sdnn.arguments import whole
 from sdnn.runs.records import TrialRows
 from sdnn.runs.registry import agent_entry
@@ -77,7 +77,7 @@ class TrainingTrial:
         self,
         training: Training,
         environments: Iterable[gym.Env[Any, Any]],
-        target: EarlyStop | None = None,
+        target: StopTrainingOnRewardThreshold | None = None,
     ) -> None:
         self.training = training
         self._open = tuple(environments)
@@ -151,7 +151,7 @@ def training_trial(spec: RunSpec) -> TrainingTrial:
     """
     target = None
     if spec.budget.target_return is not None:
-        target = EarlyStop(spec.budget.target_return)
+        target = StopTrainingOnRewardThreshold(spec.budget.target_return)
     with ExitStack() as stack:
         env: Any = spec.make_training_env()
         stack.callback(env.close)

@@ -31,7 +31,7 @@ ControllerConfig small() {
                                                      .n_actions = 5,
                                                      .u_high = 36,
                                                      .rounding = approximators::Rounding::random},
-          .learning = QLearningConfig{.max_repetitions = 3},
+          .learning = QLearningConfig{.max_action_repeat = 3},
           .seed = kSeed,
           .observation = {.low = {0.0, {}}, .high = {1.0, {}}, .adaptive = true},
           .action = {.low = {-1.0}, .high = {1.0}, .number = ActionNumber::float32},

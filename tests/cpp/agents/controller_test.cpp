@@ -56,8 +56,8 @@ ControllerConfig sdnn() {
                           .n_actions = 5,
                           .averaging_interval = 5},
               QLearningConfig{.policy = {.epsilon = 0.5, .n_greedy_steps = 0},
-                              .max_repetitions = 4,
-                              .value_range = ValueRange::seen});
+                              .max_action_repeat = 4,
+                              .value_range = ValueRange::adaptive});
 }
 ControllerConfig fuzzy() { return with(FuzzyRulesConfig{}, kTraces); }
 ControllerConfig fuzzy_of_vectors() { return with(FuzzyRulesConfig{.n_sets = 4}, kTraces, 2); }

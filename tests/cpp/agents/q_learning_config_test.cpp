@@ -52,7 +52,7 @@ TEST(QLearning, RatesGoInAStraightLineWithProgress) {
 }
 
 TEST(QLearning, NamesWhatIsImpossibleOfWhatIsNotInThePaper) {
-  EXPECT_EQ(message({.max_repetitions = 0}), "max_repetitions must be in [1, 1000000], got 0");
+  EXPECT_EQ(message({.max_action_repeat = 0}), "max_action_repeat must be in [1, 1000000], got 0");
   EXPECT_EQ(message({.final_learning_rate = 0.0}), "final_learning_rate must be in (0, 1], got 0");
   EXPECT_EQ(message({.final_learning_rate = testing::kNaN}),
             "final_learning_rate must be in (0, 1], got nan");

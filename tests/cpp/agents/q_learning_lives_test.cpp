@@ -110,8 +110,8 @@ TEST(QLearning, AnyOneOfSeveralEnvironmentsIsLikeTheOnlyOne) {
       const bool is_shared = !state.contains("environment.1." + name);
       EXPECT_EQ(state.at(is_shared ? name : before + name), tensor) << name;
     }
-    EXPECT_NE(state.at(before + "waiting.next_state"),
-              state.at("environment.1.waiting.next_state"));
+    EXPECT_NE(state.at(before + "n_step_buffer.next_state"),
+              state.at("environment.1.n_step_buffer.next_state"));
   }
 }
 
@@ -158,7 +158,7 @@ TEST(QLearning, RefusesAStateThatDoesNotFit) {
   const core::State young = core::state_of(agent);
   while (core::state_of(agent).contains("n_random_left")) world.tick(agent);
   while (testing::number_of<std::int32_t>(core::state_of(agent), "n_kept") == 0 ||
-         core::state_of(agent).at("waiting.rewards").size() < 2) {
+         core::state_of(agent).at("n_step_buffer.rewards").size() < 2) {
     world.tick(agent);
   }
   agent.set_learning_rate(std::nullopt);  // what may be missing
@@ -170,19 +170,20 @@ TEST(QLearning, RefusesAStateThatDoesNotFit) {
     testing::expect_refused(agent, bad, "state: " + message);
   };
   for (const std::int64_t bad : {-1, 7}) {
-    refused(with_number(good, "waiting.actions", bad, 1), "waiting.actions must be of actions");
+    refused(with_number(good, "n_step_buffer.actions", bad, 1),
+            "n_step_buffer.actions must be of actions");
     refused(with_number(good, "kept_action", bad), "kept_action must be an action");
   }
-  refused(with_number(good, "waiting.rewards", testing::kNaN, 1), "waiting.rewards must be finite");
-  refused(with_number(good, "waiting.states", testing::kNaN, 3),
-          "waiting.states must be in [0, 1]");
+  refused(with_number(good, "n_step_buffer.rewards", testing::kNaN, 1),
+          "n_step_buffer.rewards must be finite");
+  refused(with_number(good, "n_step_buffer.states", testing::kNaN, 3),
+          "n_step_buffer.states must be in [0, 1]");
   for (const int bad : {-1, 21}) {
-    refused(with_number(young, "n_random_left", bad),
-            "n_random_left must be in [0, n_random_steps]");
+    refused(with_number(young, "n_random_left", bad), "n_random_left must be in [0, start_steps]");
   }
   refused(with_number(good, "step", -1), "step must be 0 or more");
-  refused(with_number(good, "n_kept", -1), "n_kept must be in [0, max_repetitions)");
-  refused(with_number(good, "n_kept", 5), "n_kept must be in [0, max_repetitions)");
+  refused(with_number(good, "n_kept", -1), "n_kept must be in [0, max_action_repeat)");
+  refused(with_number(good, "n_kept", 5), "n_kept must be in [0, max_action_repeat)");
   for (const double bad : {testing::kNaN, -0.1, 1.1}) {
     refused(with_number(good, "progress", bad), "progress must be in [0, 1]");
   }
@@ -191,10 +192,10 @@ TEST(QLearning, RefusesAStateThatDoesNotFit) {
   bad["kept_action"] = testing::tensor_of<std::int64_t>({0, 0});
   refused(bad, "kept_action must be one per dimension");
   bad = good;  // as many as the ring has places: the next would have none
-  bad["waiting.rewards"] = testing::tensor_of(std::vector<double>(4, 0.0));
-  bad["waiting.actions"] = testing::tensor_of(std::vector<std::int64_t>(4, 0));
-  bad["waiting.states"] = testing::tensor_of(std::vector<double>(8, 0.0));
-  refused(bad, "waiting.rewards must be fewer than n_steps");
+  bad["n_step_buffer.rewards"] = testing::tensor_of(std::vector<double>(4, 0.0));
+  bad["n_step_buffer.actions"] = testing::tensor_of(std::vector<std::int64_t>(4, 0));
+  bad["n_step_buffer.states"] = testing::tensor_of(std::vector<double>(8, 0.0));
+  refused(bad, "n_step_buffer.rewards must be fewer than n_steps");
   bad = good;
   for (std::size_t i = 0; i < 4; ++i) {
     bad = with_number(bad, "policy.ties.words", std::uint64_t{0}, i);

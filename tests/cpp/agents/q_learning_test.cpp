@@ -215,7 +215,7 @@ TEST(QLearning, ABadTransitionLeavesTheWholeStateAsItWas) {
   using Vectors = QLearning<Decoupled<RBFNetwork>>;
   Vectors agent(Decoupled<RBFNetwork>({RBFNetwork({.n_inputs = 1, .n_actions = 3}),
                                        RBFNetwork({.n_inputs = 1, .n_actions = 2})}),
-                {.value_range = ValueRange::seen}, 1);
+                {.value_range = ValueRange::adaptive}, 1);
   agent.learn(cell(0), Indices{2, 1}, 1.0, cell(1), false);
   const core::State before = core::state_of(agent);
   for (const Indices& bad : {Indices{}, Indices{1}, Indices(40, 0), Indices{3, 0}, Indices{0, 2}}) {
@@ -237,7 +237,7 @@ TEST(QLearning, ABadTransitionLeavesTheWholeStateAsItWas) {
 TEST(QLearning, ARandomActionLastsKStepsWithProbabilityOneKth) {
   constexpr int kLongest = 8, kDraws = 20000;
   Agent agent(LookupTable(1, 1, 1 << 17),
-              {.policy = {.epsilon = 1.0, .n_greedy_steps = 0}, .max_repetitions = kLongest}, 4);
+              {.policy = {.epsilon = 1.0, .n_greedy_steps = 0}, .max_action_repeat = kLongest}, 4);
   std::array<int, kLongest + 1> at_least{};
   std::size_t last = agent.act(cell(0));
   int lasted = 1;
@@ -263,7 +263,8 @@ TEST(QLearning, ARandomActionLastsKStepsWithProbabilityOneKth) {
 TEST(QLearning, AKeptActionEndsWithTheEpisodeAndEvaluationDoesNotUseItUp) {
   LookupTable table(1, 1, 1 << 17);
   table.update(cell(0), 5, 1.0);
-  Agent agent(table, {.policy = {.epsilon = 1.0, .n_greedy_steps = 0}, .max_repetitions = 1000}, 1);
+  Agent agent(table, {.policy = {.epsilon = 1.0, .n_greedy_steps = 0}, .max_action_repeat = 1000},
+              1);
   int n_kept = 0;
   for (int i = 0; i < 200; ++i) {
     agent.begin_episode();
@@ -282,7 +283,7 @@ TEST(QLearning, TheFirstStepsOfALifeAreRandom) {
   table.update(cell(0), 5, 1.0);
   for (const int longest : {1, 7}) {
     Agent agent(table,
-                {.policy = {.epsilon = 0.0}, .max_repetitions = longest, .n_random_steps = 50}, 1);
+                {.policy = {.epsilon = 0.0}, .max_action_repeat = longest, .start_steps = 50}, 1);
     std::size_t last = 5;
     int n_repeated = 0;
     for (int i = 0; i < 50; ++i) {
@@ -297,12 +298,12 @@ TEST(QLearning, TheFirstStepsOfALifeAreRandom) {
     agent.begin_episode();  // ends what may be kept
     for (int i = 0; i < 20; ++i) EXPECT_EQ(agent.act(cell(0)), 5U);
   }
-  EXPECT_EQ(message({.n_random_steps = -1}), "n_random_steps must be in [0, 1073741824], got -1");
+  EXPECT_EQ(message({.start_steps = -1}), "start_steps must be in [0, 1073741824], got -1");
 }
 
 TEST(QLearning, ABadStateIsNoneOfTheFirstSteps) {
   QLearning<RBFNetwork> agent(RBFNetwork({.n_inputs = 1}),
-                              {.policy = {.epsilon = 0.0}, .n_random_steps = 1}, 1);
+                              {.policy = {.epsilon = 0.0}, .start_steps = 1}, 1);
   EXPECT_THROW((void)agent.act({{2.0}}), std::invalid_argument);
   EXPECT_EQ(testing::number_of<std::int32_t>(core::state_of(agent), "n_random_left"), 1);
   (void)agent.act(cell(0));
@@ -321,8 +322,8 @@ TEST(QLearning, WithoutRepetitionsTheirStreamIsNotTouched) {
 
 // gamma = 1/2: the first sum is 8, so the range is 8 and a quarter more.
 TEST(QLearning, TheRangeOfValuesFollowsTheRewards) {
-  QLearning<SDNNC> agent(SDNNC(network(), 1), {.discount = 0.5, .value_range = ValueRange::seen},
-                         1);
+  QLearning<SDNNC> agent(SDNNC(network(), 1),
+                         {.discount = 0.5, .value_range = ValueRange::adaptive}, 1);
   const auto expect_range = [&agent](double low, double high) {
     EXPECT_EQ(agent.action_value().output_scale().q_low(), low);
     EXPECT_EQ(agent.action_value().output_scale().q_high(), high);
@@ -392,7 +393,7 @@ TEST(QLearning, BestActionIsThatOfActWithoutExploring) {
 // All numbers are multiples of 1/4: the errors of one dimension have no rounding.
 TEST(QLearning, OfOneDimensionDoesWhatAnAgentWithoutDimensionsDoes) {
   const QLearningConfig config{
-      .discount = 0.5, .policy = {.epsilon = 0.3, .n_greedy_steps = 2}, .max_repetitions = 3};
+      .discount = 0.5, .policy = {.epsilon = 0.3, .n_greedy_steps = 2}, .max_action_repeat = 3};
   QLearning<SDNNC> plain(SDNNC(network(), 3), config, 3);
   QLearning<Decoupled<SDNNC>> decoupled(Decoupled<SDNNC>({SDNNC(network(), 3)}), config, 3);
   testing::World<QLearning<SDNNC>> world(2, 9);

@@ -53,11 +53,11 @@ inline approximators::SDNNCConfig network() {
 inline QLearningConfig everything() {
   return {.policy = {.epsilon = 0.3, .n_greedy_steps = 2},
           .n_steps = 4,
-          .max_repetitions = 5,
+          .max_action_repeat = 5,
           .final_learning_rate = 0.25,
           .final_epsilon = 0.0,
-          .value_range = ValueRange::seen,
-          .n_random_steps = 20};
+          .value_range = ValueRange::adaptive,
+          .start_steps = 20};
 }
 
 inline QLearning<SDNNC> sdnn_agent() {

@@ -54,15 +54,15 @@ def test_learning_agrees_with_its_definition_bit_for_bit(d, n_steps, tie_rule):
         in_episode = step % 50
         if in_episode == 0:
             agent.begin_episode()
-        following = next(walk)
+        next_observation = next(walk)
         action, picked = slow.act(
             state, lambda values, at=in_episode: policy.select(values, at, True)
         )
         assert agent.act(state) == action, step
         reward, terminated = float(rng.integers(-5, 11)), bool(rng.integers(20) == 0)
-        agent.learn(state, action, reward, following, terminated)
-        slow.learn(state, picked, reward, following, terminated)
-        state = following
+        agent.learn(state, action, reward, next_observation, terminated)
+        slow.learn(state, picked, reward, next_observation, terminated)
+        state = next_observation
         if step % 100 == 0:
             assert agent.value(state) == slow.value(state)
     table = slow.v.reshape(-1, rules.n_actions)

@@ -22,9 +22,9 @@ def live(env, agent, n_steps):
     actions = []
     for _ in range(n_steps):
         action = agent.act(observation)
-        following, reward, terminated, truncated, _ = env.step(action)
-        agent.learn(Transition(observation, action, float(reward), following, terminated))
-        observation = following
+        next_observation, reward, terminated, truncated, _ = env.step(action)
+        agent.learn(Transition(observation, action, float(reward), next_observation, terminated))
+        observation = next_observation
         actions.append(np.asarray(action).tolist())
         if terminated or truncated:
             observation, _ = env.reset()

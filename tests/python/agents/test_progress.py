@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from sdnn.agents import RBFQLearning, Training
-from sdnn.agents.callbacks import TrainingProgress
+from sdnn.agents.callbacks import ProgressBarCallback
 
 
 @pytest.mark.parametrize("is_terminal", [True, False])
@@ -17,7 +17,7 @@ def test_a_line_on_a_terminal_and_nothing_elsewhere(is_terminal, goal):
     agent = RBFQLearning(env.observation_space, env.action_space)
     text = StringIO()
     console = Console(file=text, force_terminal=is_terminal, width=120)
-    callbacks = [TrainingProgress(console, "Drifting")]
+    callbacks = [ProgressBarCallback(console, "Drifting")]
     training = Training(
         agent,
         env,

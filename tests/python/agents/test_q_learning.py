@@ -129,18 +129,18 @@ def test_learning_agrees_with_the_page_at_odd_sizes():
 
 def test_one_transition_by_hand():
     agent = small_agent(seed=1, learning=QLearningConfig(learning_rate=1.0))
-    state, following = [0.1, 0.2, 0.3], [1.5, -1.0, 0.0]
+    state, next_observation = [0.1, 0.2, 0.3], [1.5, -1.0, 0.0]
     for _ in range(200):
-        agent.learn(Transition(state, [-1.0], 10.0, following, True))
+        agent.learn(Transition(state, [-1.0], 10.0, next_observation, True))
     # Terminated: Q becomes r = 10, at the nearest count: 15 + 10 * 26 / 40 = 21.5, rounded to 22.
     line = page.Settings(u_low=2, u_high=28)
     assert agent.q_values(state)[0] == page.g(22, line)
     for _ in range(200):
-        agent.learn(Transition(following, [3.0], 1.0, state, False))
+        agent.learn(Transition(next_observation, [3.0], 1.0, state, False))
     # Otherwise r + 0.9 max Q(s'), whose windows may share units with those just corrected.
     best = agent.q_values(state).max()
     expected = page.g(page.g_inverse(1 + 0.9 * best, line), line)
-    assert agent.q_values(following)[-1] == expected
+    assert agent.q_values(next_observation)[-1] == expected
 
 
 # The Python face.
@@ -396,7 +396,7 @@ def test_evaluation_has_no_effect_on_learning():
     agents = [small_agent(seed=5) for _ in range(2)]
     rng = np.random.default_rng(0)
     for step in range(300):
-        observation, following = rng.uniform(-2, 2, (2, 3))
+        observation, next_observation = rng.uniform(-2, 2, (2, 3))
         if step % 20 == 0:
             for _ in range(step % 7):
                 agents[1].act(observation, explore=False)
@@ -405,7 +405,7 @@ def test_evaluation_has_no_effect_on_learning():
         first, second = (agent.act(observation) for agent in agents)
         assert np.array_equal(first, second)
         for agent in agents:
-            agent.learn(Transition(observation, first, 1.0, following, False))
+            agent.learn(Transition(observation, first, 1.0, next_observation, False))
     weights = [agent.core.action_value.weights() for agent in agents]
     assert np.array_equal(*weights)
 

@@ -41,9 +41,9 @@ GENERAL = QLearningConfig(
     epsilon=0.3,
     final_epsilon=0.0,
     n_greedy_steps=0,
-    max_repetitions=6,
-    n_random_steps=15,
-    value_range="seen",
+    max_action_repeat=6,
+    start_steps=15,
+    value_range="adaptive",
 )
 RANDOMLY = SDNNCConfig(
     n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5, rounding="random",
@@ -74,7 +74,7 @@ KINDS = {
         TORQUE,
         approximator=SMALL,
         learning=GENERAL,
-        observation_range="seen",
+        observation_range="adaptive",
         warm_up_steps=60,
     ),
     "sdnn, some pairs": lambda: SDNNQLearning(
@@ -107,7 +107,7 @@ def lived(agent, first, last, cut=None):
     for step in range(first, last):
         where = step % agent.n_environments
         rng = np.random.default_rng(step)
-        observation, following = (
+        observation, next_observation = (
             {"at": rng.uniform(-1, 1, 2), "lamp": int(rng.integers(2))}
             if isinstance(agent.observation_space, gym.spaces.Dict)
             else rng.uniform(-1, 1, agent.observation_space.shape)
@@ -120,7 +120,8 @@ def lived(agent, first, last, cut=None):
         if cut is not None and step == cut[0] and cut[1] == "before learning":
             agent = cut[2](agent)
         agent.learn(
-            Transition(observation, action, float(rng.normal()), following, step % 17 == 16), where
+            Transition(observation, action, float(rng.normal()), next_observation, step % 17 == 16),
+            where,
         )
         if step % 5 == 0:
             agent.act(observation, explore=False)

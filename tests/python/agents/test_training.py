@@ -15,13 +15,13 @@ import pytest
 
 from sdnn.agents import (
     Callback,
-    Checkpoints,
-    EarlyStop,
+    CheckpointCallback,
     FuzzyQLearning,
     JSONLines,
     QLearningConfig,
     RBFQLearning,
     SDNNQLearning,
+    StopTrainingOnRewardThreshold,
     Training,
     Transition,
     UnrepeatedEpisodeError,
@@ -280,7 +280,9 @@ def test_what_was_learned_before_an_environment_failed_is_kept(
     env = FailsOnce(call, failure)
     agent = make(env.observation_space, env.action_space, seed=3, **options)
     path, rows = tmp_path / "checkpoint", JSONLines(tmp_path / "rows.jsonl")
-    training = Training(agent, env, steps=100, callbacks=[rows, Checkpoints(path, every=1000)])
+    training = Training(
+        agent, env, steps=100, callbacks=[rows, CheckpointCallback(path, every=1000)]
+    )
     with pytest.raises(failure):
         training.run()
     assert not training.is_within_step
@@ -304,7 +306,7 @@ def test_what_several_learned_before_one_failed_is_kept(has_own_resets, tmp_path
     make, options = KINDS["sdnn"]
     agent = make(env.single_observation_space, env.single_action_space, seed=3, **options)
     path = tmp_path / "checkpoint"
-    training = Training(agent, env, steps=200, callbacks=[Checkpoints(path, every=1000)])
+    training = Training(agent, env, steps=200, callbacks=[CheckpointCallback(path, every=1000)])
     with pytest.raises(TimeoutError):
         training.run()
     careful = gym.vector.SyncVectorEnv([FailsOnce] * 2)
@@ -329,7 +331,7 @@ def test_a_start_that_cannot_be_made_does_not_stop_a_training_for_ever(tmp_path)
             return super().reset(seed=seed)
 
     path = tmp_path / "checkpoint"
-    callbacks = [Checkpoints(path)]
+    callbacks = [CheckpointCallback(path)]
     training = Training(corridor_agent(), Picky(), episodes=4, seed=7, callbacks=callbacks)
     for _ in bad:
         with pytest.raises(RuntimeError, match="no such start"):
@@ -370,7 +372,7 @@ def test_where_an_evaluation_fails_it_is_made_first_thereafter(tmp_path):
 
     def training(evaluation_env, name):
         agent = make(FailsOnce.observation_space, FailsOnce.action_space, seed=3, **options)
-        callbacks = [JSONLines(tmp_path / name), Checkpoints(path, every=1000)]
+        callbacks = [JSONLines(tmp_path / name), CheckpointCallback(path, every=1000)]
         evaluations = {"evaluation_env": evaluation_env, **every}
         return Training(agent, FailsOnce(), callbacks=callbacks, **evaluations)
 
@@ -424,7 +426,7 @@ def test_a_second_training_meets_other_episodes(tmp_path):
     assert again.seeds[:2] == again.seeds[2:], "as it was asked for"
 
 
-class Killed(Checkpoints):
+class Killed(CheckpointCallback):
     """Has no time for a last checkpoint."""
 
     def on_end(self, training):
@@ -620,8 +622,8 @@ def test_what_waits_is_learned_when_a_new_episode_begins(tmp_path):
     observation, _ = at.reset(seed=env.seeds[-1])
     by_hand.begin_episode()
     action = by_hand.act(observation)
-    following, reward, terminated, _, _ = at.step(action)
-    by_hand.learn(Transition(observation, action, reward, following, terminated))
+    next_observation, reward, terminated, _, _ = at.step(action)
+    by_hand.learn(Transition(observation, action, reward, next_observation, terminated))
     by_hand.progress = 1.0
     assert states_equal(with_training.agent, by_hand)
 
@@ -782,7 +784,7 @@ def test_a_training_in_pieces_is_the_same_and_may_be_left_between_two():
 
 
 def test_an_early_stop_waits_for_evaluations_in_a_row():
-    stop = EarlyStop(mean_return=0.6, patience=2)
+    stop = StopTrainingOnRewardThreshold(mean_return=0.6, patience=2)
     result = corridor_agent().train(
         Corridor(), steps=20_000, callbacks=[stop], evaluate_every=200, evaluation_env=Corridor()
     )
@@ -793,7 +795,7 @@ def test_an_early_stop_waits_for_evaluations_in_a_row():
 @pytest.mark.parametrize("cut", [15, 20, 25, 29])
 def test_an_early_stop_counts_the_evaluations_before_a_training_was_loaded(tmp_path, cut):
     def training(goal, agent):
-        stop = EarlyStop(mean_return=-1e9, patience=3)
+        stop = StopTrainingOnRewardThreshold(mean_return=-1e9, patience=3)
         return Training(
             agent, Corridor(), steps=goal, callbacks=[stop],
             evaluate_every=10, evaluation_env=Corridor(),
@@ -808,7 +810,7 @@ def test_an_early_stop_counts_the_evaluations_before_a_training_was_loaded(tmp_p
     again = Training.load(
         tmp_path / "c",
         Corridor(),
-        callbacks=[EarlyStop(mean_return=-1e9, patience=3)],
+        callbacks=[StopTrainingOnRewardThreshold(mean_return=-1e9, patience=3)],
         evaluation_env=Corridor(),
     )
     assert again.evaluations == first.evaluations
@@ -834,7 +836,7 @@ def test_an_interrupt_reaches_the_caller_after_the_callbacks(tmp_path):
                 os.kill(os.getpid(), signal.SIGINT)
 
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    callbacks = [Checkpoints(tmp_path / "c", 1000), Interrupt()]
+    callbacks = [CheckpointCallback(tmp_path / "c", 1000), Interrupt()]
     try:
         with pytest.raises(KeyboardInterrupt):
             corridor_agent().train(Corridor(), steps=100, callbacks=callbacks)

@@ -8,7 +8,7 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 import sdnn.environments  # noqa: F401  (registers the acrobot)
 from sdnn.agents import (
     Callback,
-    Checkpoints,
+    CheckpointCallback,
     FuzzyQLearning,
     FuzzyQLearningConfig,
     JSONLines,
@@ -29,8 +29,8 @@ AutoresetMode = gym.vector.AutoresetMode
 
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
 GENERAL = QLearningConfig(
-    n_steps=3, epsilon=0.3, final_epsilon=0.01, n_greedy_steps=2, max_repetitions=6,
-    n_random_steps=9, value_range="seen",
+    n_steps=3, epsilon=0.3, final_epsilon=0.01, n_greedy_steps=2, max_action_repeat=6,
+    start_steps=9, value_range="adaptive",
 )  # fmt: skip
 
 
@@ -142,14 +142,16 @@ def test_each_environment_is_learned_in_order(kind):
                 by_hand.begin_episode(i)
         actions = [by_hand.act(observations[i], environment=i) for i in range(n)]
         steps = [envs[i].step(actions[i]) for i in range(n)]
-        for i, (following, reward, terminated, truncated, _) in enumerate(steps):
+        for i, (next_observation, reward, terminated, truncated, _) in enumerate(steps):
             if n_learned == 200:
                 break
-            transition = Transition(observations[i], actions[i], reward, following, terminated)
+            transition = Transition(
+                observations[i], actions[i], reward, next_observation, terminated
+            )
             by_hand.learn(transition, environment=i)
             n_learned += 1
             lengths[i], returns[i] = lengths[i] + 1, returns[i] + reward
-            observations[i] = following
+            observations[i] = next_observation
             if terminated or truncated:
                 rows.append((n_learned, i, lengths[i], returns[i], terminated))
                 observations[i] = None
@@ -239,7 +241,7 @@ def test_steps_and_callbacks_count_transitions(tmp_path):
             seen.append((training.n_steps, training.agent.progress))
 
     path = tmp_path / "rows.jsonl"
-    callbacks = [JSONLines(path), Checkpoints(tmp_path / "c", 7), Note()]
+    callbacks = [JSONLines(path), CheckpointCallback(tmp_path / "c", 7), Note()]
     result = sdnn_agent().train(sync(4), steps=50, callbacks=callbacks)
     assert result.n_steps == 50
     assert [step for step, _ in seen] == list(range(1, 51))
@@ -350,8 +352,8 @@ class Recorder:
         return self.plans[environment].uniform(-1, 1, 1).astype(np.float32)
 
     def learn(self, transition, environment=0):
-        observation, action, reward, following, terminated = transition
-        told = (*observation, *action, reward, *following, terminated)
+        observation, action, reward, next_observation, terminated = transition
+        told = (*observation, *action, reward, *next_observation, terminated)
         self.learned[environment].append(tuple(float(x) for x in told))
 
 
@@ -369,10 +371,10 @@ def test_an_environment_that_resets_itself_is_learned_without_the_steps_of_reset
         expected.append("begin")
         for _ in range(80):
             action = plan.uniform(-1, 1, 1).astype(np.float32)
-            following, reward, terminated, truncated, _ = env.step(action)
-            told = (*observation, *action, reward, *following, terminated)
+            next_observation, reward, terminated, truncated, _ = env.step(action)
+            told = (*observation, *action, reward, *next_observation, terminated)
             expected.append(tuple(float(x) for x in told))
-            observation = following
+            observation = next_observation
             if terminated or truncated:
                 observation, _ = env.reset()
                 expected.append("begin")
@@ -412,7 +414,7 @@ def test_cart_poles_that_gymnasium_makes_by_itself_are_learned():
 )
 def test_what_cannot_be_repeated_goes_on_with_new_episodes_only(make, tmp_path):
     vector = make()
-    checkpoints = Checkpoints(tmp_path / "t", 1000)
+    checkpoints = CheckpointCallback(tmp_path / "t", 1000)
     training = Training(sdnn_agent(), vector, steps=20, callbacks=[checkpoints])
     training.run()
     with pytest.raises(ValueError, match="env must reset each of its environments with a seed"):

@@ -82,11 +82,11 @@ def compare_while_learning(config, seed, n_steps, compare_weights_every):
         assert core.value(state, action) == expected[action]
         core.update(state, action, q_hat)
         n_active += slow.update(state, action, q_hat) > 0
-        following = next_state(rng, state)
+        next_observation = next_state(rng, state)
         if step % compare_weights_every == 0:
             assert np.array_equal(core.potentials(state), slow.potentials(state)), step
             assert_equal_parameters(core, slow)
-        state = following
+        state = next_observation
     assert np.array_equal(core.potentials(state), slow.potentials(state))
     assert_equal_parameters(core, slow)
     return n_active

@@ -46,8 +46,8 @@ LEARNING = QLearningConfig(
     final_epsilon=0.0,
     final_learning_rate=0.25,
     n_greedy_steps=0,
-    max_repetitions=6,
-    value_range="seen",
+    max_action_repeat=6,
+    value_range="adaptive",
 )
 N_STEPS = 40
 
@@ -112,9 +112,9 @@ def life(agent, rng, n_steps):
         action = agent.act(seen)
         greedy = agent.act(seen, explore=False)
         turn, speed, other = turn + 0.2 * speed, rng.uniform(-8, 8), rng.normal()
-        following = observe()
+        next_observation = observe()
         reward, terminated = float(rng.normal()), bool(rng.random() < 0.1)
-        agent.learn(Transition(seen, action, reward, following, terminated))
+        agent.learn(Transition(seen, action, reward, next_observation, terminated))
         steps.append(
             {
                 "begins": begins,
@@ -122,7 +122,7 @@ def life(agent, rng, n_steps):
                 "action": np.atleast_1d(action).tolist(),
                 "greedy": np.atleast_1d(greedy).tolist(),
                 "reward": reward,
-                "next_observation": agent.flat_observation(following).tolist(),
+                "next_observation": agent.flat_observation(next_observation).tolist(),
                 "terminated": terminated,
             }
         )

@@ -123,7 +123,7 @@ SETTINGS = {
             n_active_units=20,
             n_actions=5,
         ),
-        QLearningConfig(n_steps=2, value_range="seen", n_greedy_steps=0),
+        QLearningConfig(n_steps=2, value_range="adaptive", n_greedy_steps=0),
     ),
     RBFQLearning: (RBFNetworkConfig(n_actions=5), QLearningConfig(n_greedy_steps=0)),
     FuzzyQLearning: (
@@ -184,8 +184,8 @@ def lived(agent, n_steps=7):
     generator = np.random.default_rng(1)
     for _ in range(n_steps):
         action = agent.act(HERE)
-        following = generator.uniform(-1, 1, 2)
-        agent.learn(Transition(HERE, action, float(generator.normal()), following, False))
+        next_observation = generator.uniform(-1, 1, 2)
+        agent.learn(Transition(HERE, action, float(generator.normal()), next_observation, False))
     agent.last = agent.act(HERE)
     return agent
 
@@ -205,9 +205,11 @@ def insanity(agent):
         action = agent.act(observation)
         if fault := action_fault(agent, action):
             return fault
-        following = observations[step + 1]
-        agent.learn(Transition(observation, action, -0.5 * (step % 3), following, step % 4 == 3))
-        observation = following
+        next_observation = observations[step + 1]
+        agent.learn(
+            Transition(observation, action, -0.5 * (step % 3), next_observation, step % 4 == 3)
+        )
+        observation = next_observation
     if fault := action_fault(agent, agent.act(observation, explore=False)):
         return fault
     return state_fault(agent)
@@ -450,8 +452,8 @@ def loop_cells():
         "Training": Training,
         "Training.load": Training.load,
         "Training.save": Training.save,
-        "Checkpoints": agents.Checkpoints,
-        "EarlyStop": agents.EarlyStop,
+        "CheckpointCallback": agents.CheckpointCallback,
+        "StopTrainingOnRewardThreshold": agents.StopTrainingOnRewardThreshold,
         "JSONLines": agents.JSONLines,
     }
     for name, function in callables.items():

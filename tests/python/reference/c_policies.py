@@ -52,11 +52,13 @@ def learned(agent, n_steps=300, seed=1):
     agent.begin_episode()
     observation = random.uniform(low, high)
     for _ in range(n_steps):
-        following = random.uniform(low, high)
+        next_observation = random.uniform(low, high)
         reward = float(np.sin(observation.sum()) + random.normal())
         action = agent.action_space.sample()
-        agent.learn(Transition(observation, action, reward, following, bool(random.random() < 0.1)))
-        observation = following
+        agent.learn(
+            Transition(observation, action, reward, next_observation, bool(random.random() < 0.1))
+        )
+        observation = next_observation
     return agent
 
 
@@ -111,7 +113,7 @@ def pairs_agent():
 def lone_agent():
     """One variable, which is two inputs, all windows, and a range of values given."""
     approximator = replace(SMALL, n_actions=0, u_low=3, q_low=-0.3, q_high=0.1)
-    own = learning(tie_rule="lowest", value_range="given")
+    own = learning(tie_rule="lowest", value_range="fixed")
     return SDNNQLearning(box(3.0), box(1.0), approximator=approximator, learning=own, seed=5)
 
 

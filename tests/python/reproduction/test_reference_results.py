@@ -29,9 +29,9 @@ from sdnn.reproduction.verdicts import (
     ClaimOutcome,
     SettledClaim,
     Verdict,
+    decide,
     is_paper_scale,
     judge_claims,
-    settle,
 )
 from sdnn.runs import Estimate, ResultStore, measure, run_trials
 from sdnn.runs.measures import STEP_MEASURES
@@ -138,11 +138,11 @@ def test_claims_are_settled_by_trials_of_all_their_subjects():
     outcomes = judge_claims(ran, ())
     assert next(o for o in outcomes if o.claim.number == 2).verdict == Verdict.UNDECIDED
     kept = [measured("s4", [4] * 15 + [50] * 5), measured("s6", [4] * 20)]
-    settled = {one.claim.number: one for one in settle(outcomes, kept)}
+    settled = {one.claim.number: one for one in decide(outcomes, kept)}
     assert settled[2].more.checks[0].estimate.value == 4
     assert settled[2].verdict == Verdict.HOLDS
     assert settled[8].more is None  # the noisy cases are missing
-    assert [one.more for one in settle(outcomes, kept[:1])] == [None] * len(outcomes)
+    assert [one.more for one in decide(outcomes, kept[:1])] == [None] * len(outcomes)
 
 
 def test_the_reference_results_are_of_the_papers_settings():
@@ -234,7 +234,7 @@ def test_reports_tell_what_reference_results_say(fake_results):
         ("20", "27 [4, 50]", "undecided"), ("20", "4 [4, 4]", "holds")
     ]  # fmt: skip
     told = next(one for one in report.to_json()["claims"] if one["number"] == 2)
-    assert (told["verdict"], told["settled"]) == ("holds", "a matter of chance")
+    assert (told["verdict"], told["decided"]) == ("holds", "a matter of chance")
     page = report.page(picture).to_html("")
     assert "root seed 7" in page
     assert "<b>1</b>are a matter of chance with ten trials" in page

@@ -335,9 +335,18 @@ def test_several_environments_are_learned_in(invoke):
         (["CartPole-v1", "--noise", 0.1], "--range: noise and redundant need the range"),
         (["CartPole-v1", "--redundant", -1], "--redundant"),
         (["CartPole-v1", "--redundant", 5000, "--range", "0:1"], "--redundant"),
-        (["CartPole-v1", "--range", "5"], "--range must be [VARIABLE=]LOW:HIGH or seen, got '5'"),
-        (["CartPole-v1", "--range", "0=seen"], "--range must be [VARIABLE=]LOW:HIGH or seen"),
-        (["CartPole-v1", "--range", "seen", "--range", "0:1"], "--range: must not be given togeth"),
+        (
+            ["CartPole-v1", "--range", "5"],
+            "--range must be [VARIABLE=]LOW:HIGH or adaptive, got '5'",
+        ),
+        (
+            ["CartPole-v1", "--range", "0=adaptive"],
+            "--range must be [VARIABLE=]LOW:HIGH or adaptive",
+        ),
+        (
+            ["CartPole-v1", "--range", "adaptive", "--range", "0:1"],
+            "--range: must not be given togeth",
+        ),
         (["CartPole-v1", "--range", "a:b"], "--range must be"),
         (["CartPole-v1", "--range", "4:3"], "--range: must be finite, low < high"),
         (["CartPole-v1", "--range", "9=3:4"], "--range: CartPole-v1 has the variables 0 to 3"),
@@ -450,7 +459,7 @@ discount = 0.5
         (NOISY_FILE, [], "mine.toml:1: environment.ranges: noise and redundant need the range"),
         (NOISY_FILE, ["--range", "0:1=1"], "Error: --range must be"),
         (
-            "[agent]\nobservation_range = 'seen'\n",
+            "[agent]\nobservation_range = 'adaptive'\n",
             ["CartPole-v1", "--range", "0:1"],
             "Error: --range: must not be given together with ranges that are seen",
         ),

@@ -159,7 +159,7 @@ def test_an_agent_brings_its_own_training():
 
 
 def test_ranges_are_given_or_seen():
-    seen = AgentSpec(observation_range="seen", warm_up_steps=20)
+    seen = AgentSpec(observation_range="adaptive", warm_up_steps=20)
     environment = EnvironmentSpec(id="MountainCar-v0")
     env = environment.make()
     assert not RunSpec(environment=environment).make_agent(env).is_warming_up

@@ -50,12 +50,12 @@ class Controller {
   explicit Controller(ControllerConfig config, std::vector<coding::PatternTable> tables = {})
       : Controller(std::move(config), std::move(tables), Unborn()) {
     if (observations_.is_fitted()) {
-      settle();
+      fit();
       return;
     }
     Controller trial = *this;  // finds impossible settings before the warm-up
     trial.observations_.fit(std::vector<double>(n_variables()));
-    trial.settle();
+    trial.fit();
     warm_up_.emplace(new_warm_up());
   }
 
@@ -211,7 +211,7 @@ class Controller {
       archive.part("warm_up", *self.warm_up_);
     } else {
       archive.part("observations", self.observations_);
-      if constexpr (Archive::kReads) self.settle(&archive);
+      if constexpr (Archive::kReads) self.fit(&archive);
       std::visit([&archive](auto& agent) { archive.part("agent", agent); }, *self.agent_);
     }
     archive.part("taken", self.taken_);
@@ -242,7 +242,7 @@ class Controller {
   }
 
   /// Makes the agent: all ranges are known. Of a state that is read, sizes are compared first.
-  void settle(const core::StateReader* reader = nullptr) {
+  void fit(const core::StateReader* reader = nullptr) {
     approximator_ = config_.approximator;
     std::visit(
         [this](auto& config) {
@@ -396,7 +396,7 @@ class Controller {
     Observations fitted = observations_;
     fitted.fit(warm_up_->seen());
     observations_ = std::move(fitted);
-    settle();
+    fit();
     const WarmUp warm_up = std::move(*warm_up_);
     warm_up_.reset();
     set_n_environments(warm_up.n_in_all());

@@ -32,10 +32,10 @@ inline Preset general_preset(int n_inputs) {
                        .discount = 0.99,
                        .policy = {.epsilon = 0.03, .n_greedy_steps = 0},
                        .n_steps = 5,
-                       .max_repetitions = 100,
+                       .max_action_repeat = 100,
                        .final_learning_rate = 0.1,
                        .final_epsilon = 0.01,
-                       .value_range = ValueRange::seen}};
+                       .value_range = ValueRange::adaptive}};
 }
 
 /// The general one with fewer units, so that the weights fit into the flash of a small processor

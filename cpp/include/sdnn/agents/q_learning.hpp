@@ -43,12 +43,12 @@ namespace sdnn::agents {
 /// Learning from delayed rewards (corrected n-step returns); Sutton, R., Barto, A. (2018).
 /// Reinforcement learning, section 7.1.
 ///
-/// With max_repetitions = m > 1 a random action is kept for d steps, where d is at least k with
+/// With max_action_repeat = m > 1 a random action is kept for d steps, where d is at least k with
 /// probability 1 / k, and m at most: what single random steps do not reach, some of these do.
 /// Source: Dabney, W., Ostrovski, G., Barreto, A. (2021). Temporally-extended epsilon-greedy
 /// exploration (with this distribution in the place of the zeta one, which it resembles).
 ///
-/// In its first n_random_steps steps an agent takes random actions only: a rare success is found
+/// In its first start_steps steps an agent takes random actions only: a rare success is found
 /// before the greedy ones have learned to do nothing. Source: the start_steps of Achiam, J. (2018),
 /// Spinning up in deep reinforcement learning, kept for some steps as above.
 ///
@@ -75,7 +75,7 @@ class QLearning {
         policy_(config.policy, seed),
         repetitions_(seed, core::Stream::repetitions),
         range_(config.discount),
-        n_random_left_(config.n_random_steps),
+        n_random_left_(config.start_steps),
         learning_rate_(config.learning_rate),
         workspace_(workspace()),
         episodes_(new_episode()) {}
@@ -199,9 +199,9 @@ class QLearning {
       return as_action(kept);
     }
     for (std::size_t d = 0; d < kept.size(); ++d) kept[d] = policy_.random_action(n_actions(d));
-    if (config_.max_repetitions > 1) {
+    if (config_.max_action_repeat > 1) {
       const double drawn = 1.0 - repetitions_.uniform();  // in (0, 1]
-      const double most = static_cast<double>(config_.max_repetitions);
+      const double most = static_cast<double>(config_.max_action_repeat);
       episode.n_kept = static_cast<int>(std::min(1.0 / drawn, most)) - 1;
     }
     return as_action(kept);
@@ -265,8 +265,8 @@ class QLearning {
       const double epsilon = self.set_epsilon_.value_or(0.0);
       archive.expect(epsilon >= 0.0 && epsilon <= 1.0, "epsilon", "in [0, 1]");
       self.n_random_left_ = n_random_left.value_or(0);
-      archive.expect(self.n_random_left_ >= 0 && self.n_random_left_ <= self.config_.n_random_steps,
-                     "n_random_left", "in [0, n_random_steps]");
+      archive.expect(self.n_random_left_ >= 0 && self.n_random_left_ <= self.config_.start_steps,
+                     "n_random_left", "in [0, start_steps]");
       self.apply_rates();
       self.workspace_ = self.workspace();  // a copy's has no room
     }
@@ -292,7 +292,7 @@ class QLearning {
 
   template <class Self, class Listed, class Archive>
   static void serialize_episode(Self& self, Listed& episode, Archive& archive) {
-    archive.part("waiting", episode.buffer);
+    archive.part("n_step_buffer", episode.buffer);
     archive.number("range.sum", episode.sum);
     archive.number("step", episode.step);
     std::vector<std::int64_t> kept(episode.kept.begin(), episode.kept.end());
@@ -310,12 +310,12 @@ class QLearning {
         }
         return true;
       };
-      archive.expect(episode.buffer.each_is(is_of_actions), "waiting.actions", "of actions");
-      archive.expect(!episode.buffer.is_full(), "waiting.rewards", "fewer than n_steps");
+      archive.expect(episode.buffer.each_is(is_of_actions), "n_step_buffer.actions", "of actions");
+      archive.expect(!episode.buffer.is_full(), "n_step_buffer.rewards", "fewer than n_steps");
       archive.expect(ReturnRange::is_sum(episode.sum), "range.sum", "a finite sum");
       archive.expect(episode.step >= 0, "step", "0 or more");
-      archive.expect(episode.n_kept >= 0 && episode.n_kept < self.config_.max_repetitions, "n_kept",
-                     "in [0, max_repetitions)");
+      archive.expect(episode.n_kept >= 0 && episode.n_kept < self.config_.max_action_repeat,
+                     "n_kept", "in [0, max_action_repeat)");
     }
   }
 
@@ -338,7 +338,7 @@ class QLearning {
     policy_.set_epsilon(set_epsilon_.value_or(config_.epsilon_at(progress_)));
   }
 
-  bool adapts_range() const noexcept { return config_.value_range == ValueRange::seen; }
+  bool adapts_range() const noexcept { return config_.value_range == ValueRange::adaptive; }
 
   void require_action(std::span<const std::size_t> action) const {
     if (action.size() != n_dimensions()) {  // only a bad one's text costs memory

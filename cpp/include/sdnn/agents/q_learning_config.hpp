@@ -15,11 +15,11 @@ namespace sdnn::agents {
 
 /// Whether the range of values is the approximator's, or follows the rewards.
 enum class ValueRange {
-  given,  ///< as the approximator was made
-  seen,   ///< that of ReturnRange, where the approximator has a range
+  fixed,     ///< as the approximator was made
+  adaptive,  ///< that of ReturnRange, where the approximator has a range
 };
 constexpr std::array<std::string_view, 2> words_of(ValueRange) noexcept {
-  return {"given", "seen"};
+  return {"fixed", "adaptive"};
 }
 
 /// How alpha and epsilon go from their first to their final values.
@@ -37,13 +37,13 @@ struct QLearningConfig {
   double discount = 0.9;
   EpsilonGreedyConfig policy = {};
   int n_steps = 1;
-  int max_repetitions = 1;
+  int max_action_repeat = 1;
   std::optional<double> final_learning_rate = {};
   std::optional<double> final_epsilon = {};
-  ValueRange value_range = ValueRange::given;
+  ValueRange value_range = ValueRange::fixed;
   Schedule schedule = Schedule::linear;
   double exploration_fraction = 1.0;
-  int n_random_steps = 0;
+  int start_steps = 0;
 
   /// Alpha and epsilon at a progress in [0, 1].
   double learning_rate_at(double progress) const noexcept {
@@ -66,7 +66,7 @@ struct QLearningConfig {
                         "with more, a transition is learned, once, when so many steps are known or "
                         "the episode ends.",
                         core::within(1, 1000)),
-            core::field("max_repetitions", &QLearningConfig::max_repetitions,
+            core::field("max_action_repeat", &QLearningConfig::max_action_repeat,
                         "Steps that a random action may last. Not in the paper, which has 1: with "
                         "more, it is kept for at least k steps with probability 1 / k.",
                         core::within(1, 1000000)),
@@ -82,8 +82,8 @@ struct QLearningConfig {
                 core::within(0, 1)),
             core::field(
                 "value_range", &QLearningConfig::value_range,
-                "Whether Q has the approximator's range, q_low to q_high (`given`), or one "
-                "that grows with the discounted sums of the rewards that come (`seen`). Not "
+                "Whether Q has the approximator's range, q_low to q_high (`fixed`), or one "
+                "that grows with the discounted sums of the rewards that come (`adaptive`). Not "
                 "in the paper."),
             core::field(
                 "schedule", &QLearningConfig::schedule,
@@ -100,7 +100,7 @@ struct QLearningConfig {
                 "stays. Not in the paper.",
                 core::above_up_to(0, 1)),
             core::field(
-                "n_random_steps", &QLearningConfig::n_random_steps,
+                "start_steps", &QLearningConfig::start_steps,
                 "First steps of the agent's life in which every action is random, whatever "
                 "epsilon. Not in the paper, which has 0: a rare success is found before the "
                 "greedy actions have learned to do nothing.",

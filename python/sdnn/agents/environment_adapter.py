@@ -10,13 +10,13 @@ from typing import Any, NamedTuple, TypeAlias
 import gymnasium as gym
 import numpy as np
 
-__all__ = ["OneEnvironment", "Outcome", "Rounds", "rounds_in"]
+__all__ = ["EnvironmentAdapter", "OneEnvironment", "StepResult", "adapter_for"]
 
 Seeds: TypeAlias = Mapping[int, int | None]
 Options: TypeAlias = dict[str, Any] | None
 
 
-class Outcome(NamedTuple):
+class StepResult(NamedTuple):
     """What an action led to, as it is: the reward may be none.
 
     ``observation`` is the last of the episode where it ended.
@@ -40,7 +40,7 @@ def own_copy(value: Any) -> Any:
     return value if isinstance(value, np.generic | int | float) else copy.deepcopy(value)
 
 
-class Rounds(abc.ABC):
+class EnvironmentAdapter(abc.ABC):
     """One face of all environments, single and vectorized.
 
     Attributes
@@ -63,11 +63,11 @@ class Rounds(abc.ABC):
         """
 
     @abc.abstractmethod
-    def step(self, actions: Sequence[Any]) -> list[Outcome]:
+    def step(self, actions: Sequence[Any]) -> list[StepResult]:
         """Take an action in each; None in those whose episodes have not begun."""
 
 
-def rounds_in(env: gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any]) -> Rounds:
+def adapter_for(env: gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any]) -> EnvironmentAdapter:
     """Find out how to go around an environment, or a vector of them."""
     if not isinstance(env, gym.vector.VectorEnv):
         return OneEnvironment(env)
@@ -76,7 +76,7 @@ def rounds_in(env: gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any]) -> R
     return _OwnResets(env)
 
 
-class OneEnvironment(Rounds):
+class OneEnvironment(EnvironmentAdapter):
     """A single environment."""
 
     n_environments = 1
@@ -91,19 +91,19 @@ class OneEnvironment(Rounds):
             i: own_copy(self._env.reset(seed=seed, options=options)[0]) for i, seed in seeds.items()
         }
 
-    def step(self, actions: Sequence[Any]) -> list[Outcome]:
+    def step(self, actions: Sequence[Any]) -> list[StepResult]:
         """Take the only action."""
         return [self.step_one(actions[0])]
 
-    def step_one(self, action: Any) -> Outcome:
+    def step_one(self, action: Any) -> StepResult:
         """Take an action."""
         taken = action.copy() if type(action) is np.ndarray else own_copy(action)
         seen, reward, terminated, truncated, _ = self._env.step(taken)
         seen = seen.copy() if type(seen) is np.ndarray else own_copy(seen)
-        return Outcome(seen, reward, bool(terminated), bool(truncated))
+        return StepResult(seen, reward, bool(terminated), bool(truncated))
 
 
-class _Vector(Rounds, abc.ABC):
+class _Vector(EnvironmentAdapter, abc.ABC):
     """What vector environments have in common: lists in, lists out."""
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]) -> None:
@@ -111,7 +111,7 @@ class _Vector(Rounds, abc.ABC):
         self._mode = _autoreset_mode(env)
         self.n_environments = env.num_envs
 
-    def _step(self, actions: Sequence[Any]) -> tuple[list[Outcome], list[Any]]:
+    def _step(self, actions: Sequence[Any]) -> tuple[list[StepResult], list[Any]]:
         """Give the outcomes, and what is observed after resets in the same step."""
         from gymnasium.vector.utils import concatenate, create_empty_array
 
@@ -131,7 +131,7 @@ class _Vector(Rounds, abc.ABC):
                     )
                 last[i] = copy.deepcopy(infos["final_obs"][i])
         outcomes = [
-            Outcome(last[i], rewards[i], bool(terminated[i]), bool(truncated[i]))
+            StepResult(last[i], rewards[i], bool(terminated[i]), bool(truncated[i]))
             for i in range(self.n_environments)
         ]
         return outcomes, seen
@@ -161,7 +161,7 @@ class _SeparateResets(_Vector):
         seen = self._listed(observations)
         return {i: seen[i] for i in seeds}
 
-    def step(self, actions: Sequence[Any]) -> list[Outcome]:
+    def step(self, actions: Sequence[Any]) -> list[StepResult]:
         return self._step(actions)[0]
 
 
@@ -183,7 +183,7 @@ class _OwnResets(_Vector):
             return {}
         return {i: self._seen[i] for i in seeds}
 
-    def step(self, actions: Sequence[Any]) -> list[Outcome]:
+    def step(self, actions: Sequence[Any]) -> list[StepResult]:
         # What resets takes no notice of its action, but must be given one.
         old = self._taken or list(actions)
         self._taken = [old[i] if action is None else action for i, action in enumerate(actions)]
