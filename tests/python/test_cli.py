@@ -150,7 +150,7 @@ def test_the_most_episodes_make_a_trial(tmp_path):
     request = ReproduceRequest(**parts, n_episodes=MOST_EPISODES)
     planned = request.plan.trials[0]
     planned.spec.make_trial(planned.key.seed)
-    with pytest.raises(ValueError, match="episodes must be at most 100000000, got 100000001"):
+    with pytest.raises(ValueError, match="episodes"):
         _ = ReproduceRequest(**parts, n_episodes=MOST_EPISODES + 1).plan
 
 

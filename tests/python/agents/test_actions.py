@@ -124,14 +124,14 @@ def test_many_actions_are_told_apart():
 )
 def test_what_is_no_action_is_refused(action):
     agent = agent_of(FLOATS)
-    with pytest.raises(ValueError, match="action"):
+    with pytest.raises(ValueError, match=r"\baction\b"):
         agent.learn(Transition(HERE, action, 0.0, HERE, False))
 
 
 @pytest.mark.parametrize("action", [[0.5, 0], [2, 0], [-1, 0], [True], 5e-324])
 def test_what_is_no_whole_action_is_refused(action):
     agent = agent_of(gym.spaces.MultiDiscrete([2, 4]), 0)
-    with pytest.raises(ValueError, match="action"):
+    with pytest.raises(ValueError, match=r"\baction\b"):
         agent.learn(Transition(HERE, action, 0.0, HERE, False))
 
 
@@ -153,5 +153,5 @@ def test_impossible_spaces_are_named(space, error):
 
 
 def test_continuous_actions_need_a_box():
-    with pytest.raises(TypeError, match="action_space must be a Box, got Discrete"):
+    with pytest.raises(TypeError, match="action_space"):
         FuzzyQLearning(PLANE, gym.spaces.Discrete(3))

@@ -63,5 +63,5 @@ def test_it_keeps_time_by_the_real_clock():
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, 1e-4, 2e6, math.nan, math.inf, "fast", None, True])
 def test_impossible_rates_are_named(bad):
-    with pytest.raises(ValueError, match=r"^hz must be"):
+    with pytest.raises(ValueError, match=r"\bhz\b"):
         FixedRate(bad)

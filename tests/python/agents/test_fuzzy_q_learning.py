@@ -78,11 +78,11 @@ def test_learning_agrees_with_its_definition_bit_for_bit(d, n_steps, tie_rule):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"tie_rule": "first"}, "tie_rule must be one of 'uniform', 'lowest', 'middle'"),
-        ({"learning_coefficient": 0.0}, r"learning_coefficient must be in \(0, 1\], got 0"),
-        ({"discount": 1.5}, r"discount must be in \[0, 1\], got 1.5"),
-        ({"trace_decay": 2.0}, r"trace_decay must be in \[0, 1\], got 2"),
-        ({"epsilon": -0.1}, r"epsilon must be in \[0, 1\], got -0.1"),
+        ({"tie_rule": "first"}, "tie_rule"),
+        ({"learning_coefficient": 0.0}, "learning_coefficient"),
+        ({"discount": 1.5}, "discount"),
+        ({"trace_decay": 2.0}, "trace_decay"),
+        ({"epsilon": -0.1}, "epsilon"),
     ],
 )
 def test_impossible_settings_are_named(change, message):
@@ -93,9 +93,9 @@ def test_impossible_settings_are_named(change, message):
 @pytest.mark.parametrize(
     ("observations", "actions", "error", "message"),
     [
-        (LISTS, TORQUES, TypeError, "observation_space must be a space that Gym"),
-        (OBSERVATIONS, BUTTONS, TypeError, "action_space must be a Box, got Discrete"),
-        (gym.spaces.Box(0, 1, (9,)), TORQUES, ValueError, r"9\^9 = 387420489 rules"),
+        (LISTS, TORQUES, TypeError, "observation_space"),
+        (OBSERVATIONS, BUTTONS, TypeError, "action_space"),
+        (gym.spaces.Box(0, 1, (9,)), TORQUES, ValueError, "387420489"),
     ],
 )
 def test_spaces_that_do_not_fit_are_named(observations, actions, error, message):
@@ -130,19 +130,19 @@ def test_one_transition_by_hand():
 def test_only_the_transition_of_the_last_exploring_act_is_learned():
     agent = FuzzyQLearning(OBSERVATIONS, TORQUES, seed=2)
     here, there = [0.1, 0.2, 0.3], [0.4, 0.5, 0.6]
-    with pytest.raises(ValueError, match="observation and action must be those of the last"):
+    with pytest.raises(ValueError, match="observation and action"):
         agent.learn(Transition(here, [0.0], 1.0, there, False))
     action = agent.act(here)
     agent.act(there, explore=False)
     for transition, message in [
         (
             Transition(there, action, 1.0, here, False),
-            "observation and action must be those of the last",
+            "observation and action",
         ),
-        (Transition(here, action / 2, 1.0, there, False), "action must be"),
-        (Transition(here, [7.0], 1.0, there, False), r"action\[0\] must be in"),
-        (Transition(here, action, np.nan, there, False), "reward must be finite"),
-        (Transition(here, action, 1.0, [0.0], False), "next_observation must have shape"),
+        (Transition(here, action / 2, 1.0, there, False), r"\baction\b"),
+        (Transition(here, [7.0], 1.0, there, False), r"action\[0\]"),
+        (Transition(here, action, np.nan, there, False), r"\breward\b"),
+        (Transition(here, action, 1.0, [0.0], False), "next_observation"),
     ]:
         with pytest.raises(ValueError, match=message):
             agent.learn(transition)
@@ -159,7 +159,7 @@ def test_a_changed_array_is_not_the_action_taken():
     action = agent.act(here)
     copy = action.copy()
     action[0] = 0.5 * (action[0] + 3.0)
-    with pytest.raises(ValueError, match="observation and action must be those of the last"):
+    with pytest.raises(ValueError, match="observation and action"):
         agent.learn(Transition(here, action, 1.0, here, False))
     agent.learn(Transition(here, copy, 1.0, here, False))
     assert agent.value(here) > 0.0
@@ -198,7 +198,7 @@ def test_an_rbf_network_learns_discrete_actions_too():
     assert values[2] == pytest.approx(10.0)
     assert values.argmax() == 2
     assert agent.act(observation, explore=False) == 4
-    with pytest.raises(ValueError, match=r"action\[0\] must be in"):
+    with pytest.raises(ValueError, match=r"action\[0\]"):
         agent.learn(Transition(observation, 1, 10.0, observation, True))
 
 

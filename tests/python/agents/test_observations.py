@@ -37,7 +37,7 @@ def test_bounds_are_the_ranges_unless_others_are_given():
 
 def test_the_warm_up_finds_ranges_and_pairs():
     agent = RBFQLearning(UNBOUNDED, BUTTONS, angle_pairs="find", warm_up_steps=40)
-    with pytest.raises(RuntimeError, match="warming up"):
+    with pytest.raises(RuntimeError, match="warm"):
         _ = agent.observation_range
     for turn in np.linspace(0, 5, 40):
         here = [np.cos(turn), np.sin(turn), 4.0 * turn / 5]
@@ -132,7 +132,7 @@ def test_what_tells_a_symbol_is_no_angle():
 
 
 def test_an_angle_needs_a_range():
-    with pytest.raises(ValueError, match=r"angles .* got 1"):
+    with pytest.raises(ValueError, match="angles"):
         sdnn_agent(UNBOUNDED, angles=[1])
 
 
@@ -202,5 +202,5 @@ def test_a_space_without_a_range_names_a_remedy():
     ],
 )
 def test_elements_of_other_spaces_are_refused_by_name(space, observation):
-    with pytest.raises(ValueError, match="next_observation must"):
+    with pytest.raises(ValueError, match="next_observation"):
         Observations(space).vector("next_observation", observation)

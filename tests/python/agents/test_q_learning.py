@@ -149,12 +149,12 @@ def test_one_transition_by_hand():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"tie_rule": "first"}, "tie_rule must be one of 'uniform', 'lowest', 'middle'"),
-        ({"tie_rule": None}, "tie_rule must be one of"),
-        ({"learning_rate": 0.0}, r"learning_rate must be in \(0, 1\], got 0"),
+        ({"tie_rule": "first"}, "tie_rule"),
+        ({"tie_rule": None}, "tie_rule"),
+        ({"learning_rate": 0.0}, "learning_rate"),
         ({"learning_rate": float("nan")}, "learning_rate"),
-        ({"discount": 1.5}, r"discount must be in \[0, 1\], got 1.5"),
-        ({"epsilon": -0.1}, r"epsilon must be in \[0, 1\], got -0.1"),
+        ({"discount": 1.5}, "discount"),
+        ({"epsilon": -0.1}, "epsilon"),
         ({"n_greedy_steps": -1}, "n_greedy_steps"),
     ],
 )
@@ -166,12 +166,12 @@ def test_impossible_settings_are_named(change, message):
 @pytest.mark.parametrize(
     ("observations", "actions", "error", "message"),
     [
-        (LISTS, TORQUES, TypeError, "observation_space must be a space that Gym"),
-        (gym.spaces.Box(0, 1, (0,)), TORQUES, ValueError, "observation_space must have a var"),
+        (LISTS, TORQUES, TypeError, "observation_space"),
+        (gym.spaces.Box(0, 1, (0,)), TORQUES, ValueError, "observation_space"),
         (gym.spaces.Box(0, 0, (2,)), TORQUES, ValueError, "low < high"),
-        (OBSERVATIONS, gym.spaces.Text(2), TypeError, "action_space must be a Box, Discrete"),
+        (OBSERVATIONS, gym.spaces.Text(2), TypeError, "action_space"),
         (OBSERVATIONS, gym.spaces.Box(0, np.inf, (1,)), ValueError, "of action_space"),
-        (OBSERVATIONS, gym.spaces.Discrete(92), ValueError, "n_actions must be in"),
+        (OBSERVATIONS, gym.spaces.Discrete(92), ValueError, "n_actions"),
     ],
 )
 def test_spaces_that_do_not_fit_are_named(observations, actions, error, message):
@@ -287,8 +287,7 @@ def test_a_preset_is_used_where_nothing_is_given():
     for name, chosen in PRESETS.items():
         agent = SDNNQLearning(OBSERVATIONS, TORQUES, preset=name)
         assert agent.learning == chosen.learning
-    words = "'paper', 'general', 'robust', 'small'"
-    with pytest.raises(ValueError, match=f"preset must be one of {words}"):
+    with pytest.raises(ValueError, match="preset"):
         SDNNQLearning(OBSERVATIONS, TORQUES, preset="best")
 
 
@@ -331,11 +330,11 @@ def test_observations_are_scaled_by_the_bounds_and_saturate():
 
 
 BAD_OBSERVATIONS = [
-    ([0.0, np.nan, 0.0], r"observation\[1\] must be a number"),
-    ([0.0, 0.0], r"must have shape \(3,\), got \(2,\)"),
-    ([[0.0, 0.0, 0.0]], r"must have shape \(3,\), got \(1, 3\)"),
-    (0.0, r"must have shape \(3,\), got \(\)"),
-    (["a", "b", "c"], "must be numbers, got"),
+    ([0.0, np.nan, 0.0], r"observation\[1\]"),
+    ([0.0, 0.0], r"\(2,\)"),
+    ([[0.0, 0.0, 0.0]], r"\(1, 3\)"),
+    (0.0, r"\(\)"),
+    (["a", "b", "c"], "numbers"),
 ]
 
 
@@ -377,7 +376,7 @@ def test_bad_actions_are_named_and_teach_nothing(actions, action):
     agent = small_agent(actions)
     good = [0.0, 0.0, 0.0]
     before = agent.core.action_value.weights()
-    with pytest.raises(ValueError, match=r"action(\[0\])? must be"):
+    with pytest.raises(ValueError, match=r"\baction\b"):
         agent.learn(Transition(good, action, 1.0, good, False))
     assert np.array_equal(agent.core.action_value.weights(), before)
 
@@ -387,7 +386,7 @@ def test_bad_rewards_are_named_and_teach_nothing(reward):
     agent = small_agent()
     good = [0.0, 0.0, 0.0]
     before = agent.core.action_value.weights()
-    with pytest.raises(ValueError, match="reward must be finite"):
+    with pytest.raises(ValueError, match="reward"):
         agent.learn(Transition(good, [0.0], reward, good, False))
     assert np.array_equal(agent.core.action_value.weights(), before)
 
@@ -412,9 +411,9 @@ def test_evaluation_has_no_effect_on_learning():
 
 def test_a_bad_row_of_values_is_refused():
     policy = _core.EpsilonGreedy(_core.EpsilonGreedyConfig(), seed=1)
-    with pytest.raises(ValueError, match="values must be not empty"):
+    with pytest.raises(ValueError, match="values"):
         policy.select([], 0)
-    with pytest.raises(ValueError, match="values must be numbers"):
+    with pytest.raises(ValueError, match="values"):
         policy.select([np.nan, np.nan], 0)
 
 
@@ -435,7 +434,7 @@ def test_an_agent_takes_patterns_of_any_coding():
     assert agent.q_values(observation).max() > 1.0
     around = agent.q_values(np.array([0.3, -1.0, -2.0]))  # on a circle the neighbour of 1.9
     assert around.max() > 0.5
-    with pytest.raises(ValueError, match="tables must be one per input, got 2"):
+    with pytest.raises(ValueError, match="tables"):
         small_agent(tables=tables[:2])
 
 
@@ -447,9 +446,7 @@ def test_tables_have_a_row_for_each_symbol():
         return SDNNQLearning(rooms, BUTTONS, approximator=SMALL, tables=tables)
 
     assert agent_with(3, 4).core.action_value.table(1).shape == (4, 40)
-    with pytest.raises(
-        ValueError, match=r"tables\[1\] must be of a row for each of 4 symbols, got 5"
-    ):
+    with pytest.raises(ValueError, match=r"tables\[1\]"):
         agent_with(3, 5)
-    with pytest.raises(ValueError, match="tables must be one per input, got 1"):
+    with pytest.raises(ValueError, match="tables"):
         agent_with(3)

@@ -74,13 +74,13 @@ def test_epsilon_may_reach_its_final_value_before_the_end(space):
 
 def test_impossible_schedules_are_named():
     for bad in (0.0, 1.5, float("nan")):
-        with pytest.raises(ValueError, match="exploration_fraction must be in"):
+        with pytest.raises(ValueError, match="exploration_fraction"):
             new_agent(exploration_fraction=bad)
-    with pytest.raises(ValueError, match="schedule must be one of 'linear', 'exponential'"):
+    with pytest.raises(ValueError, match="schedule"):
         new_agent(schedule="cosine")
-    with pytest.raises(ValueError, match="final_epsilon must be greater than 0 where the schedule"):
+    with pytest.raises(ValueError, match="final_epsilon"):
         new_agent(schedule="exponential", final_epsilon=0.0)
-    with pytest.raises(ValueError, match="epsilon must be greater than 0 where the schedule is"):
+    with pytest.raises(ValueError, match=r"\bepsilon\b"):
         new_agent(schedule="exponential", epsilon=0.0, final_epsilon=0.1)
 
 
@@ -107,11 +107,11 @@ def test_rates_that_are_set_stay_and_are_saved(space, tmp_path):
 def test_impossible_rates_are_named(space):
     agent = new_agent(space, **FALLING)
     for bad in (-0.1, 1.1, np.nan, np.inf, "much", [0.1]):
-        with pytest.raises(ValueError, match=r"^learning_rate must be"):
+        with pytest.raises(ValueError, match="learning_rate"):
             agent.learning_rate = bad
-        with pytest.raises(ValueError, match=r"^epsilon must be"):
+        with pytest.raises(ValueError, match=r"\bepsilon\b"):
             agent.epsilon = bad
-    with pytest.raises(ValueError, match=r"learning_rate must be in \(0, 1\], or None, got 0"):
+    with pytest.raises(ValueError, match="learning_rate"):
         agent.learning_rate = 0
     assert (agent.learning_rate, agent.epsilon) == (0.8, 0.5)
 
@@ -176,12 +176,12 @@ def test_a_schedule_gives_the_rates_of_every_step():
 
 
 def test_impossible_schedule_callbacks_are_named():
-    with pytest.raises(TypeError, match=r"epsilon must be a function of the progress, got 0\.1"):
+    with pytest.raises(TypeError, match=r"\bepsilon\b"):
         Schedule(epsilon=0.1)
     env = gym.make("Pendulum-v1")
     agent = FuzzyQLearning(env.observation_space, env.action_space)
-    with pytest.raises(TypeError, match="agent must have a epsilon, got FuzzyQLearning"):
+    with pytest.raises(TypeError, match=r"\bagent\b"):
         agent.train(env, steps=5, callbacks=[Schedule(epsilon=lambda progress: 0.1)])
     agent = SDNNQLearning(env.observation_space, env.action_space, approximator=SMALL)
-    with pytest.raises(ValueError, match="epsilon must be in"):
+    with pytest.raises(ValueError, match=r"\bepsilon\b"):
         agent.train(env, steps=5, callbacks=[Schedule(epsilon=lambda progress: 2.0)])

@@ -62,7 +62,7 @@ def test_what_an_agent_meets_is_possible_in_its_spaces(name, own, found, fits):
     if fits:
         require_same_kind(agent, env)
         return
-    with pytest.raises(ValueError, match=f"env must have the agent's {name}_space, .*, got "):
+    with pytest.raises(ValueError, match=r"\benv\b"):
         require_same_kind(agent, env)
 
 

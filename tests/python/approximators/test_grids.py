@@ -90,7 +90,7 @@ def test_the_rbf_network_corrects_at_a_rate():
         whole.update(state, action, (1.0 - rate) * value + rate * target)
         at_a_rate.update(state, action, target, rate=rate)
         assert np.array_equal(whole.weights(), at_a_rate.weights())
-    with pytest.raises(ValueError, match=r"rate must be in \(0, 1\], got 0"):
+    with pytest.raises(ValueError, match=r"\brate\b"):
         whole.update([0.5, 0.5], 0, 1.0, rate=0.0)
 
 
@@ -100,9 +100,9 @@ def test_the_exponential_of_the_core_is_the_one_of_numpy_up_to_rounding():
 
 
 def test_tables_that_are_too_large_are_refused():
-    with pytest.raises(ValueError, match=r"9\^9 = 387420489 rules needs 32543321076 bytes"):
+    with pytest.raises(ValueError, match="32543321076"):
         _core.FuzzyRules(FuzzyRulesConfig(n_inputs=9))
-    with pytest.raises(ValueError, match=r"4\^14 = 268435456 joint bases needs 2147483648 bytes"):
+    with pytest.raises(ValueError, match="2147483648"):
         _core.RBFNetwork(RBFNetworkConfig(n_inputs=13))
 
 
@@ -111,7 +111,7 @@ def test_bad_states_are_named(size):
     rules = _core.FuzzyRules(_core.FuzzyRulesConfig(n_inputs=2))
     net = _core.RBFNetwork(_core.RBFNetworkConfig(n_inputs=2))
     for use in (rules.fire, net.values):
-        with pytest.raises(ValueError, match=f"state must be 2 values, got {size}"):
+        with pytest.raises(ValueError, match=r"\bstate\b"):
             use(np.zeros(size))
-        with pytest.raises(ValueError, match=r"state\[1\] must be in \[0, 1\], got 1.5"):
+        with pytest.raises(ValueError, match=r"state\[1\]"):
             use(np.array([0.0, 1.5]))

@@ -138,34 +138,34 @@ def test_names():
     }  # fmt: skip
     assert coding_named("symbolic") == Symbolic()
     assert coding_named(Anchor()) == Anchor()
-    with pytest.raises(ValueError, match="coding must be one of 'random-inverse'"):
+    with pytest.raises(ValueError, match=r"\bcoding\b"):
         coding_named("sine")
 
 
 @pytest.mark.parametrize(
     ("coding", "error"),
     [
-        (RandomInverse(length_scale=0.0), r"length_scale must be in \(0, 1000.0\]"),
-        (RandomInverse(length_scale=1e9), r"length_scale must be in \(0, 1000.0\]"),
-        (RandomInverse(length_scale=np.inf), r"length_scale must be in \(0, 1000.0\]"),
-        (RandomInverse(n_bins=1), "n_bins must be a whole number"),
-        (RandomInverse(n_bins=2.5), "n_bins must be a whole number"),
-        (RandomInverse(n_flipped=33), r"n_flipped must be a whole number in \[1, 32\], got 33"),
-        (RandomInverse(spacing="log"), "spacing must be"),
-        (RandomInverse(spacing="quantile", low=0.0), "cannot be given with"),
-        (RandomInverse(low=2.0, high=1.0), "low < high"),
-        (Anchor(low=np.nan), "must be finite"),
+        (RandomInverse(length_scale=0.0), "length_scale"),
+        (RandomInverse(length_scale=1e9), "length_scale"),
+        (RandomInverse(length_scale=np.inf), "length_scale"),
+        (RandomInverse(n_bins=1), r"\bn_bins\b"),
+        (RandomInverse(n_bins=2.5), r"\bn_bins\b"),
+        (RandomInverse(n_flipped=33), "n_flipped"),
+        (RandomInverse(spacing="log"), "spacing"),
+        (RandomInverse(spacing="quantile", low=0.0), "spacing"),
+        (RandomInverse(low=2.0, high=1.0), r"\blow\b"),
+        (Anchor(low=np.nan), r"\blow\b"),
         (Anchor(n_interpolated=-1), "n_interpolated"),
-        (Anchor(n_anchor_patterns=2000, n_interpolated=99), r"\(n_interpolated \+ 1\)"),
-        (Circular(period=0.0), "period must be positive"),
+        (Anchor(n_anchor_patterns=2000, n_interpolated=99), "n_interpolated"),
+        (Circular(period=0.0), r"\bperiod\b"),
         (Circular(n_anchor_patterns=1), "n_anchor_patterns"),
-        (Symbolic(categories=("a", "a")), "must be different"),
-        (Symbolic(categories=()), "at least one"),
-        (CorrelationMatrix(matrix=[[1, 0.5], [0.4, 1]]), "square and symmetric"),
-        (CorrelationMatrix(matrix=[[0.5]]), "ones on its diagonal"),
+        (Symbolic(categories=("a", "a")), "categories"),
+        (Symbolic(categories=()), "categories"),
+        (CorrelationMatrix(matrix=[[1, 0.5], [0.4, 1]]), "symmetric"),
+        (CorrelationMatrix(matrix=[[0.5]]), "diagonal"),
         (CorrelationMatrix(matrix=[1.0, 2.0]), "square"),
-        (CorrelationMatrix(matrix=np.eye(3)), "a row for each"),
-        (CorrelationMatrix(matrix=np.eye(2), categories=("a", "b", "c")), "a row for each"),
+        (CorrelationMatrix(matrix=np.eye(3)), r"\brow\b"),
+        (CorrelationMatrix(matrix=np.eye(2), categories=("a", "b", "c")), r"\brow\b"),
     ],
 )
 def test_impossible_arguments_are_named(coding, error):
@@ -174,11 +174,11 @@ def test_impossible_arguments_are_named(coding, error):
 
 
 def test_symbols_are_checked():
-    with pytest.raises(ValueError, match="all words or all numbers"):
+    with pytest.raises(ValueError, match="words"):
         Symbolic().fit(np.array(["a", 1], dtype=object), 64)
     with pytest.raises(ValueError, match="NaN"):
         Symbolic().fit(np.array([1.0, np.nan]), 64)
-    with pytest.raises(ValueError, match=r"unknown categories \['d', 'e'\]"):
+    with pytest.raises(ValueError, match="'d', 'e'"):
         FITTED["symbolic"].bins(np.array(["a", "d", "e", "d"]))
     with pytest.raises(ValueError, match="not fitted"):
         RandomInverse().bins(UNIT)
@@ -188,11 +188,11 @@ def test_numbers_are_checked():
     for coding in (RandomInverse(), Anchor(), Circular(period=1.0)):
         with pytest.raises(ValueError, match="contains NaN"):
             coding.fit(UNIT, 64).bins(np.array([0.5, np.nan]))
-        with pytest.raises(ValueError, match="could not convert"):
+        with pytest.raises(ValueError, match="convert"):
             coding.fit(UNIT, 64).bins(np.array(["a"]))
-    with pytest.raises(ValueError, match=r"must be finite, low < high, got 0.0 and inf"):
+    with pytest.raises(ValueError, match=r"0\.0 and inf"):
         Anchor().fit(np.array([0.0, np.inf]), 64)
-    with pytest.raises(ValueError, match="infinity, which has no place on a circle"):
+    with pytest.raises(ValueError, match="infinity"):
         Circular().bins(np.array([np.inf]))
     assert Anchor(low=0.0, high=1.0).bins(np.array([-np.inf, np.inf])).tolist() == [0, 359]
 
@@ -200,7 +200,7 @@ def test_numbers_are_checked():
 @pytest.mark.parametrize("categories", ["red", 3])
 def test_lone_categories_are_refused(categories):
     for make in (Symbolic, lambda **given: CorrelationMatrix(matrix=[[1.0]], **given)):
-        with pytest.raises(ValueError, match="categories must be a tuple of values, got "):
+        with pytest.raises(ValueError, match="categories"):
             make(categories=categories)
 
 
@@ -232,7 +232,7 @@ def test_what_was_learned_is_not_learned_again(coding, column):
     ],
 )
 def test_impossible_knots_are_named(knots):
-    with pytest.raises(ValueError, match="knots must be"):
+    with pytest.raises(ValueError, match="knots"):
         RandomInverse(spacing="quantile", low=0.0, high=1.0, knots=knots).fit(UNIT, 400)
 
 
@@ -263,12 +263,12 @@ def test_what_is_missing_has_the_last_bin():
 @pytest.mark.parametrize(
     ("coding", "column", "message"),
     [
-        (WithMissing(unknown="ignore"), UNIT, "unknown must be one of 'missing', 'error'"),
-        (WithMissing(base=WithMissing()), UNIT, "base must be a Coding without missing values"),
-        (WithMissing(base="anchor"), UNIT, "base must be a Coding"),
-        (WithMissing(), np.array([np.nan, np.nan]), "every value of an input is missing"),
+        (WithMissing(unknown="ignore"), UNIT, "unknown"),
+        (WithMissing(base=WithMissing()), UNIT, r"\bbase\b"),
+        (WithMissing(base="anchor"), UNIT, r"\bbase\b"),
+        (WithMissing(), np.array([np.nan, np.nan]), "missing"),
         (WithMissing(), np.array([1.0, np.inf]), "infinity"),
-        (WithMissing(), np.array(["a", None], dtype=object), "could not convert"),
+        (WithMissing(), np.array(["a", None], dtype=object), "convert"),
     ],
 )
 def test_what_cannot_be_coded_with_missing_values(coding, column, message):
@@ -278,7 +278,7 @@ def test_what_cannot_be_coded_with_missing_values(coding, column, message):
 
 def test_unknown_categories_may_stay_an_error():
     strict = WithMissing(base=Symbolic(), unknown="error").fit(LETTERS, 8)
-    with pytest.raises(ValueError, match="unknown categories"):
+    with pytest.raises(ValueError, match="categories"):
         strict.bins(np.array(["z"]))
 
 

@@ -40,7 +40,7 @@ def test_by_hand():
     np.testing.assert_allclose(matrix, [expected])
     alone = kernel.AnalyticKernel(coding, n_inputs=1, n_units=100)
     np.testing.assert_allclose(alone([[0.05]], [[0.25]]), [[rho**2]])
-    with pytest.raises(ValueError, match="n_inputs must be given"):
+    with pytest.raises(ValueError, match="n_inputs"):
         kernel.AnalyticKernel("anchor")
 
 
@@ -85,9 +85,9 @@ def test_it_can_be_drawn(coding, tmp_path):
 @pytest.mark.parametrize("bad", [np.zeros((3, 1)), np.zeros((3, 3)), np.zeros(2)])
 def test_samples_of_another_shape_are_refused(bad):
     analytic = kernel.AnalyticKernel("anchor", n_inputs=2)
-    with pytest.raises(ValueError, match=r"X must have shape \(n, 2\), got "):
+    with pytest.raises(ValueError, match=r"\bX\b"):
         analytic(bad)
-    with pytest.raises(ValueError, match=r"Y must have shape \(n, 2\), got "):
+    with pytest.raises(ValueError, match=r"\bY\b"):
         analytic(np.zeros((1, 2)), bad)
 
 

@@ -77,7 +77,7 @@ def test_a_class_is_frozen_keyword_only_and_documented(kind):
         kind(first.default)
     with pytest.raises(AttributeError):
         setattr(kind(), first.name, first.default)
-    with pytest.raises(TypeError, match="is not a field: they are"):
+    with pytest.raises(TypeError, match="field"):
         kind(nothing=1)
     names = [field.name for field in fields_of(kind)]
     assert list(inspect.signature(kind).parameters) == names

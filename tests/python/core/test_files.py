@@ -105,7 +105,7 @@ def test_a_file_of_another_kind_is_refused(saved, kind, tmp_path):
         if (other, kind) in {(kind, kind), ("agent", "training")}:
             read(path)  # a training holds an agent
         else:
-            with pytest.raises(ValueError, match=f"other is a file of kind '{kind}', expected"):
+            with pytest.raises(ValueError, match=f"other.*'{kind}'"):
                 read(path)
 
 
@@ -113,7 +113,7 @@ def test_files_of_other_programs_and_versions_are_refused(tmp_path):
     path = tmp_path / "other"
     for metadata in (None, {"sdnn": '{"format": "sdnn-agent-1", "class": "SDNNQLearning"}'}):
         save_file(ARRAYS, path, metadata)
-        with pytest.raises(ValueError, match=r"other is not a file of sdnn, .* before files"):
+        with pytest.raises(ValueError, match="other"):
             read_file(path, *KINDS)
     write_file(path, "agent", ARRAYS, {})
     content = path.read_bytes()
@@ -122,7 +122,7 @@ def test_files_of_other_programs_and_versions_are_refused(tmp_path):
     )
     assert len(newer) == len(content)
     path.write_bytes(with_checksum(newer))
-    with pytest.raises(ValueError, match=r"has format 2, written by sdnn 9\.9\.9; this is sdnn"):
+    with pytest.raises(ValueError, match=r"9\.9\.9"):
         read_file(path, "agent")
 
 
@@ -142,7 +142,7 @@ def test_what_is_wrong_under_the_right_checksum_is_damage_too(part, other, tmp_p
     content = path.read_bytes()
     assert part in content
     path.write_bytes(with_checksum(content.replace(part, other)))
-    with pytest.raises(ValueError, match="crafted is damaged: "):
+    with pytest.raises(ValueError, match="crafted"):
         read_file(path, "agent")
 
 
@@ -155,9 +155,9 @@ def test_only_regular_files_are_read(tmp_path, monkeypatch):
         os.mkfifo(tmp_path / "pipe")  # without a writer, for which reading would wait
         (tmp_path / "link").symlink_to(tmp_path / "pipe")
         for name in (tmp_path / "pipe", tmp_path / "link", "/dev/zero"):
-            with pytest.raises(OSError, match=f"{name} is not a regular file"):
+            with pytest.raises(OSError, match=f"{name}"):
                 read_file(name, "agent")
     write_file(tmp_path / "file", "agent", ARRAYS, {})
     monkeypatch.setattr(files, "MAX_BYTES", 100)
-    with pytest.raises(OSError, match=r"file has .* bytes, expected at most 100"):
+    with pytest.raises(OSError, match=r"file.*\b100\b"):
         read_file(tmp_path / "file", "agent")

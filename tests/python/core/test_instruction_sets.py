@@ -76,9 +76,7 @@ def test_levels_can_be_chosen():
 @pytest.mark.parametrize("name", ["", "sse9", "AVX2", "avx2 "])
 def test_bad_names(name):
     before = instruction_set()
-    with pytest.raises(
-        ValueError, match="instruction set must be portable, neon, avx2 or avx512, got"
-    ):
+    with pytest.raises(ValueError, match="instruction set"):
         set_instruction_set(name)
     assert instruction_set() == before
     with pytest.raises(TypeError):
@@ -87,13 +85,13 @@ def test_bad_names(name):
 
 def test_levels_beyond_the_processor():
     for name in {"portable", "neon", "avx2", "avx512"} - set(available_instruction_sets()):
-        with pytest.raises(ValueError, match="one that this processor offers"):
+        with pytest.raises(ValueError, match="processor"):
             set_instruction_set(name)
 
 
 @pytest.mark.parametrize(
     ("value", "said"),
-    [("portable", "portable"), ("sse9", "instruction set must be portable, neon, avx2 or avx512")],
+    [("portable", "portable"), ("sse9", "sse9")],
 )
 def test_the_environment_variable_chooses(value, said):
     environment = os.environ | {

@@ -113,16 +113,16 @@ def test_it_is_part_of_the_spec():
 def test_bad_arguments_change_nothing():
     env = TighteningGoal(AcrobotSwingUpEnv())
     for bad in (0, -1, 1.5):
-        with pytest.raises(ValueError, match=f"episode must be .*, got {bad}"):
+        with pytest.raises(ValueError, match=f"episode.* {bad}"):
             env.reset(options={"episode": bad})
-        with pytest.raises(ValueError, match=f"episode must be .*, got {bad}"):
+        with pytest.raises(ValueError, match=f"episode.* {bad}"):
             env.episode = bad
-    with pytest.raises(ValueError, match="'episode' in place of 'goal_tolerance'"):
+    with pytest.raises(ValueError, match="'episode'"):
         env.reset(options={"goal_tolerance": 0.5})
-    with pytest.raises(ValueError, match="got 'epsiode'"):
+    with pytest.raises(ValueError, match="epsiode"):
         env.reset(options={"episode": 5, "epsiode": 3})
-    with pytest.raises(ValueError, match="goal_tolerance must be at least 0, got -1"):
+    with pytest.raises(ValueError, match="goal_tolerance"):
         TighteningGoal(AcrobotSwingUpEnv(), lambda episode: -1.0).reset()
     assert env.episode == 1
-    with pytest.raises(ValueError, match=r"env must have a goal_tolerance, got .*CartPole"):
+    with pytest.raises(ValueError, match=r"\benv\b"):
         TighteningGoal(gym.make("CartPole-v1"))

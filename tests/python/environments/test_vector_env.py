@@ -2,7 +2,6 @@
 
 import doctest
 import importlib
-import re
 import threading
 import time
 
@@ -188,45 +187,38 @@ def test_bad_actions_name_the_argument_and_move_nothing():
     for bad in (np.nan, np.inf, -np.inf, 1.01, -1.01):
         actions = np.ones((3, 1))
         actions[1] = bad
-        message = f"actions[1] must be one number in [-1, 1], got {bad}"
-        with pytest.raises(ValueError, match=re.escape(message)):
+        with pytest.raises(ValueError, match=rf"actions\[1\].*{bad}"):
             envs.step(actions)
     for shape in ((2, 1), (3, 2), (1, 3), ()):
-        with pytest.raises(ValueError, match=re.escape(f"(3, 1), got shape {shape}")):
+        with pytest.raises(ValueError, match=r"\bactions\b"):
             envs.step(np.zeros(shape))
     observations = envs.step(np.zeros(3))[0]
     np.testing.assert_array_equal(observations, np.full((3, 4), 0.5))
 
 
 def test_bad_arguments():
-    with pytest.raises(
-        ValueError, match=r"num_envs must be a whole number in \[1, 1048576\], got 0"
-    ):
+    with pytest.raises(ValueError, match="num_envs"):
         AcrobotSwingUpVectorEnv(0)
-    with pytest.raises(ValueError, match="num_envs must be a whole number"):
+    with pytest.raises(ValueError, match="num_envs"):
         AcrobotSwingUpVectorEnv(2.5)
-    with pytest.raises(ValueError, match="dtype must be one of"):
+    with pytest.raises(ValueError, match="dtype"):
         AcrobotSwingUpVectorEnv(1, dtype="float16")
     with pytest.raises(ValueError, match="render_mode"):
         AcrobotSwingUpVectorEnv(1, render_mode="human")
     with pytest.raises(ValueError, match="integration_step"):
         AcrobotSwingUpVectorEnv(1, config=AcrobotConfig(integration_step=0.03))
     envs = AcrobotSwingUpVectorEnv(2)
-    with pytest.raises(ValueError, match="seed must have num_envs=2 items, got 3"):
+    with pytest.raises(ValueError, match=r"\bseed\b"):
         envs.reset(seed=[1, 2, 3])
-    for bad, message in (
-        (-0.1, "must be at least 0, got -0.1"),
-        ([1.0, np.nan], "must be at least 0, got [1.0, nan]"),
-        ([1.0] * 3, "must be a number or of shape (2,), got shape (3,)"),
-    ):
-        message = re.escape(f"goal_tolerance {message}")
+    message = "goal_tolerance"
+    for bad in (-0.1, [1.0, np.nan], [1.0] * 3):
         with pytest.raises(ValueError, match=message):
             envs.reset(options={"goal_tolerance": bad})
         with pytest.raises(ValueError, match=message):
             AcrobotSwingUpVectorEnv(2, goal_tolerance=bad)
         with pytest.raises(ValueError, match=message):
             envs.goal_tolerance = bad
-    with pytest.raises(ValueError, match="'goal_tolerance' and 'reset_mask', got 'episode'"):
+    with pytest.raises(ValueError, match="'episode'"):
         envs.reset(options={"episode": 3})
     for mask in (np.zeros(2, bool), np.ones(3, bool), np.ones(2), "yes"):
         with pytest.raises(ValueError, match="reset_mask"):
@@ -241,22 +233,22 @@ def test_core_batch_checks_its_arguments():
     assert len(batch) == 3
     every = np.ones(3, bool)
     good = np.zeros(3)
-    with pytest.raises(ValueError, match=re.escape("torques[2] must be in [-10, 10], got 11")):
+    with pytest.raises(ValueError, match=r"torques\[2\]"):
         batch.step([0.0, 0.0, 11.0], good, every)
-    with pytest.raises(ValueError, match=r"goal_tolerances\[0\] must be at least 0, got -1"):
+    with pytest.raises(ValueError, match=r"goal_tolerances\[0\]"):
         batch.step(good, [-1.0, 0.0, 0.0], every)
-    with pytest.raises(ValueError, match="torques must be of 3 items, got 2"):
+    with pytest.raises(ValueError, match="torques"):
         batch.step(good[:2], good, every)
-    with pytest.raises(ValueError, match="moving must be of 3 items, got 1"):
+    with pytest.raises(ValueError, match="moving"):
         batch.step(good, good, every[:1])
-    with pytest.raises(ValueError, match="mask must be of 3 items, got 4"):
+    with pytest.raises(ValueError, match=r"\bmask\b"):
         batch.reset(np.ones(4, bool))
     with pytest.raises(IndexError):
         batch.decisions(3)
-    with pytest.raises(ValueError, match="n_acrobots must be in"):
+    with pytest.raises(ValueError, match="n_acrobots"):
         _core.AcrobotBatch(AcrobotConfig(), 0)
     batch.set_state(1, [0.0, 0.0, 1e300, 0.0])
-    with pytest.raises(OverflowError, match="speed of acrobot 1"):
+    with pytest.raises(OverflowError, match="acrobot 1"):
         batch.step(good, good, every)
     assert [batch.decisions(i) for i in range(3)] == [1, 0, 1]
 

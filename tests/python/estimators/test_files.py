@@ -99,7 +99,7 @@ def test_what_a_search_has_found_can_be_saved(tmp_path):
 def test_what_has_no_values_cannot_be_saved(tmp_path):
     for columns in (lambda _: [0], iter([0]), b"a"):
         model = SDNNRegressor(**SMALL).fit(X, Y).set_params(coding=[("anchor", columns)])
-        with pytest.raises(TypeError, match="a parameter cannot be saved"):
+        with pytest.raises(TypeError, match="parameter"):
             model.save(tmp_path / "model.safetensors")
 
 
@@ -124,7 +124,7 @@ def test_what_is_loaded_is_what_was_saved(name, tmp_path):
 def test_the_file_of_another_class_is_refused(tmp_path):
     path = tmp_path / "model.safetensors"
     SDNNClassifier(**SMALL).fit(X, Y > 0).save(path)
-    with pytest.raises(ValueError, match="holds an SDNNClassifier, not an SDNNRegressor"):
+    with pytest.raises(ValueError, match="SDNNClassifier"):
         SDNNRegressor.load(path)
 
 
@@ -160,7 +160,7 @@ def test_parts_that_do_not_fit_are_found_when_they_are_loaded(change, tmp_path):
     description, arrays = read_file(path, "estimator")
     change(description, arrays)
     write_file(path, "estimator", arrays, description)
-    with pytest.raises(ValueError, match="is damaged"):
+    with pytest.raises(ValueError, match="damaged"):
         SDNNRegressor.load(path)
 
 
@@ -188,8 +188,8 @@ def test_what_cannot_be_written_as_data_is_refused(tmp_path):
 
     model = SDNNRegressor(Own(), **SMALL).fit(X, Y)
     assert isinstance(model.codings_[0], Coding)
-    with pytest.raises(TypeError, match=r"only codings of sdnn\.coding"):
+    with pytest.raises(TypeError, match=r"sdnn\.coding"):
         model.save(tmp_path / "model.safetensors")
     model = SDNNRegressor([("anchor", lambda table: [0])], **SMALL).fit(X, Y)
-    with pytest.raises(TypeError, match="a parameter cannot be saved"):
+    with pytest.raises(TypeError, match="parameter"):
         model.save(tmp_path / "model.safetensors")

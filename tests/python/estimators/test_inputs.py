@@ -34,17 +34,17 @@ def test_columns_are_given_as_to_a_column_transformer():
         (lambda table: [table.shape[1] - 1], [2]),
     ]:
         assert column_indices(columns, names, 3, np.zeros((4, 3))) == expected
-    for bad, error in [(3, "no number 3"), ("d", "named 'd'"), (1.5, "name or number")]:
+    for bad, error in [(3, r"\b3\b"), ("d", "'d'"), (1.5, r"1\.5")]:
         with pytest.raises(ValueError, match=error):
             column_indices(bad, names, 3)
-    with pytest.raises(ValueError, match="a mask must have 3 entries"):
+    with pytest.raises(ValueError, match=r"\bmask\b"):
         column_indices([True], names, 3)
 
 
 def test_inputs_left_out_have_the_usual_coding():
     codings = codings_of_columns([("anchor", [1])], None, 3)
     assert [coding.name for coding in codings] == ["random-inverse", "anchor", "random-inverse"]
-    with pytest.raises(ValueError, match=r"list of \(coding, columns\)"):
+    with pytest.raises(ValueError, match=r"\bcoding\b"):
         codings_of_columns([("anchor",)], None, 3)
 
 
@@ -52,7 +52,7 @@ def test_pairs_are_ordered_and_named():
     assert input_pairs("all", None, 3) == [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)]
     assert input_pairs("all", None, 1) == [(0, 0)]
     assert input_pairs([("b", "a"), (-1, None)], ["a", "b"], 2) == [(1, 0), (1, 1)]
-    with pytest.raises(ValueError, match=r"a pair is \(modified, modifier\)"):
+    with pytest.raises(ValueError, match="pair"):
         input_pairs([(0, 1, 2)], None, 3)
 
 
@@ -87,14 +87,14 @@ def test_numbers_in_lists_with_words_stay_numbers():
     ]  # fmt: skip
     assert model.predict_one(counts[0]) == model.predict(counts[:1])[0]
     assert model.predict_one(["red", True, 3]) == model.predict([["red", True, 3]])[0]
-    with pytest.raises(ValueError, match=r"all words or all numbers"):
+    with pytest.raises(ValueError, match="words"):
         model.fit([["red", True, 3], ["blue", True, "4"]], [0, 1])
 
 
 @pytest.mark.parametrize("missing", [float("nan"), np.nan, None])
 def test_missing_values_in_lists_of_words_are_seen(missing):
     gaps = [[missing, size] if size > 8 else [color, size] for color, size in LISTED]
-    with pytest.raises(ValueError, match="a missing value is not a category"):
+    with pytest.raises(ValueError, match="missing"):
         SDNNRegressor(WORDS, **SMALL).fit(gaps, TARGETS)
     model = SDNNRegressor([(WithMissing(base=Symbolic()), [0])], **SMALL).fit(gaps, TARGETS)
     assert model.codings_[0].base.categories == ("blue", "green", "red")
@@ -105,7 +105,7 @@ def test_missing_values_in_lists_of_words_are_seen(missing):
 
 def test_unknown_categories_and_missing_values_are_refused():
     model = SDNNRegressor(CODING, **SMALL).fit(TABLE, TARGETS)
-    with pytest.raises(ValueError, match=r"unknown categories \['pink'\] in column 1"):
+    with pytest.raises(ValueError, match="pink"):
         model.predict(TABLE.assign(color="pink"))
     with pytest.raises(ValueError, match="NaN"):
         model.predict(TABLE.assign(size=np.nan))
@@ -131,7 +131,7 @@ def test_missing_values_and_unknown_categories_can_have_patterns_of_their_own(tm
     again = SDNNRegressor.load(tmp_path / "model")
     assert again.codings_ == model.codings_
     np.testing.assert_array_equal(again.predict(holes), model.predict(holes))
-    with pytest.warns(OutOfRangeWarning, match=r"in column 2, whose range"):
+    with pytest.warns(OutOfRangeWarning, match="column 2"):
         model.partial_fit(holes.assign(size=1e3), TARGETS)
 
 
@@ -142,7 +142,7 @@ def test_words_without_a_coding_are_refused():
     coding = [(Circular(period=24.0), "hour"), ("symbolic", ["size"])]
     with pytest.raises(ValueError, match=hint.replace(".*", " in column 1; ")):
         SDNNRegressor(coding).fit(TABLE, TARGETS)
-    with pytest.raises(ValueError, match="y must be numbers: could not convert") as error:
+    with pytest.raises(ValueError, match=r"\by\b") as error:
         SDNNRegressor().fit(SIZES[:, None], np.full(len(SIZES), "red"))
     assert "coding" not in str(error.value)
 

@@ -112,12 +112,12 @@ def test_a_failed_fit_leaves_the_old_model(monkeypatch):
 @pytest.mark.parametrize(
     ("parameters", "error"),
     [
-        ({"alpha": 0}, "'alpha' parameter of SDNNKernelRidge must be"),
+        ({"alpha": 0}, "'alpha'"),
         ({"alpha": np.inf}, "'alpha'"),
         ({"alpha": "much"}, "'alpha'"),
-        ({"pairs": [(0, 9)]}, "there is no number 9"),
+        ({"pairs": [(0, 9)]}, r"\b9\b"),
         ({"pairs": "budget"}, "'pairs' .* 'budget'"),
-        ({"coding": "unheard"}, "coding must be one of"),
+        ({"coding": "unheard"}, r"\bcoding\b"),
     ],
 )
 def test_impossible_parameters_are_named(parameters, error):

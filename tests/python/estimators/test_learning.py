@@ -102,14 +102,14 @@ def test_a_warm_start_goes_on_where_fit_ended(kind, options, targets):
 
 def test_a_warm_start_keeps_what_the_network_was_made_for():
     model = SDNNRegressor(**REGRESSOR, warm_start=True).fit(X, Y)
-    with pytest.raises(ValueError, match="expecting 2 features"):
+    with pytest.raises(ValueError, match="2 features"):
         model.fit(X[:, :1], Y)
-    with pytest.raises(ValueError, match="as many outputs as before, 1, got 2"):
+    with pytest.raises(ValueError, match="outputs"):
         model.fit(X, np.column_stack([Y, Y]))
-    with pytest.raises(ValueError, match="refit=True trains a new network"):
+    with pytest.raises(ValueError, match="refit"):
         model.set_params(refit=True).fit(X, Y)
     labels = SDNNClassifier(**GIVEN, warm_start=True).fit(X[:, :1], LABELS > 0)
-    with pytest.raises(ValueError, match="not in classes"):
+    with pytest.raises(ValueError, match="classes"):
         labels.fit(X[:, :1], np.full(len(X), 5))
 
 
@@ -128,24 +128,24 @@ def test_partial_fit_goes_on_after_fit():
 
 
 def test_partial_fit_needs_ranges_for_a_single_sample_and_known_labels():
-    with pytest.raises(ValueError, match=r"minimum of 2 is required"):
+    with pytest.raises(ValueError, match="minimum of 2"):
         SDNNRegressor(coding=UNIT).partial_fit(X[:1], Y[:1])
     model = SDNNClassifier(**GIVEN)
-    with pytest.raises(ValueError, match="classes must be given in the first call"):
+    with pytest.raises(ValueError, match="classes"):
         model.partial_fit(X, LABELS)
-    with pytest.raises(ValueError, match=r"labels \[2\] that are not in classes"):
+    with pytest.raises(ValueError, match=r"\[2\].*classes"):
         model.partial_fit(X, LABELS, classes=[0, 1])
     model = SDNNClassifier(**GIVEN)
-    with pytest.raises(ValueError, match=r"labels \[2\] that are not in classes, \[0, 1\]"):
+    with pytest.raises(ValueError, match=r"\[2\].*classes"):
         model.partial_fit(X, LABELS, classes=[0, 1])
     assert not hasattr(model, "network_"), "a refused first call leaves nothing behind"
     model.partial_fit(X, LABELS, classes=[0, 1, 2])
-    with pytest.raises(ValueError, match="not those of the first call"):
+    with pytest.raises(ValueError, match="classes"):
         model.partial_fit(X, LABELS, classes=[0, 1, 2, 3])
-    with pytest.raises(ValueError, match=r"labels \[7\]"):
+    with pytest.raises(ValueError, match=r"\[7\]"):
         model.partial_fit(X[:1], [7])
     regressor = SDNNRegressor(**REGRESSOR).partial_fit(X, Y)
-    with pytest.raises(ValueError, match="as many outputs as before, 1, got 2"):
+    with pytest.raises(ValueError, match="outputs"):
         regressor.partial_fit(X, np.stack([Y, Y], axis=1))
 
 
@@ -155,10 +155,10 @@ def test_one_sample_is_enough_where_every_column_is_given():
     model.partial_fit(X[:1], Y[:1])
     assert model.n_iter_ == 1
     model.set_params(coding=listed[:1])
-    with pytest.raises(ValueError, match=r"minimum of 2 is required .* to learn ranges"):
+    with pytest.raises(ValueError, match="ranges"):
         model.fit(X[:1], Y[:1])
     model.set_params(coding=listed, output_range=None)
-    with pytest.raises(ValueError, match=r"minimum of 2 is required .* to learn the output_range"):
+    with pytest.raises(ValueError, match="output_range"):
         model.fit(X[:1], Y[:1])
 
 
@@ -201,7 +201,7 @@ def test_outputs_are_steps_within_the_range():
     model = SDNNRegressor(**REGRESSOR, max_iter=20).fit(X, Y)
     counts = (model.predict(X) + 1.5) / (3 / 60)
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-9)
-    with pytest.warns(OutOfRangeWarning, match="values beyond the range are clipped"):
+    with pytest.warns(OutOfRangeWarning, match="range"):
         far = SDNNRegressor(**REGRESSOR, max_iter=20).fit(X, Y + 100)
     assert far.predict(X).max() == pytest.approx(1.5)
     assert far.n_outputs_out_of_range_ == len(X)
@@ -217,7 +217,7 @@ def test_early_stopping_keeps_the_best_weights(kind):
     assert model.n_iter_ == len(model.validation_scores_) <= 60
     again = kind(**options, early_stopping=True, n_iter_no_change=4, max_iter=best + 1)
     same(model, again.fit(X, targets))
-    with pytest.raises(ValueError, match="too few for early stopping"):
+    with pytest.raises(ValueError, match="early"):
         kind(early_stopping=True, validation_fraction=0.9).fit(X[:2], [0, 1])
 
 
@@ -283,7 +283,7 @@ def test_the_number_of_units_is_shared_out():
     assert len(one.thresholds_) == 3
     assert not hasattr(one, "predict_proba")
     assert not hasattr(SDNNClassifier(n_units_per_class=1), "predict_proba")
-    with pytest.raises(ValueError, match="1 or None with scheme='one_vs_one', got 5"):
+    with pytest.raises(ValueError, match="one_vs_one"):
         SDNNClassifier(scheme="one_vs_one", n_units_per_class=5).fit(X, LABELS)
 
 
@@ -305,9 +305,9 @@ def test_weights_of_classes_are_numbers_of_presentations():
     for bad in ({0: -1, 1: 1}, {0: np.nan}, "even"):
         with pytest.raises(ValueError, match="class_weight"):
             SDNNClassifier(class_weight=bad).fit(X, rare)
-    with pytest.raises(ValueError, match="class_weight works in fit only"):
+    with pytest.raises(ValueError, match="class_weight"):
         SDNNClassifier(class_weight="balanced").partial_fit(X, rare, classes=[0, 1])
-    with pytest.raises(ValueError, match="class_weight works in fit only"):
+    with pytest.raises(ValueError, match="class_weight"):
         balanced.learn_one(X[0], 1)
 
 
@@ -363,13 +363,13 @@ def test_weights_of_samples_count_in_what_is_held_out_refitted_and_selected():
 )
 def test_weights_that_mean_nothing_are_refused(make, bad, got):
     model = make(**GIVEN)
-    with pytest.raises(ValueError, match=f"^sample_weight must be .*{got}"):
+    with pytest.raises(ValueError, match="sample_weight"):
         model.fit(X, Y if make is SDNNRegressor else LABELS, bad)
     assert not hasattr(model, "network_")
 
 
 def test_an_epoch_has_a_largest_size():
-    with pytest.raises(ValueError, match="sample_weight must have a sum of at most 268435456"):
+    with pytest.raises(ValueError, match="sample_weight"):
         sample_weights(np.full(1000, 1e6), 1000)
 
 
@@ -386,9 +386,9 @@ def test_words_and_unit_counts_are_those_of_the_core():
     assert _core.CLASS_SCHEMES == ("one_vs_rest", "one_vs_one")
     assert [_core.n_units_for("one_vs_one", n) for n in (2, 3, 4)] == [1, 3, 6]
     assert [_core.n_units_for("one_vs_rest", n) for n in (2, 3, 4)] == [2, 3, 4]
-    with pytest.raises(ValueError, match="scheme must be one_vs_rest or one_vs_one, got rest"):
+    with pytest.raises(ValueError, match="scheme"):
         _core.n_units_for("rest", 3)
-    with pytest.raises(ValueError, match=r"n_classes must be in \[2, 1024\], got 1"):
+    with pytest.raises(ValueError, match="n_classes"):
         _core.n_units_for("one_vs_one", 1)
 
 
@@ -396,7 +396,7 @@ def test_a_trainer_refuses_units_that_its_classes_do_not_need():
     model = SDNNClassifier(**GIVEN, n_units_per_class=1, max_iter=1)
     network = model.fit(X, np.arange(len(X)) % 3).network_
     bins = network.input_code.bins(X)
-    with pytest.raises(ValueError, match="n_units must be 6 for 4 classes, got 3"):
+    with pytest.raises(ValueError, match="n_units"):
         _core.PerceptronTrainer(network.layer, bins, np.zeros(len(X)), 4, "one_vs_one")
 
 
@@ -434,11 +434,11 @@ def test_networks_that_are_averaged_count_in_memory():
         room = n_networks * weights + table_bytes
         SDNNRegressor(**options, **more, training="plain", memory_limit=room).fit(X, Y)
         model = SDNNRegressor(**options, **more, training="plain", memory_limit=room - 1)
-        with pytest.raises(ValueError, match=f"in {n_networks} networks to be averaged, need"):
+        with pytest.raises(ValueError, match=f"{n_networks} networks"):
             model.fit(X, Y)
         model.partial_fit(X, Y).learn_one(X[0], Y[0])  # which average nothing
     model.set_params(warm_start=True, refit=False, early_stopping=False)
-    with pytest.raises(ValueError, match="in 5 networks to be averaged, need"):
+    with pytest.raises(ValueError, match="5 networks"):
         model.fit(X, Y)
 
 

@@ -170,9 +170,9 @@ def test_any_two_agents_of_a_figure_have_colors_of_their_own():
 def test_mixed_settings_are_refused(results):
     (first, *others) = results[0].records
     odd = replace(first, key=first.key._replace(config_hash="other"))
-    with pytest.raises(ValueError, match="share one configuration, got 2"):
+    with pytest.raises(ValueError, match="configuration"):
         measure("", (odd, *others))
-    with pytest.raises(ValueError, match="got 0"):
+    with pytest.raises(ValueError, match=r"\b0\b"):
         measure("", ())
 
 

@@ -200,7 +200,7 @@ def test_what_is_written_of_trials_is_read_again(monkeypatch, tmp_path, fake_res
 
 def test_short_trials_are_not_kept(fake_results):
     short = replace(fake_results[0], last_episode=300)
-    with pytest.raises(ValueError, match=r"15000 learning episodes.* sdnn-c in s4 have 300"):
+    with pytest.raises(ValueError, match="sdnn-c in s4"):
         reference_csv([short], 7)
 
 

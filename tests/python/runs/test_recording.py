@@ -93,11 +93,11 @@ def test_missing_packages_are_named(run, tmp_path, monkeypatch, suffix, package)
 
 
 def test_what_cannot_be_recorded(run, tmp_path, monkeypatch):
-    with pytest.raises(RunError, match=r"must end in one of \.gif, \.mp4"):
+    with pytest.raises(RunError, match=r"\.gif, \.mp4"):
         record(run, tmp_path / "x.avi")
     for picture in (None, "text", np.zeros((3, 3)), []):
         monkeypatch.setattr(drifting_env.DriftingEnv, "render", lambda self, p=picture: p)
         for name in ("x.gif", "x.mp4"):
-            with pytest.raises(RunError, match=r"must give (a picture|pictures)"):
+            with pytest.raises(RunError, match="picture"):
                 record(run, tmp_path / name)
     assert list(tmp_path.iterdir()) == []

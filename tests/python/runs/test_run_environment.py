@@ -56,7 +56,7 @@ def test_the_words_for_what_is_scaled_are_true(redundant):
 def test_nothing_is_scaled_without_noise_and_redundancy():
     environment = EnvironmentSpec(id="tests/Drifting-v0", ranges={"all": (-0.3, 0.4)})
     assert environment.scaling() is None
-    with pytest.raises(ConfigError, match="scale nothing without noise or redundant"):
+    with pytest.raises(ConfigError, match="noise"):
         environment.scaled_ranges()
 
 
@@ -92,15 +92,15 @@ def test_observations_of_any_shape_are_flattened():
 @pytest.mark.parametrize(
     ("environment", "key", "words"),
     [
-        ({"id": "Nothing-v0"}, "environment.id", "no environment 'Nothing-v0'"),
-        ({"id": "nowhere:a/B-v0"}, "environment.id", "no environment 'nowhere:a/B-v0'"),
+        ({"id": "Nothing-v0"}, "environment.id", "Nothing-v0"),
+        ({"id": "nowhere:a/B-v0"}, "environment.id", "nowhere:a/B-v0"),
         ({"id": "CartPole-v1", "kwargs": {"colour": 1}}, "environment.kwargs", "colour"),
-        ({"id": "CartPole-v1", "noise": 0.1}, "environment.ranges", "none of variables 1, 3 of 4"),
+        ({"id": "CartPole-v1", "noise": 0.1}, "environment.ranges", "1, 3"),
         ({"id": "CartPole-v1", "redundant": 1}, "environment.ranges", "--range 1=LOW:HIGH"),
         (
             {"id": "CartPole-v1", "noise": 0.1, "ranges": {"4": (0, 1)}},
             "environment.ranges.4",
-            "has the variables 0 to 3, got 4",
+            r"\b4\b",
         ),
     ],
 )

@@ -218,7 +218,7 @@ def test_options_override_the_file(study):
 def test_some_variants_only(study):
     found = study(PAPER + "[axes]\nlearning.discount = [0.5, 0.7]\n")
     assert {p.spec.learning.discount for p in found.plan(["discount=0.5"])} == {0.5}
-    with pytest.raises(ValueError, match=r"no variant 'discount=0.6'; possible: discount=0.[57]"):
+    with pytest.raises(ValueError, match=r"discount=0\.6.*discount=0\.[57]"):
         found.plan(["discount=0.6"])
 
 
@@ -279,7 +279,7 @@ def test_what_own_settings_refuse_is_told_with_its_place(study, tmp_path, error)
     (tmp_path / "strict_agents.py").write_text(STRICT.replace("ERROR", error))
     text = "[study]\nimports = ['strict_agents']\ncases = ['s4']\n[base]\nagent = 'strict'\n"
     try:
-        with pytest.raises(ConfigError, match=r"mine\.toml:6: base\.approximator\.size: \w+"):
+        with pytest.raises(ConfigError, match=r"mine\.toml:6: base\.approximator\.size"):
             study(text + "approximator.size = 0\n")
     finally:
         AGENTS.pop("strict", None)

@@ -133,13 +133,13 @@ def test_asking_a_trials_agent_for_values_changes_nothing_that_follows():
 
 def test_ids_are_registered_once():
     before = dict(AGENTS)
-    with pytest.raises(ValueError, match="agent 'fuzzy' is already registered"):
+    with pytest.raises(ValueError, match="fuzzy"):
         register(entry_of("fuzzy"))
-    with pytest.raises(ValueError, match="series 'rbf-plain' is already registered"):
+    with pytest.raises(ValueError, match="rbf-plain"):
         register(entry_of("new", "rbf-plain"))
-    with pytest.raises(ValueError, match="series 'twice' is already registered"):
+    with pytest.raises(ValueError, match="twice"):
         register(entry_of("new", "twice", "twice"))
-    with pytest.raises(ValueError, match=r"id must be of letters.*got '\.\./x'"):
+    with pytest.raises(ValueError, match=r"\bid\b"):
         register(entry_of("../x"))
     assert before == AGENTS
 
@@ -152,7 +152,7 @@ def test_agents_are_looked_up_by_word():
     ]  # fmt: skip
     assert all(agent_entry(name) is entry for name, entry in AGENTS.items())
     assert agent_entry("sdnn-c-small") is AGENTS["sdnn-c"]
-    with pytest.raises(ValueError, match=f"one of {', '.join(words)}, got 'dqn'"):
+    with pytest.raises(ValueError, match="dqn"):
         agent_entry("dqn")
 
 
