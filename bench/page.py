@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sdnn.runs.report import Table
-from sdnn.runs.statistics import Estimate
+from sdnn.runs.results import Estimate
 from sdnn.whole_files import write_whole
 
 PAGE = "benchmarks.md"

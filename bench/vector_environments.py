@@ -20,7 +20,7 @@ from page import markdown
 
 from sdnn.agents import Training
 from sdnn.runs import BudgetSpec, EnvironmentSpec, ProtocolSpec, RunSpec
-from sdnn.runs.statistics import estimate_median
+from sdnn.runs.results import estimate_median
 
 KIND = "vector environments"
 TASKS = ("CartPole-v1", "Pendulum-v1")

@@ -12,7 +12,7 @@ from page import interval, markdown
 from scipy.stats import trim_mean
 from tasks import CONDITIONS, TASKS
 
-from sdnn.runs.statistics import Estimate, estimate_median
+from sdnn.runs.results import Estimate, estimate_median
 
 Trials = Mapping[tuple[str, str, str], Sequence[Mapping[str, Any]]]
 """What was seen in each trial by task, condition and contender, then by seed."""

@@ -28,7 +28,7 @@ from page import interval, markdown, show
 from report import OURS, Trials, by_kind
 from tasks import TASKS
 
-from sdnn.runs.statistics import estimate_median
+from sdnn.runs.results import estimate_median
 
 KIND = "until solved"
 INTERVAL = 1000

@@ -16,8 +16,8 @@ import numpy as np
 
 from sdnn.reproduction.studies import read_study
 from sdnn.runs.figures import figure_bytes, require_matplotlib
-from sdnn.runs.measures import SHARE_STABLE, final_share_solved
 from sdnn.runs.registry import title_of
+from sdnn.runs.results import SHARE_STABLE, final_share_solved
 from sdnn.runs.store import ResultStore
 from sdnn.runs.study import Study
 from sdnn.whole_files import write_whole

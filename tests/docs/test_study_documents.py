@@ -57,9 +57,9 @@ def test_the_agent_of_the_page_runs(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "name",
     [
-        "runs.config_file", "runs.measures", "runs.planned_trial", "runs.registry", "runs.settings",
+        "runs.config_file", "runs.planned_trial", "runs.registry", "runs.settings",
         "runs.spec",
-        "runs.report", "runs.statistics", "reproduction.report",
+        "runs.report", "runs.results", "reproduction.report",
     ],
 )  # fmt: skip
 def test_examples_in_docstrings(name):

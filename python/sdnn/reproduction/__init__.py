@@ -11,11 +11,10 @@ from sdnn.lazy import attach
 
 if TYPE_CHECKING:
     from sdnn.reproduction.cases import EXPERIMENTS, Case, Experiment, select_experiments
-    from sdnn.reproduction.claims import CLAIMS, Claim
+    from sdnn.reproduction.claims import CLAIMS, Claim, judge_claims
     from sdnn.reproduction.cost import CostConfig, CostRecord
     from sdnn.reproduction.figures import draw_cost, draw_experiment
     from sdnn.reproduction.reproduce import ReproduceRequest, case_spec, collect, plan_trials
-    from sdnn.reproduction.verdicts import judge_claims
 
 __getattr__, __dir__ = attach(globals())
 

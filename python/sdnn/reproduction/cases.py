@@ -9,11 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-PAPER_TRIALS = 10
-"""Trials per case in the paper; fewer support no conclusion."""
-
-PAPER_EPISODES = 15_000
-"""Learning episodes per trial in the paper."""
+PAPER_TRIALS = 10  # per case; fewer support no conclusion
+PAPER_EPISODES = 15_000  # learning episodes per trial
 
 MOST_EPISODES = 10**8
 """Learning episodes per trial at most: the rows of more test episodes fill the memory."""
@@ -26,14 +23,13 @@ SENSOR_NOISE = 0.02
 class Case:
     """What the agents observe in one panel of a figure.
 
-    Seeds are derived from `id`: cases that share it share their trials. `n_sensors` is 4, 5 (with
-    s5) or 6 (with s5 and s6), `noise` the standard deviation in units of the normalized variables.
+    Seeds are derived from `id`: cases that share it share their trials.
     """
 
     id: str
     title: str
-    n_sensors: int
-    noise: float
+    n_sensors: int  # 4, 5 (with s5) or 6 (with s5 and s6)
+    noise: float  # standard deviation in units of the normalized variables
     agents: tuple[str, ...]
     paper_figure: str
 
@@ -55,20 +51,15 @@ class Experiment:
         """Ids of case and agent whose trials it needs."""
         return frozenset((case.id, agent) for case in self.cases for agent in case.agents)
 
-    def with_agents(self, agents: Iterable[str]) -> Experiment:
-        """Return the experiment with other agents in all its cases; with none: as it is."""
-        others = tuple(dict.fromkeys(agents))
-        cases = tuple(replace(case, agents=others or case.agents) for case in self.cases)
-        return replace(self, cases=cases)
-
-    def with_presets(self, presets: Iterable[str]) -> Experiment:
-        """Return the experiment with SDNN-C under some of its presets beside its agents."""
-        added = tuple("sdnn-c" if name == "paper" else f"sdnn-c-{name}" for name in presets)
-        cases = tuple(
-            replace(case, agents=tuple(dict.fromkeys((*case.agents, *added))))
+    def with_agents(self, agents: Iterable[str], presets: Iterable[str] = ()) -> Experiment:
+        """Return it with other agents, if any, in all cases, and SDNN-C under presets beside."""
+        own = tuple(agents)
+        names = [f"sdnn-c-{name}".removesuffix("-paper") for name in presets]
+        cases = (
+            replace(case, agents=tuple(dict.fromkeys((*(own or case.agents), *names))))
             for case in self.cases
         )
-        return replace(self, cases=cases)
+        return replace(self, cases=tuple(cases))
 
 
 BOTH = ("sdnn-c", "fuzzy")

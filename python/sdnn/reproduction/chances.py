@@ -1,24 +1,32 @@
 """What other numbers of trials would show, by drawing so many from those that are there.
 
-`TenTrials` draws ten trials, with replacement, and takes their medians: the paper's ten seen as one
-such draw. A draw shows a claim if the medians lie in the ranges of all its checks, so a claim that
-the trials leave undecided has a chance, too. `powers` draws more trials than there are and judges
-each draw: the power of a check. Both take the trials for ones like those to come; from ten trials
-that is a guess.
+The paper's ten trials are one draw. A draw shows a claim if the medians lie in the ranges of all
+its checks, so a claim that the trials leave undecided has a chance, too. All this takes the trials
+for ones like those to come; from ten trials that is a guess.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.reproduction.cases import PAPER_TRIALS
-from sdnn.reproduction.claims import Check, Claim, Difference, Growth, Subject
-from sdnn.runs.results import TrialMeasures, on_equal_terms
-from sdnn.runs.statistics import DEFAULT_BOOTSTRAP, Estimate, FloatArray, tails
+from sdnn.reproduction.claims import (
+    ALWAYS,
+    NEVER,
+    Check,
+    Claim,
+    ClaimOutcome,
+    Median,
+    Subject,
+    Verdict,
+    judge_claims,
+)
+from sdnn.runs.results import DEFAULT_BOOTSTRAP, Estimate, FloatArray, TrialMeasures, tails
 
 N_DRAWS = 10_000
 _N_RESAMPLES, _N_DRAWS_OF_EACH = 200, 250
@@ -29,17 +37,14 @@ MULTIPLES = (2, 4, 8, 16, 32)
 N_POWER_DRAWS = 200
 _N_MEDIANS = 1000
 
-_Places = NDArray[np.intp]
-_Met = NDArray[np.bool_]
-
 
 class TenTrials:
-    """Experiments of ten trials, drawn from more: the same draws for all that is asked of them."""
+    """Experiments of ten trials, drawn from more, with replacement: all claims share the draws."""
 
     def __init__(self, measured: Iterable[TrialMeasures]) -> None:
         self._measured = {Subject(one.case_id, one.agent): one for one in measured}
-        self._places: dict[Subject, tuple[_Places, _Places]] = {}
-        self._met: dict[Check, tuple[_Met, _Met]] = {}
+        self._draws = cache(self._draw)
+        self._met = cache(self._is_met)
 
     def chance(self, *claims: Claim) -> Estimate | None:
         """Return in which share of the draws all the claims are shown.
@@ -48,55 +53,39 @@ class TenTrials:
         one that a claim speaks of are missing, or a claim is about costs.
         """
         checks = [check for claim in claims for check in claim.checks]
-        for check in checks:
-            if isinstance(check.quantity, Growth) or not self._measured.keys() >= set(
-                check.quantity.subjects
-            ):
+        for quantity in (check.quantity for check in checks):
+            if not isinstance(quantity, Median) or set(quantity.subjects) - self._measured.keys():
                 return None
-        met = [self._whether_met(check) for check in checks]
-        drawn, redrawn = (np.logical_and.reduce(arrays) for arrays in zip(*met, strict=True))
+        met = zip(*map(self._met, checks), strict=True)
+        drawn, redrawn = (np.logical_and.reduce(arrays) for arrays in met)
         lower, upper = tails(redrawn.mean(axis=1), DEFAULT_BOOTSTRAP.confidence)
         return Estimate(float(drawn.mean()), float(lower), float(upper))
 
-    def _draws(self, subject: Subject) -> tuple[_Places, _Places]:
+    def _draw(self, subject: Subject) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Draw from the trials, (N_DRAWS, 10), and from resamples of them, (..., 10).
 
         Each subject has a generator of its own, whoever else is drawn.
         """
-        if subject not in self._places:
-            generator = np.random.default_rng([DEFAULT_BOOTSTRAP.seed, *str(subject).encode()])
-            size = self._measured[subject].n_trials
-            drawn = generator.integers(size, size=(N_DRAWS, PAPER_TRIALS))
-            resampled = generator.integers(size, size=(_N_RESAMPLES, size))
-            shape = (_N_RESAMPLES, _N_DRAWS_OF_EACH * PAPER_TRIALS)
-            redrawn = np.take_along_axis(resampled, generator.integers(size, size=shape), axis=1)
-            redrawn = redrawn.reshape(_N_RESAMPLES, _N_DRAWS_OF_EACH, PAPER_TRIALS)
-            self._places[subject] = drawn, redrawn
-        return self._places[subject]
+        generator = np.random.default_rng([DEFAULT_BOOTSTRAP.seed, *str(subject).encode()])
+        size = self._measured[subject].n_trials
+        drawn = generator.integers(size, size=(N_DRAWS, PAPER_TRIALS))
+        resampled = generator.integers(size, size=(_N_RESAMPLES, size))
+        shape = (_N_RESAMPLES, _N_DRAWS_OF_EACH * PAPER_TRIALS)
+        redrawn = np.take_along_axis(resampled, generator.integers(size, size=shape), axis=1)
+        return drawn, redrawn.reshape(_N_RESAMPLES, _N_DRAWS_OF_EACH, PAPER_TRIALS)
 
-    def _whether_met(self, check: Check) -> tuple[_Met, _Met]:
+    def _is_met(self, check: Check) -> tuple[NDArray[np.bool_], ...]:
         """Find in which draws a check is met, (N_DRAWS,), and in which of resamples."""
-        if check not in self._met:
-            quantity = check.quantity
-            assert not isinstance(quantity, Growth)
-            measured = [self._measured[subject] for subject in quantity.subjects]
-            values = (
-                on_equal_terms(quantity.measure, *measured)
-                if isinstance(quantity, Difference)
-                else (measured[0].values[quantity.measure],)
+        quantity = check.quantity
+        assert isinstance(quantity, Median)
+        values = quantity.samples(self._measured)
+        draws = [self._draws(subject) for subject in quantity.subjects]
+        return tuple(
+            check.contains(
+                _difference([np.median(v[d], axis=-1) for v, d in zip(values, kind, strict=True)])
             )
-            draws = [self._draws(subject) for subject in quantity.subjects]
-            first, second = (
-                is_in_range(
-                    check,
-                    difference_of(
-                        [np.median(v[d[kind]], axis=-1) for v, d in zip(values, draws, strict=True)]
-                    ),
-                )
-                for kind in (0, 1)
-            )
-            self._met[check] = first, second
-        return self._met[check]
+            for kind in zip(*draws, strict=True)
+        )
 
 
 @dataclass(frozen=True)
@@ -109,16 +98,15 @@ class Power:
 
 
 def powers(check: Check, samples: Sequence[FloatArray]) -> tuple[Power, ...]:
-    """Return the power of a check that was judged by these samples, with each of `MULTIPLES`."""
+    """Draw more trials than these samples of a check, judge each draw, for each of `MULTIPLES`."""
     found = []
     for multiple in MULTIPLES:
         generator = np.random.default_rng(DEFAULT_BOOTSTRAP.seed)
-        medians = difference_of([drawn_medians(one, multiple, generator) for one in samples])
+        medians = _difference([drawn_medians(one, multiple, generator) for one in samples])
         lower, upper = tails(medians, DEFAULT_BOOTSTRAP.confidence)
-        holds = is_in_range(check, lower) & is_in_range(check, upper)
-        fails = (upper < check.at_least) | (lower > check.at_most)
-        n_trials = multiple * samples[0].size
-        found.append(Power(n_trials, float(holds.mean()), float(fails.mean())))
+        holds = (check.contains(lower) & check.contains(upper)).mean()
+        fails = check.excludes(lower, upper).mean()
+        found.append(Power(multiple * samples[0].size, float(holds), float(fails)))
     return tuple(found)
 
 
@@ -139,11 +127,48 @@ def drawn_medians(sample: FloatArray, multiple: int, generator: np.random.Genera
     return (low + drawn[:, (n * second).astype(np.intp)]) / 2.0
 
 
-def difference_of(medians: Sequence[FloatArray]) -> FloatArray:
-    """Return the first medians minus the second ones, if there are any."""
+def _difference(medians: Sequence[FloatArray]) -> FloatArray:
     return medians[0] - medians[1] if len(medians) == 2 else medians[0]
 
 
-def is_in_range(check: Check, quantity: FloatArray) -> _Met:
-    """Return where a quantity lies in the range of a check."""
-    return np.asarray((check.at_least <= quantity) & (quantity <= check.at_most))
+@dataclass(frozen=True)
+class SettledClaim:
+    """A claim with what the trials that were run say of it, and what more trials do, if any.
+
+    `chance` is the share of draws of ten of these in which it is shown.
+    """
+
+    own: ClaimOutcome
+    more: ClaimOutcome | None = None
+    chance: Estimate | None = None
+
+    @property
+    def best(self) -> ClaimOutcome:
+        """What the most trials give."""
+        return self.more or self.own
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict about the claim, by the whole rule of `sdnn.reproduction.claims`."""
+        if self.own.verdict in (Verdict.NOT_JUDGED, Verdict.NOT_RUN):
+            return self.own.verdict
+        if self.best.verdict is not Verdict.UNDECIDED or self.chance is None:
+            return self.best.verdict
+        if self.chance.value >= ALWAYS:
+            return Verdict.HOLDS
+        return Verdict.FAILS if self.chance.value <= NEVER else Verdict.CHANCE
+
+
+def decide(
+    outcomes: Iterable[ClaimOutcome], more: Iterable[TrialMeasures]
+) -> tuple[SettledClaim, ...]:
+    """Put beside each claim what more trials say, if all that it speaks of is among them."""
+    trials = tuple(more)
+    judged = {one.claim.number: one for one in judge_claims(trials)}
+    draws = TenTrials(trials)
+    return tuple(
+        SettledClaim(own, found, draws.chance(own.claim))
+        if (found := judged.get(own.claim.number)) and found.verdict is not Verdict.NOT_RUN
+        else SettledClaim(own)
+        for own in outcomes
+    )

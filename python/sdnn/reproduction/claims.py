@@ -1,68 +1,94 @@
-"""The paper's claims as data: quantities that our data give, and the ranges they must lie in.
+"""The paper's claims as data, and the rule by which results speak about them.
 
-Source: method.md, section 5.4; the paper's sections 4.2.2 and 4.3.3. Ranges and
-margins were written down before the trials of Experiment B were run; `sdnn.reproduction.verdicts`
-says by which rule they are judged.
+Source: method.md, section 5.4; the paper's sections 4.2.2 and 4.3.3. Ranges, margins and this rule
+were written down before the trials of Experiment B were run:
+
+- a check *holds* if the whole 95 % interval of the quantity lies in the range, *does not hold* if
+  the whole interval lies outside on one side, and is *undecided* otherwise;
+- a claim holds if all its checks hold, does not hold if one of them does not, and is undecided
+  otherwise;
+- runs smaller than the paper's (10 trials x 15,000 episodes) are not judged, nor are costs measured
+  with other settings than `CostConfig()`.
+
+What follows was added after the first 200 trials of each case had been seen, since ten trials, and
+a hundred, leave three claims undecided:
+
+- more trials of the same settings overrule fewer;
+- a claim that these leave undecided, too, is judged by how often ten of them show it, as the
+  paper's ten did (`sdnn.reproduction.chances`): it holds if 95 % of the draws or more show it, does
+  not hold if 5 % or fewer do, and is a matter of *chance* in between.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import TypeAlias
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, TypeAlias
 
-from sdnn.reproduction.cases import EXPERIMENTS
-from sdnn.runs.measures import SHARE_STABLE, MeasureName
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS
+from sdnn.reproduction.cost import CostConfig, CostRecord
 from sdnn.runs.registry import cost_series, title_of
+from sdnn.runs.results import (
+    SHARE_STABLE,
+    Estimate,
+    FloatArray,
+    MeasureName,
+    TrialMeasures,
+    estimate_contrast,
+    json_number,
+    on_equal_terms,
+)
 
-EQUAL_STEPS = 2.0
-"""Steps by which two agents that do "almost the same" may differ."""
+EQUAL_STEPS = 2.0  # by which two agents that do "almost the same" may differ
 
 
 @dataclass(frozen=True)
 class Subject:
-    """An agent in a case, by their ids."""
+    """An agent in a case, by their ids; as text, for a reader."""
 
     case_id: str
     agent: str = "sdnn-c"
 
     def __str__(self) -> str:
-        """Name of both for a reader."""
-        case = next(c for e in EXPERIMENTS for c in e.cases if c.id == self.case_id)
+        case = PAPER_CASES[self.case_id]
         noisy = "noisy " if case.noise else ""
         return f"{title_of(self.agent)}, {case.n_sensors} {noisy}inputs"
 
 
 @dataclass(frozen=True)
 class Median:
-    """The median of a measure over the trials of a subject."""
+    """The median of a measure over the trials of a subject, minus that of another one if given.
 
-    measure: MeasureName
-    subject: Subject
-
-    @property
-    def subjects(self) -> tuple[Subject, ...]:
-        """Whose trials are compared."""
-        return (self.subject,)
-
-
-@dataclass(frozen=True)
-class Difference:
-    """The median of a measure of one subject minus that of another.
-
-    Censored values count as the last episode of their trial, so a difference between late collapses
-    is rather too small than too large.
+    Censored values in a difference count as the last episode of their trial, so a difference
+    between late collapses is rather too small than too large.
     """
 
     measure: MeasureName
     subject: Subject
-    other: Subject
+    other: Subject | None = None
+
+    def __str__(self) -> str:
+        words = f"{self.measure.replace('_', ' ')}: {self.subject}"
+        if self.other is None:
+            return words
+        return f"{words} less {str(self.other).removeprefix(f'{title_of(self.subject.agent)}, ')}"
 
     @property
     def subjects(self) -> tuple[Subject, ...]:
         """Whose trials are compared."""
-        return self.subject, self.other
+        return (self.subject,) if self.other is None else (self.subject, self.other)
+
+    def samples(self, measured: Mapping[Subject, TrialMeasures]) -> tuple[FloatArray, ...]:
+        """Return the trials' values of each subject, (n_trials,)."""
+        found = [measured[subject] for subject in self.subjects]
+        return (
+            on_equal_terms(self.measure, *found) if self.other else (found[0].values[self.measure],)
+        )
 
 
 @dataclass(frozen=True)
@@ -73,8 +99,12 @@ class Growth:
     n_inputs: int
     n_fewer: int
 
+    def __str__(self) -> str:
+        title = next(series.title for _, series in cost_series() if series.id == self.series)
+        return f"time per step, {self.n_inputs} inputs / {self.n_fewer} inputs: {title}"
 
-Quantity: TypeAlias = Median | Difference | Growth
+
+Quantity: TypeAlias = Median | Growth
 
 
 @dataclass(frozen=True)
@@ -86,10 +116,18 @@ class Check:
     at_least: float = -math.inf
     at_most: float = math.inf
 
+    def contains(self, values: FloatArray) -> NDArray[np.bool_]:
+        """Return where values lie in the range."""
+        return np.asarray((values >= self.at_least) & (values <= self.at_most))
+
+    def excludes(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.bool_]:
+        """Return where whole intervals lie outside of the range on one side."""
+        return np.asarray((upper < self.at_least) | (lower > self.at_most))
+
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the paper: its number in the spec's list, its text, and what has to hold."""
+    """A claim of the paper: its number in method.md's list, its text, and what has to hold."""
 
     number: int
     text: str
@@ -109,7 +147,7 @@ def _medians(
 def _difference(
     measure: MeasureName, case: str, other: str, paper: str, **limits: float
 ) -> tuple[Check, ...]:
-    return (Check(Difference(measure, Subject(case), Subject(other)), paper, **limits),)
+    return (Check(Median(measure, Subject(case), Subject(other)), paper, **limits),)
 
 
 CLAIMS = (
@@ -183,24 +221,126 @@ CLAIMS = (
         ),
     ),
 )  # fmt: skip
-"""The paper's nine claims, by their numbers in the spec's list."""
+"""The paper's nine claims, by their numbers in method.md's list."""
 
 
-def describe(quantity: Quantity) -> str:
-    """Describe for a reader what is measured on whom.
+class Verdict(Enum):
+    """What our data say about a claim; the value is the word for a reader."""
 
-    >>> describe(Growth("rbf", 8, 4))
-    'time per step, 8 inputs / 4 inputs: RBFN, factored'
+    HOLDS = "holds"
+    FAILS = "does not hold"
+    CHANCE = "a matter of chance"
+    UNDECIDED = "undecided"
+    NOT_JUDGED = "not judged"
+    NOT_RUN = "not run"
+
+
+ALWAYS, NEVER = 0.95, 0.05
+"""Shares of draws of ten trials from which on, and up to which, a claim holds, and does not."""
+
+_DECISIVE = (Verdict.FAILS, Verdict.NOT_RUN, Verdict.NOT_JUDGED, Verdict.UNDECIDED)
+
+
+def is_paper_scale(measured: TrialMeasures) -> bool:
+    """Whether there are as many trials and episodes as in the paper: else nothing is judged."""
+    return measured.n_trials >= PAPER_TRIALS and measured.last_episode >= PAPER_EPISODES
+
+
+def verdict_of(check: Check, estimate: Estimate) -> Verdict:
+    """Judge one check by the rule of this module."""
+    ends = np.array([estimate.lower, estimate.upper])
+    if check.contains(ends).all():
+        return Verdict.HOLDS
+    return Verdict.FAILS if check.excludes(ends[:1], ends[1:]).all() else Verdict.UNDECIDED
+
+
+@dataclass(frozen=True)
+class CheckOutcome:
+    """A check with the estimate of its quantity, None where its trials were not run.
+
+    `samples` are the values that it was judged by, one array or two of a difference; censored ones
+    are cut off at `last_episode`.
     """
+
+    check: Check
+    estimate: Estimate | None
+    verdict: Verdict
+    samples: tuple[FloatArray, ...] = field(default=(), compare=False, repr=False)
+    last_episode: int = PAPER_EPISODES
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as values that JSON can hold; what is censored becomes ``">last_episode"``."""
+        return {
+            "measured": str(self.check.quantity),
+            "paper": self.check.paper,
+            "at_least": json_number(self.check.at_least, None),
+            "at_most": json_number(self.check.at_most, None),
+            "ours": self.estimate and self.estimate.to_json(self.last_episode),
+            "verdict": self.verdict.value,
+        }
+
+
+@dataclass(frozen=True)
+class ClaimOutcome:
+    """A claim with its checks' outcomes."""
+
+    claim: Claim
+    checks: tuple[CheckOutcome, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict about the whole claim, by the rule of this module."""
+        verdicts = {outcome.verdict for outcome in self.checks}
+        return next((verdict for verdict in _DECISIVE if verdict in verdicts), Verdict.HOLDS)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as values that JSON can hold."""
+        return {
+            "number": self.claim.number,
+            "text": self.claim.text,
+            "verdict": self.verdict.value,
+            "checks": [checked.to_json() for checked in self.checks],
+        }
+
+
+def judge_claims(
+    measured: Iterable[TrialMeasures], costs: Sequence[CostRecord] = ()
+) -> tuple[ClaimOutcome, ...]:
+    """Judge the claims that the given results speak about, at least in part.
+
+    A case that experiments share may come more than once.
+    """
+    by_subject = {Subject(one.case_id, one.agent): one for one in measured}
+    outcomes = (
+        ClaimOutcome(claim, tuple(_judge(check, by_subject, costs) for check in claim.checks))
+        for claim in CLAIMS
+    )
+    return tuple(o for o in outcomes if any(check.estimate is not None for check in o.checks))
+
+
+def _judge(
+    check: Check, measured: Mapping[Subject, TrialMeasures], costs: Sequence[CostRecord]
+) -> CheckOutcome:
+    quantity = check.quantity
+    samples: tuple[FloatArray, ...] = ()
+    last_episode = PAPER_EPISODES
     if isinstance(quantity, Growth):
-        titles = {series.id: series.title for _, series in cost_series()}
-        return (
-            f"time per step, {quantity.n_inputs} inputs / {quantity.n_fewer} inputs:"
-            f" {titles[quantity.series]}"
+        times = {c.n_inputs: c.microseconds for c in costs if c.series == quantity.series}
+        if not {quantity.n_inputs, quantity.n_fewer} <= times.keys():
+            return CheckOutcome(check, None, Verdict.NOT_RUN)
+        estimate = estimate_contrast(times[quantity.n_inputs], times[quantity.n_fewer], np.divide)
+        is_full = all(one.config_hash == CostConfig().config_hash for one in costs)
+    else:
+        if not measured.keys() >= set(quantity.subjects):
+            return CheckOutcome(check, None, Verdict.NOT_RUN)
+        found = [measured[subject] for subject in quantity.subjects]
+        samples = quantity.samples(measured)
+        estimate = (
+            estimate_contrast(samples[0], samples[1])
+            if quantity.other
+            else found[0].medians[quantity.measure]
         )
-    words = quantity.measure.replace("_", " ")
-    if isinstance(quantity, Difference):
-        title = title_of(quantity.subject.agent)
-        fewer = str(quantity.other).removeprefix(f"{title}, ")
-        return f"{words}: {quantity.subject} less {fewer}"
-    return f"{words}: {quantity.subject}"
+        is_full = all(map(is_paper_scale, found))
+        last_episode = min(one.last_episode for one in found)
+    verdict = verdict_of(check, estimate) if is_full else Verdict.NOT_JUDGED
+    return CheckOutcome(check, estimate, verdict, samples, last_episode)

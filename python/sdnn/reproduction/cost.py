@@ -22,8 +22,7 @@ from sdnn.runs.registry import AgentEntry, CostSeries, cost_series
 from sdnn.runs.store import ResultStore
 
 SEED = 1
-KIND = "cost"
-"""Of these measurements in a result file."""
+KIND = "cost"  # of these measurements in a result file
 
 COST_ROW_HEADER = (
     "series", "n_inputs", "round", "microseconds", "n_steps", "table_bytes", "version", "machine"
@@ -41,16 +40,13 @@ class CostKey(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class CostRecord:
-    """The cost of a series at one number of inputs: the median time of a step in each round.
-
-    `n_steps` are those of a round, `table_bytes` the memory of what the agent learns.
-    """
+    """The cost of a series at one number of inputs."""
 
     series: str
     n_inputs: int
-    microseconds: tuple[float, ...]
-    n_steps: int
-    table_bytes: int
+    microseconds: tuple[float, ...]  # median time of a step in each round
+    n_steps: int  # in a round
+    table_bytes: int  # memory of what the agent learns
     machine: str
     version: str
     config_hash: str
@@ -87,17 +83,15 @@ def load_costs(store: ResultStore, config_hash: str) -> tuple[CostRecord, ...]:
 class CostConfig:
     """How thoroughly costs are measured.
 
-    Each of `n_rounds` gives the median over its steps, at least `min_steps` of them; intervals are
-    drawn from rounds. An agent learns `n_learned` steps before the first, so it has no fresh
-    weights. Plain evaluations, seconds a step with 8 inputs, end at `most_plain_inputs`.
+    Each round gives the median over its steps; intervals are drawn from rounds.
     """
 
     n_inputs: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 8)
     n_rounds: int = 5
     round_seconds: float = 0.1
-    min_steps: int = 1
-    n_learned: int = 500
-    most_plain_inputs: int = 8
+    min_steps: int = 1  # in a round
+    n_learned: int = 500  # steps before the first round, so that no weights are fresh
+    most_plain_inputs: int = 8  # of plain evaluations, seconds a step with 8 inputs
 
     @property
     def config_hash(self) -> str:
@@ -114,7 +108,7 @@ QUICK_COST = CostConfig(n_rounds=3, round_seconds=0.01, min_steps=1, most_plain_
 
 
 def cost_keys(config: CostConfig, agents: Iterable[str] | None = None) -> tuple[CostKey, ...]:
-    """Keys of all measurements of some agents (default: all), inputs ascending in each series."""
+    """Return the keys of all measurements of some agents (default: all), series by series."""
     return tuple(
         CostKey(series.id, n_inputs, config.config_hash)
         for _, series in cost_series(agents)
@@ -135,16 +129,10 @@ def measure_costs(
         entry, series = by_id[key.series]
         measured = measure_steps(entry, series, key.n_inputs, config)
         if measured is not None:
-            microseconds, n_steps, table_bytes = measured
-            record = CostRecord(
-                **key._asdict(),
-                microseconds=microseconds,
-                n_steps=n_steps,
-                table_bytes=table_bytes,
-                machine=machine.description(),
-                version=_core.__version__,
-            )
-            store.put(KIND, repr(tuple(key)), asdict(record))
+            names = ("microseconds", "n_steps", "table_bytes")
+            made = {"machine": machine.description(), "version": _core.__version__}
+            record = key._asdict() | dict(zip(names, measured, strict=True)) | made
+            store.put(KIND, repr(tuple(key)), record)
         observer.cost_measured(f"{series.title}, {key.n_inputs} inputs")
 
 
@@ -153,15 +141,18 @@ def measure_steps(
 ) -> tuple[tuple[float, ...], int, int] | None:
     """Measure a step of an agent of the paper's sizes: acting in a new state and learning.
 
-    Returns
-    -------
-    tuple or None
-        Microseconds in each round, steps in a round, and bytes of what the agent learns; None where
-        there is no memory for the agent.
+    Returns microseconds in each round, steps in a round, and bytes of what the agent learns; None
+    where there is no memory for the agent.
     """
     approximator = entry.approximator(**(dict(series.settings) | {"n_inputs": n_inputs}))
+    given: dict[str, Any] = {"approximator": approximator, "learning": entry.learning()}
     try:
-        agent = _core_agent(entry, series, approximator)
+        if series.core_agent is not None:
+            agent = series.core_agent(**given, seed=SEED)
+        else:
+            spaces = Box(0.0, 1.0, (n_inputs,), np.float64), Box(-1.0, 1.0, (1,), np.float64)
+            made: Any = entry.agent(*spaces, **given, seed=SEED)
+            agent = made.core
     except MemoryError:
         return None
     step_seconds = float(_core.time_agent_steps(agent, 1, SEED)[0]) / 1e9
@@ -176,15 +167,3 @@ def measure_steps(
         for number in range(config.n_rounds)
     )
     return medians, n_steps, series.learned_bytes(approximator)
-
-
-def _core_agent(entry: AgentEntry, series: CostSeries, approximator: Any) -> Any:
-    learning = entry.learning()
-    if series.core_agent is not None:
-        return series.core_agent(approximator=approximator, learning=learning, seed=SEED)
-    states = Box(0.0, 1.0, (approximator.n_inputs,), np.float64)
-    actions = Box(-1.0, 1.0, (1,), np.float64)
-    agent: Any = entry.agent(
-        states, actions, approximator=approximator, learning=learning, seed=SEED
-    )
-    return agent.core

@@ -16,8 +16,7 @@ from importlib.resources import files
 import numpy as np
 
 from sdnn.reproduction.cases import PAPER_EPISODES
-from sdnn.runs.measures import STEP_MEASURES
-from sdnn.runs.results import CaseResult, TrialMeasures
+from sdnn.runs.results import STEP_MEASURES, CaseResult, TrialMeasures
 from sdnn.whole_files import csv_bytes
 
 FILE_NAME = "reference-results.csv"
@@ -64,11 +63,8 @@ def reference_csv(results: Iterable[CaseResult], root_seed: int) -> bytes:
                 f"reference results have {PAPER_EPISODES} learning episodes, those of"
                 f" {result.agent} in {result.case_id} have {result.last_episode}"
             )
-        for number, (key, digest) in enumerate(
-            (record.key, record.rows.digest()[:16]) for record in result.records
-        ):
+        names = (result.case_id, result.agent, result.config_hash, root_seed)
+        for number, record in enumerate(result.records):
             measures = (f"{result.values[name][number]:g}" for name in STEP_MEASURES)
-            rows.append(
-                (key.case_id, key.agent, key.config_hash, root_seed, key.trial, digest, *measures)
-            )
+            rows.append((*names, record.key.trial, record.rows.digest()[:16], *measures))
     return csv_bytes(HEADER, rows)

@@ -13,21 +13,26 @@ import numpy as np
 
 from sdnn import _core
 from sdnn.reproduction.cases import PAPER_EPISODES, PAPER_TRIALS, Experiment
-from sdnn.reproduction.chances import MULTIPLES, N_POWER_DRAWS, Power, powers
-from sdnn.reproduction.claims import Claim, Growth, describe
-from sdnn.reproduction.cost import CostRecord
-from sdnn.reproduction.reference_results import ReferenceResult
-from sdnn.reproduction.verdicts import (
+from sdnn.reproduction.chances import (
+    MULTIPLES,
+    N_POWER_DRAWS,
+    Power,
+    SettledClaim,
+    decide,
+    powers,
+)
+from sdnn.reproduction.claims import (
     ALWAYS,
     NEVER,
     CheckOutcome,
-    SettledClaim,
+    Claim,
+    Growth,
     Verdict,
-    decide,
     is_paper_scale,
     judge_claims,
 )
-from sdnn.runs.measures import STEP_MEASURES
+from sdnn.reproduction.cost import CostRecord
+from sdnn.reproduction.reference_results import ReferenceResult
 from sdnn.runs.registry import cost_series, title_of
 from sdnn.runs.report import (
     MEASURE_END,
@@ -40,8 +45,7 @@ from sdnn.runs.report import (
     measures_section,
     settings_section,
 )
-from sdnn.runs.results import CaseResult
-from sdnn.runs.statistics import Estimate
+from sdnn.runs.results import STEP_MEASURES, CaseResult, Estimate
 
 QUICK_WARNING = "QUICK LOOK: a fraction of the experiments, not their result."
 RULE_NOTE = (
@@ -81,33 +85,15 @@ VERDICT_KINDS = {verdict.value: kind for verdict, (kind, _) in _SHOWN.items()}
 
 @dataclass(frozen=True)
 class Report:
-    """The results of a run.
+    """The results of a run."""
 
-    Parameters
-    ----------
-    experiments
-        Those of which every trial is there, with a result for each case and agent.
-    costs
-        Measured costs; none if they were not measured.
-    quick
-        Whether this is a look at a fraction.
-    seed
-        Root of all seeds.
-    digest
-        Digest of the experiments' rows.
-    agents
-        Ids of the agents that were run instead of those of the cases; none if those were.
-    reference
-        Reference results: more trials of the same settings than were run.
-    """
-
-    experiments: tuple[tuple[Experiment, tuple[CaseResult, ...]], ...]
+    experiments: tuple[tuple[Experiment, tuple[CaseResult, ...]], ...]  # those that are complete
     costs: tuple[CostRecord, ...]
     quick: bool
-    seed: int
-    digest: str
-    agents: tuple[str, ...] = ()
-    reference: tuple[ReferenceResult, ...] = ()
+    seed: int  # root of all seeds
+    digest: str  # of the experiments' rows
+    agents: tuple[str, ...] = ()  # that were run instead of those of the cases
+    reference: tuple[ReferenceResult, ...] = ()  # more trials of the same settings
 
     @property
     def results(self) -> list[CaseResult]:
@@ -123,7 +109,7 @@ class Report:
     def powers(self) -> tuple[tuple[Claim, CheckOutcome, tuple[Power, ...]], ...]:
         """What more trials would say of the checks that the most trials leave undecided."""
         return tuple(
-            (one.claim, checked, powers(checked.check, checked.samples))
+            (one.own.claim, checked, powers(checked.check, checked.samples))
             for one in self.claims
             for checked in one.best.checks
             if checked.verdict is Verdict.UNDECIDED and checked.samples
@@ -170,7 +156,7 @@ class Report:
             yield Section(level=3, table=more, notes=[note])
         if self.powers:
             rows = [
-                (str(claim.number), describe(checked.check.quantity), format_quantity(checked),
+                (str(claim.number), str(checked.check.quantity), format_quantity(checked),
                  *(f"{100 * one.holds:.0f} / {100 * one.fails:.0f} %" for one in found))
                 for claim, checked, found in self.powers
             ]  # fmt: skip
@@ -230,7 +216,7 @@ class Report:
             "claims": [
                 {
                     **one.own.to_json(),
-                    "with_more_trials": None if one.more is None else one.more.to_json(),
+                    "with_more_trials": one.more and one.more.to_json(),
                     "ten_trials_show_it": chance_json(one.chance),
                     "decided": one.verdict.value,
                 }
@@ -239,7 +225,7 @@ class Report:
             "powers": [
                 {
                     "claim": claim.number,
-                    "measured": describe(checked.check.quantity),
+                    "measured": str(checked.check.quantity),
                     "with": [asdict(one) for one in found],
                 }
                 for claim, checked, found in self.powers
@@ -250,14 +236,13 @@ class Report:
 def _claim_table(claims: Iterable[SettledClaim]) -> Table:
     """Return the verdicts; a claim of several checks has a row of its own before theirs."""
     rows: list[tuple[str, ...]] = []
-    for claim in claims:
-        own = claim.own
+    for own in (claim.own for claim in claims):
         start: tuple[str, str] = (str(own.claim.number), own.claim.text)
         if len(own.checks) > 1:
             rows.append((*start, "", "", "", own.verdict.value))
             start = ("", "")
         for one in own.checks:
-            words = (describe(one.check.quantity), one.check.paper, format_quantity(one))
+            words = (str(one.check.quantity), one.check.paper, format_quantity(one))
             rows.append((*start, *words, one.verdict.value))
     header = ("claim", "the paper says", "measured", "paper", "ours", "verdict")
     return Table("What the paper claims, and what our data say", header, rows, VERDICT_KINDS)
@@ -269,10 +254,10 @@ def _more_table(claims: Iterable[SettledClaim]) -> Table:
     for claim in claims:
         if claim.more is None or claim.chance is None:
             continue
-        start = (str(claim.claim.number), claim.claim.text, "", "", "")
+        start = (str(claim.own.claim.number), claim.own.claim.text, "", "", "")
         rows.append((*start, claim.verdict.value, format_share(claim.chance)))
         for one in claim.more.checks:
-            words = (describe(one.check.quantity), str(min(s.size for s in one.samples)))
+            words = (str(one.check.quantity), str(min(s.size for s in one.samples)))
             rows.append(("", "", *words, format_quantity(one), one.verdict.value, ""))
     header = (
         "claim", "the paper says", "measured", "trials", "ours", "verdict", "ten trials show it"
@@ -281,30 +266,25 @@ def _more_table(claims: Iterable[SettledClaim]) -> Table:
 
 
 def _case_json(experiment: Experiment, result: CaseResult) -> dict[str, Any]:
-    case = next(case for case in experiment.cases if case.id == result.case_id)
-    names = {"case": case.id, "title": case.title, "paper_figure": case.paper_figure}
+    figure = next(c.paper_figure for c in experiment.cases if c.id == result.case_id)
+    names = {"case": result.case_id, "title": result.title, "paper_figure": figure}
     return names | result.to_json()
 
 
 def chance_json(chance: Estimate | None) -> dict[str, float | str | None] | None:
     """Return a chance as values that JSON can hold."""
-    return None if chance is None else chance.to_json(PAPER_EPISODES)
+    return chance.to_json(PAPER_EPISODES) if chance else None
 
 
 def tally(verdicts: Iterable[Verdict]) -> list[tuple[str, int, str]]:
     """Count verdicts: how the page colors each kind, how many there are, and their word.
 
-    Examples
-    --------
     >>> tally([Verdict.HOLDS, Verdict.NOT_RUN, Verdict.HOLDS, Verdict.NOT_JUDGED])
     [('good', 2, 'hold'), ('none', 2, 'not judged')]
     """
     counts = Counter(_SHOWN[verdict] for verdict in verdicts)
-    return [
-        (kind, counts[kind, word], word)
-        for kind, word in dict.fromkeys(_SHOWN.values())
-        if counts[kind, word]
-    ]
+    shown = dict.fromkeys(_SHOWN.values())
+    return [(kind, counts[kind, word], word) for kind, word in shown if counts[kind, word]]
 
 
 def format_quantity(checked: CheckOutcome) -> str:
@@ -314,7 +294,7 @@ def format_quantity(checked: CheckOutcome) -> str:
         return "-"
     if not isinstance(quantity, Growth):
         return format_estimate(estimate, quantity.measure, checked.last_episode)
-    value, lower, upper = (_growth(end) for end in vars(estimate).values())
+    value, lower, upper = map(_growth, vars(estimate).values())
     return value if math.isnan(estimate.lower) else f"{value} [{lower}, {upper}]"
 
 
@@ -324,15 +304,14 @@ def cost_table(costs: Sequence[CostRecord]) -> Table:
     series = [series for _, series in cost_series()]
     rows = []
     for n_inputs in sorted({cost.n_inputs for cost in costs}):
-        cells = [_cost(by_key, one.id, n_inputs) for one in series]
         table = by_key.get(("fuzzy", n_inputs))
         size = "-" if table is None else _scaled(table.table_bytes, _BYTES, "B")
-        rows.append((str(n_inputs), *cells, size))
+        found = [(by_key.get((s.id, n_inputs)), by_key.get((s.id, n_inputs - 1))) for s in series]
+        rows.append((str(n_inputs), *(_cost(*pair) for pair in found), size))
     return Table("Cost of a step", ("inputs", *(one.title for one in series), "FQL's table"), rows)
 
 
-def _cost(costs: Mapping[tuple[str, int], CostRecord], series: str, n_inputs: int) -> str:
-    cost, with_one_less = costs.get((series, n_inputs)), costs.get((series, n_inputs - 1))
+def _cost(cost: CostRecord | None, with_one_less: CostRecord | None) -> str:
     if cost is None:
         return "-"
     lower, middle, upper = np.percentile(cost.microseconds, (25, 50, 75))

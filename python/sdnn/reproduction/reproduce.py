@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import time
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from sdnn.config import SensorConfig
+from sdnn.reproduction import cost
 from sdnn.reproduction.cases import (
     EXPERIMENTS,
     MOST_EPISODES,
@@ -18,16 +20,7 @@ from sdnn.reproduction.cases import (
     Case,
     Experiment,
 )
-from sdnn.reproduction.cost import (
-    COST_ROW_HEADER,
-    QUICK_COST,
-    CostConfig,
-    CostKey,
-    cost_keys,
-    load_costs,
-    measure_costs,
-    round_rows,
-)
+from sdnn.reproduction.cost import CostConfig, CostKey, CostRecord
 from sdnn.reproduction.figures import draw_cost, draw_experiment
 from sdnn.reproduction.reference_results import reference_results
 from sdnn.reproduction.report import Report
@@ -35,13 +28,7 @@ from sdnn.runs.engine import Observer, run_trials
 from sdnn.runs.executor import Executor
 from sdnn.runs.figures import figure_bytes, require_matplotlib
 from sdnn.runs.planned_trial import PlannedTrial, trial_seed
-from sdnn.runs.records import (
-    ROW_HEADER,
-    TrialKey,
-    TrialRecord,
-    records_digest,
-    trial_rows,
-)
+from sdnn.runs.records import ROW_HEADER, TrialKey, TrialRecord, records_digest, trial_rows
 from sdnn.runs.registry import cost_series, label_of, split_label
 from sdnn.runs.report import Finished, describe_call, json_bytes, require_jinja
 from sdnn.runs.results import CaseResult, measure
@@ -55,14 +42,11 @@ QUICK_EPISODES = 300
 
 @dataclass(frozen=True)
 class Plan:
-    """What a request needs: its trials and costs, in order, and what its report may show.
-
-    ``experiments`` are all of them under the request's settings with the keys of their trials: the
-    report shows those whose trials are all there, asked for or not.
-    """
+    """What a request needs, in order, and what its report may show."""
 
     trials: tuple[PlannedTrial, ...]
     costs: tuple[CostKey, ...]
+    # All of them: those are shown whose trials are all stored, asked for or not.
     experiments: tuple[tuple[Experiment, tuple[TrialKey, ...]], ...]
 
 
@@ -123,14 +107,7 @@ class ReproduceRequest:
 
     @cached_property
     def n_learning_episodes(self) -> int:
-        """Learning episodes of a trial.
-
-        Raises
-        ------
-        ValueError
-            If the trials would be too short to hold a test episode, or have more than
-            `MOST_EPISODES`.
-        """
+        """Learning episodes of a trial; a ValueError if they are too few or too many."""
         n_episodes = self.n_episodes or self._defaults[1]
         if n_episodes < PAPER_INTERVAL:
             raise ValueError(
@@ -145,21 +122,20 @@ class ReproduceRequest:
     def plan(self) -> Plan:
         """What is needed: made when first asked for, and once.
 
-        Raises
-        ------
-        ValueError
-            If the trials are too short or too long, no agent has one of the ids, or only costs are
-            asked for, of agents that have none.
+        A ValueError says that the trials are too short or too long, no agent has one of the ids, or
+        only costs are asked for, of agents that have none.
         """
         by_id = {experiment.id: experiment for experiment in (*EXPERIMENTS, *self.experiments)}
-        known = [e.with_agents(self.agents).with_presets(self.presets) for e in by_id.values()]
-        cases = [case for experiment in known for case in experiment.cases]
+        known = [one.with_agents(self.agents, self.presets) for one in by_id.values()]
         planned = plan_trials(
-            cases, self.n_trials or self._defaults[0], self.seed, self.n_learning_episodes
+            [case for experiment in known for case in experiment.cases],
+            self.n_trials or self._defaults[0],
+            self.seed,
+            self.n_learning_episodes,
         )
         asked = {experiment.id for experiment in self.experiments}
         wanted = {pair for e in known if e.id in asked for pair in e.pairs}
-        costs = cost_keys(self.cost_config, self.agents or None) if self.cost else ()
+        costs = cost.cost_keys(self.cost_config, self.agents or None) if self.cost else ()
         if self.cost and not (wanted or costs):
             measured = dict.fromkeys(entry.id for entry, _ in cost_series())
             raise ValueError(
@@ -177,7 +153,7 @@ class ReproduceRequest:
     @property
     def cost_config(self) -> CostConfig:
         """How thoroughly costs are measured."""
-        return QUICK_COST if self.quick else CostConfig()
+        return cost.QUICK_COST if self.quick else CostConfig()
 
     def file_name(self, name: str) -> str:
         """Name of a file of this request, such as ``table-rbf-3-trials-quick.json``.
@@ -203,22 +179,21 @@ def count_stored(
 ) -> tuple[dict[tuple[str, str], tuple[int, int]], tuple[int, int]]:
     """Count what is planned and what of it is stored, without making any file.
 
-    Returns
-    -------
-    tuple
-        Pairs (planned, stored): of the trials of each case and agent, and of all costs.
+    Returns pairs (planned, stored): of the trials of each case and agent, and of all costs.
     """
-    keys: set[TrialKey | CostKey] = set()
+    keys: set[TrialKey] = set()
+    measured: set[CostKey] = set()
     if (request.out / STORE_NAME).exists() or request.out.is_file():
         with ResultStore(request.out, read_only=True) as store:
-            keys |= store.keys()
-            keys |= {one.key for one in load_costs(store, request.cost_config.config_hash)}
-    trials: dict[tuple[str, str], tuple[int, int]] = {}
-    for planned in request.plan.trials:
-        n_planned, n_stored = trials.get(planned.key[:2], (0, 0))
-        trials[planned.key[:2]] = (n_planned + 1, n_stored + (planned.key in keys))
+            keys = store.keys()
+            measured = {one.key for one in _costs(request, store)}
+    planned = [one.key for one in request.plan.trials]
+    all_trials, stored = (
+        Counter(key[:2] for key in found) for found in (planned, keys.intersection(planned))
+    )
+    trials = {pair: (n, stored[pair]) for pair, n in all_trials.items()}
     costs = request.plan.costs
-    return trials, (len(costs), len(keys.intersection(costs)))
+    return trials, (len(costs), len(measured.intersection(costs)))
 
 
 def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) -> Finished:
@@ -226,13 +201,6 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
 
     The files cover every experiment whose trials are all stored under the request's settings, not
     only those that were asked for now. None is written unless every trial is there.
-
-    Parameters
-    ----------
-    request
-        What to run.
-    observer
-        Receives the progress.
 
     Raises
     ------
@@ -257,7 +225,7 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
         )
         if outcome.failures or outcome.interrupted:
             return Finished(outcome)
-        measure_costs(plan.costs, request.cost_config, store, watcher)
+        cost.measure_costs(plan.costs, request.cost_config, store, watcher)
         report, records = _read(request, store)
     drawn = {
         f"experiment-{experiment.id}": draw_experiment(experiment, results, quick=request.quick)
@@ -274,7 +242,7 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
     contents["table.json"] = json_bytes(table)
     contents["results.csv"] = csv_bytes(ROW_HEADER, trial_rows(records))
     if report.costs:
-        contents["cost.csv"] = csv_bytes(COST_ROW_HEADER, round_rows(report.costs))
+        contents["cost.csv"] = csv_bytes(cost.COST_ROW_HEADER, cost.round_rows(report.costs))
     seconds = sum(record.seconds for record in records)
     call = describe_call(outcome, time.monotonic() - begin, seconds)
     contents["report.html"] = page.to_html(call).encode()
@@ -290,7 +258,6 @@ def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[
     complete = [(e, keys) for e, keys in request.plan.experiments if stored.issuperset(keys)]
     records = store.load(key for _, keys in complete for key in keys)
     shown = {series.id for _, series in cost_series(request.agents or None)}
-    costs = load_costs(store, request.cost_config.config_hash)
     experiments = tuple((e, collect(e, records)) for e, _ in complete)
     n_run = {
         (one.case_id, one.agent, one.config_hash): one.n_trials
@@ -299,7 +266,7 @@ def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[
     }
     report = Report(
         experiments=experiments,
-        costs=tuple(cost for cost in costs if cost.series in shown),
+        costs=tuple(one for one in _costs(request, store) if one.series in shown),
         quick=request.quick,
         seed=request.seed,
         digest=records_digest(records),
@@ -311,6 +278,10 @@ def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[
         ),
     )
     return report, records
+
+
+def _costs(request: ReproduceRequest, store: ResultStore) -> tuple[CostRecord, ...]:
+    return cost.load_costs(store, request.cost_config.config_hash)
 
 
 def collect(experiment: Experiment, records: Iterable[TrialRecord]) -> tuple[CaseResult, ...]:

@@ -9,17 +9,14 @@ from pathlib import Path
 
 from sdnn.reproduction.cases import PAPER_CASES, PAPER_TRIALS
 from sdnn.reproduction.chances import TenTrials
-from sdnn.reproduction.claims import Claim, describe
+from sdnn.reproduction.claims import Claim, ClaimOutcome, Verdict, judge_claims
 from sdnn.reproduction.report import RULE_NOTE, VERDICT_KINDS, chance_json, format_quantity
-from sdnn.reproduction.verdicts import ClaimOutcome, Verdict, judge_claims
 from sdnn.runs import study
-from sdnn.runs.comparison import Comparison
+from sdnn.runs.comparison import Addition, Comparison
 from sdnn.runs.report import Folded, Section, Table, format_share
-from sdnn.runs.results import CaseResult
-from sdnn.runs.statistics import Estimate
+from sdnn.runs.results import CaseResult, Estimate
 from sdnn.runs.study import Study
 from sdnn.runs.study_file import KnownCase
-from sdnn.runs.study_report import Addition
 
 MIN_TRIALS_TO_DRAW = 2 * PAPER_TRIALS
 """Fewer trials are too few to draw ten from."""
@@ -53,16 +50,11 @@ def read_study(path: Path, *, n_trials: int | None = None, seed: int | None = No
 
 @dataclass(frozen=True)
 class VariantClaim:
-    """A claim of the paper about a variant.
-
-    `moved` is whether the verdict about the reference is another one, None where there is none;
-    `chance` the share of draws of ten of its trials in which the claim is shown, None where there
-    are fewer than `MIN_TRIALS_TO_DRAW`.
-    """
+    """A claim of the paper about a variant."""
 
     outcome: ClaimOutcome
-    moved: bool | None
-    chance: Estimate | None = None
+    moved: bool | None  # whether the verdict about the reference is another; None: there is none
+    chance: Estimate | None  # share of draws of ten trials that show it; None: too few trials
 
     @property
     def verdict(self) -> str:
@@ -83,7 +75,14 @@ class StudyClaims:
     @cached_property
     def by_variant(self) -> Mapping[str, Mapping[int, VariantClaim]]:
         """Claims of which every quantity is measured, by variant and number of the claim."""
-        outcomes = {variant.id: self._outcomes(variant.id) for variant in self.comparison.variants}
+        outcomes = {
+            variant: {
+                outcome.claim.number: outcome
+                for outcome in judge_claims(results)
+                if all(checked.estimate is not None for checked in outcome.checks)
+            }
+            for variant, results in self._results.items()
+        }
         reference = self.comparison.study.reference
         of_reference = outcomes.get(reference, {})
         return {
@@ -105,79 +104,60 @@ class StudyClaims:
         found = {n: one.outcome.claim for of_one in claims for n, one in of_one.items()}
         return tuple(found[number] for number in sorted(found))
 
-    def chance_of_all(self, variant_id: str) -> Estimate | None:
-        """In which share of draws of ten trials a variant shows all claims about it together.
+    def sections(self) -> list[Section]:
+        """Return verdicts about all claims, how often ten trials show them, and the quantities."""
+        sections = []
+        titles = {variant.id: variant.title for variant in self.comparison.variants}
+        found = [
+            (variant, [claims.get(one.number) for one in self.shown])
+            for variant, claims in self.by_variant.items()
+        ]
+        header = ("variant", *(f"claim {claim.number}" for claim in self.shown))
+        if self.shown:
+            rows = [(titles[v], *(c.verdict if c else "-" for c in own)) for v, own in found]
+            overview = Table("The paper's claims", header, rows, _KINDS)
+            sections.append(Section(table=overview, notes=[CLAIMS_NOTE, RULE_NOTE]))
+        chances = [
+            (titles[v], *(format_share(c.chance if c else None) for c in own), format_share(both))
+            for v, own in found
+            if (both := self._chance(v, *(c.outcome.claim for c in own if c)))
+        ]
+        if chances:
+            title = "How often ten trials show the claims"
+            table = Table(title, (*header, "all of these"), chances)
+            sections.append(Section(level=3, table=table, notes=[CHANCES_NOTE]))
+        tables = [self._details(claim, titles) for claim in self.shown]
+        sections.append(Section(folded=[Folded(summary=one.title, table=one) for one in tables]))
+        return sections
 
-        None where there are none, or fewer than `MIN_TRIALS_TO_DRAW` trials.
-        """
-        claims = [one.outcome.claim for one in self.by_variant[variant_id].values()]
-        return self._chance(variant_id, *claims) if claims else None
-
-    def overview(self) -> Table:
-        """Return verdicts about all claims, a row for each variant."""
-        return Table(
-            "The paper's claims",
-            ("variant", *(f"claim {claim.number}" for claim in self.shown)),
-            [
-                (v.title, *(f.verdict if (f := self._found(v.id, c)) else "-" for c in self.shown))
-                for v in self.comparison.variants
-            ],
-            _KINDS,
-        )
-
-    def chances(self) -> Table:
-        """Return how often ten trials show the claims, a row for each variant that has chances."""
+    def _details(self, claim: Claim, titles: Mapping[str, str]) -> Table:
         rows = []
-        for variant in self.comparison.variants:
-            together = self.chance_of_all(variant.id)
-            if together is not None:
-                found = (self._found(variant.id, claim) for claim in self.shown)
-                ones = (format_share(one.chance if one else None) for one in found)
-                rows.append((variant.title, *ones, format_share(together)))
-        header = ("variant", *(f"claim {claim.number}" for claim in self.shown), "all of these")
-        return Table("How often ten trials show the claims", header, rows)
-
-    def details(self, claim: Claim) -> Table:
-        """Return the quantities of a claim, a row for each variant."""
-        rows = []
-        for variant in self.comparison.variants:
-            if found := self._found(variant.id, claim):
+        for variant, claims in self.by_variant.items():
+            if found := claims.get(claim.number):
                 checks = found.outcome.checks
                 cells = (f"{format_quantity(one)}: {one.verdict.value}" for one in checks)
-                rows.append((variant.title, *cells, found.verdict))
-        measured = (f"{describe(one.quantity)} (paper: {one.paper})" for one in claim.checks)
+                rows.append((titles[variant], *cells, found.verdict))
+        measured = (f"{one.quantity} (paper: {one.paper})" for one in claim.checks)
         header = ("variant", *measured, "verdict")
         return Table(f"Claim {claim.number}: {claim.text}", header, rows)
 
-    def _found(self, variant_id: str, claim: Claim) -> VariantClaim | None:
-        return self.by_variant[variant_id].get(claim.number)
-
     def _chance(self, variant_id: str, *claims: Claim) -> Estimate | None:
-        if self.comparison.study.n_trials < MIN_TRIALS_TO_DRAW:
+        if self.comparison.study.n_trials < MIN_TRIALS_TO_DRAW or not claims:
             return None
         return self._ten_trials[variant_id].chance(*claims)
 
     @cached_property
     def _ten_trials(self) -> dict[str, TenTrials]:
-        variants = self.comparison.variants
-        return {variant.id: TenTrials(self._results(variant.id)) for variant in variants}
+        return {variant: TenTrials(results) for variant, results in self._results.items()}
 
-    def _results(self, variant_id: str) -> list[CaseResult]:
-        """Return what is measured of a variant in the paper's cases."""
-        return [
-            measured.result
-            for (case, variant), measured in self.comparison.measured.items()
-            if variant == variant_id
-            and case in PAPER_CASES
-            and measured.combination.spec.environment is None
-        ]
-
-    def _outcomes(self, variant_id: str) -> dict[int, ClaimOutcome]:
-        return {
-            outcome.claim.number: outcome
-            for outcome in judge_claims(self._results(variant_id))
-            if all(checked.estimate is not None for checked in outcome.checks)
-        }
+    @cached_property
+    def _results(self) -> dict[str, list[CaseResult]]:
+        """What is measured of each variant in the paper's cases."""
+        results: dict[str, list[CaseResult]] = {v.id: [] for v in self.comparison.variants}
+        for (case, variant), measured in self.comparison.measured.items():
+            if case in PAPER_CASES and measured.combination.spec.environment is None:
+                results[variant].append(measured.result)
+        return results
 
 
 def _moved(outcome: ClaimOutcome, reference: ClaimOutcome | None) -> bool | None:
@@ -189,26 +169,14 @@ def _moved(outcome: ClaimOutcome, reference: ClaimOutcome | None) -> bool | None
 def add_claims(comparison: Comparison) -> Addition:
     """Make the addition about the paper's claims to the report of a study."""
     claims = StudyClaims(comparison)
-    sections = []
-    if claims.shown:
-        sections.append(Section(table=claims.overview(), notes=[CLAIMS_NOTE, RULE_NOTE]))
-    chances = claims.chances()
-    if chances.rows:
-        sections.append(Section(level=3, table=chances, notes=[CHANCES_NOTE]))
-    tables = map(claims.details, claims.shown)
-    sections.append(Section(folded=[Folded(summary=one.title, table=one) for one in tables]))
-    return Addition(
-        sections=sections,
-        json={
-            "claims": [
-                {
-                    "variant": variant,
-                    "moved": claim.moved,
-                    "ten_trials_show_it": chance_json(claim.chance),
-                    **claim.outcome.to_json(),
-                }
-                for variant, of_variant in claims.by_variant.items()
-                for claim in of_variant.values()
-            ]
-        },
-    )
+    told = [
+        {
+            "variant": variant,
+            "moved": claim.moved,
+            "ten_trials_show_it": chance_json(claim.chance),
+            **claim.outcome.to_json(),
+        }
+        for variant, of_variant in claims.by_variant.items()
+        for claim in of_variant.values()
+    ]
+    return Addition(sections=claims.sections(), json={"claims": told})

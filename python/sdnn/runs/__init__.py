@@ -26,14 +26,12 @@ if TYPE_CHECKING:
         WorkerLostError,
     )
     from sdnn.runs.executor import Executor, ThreadExecutor
-    from sdnn.runs.measures import MeasureConfig
     from sdnn.runs.planned_trial import PlannedTrial, trial_seed
     from sdnn.runs.records import TrialKey, TrialRecord, TrialRows
     from sdnn.runs.registry import AGENTS, AgentEntry, CostSeries, agent_entry, register
-    from sdnn.runs.results import CaseResult, measure
+    from sdnn.runs.results import CaseResult, Estimate, MeasureConfig, measure
     from sdnn.runs.run import Goal, Run, RunEvaluation, RunOutcome
     from sdnn.runs.spec import AgentSpec, BudgetSpec, OutputSpec, ProtocolSpec, RunSpec
-    from sdnn.runs.statistics import Estimate
     from sdnn.runs.store import ResultStore
     from sdnn.runs.trial import Trial
 

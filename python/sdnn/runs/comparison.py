@@ -1,22 +1,58 @@
-"""What the trials of a study say: measures of each variant, and differences from the reference."""
+"""What the trials of a study say: measures, differences from the reference, page and JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.runs.measures import RETURN_MEASURES, SHARE_STABLE, STEP_MEASURES, MeasureName
+from sdnn import _core
 from sdnn.runs.records import TrialRecord
-from sdnn.runs.results import CaseResult, measure, on_equal_terms
-from sdnn.runs.statistics import Estimate, estimate_mean
+from sdnn.runs.registry import title_of
+from sdnn.runs.report import (
+    MEASURE_END,
+    PERCENT,
+    Folded,
+    Page,
+    Section,
+    Table,
+    format_estimate,
+    measure_cells,
+    measures_section,
+    settings_section,
+)
+from sdnn.runs.results import (
+    DEFAULT_MEASURES,
+    MEASURES,
+    RETURN_MEASURES,
+    SHARE_STABLE,
+    STEP_MEASURES,
+    CaseResult,
+    Estimate,
+    MeasureName,
+    estimate_mean,
+    measure,
+    on_equal_terms,
+)
 from sdnn.runs.study import Combination, Study
 from sdnn.runs.study_file import StudyCase, StudyVariant
 
 MIN_TRIALS_TO_DIFFER = 6
 """Fewer paired trials are all on one side by chance more often than once in twenty times."""
+
+DIFFERENCE_NOTE = (
+    "Differences are paired: a trial less the reference's trial of the same number, which has the"
+    f" same seed; the mean over trials with its {PERCENT} bootstrap interval over trials, censored"
+    f" episodes as the last one. * marks intervals without 0 over at least {MIN_TRIALS_TO_DIFFER}"
+    " trials; where nothing differs, about one in twenty of them does so by chance."
+)
+SOLVED_NOTE = (
+    "end solved: trials that solve at least"
+    f" {100 * SHARE_STABLE:.0f} % of their last {DEFAULT_MEASURES.final_window} tests."
+)
 
 
 @dataclass(frozen=True)
@@ -38,11 +74,7 @@ class Measured:
         return self.combination.variant
 
     def differs(self, name: MeasureName) -> bool:
-        """Whether a measure differs from the reference's by more than chance.
-
-        That is where the interval of the difference leaves 0 out, over at least
-        `MIN_TRIALS_TO_DIFFER` trials.
-        """
+        """Whether a difference's interval leaves 0 out, over `MIN_TRIALS_TO_DIFFER` or more."""
         difference = self.differences.get(name)
         if difference is None or self.result.n_trials < MIN_TRIALS_TO_DIFFER:
             return False
@@ -96,27 +128,129 @@ def compare(study: Study, records: Iterable[TrialRecord]) -> Comparison:
             has_returns = combination.spec.environment is not None
             names = RETURN_MEASURES if has_returns else STEP_MEASURES
             results[pair] = measure(combination.case.title, [by_key[key] for key in keys], names)
-    return Comparison(
-        study,
-        {
-            (case, variant): Measured(
-                study.combinations[case, variant],
-                result,
-                {}
-                if variant == study.reference
-                else _differences(result, results.get((case, study.reference))),
-            )
-            for (case, variant), result in results.items()
-        },
+    measured = {}
+    for (case, variant), result in results.items():
+        reference = None if variant == study.reference else results.get((case, study.reference))
+        # Trials of one number have the same seed.
+        differences = {
+            name: estimate_mean(np.subtract(*on_equal_terms(name, result, reference)))
+            for name in result.values
+            if reference is not None and name in reference.values
+        }
+        combination = study.combinations[case, variant]
+        measured[case, variant] = Measured(combination, result, differences)
+    return Comparison(study, measured)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Addition:
+    """What else the results of a study say, such as about claims: for the page and the JSON."""
+
+    sections: Sequence[Section] = ()
+    json: dict[str, Any] = field(default_factory=dict)
+
+
+def study_page(comparison: Comparison, digest: str, addition: Addition, picture: bytes) -> Page:
+    """Return the page of a study, with the digest of its rows and the SVG of its figure."""
+    study = comparison.study
+    n_all, n_measured = len(study.combinations), len(comparison.measured)
+    counts = {"variant": study.variants, "case": study.cases, "trial": range(study.n_trials)}
+    variants, cases, trials = (
+        f"{len(found)} {word}{'' if len(found) == 1 else 's'}" for word, found in counts.items()
+    )
+    missing = (
+        f"Not complete: {n_all - n_measured} of {n_all} combinations of case and variant lack"
+        " trials and are left out."
+    )
+    alt = f"{study.title}: each variant in each case, trial by trial"
+    file = Folded(summary=study.file.path.name, text=study.file.text)
+    titles = (
+        (f"{m.variant.title}, {m.result.title}, {title_of(m.result.agent)}", m.result)
+        for m in comparison.measured.values()
+    )
+    return Page(
+        title=study.title,
+        intro=f"{variants} in {cases}, {trials} each; reference: {study.reference}.",
+        warnings=[missing] if n_measured < n_all else [],
+        sections=[
+            Section(title="At a glance", picture=picture, alt=alt),
+            *addition.sections,
+            *_case_sections(comparison),
+            _measures(comparison),
+            Section(title="The study", folded=[file]),
+            settings_section(titles),
+        ],
+        source=f"Study {study.file.path.name}; root seed {study.seed}; digest of the rows"
+        f" {digest[:16]}; sdnn {_core.__version__}.",
     )
 
 
-def _differences(result: CaseResult, reference: CaseResult | None) -> dict[MeasureName, Estimate]:
-    """Compare trial by trial: those of one number have the same seed."""
-    if reference is None:
-        return {}
+def _case_sections(comparison: Comparison) -> Iterator[Section]:
+    """For each case the table of measures, and that of differences if there are any."""
+    for case in comparison.cases:
+        measured = comparison.of_case(case.id)
+        names = [n for n in MEASURES if any(n in m.result.values for m in measured)]
+        words = tuple(name.replace("_", " ") for name in names)
+        end = ("end solved",) if any(m.solved_at_end is not None for m in measured) else ()
+        rows = [
+            (m.variant.title, title_of(m.result.agent), str(m.result.n_trials),
+             *(m.end_solved for _ in end), *measure_cells(m.result, names))
+            for m in measured
+        ]  # fmt: skip
+        header = ("variant", "agent", "trials", *end, *words, *MEASURE_END)
+        yield Section(table=Table(case.title, header, rows))
+        title = f"{case.title}: less {comparison.study.reference}, trial by trial"
+        compared = [m for m in measured if m.differences]
+        rows = [(m.variant.title, *(_difference(m, n) for n in names)) for m in compared]
+        if rows:
+            yield Section(level=0, table=Table(title, ("variant", *words), rows))
+
+
+def _difference(measured: Measured, name: MeasureName) -> str:
+    if name not in measured.differences:
+        return "-"
+    text = format_estimate(measured.differences[name], name, sign="+")
+    return text + (" *" if measured.differs(name) else "")
+
+
+def _measures(comparison: Comparison) -> Section:
+    """Explain the measures shown, and which variants are the same."""
+    found, study = comparison.measured.values(), comparison.study
+    copies = ((v.id, study.same_as(v.id)) for v in study.variants)
+    notes = [f"{variant} is the same as {first}." for variant, first in copies if first]
+    notes += [DIFFERENCE_NOTE] if any(m.differences for m in found) else []
+    notes += [SOLVED_NOTE] if any(m.solved_at_end is not None for m in found) else []
+    shown = {name for m in found for name in m.result.values}
+    return measures_section((name for name in MEASURES if name in shown), notes)
+
+
+def study_json(comparison: Comparison, digest: str, addition: Addition) -> dict[str, Any]:
+    """Return the results as values that JSON can hold; see `CaseResult.to_json`."""
+    study = comparison.study
     return {
-        name: estimate_mean(np.subtract(*on_equal_terms(name, result, reference)))
-        for name in result.values
-        if name in reference.values
+        "title": study.title,
+        "file": study.file.path.name,
+        "n_trials": study.n_trials,
+        "seed": study.seed,
+        "reference": study.reference,
+        "version": _core.__version__,
+        "digest": digest,
+        "cases": [{"id": case.id, "title": case.title} for case in study.cases],
+        "variants": [
+            {"id": v.id, "title": v.title, "same_as": study.same_as(v.id)} for v in study.variants
+        ],
+        "results": [
+            {
+                "case": case,
+                "variant": variant,
+                "n_end_solved": None if m.solved_at_end is None else int(m.solved_at_end.sum()),
+                **m.result.to_json(),
+                "differences": {
+                    name: estimate.to_json(m.result.last_episode)
+                    for name, estimate in m.differences.items()
+                },
+            }
+            for (case, variant), m in comparison.measured.items()
+        ],
+        **addition.json,
     }

@@ -1,8 +1,10 @@
-"""Learning curves: the numbers of runs' rows, and a figure of them."""
+"""Learning curves: which runs differ in their seeds only, the numbers of their rows, and files."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -14,11 +16,10 @@ from numpy.typing import NDArray
 from sdnn.interrupts import stay_interrupts
 from sdnn.runs.errors import RunError
 from sdnn.runs.figures import draw_curves
-from sdnn.runs.groups import Group, groups_of
 from sdnn.runs.run import Run
 from sdnn.whole_files import csv_bytes, write_whole
 
-__all__ = ["SUFFIXES", "Curve", "curves_of", "write_curves"]
+__all__ = ["SUFFIXES", "Curve", "Group", "curves_of", "groups_of", "write_curves"]
 
 WINDOW = 20
 """Episodes in the running median of the returns, or all so far where they are fewer."""
@@ -32,23 +33,103 @@ Kind: TypeAlias = Literal["return", "running median", "evaluation"]
 _Series: TypeAlias = tuple[NDArray[np.int64], NDArray[np.float64]]
 _NOTHING = "no episode and no evaluation"
 
+_CHANGES_NOTHING = ("seed", "output")  # of a configuration: may differ within a group
+_NOT_NAMED = ("0", "0.0", "none", "false", "null")  # values that a name leaves out
+
+
+@dataclass(frozen=True, kw_only=True)
+class Group:
+    """Runs that differ in their seeds only; no other group has both its task and its agent."""
+
+    task: str
+    agent: str
+    runs: tuple[Run, ...]
+
+
+def groups_of(runs: Sequence[Run]) -> list[Group]:
+    """Put runs together that differ in their seeds only, in the order of the first of each."""
+    groups: dict[tuple[tuple[str, str], ...], list[Run]] = {}
+    for run in runs:
+        values = {k: v for k, v in run.spec.full_values().items() if k not in _CHANGES_NOTHING}
+        definition = dict(_flat(values)) | {"goals": ", then ".join(_goals(run))}
+        groups.setdefault(tuple(sorted(definition.items())), []).append(run)
+    names = [_names(dict(_flat(members[0].spec.values()))) for members in groups.values()]
+    names = _told_apart(names, [dict(definition) for definition in groups])
+    names = _told_apart(names, [{"folder": str(own[0].folder)} for own in groups.values()])
+    return [
+        Group(task=task, agent=agent, runs=tuple(members))
+        for (task, agent), members in zip(names, groups.values(), strict=True)
+    ]
+
+
+def _told_apart(
+    names: Sequence[tuple[str, str]], definitions: Sequence[Mapping[str, str]]
+) -> list[tuple[str, str]]:
+    """Add the values in which they differ to the agents of equal names."""
+    counts = Counter(names)
+    found = []
+    for name, own in zip(names, definitions, strict=True):
+        others = [one for other, one in zip(names, definitions, strict=True) if other == name]
+        keys = sorted({key for one in others for key in one if one[key] != own.get(key)})
+        words = [_word(key, own[key]) for key in keys if key in own]
+        found.append((name[0], ", ".join([name[1], *words])) if counts[name] > 1 else name)
+    return found
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{name}.")
+        elif f"{prefix}{name}" not in ("budget.steps", "budget.episodes"):
+            yield f"{prefix}{name}", value if isinstance(value, str) else json.dumps(value)
+
+
+def _names(values: Mapping[str, str]) -> tuple[str, str]:
+    """Return the name of the task and that of the agent."""
+    task = [values.get("environment.id", "acrobot")]
+    agent = [" ".join(values[key] for key in ("agent.name", "agent.preset") if key in values)]
+    for key, value in values.items():
+        table, _, name = key.partition(".")
+        if table in ("environment", "acrobot", "goal", "sensors") and name != "id":
+            task += [_word(key, value)] * (value not in _NOT_NAMED)
+        if table in ("agent", "approximator", "learning") and name not in ("name", "preset"):
+            agent.append(_word(key, value))
+    return ", ".join(task), ", ".join(agent)
+
+
+def _word(key: str, value: str) -> str:
+    return value if key in ("goals", "folder") else f"{key.rpartition('.')[2]}={value}"
+
+
+def _goals(run: Run) -> list[str]:
+    """Write its goals, each after the step where it was given, if that was the user's choice."""
+    budget = run.spec.budget
+    words = [f"{budget.episodes} episodes" if budget.steps is None else f"{budget.steps} steps"]
+    due = None if budget.target_return is not None else budget.steps
+    for goal in run.goals:
+        text = f"{goal.episodes} episodes" if goal.steps is None else f"{goal.steps} steps"
+        is_early = due is not None and goal.at_step < due
+        words.append(f"from {goal.at_step} on {text}" if is_early else text)
+        due = goal.steps
+    return words
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curve:
     """Numbers against steps, arrays (n,).
 
-    They are returns of episodes, the running median of these, or evaluations: of one run, whose
-    folder is `run`, the mean, of several that differ in their seeds the median of their means.
-    `low` and `high` are quartiles over the episodes of each evaluation of one run, or over runs.
+    They are returns of episodes, the running median of these, or evaluations: of one run the mean,
+    of several that differ in their seeds the median of their means.
     """
 
     task: str
     agent: str
     kind: Kind
     n_runs: int = 1
-    run: str = ""
+    run: str = ""  # folder of the run, if it is one
     steps: NDArray[np.int64]
     values: NDArray[np.float64]
+    # Quartiles over the episodes of each evaluation of one run, or over runs.
     low: NDArray[np.float64] | None = None
     high: NDArray[np.float64] | None = None
 
@@ -63,12 +144,9 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
     RunError
         If there is nothing to draw yet, or rows cannot be read.
     """
-    curves: list[Curve] = []
-    notes: list[str] = []
-    for group in groups_of(runs):
-        made, told = _curves_of_group(group)
-        curves += made
-        notes += told
+    made = [_curves_of_group(group) for group in groups_of(runs)]
+    curves = [curve for own, _ in made for curve in own]
+    notes = [note for _, own in made for note in own]
     if not curves:
         raise RunError("; ".join(notes) + ": nothing to draw")
     return curves, notes
@@ -100,11 +178,11 @@ def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
         made = _curves_of_run(group, run, rows[run])
         return made, [] if made else [f"{run.folder}: {_NOTHING} is whole yet"]
     kind: Kind = "evaluation"
-    series = {run: _evaluations(own) for run, own in rows.items()}
+    series = {run: _series(own, "evaluation") for run, own in rows.items()}
     if not any(len(steps) for steps, _ in series.values()):
         kind = "running median"
         for run, own in rows.items():
-            steps, returns = _episodes(own)
+            steps, returns = _series(own, "episode")
             series[run] = steps, _running_median(returns)
     what = "no evaluation" if kind == "evaluation" else _NOTHING
     notes = [f"{run.folder}: {what} is whole yet" for run in series if not len(series[run][0])]
@@ -126,12 +204,12 @@ def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
 def _curves_of_run(group: Group, run: Run, rows: Sequence[Any]) -> list[Curve]:
     names: dict[str, Any] = {"task": group.task, "agent": group.agent, "run": str(run.folder)}
     curves = []
-    steps, returns = _episodes(rows)
+    steps, returns = _series(rows, "episode")
     if len(steps):
         medians = _running_median(returns)
         curves.append(Curve(**names, kind="return", steps=steps, values=returns))
         curves.append(Curve(**names, kind="running median", steps=steps, values=medians))
-    steps, means = _evaluations(rows)
+    steps, means = _series(rows, "evaluation")
     if len(steps):
         evaluations = (row["returns"] for row in rows if row["kind"] == "evaluation")
         low, high = np.array([np.percentile(one, (25, 75)) for one in evaluations]).T
@@ -151,19 +229,12 @@ def _steps_of_all(all_steps: Sequence[NDArray[np.int64]], is_grid: bool) -> NDAr
     return np.unique(steps.astype(np.int64))
 
 
-def _episodes(rows: Sequence[Any]) -> _Series:
-    own = [(row["step"], row["return"]) for row in rows if row["kind"] == "episode"]
-    return _series(own)
-
-
-def _evaluations(rows: Sequence[Any]) -> _Series:
-    own = [(row["step"], row["mean_return"]) for row in rows if row["kind"] == "evaluation"]
-    return _series(own)
-
-
-def _series(pairs: Sequence[tuple[int, float]]) -> _Series:
-    steps, values = np.array([p[0] for p in pairs], np.int64), np.array([p[1] for p in pairs])
-    return steps, values.astype(np.float64)
+def _series(rows: Sequence[Any], kind: Literal["episode", "evaluation"]) -> _Series:
+    """Return the steps and returns of rows of a kind."""
+    name = "return" if kind == "episode" else "mean_return"
+    own = [row for row in rows if row["kind"] == kind]
+    steps = np.array([row["step"] for row in own], np.int64)
+    return steps, np.array([row[name] for row in own], np.float64)
 
 
 def _running_median(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -175,7 +246,7 @@ def _csv_rows(curves: Sequence[Curve]) -> Iterable[tuple[object, ...]]:
     """Numbers of curves under `HEADER`."""
     for curve in curves:
         names = (curve.task, curve.agent, curve.kind, curve.n_runs, curve.run)
-        for place, (step, value) in enumerate(zip(curve.steps, curve.values, strict=True)):
-            low = "" if curve.low is None else repr(float(curve.low[place]))
-            high = "" if curve.high is None else repr(float(curve.high[place]))
-            yield (*names, int(step), repr(float(value)), low, high)
+        columns = (curve.values, curve.low, curve.high)
+        for place, step in enumerate(curve.steps):
+            numbers = ("" if c is None else repr(float(c[place])) for c in columns)
+            yield (*names, int(step), *numbers)

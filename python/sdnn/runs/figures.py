@@ -16,10 +16,14 @@ from numpy.typing import NDArray
 
 from sdnn.interrupts import stay_interrupts
 from sdnn.runs.errors import PlotUnavailableError
-from sdnn.runs.measures import CENSORED_MEASURES, MeasureName
 from sdnn.runs.registry import labels, title_of
-from sdnn.runs.results import CaseResult
-from sdnn.runs.statistics import estimate_mean, running_median
+from sdnn.runs.results import (
+    CENSORED_MEASURES,
+    CaseResult,
+    MeasureName,
+    estimate_mean,
+    running_median,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

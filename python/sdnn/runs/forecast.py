@@ -17,18 +17,14 @@ from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.sweep import SweepRequest
 from sdnn.runs.trial import opened
 
-PROBE_SECONDS = 0.3
-"""Processor time of a probe, about."""
+PROBE_SECONDS = 0.3  # processor time of a probe, about
 
 
 def forecast(request: SweepRequest) -> dict[str, Any]:
     """Count what is to be run and estimate how long it takes, without making any file.
 
-    Returns
-    -------
-    dict
-        Values that JSON can hold. The ``upper`` seconds are null where trials are longer than those
-        that the estimate is from: later episodes are longer where the task gets harder.
+    Returns values that JSON can hold. The ``upper`` seconds are null where trials are longer than
+    those that the estimate is from: later episodes are longer where the task gets harder.
 
     Raises
     ------
@@ -49,9 +45,8 @@ def forecast(request: SweepRequest) -> dict[str, Any]:
             stored, times = store.keys(), store.times()
     study.check(stored)
     durations = Durations(times)
-    jobs = n_cores() if request.jobs is None else request.jobs
-    if request.executor is not None:
-        jobs = 1  # a cluster, whose size is not known
+    # The size of a cluster is not known.
+    jobs = 1 if request.executor is not None else request.jobs or n_cores()
     works = []
     seconds: dict[tuple[str, str], dict[str, Any]] = {}
     for (case, variant), combination in study.combinations.items():
@@ -79,15 +74,13 @@ def forecast(request: SweepRequest) -> dict[str, Any]:
     lower = wall_seconds(
         [(one["lower"], p.spec.is_compiled) for one, p in zip(found, missing, strict=True)], jobs
     )
+    upper = None if any(one["upper"] is None for one in found) else lower
     return {
         "trials": works,
         "planned": len(plan),
         "stored": len(plan) - len(missing),
         "jobs": jobs,
-        "seconds": {
-            "lower": lower,
-            "upper": None if any(one["upper"] is None for one in found) else lower,
-        },
+        "seconds": {"lower": lower, "upper": upper},
     }
 
 
@@ -97,13 +90,11 @@ def forecast_lines(found: dict[str, Any], out: Path) -> Iterator[str]:
         text = (
             f"{one['case']} {one['variant']}: {one['planned']} trials x"
             f" {one['episodes'] or one['steps']} {'episodes' if one['episodes'] else 'steps'} of"
-            f" {one['agent']}, {one['stored']} of them"
-            f" stored in {out}"
+            f" {one['agent']}, {one['stored']} of them stored in {out}"
         )
-        seconds = one["seconds_of_a_trial"]
-        yield (
-            f"{text}; a trial takes {_words(seconds)} (by {seconds['source']})" if seconds else text
-        )
+        if seconds := one["seconds_of_a_trial"]:
+            text += f"; a trial takes {_words(seconds)} (by {seconds['source']})"
+        yield text
     yield (
         f"in all {found['planned']} trials, {found['stored']} of them stored; the rest takes"
         f" {_words(found['seconds'])} with {found['jobs']} at the same time"
@@ -117,15 +108,10 @@ def _words(seconds: dict[str, Any]) -> str:
 
 
 class Durations:
-    """Estimates the processor time of trials.
+    """Estimates the processor time of trials from those of stored ones.
 
     Trials of the same configuration count first, then those of the same case and agent, of these
     the ones that are long enough. If there are none, a trial is begun.
-
-    Parameters
-    ----------
-    times
-        Of stored trials.
     """
 
     def __init__(self, times: Iterable[TrialTime]) -> None:
@@ -146,17 +132,14 @@ class Durations:
             if key[:2] not in self._probes:
                 self._probes[key[:2]] = _probe(key, spec)
             found, source = [self._probes[key[:2]]], "a probe"
-        seconds = sum(t.seconds for t in found) / sum(_amount(t, spec) for t in found) * spec.length
+        in_steps = spec.budget.steps is not None
+        amount = sum(t.n_decisions if in_steps else t.n_episodes for t in found)
+        seconds = sum(t.seconds for t in found) / amount * spec.length
         shortest = min(t.n_episodes for t in found)
         if shortest < last_test:
             source += f": as in the first {shortest} episodes"
         upper = seconds if shortest >= last_test else None
         return {"lower": seconds, "upper": upper, "source": source}
-
-
-def _amount(trial: TrialTime, spec: RunSpec) -> int:
-    """Return the episodes of a trial, or its decisions if the budget is in steps."""
-    return trial.n_episodes if spec.budget.steps is None else trial.n_decisions
 
 
 def _probe(key: TrialKey, spec: RunSpec) -> TrialTime:
@@ -170,16 +153,15 @@ def _probe(key: TrialKey, spec: RunSpec) -> TrialTime:
                 seconds = time.thread_time() - begin
             n_episodes, n_decisions = int(trial.episode), int(trial.n_decisions)
     except Exception as error:  # whatever a trial raises
-        message = f"{type(error).__name__}: {error}"
-        raise RunError(f"{describe(key)} fails: {message}") from error
+        raise RunError(f"{describe(key)} fails: {type(error).__name__}: {error}") from error
     return TrialTime(key=key, seconds=seconds, n_episodes=n_episodes, n_decisions=n_decisions)
 
 
 def wall_seconds(trials: list[tuple[float, bool]], jobs: int) -> float:
-    """Estimate the time that passes while trials run.
+    """Estimate the time that passes while trials run, from processor times and who is compiled.
 
-    Each has a processor time and is compiled or not. Those that are not share one core however many
-    jobs there are, because they hold Python's lock; no more jobs than cores are any help.
+    Those that are not share one core however many jobs there are, because they hold Python's lock;
+    no more jobs than cores are any help.
     """
     times = [seconds for seconds, _ in trials]
     locked = [seconds for seconds, is_compiled in trials if not is_compiled]

@@ -19,9 +19,14 @@ import numpy as np
 from sdnn import machine
 from sdnn.runs.engine import RunOutcome
 from sdnn.runs.errors import PlotUnavailableError
-from sdnn.runs.measures import MEASURES, RETURN_MEASURES, MeasureName
-from sdnn.runs.results import CaseResult
-from sdnn.runs.statistics import DEFAULT_BOOTSTRAP, Estimate
+from sdnn.runs.results import (
+    DEFAULT_BOOTSTRAP,
+    MEASURES,
+    RETURN_MEASURES,
+    CaseResult,
+    Estimate,
+    MeasureName,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -37,15 +42,12 @@ MEASURE_END = ("decisions", "us/decision")
 
 @dataclass(frozen=True)
 class Table:
-    """A table of texts.
-
-    ``kinds`` says how a page colors a cell of some text: as good, bad, open or none.
-    """
+    """A table of texts."""
 
     title: str
     header: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
-    kinds: Mapping[str, str] = field(default_factory=dict)
+    kinds: Mapping[str, str] = field(default_factory=dict)  # color of a text: good, bad, open, none
 
     def to_markdown(self) -> str:
         """Write header and rows as lines of Markdown."""
@@ -179,11 +181,10 @@ def require_jinja() -> None:
 def describe_call(outcome: RunOutcome, seconds: float, processor_seconds: float) -> str:
     """Write how a page came about: wall time of the call, processor time of all trials shown."""
     text = f"Processor time of the trials shown: {duration_words(processor_seconds)}."
-    if outcome.n_run < outcome.n_planned:
-        text += (
-            f" {outcome.n_planned - outcome.n_run} of {outcome.n_planned} trials were stored"
-            " before the call that made this page."
-        )
+    n_stored = outcome.n_planned - outcome.n_run
+    if n_stored > 0:
+        text += f" {n_stored} of {outcome.n_planned} trials were stored before the call that made"
+        text += " this page."
     else:
         text = f"Everything asked for was run in {duration_words(seconds)}. {text}"
     return f"{text} Made on {machine.description()}."
@@ -217,16 +218,9 @@ def settings_section(results: Iterable[tuple[str, CaseResult]]) -> Section:
 
 def measure_cells(result: CaseResult, names: Iterable[MeasureName]) -> tuple[str, ...]:
     """Write the medians of measures, then `MEASURE_END`; what a result lacks is ``"-"``."""
-    return (
-        *(
-            format_estimate(result.medians[name], name, result.last_episode)
-            if name in result.values
-            else "-"
-            for name in names
-        ),
-        f"{result.n_decisions:,}",
-        f"{result.microseconds_per_decision:.1f}",
-    )
+    medians, last = result.medians, result.last_episode
+    cells = (format_estimate(medians[n], n, last) if n in medians else "-" for n in names)
+    return *cells, f"{result.n_decisions:,}", f"{result.microseconds_per_decision:.1f}"
 
 
 def format_estimate(
@@ -234,8 +228,6 @@ def format_estimate(
 ) -> str:
     """Write an estimate with its interval; what is censored becomes ``>last_episode``.
 
-    Examples
-    --------
     >>> format_estimate(Estimate(120.0, 90.0, math.inf), "episodes_to_learn", 15000)
     '120 [90, >15000]'
     >>> format_estimate(Estimate(0.9, 0.8, 1.0), "final_share_solved")
@@ -261,8 +253,6 @@ def format_estimate(
 def format_share(estimate: Estimate | None) -> str:
     """Write a share with its interval; None is ``"-"``.
 
-    Examples
-    --------
     >>> format_share(Estimate(0.479, 0.26, 0.712))
     '47.9 % [26, 71.2]'
     """
@@ -282,8 +272,6 @@ def decimals_of(estimate: Estimate, measure: MeasureName) -> int:
 def plain_number(value: float, decimals: int, sign: str = "") -> str:
     """Write a number with so many decimals at most.
 
-    Examples
-    --------
     >>> plain_number(2.50, 2), plain_number(-0.01, 1), plain_number(0.25, 2, sign="+")
     ('2.5', '0', '+0.25')
     """
@@ -295,8 +283,6 @@ def plain_number(value: float, decimals: int, sign: str = "") -> str:
 def duration_words(seconds: float) -> str:
     """Write a time for a reader.
 
-    Examples
-    --------
     >>> duration_words(61.4), duration_words(3661.4)
     ('1 min 1 s', '1 h 1 min')
     """

@@ -1,40 +1,367 @@
-"""Trials of an agent in a case, and what is measured on them."""
+"""What is measured on the trials of an agent in a case, and statistics over trials.
+
+Measures give a number for each trial, from its test episodes alone. They were fixed before the data
+of the noisy cases were seen. Their arrays hold one value per test episode, (n_tests,): ``episode``
+the learning episodes done before it, ``steps`` its steps, ``solved`` whether it reached the goal,
+``episode_return`` its sum of rewards.
+
+The spread that matters is the one between trials, so every interval is a percentile bootstrap over
+whole trials. Each call draws from a generator of its own with a fixed seed: an interval depends on
+the values alone. Its ends are values of the bootstrap distribution, never interpolated, so
+censored, infinite trials are allowed.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import ArrayLike, NDArray
 
-from sdnn.runs.measures import (
-    CENSORED_MEASURES,
-    DEFAULT_MEASURES,
-    MEASURES,
-    STEP_MEASURES,
-    MeasureConfig,
-    MeasureName,
-    episodes_to_learn,
-)
-from sdnn.runs.records import TrialRecord
-from sdnn.runs.statistics import Estimate, FloatArray, estimate_median, json_number
+from sdnn.arguments import real, whole
+from sdnn.runs.records import TrialRecord, TrialRows
+
+FloatArray = NDArray[np.float64]
+
+MeasureName = Literal[
+    "episodes_to_learn",
+    "early_steps",
+    "episode_of_collapse",
+    "final_steps",
+    "final_share_solved",
+    "final_return",
+    "mean_return",
+]
+
+SHARE_STABLE = 0.9
+"""Share of test episodes that an agent must solve at the end to be called stable."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasureConfig:
+    """Constants of the measures.
+
+    A test episode of at most `good_steps` is good: the paper's "within 10 steps". The median of
+    `learned_window` consecutive tests must be good for the task to count as learned, and of
+    `stable_window` as mastered. `early_episodes` are a third of the way to the paper's 7,500.
+    """
+
+    good_steps: float = 10.0
+    learned_window: int = 10
+    early_episodes: int = 2_500
+    stable_window: int = 50
+    final_window: int = 50
+
+    def __post_init__(self) -> None:
+        if math.isnan(real("good_steps", self.good_steps)):
+            raise ValueError(f"good_steps must be a number, got {self.good_steps!r}")
+        whole("early_episodes", self.early_episodes, 0, 2**62)
+        for name in ("learned_window", "stable_window", "final_window"):
+            whole(name, getattr(self, name), 1, 2**62)
+
+
+DEFAULT_MEASURES = MeasureConfig()
+
+
+def episodes_to_learn(
+    episode: ArrayLike, steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES
+) -> float:
+    """Return the learning episodes until the task is learned; infinite if it never is (censored).
+
+    The task is learned at the first test episode that (1) takes at most `good_steps` steps
+    and (2) begins `learned_window` consecutive test episodes whose median is at most
+    `good_steps`. The result is the number of learning episodes done before that test.
+
+    (1) keeps failed tests just before the first good one from counting as learned already;
+    (2) keeps a single lucky test from counting. A later relapse does not undo learning. A window
+    that the trial's end cuts off does not count.
+
+    >>> episode = 10 * np.arange(1, 13)
+    >>> episodes_to_learn(episode, [50, 50] + 10 * [7])
+    30.0
+    >>> episodes_to_learn(episode, 12 * [50])
+    inf
+    """
+    medians = _medians_of_windows(steps, config.learned_window)
+    first = np.asarray(steps, np.float64)[: medians.size]
+    good = (medians <= config.good_steps) & (first <= config.good_steps)
+    return float(np.asarray(episode)[int(np.argmax(good))]) if good.any() else math.inf
+
+
+def early_steps(
+    episode: ArrayLike, steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES
+) -> float:
+    """Return the median steps of the tests after at most `early_episodes` learning episodes.
+
+    >>> early_steps([1000, 2000, 3000], [4, 6, 50])
+    5.0
+    """
+    early = np.asarray(episode) <= config.early_episodes
+    return float(np.median(np.asarray(steps, np.float64)[early]))
+
+
+def episode_of_collapse(
+    episode: ArrayLike, steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES
+) -> float:
+    """Return the learning episodes after which the task is not mastered any more.
+
+    The task is mastered in every run of `stable_window` consecutive test episodes whose median is
+    at most `good_steps`. The result is the number of learning episodes done before the last test of
+    the last such run. It is infinite (censored) if that is the trial's last test: the trial ended
+    before a collapse. It is 0 if there is no such run: there was nothing to collapse; NaN if there
+    are fewer tests than in a run. Relapses from which the agent recovers do not count.
+
+    >>> episode = 10 * np.arange(1, 201)
+    >>> episode_of_collapse(episode, 100 * [4] + 100 * [50])
+    1240.0
+    >>> episode_of_collapse(episode, 100 * [50] + 100 * [4])
+    inf
+    >>> episode_of_collapse(episode, 200 * [50])
+    0.0
+    """
+    mastered = _medians_of_windows(steps, config.stable_window) <= config.good_steps
+    if not mastered.any():
+        return 0.0 if mastered.size else math.nan
+    last = int(np.flatnonzero(mastered)[-1])
+    if last == mastered.size - 1:
+        return math.inf
+    return float(np.asarray(episode)[last + config.stable_window - 1])
+
+
+def final_steps(steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES) -> float:
+    """Return the median steps of the last `final_window` tests, or of all if there are fewer.
+
+    >>> final_steps(100 * [50] + 50 * [4])
+    4.0
+    """
+    return float(np.median(np.asarray(steps, np.float64)[-config.final_window :]))
+
+
+def final_share_solved(solved: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES) -> float:
+    """Return the share solved of the last `final_window` tests, or of all if there are fewer.
+
+    >>> final_share_solved([False, True, True, True])
+    0.75
+    """
+    return float(np.mean(np.asarray(solved, np.float64)[-config.final_window :]))
+
+
+def final_return(episode_return: ArrayLike) -> float:
+    """Return the mean return of the last tenth of the test episodes, at least of one.
+
+    >>> final_return(18 * [-20.0] + [8.0, 9.0])
+    8.5
+    """
+    returns = np.asarray(episode_return, np.float64)
+    return float(np.mean(returns[-max(1, returns.size // 10) :]))
+
+
+def mean_return(episode_return: ArrayLike) -> float:
+    """Return the mean return of all test episodes: the area under the learning curve, per episode.
+
+    >>> mean_return([-20.0, 8.0])
+    -6.0
+    """
+    return float(np.mean(np.asarray(episode_return, np.float64)))
+
+
+def _medians_of_windows(steps: ArrayLike, window: int) -> FloatArray:
+    """Return the medians of all runs of tests, (n_tests - window + 1,), or (0,)."""
+    taken = np.asarray(steps, np.float64)
+    if taken.size < window:
+        return np.empty(0)
+    return np.asarray(np.median(sliding_window_view(taken, window), axis=1))
+
+
+_GOOD = f"{DEFAULT_MEASURES.good_steps:g}"
+
+MEASURES: dict[MeasureName, tuple[str, Callable[[TrialRows, MeasureConfig], float]]] = {
+    "episodes_to_learn": (
+        f"learning episodes before the first test of at most {_GOOD} steps that begins"
+        f" {DEFAULT_MEASURES.learned_window} tests in a row with a median of at most {_GOOD}",
+        lambda rows, config: episodes_to_learn(rows.episode, rows.steps, config),
+    ),
+    "early_steps": (
+        "median steps of the tests in the first"
+        f" {DEFAULT_MEASURES.early_episodes:,} learning episodes",
+        lambda rows, config: early_steps(rows.episode, rows.steps, config),
+    ),
+    "episode_of_collapse": (
+        f"learning episodes before the end of the last {DEFAULT_MEASURES.stable_window} tests in a"
+        f" row with a median of at most {_GOOD} steps: until then the agent can do the task;"
+        " censored (> the last episode) if it still can at the end",
+        lambda rows, config: episode_of_collapse(rows.episode, rows.steps, config),
+    ),
+    "final_steps": (
+        f"median steps of the last {DEFAULT_MEASURES.final_window} tests",
+        lambda rows, config: final_steps(rows.steps, config),
+    ),
+    "final_share_solved": (
+        f"share of the last {DEFAULT_MEASURES.final_window} tests that reach the goal",
+        lambda rows, config: final_share_solved(rows.solved, config),
+    ),
+    "final_return": (
+        "mean return of the last tenth of the tests",
+        lambda rows, _: final_return(rows.episode_return),
+    ),
+    "mean_return": (
+        "mean return of all tests: the area under the learning curve",
+        lambda rows, _: mean_return(rows.episode_return),
+    ),
+}
+"""What each measure means, for a reader, and how it is taken from the rows of a trial."""
+
+RETURN_MEASURES: tuple[MeasureName, ...] = ("final_return", "mean_return")
+"""Of any task."""
+
+STEP_MEASURES: tuple[MeasureName, ...] = tuple(n for n in MEASURES if n not in RETURN_MEASURES)
+"""Of tasks that are to be solved in few steps, as the acrobot's."""
+
+CENSORED_MEASURES: tuple[MeasureName, ...] = ("episodes_to_learn", "episode_of_collapse")
+"""Of which it may only be known that they are beyond the last episode: then they are infinite."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BootstrapConfig:
+    """Share of the distribution inside an interval, number of resamples, and their seed."""
+
+    confidence: float = 0.95
+    n_resamples: int = 10_000
+    seed: int = 2015
+
+
+DEFAULT_BOOTSTRAP = BootstrapConfig()
+
+
+def json_number(value: float, last_episode: int | None) -> float | str | None:
+    """Return a number as JSON can hold it: NaN is null, infinity ``">last_episode"`` or null.
+
+    >>> json_number(math.inf, 15000)
+    '>15000'
+    """
+    if math.isnan(value) or (math.isinf(value) and last_episode is None):
+        return None
+    return f">{last_episode}" if math.isinf(value) else value
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A statistic over trials, infinite where it is censored, with its interval.
+
+    The ends are NaN where there are fewer than two trials.
+    """
+
+    value: float
+    lower: float
+    upper: float
+
+    def to_json(self, last_episode: int) -> dict[str, float | str | None]:
+        """Return it as values that JSON can hold; what is censored is ``">last_episode"``."""
+        return {name: json_number(value, last_episode) for name, value in vars(self).items()}
+
+
+def running_median(values: ArrayLike, window: int) -> FloatArray:
+    """Return the median of each value with its neighbours, fewer at both ends; the window is odd.
+
+    >>> running_median([1, 9, 2, 3, 8], 3)
+    array([5. , 2. , 3. , 3. , 5.5])
+    """
+    padded = np.pad(np.asarray(values, np.float64), window // 2, constant_values=np.nan)
+    return np.asarray(np.nanmedian(sliding_window_view(padded, window), axis=1))
+
+
+def estimate_median(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTRAP) -> Estimate:
+    """Return the median of the values of trials, (n_trials,), with its interval.
+
+    >>> estimate_median([4.0, 4.0, 4.0])
+    Estimate(value=4.0, lower=4.0, upper=4.0)
+    """
+    return _estimate(_median, (values,), config)
+
+
+def estimate_mean(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTRAP) -> Estimate:
+    """Return the mean of the values of trials, (n_trials,), with its interval; NaN gives NaN.
+
+    A ValueError says that there are no values or an infinite one.
+
+    >>> estimate_mean([3.0, 3.0])
+    Estimate(value=3.0, lower=3.0, upper=3.0)
+    """
+    _check_finite("averaged", values)
+    return _estimate(lambda sample: np.asarray(np.mean(sample, axis=-1)), (values,), config)
+
+
+def estimate_contrast(
+    values: ArrayLike,
+    others: ArrayLike,
+    contrast: Callable[[FloatArray, FloatArray], FloatArray] = np.subtract,
+    config: BootstrapConfig = DEFAULT_BOOTSTRAP,
+) -> Estimate:
+    """Compare the medians of two groups of trials; each group is resampled by itself.
+
+    NaN gives NaN; a ValueError says that a group has no values or an infinite one.
+
+    >>> estimate_contrast([7.0, 7.0], [4.0, 4.0, 4.0])
+    Estimate(value=3.0, lower=3.0, upper=3.0)
+    """
+    _check_finite("compared", values, others)
+    return _estimate(
+        lambda first, second: contrast(_median(first), _median(second)), (values, others), config
+    )
+
+
+def tails(distribution: FloatArray, confidence: float) -> FloatArray:
+    """Return the ends of the middle part of distributions over the last axis, values of theirs.
+
+    >>> tails(np.arange(101.0), 0.9)
+    array([ 5., 95.])
+    """
+    tail = (1 - confidence) / 2
+    ends = np.quantile(distribution, (tail, 1 - tail), axis=-1, method="inverted_cdf")
+    return np.asarray(ends, np.float64)
+
+
+def _estimate(
+    statistic: Callable[..., FloatArray], groups: tuple[ArrayLike, ...], config: BootstrapConfig
+) -> Estimate:
+    samples = [np.asarray(values, np.float64) for values in groups]
+    for sample in samples:
+        if sample.ndim != 1 or sample.size == 0:
+            raise ValueError(f"values must be one per trial, got shape {sample.shape}")
+    value = float(statistic(*samples))
+    if min(sample.size for sample in samples) == 1:
+        return Estimate(value, math.nan, math.nan)
+    generator = np.random.default_rng(config.seed)
+    drawn = [
+        sample[generator.integers(sample.size, size=(config.n_resamples, sample.size))]
+        for sample in samples
+    ]
+    lower, upper = tails(statistic(*drawn), config.confidence)
+    return Estimate(value, float(lower), float(upper))
+
+
+def _median(values: FloatArray) -> FloatArray:
+    return np.asarray(np.median(values, axis=-1))
+
+
+def _check_finite(done: str, *groups: ArrayLike) -> None:
+    if any(np.isinf(np.asarray(values, np.float64)).any() for values in groups):
+        raise ValueError(f"{done} values must not be infinite; cap censored ones first")
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrialMeasures:
-    """Measures of the trials of an agent in a case, whether or not their rows are at hand.
-
-    `last_episode` are the learning episodes of a trial; `values` are arrays (n_trials,).
-    """
+    """Measures of the trials of an agent in a case, whether or not their rows are at hand."""
 
     case_id: str
     agent: str
-    last_episode: int
-    values: dict[MeasureName, FloatArray]
+    last_episode: int  # learning episodes of a trial
+    values: dict[MeasureName, FloatArray]  # arrays (n_trials,)
 
     @property
     def n_trials(self) -> int:
@@ -127,10 +454,7 @@ def measure(
 ) -> CaseResult:
     """Measure the trials of an agent in a case of some title.
 
-    Raises
-    ------
-    ValueError
-        If there are no trials, or they were run under different settings.
+    A ValueError says that there are no trials, or that their settings differ.
     """
     settings = {(r.key.case_id, r.key.agent, r.key.config_hash) for r in records}
     if len(settings) != 1:

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 
 from sdnn import _core
-from sdnn.runs.comparison import Comparison, compare
+from sdnn.runs.comparison import Addition, Comparison, compare, study_json, study_page
 from sdnn.runs.engine import Observer, run_trials
 from sdnn.runs.executor import Executor
 from sdnn.runs.figures import draw_study, figure_bytes, require_matplotlib
@@ -18,7 +18,6 @@ from sdnn.runs.records import ROW_HEADER, records_digest, trial_rows
 from sdnn.runs.report import Finished, describe_call, json_bytes, require_jinja
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study import Study
-from sdnn.runs.study_report import Addition, study_json, study_page
 from sdnn.whole_files import csv_pieces, gzip_pieces, remove_abandoned_files, write_whole
 
 
@@ -61,13 +60,6 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Finishe
     A variant in a case is complete when all its trials are stored, whether asked for now or not. A
     trial that raises leaves its variant out of the report and nothing else. There is no report if
     nothing is complete, or the run was interrupted.
-
-    Parameters
-    ----------
-    request
-        What to run.
-    observer
-        Receives the progress.
 
     Raises
     ------
@@ -113,26 +105,25 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Finishe
     table = study_json(comparison, digest, addition)
     seconds = sum(record.seconds for record in shown)
     call = describe_call(outcome, time.monotonic() - begin, seconds)
+    # Test episodes of variants that are the same come more than once.
+    tests = (
+        (variant, *row)
+        for (_, variant), measured in comparison.measured.items()
+        for row in trial_rows(measured.result.records)
+    )
     contents: dict[str, bytes | Iterator[bytes]] = {
         "figure.png": png,
         "figure.svg": svg,
         "results.md": page.to_markdown().encode(),
         "table.json": json_bytes(table),
         "trials.csv": csv_pieces(*_trial_table(comparison)),
-        "results.csv.gz": gzip_pieces(csv_pieces(("variant", *ROW_HEADER), _test_rows(comparison))),
+        "results.csv.gz": gzip_pieces(csv_pieces(("variant", *ROW_HEADER), tests)),
         "report.html": page.to_html(call).encode(),
     }
     files = {request.out / f"{study.file.path.stem}-{end}": c for end, c in contents.items()}
     for path, content in files.items():
         write_whole(path, content)
     return Finished(outcome, page, tuple(files), table)
-
-
-def _test_rows(comparison: Comparison) -> Iterator[tuple[object, ...]]:
-    """All test episodes, of variants that are the same more than once."""
-    for (_, variant), measured in comparison.measured.items():
-        for row in trial_rows(measured.result.records):
-            yield (variant, *row)
 
 
 def _trial_table(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
@@ -143,14 +134,12 @@ def _trial_table(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[ob
         "case", "variant", "agent", "trial", "seed", "config_hash", "version", *names, "decisions",
         "seconds",
     )  # fmt: skip
-    rows: list[tuple[object, ...]] = []
-    for (case, variant), measured in found:
-        values = measured.result.values
-        for n, record in enumerate(measured.result.records):
-            key = record.key
-            rows.append(
-                (case, variant, key.agent, key.trial, key.seed, key.config_hash, record.version,
-                 *(values[name][n] if name in values else "" for name in names),
-                 record.n_decisions, round(record.seconds, 3))
-            )  # fmt: skip
+    rows: list[tuple[object, ...]] = [
+        (case, variant, r.key.agent, r.key.trial, r.key.seed, r.key.config_hash, r.version,
+         *(values[name][n] if name in values else "" for name in names),
+         r.n_decisions, round(r.seconds, 3))
+        for (case, variant), measured in found
+        for values in [measured.result.values]
+        for n, r in enumerate(measured.result.records)
+    ]  # fmt: skip
     return header, rows

@@ -9,26 +9,22 @@ from sdnn.reproduction.chances import MULTIPLES, Power, drawn_medians, powers
 from sdnn.reproduction.claims import (
     CLAIMS,
     Check,
+    CheckOutcome,
     Claim,
-    Difference,
+    ClaimOutcome,
     Growth,
     Median,
     Subject,
-    describe,
-)
-from sdnn.reproduction.cost import QUICK_COST, CostConfig, CostRecord
-from sdnn.reproduction.report import POWER_NOTE, Report
-from sdnn.reproduction.verdicts import (
-    CheckOutcome,
-    ClaimOutcome,
     Verdict,
     is_paper_scale,
     judge_claims,
     verdict_of,
 )
+from sdnn.reproduction.cost import QUICK_COST, CostConfig, CostRecord
+from sdnn.reproduction.report import POWER_NOTE, Report
 from sdnn.runs import Estimate, TrialKey, TrialRecord, TrialRows, measure
 from sdnn.runs.registry import cost_series
-from sdnn.runs.statistics import estimate_contrast, estimate_median
+from sdnn.runs.results import estimate_contrast, estimate_median
 
 PICTURES = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}
 CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
@@ -120,7 +116,7 @@ def test_the_claims_are_the_nine_of_the_paper_and_know_their_subjects():
         for name in ("subject", "other"):
             subject = getattr(quantity, name, None)
             assert subject is None or (subject.case_id, subject.agent) in planned
-        assert describe(quantity)
+        assert str(quantity)
         assert check.at_least > -math.inf or check.at_most < math.inf
 
 
@@ -254,9 +250,9 @@ def test_growth_is_a_ratio_of_medians():
 
 
 def test_descriptions_name_both_sides():
-    quantity = Difference("final_steps", Subject("s6-noise"), Subject("s4"))
-    assert describe(quantity) == "final steps: SDNN-C, 6 noisy inputs less 4 inputs"
-    assert describe(Median("early_steps", Subject("s4", "fuzzy"))) == "early steps: FQL, 4 inputs"
+    quantity = Median("final_steps", Subject("s6-noise"), Subject("s4"))
+    assert str(quantity) == "final steps: SDNN-C, 6 noisy inputs less 4 inputs"
+    assert str(Median("early_steps", Subject("s4", "fuzzy"))) == "early steps: FQL, 4 inputs"
 
 
 def test_summaries_do_not_mix_measures():

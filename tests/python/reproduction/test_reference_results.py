@@ -14,8 +14,20 @@ from sdnn.reproduction import (
     select_experiments,
 )
 from sdnn.reproduction.cases import PAPER_EPISODES
-from sdnn.reproduction.chances import TenTrials
-from sdnn.reproduction.claims import CLAIMS, Check, Claim, Difference, Growth, Median, Subject
+from sdnn.reproduction.chances import SettledClaim, TenTrials, decide
+from sdnn.reproduction.claims import (
+    CLAIMS,
+    Check,
+    CheckOutcome,
+    Claim,
+    ClaimOutcome,
+    Growth,
+    Median,
+    Subject,
+    Verdict,
+    is_paper_scale,
+    judge_claims,
+)
 from sdnn.reproduction.reference_results import (
     HEADER,
     ReferenceResult,
@@ -24,18 +36,8 @@ from sdnn.reproduction.reference_results import (
 )
 from sdnn.reproduction.report import Report
 from sdnn.reproduction.reproduce import reproduce
-from sdnn.reproduction.verdicts import (
-    CheckOutcome,
-    ClaimOutcome,
-    SettledClaim,
-    Verdict,
-    decide,
-    is_paper_scale,
-    judge_claims,
-)
 from sdnn.runs import Estimate, ResultStore, measure, run_trials
-from sdnn.runs.measures import STEP_MEASURES
-from sdnn.runs.results import TrialMeasures
+from sdnn.runs.results import STEP_MEASURES, TrialMeasures
 
 CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
 
@@ -97,7 +99,7 @@ def test_chances_of_differences_count_censored_values_as_the_last_episode():
 
 
 def test_chances_need_trials_of_every_subject():
-    difference = Difference("final_steps", Subject("s6-noise"), Subject("s4"))
+    difference = Median("final_steps", Subject("s6-noise"), Subject("s4"))
     claim = Claim(7, "", (Check(difference, "", at_most=2),))
     assert TenTrials([measured("s4", [4, 4])]).chance(claim) is None
     growth = Claim(9, "", (Check(Growth("rbf", 8, 4), "", at_least=16),))
@@ -138,7 +140,7 @@ def test_claims_are_settled_by_trials_of_all_their_subjects():
     outcomes = judge_claims(ran, ())
     assert next(o for o in outcomes if o.claim.number == 2).verdict == Verdict.UNDECIDED
     kept = [measured("s4", [4] * 15 + [50] * 5), measured("s6", [4] * 20)]
-    settled = {one.claim.number: one for one in decide(outcomes, kept)}
+    settled = {one.own.claim.number: one for one in decide(outcomes, kept)}
     assert settled[2].more.checks[0].estimate.value == 4
     assert settled[2].verdict == Verdict.HOLDS
     assert settled[8].more is None  # the noisy cases are missing

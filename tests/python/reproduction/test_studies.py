@@ -6,14 +6,13 @@ import math
 import numpy as np
 import pytest
 
+from sdnn.reproduction.claims import Verdict
 from sdnn.reproduction.studies import StudyClaims, add_claims
-from sdnn.reproduction.verdicts import Verdict
-from sdnn.runs.comparison import compare
+from sdnn.runs.comparison import compare, study_json, study_page
 from sdnn.runs.figures import draw_study, figure_bytes
 from sdnn.runs.records import TrialRecord, TrialRows
 from sdnn.runs.report import format_estimate
-from sdnn.runs.statistics import Estimate
-from sdnn.runs.study_report import study_json, study_page
+from sdnn.runs.results import Estimate
 
 
 def record(study, case, variant, number, steps, returns=None, interval=10):

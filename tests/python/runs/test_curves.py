@@ -6,9 +6,8 @@ import pytest
 
 from run_specs import run_spec
 from sdnn.runs import EnvironmentSpec, Goal, Run, RunError
-from sdnn.runs.curves import curves_of, write_curves
+from sdnn.runs.curves import curves_of, groups_of, write_curves
 from sdnn.runs.figures import draw_curves
-from sdnn.runs.groups import groups_of
 from sdnn.runs.records import TrialRows
 from sdnn.runs.store import ResultStore
 

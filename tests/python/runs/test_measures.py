@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from sdnn.runs.measures import (
+from sdnn.runs.results import (
     MeasureConfig,
     early_steps,
     episode_of_collapse,

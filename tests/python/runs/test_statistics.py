@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from sdnn.runs.statistics import (
+from sdnn.runs.results import (
     BootstrapConfig,
     Estimate,
     estimate_contrast,
