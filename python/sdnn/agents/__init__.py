@@ -9,15 +9,13 @@ from sdnn.agents.callbacks import (
     StopTrainingOnRewardThreshold,
     TensorBoard,
 )
-from sdnn.agents.episode import UnrepeatedEpisodeError
+from sdnn.agents.episode import Transition, UnrepeatedEpisodeError, UnusableStepError
 from sdnn.agents.evaluation import Evaluation, evaluate
 from sdnn.agents.fixed_rate import FixedRate
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
-from sdnn.agents.presets import PRESETS, Preset
-from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
+from sdnn.agents.q_learning import PRESETS, Preset, RBFQLearning, SDNNQLearning
 from sdnn.agents.scaling import Scaling
 from sdnn.agents.training import Training, TrainingResult
-from sdnn.agents.transition import Transition, UnusableStepError
 from sdnn.config import FuzzyQLearningConfig, QLearningConfig
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""What all agents have in common: Gymnasium's spaces around the core's controller."""
+"""The base of all agents: Gymnasium's spaces around the core's controller."""
 
 from __future__ import annotations
 
@@ -13,13 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.agents.actions import Actions
-from sdnn.agents.files import read_agent, register
-from sdnn.agents.observations import AnglePairs, Observations, Ranges
+from sdnn.agents.episode import Transition, reward_of
+from sdnn.agents.files import ARRAYS_OF_TRAINING, read_agent, register
 from sdnn.agents.scaling import Scaling
-from sdnn.agents.spaces import action_space_of, observation_space_of, space_data, space_of
+from sdnn.agents.spaces import (
+    Actions,
+    AnglePairs,
+    Observations,
+    Ranges,
+    action_space_of,
+    observation_space_of,
+    space_data,
+    space_of,
+)
 from sdnn.agents.training import Training, TrainingResult
-from sdnn.agents.transition import Transition, reward_of
 from sdnn.arguments import flag, path_of, real, seed_of, whole
 from sdnn.files import Arrays, Description, write_file
 
@@ -31,8 +38,6 @@ if TYPE_CHECKING:
 __all__ = ["Agent", "load_agent"]
 
 _MOST_ENVIRONMENTS = 2**14
-_OF_TRAINING = "training."
-"""Arrays in an agent's file that are not the agent's."""
 
 Approximator = TypeVar("Approximator")
 Learning = TypeVar("Learning")
@@ -41,17 +46,14 @@ Learning = TypeVar("Learning")
 class Agent(abc.ABC, Generic[Approximator, Learning]):
     """An agent in a Gymnasium environment that learns one transition at a time.
 
-    A loop over an environment, or several at once, is ``train``; a robot that brings its own loop
-    calls `begin_episode`, `act` and `learn`.
-
-    An agent whose observations have no known ranges begins with a *warm-up*: it acts at random
-    for a while, takes the ranges from what it saw, and then learns what it did, in order. From
-    then on the ranges stay.
+    ``train`` is a loop over environments; a robot that brings its own loop calls `begin_episode`,
+    `act` and `learn`. An agent whose observations have no known ranges begins with a *warm-up*: it
+    acts at random, takes the ranges from what it saw, and then learns what it did, in order.
 
     Parameters
     ----------
     observation_space : gymnasium.Space
-        What Gymnasium flattens to a vector: Box, Dict, Tuple, Discrete, ...
+        Any that Gymnasium flattens to a vector: Box, Dict, Tuple, Discrete, ...
     action_space : gymnasium.Space
         Box with finite bounds, Discrete, MultiDiscrete or MultiBinary.
     approximator, learning
@@ -59,12 +61,12 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     seed : int
         The root of every random stream of the agent.
     observation_range : (low, high) or "adaptive", optional
-        Of the observed variables, two numbers or two for each; values outside saturate. By default
-        the bounds of the space, and what the warm-up sees where these are infinite. ``"adaptive"``:
-        from the warm-up for all numbers but angles, a twentieth of what it sees left out at each
-        end, for spaces whose bounds are much wider than what a policy meets.
+        Two numbers, or two for each observed variable; values outside are clipped. By default the
+        bounds of the space, and what the warm-up sees where these are infinite. ``"adaptive"``:
+        what the warm-up sees of all variables but angles, without a twentieth at each end, for
+        spaces whose bounds are much wider than what a policy meets.
     angles : sequence of int
-        Numbers of variables that are angles: their ranges wrap around.
+        Variables that are angles: their ranges wrap around.
     angle_pairs : "none", "find" or sequence of (int, int)
         Pairs of variables that are the cosine and the sine of an angle, which becomes one input.
         ``"find"``: those that the warm-up finds on the unit circle.
@@ -73,32 +75,20 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
     Raises
     ------
-    TypeError
-        For spaces of another kind.
-    ValueError
-        For spaces, ranges or settings that are impossible.
-
-    Attributes
-    ----------
-    observation_space, action_space : gymnasium.Space
-    approximator, learning
-        As used; sizes that follow from the spaces are known once the warm-up is over.
-    seed : int
+    TypeError, ValueError
+        For spaces of another kind; for spaces, ranges or settings that are impossible.
     """
 
     kind: ClassVar[str]
-    """What files call agents with this approximator and learning rule, of whatever class."""
-
+    """The word for this approximator and learning rule in files."""
     approximator_type: ClassVar[type[Any]]
     learning_type: ClassVar[type[Any]]
-    """Of the settings."""
 
     learning: Learning
     _approximator: Approximator
     _controller: _core.Controller
     _scaling: Scaling | None = None
-    _next_episode: int = 0
-    """Of a `train` without a seed of its own."""
+    _next_episode: int = 0  # of `train` without a seed
 
     def __init__(
         self,
@@ -131,11 +121,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         self._actions = Actions(actions)
 
     def _take_settings(self, approximator: Any, learning: Any, seed: Any, steps: Any) -> None:
-        settings: tuple[tuple[str, Any, type[Any]], ...] = (
-            ("approximator", approximator, self.approximator_type),
-            ("learning", learning, self.learning_type),
-        )
-        for name, part, kind in settings:
+        for name, part in (("approximator", approximator), ("learning", learning)):
+            kind: type[Any] = getattr(self, f"{name}_type")
             if not isinstance(part, kind):
                 raise TypeError(f"{name} must be a {kind.__name__}, got {part!r}")
         self._approximator, self.learning = approximator, learning
@@ -143,7 +130,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         self._warm_up_steps = whole("warm_up_steps", steps, 2, 10**7)
 
     def _make(self, **made_of: Any) -> None:
-        """Make the core's controller; an error about sizes says which space they follow from."""
+        """Make the core's controller; errors about sizes name the space they follow from."""
         approximator: Any = self._approximator
         learning: Any = self.learning
         try:
@@ -187,17 +174,14 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     def observation_range(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lowest and highest values of the observed variables, shapes (n_variables,), as used.
 
-        Raises
-        ------
-        RuntimeError
-            If the warm-up has not found them yet.
+        RuntimeError if the warm-up has not found them yet.
         """
         self._require_warm()
         return self._controller.ranges
 
     @property
     def inputs(self) -> list[tuple[str, list[int]]]:
-        """What the inputs of a state are made of: kinds, and numbers of observed variables.
+        """Kinds of the inputs of a state, with the numbers of observed variables.
 
         ``("variable", [i])``, ``("circular", [i])``, ``("angle", [cosine, sine])`` or
         ``("symbol", [first, n])``. Empty until a warm-up is over.
@@ -208,13 +192,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     def scaling(self) -> Scaling | None:
         """How its run scaled what it observes, with ``--noise`` or ``--redundant``; None: not.
 
-        `train` and `evaluate` refuse environments that do not scale their observations then. May be
-        set, and is kept in files.
-
-        Raises
-        ------
-        TypeError
-            If it is set to anything else.
+        May be set, and is kept in files. `train` and `evaluate` refuse environments that do not
+        scale their observations then.
         """
         return self._scaling
 
@@ -226,9 +205,9 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
     @property
     def progress(self) -> float:
-        """How much of the learning is done, in [0, 1].
+        """The part of the learning that is done, in [0, 1]; ``train`` sets it.
 
-        Settings such as ``final_epsilon`` follow it; ``train`` sets it.
+        Settings such as ``final_epsilon`` follow it.
         """
         return self._controller.progress
 
@@ -240,9 +219,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     def n_environments(self) -> int:
         """In how many environments at once the agent learns; may be set, from 1 to 2**14.
 
-        They are numbered from 0. Each has an episode of its own: the transitions that wait, the
-        steps counted, the random action that is kept. All else is shared. Where there are fewer
-        than before, what waits in the others is learned. `train` sets it.
+        Each, from number 0, has an episode of its own; all else is shared. Where there are fewer
+        than before, the transitions that wait in the others are learned. `train` sets it.
         """
         return self._controller.n_environments
 
@@ -258,18 +236,13 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     def begin_episode(self, environment: int = 0) -> None:
         """Note that an episode begins: `learn` never does.
 
-        Starts the greedy first steps of an episode anew, and learns what still waits.
-
-        Raises
-        ------
-        ValueError
-            If there is no such environment.
+        Starts the greedy first steps of an episode anew, and learns the transitions that wait.
         """
         self._check_environment(environment)
         self._controller.begin_episode(environment)
 
     def act(self, observation: Any, explore: bool = True, environment: int = 0) -> Any:
-        """Choose the action to take, an element of the action space.
+        """Return the action to take, an element of the action space.
 
         Parameters
         ----------
@@ -281,10 +254,9 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
         Raises
         ------
-        ValueError
-            If the observation has another shape or holds NaN, or there is no such environment.
-        TypeError
-            If ``explore`` is not True or False.
+        TypeError, ValueError
+            If ``explore`` is no bool, the observation has another shape or holds NaN, or there is
+            no such environment.
         """
         if explore is not True and explore is not False:
             explore = flag("explore", explore)
@@ -293,12 +265,9 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         return self._actions.element(self._controller.act(variables, explore, environment))
 
     def flat_observation(self, observation: Any) -> NDArray[np.float64]:
-        """Give the observed variables as a vector, shape (n_variables,), in their own units.
+        """Return the observed variables as a vector, shape (n_variables,), in their own units.
 
-        Raises
-        ------
-        ValueError
-            If the observation has another shape or holds NaN.
+        ValueError if the observation has another shape or holds NaN.
         """
         vector = self._observations.vector("observation", observation)
         if np.isnan(vector).any():
@@ -308,12 +277,11 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     def learn(self, transition: Transition, environment: int = 0) -> None:
         """Learn one transition.
 
-        Any action of the space can be learned, not only that of the last `act` (but by
+        Any action of the space can be learned, not only that of the last `act` (except by
         `FuzzyQLearning`); of a ``Box`` the nearest one is. A terminated transition begins no
-        episode. With ``n_steps`` above 1 a transition waits for those that follow; one that does
-        not begin where the one before it ended (another ``observation`` than the last
-        ``next_observation``) begins anew, and `begin_episode` learns what still waits. All this is
-        within the environment that the transition comes from.
+        episode. With ``n_steps`` above 1 a transition waits for the next ones in its environment.
+        One that does not begin where the last one ended starts anew; `begin_episode` learns what
+        still waits.
 
         Raises
         ------
@@ -321,8 +289,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             If an observation, the action, the reward (beyond +-1e300, for example) or
             ``terminated`` is not usable, or there is no such environment; nothing is learned then.
         OverflowError
-            If a weight would leave its range. What waited for this transition, or other dimensions
-            of its action, may have been learned: load a checkpoint.
+            If a weight would leave its range. Earlier transitions, or other dimensions of the
+            action, may have been learned: load a checkpoint.
         """
         self._check_environment(environment)
         if not isinstance(transition, Transition):
@@ -375,10 +343,9 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     ) -> TrainingResult:
         """Learn in an environment, or in all of a vector; see `sdnn.agents.Training`.
 
-        With ``progress`` a line on a terminal says how far it is. Without ``seed``, episodes follow
-        from the agent's, and those of a second call are others than those of the first. But what
-        falls over a training, such as ``final_learning_rate``, falls in each: where a training is
-        to be looked at in between, callbacks and ``evaluate_every`` do that within one.
+        With ``progress`` a line on a terminal shows how far it is. Without ``seed``, episodes
+        follow from the agent's, and a second call has other ones. Scheduled settings such as
+        ``final_learning_rate`` run through their schedule in each call.
 
         Examples
         --------
@@ -390,13 +357,12 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         >>> result.n_steps
         200
         """
-        own: list[Callback] | Iterable[Callback] = callbacks
         if flag("progress", progress):
             from rich.console import Console
 
             from sdnn.agents.callbacks import ProgressBarCallback
 
-            own = [*callbacks, ProgressBarCallback(Console(stderr=True), "learning")]
+            callbacks = [*callbacks, ProgressBarCallback(Console(stderr=True), "learning")]
         training = Training(
             self,
             env,
@@ -404,7 +370,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             episodes=episodes,
             seed=self.seed if seed is None else seed,
             first_episode=self._next_episode if seed is None else 0,
-            callbacks=own,
+            callbacks=callbacks,
             evaluate_every=evaluate_every,
             evaluation_env=evaluation_env,
             evaluation_episodes=evaluation_episodes,
@@ -416,15 +382,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
                 self._next_episode = training.next_episode
 
     def save(self, path: str | Path) -> None:
-        """Write the agent, with all that it needs to go on exactly as it would have.
-
-        One safetensors file, there as a whole or not at all.
-
-        Raises
-        ------
-        OSError
-            If the file cannot be written.
-        """
+        """Write the whole state as one safetensors file; OSError if it cannot be written."""
         write_file(path_of("path", path), "agent", self.state(), self.description())
 
     @classmethod
@@ -433,10 +391,9 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
         Raises
         ------
-        OSError
-            If the file cannot be read.
-        ValueError
-            If it is damaged, from another version of the format, or holds another kind of agent.
+        OSError, ValueError
+            If the file cannot be read; if it is damaged, of another format, or holds another kind
+            of agent.
         """
         agent = load_agent(path)
         if not isinstance(agent, cls):
@@ -444,13 +401,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         return agent
 
     def description(self) -> Description:
-        """Return the settings, of which `rebuild` makes an agent like this one.
-
-        Raises
-        ------
-        TypeError
-            If a space cannot be written down.
-        """
+        """Return the settings, from which `rebuild` makes an agent like this one."""
         more: Description = {} if self.scaling is None else {"scaling": self.scaling.values()}
         if self._next_episode:
             more["next_episode"] = self._next_episode
@@ -474,13 +425,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
     @classmethod
     def rebuild(cls, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Self:
-        """Make an agent of what `description` and `state` gave.
-
-        Raises
-        ------
-        ValueError
-            If they do not fit; before much memory is asked for.
-        """
+        """Make an agent from its `description` and `state`; ValueError if they do not fit."""
         agent = cls.__new__(cls)
         agent._observation, agent._action = description["observation"], description["action"]
         if "observation_space" in description:
@@ -499,7 +444,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             description["seed"],
             description["warm_up_steps"],
         )
-        own = {name: a for name, a in arrays.items() if not name.startswith(_OF_TRAINING)}
+        own = {name: a for name, a in arrays.items() if not name.startswith(ARRAYS_OF_TRAINING)}
         agent._make(state=own)
         n_variables = agent._observations.n_variables
         if agent._controller.n_variables != n_variables:

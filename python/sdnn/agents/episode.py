@@ -1,49 +1,191 @@
-"""The present episodes of a training, one in each of its environments."""
+"""Episodes of a training, one in each of its environments, and the transitions they give."""
 
 from __future__ import annotations
 
+import abc
+import copy
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from sdnn.agents.environment_adapter import OneEnvironment, StepResult, adapter_for
-from sdnn.agents.evaluation import episode_seed
-from sdnn.agents.saved_training import SavedEpisode
+from sdnn.agents.files import SavedEpisode
+from sdnn.arguments import real
 
-__all__ = ["Actions", "Episode", "Episodes", "UnrepeatedEpisodeError"]
+__all__ = [
+    "EVALUATION",
+    "EnvironmentAdapter",
+    "Episode",
+    "Episodes",
+    "Learner",
+    "OneEnvironment",
+    "Options",
+    "Seeds",
+    "StepResult",
+    "Transition",
+    "UnrepeatedEpisodeError",
+    "UnusableStepError",
+    "episode_seed",
+    "reward_of",
+]
 
-_LEARNING = 0
+_LEARNING, EVALUATION = 0, 1
+"""The kinds of episodes that `episode_seed` gives seeds to."""
 
 _PART = 1024
 """Actions in an array."""
+
+Seeds: TypeAlias = Mapping[int, int | None]
+Options: TypeAlias = dict[str, Any] | None
 
 
 class UnrepeatedEpisodeError(ValueError):
     """An environment does not repeat the episode in which a training was saved."""
 
 
-class Actions:
-    """The actions of an episode, which may have millions of them, in arrays of many each.
+class UnusableStepError(ValueError):
+    """An environment gave what cannot be learned or added up: the message says where."""
 
-    Parameters
-    ----------
-    taken
-        Those that it has already, shape (n, ...).
+
+class Transition(NamedTuple):
+    """One step of an environment.
+
+    ``terminated`` is Gymnasium's: the episode ended in a terminal state. An episode cut off by a
+    time limit (``truncated``) is not terminated; its last transition is learned like any other.
     """
+
+    observation: ArrayLike
+    action: Any
+    reward: float
+    next_observation: ArrayLike
+    terminated: bool
+
+
+class Learner(Protocol):
+    """The interface of what is trained: every `sdnn.agents.Agent` has it.
+
+    An agent that learns in one environment and is not saved needs only these methods, without the
+    argument ``environment``. Where it has an attribute ``progress``, that is kept up to date.
+    """
+
+    def begin_episode(self) -> None:
+        """Note that an episode begins."""
+
+    def act(self, observation: Any, explore: bool = True) -> Any:
+        """Choose an action; without `explore` nothing may be learned or remembered."""
+
+    def learn(self, transition: Transition) -> None:
+        """Learn a step."""
+
+
+def reward_of(reward: Any) -> float:
+    """Read a reward: a number of any library, an array of one or a bool; else ValueError."""
+    if isinstance(reward, float):  # NumPy's, too
+        return float(reward)
+    if isinstance(reward, np.ndarray) and reward.size == 1 and reward.dtype.kind in "fiub":
+        reward = reward.item()
+    is_real = not isinstance(reward, np.ndarray | np.complexfloating)
+    if is_real and hasattr(reward, "__float__"):
+        with suppress(OverflowError, TypeError, ValueError):
+            return float(reward)
+    try:
+        return real("reward", reward)  # for its message
+    except OverflowError as error:  # which would say of `Agent.learn` that a weight left its range
+        raise ValueError(str(error)) from None
+
+
+def episode_seed(seed: int, kind: int, episode: int) -> int:
+    """Return the seed of an episode's `reset`; learning and evaluation have their own."""
+    word = np.random.SeedSequence(seed, spawn_key=(kind, episode)).generate_state(1, np.uint32)[0]
+    return int(word) % 2**31  # some environments take no larger ones
+
+
+# Steps in one environment, or in several at once: a round is a step in each.
+
+
+class StepResult(NamedTuple):
+    """The result of a step, unchecked; ``observation`` is the last of an episode that ended."""
+
+    observation: Any
+    reward: Any
+    terminated: bool
+    truncated: bool
+
+    @property
+    def ends(self) -> bool:
+        """Whether the episode is over."""
+        return self.terminated or self.truncated
+
+
+def own_copy(value: Any) -> Any:
+    """Copy what others may write to: environments may keep their state, or change an action."""
+    if type(value) is np.ndarray:
+        return value.copy()
+    return value if isinstance(value, np.generic | int | float) else copy.deepcopy(value)
+
+
+class EnvironmentAdapter(abc.ABC):
+    """The interface of all environments, single and vectorized.
+
+    ``can_repeat`` is whether each environment can be reset at any time, with a seed of its own.
+    """
+
+    n_environments: int
+    can_repeat: bool
+
+    @abc.abstractmethod
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
+        """Begin episodes in some environments, with seeds; return their first observations.
+
+        Where one is missing, the episode begins with the next `step`, which returns it.
+        """
+
+    @abc.abstractmethod
+    def step(self, actions: Sequence[Any]) -> list[StepResult]:
+        """Take an action in each; None in those whose episodes have not begun."""
+
+
+class OneEnvironment(EnvironmentAdapter):
+    """A single environment."""
+
+    n_environments = 1
+    can_repeat = True
+
+    def __init__(self, env: gym.Env[Any, Any]) -> None:
+        self._env = env
+
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
+        """Begin its episode."""
+        return {
+            i: own_copy(self._env.reset(seed=seed, options=options)[0]) for i, seed in seeds.items()
+        }
+
+    def step(self, actions: Sequence[Any]) -> list[StepResult]:
+        """Take the only action."""
+        return [self.step_one(actions[0])]
+
+    def step_one(self, action: Any) -> StepResult:
+        """Take an action."""
+        taken = action.copy() if type(action) is np.ndarray else own_copy(action)
+        seen, reward, terminated, truncated, _ = self._env.step(taken)
+        seen = seen.copy() if type(seen) is np.ndarray else own_copy(seen)
+        return StepResult(seen, reward, bool(terminated), bool(truncated))
+
+
+class _Taken:
+    """The actions of an episode, which may have millions of them, in arrays of many each."""
 
     def __init__(self, taken: NDArray[Any] | None = None) -> None:
         self._old = [] if taken is None or not len(taken) else [taken]
         self._recent: list[Any] = []
 
-    @property
-    def taken(self) -> NDArray[Any]:
-        """All of them, shape (n, ...)."""
-        recent = [np.array(self._recent)] if self._recent else []
-        parts = self._old + recent
+    def array(self) -> NDArray[Any]:
+        """Return all of them, shape (n, ...)."""
+        parts = self._old + ([np.array(self._recent)] if self._recent else [])
         return np.concatenate(parts) if parts else np.empty(0)
 
     def append(self, action: Any) -> None:
@@ -58,27 +200,13 @@ class Actions:
 class Episode:
     """The state of an episode.
 
-    Parameters
-    ----------
-    number
-        Of all that have begun.
-    observation
-        What was observed before ``outcome``, if that is still to be learned; else the last one.
-    actions
-        Taken in it, where it may have to be repeated.
-    n_steps
-        How many were taken.
-    action
-        The last one.
-    sum_of_rewards
-        Learned in it.
-    outcome
-        What the last action led to, if it is still to be learned.
+    ``outcome`` is that of the last action while it is still to be learned; ``observation`` is the
+    one before it then, else the last. ``actions`` are kept where the episode may be repeated.
     """
 
     number: int
     observation: Any
-    actions: Actions = field(default_factory=Actions)
+    actions: _Taken = field(default_factory=_Taken)
     n_steps: int = 0
     action: Any = None
     sum_of_rewards: float = 0.0
@@ -97,12 +225,14 @@ class Episodes:
     ----------
     env
         An environment, or a vector of them.
+    adapter_for
+        Returns the adapter for it.
     seed
         Root of the episodes' seeds; None: resets have no seeds.
     first
         The number of the first episode.
     options
-        Gives the options of the reset of the single environment from an episode's number.
+        Returns the options of the reset of the single environment from an episode's number.
 
     Attributes
     ----------
@@ -115,12 +245,14 @@ class Episodes:
 
     def __init__(
         self,
-        env: gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any],
+        env: Any,
+        adapter_for: Callable[[Any], EnvironmentAdapter],
         seed: int | None,
         first: int,
         options: Callable[[int], dict[str, Any] | None],
     ) -> None:
         self._env, self._seed, self._options = env, seed, options
+        self._adapter_for = adapter_for
         self._adapter = adapter_for(env)
         self.n_environments = self._adapter.n_environments
         self.next_number = first
@@ -129,22 +261,16 @@ class Episodes:
 
     def leave(self) -> None:
         """Begin anew in every environment with the next round, with other seeds."""
-        self._adapter = adapter_for(self._env)
+        self._adapter = self._adapter_for(self._env)
         self.present[:] = [None] * self.n_environments
 
     def outcomes(
         self, begin: Callable[[int], None], act: Callable[[int, Episode], Any]
     ) -> Iterator[tuple[int, Episode, StepResult]]:
-        """Give the outcomes of steps, in the order of environments; each is to be learned.
+        """Yield the outcomes of steps, in the order of environments; each is to be learned.
 
-        When those of a round are learned, a step is taken in every environment.
-
-        Parameters
-        ----------
-        begin
-            Called with an environment whose episode has begun.
-        act
-            Gives the action in an environment.
+        When those of a round are learned, a step is taken in every environment. ``begin`` is called
+        with an environment whose episode has begun; ``act`` returns the action in an environment.
         """
         if isinstance(self._adapter, OneEnvironment):
             yield from self._outcomes_of_one(self._adapter, begin, act)
@@ -156,12 +282,8 @@ class Episodes:
                     self._first_left = i
                     yield i, episode, episode.outcome
             self._first_left = 0
-            numbers = {}
-            if None in present:
-                numbers = self._begin_episodes(begin)
-            actions = []
-            for i, episode in enumerate(present):
-                actions.append(None if episode is None else act(i, episode))
+            numbers = self._begin_episodes(begin) if None in present else {}
+            actions = [None if one is None else act(i, one) for i, one in enumerate(present)]
             for i, outcome in enumerate(self._adapter.step(actions)):
                 episode = present[i]
                 if episode is None:
@@ -179,7 +301,7 @@ class Episodes:
         begin: Callable[[int], None],
         act: Callable[[int, Episode], Any],
     ) -> Iterator[tuple[int, Episode, StepResult]]:
-        """Give the same of a single environment, where a round is as short as can be."""
+        """Yield the same of a single environment, with less work for each step."""
         present, has_seeds, step = self.present, self._seed is not None, env.step_one
         while True:
             episode = present[0]
@@ -187,13 +309,15 @@ class Episodes:
                 self._begin_episodes(begin)
                 episode = present[0]
                 assert episode is not None
-            if episode.outcome is None:
+            outcome = episode.outcome
+            if outcome is None:
                 action = act(0, episode)
-                episode.outcome, episode.action = step(action), action
+                episode.outcome = outcome = step(action)
+                episode.action = action
                 episode.n_steps += 1
                 if has_seeds:
                     episode.actions.append(action)
-            yield 0, episode, episode.outcome
+            yield 0, episode, outcome
 
     def _begin_episodes(self, begin: Callable[[int], None]) -> dict[int, int]:
         """Begin an episode where the last one is over; return their numbers."""
@@ -206,7 +330,7 @@ class Episodes:
         return numbers
 
     def _reset(self, numbers: Mapping[int, int]) -> dict[int, Any]:
-        """Begin episodes of these numbers in some environments: their first observations."""
+        """Begin episodes of these numbers in some environments; return first observations."""
         seeds = {
             i: None if self._seed is None else episode_seed(self._seed, _LEARNING, number)
             for i, number in numbers.items()
@@ -223,7 +347,7 @@ class Episodes:
             else SavedEpisode(
                 number=episode.number,
                 sum_of_rewards=episode.sum_of_rewards,
-                actions=episode.actions.taken.reshape((-1, *shape)),
+                actions=episode.actions.array().reshape((-1, *shape)),
                 observation=np.asarray(flat(episode.last_observation)),
                 waits=episode.outcome is not None,
             )
@@ -248,7 +372,7 @@ class Episodes:
                 n = len(one.actions)
                 last = one.actions[-1] if n else None
                 self.present[i] = Episode(
-                    one.number, None, Actions(one.actions), n, last, one.sum_of_rewards
+                    one.number, None, _Taken(one.actions), n, last, one.sum_of_rewards
                 )
         self._replay({i for i, one in enumerate(saved) if one is not None and one.waits})
         for now, then in zip(self.present, saved, strict=True):
@@ -285,7 +409,7 @@ class Episodes:
         Until its own episode begins, an environment does anything.
         """
         present = {i: episode for i, episode in enumerate(self.present) if episode is not None}
-        taken = {i: episode.actions.taken for i, episode in present.items()}
+        taken = {i: episode.actions.array() for i, episode in present.items()}
         n_rounds = max(map(len, taken.values()), default=0)
         longest = next((one for one in taken.values() if len(one) == n_rounds), None)
         every = range(self.n_environments)

@@ -12,18 +12,14 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.agents.episode import EVALUATION, UnusableStepError, episode_seed, reward_of
 from sdnn.agents.spaces import require_same_kind, require_single
-from sdnn.agents.transition import UnusableStepError, reward_of
 from sdnn.arguments import has_methods, seed_of, whole
 
-__all__ = ["Evaluation", "episode_seed", "evaluate", "greedy_episode"]
-
-EVALUATION = 1
-"""The kind of episodes that `episode_seed` gives seeds to."""
-
+__all__ = ["Evaluation", "evaluate", "greedy_episode"]
 
 _LONG = 100_000
-"""Steps of an episode that make one wonder."""
+"""Warn after this many steps in one episode."""
 
 
 class Acts(Protocol):
@@ -71,12 +67,6 @@ class Evaluation:
             "share_terminated": float(self.terminated.mean()),
             "terminated": self.terminated.tolist(),
         }
-
-
-def episode_seed(seed: int, kind: int, episode: int) -> int:
-    """Give the seed that an episode's `reset` gets: own ones for learning and evaluation."""
-    word = np.random.SeedSequence(seed, spawn_key=(kind, episode)).generate_state(1, np.uint32)[0]
-    return int(word) % 2**31  # some environments take no larger ones
 
 
 def evaluate(

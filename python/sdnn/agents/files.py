@@ -1,22 +1,43 @@
-"""Agents of any class in files: which class rebuilds one."""
+"""Agents and trainings in files: which class rebuilds an agent, and the episodes it is within."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from sdnn.files import Arrays, Description, read_file
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["read_agent", "register"]
+from sdnn.arguments import seed_of
+from sdnn.files import Arrays, Description, read_file, write_file
+
+__all__ = [
+    "ARRAYS_OF_TRAINING",
+    "SavedEpisode",
+    "SavedTraining",
+    "read_agent",
+    "read_training",
+    "register",
+    "write_training",
+]
+
+ARRAYS_OF_TRAINING = "training."
+"""How the names of arrays begin that are not the agent's."""
+_EVALUATIONS = ARRAYS_OF_TRAINING + "evaluations"
 
 _CLASSES: dict[str, type[Any]] = {}
 
+_Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
+_Period = Annotated[int, msgspec.Meta(ge=1, le=2**53)]
+
 
 def register(kind: type[Any]) -> None:
-    """Make a class of agents known by its name; its ``rebuild`` makes one of a file.
+    """Make a class of agents known by its name; its ``rebuild`` makes one from a file.
 
-    A class that is defined again, as in a notebook or by a script that is imported too, takes the
-    place of the one before.
+    A class that is defined again, as in a notebook or by a script that is imported too, replaces
+    the one before.
 
     Raises
     ------
@@ -51,3 +72,99 @@ def read_agent(path: Path, *kinds: str) -> tuple[Any, Description, Arrays]:
         return _CLASSES[str(name)].rebuild(description, arrays), description, arrays
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is damaged: {error}") from error
+
+
+class SavedEpisode(msgspec.Struct, frozen=True, kw_only=True):
+    """The present episode in one environment.
+
+    ``number`` counts all that have begun; ``waits`` is whether the last action's outcome is still
+    to be learned; ``actions`` are those taken, shape (n, ...); ``observation`` is the last one,
+    flattened.
+    """
+
+    number: _Count
+    sum_of_rewards: float
+    waits: bool
+    actions: Any = None
+    observation: Any = None
+
+
+class SavedTraining(msgspec.Struct, frozen=True, kw_only=True):
+    """The state that `sdnn.agents.Training` resumes.
+
+    ``present`` has an entry for each environment, ``evaluations`` steps and mean returns, shape
+    (n, 2); ``next_episode`` is the number of the first that has not begun.
+    """
+
+    steps: _Period | None
+    episodes: _Period | None
+    seed: int | None
+    n_steps: _Count
+    n_episodes: _Count
+    n_rows: _Count
+    next_episode: _Count
+    evaluate_every: _Period | None
+    evaluate_every_episodes: _Period | None
+    evaluation_episodes: Annotated[int, msgspec.Meta(ge=1, le=10**9)]
+    limit_bootstraps: bool
+    present: Sequence[SavedEpisode | None]
+    evaluations: Any = None
+
+    def __post_init__(self) -> None:
+        if (self.steps is None) == (self.episodes is None):
+            raise ValueError("one of steps and episodes must be given")
+        if self.seed is not None:
+            seed_of(self.seed)
+
+
+def write_training(path: Path, agent: Any, training: SavedTraining) -> None:
+    """Write both in one file; OSError if it cannot be written."""
+    arrays = agent.state()
+    arrays[_EVALUATIONS] = training.evaluations
+    for i, episode in enumerate(training.present):
+        if episode is not None:
+            arrays[f"{ARRAYS_OF_TRAINING}{i}.actions"] = episode.actions
+            arrays[f"{ARRAYS_OF_TRAINING}{i}.observation"] = episode.observation
+    values = msgspec.to_builtins(training, enc_hook=_without_arrays)
+    write_file(path, "training", arrays, {**agent.description(), "training": values})
+
+
+def _without_arrays(value: Any) -> Any:
+    return None if isinstance(value, np.ndarray) else value.item()
+
+
+def read_training(path: Path) -> tuple[Any, SavedTraining]:
+    """Read an agent and its training.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        If it is damaged or holds no training.
+    """
+    agent, description, arrays = read_agent(path, "training")
+
+    def array(name: str) -> NDArray[Any]:
+        # Infinite numbers may be observed: they saturate.
+        if name not in arrays or np.isnan(arrays[name]).any():
+            raise ValueError(f"{path} is damaged: {name} must be there, of numbers")
+        return arrays[name]
+
+    try:
+        saved = msgspec.convert(description.get("training"), SavedTraining)
+    except msgspec.ValidationError as error:
+        raise ValueError(f"{path} is damaged: training: {error}") from None
+    evaluations = array(_EVALUATIONS)
+    if evaluations.ndim != 2 or evaluations.shape[1] != 2:
+        raise ValueError(f"{path} is damaged: {_EVALUATIONS} must have shape (n, 2)")
+    present = [
+        episode
+        and msgspec.structs.replace(
+            episode,
+            actions=array(f"{ARRAYS_OF_TRAINING}{i}.actions"),
+            observation=array(f"{ARRAYS_OF_TRAINING}{i}.observation"),
+        )
+        for i, episode in enumerate(saved.present)
+    ]
+    return agent, msgspec.structs.replace(saved, evaluations=evaluations, present=present)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn.agents.agent import Agent
-from sdnn.agents.observations import AnglePairs, Ranges
+from sdnn.agents.spaces import AnglePairs, Ranges
 from sdnn.arguments import whole
 from sdnn.config import FuzzyQLearningConfig, FuzzyRulesConfig
 

@@ -3,23 +3,38 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Sequence
-from typing import Any, Generic, TypeVar
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sdnn import _core
 from sdnn.agents.agent import Agent
-from sdnn.agents.observations import AnglePairs, Ranges
-from sdnn.agents.presets import PRESETS
+from sdnn.agents.spaces import AnglePairs, Ranges
 from sdnn.approximators.sdnn_c import pattern_tables
 from sdnn.arguments import choice, real, whole
 from sdnn.config import QLearningConfig, RBFNetworkConfig, SDNNCConfig
 
-__all__ = ["RBFQLearning", "SDNNQLearning"]
+__all__ = ["PRESETS", "Preset", "RBFQLearning", "SDNNQLearning"]
 
 Approximator = TypeVar("Approximator", SDNNCConfig, RBFNetworkConfig)
+
+
+class Preset(NamedTuple):
+    """Settings that belong together, with a title of a few words."""
+
+    title: str
+    approximator: SDNNCConfig
+    learning: QLearningConfig
+
+
+PRESETS: Mapping[str, Preset] = MappingProxyType(
+    {name: Preset(*settings) for name, settings in _core.presets().items()}
+)
+"""Settings by name: ``"paper"``, ``"general"``, ``"robust"`` and ``"small"``."""
 
 
 class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approximator]):

@@ -1,17 +1,22 @@
-"""Gymnasium spaces: whether those of agent and environment fit, and as data that JSON can hold."""
+"""Gymnasium's spaces: as the vectors of numbers that the core takes, in files, and compared."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, TypeAlias
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Literal, TypeAlias
 
 import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from sdnn.arguments import has_methods
+from sdnn.arguments import has_methods, whole
+from sdnn.bounds import flat_bounds, with_infinities
 
 __all__ = [
+    "Actions",
+    "AnglePairs",
+    "Observations",
+    "Ranges",
     "action_space_of",
     "observation_space_of",
     "require_same_kind",
@@ -19,6 +24,234 @@ __all__ = [
     "space_data",
     "space_of",
 ]
+
+AnglePairs: TypeAlias = Literal["none", "find"] | Sequence[tuple[int, int]]
+"""Which variables are the cosine and the sine of one angle."""
+
+Ranges: TypeAlias = Literal["adaptive"] | tuple[ArrayLike, ArrayLike]
+"""Lowest and highest values, a number for all variables or one for each; or adaptive ones."""
+
+_FLOAT64 = np.dtype(np.float64)
+
+
+class Observations:
+    """The variables of an observation space, flattened as Gymnasium does it.
+
+    Parameters
+    ----------
+    space : gymnasium.Space
+        Box, Discrete, MultiDiscrete, MultiBinary, Dict or Tuple.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For a space that is no vector when flattened, or has no variable.
+    """
+
+    def __init__(self, space: gym.Space[Any]) -> None:
+        self._space = space
+        self._shape = space.shape if isinstance(space, gym.spaces.Box) else None
+        self._low, self._high = flat_bounds(space)
+        self.n_variables = self._low.size
+        if self.n_variables == 0:
+            raise ValueError(f"observation_space must have a variable, got {space}")
+
+    def config(
+        self, ranges: Ranges | None, angles: Sequence[int], angle_pairs: AnglePairs
+    ) -> dict[str, Any]:
+        """Return the fields of the core's ``ObservationConfig``; see `sdnn.agents.Agent`."""
+        is_adaptive = isinstance(ranges, str) and ranges == "adaptive"
+        low, high = _ranges(self._low, self._high, None if is_adaptive else ranges)
+        is_word = isinstance(angle_pairs, str)
+        if is_word and angle_pairs not in ("none", "find"):
+            raise ValueError(
+                f"angle_pairs must be 'none', 'find' or pairs of variables, got {angle_pairs!r}"
+            )
+        pairs = () if is_word else _listed("angle_pairs", angle_pairs)
+        return {
+            "low": [None if np.isnan(x) else x for x in low.tolist()],
+            "high": [None if np.isnan(x) else x for x in high.tolist()],
+            "adaptive": is_adaptive,
+            "angles": [self._variable("angles", one) for one in _listed("angles", angles)],
+            "angle_pairs": [self._pair(pair) for pair in pairs],
+            "find_angle_pairs": is_word and angle_pairs == "find",
+            "symbols": [list(symbol) for symbol in _symbols_of(self._space)],
+        }
+
+    def vector(self, name: str, observation: Any) -> NDArray[np.float64]:
+        """Return the variables of an observation, in any shape; ValueError if it is none."""
+        if self._shape is None:
+            try:
+                _check_parts(self._space, observation)
+                return np.asarray(gym.spaces.flatten(self._space, observation), np.float64)
+            except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+                raise ValueError(f"{name} must be of {self._space}, got {observation!r}") from error
+        if type(observation) is np.ndarray and observation.dtype is _FLOAT64:
+            values: NDArray[np.float64] = observation
+        else:
+            values = _numbers(name, observation)
+        if values.shape != self._shape:
+            raise ValueError(f"{name} must have shape {self._shape}, got {values.shape}")
+        return values
+
+    def _variable(self, name: str, number: Any) -> int:
+        last = self.n_variables - 1
+        try:
+            return whole(name, number, 0, last)
+        except ValueError:
+            raise ValueError(f"{name} must be variables from 0 to {last}, got {number!r}") from None
+
+    def _pair(self, pair: Any) -> list[int]:
+        if isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2:
+            raise ValueError(f"angle_pairs must be pairs (cosine, sine) of variables, got {pair!r}")
+        return [self._variable("angle_pairs", variable) for variable in pair]
+
+
+def _check_parts(space: gym.Space[Any], observation: Any) -> None:
+    """Refuse what Gymnasium flattens to something else: ValueError, or what looking raises."""
+    if isinstance(space, gym.spaces.Dict):
+        for key, part in space.spaces.items():
+            _check_parts(part, observation[key])
+    elif isinstance(space, gym.spaces.Tuple):
+        for part, one in zip(space.spaces, observation, strict=True):
+            _check_parts(part, one)
+    elif isinstance(space, gym.spaces.Discrete):
+        if not 0 <= observation - space.start < space.n:
+            raise ValueError(f"must be in {space}")
+    elif isinstance(space, gym.spaces.MultiDiscrete):
+        steps = np.asarray(observation) - space.start
+        if steps.shape != space.shape or not ((steps >= 0) & (steps < space.nvec)).all():
+            raise ValueError(f"must be in {space}")
+    elif (
+        isinstance(space, gym.spaces.Box | gym.spaces.MultiBinary)
+        and np.shape(observation) != space.shape
+    ):
+        raise ValueError(f"must have shape {space.shape}")
+
+
+def _symbols_of(space: gym.Space[Any], first: int = 0) -> Iterator[tuple[int, int]]:
+    """Yield the first variable and the length of each one-hot group of a flattened space."""
+    if isinstance(space, gym.spaces.Dict | gym.spaces.Tuple):
+        for part in space.spaces.values() if isinstance(space, gym.spaces.Dict) else space.spaces:
+            yield from _symbols_of(part, first)
+            first += gym.spaces.flatdim(part)
+    elif isinstance(space, gym.spaces.Discrete | gym.spaces.MultiDiscrete):
+        for n in np.ravel(
+            space.n if isinstance(space, gym.spaces.Discrete) else space.nvec
+        ).tolist():
+            yield first, n
+            first += n
+
+
+def _numbers(name: str, values: Any) -> NDArray[np.float64]:
+    try:
+        array = np.asarray(values)
+    except ValueError as error:  # lists of several lengths
+        raise ValueError(f"{name} must be numbers, got {values!r}") from error
+    if array.dtype.kind not in "fiub":
+        raise ValueError(f"{name} must be numbers, got {values!r}")
+    return array.astype(np.float64, copy=False)
+
+
+def _listed(name: str, values: Any) -> tuple[Any, ...]:
+    try:
+        return tuple(values)
+    except TypeError:
+        raise TypeError(f"{name} must be a list, got {values!r}") from None
+
+
+def _ranges(
+    low: NDArray[np.float64], high: NDArray[np.float64], ranges: Any
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the range of each variable, as given or from the bounds; NaN: not known."""
+    if ranges is not None:
+        if not isinstance(ranges, Sequence) or isinstance(ranges, str) or len(ranges) != 2:
+            raise ValueError(f"observation_range must be (low, high) or 'adaptive', got {ranges!r}")
+        try:
+            low, high = (
+                with_infinities(
+                    np.broadcast_to(_numbers("observation_range", end).reshape(-1), low.shape)
+                )
+                for end in ranges
+            )
+        except ValueError:
+            raise ValueError(
+                f"observation_range must be two numbers or two times {low.size}, got {ranges!r}"
+            ) from None
+    known = np.isfinite(low) & np.isfinite(high)
+    for i in np.flatnonzero(known & (low >= high)):
+        name, way_out = "observation_range", ""
+        if ranges is None:
+            name = "observation_space"
+            way_out = (
+                f"; give observation_range (--range {i}=LOW:HIGH) where the variable is constant"
+            )
+        raise ValueError(
+            f"{name} must have low < high, got {low[i]} to {high[i]} of variable {i}{way_out}"
+        )
+    return np.where(known, low, np.nan), np.where(known, high, np.nan)
+
+
+class Actions:
+    """The numbers of an action space: a row of them for each action.
+
+    Parameters
+    ----------
+    space : gymnasium.Space
+        Box with finite bounds, Discrete, MultiDiscrete or MultiBinary; TypeError for others.
+
+    Attributes
+    ----------
+    is_box : bool
+    config : dict
+        The fields of the core's ``ActionConfig``.
+    """
+
+    def __init__(self, space: gym.Space[Any]) -> None:
+        self._space = space
+        self.is_box = isinstance(space, gym.spaces.Box)
+        self._is_discrete = isinstance(space, gym.spaces.Discrete)
+        wholes = _wholes(space)
+        if isinstance(space, gym.spaces.Box):
+            low, high = np.ravel(space.low), np.ravel(space.high)
+        elif wholes is not None:
+            low, high = np.array(wholes, np.float64).reshape(-1, 2).T
+        else:
+            raise TypeError(
+                "action_space must be a Box, Discrete, MultiDiscrete or MultiBinary,"
+                f" got {type(space).__name__}"
+            )
+        dtype = np.dtype(space.dtype)
+        self._dtype = dtype
+        self._type: Any = dtype.type
+        self._shape = space.shape or ()
+        self._is_vector = len(self._shape) == 1
+        number = {"f2": "float16", "f4": "float32"}.get(dtype.str[1:], "float64")
+        self.config: dict[str, Any] = {
+            "low": low.astype(np.float64).tolist(),
+            "high": high.astype(np.float64).tolist(),
+            "discrete": not self.is_box,
+            "number": number if dtype.kind == "f" else "whole",
+        }
+
+    def element(self, numbers: NDArray[np.float64]) -> Any:
+        """Make the element of the space that has these numbers."""
+        if self._is_discrete:
+            return self._type(numbers[0])
+        element = numbers.astype(self._dtype)
+        return element if self._is_vector else element.reshape(self._shape)
+
+    def numbers(self, action: Any) -> NDArray[Any]:
+        """Return the numbers of an element, in any shape; ValueError if they are none."""
+        if type(action) is np.ndarray and action.dtype is self._dtype:
+            return action
+        try:
+            values = np.asarray(action)
+        except ValueError:  # lists of several lengths
+            values = np.empty(0, object)
+        if values.dtype.kind not in "biuf":
+            raise ValueError(f"action must be in {self._space}, got {action!r}")
+        return values
 
 
 def require_single(name: str, env: Any) -> None:
@@ -31,12 +264,11 @@ def require_single(name: str, env: Any) -> None:
 
 
 def require_same_kind(agent: Any, env: Any) -> None:
-    """Check that an environment, or each of a vector, is one that an agent was made for.
+    """Check that an agent can learn in an environment, or in each of a vector.
 
-    What it observes must be possible in the agent's space, but for bounds, and its actions must be
-    as many. What tells no spaces is not checked.
-
-    Where the agent's run scaled its observations, the environment must have scaled ones, too.
+    Observations must be possible in the agent's space, but for bounds; there must be as many
+    actions. Where the agent's run scaled its observations, the environment must scale them, too.
+    An environment without spaces is not checked.
 
     Raises
     ------
@@ -52,8 +284,7 @@ def require_same_kind(agent: Any, env: Any) -> None:
             " of sdnn.runs"
         )
     for name, fits in (("observation_space", _can_observe), ("action_space", _acts_alike)):
-        own = getattr(agent, name, None)
-        found = _space_of(env, name)
+        own, found = getattr(agent, name, None), _space_of(env, name)
         if own is not None and found is not None and not fits(own, found):
             raise ValueError(f"env must have the agent's {name}, {_line(own)}, got {_line(found)}")
 
@@ -63,18 +294,9 @@ def _space_of(env: Any, name: str) -> Any:
 
 
 def _is_unit(space: Any) -> bool:
-    """Whether all that is observed lies in [0, 1]; what tells no space is not checked."""
     if not isinstance(space, gym.spaces.Box):
         return space is None
     return bool((space.low >= 0.0).all() and (space.high <= 1.0).all())
-
-
-_NUMBERS = (
-    gym.spaces.Box,
-    gym.spaces.Discrete,
-    gym.spaces.MultiDiscrete,
-    gym.spaces.MultiBinary,
-)
 
 
 def _can_observe(own: gym.Space[Any], found: gym.Space[Any]) -> bool:
@@ -82,9 +304,14 @@ def _can_observe(own: gym.Space[Any], found: gym.Space[Any]) -> bool:
         return own.keys() == found.keys() and all(_can_observe(own[key], found[key]) for key in own)
     if isinstance(own, gym.spaces.Tuple) and isinstance(found, gym.spaces.Tuple):
         return len(own) == len(found) and all(map(_can_observe, own, found))
+    found_wholes, own_wholes = _wholes(found), _wholes(own)
     if isinstance(own, gym.spaces.Box):
-        return isinstance(found, _NUMBERS) and own.shape == found.shape
-    return own.shape == found.shape and _is_within(_wholes(found), _wholes(own))
+        has_numbers = isinstance(found, gym.spaces.Box) or found_wholes is not None
+        return has_numbers and own.shape == found.shape
+    if own.shape != found.shape or found_wholes is None or own_wholes is None:
+        return False
+    pairs = zip(found_wholes, own_wholes, strict=True)
+    return all(mine[0] <= one[0] and one[1] <= mine[1] for one, mine in pairs)
 
 
 def _acts_alike(own: gym.Space[Any], found: gym.Space[Any]) -> bool:
@@ -93,13 +320,10 @@ def _acts_alike(own: gym.Space[Any], found: gym.Space[Any]) -> bool:
     return _wholes(own) is not None and _wholes(own) == _wholes(found)
 
 
-_Wholes: TypeAlias = "list[tuple[int, int]] | None"
-"""The first and the last whole number of each dimension; None of other spaces."""
-
-
-def _wholes(space: gym.Space[Any]) -> _Wholes:
+def _wholes(space: gym.Space[Any]) -> list[tuple[int, int]] | None:
+    """Return the first and the last whole number of each dimension; None for other spaces."""
     if isinstance(space, gym.spaces.Discrete):
-        return [(int(space.start), int(space.start + space.n - 1))]
+        return [(int(space.start), int(space.start) + int(space.n) - 1)]
     if isinstance(space, gym.spaces.MultiDiscrete):
         first, n = np.ravel(space.start).tolist(), np.ravel(space.nvec).tolist()
         return [(a, a + k - 1) for a, k in zip(first, n, strict=True)]
@@ -108,37 +332,21 @@ def _wholes(space: gym.Space[Any]) -> _Wholes:
     return None
 
 
-def _is_within(found: _Wholes, own: _Wholes) -> bool:
-    if found is None or own is None or len(found) != len(own):
-        return False
-    pairs = zip(found, own, strict=True)
-    return all(mine[0] <= one[0] and one[1] <= mine[1] for one, mine in pairs)
-
-
 def _line(space: gym.Space[Any]) -> str:
     return " ".join(str(space).split())
 
 
 def space_data(space: gym.Space[Any]) -> dict[str, Any]:
-    """Write a space down as data that JSON can hold; TypeError for kinds that are not known."""
+    """Return a space as data that JSON can hold; TypeError for other kinds of spaces."""
+    dtype = np.dtype(space.dtype).str
     if isinstance(space, gym.spaces.Box):
-        return {
-            "box": [_finite(space.low), _finite(space.high)],
-            "shape": list(space.shape),
-            "dtype": np.dtype(space.dtype).str,
-        }
+        ends = [_finite(space.low), _finite(space.high)]
+        return {"box": ends, "shape": list(space.shape), "dtype": dtype}
     if isinstance(space, gym.spaces.Discrete):
-        return {
-            "discrete": int(space.n),
-            "start": int(space.start),
-            "dtype": np.dtype(space.dtype).str,
-        }
+        return {"discrete": int(space.n), "start": int(space.start), "dtype": dtype}
     if isinstance(space, gym.spaces.MultiDiscrete):
-        return {
-            "multi_discrete": space.nvec.tolist(),
-            "start": space.start.tolist(),
-            "dtype": np.dtype(space.dtype).str,
-        }
+        n, start = space.nvec.tolist(), space.start.tolist()
+        return {"multi_discrete": n, "start": start, "dtype": dtype}
     if isinstance(space, gym.spaces.MultiBinary):
         return {"multi_binary": list(space.shape)}
     if isinstance(space, gym.spaces.Dict):
@@ -152,45 +360,41 @@ def space_data(space: gym.Space[Any]) -> dict[str, Any]:
 
 
 _TYPES = {
-    np.dtype(letters).str for letters in ("b1", *(f"{k}{n}" for k in "iu" for n in (1, 2, 4, 8)))
+    np.dtype(one).str
+    for one in ["b1", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "f2", "f4", "f8"]
 }
-_TYPES |= {np.dtype(f"f{n}").str for n in (2, 4, 8)}
 _MOST_VALUES = 2**20
 """Of a space that is read: more would ask for memory without need."""
 
 
 def _finite(values: NDArray[Any]) -> list[Any]:
-    """Give numbers in a row, infinite ones as words: JSON has none."""
+    """Return numbers in a row, infinite ones as words: JSON has none."""
     return [str(x) if np.isinf(x) else x for x in values.reshape(-1).tolist()]
 
 
 def space_of(data: Mapping[str, Any]) -> gym.Space[Any]:
-    """Make the space that `space_data` wrote down; ValueError if it cannot have."""
+    """Make the space that `space_data` described; ValueError if there is none."""
     if data.get("dtype", "<f4") not in _TYPES:
         raise ValueError(f"dtype must be that of numbers, got {data['dtype']!r}")
     sizes = [data.get("discrete", 0), *np.ravel(data.get("multi_discrete", 0)).tolist()]
     sizes += [int(np.prod(data.get("multi_binary", 0)))]
     if not all(isinstance(size, int) and 0 <= size <= _MOST_VALUES for size in sizes):
         raise ValueError(f"a space must have at most {_MOST_VALUES} values, got {sizes}")
+    dtype: Any = np.dtype(data.get("dtype", "<f4"))
     if "box" in data:
-        dtype = np.dtype(data["dtype"])
         low, high = (
-            np.array([float(x) if isinstance(x, str) else x for x in end], dtype)
+            np.array([float(x) if isinstance(x, str) else x for x in end], dtype).reshape(
+                data["shape"]
+            )
             for end in data["box"]
         )
-        low, high = low.reshape(data["shape"]), high.reshape(data["shape"])
         return gym.spaces.Box(low, high, dtype=dtype.type)
     if "discrete" in data:
-        dtype = np.dtype(data["dtype"])
-        if dtype == np.int64:
-            return gym.spaces.Discrete(data["discrete"], start=data["start"])
-        return gym.spaces.Discrete(data["discrete"], start=data["start"], dtype=dtype.type)
+        own = {} if dtype == np.int64 else {"dtype": dtype.type}  # Gymnasium 1.0 has no dtype
+        return gym.spaces.Discrete(data["discrete"], start=data["start"], **own)
     if "multi_discrete" in data:
-        return gym.spaces.MultiDiscrete(
-            np.array(data["multi_discrete"]),
-            dtype=np.dtype(data["dtype"]).type,
-            start=np.array(data["start"]),
-        )
+        n, start = np.array(data["multi_discrete"]), np.array(data["start"])
+        return gym.spaces.MultiDiscrete(n, dtype=dtype.type, start=start)
     if "multi_binary" in data:
         return gym.spaces.MultiBinary(data["multi_binary"])
     if "dict" in data:
@@ -199,14 +403,14 @@ def space_of(data: Mapping[str, Any]) -> gym.Space[Any]:
 
 
 def observation_space_of(config: Mapping[str, Any]) -> gym.Space[Any]:
-    """Make the space of an agent that was made in C++, which observes real numbers."""
+    """Make the observation space of an agent that was made in C++: real numbers."""
     low = np.array([-np.inf if x is None else x for x in config["low"]], np.float64)
     high = np.array([np.inf if x is None else x for x in config["high"]], np.float64)
     return gym.spaces.Box(low, high, dtype=np.float64)
 
 
 def action_space_of(config: Mapping[str, Any]) -> gym.Space[Any]:
-    """Make the space of an agent that was made in C++: a Box, a button or several."""
+    """Make the action space of an agent that was made in C++: Box, Discrete or MultiDiscrete."""
     low, high = np.array(config["low"], np.float64), np.array(config["high"], np.float64)
     if not config["discrete"]:
         dtype = np.int64 if config["number"] == "whole" else np.dtype(config["number"]).type

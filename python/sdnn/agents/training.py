@@ -14,12 +14,20 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents.environment_adapter import StepResult
-from sdnn.agents.episode import Episode, Episodes
+from sdnn.agents.episode import (
+    EnvironmentAdapter,
+    Episode,
+    Episodes,
+    Learner,
+    OneEnvironment,
+    StepResult,
+    Transition,
+    UnusableStepError,
+    reward_of,
+)
 from sdnn.agents.evaluation import evaluate
-from sdnn.agents.saved_training import SavedTraining, read_training, write_training
+from sdnn.agents.files import SavedTraining, read_training, write_training
 from sdnn.agents.spaces import require_same_kind, require_single
-from sdnn.agents.transition import Learner, Transition, UnusableStepError, reward_of
 from sdnn.arguments import flag, has_methods, path_of, whole
 from sdnn.interrupts import Interrupts
 
@@ -39,16 +47,10 @@ _COUNTS = ("n_steps", "n_episodes", "n_rows")
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingResult:
-    """What came of a training.
+    """The result of a training.
 
-    Parameters
-    ----------
-    n_steps, n_episodes
-        Learned in all, and whole episodes among them.
-    rows
-        Of the episodes and evaluations since it was begun, or last loaded.
-    is_finished
-        Whether all that was asked for is done: False if a callback stopped it.
+    ``rows`` are those of the episodes and evaluations since it was begun, or last loaded;
+    ``is_finished`` is False if a callback stopped it.
     """
 
     n_steps: int
@@ -71,37 +73,34 @@ class TrainingResult:
 class Training:
     """An agent that learns in an environment for a number of steps or episodes.
 
-    Every episode resets the environment with a seed that follows from ``seed`` and the episode's
-    number. A training can therefore be resumed exactly after `load`, from within an episode too:
-    the episode is repeated from its reset with the actions that were taken, which gives the
-    environment the state it had, whatever environment it is, as long as equal seeds and actions
-    give equal episodes. Where they do not, new episodes can be begun instead.
+    Every episode resets the environment with a seed of its own. A training is therefore resumed
+    exactly after `load`, from within an episode too: the episode is repeated from its reset with
+    the actions that were taken. That needs an environment in which equal seeds and actions give
+    equal episodes; elsewhere new episodes can be begun instead.
 
     In a *vector environment* one agent learns in several environments. In each round it chooses an
-    action for each of them, in their order, all step together, and then it learns the outcomes, in
-    their order: a vector of one gives the bits of the single environment. Episodes are numbered as
-    they begin. ``SyncVectorEnv``, ``AsyncVectorEnv`` and all autoreset modes give the same bits.
-
-    Episodes of a vector that cannot be reset one by one with seeds cannot be repeated: any with
-    Gymnasium 1.0, and any other than these two, unless its autoreset mode is ``DISABLED`` or its
-    metadata say ``"reset_mask": True``.
+    action for each, all step together, and it learns the outcomes, all in the environments' order:
+    a vector of one gives the bits of the single environment. ``SyncVectorEnv``, ``AsyncVectorEnv``
+    and all autoreset modes give the same bits. Episodes of a vector that cannot be reset one by one
+    with seeds cannot be repeated: any with Gymnasium 1.0, and any other than these two, unless its
+    autoreset mode is ``DISABLED`` or its metadata have ``"reset_mask": True``.
 
     Parameters
     ----------
     agent
         Learns every transition; its `progress` and its number of environments follow the training.
     env
-        With the agent's spaces; those of a single environment, where it is a vector of them.
+        An environment with the agent's spaces, or a vector of such.
     steps, episodes
         How long: one of them. Steps are transitions learned, over all environments.
     seed
-        Root of the episodes' seeds: every episode has one of its own. None: resets have no seeds,
-        so that the environments' random streams run on; episodes cannot be repeated then.
+        Root of the episodes' seeds. None: resets have no seeds, so that the environments' random
+        streams run on; episodes cannot be repeated then.
     first_episode
-        The number of the first episode: a second training with the same seed should begin where the
-        first one ended (its ``next_episode``), so as not to meet the same episodes again.
+        The number of the first episode: the ``next_episode`` of an earlier training with the same
+        seed, so as not to meet the same episodes again.
     callbacks
-        Are told what happens; see `sdnn.agents.callbacks`.
+        See `sdnn.agents.callbacks`.
     evaluate_every, evaluate_every_episodes
         Steps, or learned episodes, between two evaluations; both None: none.
     evaluation_env
@@ -112,8 +111,8 @@ class Training:
         Whether the last step of an episode that a time limit ends is learned like any other; else
         as one that terminates.
     reset_options
-        Gives the options of a reset: of a learning episode from its number, from 1, of an
-        evaluation from the number of learned episodes. For a single environment.
+        Returns the options of a reset of a single environment: of a learning episode from its
+        number, from 1, of an evaluation from the number of learned episodes.
 
     Raises
     ------
@@ -187,17 +186,12 @@ class Training:
         if reset_options is not None and not callable(reset_options):
             raise TypeError(f"reset_options must be a function or None, got {reset_options!r}")
         self.reset_options = reset_options
-        self.n_steps = 0
-        """Steps learned."""
-        self.n_episodes = 0
-        """Whole episodes."""
-        self.n_rows = 0
-        """Rows so far."""
+        self.n_steps = self.n_episodes = self.n_rows = 0
         self.evaluations: list[tuple[int, float]] = []
         """Steps and mean returns of all evaluations so far, also of those before it was loaded."""
         self.rows: list[Row] = []
         """Rows since it was begun, or last loaded."""
-        self._episodes = Episodes(env, self.seed, first, self._options)
+        self._episodes = Episodes(env, _adapter_for, self.seed, first, self._options)
         if reset_options is not None and self.n_environments > 1:
             raise ValueError("reset_options must be None for a vector environment")
         self._place: list[dict[str, int]] = [{}]  # which environment, where there are several
@@ -295,13 +289,7 @@ class Training:
             raise KeyboardInterrupt
 
     def save(self, path: str | Path) -> None:
-        """Write agent and training in one file, from which `load` goes on.
-
-        Raises
-        ------
-        OSError
-            If the file cannot be written.
-        """
+        """Write agent and training in one file for `load`; OSError if it cannot be written."""
         names = ("steps", "episodes", "next_episode", *_SETTINGS, *_COUNTS)
         saved = SavedTraining(
             **{name: getattr(self, name) for name in names},
@@ -325,7 +313,7 @@ class Training:
         repeat_episodes: bool = True,
         reset_options: Callable[[int], Mapping[str, Any]] | None = None,
     ) -> Self:
-        """Read a training that `save` wrote, to go on exactly where it was.
+        """Read a training that `save` wrote, to resume exactly where it was.
 
         Parameters
         ----------
@@ -338,9 +326,8 @@ class Training:
         steps, episodes
             Another goal.
         repeat_episodes
-            False: what has begun is left, and new episodes begin, in any number of environments.
-            For robots, which should not repeat what they did, and where equal seeds and actions do
-            not give equal episodes.
+            False: begin new episodes, in any number of environments. For robots, which should not
+            repeat what they did, and where equal seeds and actions do not give equal episodes.
 
         Raises
         ------
@@ -399,10 +386,11 @@ class Training:
         )
 
     def _learn_step(self, i: int, episode: Episode, outcome: StepResult) -> None:
-        next_observation, told, terminated, truncated = outcome
+        next_observation, reward, terminated, truncated = outcome
         ends = terminated or (truncated and not self.limit_bootstraps)
         try:
-            reward = reward_of(told)
+            if type(reward) is not float:
+                reward = reward_of(reward)
             step = Transition(episode.observation, episode.action, reward, next_observation, ends)
             self.agent.learn(step, **self._place[i])
         except (ValueError, OverflowError) as error:
@@ -412,24 +400,16 @@ class Training:
         self.n_steps += 1
 
     def _note_step(self, i: int, episode: Episode, outcome: StepResult) -> Exception | None:
-        """Count what ends with the step, evaluate where it is due, and tell the callbacks.
+        """Count what ends with the step, evaluate where it is due, and call the callbacks.
 
         Returns the error of an evaluation, without which the step is whole.
         """
-        rows: list[Row] = []
+        _, _, ends, truncated = outcome
+        rows: list[Row] | None = None
         failure: Exception | None = None
-        ends = outcome.terminated or outcome.truncated
-        if ends:
-            rows.append(
-                self._row(
-                    "episode",
-                    episode=self.n_episodes,
-                    **self._place[i],
-                    **{"return": episode.sum_of_rewards},
-                    length=episode.n_steps,
-                    terminated=outcome.terminated,
-                )
-            )
+        if ends or truncated:
+            ends = True
+            rows = [self._episode_row(i, episode, outcome.terminated)]
             self.n_episodes += 1
             self._episodes.present[i] = None
             if self.evaluate_every_episodes is not None and self._lacks_evaluation:
@@ -440,6 +420,7 @@ class Training:
             elif ends and self.episodes is not None:
                 self.agent.progress = self.n_episodes / max(self.episodes, self.n_episodes)
         if (ends or self.evaluate_every is not None) and self._lacks_evaluation:
+            rows = rows or []
             try:
                 rows.append(self._evaluation())
             except Exception as error:
@@ -449,6 +430,11 @@ class Training:
         for callback in self.callbacks:
             callback.on_step(self)
         return failure
+
+    def _episode_row(self, i: int, episode: Episode, terminated: bool) -> Row:
+        own = {"return": episode.sum_of_rewards, "length": episode.n_steps}
+        values = {"episode": self.n_episodes, **self._place[i], **own, "terminated": terminated}
+        return self._row("episode", **values)
 
     def _tell(self, rows: list[Row]) -> None:
         for row in rows:
@@ -480,6 +466,14 @@ class Training:
     def _row(self, kind: str, **values: Any) -> Row:
         self.n_rows += 1
         return {"kind": kind, "step": self.n_steps, **values}
+
+
+def _adapter_for(env: Any) -> EnvironmentAdapter:
+    if not isinstance(env, gym.vector.VectorEnv):
+        return OneEnvironment(env)
+    from sdnn.agents.vectors import vector_adapter
+
+    return vector_adapter(env)
 
 
 def _optional(name: str, value: int | None) -> int | None:

@@ -24,7 +24,7 @@ from sdnn.agents import (
     SDNNQLearning,
     Training,
 )
-from sdnn.agents.transition import Learner
+from sdnn.agents.episode import Learner
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import msgspec
 from msgspec import Meta
 
 from sdnn.agents import Agent
-from sdnn.agents.transition import Learner
+from sdnn.agents.episode import Learner
 from sdnn.config import ProtocolConfig
 from sdnn.environments import (
     AcrobotConfig,

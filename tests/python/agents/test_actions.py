@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from sdnn.agents import FuzzyQLearning, QLearningConfig, SDNNQLearning, Transition
-from sdnn.agents.actions import Actions
+from sdnn.agents.spaces import Actions
 from sdnn.approximators import SDNNCConfig
 
 FLOATS = gym.spaces.Box(np.array([-1.0, 0.0], np.float32), np.array([1.0, 0.1], np.float32))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from sdnn.agents import RBFQLearning, SDNNQLearning, Transition
-from sdnn.agents.observations import Observations
+from sdnn.agents.spaces import Observations
 from sdnn.approximators import SDNNCConfig
 from sdnn.bounds import flat_bounds
 

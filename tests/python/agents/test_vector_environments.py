@@ -19,7 +19,7 @@ from sdnn.agents import (
     Transition,
     UnrepeatedEpisodeError,
 )
-from sdnn.agents.evaluation import episode_seed
+from sdnn.agents.episode import episode_seed
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
 from stopped_training import Stop, states_equal
 

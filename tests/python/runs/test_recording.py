@@ -9,7 +9,7 @@ from PIL import Image
 
 import drifting_env
 from run_specs import run_spec
-from sdnn.agents.evaluation import EVALUATION, episode_seed
+from sdnn.agents.episode import EVALUATION, episode_seed
 from sdnn.runs import EnvironmentSpec, Run, RunError
 from sdnn.runs.recording import record
 

@@ -1,110 +1,28 @@
-"""Steps in one environment, or in several at once: a round is a step in each."""
+"""Steps and resets of vector environments, of any of Gymnasium's autoreset modes."""
 
 from __future__ import annotations
 
 import abc
 import copy
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, TypeAlias
+from collections.abc import Sequence
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.vector.utils import concatenate, create_empty_array, iterate
 
-__all__ = ["EnvironmentAdapter", "OneEnvironment", "StepResult", "adapter_for"]
+from sdnn.agents.episode import EnvironmentAdapter, Options, Seeds, StepResult
 
-Seeds: TypeAlias = Mapping[int, int | None]
-Options: TypeAlias = dict[str, Any] | None
-
-
-class StepResult(NamedTuple):
-    """What an action led to, as it is: the reward may be none.
-
-    ``observation`` is the last of the episode where it ended.
-    """
-
-    observation: Any
-    reward: Any
-    terminated: bool
-    truncated: bool
-
-    @property
-    def ends(self) -> bool:
-        """Whether the episode is over."""
-        return self.terminated or self.truncated
+__all__ = ["vector_adapter"]
 
 
-def own_copy(value: Any) -> Any:
-    """Copy what others may write to: environments may keep their state, or change an action."""
-    if type(value) is np.ndarray:
-        return value.copy()
-    return value if isinstance(value, np.generic | int | float) else copy.deepcopy(value)
-
-
-class EnvironmentAdapter(abc.ABC):
-    """One face of all environments, single and vectorized.
-
-    Attributes
-    ----------
-    n_environments : int
-    can_repeat : bool
-        Whether each environment can be reset at any time, with a seed of its own: then its episode
-        can be repeated.
-    """
-
-    n_environments: int
-    can_repeat: bool
-
-    @abc.abstractmethod
-    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
-        """Begin episodes in some environments, with seeds: their first observations.
-
-        One that is missing has none yet: its episode begins with the next `step`, which gives it.
-        Options are those of a single environment.
-        """
-
-    @abc.abstractmethod
-    def step(self, actions: Sequence[Any]) -> list[StepResult]:
-        """Take an action in each; None in those whose episodes have not begun."""
-
-
-def adapter_for(env: gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any]) -> EnvironmentAdapter:
-    """Find out how to go around an environment, or a vector of them."""
-    if not isinstance(env, gym.vector.VectorEnv):
-        return OneEnvironment(env)
-    if _resets_each(env):
-        return _SeparateResets(env)
-    return _OwnResets(env)
-
-
-class OneEnvironment(EnvironmentAdapter):
-    """A single environment."""
-
-    n_environments = 1
-    can_repeat = True
-
-    def __init__(self, env: gym.Env[Any, Any]) -> None:
-        self._env = env
-
-    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
-        """Begin its episode."""
-        return {
-            i: own_copy(self._env.reset(seed=seed, options=options)[0]) for i, seed in seeds.items()
-        }
-
-    def step(self, actions: Sequence[Any]) -> list[StepResult]:
-        """Take the only action."""
-        return [self.step_one(actions[0])]
-
-    def step_one(self, action: Any) -> StepResult:
-        """Take an action."""
-        taken = action.copy() if type(action) is np.ndarray else own_copy(action)
-        seen, reward, terminated, truncated, _ = self._env.step(taken)
-        seen = seen.copy() if type(seen) is np.ndarray else own_copy(seen)
-        return StepResult(seen, reward, bool(terminated), bool(truncated))
+def vector_adapter(env: gym.vector.VectorEnv[Any, Any, Any]) -> EnvironmentAdapter:
+    """Return the adapter for a vector environment."""
+    return _SeparateResets(env) if _resets_each(env) else _OwnResets(env)
 
 
 class _Vector(EnvironmentAdapter, abc.ABC):
-    """What vector environments have in common: lists in, lists out."""
+    """A vector environment: lists in, lists out."""
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]) -> None:
         self._env = env
@@ -112,9 +30,7 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         self.n_environments = env.num_envs
 
     def _step(self, actions: Sequence[Any]) -> tuple[list[StepResult], list[Any]]:
-        """Give the outcomes, and what is observed after resets in the same step."""
-        from gymnasium.vector.utils import concatenate, create_empty_array
-
+        """Return the outcomes, and what is observed after resets in the same step."""
         space = self._env.single_action_space
         batch: Any = create_empty_array(space, self.n_environments)
         observations, rewards, terminated, truncated, infos = self._env.step(
@@ -137,17 +53,14 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         return outcomes, seen
 
     def _listed(self, observations: Any) -> list[Any]:
-        from gymnasium.vector.utils import iterate
-
         # A copy: some vector environments write to the same array again.
         return list(iterate(self._env.observation_space, copy.deepcopy(observations)))
 
 
 class _SeparateResets(_Vector):
-    """Resets each environment whose episode is over by itself, whatever the autoreset mode.
+    """A vector in which each environment is reset by itself, whatever the autoreset mode.
 
-    A reset forestalls the one that would come with the next step, and follows the one that came
-    with the last.
+    A reset replaces the one that would come with the next step or came with the last.
     """
 
     can_repeat = True
@@ -166,7 +79,7 @@ class _SeparateResets(_Vector):
 
 
 class _OwnResets(_Vector):
-    """Follows an environment that resets itself; it is seeded at the beginning only."""
+    """A vector that resets itself; it is seeded at the beginning only."""
 
     can_repeat = False
 
@@ -184,7 +97,7 @@ class _OwnResets(_Vector):
         return {i: self._seen[i] for i in seeds}
 
     def step(self, actions: Sequence[Any]) -> list[StepResult]:
-        # What resets takes no notice of its action, but must be given one.
+        # An environment that resets ignores its action, but must be given one.
         old = self._taken or list(actions)
         self._taken = [old[i] if action is None else action for i, action in enumerate(actions)]
         outcomes, self._seen = self._step(self._taken)
@@ -192,7 +105,7 @@ class _OwnResets(_Vector):
 
 
 def _autoreset_mode(env: gym.vector.VectorEnv[Any, Any, Any]) -> str:
-    """Name the mode as Gymnasium's ``AutoresetMode`` does, which Gymnasium 1.0 has not."""
+    """Return the name in Gymnasium's ``AutoresetMode``, which Gymnasium 1.0 does not have."""
     modes = getattr(gym.vector, "AutoresetMode", None)
     # Not by the metadata first: in Gymnasium 1.1 these may be another vector's.
     mode = getattr(env.unwrapped, "autoreset_mode", env.metadata.get("autoreset_mode"))
