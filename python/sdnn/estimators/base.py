@@ -1,4 +1,4 @@
-"""What the regressor and the classifier share: parameters, fitting, learning online, files."""
+"""The base class of the regressor and the classifier."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Self = TypeVar("Self", bound="BaseSDNN")
 
 
 class OutOfRangeWarning(UserWarning):
-    """Values to learn lie beyond a range that was given or learned; issued once per model."""
+    """Values to learn are outside the range; issued once per model."""
 
 
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
@@ -50,36 +50,32 @@ class BaseSDNN(Fitted, CodedInputs):
     coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
         How inputs become patterns: "random-inverse", "anchor", "circular", "symbolic", or an
         object of `sdnn.coding`; for all inputs, or for columns given as to scikit-learn's
-        ColumnTransformer (inputs left out have "random-inverse").
+        ColumnTransformer (other inputs have "random-inverse").
     n_pattern_units : int, optional
         Units per pattern, even. None divides about 16,000 columns among the pairs.
     pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"
-        Pairs of features, by number or name. A modifier of None leaves a pattern plain, which is
-        also what a single feature gets. "budget" means all pairs up to 22 features, and beyond an
-        even share of them drawn at random: 500 pairs, or one per feature. "auto" lets `fit` leave
-        out those that do not matter, as far as cross-validation is clearly better without them;
-        it takes some forty times as long.
+        Pairs of features, by number or name; a modifier of None leaves a pattern plain. "budget"
+        takes all pairs up to 22 features, beyond that an even random share: 500 pairs, or one per
+        feature. "auto" selects pairs by cross-validation, which takes some forty times as long.
     tables : {"shared", "separate"}, default="shared"
-        One table of patterns per input, permuted anew for each pair, or two tables per pair.
+        One table of patterns per input, permuted for each pair, or two tables per pair.
     shuffle : bool, default=True
-        Whether each epoch has a new random order; otherwise it is the order of the sample.
+        Whether each epoch has a new random order.
     early_stopping : bool, default=False
-        Whether to hold out a fraction of the sample, stop when the validation score no longer
-        rises, and keep the best weights.
+        Whether to hold out samples, stop when their score no longer improves, and keep the best
+        weights.
     validation_fraction : float, default=0.1
-        Fraction of the sample that early stopping holds out.
+        Fraction of the sample held out by early stopping.
     n_iter_no_change : int, default=10
         Epochs without improvement before early stopping.
     training : {"auto", "dual", "block", "plain"}, default="auto"
-        Form of training; the result is the same to the last bit, time and memory differ.
+        Form of training; affects time and memory, never the result.
     memory_limit : int, default=2**30
-        Bytes that weights and patterns may use, and that training may use beside them. Networks
-        that are averaged count, and with early stopping those of the best epochs too.
+        Bytes for weights and patterns of all networks kept, and again for training.
     warm_start : bool, default=False
-        Whether `fit` resumes with the existing network, its ranges, categories and sizes, instead
-        of drawing a new one.
+        Whether `fit` resumes with the existing network, ranges and categories.
     random_state : int, RandomState or None, default=None
-        Determines patterns, first weights, orders and the validation share.
+        Determines patterns, initial weights, orders and the validation share.
     n_jobs : int, optional
         Threads; the result does not depend on it.
     verbose : int, default=0
@@ -90,22 +86,21 @@ class BaseSDNN(Fitted, CodedInputs):
     codings_ : tuple of Coding
         The fitted coding of each input.
     pairs_ : tuple of (int, int)
-        The pairs in use.
+        The pairs (modified, modifier) in use; equal numbers for a plain pattern.
     pair_importances_ : ndarray, shape (n_pairs,)
-        How much training has changed the weights of each pair; they sum to 1.
-    weights_ : ndarray of int32, shape (n_units, n_columns)
+        Squared change of the weights of each pair, normalized to a sum of 1.
+    weights_ : ndarray of int32, shape (n_units, n_pairs * n_pattern_units)
     thresholds_ : ndarray of int32, shape (n_units,)
     n_inputs_out_of_range_ : int
-        Values learned since the last `fit` that lay beyond their range.
+        Values learned since the last `fit` that were outside their range.
     n_iter_ : int
         Epochs of the last `fit` and calls of `partial_fit` since.
     n_corrected_ : ndarray of int64, shape (n_epochs,)
         Samples corrected in each epoch of the last `fit`.
     training_form_, training_memory_ : str, int
-        The form of training that the last `fit` chose, and the most bytes it takes beside the
-        weights.
+        Form of training that the last `fit` chose, and its bytes beside the weights.
     n_features_in_, feature_names_in_ : int, ndarray of str
-        As everywhere in scikit-learn.
+        As in scikit-learn.
     """
 
     n_pattern_units: int | None = None
@@ -148,7 +143,7 @@ class BaseSDNN(Fitted, CodedInputs):
     }
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Complete the docstring by the parameters and attributes that are documented here."""
+        """Add the parameters and attributes documented here to the docstring."""
         super().__init_subclass__(**options)
         if cls.__doc__ and BaseSDNN.__doc__:
             cls.__doc__ = inspect.cleandoc(cls.__doc__)
@@ -166,15 +161,15 @@ class BaseSDNN(Fitted, CodedInputs):
 
     @abc.abstractmethod
     def _set_outputs(self, y: NDArray[Any]) -> int:
-        """Learn from targets (or all classes) what the outputs are; returns the number of units."""
+        """Learn the outputs from targets (or all classes); return the number of units."""
 
     @abc.abstractmethod
     def _check_outputs(self, y: NDArray[Any], classes: ArrayLike | None) -> None:
-        """ValueError if the outputs are not those of the network."""
+        """Raise ValueError if the outputs are not those of the network."""
 
     @abc.abstractmethod
     def _targets(self, y: NDArray[Any], at_once: bool = False) -> NDArray[Any]:
-        """Return targets as they are learned, one row per sample; may widen the output range."""
+        """Return targets as learned, one row per sample; may widen the output range."""
 
     @abc.abstractmethod
     def _rule_arguments(self, targets: NDArray[Any]) -> tuple[Any, ...]:
@@ -184,12 +179,12 @@ class BaseSDNN(Fitted, CodedInputs):
     def _validation_score(
         self, bins: NDArray[np.int32], targets: NDArray[Any], weights: NDArray[np.float64] | None
     ) -> float:
-        """Return the score of the network as it is; larger is better."""
+        """Return the network's score; larger is better."""
 
     def _presentations(
         self, targets: NDArray[Any], weights: NDArray[np.float64] | None
     ) -> NDArray[np.float64] | None:
-        """Return how often each sample is presented per epoch, on average; None for once."""
+        """Return the mean number of presentations per epoch of each sample; None for once."""
         return weights
 
     def fit(self: Self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
@@ -201,23 +196,15 @@ class BaseSDNN(Fitted, CodedInputs):
         y : array_like, shape (n_samples,) or (n_samples, n_outputs)
             Several outputs for the regressor only.
         sample_weight : array_like, shape (n_samples,), optional
-            How often each sample is presented per epoch, on average; 1 by default. What early
-            stopping holds out and "auto" compares is weighted too. Ranges and categories are
-            learned from all samples.
-
-        Returns
-        -------
-        self
+            Mean number of presentations of each sample per epoch, by default 1.
 
         Raises
         ------
         ValueError
-            For an impossible parameter, data that cannot be used, or a form of training that needs
-            more than ``memory_limit``.
+            For an impossible parameter, unusable data, or training that needs more than
+            ``memory_limit``.
         OverflowError
             Before a weight could leave its range.
-        MemoryError
-            If there is no room for the weights.
         """
         work = self._scratch()
         work._fit(X, y, sample_weight)
@@ -292,7 +279,7 @@ class BaseSDNN(Fitted, CodedInputs):
         return self
 
     def _learn_one(self: Self, x: Any, y: NDArray[Any], classes: ArrayLike | None) -> Self:
-        """Learn one sample, whose target is checked: shape (1,) or (1, n_outputs)."""
+        """Learn one sample; y has shape (1,) or (1, n_outputs)."""
         work = self._scratch()
         if hasattr(self, "network_"):
             work._check_outputs(y, classes)
@@ -318,7 +305,7 @@ class BaseSDNN(Fitted, CodedInputs):
         pairs: Pairs | None = None,
         n_networks: int = 1,
     ) -> np.random.RandomState:
-        """Fit the codings, draw tables and first weights; returns the generator of orders."""
+        """Fit the codings, draw tables and weights; return the generator of orders."""
         n_units = self._set_outputs(y)
         codings = self._codings(X, table)
         random: np.random.RandomState = check_random_state(self.random_state)
@@ -340,7 +327,7 @@ class BaseSDNN(Fitted, CodedInputs):
         return random
 
     def _resume(self, table: NDArray[Any], y: NDArray[Any]) -> np.random.RandomState:
-        """Train a copy of the network from now on; returns the generator of orders."""
+        """Continue with a copy of the network; return the generator of orders."""
         self._check_outputs(y, None)
         network = self.network_
         if self._n_networks() > 1:
@@ -356,7 +343,7 @@ class BaseSDNN(Fitted, CodedInputs):
     def _select_pairs(
         self, X: Any, table: NDArray[Any], y: Any, weights: NDArray[np.float64] | None
     ) -> Pairs | None:
-        """Return the pairs that cross-validation selects; None without ``pairs="auto"``."""
+        """Return the pairs selected by cross-validation; None without ``pairs="auto"``."""
         if not (isinstance(self.pairs, str) and self.pairs == "auto") or table.shape[1] < 2:
             return None
         seed = int(check_random_state(self.random_state).randint(2**31 - 1))
@@ -369,7 +356,7 @@ class BaseSDNN(Fitted, CodedInputs):
         return select_pairs(model, X, y, weights, every, seed)
 
     def _n_networks(self) -> int:
-        """Return the most networks that `fit` has in memory, those that are averaged included."""
+        """Return the most networks that `fit` keeps, averaged ones included."""
         n_earlier = min(self.n_averaged_epochs, self.max_iter) - 1
         has_best = self.early_stopping and not self.refit
         return 1 + (2 if has_best else 1) * n_earlier  # the best ones beside the last ones
@@ -382,7 +369,7 @@ class BaseSDNN(Fitted, CodedInputs):
         codings: Sequence[Coding],
         pairs: Sequence[tuple[int, int]],
     ) -> None:
-        """ValueError if weights and patterns would take more than the limit."""
+        """Raise ValueError if weights and patterns exceed the limit."""
         n_bytes = 4 * n_networks * n_units * len(pairs) * n_pattern_units
         n_bytes += code_bytes(codings, pairs, n_pattern_units)
         if n_bytes > self.memory_limit:
@@ -396,7 +383,7 @@ class BaseSDNN(Fitted, CodedInputs):
     def _split(
         self, random: np.random.RandomState, n_samples: int
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the indices of the held out samples, none by default, and of the others."""
+        """Return the indices of the held-out samples and of the others."""
         if not self.early_stopping:
             return np.empty(0, dtype=np.int64), np.arange(n_samples)
         n_held = max(1, round(self.validation_fraction * n_samples))
@@ -423,9 +410,9 @@ class BaseSDNN(Fitted, CodedInputs):
         return trainer
 
     def _learn(self, bins: NDArray[np.int32], targets: NDArray[Any]) -> None:
-        """Present every sample in its order; all or nothing.
+        """Present every sample once, in order; all or nothing.
 
-        Single samples are learned in place: nothing that may fail may follow.
+        Small numbers are learned in place, so nothing that may fail may follow.
         """
         self.n_iter_ += 1
         if self._earlier:
@@ -443,7 +430,7 @@ class BaseSDNN(Fitted, CodedInputs):
         trainer.synchronize()
 
     def _note_inputs(self, table: NDArray[Any]) -> None:
-        """Count values to learn that lie beyond their input's range."""
+        """Count values to learn that are outside their input's range."""
         n_outside, first = self.network_.input_code.outside(table)
         if n_outside == 0:
             return
@@ -455,7 +442,7 @@ class BaseSDNN(Fitted, CodedInputs):
 
     @staticmethod
     def _warn(message: str) -> None:
-        """Warn at the line outside this package and scikit-learn that called."""
+        """Warn at the calling line outside this package and scikit-learn."""
         level, frame = 1, sys._getframe()
         while frame.f_back and frame.f_globals.get("__name__", "").startswith(
             ("sdnn.", "sklearn.")
@@ -470,22 +457,13 @@ class BaseSDNN(Fitted, CodedInputs):
         return self.network_.input_code.bins(table)
 
     def _bins_of_one(self, x: Any) -> NDArray[np.int32]:
-        """Return the bins of one sample to predict without overhead."""
+        """Return the bins of one sample to predict, without overhead."""
         network = self._fitted_network
         network.online(self.memory_limit)
         code = network.input_code
         return code.bins_of_row(self._row(x, code.codings, code.is_numeric))
 
     def transform_code(self, X: ArrayLike) -> NDArray[np.int8]:
-        """Return the code of samples, entries +1, 0 and -1.
-
-        Parameters
-        ----------
-        X : array_like, shape (n_samples, n_features)
-
-        Returns
-        -------
-        ndarray, shape (n_samples, n_pairs * n_pattern_units)
-        """
+        """Return the code of samples: +1, 0, -1, shape (n_samples, n_pairs * n_pattern_units)."""
         bins = self._bins(X)
         return self.network_.input_code.core.transform(bins)

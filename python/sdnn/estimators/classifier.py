@@ -1,4 +1,4 @@
-"""SDNNClassifier: selective desensitization and perceptrons with error correction."""
+"""The classifier: selective desensitization and perceptrons."""
 
 from __future__ import annotations
 
@@ -22,10 +22,8 @@ __all__ = ["SDNNClassifier"]
 
 UNITS_EACH = 60
 MOST_UNITS = 1200
-OWN_SHARE = 5 / 6
-"""The share of a class's units that are to fire for its own samples; for others the rest."""
-STEEPNESS = 6.0
-"""Of the softmax that makes probabilities of scores."""
+OWN_SHARE = 5 / 6  # of a class's units, to fire for its samples; the rest for others
+STEEPNESS = 6.0  # of the softmax of scores
 
 Self = TypeVar("Self", bound="SDNNClassifier")
 
@@ -34,36 +32,32 @@ Self = TypeVar("Self", bound="SDNNClassifier")
 class SDNNClassifier(ClassifierMixin, BaseSDNN):
     """Classification by a selective desensitization neural network, exact and online.
 
-    Each input becomes a binary pattern, the patterns of each two inputs are combined by selective
-    desensitization, and over this code units with integer weights are trained: some for each
-    class, whose number that fires is its score, or one per class or pair of classes. Sources:
-    Nonaka, Tanaka and Morita 2011 (the code); Auer, Burgsteiner and Maass 2008 (groups of units,
-    the p-delta rule); the manual of LIBSDNN (both schemes of single units).
+    Each input becomes a binary pattern; selective desensitization combines the patterns of each two
+    inputs; integer units are trained over this code, several per class, whose firing count is its
+    score, or one per class or pair of classes. Sources: Nonaka, Tanaka and Morita 2011 (the code);
+    Auer, Burgsteiner and Maass 2008 (the p-delta rule); the manual of LIBSDNN (single units).
 
     Parameters
     ----------
     out_of_range : {"clip", "error"}, default="clip"
-        Inputs to learn beyond their range are clipped, and an `OutOfRangeWarning` reports the
-        first; or they are errors.
+        Whether inputs to learn outside their range are clipped, with an `OutOfRangeWarning`.
     scheme : {"one_vs_rest", "one_vs_one"}, default="one_vs_rest"
-        Units for each class, the largest score wins; or one per pair of classes, which vote.
+        Units per class, of which the largest score wins; or one per pair of classes, which vote.
     n_units_per_class : int, optional
-        Units for each class. Of those of a sample's class five sixths are to fire and of those of
-        others one sixth, so that units may specialize: several can tell apart what one cannot.
-        With 1 the unit's potential is the score. None: 60, or fewer from 20 classes on, 1,200 in
-        all; 1 with "one_vs_one".
+        Units per class. Five sixths of the own class's units are trained to fire and one sixth of
+        the others', so that units may specialize. With 1, the potential is the score. None: 60, or
+        fewer from 20 classes on (1,200 in all); 1 with "one_vs_one".
     class_weight : "balanced" or dict, optional
-        How often the samples of a class are presented per epoch of `fit`, on average; "balanced"
-        presents all classes as often. `partial_fit` knows no weights.
+        Mean number of presentations per epoch of `fit` of each class's samples.
     max_iter : int, default=100
-        Largest number of epochs of `fit`, which ends earlier once nothing is corrected.
+        Largest number of epochs of `fit`, which stops early once nothing is corrected.
 
     Attributes
     ----------
     classes_ : ndarray, shape (n_classes,)
         The labels, sorted.
     validation_scores_ : ndarray, shape (n_epochs,) or (0,)
-        With early stopping, the accuracy on what is held out.
+        With early stopping, the accuracy on the held-out samples.
 
     Examples
     --------
@@ -90,27 +84,11 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     def partial_fit(
         self: Self, X: ArrayLike, y: ArrayLike, classes: ArrayLike | None = None
     ) -> Self:
-        """Go once through the samples, in their order.
+        """Present the samples once, in order; any portions give the same weights.
 
-        Samples given one at a time, in any portions, or all at once give the same weights, which
-        are also those of `fit` with ``max_iter=1, shuffle=False``, provided that ranges and
-        categories are given. What is not given is learned from the samples of the first call.
-
-        Parameters
-        ----------
-        X : array_like, shape (n_samples, n_features)
-        y : array_like, shape (n_samples,)
-        classes : array_like, shape (n_classes,), optional
-            All labels that can occur; needed in the first call.
-
-        Returns
-        -------
-        self
-
-        Raises
-        ------
-        ValueError, OverflowError, MemoryError
-            As of `fit`; ValueError too for other labels than ``classes``.
+        They equal those of `fit` with ``max_iter=1, shuffle=False`` if ranges and categories are
+        given; otherwise the first call learns them. ``classes``, all labels that can occur, must be
+        given in the first call. Raises as `fit`.
         """
         self._require_classes(classes)
         return self._partial_fit(X, y, classes)
@@ -118,80 +96,28 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     def learn_one(self: Self, x: Any, y: Any, classes: ArrayLike | None = None) -> Self:
         """Learn one sample: `partial_fit` of one row, to the same bits, without its overhead.
 
-        Parameters
-        ----------
-        x : array_like of shape (n_features,), or mapping from feature names to values
-            The names of a mapping that comes first of all are those of the features. Later ones
-            may lack features whose coding is `WithMissing`: their values are missing.
-        y : label
-        classes : array_like, shape (n_classes,), optional
-            All labels that can occur; needed in the first call.
-
-        Returns
-        -------
-        self
-
-        Raises
-        ------
-        ValueError, OverflowError, MemoryError
-            As of `partial_fit`; nothing is changed then.
+        ``x`` is a row or a mapping from feature names to values, which may lack features coded with
+        `WithMissing`. An error changes nothing.
         """
         self._require_classes(classes)
         return self._learn_one(x, np.array([y]), classes)
 
     def predict_one(self, x: Any) -> Any:
-        """Predict the label of one sample: `predict` of one row, without its overhead.
-
-        Parameters
-        ----------
-        x : array_like of shape (n_features,), or mapping from feature names to values
-            As of `learn_one`.
-        """
+        """Predict the label of one sample, given as to `learn_one`."""
         decision = self._decision(self._bins_of_one(x), n_threads=1)
         return self.classes_[self._winners(decision)[0]]
 
     def decision_function(self, X: ArrayLike) -> NDArray[np.float64]:
-        """Return how much speaks for each class.
+        """Return the score of each class, shape (n_samples, n_classes).
 
-        The share of its units that fire, or the potential of a single one. One-versus-one: votes,
-        and less than half a vote more by the potentials, which decides between classes of equal
-        votes.
-
-        Parameters
-        ----------
-        X : array_like, shape (n_samples, n_features)
-
-        Returns
-        -------
-        ndarray, shape (n_samples, n_classes), or (n_samples,) for two classes
-            For two classes, positive values speak for ``classes_[1]``.
-
-        Raises
-        ------
-        NotFittedError
-            Before `fit` or `partial_fit`.
-        ValueError
-            For samples that cannot be used: another number of features, NaN, unknown categories.
+        The share of its units that fire, the potential of a single unit, or with "one_vs_one" the
+        votes, ties decided by potentials. Two classes: shape (n_samples,), positive for the second.
         """
         return self._decision(self._bins(X), self._n_threads())
 
     def predict(self, X: ArrayLike) -> NDArray[Any]:
-        """Predict the labels of samples.
-
-        Parameters
-        ----------
-        X : array_like, shape (n_samples, n_features)
-
-        Returns
-        -------
-        ndarray, shape (n_samples,)
-
-        Raises
-        ------
-        NotFittedError, ValueError
-            As of `decision_function`.
-        """
-        winners = self._winners(self.decision_function(X))
+        """Predict the labels of samples, shape (n_samples,)."""
+        winners = self._winners(self.decision_function(X))  # first: it may raise NotFittedError
         labels: NDArray[Any] = self.classes_[winners]
         return labels
 
@@ -200,42 +126,21 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
 
     @available_if(_has_several_units)  # type: ignore[untyped-decorator]
     def predict_proba(self, X: ArrayLike) -> NDArray[np.float64]:
-        """Return estimated probabilities of the classes, a softmax of their scores.
+        """Return a softmax of the scores, shape (n_samples, n_classes).
 
-        Its steepness is a constant that suits many problems, not one learned from the sample:
-        `docs/regression.md` says how well it is calibrated. Where that matters, use scikit-learn's
-        `CalibratedClassifierCV`. There are none with one unit per class or pair of classes.
-
-        Parameters
-        ----------
-        X : array_like, shape (n_samples, n_features)
-
-        Returns
-        -------
-        ndarray, shape (n_samples, n_classes)
-            Columns in the order of ``classes_``.
+        Its steepness is a constant; where calibration matters, see docs/regression.md and
+        scikit-learn's `CalibratedClassifierCV`. Needs several units per class.
         """
         return self._probabilities(self._bins(X), self._n_threads())
 
     @available_if(_has_several_units)  # type: ignore[untyped-decorator]
     def predict_proba_one(self, x: Any) -> NDArray[np.float64]:
-        """Estimate the probabilities of one sample: `predict_proba` of a row, without its overhead.
-
-        Parameters
-        ----------
-        x : array_like of shape (n_features,), or mapping from feature names to values
-            As of `learn_one`.
-
-        Returns
-        -------
-        ndarray, shape (n_classes,)
-            In the order of ``classes_``.
-        """
+        """Return `predict_proba` of one sample, given as to `learn_one`, shape (n_classes,)."""
         of_one: NDArray[np.float64] = self._probabilities(self._bins_of_one(x), n_threads=1)[0]
         return of_one
 
     def _require_classes(self, classes: ArrayLike | None) -> None:
-        """Check what learning piece by piece needs and cannot do."""
+        """Check the arguments of learning piece by piece."""
         if self.class_weight is not None:
             raise ValueError(f"class_weight works in fit only, got {self.class_weight!r}")
         if classes is None and not hasattr(self, "network_"):
@@ -331,12 +236,11 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             scores = self.network_.potentials(bins, n_threads).astype(np.float64)
         if self._scheme == "one_vs_rest":
             return scores[:, 1] - scores[:, 0] if n_classes == 2 else scores
-        # A unit that fires speaks for the first of its pair; a potential of 0 is silence.
+        # A firing unit (potential above 0) votes for the first class of its pair.
         leaning = scores - 0.5
         if n_classes == 2:
             return -leaning[:, 0]
-        votes = np.zeros((len(leaning), n_classes))
-        sums = np.zeros((len(leaning), n_classes))
+        votes, sums = np.zeros((2, len(leaning), n_classes))
         for unit, (i, j) in enumerate(zip(*np.triu_indices(n_classes, 1), strict=True)):
             votes[np.arange(len(votes)), np.where(leaning[:, unit] > 0, i, j)] += 1
             sums[:, i] += leaning[:, unit]

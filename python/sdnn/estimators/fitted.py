@@ -1,26 +1,48 @@
-"""What a fitted estimator holds: its network read as attributes, and its file."""
+"""The attributes of a fitted estimator, and its file: arrays and a description."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
 from sdnn import _core
-from sdnn.coding import Coding
-from sdnn.estimators import files
-from sdnn.estimators.network import Network
+from sdnn.arguments import seed_of
+from sdnn.coding import Coding, from_dict, to_dict
+from sdnn.estimators.network import InputCode, Network
+from sdnn.files import Arrays, Description, read_file, write_file
 
 __all__ = ["Fitted"]
 
 Self = TypeVar("Self", bound="Fitted")
 
+ATTRIBUTES = (
+    "n_corrected_",
+    "n_features_in_",
+    "n_inputs_out_of_range_",
+    "n_iter_",
+    "n_outputs_",
+    "n_outputs_out_of_range_",
+    "output_range_",
+    "training_form_",
+    "training_memory_",
+    "validation_scores_",
+    "_counts_of_range",
+    "_flat",
+    "_n_units_each",
+    "_scheme",
+    "_weight_seed",
+)
+NAMES = ("classes_", "feature_names_in_")  # arrays whose type may be text
 
-class Fitted:
-    """Attributes of an estimator that holds a network."""
+
+class Fitted(BaseEstimator):
+    """Attributes of an estimator that holds a network, and its file."""
 
     network_: Network
     n_iter_: int
@@ -41,30 +63,27 @@ class Fitted:
 
     @property
     def codings_(self) -> tuple[Coding, ...]:
-        """The fitted coding of each input."""
+        """Fitted coding of each input."""
         return self._fitted_network.input_code.codings
 
     @property
     def pairs_(self) -> tuple[tuple[int, int], ...]:
-        """The pairs (modified, modifier) of inputs; equal numbers stand for the plain pattern."""
+        """Pairs (modified, modifier) of inputs; equal numbers for the plain pattern."""
         return self._fitted_network.input_code.pairs
 
     @property
     def weights_(self) -> NDArray[np.int32]:
-        """The integer weights, shape (n_units, n_pairs * n_pattern_units)."""
+        """Integer weights, shape (n_units, n_pairs * n_pattern_units)."""
         return self._fitted_network.weights
 
     @property
     def thresholds_(self) -> NDArray[np.int32]:
-        """The integer thresholds, shape (n_units,)."""
+        """Integer thresholds, shape (n_units,)."""
         return self._fitted_network.thresholds
 
     @property
     def pair_importances_(self) -> NDArray[np.float64]:
-        """How much training has changed the weights of each of ``pairs_``: squares, of a sum of 1.
-
-        Shape (n_pairs,). Zeros if nothing was learned.
-        """
+        """Squared change of the weights of each pair, normalized, shape (n_pairs,)."""
         network = self._fitted_network
         code = network.input_code
         begun = _core.ParallelPerceptron(code.core, network.n_units, seed=self._weight_seed)
@@ -77,27 +96,158 @@ class Fitted:
     def save(self, path: str | Path) -> None:
         """Write the fitted estimator to a safetensors file with JSON metadata, without pickle.
 
-        Raises
-        ------
-        NotFittedError
-            If there is nothing to write yet.
-        TypeError
-            If a parameter cannot be written as JSON, such as a coding of one's own.
-        OSError
-            If the file cannot be written; one that was there before stays as it was.
+        Raises TypeError if a parameter cannot be written as JSON, such as a user-defined coding.
         """
         check_is_fitted(self, "network_")
-        files.save(self, path)  # type: ignore[arg-type]
+        held = vars(self)
+        code = self.network_.input_code
+        tables = {id(table): table for table in (*code.modified, *code.modifiers)}
+        number_of = {key: number for number, key in enumerate(tables)}
+        networks = (self.network_, *held.get("_earlier", ()))
+        arrays = {name: held[name] for name in ATTRIBUTES if isinstance(held.get(name), np.ndarray)}
+        for number, table in enumerate(tables.values()):
+            arrays[f"table.{number}"] = np.packbits(table > 0, axis=1)
+        for number, network in enumerate(networks):
+            arrays[f"weights.{number}"] = narrowed(network.weights)
+            arrays[f"thresholds.{number}"] = narrowed(network.thresholds)
+        attributes = {
+            name: held[name] for name in ATTRIBUTES if name in held and name not in arrays
+        }
+        parameters = self.get_params(deep=False)
+        description = {
+            "class": type(self).__name__,
+            "parameters": {name: plain(value) for name, value in parameters.items()},
+            "attributes": attributes,
+            "names": {name: named(held[name]) for name in NAMES if name in held},
+            "codings": [to_dict(coding) for coding in code.codings],
+            "pairs": code.pairs,
+            "n_units": self.network_.n_units,
+            "n_networks": len(networks),
+            "n_pattern_units": code.n_units,
+            "modified": [number_of[id(table)] for table in code.modified],
+            "modifiers": [number_of[id(table)] for table in code.modifiers],
+        }
+        write_file(Path(path), "estimator", arrays, description)
 
     @classmethod
     def load(cls: type[Self], path: str | Path) -> Self:
-        """Read an estimator that `save` has written.
+        """Read an estimator that `save` has written; ValueError if the file holds another one."""
+        path = Path(path)
+        description, arrays = read_file(path, "estimator")
+        if description.get("class") != cls.__name__:
+            raise ValueError(f"{path} holds an {description.get('class')}, not an {cls.__name__}")
+        try:
+            return read_estimator(description, arrays, cls)
+        except (
+            ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError,
+        ) as error:  # fmt: skip
+            raise ValueError(f"{path} is damaged: {error!r}") from error
 
-        Raises
-        ------
-        ValueError
-            If the file holds something else.
-        OSError
-            If the file cannot be read.
-        """
-        return files.load(path, cls)  # type: ignore[type-var]
+
+def plain(value: Any) -> Any:
+    """Turn a parameter into data that JSON can hold; TypeError if that is impossible."""
+    if isinstance(value, Coding):
+        return to_dict(value)
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, slice):
+        return {"slice": [plain(end) for end in (value.start, value.stop, value.step)]}
+    if isinstance(value, Mapping):  # whose keys may be numbers, which those of JSON are not
+        return {"dict": [[plain(key), plain(item)] for key, item in value.items()]}
+    if isinstance(value, np.random.RandomState):
+        return None  # a fitted model draws no more
+    if value is None or isinstance(value, str | int | float | bool):
+        return value
+    if hasattr(value, "__array__"):  # columns and labels of pandas
+        return plain(np.asarray(value))
+    if isinstance(value, Iterable) and not isinstance(value, bytes | Iterator):
+        return [plain(item) for item in value]
+    raise TypeError(f"a parameter cannot be saved: {value!r}")
+
+
+def restored(value: Any) -> Any:
+    """Undo `plain`."""
+    if isinstance(value, dict):
+        if "slice" in value:
+            return slice(*value["slice"])
+        if "dict" in value:
+            return {restored(key): restored(item) for key, item in value["dict"]}
+        return from_dict(value)
+    return [restored(item) for item in value] if isinstance(value, list) else value
+
+
+def narrowed(values: NDArray[np.int32]) -> NDArray[Any]:
+    """Return integers in the smallest type that holds them."""
+    for kind in (np.int8, np.int16):
+        info = np.iinfo(kind)
+        if values.size == 0 or (values.min() >= info.min and values.max() <= info.max):
+            return values.astype(kind)
+    return values
+
+
+def named(values: NDArray[Any]) -> dict[str, Any]:
+    """Describe an array of labels or names with its type."""
+    kind = "object" if values.dtype == object else values.dtype.str
+    return {"type": kind, "values": values.tolist()}
+
+
+def read_estimator(description: Description, arrays: Arrays, kind: type[Self]) -> Self:
+    """Make the estimator with its parameters and everything it has learned."""
+    estimator = kind(**{name: restored(value) for name, value in description["parameters"].items()})
+    held: dict[str, Any] = estimator.__dict__
+    held |= {name: arrays[name] for name in ATTRIBUTES if name in arrays}
+    attributes = description["attributes"]
+    held |= {name: attributes[name] for name in ATTRIBUTES if name in attributes}
+    for name in NAMES:
+        if name in description["names"]:
+            told = description["names"][name]
+            held[name] = np.array(told["values"], dtype=told["type"])
+    estimator.network_, *earlier = read_networks(description, arrays)
+    if "n_outputs_" in held:
+        held["_earlier"] = tuple(earlier)
+    require_consistent(estimator)
+    return estimator
+
+
+def require_consistent(estimator: Fitted) -> None:
+    """Raise ValueError if the parts of a loaded estimator do not fit together."""
+    held = vars(estimator)
+    seed_of(held["_weight_seed"])
+    network = estimator.network_
+    code = network.input_code
+    if "classes_" in held:
+        n_units = _core.n_units_for(held["_scheme"], len(held["classes_"])) * held["_n_units_each"]
+        fits = network.n_units == n_units
+    else:
+        n_outputs = held["n_outputs_"]
+        fits = held["output_range_"].shape == (n_outputs, 2) and network.n_units == (
+            n_outputs * held["_counts_of_range"]
+        )
+        fits = fits and isinstance(held["_flat"], bool)
+    fits = fits and len(code.codings) == held["n_features_in_"]
+    for (mu, nu), modified, modifier in zip(code.pairs, code.modified, code.modifiers, strict=True):
+        fits = fits and len(modified) == code.codings[mu].size
+        fits = fits and len(modifier) == code.codings[nu].size
+    if not fits:
+        raise ValueError("its parts do not fit together")
+
+
+def read_networks(description: Description, arrays: Arrays) -> Iterator[Network]:
+    """Build the code and the networks that share it."""
+    n_units = description["n_pattern_units"]
+    numbers = {*description["modified"], *description["modifiers"]}
+    bits = {i: np.unpackbits(arrays[f"table.{i}"], axis=1, count=n_units) for i in numbers}
+    tables = {i: (2 * table.astype(np.int8) - 1).astype(np.int8) for i, table in bits.items()}
+    code = InputCode(
+        [from_dict(coding) for coding in description["codings"]],
+        [(mu, nu) for mu, nu in description["pairs"]],
+        [tables[number] for number in description["modified"]],
+        [tables[number] for number in description["modifiers"]],
+    )
+    for number in range(description["n_networks"]):
+        yield Network(
+            code,
+            description["n_units"],
+            weights=arrays[f"weights.{number}"].astype(np.int32),
+            thresholds=arrays[f"thresholds.{number}"].astype(np.int32),
+        )

@@ -1,4 +1,4 @@
-"""Samples whose inputs have codings: which column is coded how, and scikit-learn's checks."""
+"""Samples whose inputs have codings: columns, pairs and scikit-learn's checks."""
 
 from __future__ import annotations
 
@@ -20,13 +20,12 @@ __all__ = ["PAIR_BUDGET", "CodedInputs", "CodedRegressor", "Pairs", "column_indi
 Columns = int | str | slice | Sequence[int] | Sequence[str] | Sequence[bool] | Callable[[Any], Any]
 Pairs = list[tuple[int, int]]
 Self = TypeVar("Self", bound="CodedInputs")
-PAIR_BUDGET = 500
-"""Pairs that are formed where the user names none."""
+PAIR_BUDGET = 500  # pairs that are formed by default
 WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
 
 
 def one_index(column: Any, names: Sequence[str] | None, n_inputs: int) -> int:
-    """Return the index of a feature given by name or number; negative numbers count from the end.
+    """Return the index of a feature given by name or number.
 
     >>> one_index("y", ["x", "y"], 2), one_index(-1, None, 3)
     (1, 2)
@@ -49,8 +48,6 @@ def column_indices(
 ) -> list[int]:
     """Return the indices of features given as to scikit-learn's ColumnTransformer.
 
-    Slices are of numbers only; a callable is called with ``table``.
-
     >>> column_indices(slice(1, None), None, 3), column_indices([True, False, True], None, 3)
     ([1, 2], [0, 2])
     """
@@ -69,11 +66,7 @@ def column_indices(
 
 
 def coding_entries(coding: Any) -> list[tuple[Coding, Columns]]:
-    """Return the entries (coding, columns) of a coding or of a list of them, names replaced.
-
-    >>> [coding.name for coding, _ in coding_entries([("anchor", [0, 1]), ("circular", "hour")])]
-    ['anchor', 'circular']
-    """
+    """Return the entries (coding, columns) of a coding or a list, names replaced."""
     if not isinstance(coding, list | tuple):
         return [(coding_named(coding), slice(None))]
     if not coding:
@@ -89,7 +82,7 @@ def coding_entries(coding: Any) -> list[tuple[Coding, Columns]]:
 def codings_of_columns(
     coding: Any, names: Sequence[str] | None, n_inputs: int, table: Any = None
 ) -> list[Coding]:
-    """Return the coding of each feature; those that a list leaves out have random-inverse.
+    """Return the coding of each feature, random-inverse where a list has none.
 
     >>> [coding.name for coding in codings_of_columns([("anchor", [1])], None, 2)]
     ['random-inverse', 'anchor']
@@ -104,22 +97,11 @@ def codings_of_columns(
 
 
 def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int, seed: int = 0) -> Pairs:
-    """Return the ordered pairs (modified, modifier) of features; (mu, mu) is mu's plain pattern.
+    """Return the pairs (modified, modifier) of features; (mu, mu) is mu's plain pattern.
 
-    Parameters
-    ----------
-    pairs : str or list of (modified, modifier)
-        By number or name; a modifier of None leaves the pattern plain. "all" means every ordered
-        pair of different features, and the plain pattern where there is one feature only. Any
-        other word means up to `PAIR_BUDGET` of these: beyond it an even share drawn at random, in
-        which every input is modified as often as any other, and modifies as often, at least once.
-    names, n_inputs
-        As of `column_indices`.
-    seed : int
-        Of the share.
+    "all" gives every pair of different features. Other words give at most `PAIR_BUDGET` of them,
+    drawn with the seed so that each input is modified, and modifies, equally often.
 
-    Examples
-    --------
     >>> input_pairs("all", None, 3)
     [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)]
     >>> input_pairs([("a", "b"), ("a", None)], ["a", "b"], 2)
@@ -150,7 +132,7 @@ def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int, seed: in
 
 
 def as_it_came(X: Any) -> Any:
-    """Return samples with words as they are to be checked: every value of its own type."""
+    """Return samples so that scikit-learn checks every value with its own type."""
     if hasattr(X, "columns") and hasattr(X, "astype"):
         return X.astype(object)  # pandas has no common type of categories and its own numbers
     if hasattr(X, "dtype"):
@@ -171,13 +153,7 @@ class CodedInputs(BaseEstimator):
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {"coding": [str, Coding, list, tuple]}
 
     def set_params(self: Self, **params: Any) -> Self:
-        """Set parameters; ``coding__length_scale`` and the like replace a field of the coding.
-
-        Raises
-        ------
-        ValueError
-            For an unknown parameter or field, or a field where columns have codings of their own.
-        """
+        """Set parameters; ``coding__length_scale`` and the like replace a field of the coding."""
         fields = {name[8:]: params.pop(name) for name in list(params) if name[:8] == "coding__"}
         super().set_params(**params)
         if fields:
@@ -193,17 +169,13 @@ class CodedInputs(BaseEstimator):
         return self
 
     def _scratch(self: Self) -> Self:
-        """Return an estimator to be trained instead of this one, which takes its attributes over.
-
-        So whatever fails leaves this one as it was. They share what they have until then: nothing
-        of it may be changed in place.
-        """
+        """Return a shallow copy to train, so that failures leave this one unchanged."""
         work = object.__new__(type(self))
         work.__dict__.update(self.__dict__)
         return work
 
     def _validated(self, X: Any, y: Any = "no_validation", **options: Any) -> Any:
-        """Check data by scikit-learn's rules; words are let through where a coding takes them."""
+        """Check data by scikit-learn's rules; words pass where a coding takes them."""
         numeric = all(coding.is_numeric for coding, _ in coding_entries(self.coding))
         checks: dict[str, Any] = (
             {"dtype": np.float64} if numeric else {"dtype": None, "ensure_all_finite": False}
@@ -231,7 +203,7 @@ class CodedInputs(BaseEstimator):
         return None if names is None else names.tolist()
 
     def _codings(self, X: Any, table: NDArray[Any]) -> list[Coding]:
-        """Return the coding of each input, not fitted yet, and check the table's numbers."""
+        """Return the unfitted coding of each input, and check the table's numbers."""
         codings = codings_of_columns(self.coding, self._feature_names(), table.shape[1], X)
         if any(coding.learns for coding in codings):
             self._need_two(table, "ranges and categories that are not given")
@@ -239,7 +211,7 @@ class CodedInputs(BaseEstimator):
         return codings
 
     def _need_two(self, samples: NDArray[Any], what: str) -> None:
-        """ValueError, in scikit-learn's words, if one sample has to teach what it cannot."""
+        """Raise ValueError, in scikit-learn's words, for a single sample."""
         if len(samples) < 2:
             raise ValueError(
                 f"Found array with {len(samples)} sample(s) while a minimum of 2 is required by "
@@ -247,7 +219,7 @@ class CodedInputs(BaseEstimator):
             )
 
     def _row(self, x: Any, codings: tuple[Coding, ...], is_numeric: bool) -> NDArray[Any]:
-        """Return one sample, shape (n_features,), checked: a row, or a mapping from names."""
+        """Return one sample, a row or a mapping from names, checked, shape (n_features,)."""
         values: Any = self._values_of(x, codings) if isinstance(x, Mapping) else x
         if is_numeric:
             try:
@@ -263,7 +235,7 @@ class CodedInputs(BaseEstimator):
         return row if row.dtype == np.float64 else self._finite(row[None], codings)[0]
 
     def _values_of(self, x: Mapping[Any, Any], codings: tuple[Coding, ...]) -> list[Any]:
-        """Return a sample's values in the order of the features, None for one that is missing."""
+        """Return a sample's values in feature order, None for missing ones."""
         names = getattr(self, "feature_names_in_", None)
         if names is None:
             raise ValueError("x must be a 1-D array: the features were learned without names")
@@ -278,7 +250,7 @@ class CodedInputs(BaseEstimator):
         return [x.get(name) for name in names]
 
     def _first_row(self, x: Any) -> NDArray[Any]:
-        """Return the first sample of all as a table; a mapping gives names to the features."""
+        """Return the very first sample as a table; a mapping names the features."""
         names = list(x) if isinstance(x, Mapping) else None
         row = np.array(list(x.values()) if isinstance(x, Mapping) else x, dtype=object)
         if row.ndim != 1 or (names is not None and not all(isinstance(n, str) for n in names)):
@@ -290,7 +262,7 @@ class CodedInputs(BaseEstimator):
 
 
 class CodedRegressor(RegressorMixin, CodedInputs):
-    """Validation of targets that are numbers, of one output or several."""
+    """Validation of numeric targets, of one output or several."""
 
     def __sklearn_tags__(self) -> Any:
         """Declare that several outputs can be learned at once."""

@@ -1,4 +1,4 @@
-"""SDNNKernelRidge: ridge regression with the kernel that the network approaches."""
+"""Ridge regression with the kernel that the network approaches."""
 
 from __future__ import annotations
 
@@ -17,30 +17,26 @@ from sdnn.kernel import N_UNITS, AnalyticKernel
 
 __all__ = ["SDNNKernelRidge"]
 
-SAMPLES_AT_ONCE = 4096
-"""Samples whose kernel with the training sample is in memory at a time in prediction."""
+SAMPLES_AT_ONCE = 4096  # in prediction
 
 Self = TypeVar("Self", bound="SDNNKernelRidge")
 
 
 @dataclasses.dataclass(eq=False, repr=False)
 class SDNNKernelRidge(CodedRegressor):
-    """Kernel ridge regression with the network's kernel, as of codes of infinitely many units.
+    """Kernel ridge regression with the network's kernel, as for infinitely many units.
 
-    For samples that are all at hand, some thousand at most, and noisy: unlike the network it has a
-    penalty on its weights. It learns nothing online. Sources: `sdnn.kernel.AnalyticKernel`;
-    scikit-learn's `KernelRidge`, which solves for the weights.
+    For noisy samples of up to some thousand; it does not learn online.
 
     Parameters
     ----------
     coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
-        As of `SDNNRegressor`.
+        As for `SDNNRegressor`.
     alpha : float, default=0.1
-        Strength of the penalty, above 0; noisy targets want more.
+        Strength of the penalty, above 0; more for noisy targets.
     pairs : "all" or list of (modified, modifier), default="all"
-        Pairs of features, by number or name; a modifier of None leaves a pattern plain, which is
-        also what a single feature gets. All pairs take no more time than one per feature, so
-        there is no "budget" of them as of `SDNNRegressor`, nor "auto".
+        Pairs of features, by number or name; a modifier of None leaves a pattern plain. All pairs
+        are as fast as one per feature.
 
     Attributes
     ----------
@@ -49,16 +45,14 @@ class SDNNKernelRidge(CodedRegressor):
         Fitted to the kernel of the training sample.
     X_fit_ : ndarray, shape (n_samples, n_features)
     y_mean_ : ndarray, shape (n_outputs,) or ()
-        Mean targets, which bear no penalty.
+        Mean targets, which are not penalized.
     n_features_in_, feature_names_in_ : int, ndarray of str
-        As everywhere in scikit-learn.
+        As in scikit-learn.
 
     Notes
     -----
-    `fit` takes ``32 n_samples^2`` bytes for any number of features: the kernel matrix, which is
-    kept, and three copies that scikit-learn's solver makes. `predict` takes ``32768 n_samples``
-    bytes. Beside these there are ``8 n_bins^2`` bytes for the correlations of each different
-    coding, of 1,000 bins by default. Time grows with the cube of the sample.
+    `fit` takes ``32 n_samples^2`` bytes, `predict` ``32768 n_samples``, and both ``8 n_bins^2`` per
+    different coding. Time grows with the cube of the sample.
 
     Examples
     --------
@@ -80,22 +74,7 @@ class SDNNKernelRidge(CodedRegressor):
     }
 
     def fit(self: Self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Learn ranges, and weights of the training samples.
-
-        Parameters
-        ----------
-        X : array_like, shape (n_samples, n_features)
-        y : array_like, shape (n_samples,) or (n_samples, n_outputs)
-
-        Returns
-        -------
-        self
-
-        Raises
-        ------
-        ValueError
-            For an impossible parameter, or data that cannot be used.
-        """
+        """Learn ranges, and weights of the training samples; y may have several outputs."""
         work = self._scratch()
         work._fit(X, y)
         self.__dict__ = work.__dict__
@@ -118,24 +97,7 @@ class SDNNKernelRidge(CodedRegressor):
         self.ridge_.fit(self.kernel_(table), targets - self.y_mean_)
 
     def predict(self, X: ArrayLike) -> NDArray[np.float64]:
-        """Predict the outputs of samples.
-
-        Parameters
-        ----------
-        X : array_like, shape (n_samples, n_features)
-
-        Returns
-        -------
-        ndarray, shape (n_samples,) or (n_samples, n_outputs)
-            As the targets' shape was in training.
-
-        Raises
-        ------
-        NotFittedError
-            Before `fit`.
-        ValueError
-            For samples that cannot be used: another number of features, NaN, unknown categories.
-        """
+        """Predict the outputs of samples, shape (n_samples,) or (n_samples, n_outputs)."""
         check_is_fitted(self, "ridge_")
         table = self._finite(self._validated(X, reset=False), self.kernel_.codings)
         parts = [

@@ -1,4 +1,4 @@
-"""LIBSDNN's parameter and model files: what they contain, and the same network from it."""
+"""LIBSDNN's parameter and model files, and the same network from them."""
 
 from __future__ import annotations
 
@@ -26,8 +26,7 @@ __all__ = [
 
 Library = Literal["msvc", "libstdc++"]
 
-MOST_DRAWN = 2**27
-"""Flips, and words of 64 units, of the code tables that are drawn: some seconds of them."""
+MOST_DRAWN = 2**27  # flips and 64-unit words of code tables: some seconds
 
 OPERATORS: dict[type, Callable[..., float]] = {
     ast.Add: operator.add,
@@ -72,7 +71,7 @@ def whole_of(text: str, what: str, low: int, high: int = 2**31 - 1) -> int:
 
 
 def items_of(text: str, what: str) -> list[str]:
-    """Return the items of ``[a, b:3]``, that is ``[a, b, b, b]``; not cut in parentheses."""
+    """Return the items of ``[a, b:3]``, which is ``[a, b, b, b]``."""
     if not (text.startswith("[") and text.endswith("]")):
         raise ValueError(f"{what} must be a list in brackets, got {text[:80]!r}")
     found: list[str] = []
@@ -83,7 +82,7 @@ def items_of(text: str, what: str) -> list[str]:
 
 
 class Entries(dict[str, str]):
-    """The entries of a parameter file by their full names, such as ``SDNN/PC/n``."""
+    """The entries of a parameter file by full names, such as ``SDNN/PC/n``."""
 
     def __init__(self, text: str, path: Path) -> None:
         self.path = path
@@ -125,7 +124,7 @@ class Entries(dict[str, str]):
         return items_of(text, name.rpartition("/")[2])
 
     def seed(self, name: str) -> tuple[int, ...] | None:
-        """Return the numbers of a seed; None where it is hardware entropy."""
+        """Return the numbers of a seed; None for hardware entropy."""
         if self.get(name, "hardware_entropy") == "hardware_entropy":
             return None
         return tuple(whole_of(item, name, 0, 2**32 - 1) for item in self.list_of(name))
@@ -133,7 +132,7 @@ class Entries(dict[str, str]):
 
 @dataclass(frozen=True, kw_only=True)
 class LibsdnnInput:
-    """How LIBSDNN codes one input: numbers in [0, 1], or symbols that are whole numbers from 0."""
+    """Coding of one input: numbers in [0, 1], or symbols (whole numbers from 0)."""
 
     symbolic: bool
     n_bins: int
@@ -142,10 +141,10 @@ class LibsdnnInput:
 
 @dataclass(frozen=True, kw_only=True)
 class LibsdnnParameters:
-    """What a parameter file says. Seeds are None where it asks for hardware entropy.
+    """The content of a parameter file; seeds are None for hardware entropy.
 
-    ``output_range`` and ``step_size`` mean something for regression only, ``n_classes`` and
-    ``scheme`` for classification only.
+    ``output_range`` and ``step_size`` are for regression, ``n_classes`` and ``scheme`` for
+    classification.
     """
 
     task: Literal["regression", "classification"]
@@ -169,10 +168,7 @@ class LibsdnnParameters:
         return _core.n_units_for(self.scheme, self.n_classes)
 
     def bins(self, inputs: npt.ArrayLike) -> npt.NDArray[np.int32]:
-        """Return the bins of samples: ``int(n_bins * x)``, or ``int(x)`` of a symbol, clipped.
-
-        Shapes: inputs and bins (n_samples, n_inputs).
-        """
+        """Return the bins of samples, shape (n_samples, n_inputs), values outside clipped."""
         values = np.asarray(inputs, dtype=np.float64)
         if values.ndim != 2 or values.shape[1] != len(self.inputs):
             raise ValueError(
@@ -238,10 +234,7 @@ class LibsdnnModel:
     layer: _core.ParallelPerceptron
 
     def predict(self, inputs: npt.ArrayLike, n_threads: int = 1) -> npt.NDArray[Any]:
-        """Return LIBSDNN's outputs, numbers or classes from 0.
-
-        Shapes: inputs (n_samples, n_inputs), outputs (n_samples,).
-        """
+        """Return LIBSDNN's outputs, numbers or classes from 0, shape (n_samples,)."""
         given = self.parameters
         bins = given.bins(inputs)
         if given.task == "regression":
@@ -263,32 +256,26 @@ class LibsdnnModel:
 def read_parameter_file(path: str | Path) -> LibsdnnParameters:
     """Read a parameter file.
 
-    Raises
-    ------
-    ValueError
-        If it is not one, lacks an entry, or asks for codes by correlation matrix, which cannot be
-        reproduced.
+    Raises ValueError if it is not one, lacks an entry, or uses codes by correlation matrix.
     """
     path = Path(path)
     return _parameters(path.read_text("latin-1"), path)
 
 
 def read_model_file(path: str | Path, library: Library = "msvc") -> LibsdnnModel:
-    """Read a model file: the parameters as text, then thresholds and weights.
+    """Read a model file: parameters as text, then thresholds and weights.
 
     Parameters
     ----------
     path : path
     library : {"msvc", "libstdc++"}
-        The C++ library of the program that wrote it. A model file holds seeds instead of code
-        tables, and the two make different tables of the same seed: LIBSDNN's own programs are
-        "msvc"; built with GCC it is "libstdc++".
+        The C++ library of the program that wrote it, which decides the tables of a seed. LIBSDNN's
+        own programs are "msvc"; built with GCC they are "libstdc++".
 
     Raises
     ------
     ValueError
-        If it is not a model file, is cut off, its size does not fit its parameters, or its weights
-        are too large for exact sums.
+        For another kind of file, a wrong size, or weights too large for exact sums.
     """
     path = Path(path)
     content = path.read_bytes()

@@ -1,4 +1,4 @@
-"""The code of whole samples and the units over it: what a fitted estimator predicts with."""
+"""The code of samples and the units over it."""
 
 from __future__ import annotations
 
@@ -18,17 +18,12 @@ from sdnn.estimators.inputs import PAIR_BUDGET, Pairs
 
 __all__ = ["InputCode", "Network", "code_bytes", "draw_input_code", "units_for_pairs"]
 
-COLUMN_BUDGET = 16000
-"""Columns of the code that are divided among the pairs where the user names no size."""
-
-FEW_SAMPLES = 32
-"""Samples up to which weights in bytes are the quicker way to learn and answer them."""
+COLUMN_BUDGET = 16000  # columns divided among the pairs by default
+FEW_SAMPLES = 32  # up to which weights in bytes are faster
 
 
 def units_for_pairs(n_pairs: int) -> int:
-    """Units per pattern so that the whole code is about `COLUMN_BUDGET` wide.
-
-    At least 32 up to `PAIR_BUDGET` pairs, and 8 beyond.
+    """Return the units per pattern with which the whole code is about `COLUMN_BUDGET` wide.
 
     >>> [units_for_pairs(n) for n in (2, 90, 500, 870, 4032)]
     [2000, 178, 32, 18, 8]
@@ -38,7 +33,7 @@ def units_for_pairs(n_pairs: int) -> int:
 
 
 def code_bytes(codings: Sequence[Coding], pairs: Sequence[tuple[int, int]], n_units: int) -> int:
-    """Return the bytes that drawing and keeping the patterns of fitted codings takes, about."""
+    """Return about how many bytes drawing and keeping the patterns takes."""
     of_pairs = sum(codings[mu].size + codings[nu].size for mu, nu in pairs)
     return int(of_pairs * n_units * 9 / 8)  # a byte a unit, and a bit in the core
 
@@ -51,7 +46,7 @@ class InputCode:
     codings : sequence of Coding
         One per input, fitted.
     pairs : sequence of (int, int)
-        Ordered pairs (modified, modifier); equal ones stand for the plain pattern.
+        Ordered pairs (modified, modifier); equal ones for the plain pattern.
     modified, modifiers : list of ndarray, shape (n_bins, n_units)
         Per pair, the patterns of the modified input and of the modifier.
     """
@@ -75,7 +70,6 @@ class InputCode:
         self.core = _core.SelectiveDesensitization(modified, modifiers, self.core_pairs)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle everything but the core's object, which follows from it."""
         return InputCode, (self.codings, self.pairs, self.modified, self.modifiers)
 
     @property
@@ -84,13 +78,7 @@ class InputCode:
         return self.core.n_units
 
     def bins(self, table: NDArray[Any]) -> NDArray[np.int32]:
-        """Return the bins of samples, (n_samples, n_inputs) to (n_samples, n inputs in pairs).
-
-        Raises
-        ------
-        ValueError
-            For a category that was not there in training; the message names the input.
-        """
+        """Return the bins of samples, (n_samples, n_inputs) to (n_samples, n inputs in pairs)."""
         bins = np.empty((len(table), len(self.used)), dtype=np.int32)
         for number, index in enumerate(self.used):
             try:
@@ -101,7 +89,7 @@ class InputCode:
 
     @functools.cached_property
     def _even(self) -> tuple[Any, ...] | None:
-        """Inputs in pairs, their ranges and numbers of bins, if all have bins of equal width."""
+        """Return inputs in pairs, ranges and numbers of bins, if all bins have equal width."""
         ranges = [self.codings[index].even_range() for index in self.used]
         if any(ends is None or not ends[0] < ends[1] for ends in ranges):
             return None
@@ -111,11 +99,7 @@ class InputCode:
         return slice(None) if every else np.array(self.used), low, high, sizes
 
     def bins_of_row(self, row: NDArray[Any]) -> NDArray[np.int32]:
-        """Return the bins of one sample, (n_inputs,) to (1, n inputs in pairs); as of `bins`.
-
-        Where all inputs have bins of equal width, they are found together: inputs one by one
-        would cost more than the network.
-        """
+        """Return the bins of one sample; equal-width bins are found together, which is faster."""
         if self._even is None or row.dtype != np.float64:
             return self.bins(row[None])
         used, low, high, sizes = self._even
@@ -126,17 +110,14 @@ class InputCode:
 
     @functools.cached_property
     def _ends(self) -> tuple[list[int], NDArray[np.float64], NDArray[np.float64]]:
-        """Which inputs have a range, and their ranges."""
+        """Return the inputs that have a range, and their ranges."""
         ends = {index: self.codings[index].ends() for index in self.used}
         ranges = {index: pair for index, pair in ends.items() if pair is not None}
         low, high = np.array(list(ranges.values()), dtype=np.float64).reshape(-1, 2).T
         return list(ranges), low, high
 
     def outside(self, table: NDArray[Any]) -> tuple[int, str]:
-        """Return how many values lie beyond their input's range, and what the first of them is.
-
-        Shapes: table (n_samples, n_inputs).
-        """
+        """Return how many values are outside their input's range, and describe the first."""
         indices, low, high = self._ends
         values = table if len(indices) == table.shape[1] else table[:, indices]
         if values.dtype != np.float64:
@@ -157,17 +138,8 @@ def draw_input_code(
 ) -> InputCode:
     """Draw the patterns of fitted codings.
 
-    Parameters
-    ----------
-    codings, pairs
-        As of `InputCode`.
-    n_units : int
-        Units per pattern.
-    tables : {"shared", "separate"}
-        One table per input, its units permuted anew as modifier in each pair; or two fresh tables
-        per pair.
-    seed : int
-        Equal seeds give equal tables.
+    ``tables="shared"`` draws one table per input, permuted as modifier in each pair; "separate"
+    draws two tables per pair.
     """
     n_seeds = 2 * (len(codings) + len(pairs))
     seeds = iter(np.random.SeedSequence(seed).generate_state(n_seeds, np.uint64).tolist())
@@ -190,22 +162,10 @@ def draw_input_code(
 
 
 class Network:
-    """N units over the code of the inputs; weights and thresholds are exact integers.
+    """Units over the code of the inputs; weights and thresholds are exact integers.
 
-    Any number of threads may read it at once, as long as none trains it.
-
-    Parameters
-    ----------
-    input_code : InputCode
-        Gives the columns that the units read.
-    n_units : int
-        N, at least 1.
-    seed : int
-        First weights follow from it where none are given.
-    weights, thresholds : ndarray, shapes (n_units, n_columns) and (n_units,), optional
-        Both or neither.
-    layer : ParallelPerceptron, optional
-        The core's layer, where there is one already.
+    Any number of threads may read it while none trains it. Initial weights follow from the seed
+    unless weights (n_units, n_columns) and thresholds (n_units,), or a core's layer, are given.
     """
 
     def __init__(
@@ -220,9 +180,8 @@ class Network:
         self.input_code = input_code
         self.n_units = n_units
         self._online: _core.OnlineLayer | None = None
-        # Marks of what the online layer learned last, and of what the other one has of it.
-        self._learned: object = None
-        self._synchronized: object = None
+        self._learned: object = None  # marks the last change of the online layer
+        self._synchronized: object = None  # the last change that the other layer has
         self._lock = threading.RLock()
         try:
             self._layer = layer or _core.ParallelPerceptron(
@@ -236,15 +195,13 @@ class Network:
             ) from None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the weights instead of the core's object."""
         return Network, (self.input_code, self.n_units, 0, self.weights, self.thresholds)
 
     @property
     def layer(self) -> _core.ParallelPerceptron:
-        """The core's layer as it is now; who trains it trains a `copy`, or a fresh network."""
+        """The core's layer, synchronized; train a `copy` of the network instead."""
         if self._synchronized is not self._learned:
-            # Only then, and one thread while others wait: the core refuses to synchronize what
-            # another thread reads.
+            # One thread while others wait: the core refuses to synchronize what others read.
             with self._lock:
                 learned = self._learned
                 if self._online is not None and self._synchronized is not learned:
@@ -253,18 +210,16 @@ class Network:
         return self._layer
 
     def copy(self) -> Network:
-        """Return a network with the same code and weights of its own."""
+        """Return a network with the same code and its own weights."""
         return Network(self.input_code, self.n_units, layer=self.layer.copy())
 
     def online(self, memory_limit: int) -> _core.OnlineLayer | None:
-        """Return the layer for samples one at a time; None if its weights do not fit into bytes.
+        """Return the layer for single samples, kept until the weights are replaced.
 
-        It is kept until the network is pickled or its weights are replaced. None too if its two
-        bytes per weight are more than ``memory_limit``.
+        None if the weights do not fit into bytes, or exceed ``memory_limit`` at two bytes each.
         """
-        if self._online is None and 2 * self.n_units * self.input_code.core.n_columns <= (
-            memory_limit
-        ):
+        n_bytes = 2 * self.n_units * self.input_code.core.n_columns
+        if self._online is None and n_bytes <= memory_limit:
             with self._lock, contextlib.suppress(ValueError, MemoryError):
                 self._online = self._online or _core.OnlineLayer(self._layer)
         return self._online
@@ -272,39 +227,39 @@ class Network:
     def learn_online(
         self, bins: NDArray[np.int32], rule: tuple[Any, ...], memory_limit: int
     ) -> bool:
-        """Learn samples in place, in their order; False if there is no layer of `online`.
+        """Learn samples in place, in order; return False without a layer for single samples.
 
-        ``rule`` is (counts,) for the p-delta rule, or (labels, n_classes, scheme). Nothing that
-        may fail follows.
+        ``rule`` is (counts,) for the p-delta rule, or (labels, n_classes, scheme). Nothing that may
+        fail may follow.
         """
         online = self.online(memory_limit)
         if online is None:
             return False
         learn = online.learn_counts if len(rule) == 1 else online.learn_labels
-        begun, ended = object(), object()
-        self._learned = begun  # an interrupt may come between learning and the other mark
+        ended = object()
+        self._learned = object()  # an interrupt may come between learning and the other mark
         learn(bins, *rule)
         self._learned = ended
         return True
 
     @property
     def weights(self) -> NDArray[np.int32]:
-        """Copy the weights, shape (n_units, n_columns)."""
+        """Copy of the weights, shape (n_units, n_columns)."""
         return self.layer.weights
 
     @property
     def thresholds(self) -> NDArray[np.int32]:
-        """Copy the thresholds, shape (n_units,)."""
+        """Copy of the thresholds, shape (n_units,)."""
         return self.layer.thresholds
 
     def potentials(self, bins: NDArray[np.int32], n_threads: int) -> NDArray[np.int32]:
-        """Potentials, (n_samples, n inputs in pairs) to (n_samples, n_units)."""
+        """Return the potentials, shape (n_samples, n_units)."""
         if self._online is not None and len(bins) <= FEW_SAMPLES:
             return self._online.potentials(bins)
         return self.layer.potentials(bins, n_threads=n_threads)
 
     def counts(self, bins: NDArray[np.int32], n_groups: int, n_threads: int) -> NDArray[np.int32]:
-        """How many units fire, (n_samples, n inputs in pairs) to (n_samples, n_groups)."""
+        """Return the numbers of units that fire, shape (n_samples, n_groups)."""
         if self._online is not None and len(bins) <= FEW_SAMPLES:
             firing = self.potentials(bins, n_threads) > 0
             counts: NDArray[np.int32] = firing.reshape(len(bins), n_groups, -1).sum(

@@ -1,4 +1,4 @@
-"""Which pairs of inputs matter: repeated halving by the change of weights, by cross-validation."""
+"""Selection of pairs of inputs by repeated halving and cross-validation."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ __all__ = ["select_pairs", "with_categories"]
 
 N_FOLDS = 5
 STANDARD_ERRORS = 2.0
-"""By how many of them fewer pairs must be better than all, in the folds' mean difference."""
 
 
 def halved(pairs: Pairs, importances: NDArray[np.float64]) -> Pairs:
-    """Return the more important half of the pairs, both orders of two inputs counted together.
+    """Return the more important half of the pairs; both orders of two inputs stay together.
 
     >>> halved([(0, 1), (1, 0), (0, 2), (2, 0)], np.array([0.1, 0.1, 0.2, 0.6]))
     [(0, 2), (2, 0)]
@@ -35,10 +34,7 @@ def halved(pairs: Pairs, importances: NDArray[np.float64]) -> Pairs:
 
 
 def with_categories(coding: Coding, column: NDArray[Any]) -> Coding:
-    """Return a coding that knows the categories of the whole column, where a part may lack some.
-
-    Where unknown categories count as missing, a part may do without.
-    """
+    """Return a coding with all categories of the column, where it could refuse unknown ones."""
     base = coding.base if isinstance(coding, WithMissing) else coding
     is_strict = not isinstance(coding, WithMissing) or coding.unknown == "error"
     if isinstance(base, CorrelationMatrix) or (isinstance(base, Symbolic) and is_strict):
@@ -49,7 +45,7 @@ def with_categories(coding: Coding, column: NDArray[Any]) -> Coding:
 def halving(
     model: Any, X: Any, y: Any, weights: Any, pairs: Pairs, n_levels: int | None = None
 ) -> list[Any]:
-    """Return the fitted models with all pairs, half of them, and so on, down to two inputs."""
+    """Return the models fitted with all pairs, half of them, and so on, down to two inputs."""
     fitted = []
     while True:
         fitted.append(clone(model).set_params(pairs=pairs).fit(X, y, weights))
@@ -62,25 +58,11 @@ def halving(
 def select_pairs(
     model: Any, X: ArrayLike, y: ArrayLike, weights: Any, pairs: Pairs, seed: int
 ) -> Pairs:
-    """Return the pairs with which cross-validation is best, all of them unless fewer are clearly.
+    """Return the pairs with the best cross-validation score, all unless fewer are clearly better.
 
-    In each of five folds the less important half of the pairs is left out again and again. A
-    number of pairs is taken if its score is better than that of all pairs by two standard errors
-    of the folds' differences: the best of many scores is better by chance alone. A fold that has
-    nearly all samples of a class, so that the others have one class only, is left out.
-
-    Parameters
-    ----------
-    model : SDNNRegressor or SDNNClassifier
-        How to fit; it is cloned.
-    X, y : array_like
-        The training sample.
-    weights : ndarray, shape (n_samples,), optional
-        Of the samples, in training and in scores.
-    pairs : list of (int, int)
-        Candidates.
-    seed : int
-        Decides the folds.
+    Each of five folds halves the pairs repeatedly by importance. Fewer pairs must be better than
+    all by two standard errors of the folds' differences, as the best of many scores is better by
+    chance. Folds whose training part has one class only are left out.
     """
     labels = np.asarray(y)
     stratified = is_classifier(model) and np.unique(labels, return_counts=True)[1].min() >= N_FOLDS

@@ -1,4 +1,4 @@
-"""SDNNRegressor: selective desensitization and a parallel perceptron with the p-delta rule."""
+"""The regressor: selective desensitization and the p-delta rule."""
 
 from __future__ import annotations
 
@@ -16,11 +16,8 @@ from sdnn.estimators.training import weighted_mean
 
 __all__ = ["SDNNRegressor"]
 
-MARGIN = 0.2
-"""Fraction of the targets' range that a learned output range adds on either side."""
-
-FURTHEST = 1e300
-"""The largest end of an output range: what lies between two ends stays finite."""
+MARGIN = 0.2  # that a learned output range adds on either side
+FURTHEST = 1e300  # largest end of an output range, so that its width is finite
 
 Self = TypeVar("Self", bound="SDNNRegressor")
 
@@ -29,39 +26,35 @@ Self = TypeVar("Self", bound="SDNNRegressor")
 class SDNNRegressor(CodedRegressor, BaseSDNN):
     """Regression by a selective desensitization neural network, exact and online.
 
-    Each input becomes a binary pattern, the patterns of each two inputs are combined by selective
-    desensitization, and the number of units that fire over this code, all of them with integer
-    weights, is the output. The p-delta rule corrects just the units nearest to their threshold.
-    Sources: Nonaka, Tanaka and Morita 2011 (the network); Auer, Burgsteiner and Maass 2008 (the
-    rule).
+    Each input becomes a binary pattern, selective desensitization combines the patterns of each two
+    inputs, and the number of integer units that fire over this code is the output. The p-delta rule
+    corrects only the units nearest to their threshold. Sources: Nonaka, Tanaka and Morita 2011 (the
+    network); Auer, Burgsteiner and Maass 2008 (the rule).
 
     Parameters
     ----------
     n_output_units : int, default=280
-        Units per output; the output's resolution is the output range divided by it.
+        Units per output, which divide the output range into as many steps.
     output_range : (float, float) or array_like of shape (n_outputs, 2), optional
-        Smallest and largest output. None takes the range of the first sample's targets and a
-        fifth of it more on either side.
+        Smallest and largest output; None widens the range of the first targets by a fifth on
+        either side.
     out_of_range : {"clip", "widen", "error"}, default="clip"
-        Targets to learn beyond the output range are clipped, widen it (which stretches what was
-        learned until it is learned anew), or are errors. Inputs beyond their range are clipped,
-        unless they are errors. An `OutOfRangeWarning` reports the first.
+        Treatment of targets outside the output range; "widen" stretches what was learned. Inputs
+        outside their range are clipped unless "error". The first causes an `OutOfRangeWarning`.
     max_iter : int, default=30
-        Largest number of epochs of `fit`, which ends earlier once nothing is corrected. Targets
-        with much noise want fewer, say 5; exact ones more, say 300.
+        Largest number of epochs of `fit`, which stops early once nothing is corrected. Use fewer
+        for noisy targets, say 5, and more for exact ones, say 300.
     n_averaged_epochs : int, default=1
-        Predict the mean of the answers after this many last epochs of `fit`; each is a network in
-        memory. On noisy targets 10 are much better than one. `partial_fit` resumes from the last
-        alone.
+        Predict the mean over this many last epochs of `fit`, each a network in memory; 10 is much
+        better on noisy targets. `partial_fit` resumes from the last alone.
     refit : bool, default=False
-        Whether to train anew on the whole sample after early stopping, for the best number of
-        epochs; without early stopping nothing is.
+        Whether early stopping trains again on the whole sample, for the best number of epochs.
 
     Attributes
     ----------
     output_range_ : ndarray, shape (n_outputs, 2)
     n_outputs_, n_outputs_out_of_range_ : int
-        Number of outputs, and of targets learned since the last `fit` that lay beyond the range.
+        Number of outputs, and of targets outside the range since the last `fit`.
     validation_scores_ : ndarray, shape (n_epochs,) or (0,)
         With early stopping, minus the mean squared error in units of the firing count.
 
@@ -93,51 +86,20 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
     }
 
     def partial_fit(self: Self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Go once through the samples, in their order.
+        """Present the samples once, in order; any portions give the same weights.
 
-        Samples given one at a time, in any portions, or all at once give the same weights, which
-        are also those of `fit` with ``max_iter=1, shuffle=False``, provided that ranges and
-        categories are given. What is not given is learned from the samples of the first call. With
-        ``out_of_range="widen"`` `fit` differs if a target is beyond the range: there all of them
-        widen it first, here each as it comes.
-
-        Parameters
-        ----------
-        X : array_like, shape (n_samples, n_features)
-        y : array_like, shape (n_samples,) or (n_samples, n_outputs)
-
-        Returns
-        -------
-        self
-
-        Raises
-        ------
-        ValueError, OverflowError, MemoryError
-            As of `fit`; ValueError too for another number of outputs.
+        They equal those of `fit` with ``max_iter=1, shuffle=False`` if ranges and categories are
+        given; otherwise the first call learns them. With ``out_of_range="widen"`` targets widen the
+        range one after the other, not all at once as in `fit`. Raises as `fit`.
         """
         return self._partial_fit(X, y, None)
 
     def learn_one(self: Self, x: Any, y: Any) -> Self:
         """Learn one sample: `partial_fit` of one row, to the same bits, without its overhead.
 
-        Parameters
-        ----------
-        x : array_like of shape (n_features,), or mapping from feature names to values
-            The names of a mapping that comes first of all are those of the features. Later ones
-            may lack features whose coding is `WithMissing`: their values are missing.
-        y : float or array_like of shape (n_outputs,)
+        ``x`` is a row or a mapping from feature names to values, which may lack features coded with
+        `WithMissing`. An error changes nothing.
 
-        Returns
-        -------
-        self
-
-        Raises
-        ------
-        ValueError, OverflowError, MemoryError
-            As of `partial_fit`; nothing is changed then.
-
-        Examples
-        --------
         >>> from sdnn.coding import RandomInverse
         >>> unit = RandomInverse(low=0.0, high=1.0)
         >>> model = SDNNRegressor(unit, output_range=(0, 1), n_pattern_units=64, random_state=0)
@@ -155,45 +117,16 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         return self._learn_one(x, targets[None], None)
 
     def predict_one(self, x: Any) -> Any:
-        """Predict the outputs of one sample: `predict` of one row, without its overhead.
-
-        Parameters
-        ----------
-        x : array_like of shape (n_features,), or mapping from feature names to values
-            As of `learn_one`.
-
-        Returns
-        -------
-        float, or ndarray of shape (n_outputs,) where targets had several
-        """
+        """Predict a sample given as to `learn_one`: a float, or shape (n_outputs,)."""
         counts = self._counts(self._bins_of_one(x), n_threads=1)
         values = self._of_counts(np.mean(counts, axis=0) if self._earlier else counts[0])[0]
         return float(values[0]) if self._flat else values
 
     def predict(self, X: ArrayLike, return_std: bool = False) -> Any:
-        """Predict the outputs of samples.
+        """Predict the outputs of samples, shape (n_samples,) or (n_samples, n_outputs).
 
-        Parameters
-        ----------
-        X : array_like, shape (n_samples, n_features)
-        return_std : bool, default=False
-            Whether to return the standard deviation of the averaged epochs' answers too: how
-            unsettled a prediction is, which is not the noise of the targets. Zero where nothing
-            is averaged.
-
-        Returns
-        -------
-        ndarray, shape (n_samples,) or (n_samples, n_outputs)
-            As the targets' shape was in training.
-        ndarray, the same shape
-            With ``return_std``.
-
-        Raises
-        ------
-        NotFittedError
-            Before `fit` or `partial_fit`.
-        ValueError
-            For samples that cannot be used: another number of features, NaN, unknown categories.
+        ``return_std`` adds the standard deviation over the averaged epochs, which shows how settled
+        a prediction is (not the noise of the targets).
         """
         counts = self._counts(self._bins(X), self._n_threads())
         values = self._of_counts(np.mean(counts, axis=0) if self._earlier else counts[0])
@@ -271,12 +204,12 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         return [network.counts(bins, self.n_outputs_, n_threads) for network in networks]
 
     def _step(self) -> NDArray[np.float64]:
-        """Return the change of an output by one unit, shape (n_outputs,)."""
+        """Return the change of an output per unit, shape (n_outputs,)."""
         width: NDArray[np.float64] = self.output_range_[:, 1] - self.output_range_[:, 0]
         return width / self._counts_of_range
 
     def _in_counts(self, targets: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Targets in units of the firing count, not rounded."""
+        """Return targets in units of the firing count, not rounded."""
         counts: NDArray[np.float64] = (targets - self.output_range_[:, 0]) / self._step()
         return counts
 
@@ -286,10 +219,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         return values
 
     def _targets(self, y: NDArray[np.float64], at_once: bool = False) -> NDArray[np.float64]:
-        """Return targets in counts; those beyond the range are counted, refused, or widen it.
-
-        They widen it one after the other, as if they came so, or all at once.
-        """
+        """Return targets in counts; those outside the range are clipped, refused, or widen it."""
         targets = y.reshape(len(y), -1)
         counts = self._in_counts(targets)
         if counts.min() >= 0 and counts.max() <= self._counts_of_range:
@@ -322,10 +252,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         return counts
 
     def _widen(self, targets: NDArray[np.float64]) -> int:
-        """Widen the ranges of outputs whose target lies beyond; returns how many did.
-
-        Predictions so far are stretched with the range, as counts keep their meaning within it.
-        """
+        """Widen the ranges to targets of one sample; return the number of ranges widened."""
         low, high = self.output_range_.T
         new_low = np.where(targets < low, targets - MARGIN * (high - targets), low)
         new_high = np.where(targets > high, targets + MARGIN * (targets - low), high)

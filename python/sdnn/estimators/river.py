@@ -1,7 +1,4 @@
-"""The estimators by the interface of the river library: samples are dictionaries, one at a time.
-
-Needs river, of the extra ``sdnn[river]``; nothing else of this package does.
-"""
+"""The estimators for the river library; needs the extra ``sdnn[river]``."""
 
 from __future__ import annotations
 
@@ -20,18 +17,14 @@ __all__ = ["RiverClassifier", "RiverRegressor"]
 
 
 def named(x: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return a sample with words as names, as scikit-learn wants them; river has numbers too."""
+    """Return a sample with strings as names, as scikit-learn requires."""
     return {str(name): value for name, value in x.items()}
 
 
 class Waiting:
-    """Collects the first samples, from which ranges, categories and classes are learned.
+    """Collects the first samples, from which ranges, categories and classes are learned."""
 
-    If the model refuses one of them, all are dropped, and the collecting begins anew.
-    """
-
-    least_targets = 1
-    """Different ones that have to be among the samples."""
+    least_targets = 1  # different ones among the first samples
 
     def __init__(self, model: Any, grace_period: int = 100) -> None:
         if grace_period < 2:
@@ -43,7 +36,7 @@ class Waiting:
         self.targets: list[Any] = []
 
     def learn_one(self, x: dict[Hashable, Any], y: Any) -> None:
-        """Learn one sample; ValueError if the model refuses it, or one of the first ones."""
+        """Learn one sample; if the model refuses one of the first, all of them are dropped."""
         sample = named(x)
         if self.fitted is not None:
             self.fitted.learn_one(sample, y)
@@ -71,12 +64,10 @@ class RiverRegressor(Waiting, base.Regressor):
     Parameters
     ----------
     model : SDNNRegressor
-        How to learn; it is cloned. ``out_of_range="widen"`` suits streams that drift. Features
-        that samples may lack want the coding "with-missing", or another `WithMissing`; the first
-        samples have to show all features.
+        Cloned. ``out_of_range="widen"`` suits drifting streams; features that samples may lack
+        need the coding "with-missing", but must be in the first samples.
     grace_period : int, default=100
-        Samples from which ranges and categories are learned first. Until then the mean target is
-        predicted.
+        Samples from which ranges and categories are learned; until then the mean is predicted.
     """
 
     def predict_one(self, x: dict[Hashable, Any]) -> float:
@@ -92,11 +83,10 @@ class RiverClassifier(Waiting, base.Classifier):
     Parameters
     ----------
     model : SDNNClassifier
-        How to learn; it is cloned. Features that samples may lack as of `RiverRegressor`.
+        Cloned; missing features as for `RiverRegressor`.
     grace_period : int, default=100
-        Samples from which ranges, categories and the classes are learned first, and more until
-        there are two classes. Until then the most frequent label is predicted, and the share of
-        each label so far is its probability. Samples of classes that come later are errors.
+        Samples, of at least two classes, from which ranges, categories and classes are learned.
+        Until then label frequencies are predicted. Classes that come later are errors.
     """
 
     least_targets = 2
@@ -111,8 +101,7 @@ class RiverClassifier(Waiting, base.Classifier):
     def predict_proba_one(self, x: dict[Hashable, Any], **_options: Any) -> dict[Any, float]:
         """Estimate the probability of each label; none before the first sample.
 
-        Of the first samples it is each label's share so far. NotImplementedError if the model has
-        one unit per class or pair of classes, which tell no probabilities.
+        NotImplementedError for models with one unit per class or pair of classes.
         """
         if not hasattr(self.model, "predict_proba_one"):
             raise NotImplementedError(

@@ -17,30 +17,25 @@ from sdnn.estimators.network import Network
 __all__ = ["History", "Trainer", "run_epochs", "sample_weights", "weighted_mean"]
 
 LARGEST_WEIGHT = 10**6
-MOST_PRESENTED = 2**28
-"""Samples presented in an epoch: their indices are a GiB."""
+MOST_PRESENTED = 2**28  # samples in an epoch: their indices take a GiB
 
 Trainer = _core.PDeltaTrainer | _core.PerceptronTrainer
 
 
 @dataclasses.dataclass
 class History:
-    """What happened in each epoch; ``network`` is the last one, or by validation the best one."""
+    """The epochs of a training; ``network`` is the last one, or the best by validation."""
 
     network: Network
     n_corrected: list[int] = dataclasses.field(default_factory=list)
-    """Samples that were corrected."""
-    scores: list[float] = dataclasses.field(default_factory=list)
-    """Validation scores; empty without early stopping."""
-    n_epochs: int = 0
-    """Epochs that made the weights: with early stopping, up to the best."""
-    earlier: tuple[Network, ...] = ()
-    """The network after each of the epochs before the last of these."""
+    scores: list[float] = dataclasses.field(default_factory=list)  # with early stopping
+    n_epochs: int = 0  # with early stopping, up to the best
+    earlier: tuple[Network, ...] = ()  # the networks to be averaged before the last one
 
 
 @contextmanager
 def progress_bar(verbose: int, n_epochs: int) -> Iterator[Callable[[int], None]]:
-    """Yield what to call after each epoch with the number of corrected samples."""
+    """Yield a function to call after each epoch with the number of corrected samples."""
     if not verbose:
         yield lambda n_corrected: None
         return
@@ -58,11 +53,7 @@ def sample_weights(
 ) -> NDArray[np.float64] | None:
     """Return checked weights of samples, shape (n_samples,), or None.
 
-    Raises
-    ------
-    ValueError
-        Unless there is a finite number in [0, `LARGEST_WEIGHT`] for each sample, above 0 for some,
-        and an epoch presents `MOST_PRESENTED` samples at most.
+    They must be in [0, `LARGEST_WEIGHT`], not all 0, with a sum of at most `MOST_PRESENTED`.
     """
     if weights is None:
         return None
@@ -87,14 +78,14 @@ def sample_weights(
 
 
 def weighted_mean(values: NDArray[Any], weights: NDArray[np.float64] | None) -> float:
-    """Return the mean over samples; the plain one without weights or if all of them are 0."""
+    """Return the mean over samples, plain without weights or if all of them are 0."""
     if weights is None or not weights.any():
         return float(np.mean(values))
     return float(np.average(values, axis=0, weights=weights).mean())
 
 
 def presented(n_samples: int, weights: NDArray[np.float64] | None, epoch: int) -> NDArray[np.int32]:
-    """Return the samples of an epoch, a sample of weight 2 twice and one of 1/2 in every other.
+    """Return the samples of an epoch: one of weight 2 twice, one of 1/2 in every other epoch.
 
     >>> [presented(3, np.array([2.0, 0.5, 0.0]), epoch).tolist() for epoch in range(3)]
     [[0, 0, 1], [0, 0], [0, 0, 1]]
@@ -108,7 +99,7 @@ def presented(n_samples: int, weights: NDArray[np.float64] | None, epoch: int) -
 
 
 def epochs_to_present_all(weights: NDArray[np.float64] | None) -> int:
-    """Return how many epochs it takes until each sample of a weight above 0 has come."""
+    """Return after how many epochs every sample of a weight above 0 was presented."""
     if weights is None:
         return 1
     least = float(np.min(weights, where=weights > 0, initial=1.0))
@@ -130,22 +121,8 @@ def run_epochs(
 ) -> History:
     """Train until nothing is corrected, nothing improves, or ``max_iter`` epochs are over.
 
-    Parameters
-    ----------
-    network, trainer : Network, Trainer
-        What is trained, and the trainer of its layer.
-    n_samples, max_iter : int
-        Size of the training sample, and the largest number of epochs.
-    random : RandomState, optional
-        Draws a new order for every epoch; without it the order is that of the sample.
-    score : callable, optional
-        Validation score of the network as it is; larger is better.
-    n_iter_no_change : int
-        Epochs without a better score after which training stops.
-    weights : ndarray, shape (n_samples,), optional
-        How often each sample is presented per epoch, on average; once by default.
-    n_averaged_epochs : int
-        How many epochs' networks are kept, the last included.
+    ``random`` draws the order of every epoch, ``score`` returns the validation score (larger is
+    better), ``weights`` are mean presentations per epoch, ``n_averaged_epochs`` networks are kept.
     """
     history = History(network)
     quiet, n_quiet = 0, epochs_to_present_all(weights)
