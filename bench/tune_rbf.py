@@ -28,7 +28,7 @@ from page import markdown
 from sdnn.agents import QLearningConfig
 from sdnn.approximators import RBFNetworkConfig
 from sdnn.runs import AgentSpec, BudgetSpec, ProtocolSpec, RunSpec
-from sdnn.runs.planned_trial import trial_seed
+from sdnn.runs.engine import trial_seed
 
 KIND = "rbf tuning"
 STAGES = ("grid", "fine", "ties", "bases", "report")

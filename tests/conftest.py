@@ -105,7 +105,7 @@ def use_trial(monkeypatch, fake):
 def run(fake, use_trial):
     """Run a plan into the store of a folder, with fake trials; returns outcome and digest."""
     from sdnn.runs import ResultStore, run_trials
-    from sdnn.runs.records import records_digest
+    from sdnn.runs.trial import records_digest
 
     def _run(folder, plan=None, trial=fake.FakeTrial, **options):
         use_trial(trial)

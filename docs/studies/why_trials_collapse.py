@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from sdnn import _core
 from sdnn.reproduction.cases import EXPERIMENTS
 from sdnn.reproduction.reproduce import case_spec
-from sdnn.runs.planned_trial import trial_seed
+from sdnn.runs.engine import trial_seed
 from sdnn.runs.results import MeasureConfig, episode_of_collapse
 from sdnn.runs.spec import RunSpec
 from sdnn.whole_files import write_whole

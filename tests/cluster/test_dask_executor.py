@@ -31,7 +31,7 @@ from sdnn.runs import (
     WorkerLostError,
     run_trials,
 )
-from sdnn.runs.records import records_digest
+from sdnn.runs.trial import records_digest
 
 
 class Recorder(Observer):
@@ -173,7 +173,7 @@ UNFIT = {
         _core.__version__ = "0.0.9"
     """,
     "does not give the rows of this one": """
-        from sdnn.runs.records import TrialRows
+        from sdnn.runs.trial import TrialRows
         TrialRows.digest = lambda rows: "other"
     """,
     "it cannot run these trials: ModuleNotFoundError": """

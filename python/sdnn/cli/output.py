@@ -41,7 +41,7 @@ def _finite(value: Any) -> Any:
 
 def report_outcome(context: click.Context, outcome: RunOutcome, out: Path) -> str:
     """Tell what failed, exit if interrupted, and say how much is stored."""
-    from sdnn.runs.planned_trial import describe
+    from sdnn.runs.engine import describe
 
     n_stored = outcome.n_reused + outcome.n_run
     stored = f"{n_stored} of {outcome.n_planned} trials are stored in {out}"

@@ -26,7 +26,7 @@ from sdnn.reproduction.cases import (
 
 if TYPE_CHECKING:
     from sdnn.reproduction.reproduce import ReproduceRequest
-    from sdnn.runs.executor import Executor
+    from sdnn.runs.engine import Executor
     from sdnn.runs.report import Finished
 
 

@@ -18,7 +18,7 @@ from sdnn.cli.output import (
 )
 
 if TYPE_CHECKING:
-    from sdnn.runs.executor import Executor
+    from sdnn.runs.engine import Executor
     from sdnn.runs.report import Finished
     from sdnn.runs.sweep import SweepRequest
 

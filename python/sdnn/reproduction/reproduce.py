@@ -24,16 +24,14 @@ from sdnn.reproduction.cost import CostConfig, CostKey, CostRecord
 from sdnn.reproduction.figures import draw_cost, draw_experiment
 from sdnn.reproduction.reference_results import reference_results
 from sdnn.reproduction.report import Report
-from sdnn.runs.engine import Observer, run_trials
-from sdnn.runs.executor import Executor
+from sdnn.runs.engine import Executor, Observer, PlannedTrial, run_trials, trial_seed
 from sdnn.runs.figures import figure_bytes, require_matplotlib
-from sdnn.runs.planned_trial import PlannedTrial, trial_seed
-from sdnn.runs.records import ROW_HEADER, TrialKey, TrialRecord, records_digest, trial_rows
 from sdnn.runs.registry import cost_series, label_of, split_label
 from sdnn.runs.report import Finished, describe_call, json_bytes, require_jinja
 from sdnn.runs.results import CaseResult, measure
 from sdnn.runs.spec import PAPER_INTERVAL, AgentSpec, BudgetSpec, RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
+from sdnn.runs.trial import ROW_HEADER, TrialKey, TrialRecord, records_digest, trial_rows
 from sdnn.whole_files import csv_bytes, remove_abandoned_files, write_whole
 
 QUICK_TRIALS = 2

@@ -14,7 +14,14 @@ from sdnn.lazy import attach
 
 if TYPE_CHECKING:
     from sdnn.runs.dask_executor import DaskExecutor
-    from sdnn.runs.engine import Observer, run_trials
+    from sdnn.runs.engine import (
+        Executor,
+        Observer,
+        PlannedTrial,
+        ThreadExecutor,
+        run_trials,
+        trial_seed,
+    )
     from sdnn.runs.environment import EnvironmentSpec
     from sdnn.runs.errors import (
         ClusterError,
@@ -25,15 +32,12 @@ if TYPE_CHECKING:
         StoreError,
         WorkerLostError,
     )
-    from sdnn.runs.executor import Executor, ThreadExecutor
-    from sdnn.runs.planned_trial import PlannedTrial, trial_seed
-    from sdnn.runs.records import TrialKey, TrialRecord, TrialRows
     from sdnn.runs.registry import AGENTS, AgentEntry, CostSeries, agent_entry, register
     from sdnn.runs.results import CaseResult, Estimate, MeasureConfig, measure
     from sdnn.runs.run import Goal, Run, RunEvaluation, RunOutcome
     from sdnn.runs.spec import AgentSpec, BudgetSpec, OutputSpec, ProtocolSpec, RunSpec
     from sdnn.runs.store import ResultStore
-    from sdnn.runs.trial import Trial
+    from sdnn.runs.trial import Trial, TrialKey, TrialRecord, TrialRows
 
 __getattr__, __dir__ = attach(globals())
 

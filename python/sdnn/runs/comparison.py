@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.runs.records import TrialRecord
 from sdnn.runs.registry import title_of
 from sdnn.runs.report import (
     MEASURE_END,
@@ -39,6 +38,7 @@ from sdnn.runs.results import (
 )
 from sdnn.runs.study import Combination, Study
 from sdnn.runs.study_file import StudyCase, StudyVariant
+from sdnn.runs.trial import TrialRecord
 
 MIN_TRIALS_TO_DIFFER = 6
 """Fewer paired trials are all on one side by chance more often than once in twenty times."""

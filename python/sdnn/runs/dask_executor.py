@@ -22,10 +22,9 @@ from typing import TYPE_CHECKING, Any
 
 from sdnn import _core
 from sdnn.runs.dask_worker import PROBE_CALL, PROGRESS_TOPIC, probe, run_on_worker
+from sdnn.runs.engine import Advanced, Failed, Finished, Lost, Message, Noted, PlannedTrial, Started
 from sdnn.runs.errors import ClusterError, WorkerLostError
-from sdnn.runs.executor import Advanced, Failed, Finished, Lost, Message, Noted, Started
-from sdnn.runs.planned_trial import PlannedTrial
-from sdnn.runs.records import TrialKey
+from sdnn.runs.trial import TrialKey
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -78,7 +77,7 @@ class DaskExecutor:
     def run(
         self, planned: Sequence[PlannedTrial], stop: threading.Event
     ) -> Generator[Message, None, None]:
-        """Run the trials; see `sdnn.runs.executor.Executor`.
+        """Run the trials; see `sdnn.runs.engine.Executor`.
 
         Raises
         ------

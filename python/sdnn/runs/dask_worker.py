@@ -10,11 +10,9 @@ import pickle
 import time
 
 from sdnn import _core
+from sdnn.runs.engine import PlannedTrial, run_to_end
 from sdnn.runs.errors import ClusterError
-from sdnn.runs.executor import run_to_end
-from sdnn.runs.planned_trial import PlannedTrial
-from sdnn.runs.records import TrialRecord, TrialRows
-from sdnn.runs.trial import opened
+from sdnn.runs.trial import TrialRecord, TrialRows, opened
 
 PROBE_EPISODES = 10
 """Learning episodes of a probe: few, but they use every part of the agent and the task."""

@@ -1,44 +1,152 @@
-"""Runs the trials that a store does not hold yet.
+"""The engine: runs the trials that a store does not hold yet, in threads or on other machines.
 
-Where they run is an executor's affair: threads of this process, or a cluster. The calling thread
-alone writes the store and tells the observer. What is stored is the truth: whatever else happens to
-a trial, it is missing until it is in the store.
+An executor runs trials and reports about them; it knows no store. The calling thread alone writes
+the store and calls the observer, and stores a finished trial before it takes the next report. What
+is not stored, whatever happened to it, is missing and runs again. A trial in C++ releases Python's
+lock while it advances, so threads scale over the cores.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
-from contextlib import closing
+import time
+import zlib
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from datetime import datetime, timezone
+from queue import Empty, SimpleQueue
+from typing import NamedTuple, Protocol
 
+import numpy as np
+
+from sdnn import _core
 from sdnn.interrupts import Interrupts
-from sdnn.runs.executor import (
-    Advanced,
-    Executor,
-    Failed,
-    Finished,
-    Lost,
-    Noted,
-    Started,
-    ThreadExecutor,
-)
-from sdnn.runs.planned_trial import PlannedTrial
-from sdnn.runs.records import TrialKey
+from sdnn.machine import n_cores
+from sdnn.runs.registry import title_of
+from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
+from sdnn.runs.trial import TrainingTrial, Trial, TrialKey, TrialRecord, TrialRows, opened
+
+CHUNK_SECONDS = 0.1
+"""A trial reports about this often; it is also how long an interruption waits."""
+
+POLL_SECONDS = 0.1
+"""How often the calling thread wakes up while no message comes."""
+
+
+def trial_seed(root_seed: int, case_id: str, trial: int) -> int:
+    """Return the seed of a trial, the same for every agent, order of execution and number of jobs.
+
+    All agents thus meet the same sensor noise in the same trial of a case. It is the first 64-bit
+    word of ``SeedSequence(root_seed, spawn_key=(crc32(case_id), trial))`` without its lowest bit,
+    because the result file's integers have a sign.
+
+    Examples
+    --------
+    >>> trial_seed(0, "s4", 0) == trial_seed(0, "s4", 1)
+    False
+    """
+    spawn_key = (zlib.crc32(case_id.encode()), trial)
+    word = np.random.SeedSequence(root_seed, spawn_key=spawn_key).generate_state(1, np.uint64)[0]
+    return int(word) >> 1
+
+
+def describe(key: TrialKey) -> str:
+    """Return the name of a trial for a reader; trials count from 1.
+
+    Examples
+    --------
+    >>> describe(TrialKey("s4", "sdnn-c", 0, 1, ""))
+    'SDNN-C s4, trial 1'
+    """
+    return f"{title_of(key.agent)} {key.case_id}, trial {key.trial + 1}"
+
+
+@dataclass(frozen=True)
+class PlannedTrial:
+    """A trial that a run needs: where its result is stored, and what is run with the key's seed."""
+
+    key: TrialKey
+    spec: RunSpec
+
+    @property
+    def title(self) -> str:
+        """Its name for a reader."""
+        return describe(self.key)
+
+
+# The reports of executors.
+
+
+class Started(NamedTuple):
+    """A trial starts."""
+
+    planned: PlannedTrial
+
+
+class Advanced(NamedTuple):
+    """A trial has done so many learning episodes."""
+
+    planned: PlannedTrial
+    episode: int
+
+
+class Lost(NamedTuple):
+    """A trial was lost with what ran it; it starts again later, or fails."""
+
+    planned: PlannedTrial
+
+
+class Finished(NamedTuple):
+    """A trial is done."""
+
+    planned: PlannedTrial
+    record: TrialRecord
+
+
+class Failed(NamedTuple):
+    """A trial raised, or was lost too often."""
+
+    planned: PlannedTrial
+    error: Exception
+
+
+class Noted(NamedTuple):
+    """A text for a person."""
+
+    text: str
+
+
+class _Abandoned(NamedTuple):
+    """A trial was given up after a stop."""
+
+
+Message = Started | Advanced | Lost | Finished | Failed | Noted
+
+
+class Executor(Protocol):
+    """Runs trials somewhere."""
+
+    def run(
+        self, planned: Sequence[PlannedTrial], stop: threading.Event
+    ) -> Generator[Message, None, None]:
+        """Run the trials, and yield what happens until each is finished or failed.
+
+        The generator runs in the calling thread. Closing it gives up what is running. Once `stop`
+        is set, running trials are given up and no further one starts.
+
+        Raises
+        ------
+        RunError
+            If no trial can be run any more.
+        """
 
 
 @dataclass(frozen=True)
 class Failure:
-    """A trial that raised, or was lost too often.
-
-    Parameters
-    ----------
-    key
-        Which trial it was.
-    error
-        What it raised, or how it was lost.
-    """
+    """A trial that raised, or was lost too often."""
 
     key: TrialKey
     error: Exception
@@ -46,20 +154,10 @@ class Failure:
 
 @dataclass(frozen=True, kw_only=True)
 class RunOutcome:
-    """What became of a run.
+    """The result of `run_trials`.
 
-    Parameters
-    ----------
-    n_planned
-        Trials the run needs.
-    n_reused
-        Trials that were stored before.
-    n_run
-        Trials finished and stored now.
-    failures
-        Trials that raised, or were lost too often.
-    interrupted
-        Whether the run was stopped before its end.
+    ``n_planned`` trials were needed, of which ``n_reused`` were stored before and ``n_run`` are
+    finished and stored now; ``interrupted`` is whether it was stopped before its end.
     """
 
     n_planned: int
@@ -70,7 +168,7 @@ class RunOutcome:
 
 
 class Observer:
-    """Told about a run, from the thread that runs it. This one ignores everything."""
+    """The interface of what shows progress, called by the thread that runs; it ignores all."""
 
     def begun(self, n_planned: int, n_reused: int, n_episodes: int) -> None:
         """Note that the run begins, with `n_episodes` learning episodes before it."""
@@ -91,7 +189,7 @@ class Observer:
         """Note that a trial raised, or was lost too often."""
 
     def noted(self, text: str) -> None:
-        """Pass on what a person should know, such as a worker that was refused."""
+        """Pass on a text for a person, such as about a worker that was refused."""
 
     def costs_begun(self, n_missing: int) -> None:
         """Note that the measurement of costs begins, with `n_missing` of them before it."""
@@ -125,9 +223,9 @@ def run_trials(
     jobs
         Threads of the default executor; default one for each core.
     stop
-        Set by Ctrl-C; whoever sets it ends the run, too.
+        Ends the run when it is set, as Ctrl-C does.
     observer
-        Told what happens.
+        Notified of what happens.
 
     Raises
     ------
@@ -146,8 +244,8 @@ def run_trials(
     planned = tuple(plan)
     stored = store.keys()
     missing = tuple(p for p in planned if p.key not in stored)
-    n_episodes = sum(p.spec.length for p in missing)
-    watcher.begun(len(planned), len(planned) - len(missing), n_episodes)
+    n_reused = len(planned) - len(missing)
+    watcher.begun(len(planned), n_reused, sum(p.spec.length for p in missing))
     stop = threading.Event() if stop is None else stop
     failures: list[Failure] = []
     n_run = 0
@@ -173,8 +271,155 @@ def run_trials(
                         watcher.noted(text)
     return RunOutcome(
         n_planned=len(planned),
-        n_reused=len(planned) - len(missing),
+        n_reused=n_reused,
         n_run=n_run,
         failures=tuple(failures),
         interrupted=stop.is_set(),
     )
+
+
+def run_to_end(
+    planned: PlannedTrial,
+    *,
+    wanted: Callable[[], bool],
+    advanced: Callable[[int], None],
+) -> TrialRecord | None:
+    """Run one trial, in pieces of about `CHUNK_SECONDS`; None where it did not come to its end.
+
+    After every piece, ``advanced`` is called with the number of learning episodes done, and the
+    trial is given up unless ``wanted`` returns True.
+    """
+    begin = time.thread_time()
+    with opened(planned.spec.make_trial(planned.key.seed)) as trial:
+        with closing(_pieces(trial)) as pieces:
+            for _ in pieces:
+                advanced(trial.done if isinstance(trial, TrainingTrial) else int(trial.episode))
+                if not wanted():
+                    return None
+        if not trial.finished:
+            return None
+        rows = (
+            trial.rows()
+            if isinstance(trial, TrainingTrial)
+            else TrialRows.of_tests(**trial.test_rows())
+        )
+    return TrialRecord(
+        key=planned.key,
+        config=planned.spec.canonical_json(),
+        version=_core.__version__,
+        n_decisions=int(trial.n_decisions),
+        seconds=time.thread_time() - begin,
+        finished_at=datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        rows=rows,
+    )
+
+
+def _pieces(trial: Trial | TrainingTrial) -> Generator[None, None, None]:
+    """Run a trial to its end; yield about every `CHUNK_SECONDS`, and first of all."""
+    yield
+    if isinstance(trial, TrainingTrial):  # whose episodes may be long
+        yield from trial.pieces(CHUNK_SECONDS)
+        return
+    chunk = 1
+    while not trial.finished:
+        begin = time.monotonic()
+        trial.advance(chunk)
+        seconds = time.monotonic() - begin
+        if seconds < CHUNK_SECONDS / 2:
+            chunk *= 2
+        elif seconds > 2 * CHUNK_SECONDS:
+            chunk = max(1, chunk // 2)
+        yield
+
+
+class ThreadExecutor:
+    """Runs trials in threads of this process; ``jobs`` at a time, by default one for each core.
+
+    Raises
+    ------
+    ValueError
+        If `jobs` is less than 1.
+    """
+
+    def __init__(self, jobs: int | None = None) -> None:
+        self.jobs = n_cores() if jobs is None else jobs
+        if self.jobs < 1:
+            raise ValueError(f"jobs must be at least 1, got {self.jobs}")
+
+    def run(
+        self, planned: Sequence[PlannedTrial], stop: threading.Event
+    ) -> Generator[Message, None, None]:
+        """Run the trials; see `Executor`."""
+        messages: SimpleQueue[Message | _Abandoned] = SimpleQueue()
+        with (
+            ThreadPoolExecutor(self.jobs, thread_name_prefix="trial") as pool,
+            _set_at_exit(stop),
+        ):
+            for item in planned:
+                pool.submit(_run_one, item, messages, stop)
+            # Every submitted trial sends one last message, also after a stop.
+            n_open = len(planned)
+            while n_open:
+                try:
+                    message = messages.get(timeout=POLL_SECONDS)
+                except Empty:
+                    continue
+                n_open -= not isinstance(message, Started | Advanced)
+                if not isinstance(message, _Abandoned):
+                    yield message
+
+
+class SerialExecutor:
+    """Runs trials one after another in the calling thread, as an environment may need it."""
+
+    def run(
+        self, planned: Sequence[PlannedTrial], stop: threading.Event
+    ) -> Generator[Message, None, None]:
+        """Run the trials; see `Executor`."""
+        for item in planned:
+            yield Started(item)
+            try:
+                record = run_to_end(
+                    item, wanted=lambda: not stop.is_set(), advanced=lambda episode: None
+                )
+            except Exception as error:
+                yield Failed(item, error)
+                continue
+            if stop.is_set() and record is None:
+                return
+            if record is not None:
+                yield Finished(item, record)
+
+
+def _run_one(
+    planned: PlannedTrial, messages: SimpleQueue[Message | _Abandoned], stop: threading.Event
+) -> None:
+    """Run one trial; runs in a worker thread."""
+    if stop.is_set():
+        messages.put(_Abandoned())
+        return
+    try:
+        messages.put(Started(planned))
+        record = run_to_end(
+            planned,
+            wanted=lambda: not stop.is_set(),
+            advanced=lambda episode: messages.put(Advanced(planned, episode)),
+        )
+    except Exception as error:
+        messages.put(Failed(planned, error))
+    except BaseException as error:  # SystemExit and the like end a thread without a word
+        failure = RuntimeError(f"the trial raised {error!r}")
+        failure.__cause__ = error
+        messages.put(Failed(planned, failure))
+    else:
+        messages.put(_Abandoned() if record is None else Finished(planned, record))
+
+
+@contextmanager
+def _set_at_exit(event: threading.Event) -> Iterator[None]:
+    """Let an error in the calling thread stop the workers before the pool waits for them."""
+    try:
+        yield
+    except BaseException:
+        event.set()
+        raise

@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from sdnn.machine import n_cores
+from sdnn.runs.engine import describe
 from sdnn.runs.errors import RunError
-from sdnn.runs.planned_trial import describe
-from sdnn.runs.records import TrialKey, TrialTime
 from sdnn.runs.report import duration_words
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.sweep import SweepRequest
-from sdnn.runs.trial import opened
+from sdnn.runs.trial import TrialKey, TrialTime, opened
 
 PROBE_SECONDS = 0.3  # processor time of a probe, about
 

@@ -24,7 +24,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn.arguments import real, whole
-from sdnn.runs.records import TrialRecord, TrialRows
+from sdnn.runs.trial import TrialRecord, TrialRows
 
 FloatArray = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import json
 import os
 import signal
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,34 +19,37 @@ from sdnn._core import __version__
 from sdnn.agents import (
     Agent,
     Callback,
+    CheckpointCallback,
     Evaluation,
+    Scaling,
     SDNNQLearning,
+    StopTrainingOnRewardThreshold,
+    TensorBoard,
+    Training,
+    UnrepeatedEpisodeError,
     UnusableStepError,
     evaluate,
     load_agent,
 )
 from sdnn.agents.callbacks import Row
 from sdnn.agents.spaces import require_same_kind
+from sdnn.arguments import whole
 from sdnn.interrupts import Interrupts
 from sdnn.runs.config_file import ConfigFile
-from sdnn.runs.engine import run_trials
+from sdnn.runs.engine import PlannedTrial, SerialExecutor, run_trials
 from sdnn.runs.environment import render_modes
-from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line
-from sdnn.runs.executor import SerialExecutor
-from sdnn.runs.planned_trial import PlannedTrial
-from sdnn.runs.records import TrialKey
-from sdnn.runs.run_training import (
-    AGENT,
-    CHECKPOINT,
-    Goal,
-    RunOutcome,
-    RunTask,
-    one_of,
-    tensorboard_in,
-)
+from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line, problem_of
 from sdnn.runs.spec import BudgetSpec, RunSpec
 from sdnn.runs.spec_file import FORMAT, read_spec
-from sdnn.runs.store import ResultStore
+from sdnn.runs.store import STORE_NAME, ResultStore
+from sdnn.runs.trial import (
+    Reason,
+    TrainingTrial,
+    TrialKey,
+    TrialRows,
+    reset_options,
+    training_of,
+)
 from sdnn.whole_files import lock, remove_abandoned_files, write_whole
 
 if TYPE_CHECKING:
@@ -56,35 +59,60 @@ __all__ = ["Goal", "Run", "RunEvaluation", "RunOutcome"]
 
 CONFIG = "config.json"
 LOCK = ".lock"
+CHECKPOINT = "checkpoint.safetensors"
+AGENT = "agent.safetensors"
+TENSORBOARD = "tensorboard"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Goal:
+    """A new goal of a run that was resumed at a step: ``steps`` or ``episodes`` in all.
+
+    ValueError if a number is out of its range, or not one of ``steps`` and ``episodes`` is given.
+    """
+
+    at_step: int
+    steps: int | None = None
+    episodes: int | None = None
+
+    def __post_init__(self) -> None:
+        whole("at_step", self.at_step, 0, 2**53)
+        if (self.steps is None) == (self.episodes is None):
+            raise ValueError("steps or episodes must be given")
+        name = "episodes" if self.steps is None else "steps"
+        whole(name, getattr(self, name), 1, 2**53)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOutcome:
+    """The result of training a run.
+
+    ``reason``: all is done, an evaluation reached the target, or a callback stopped it;
+    ``learning_report``: see `sdnn.agents.SDNNQLearning.learning_report`, None for other agents and
+    while it is warming up; ``has_pictures``: whether `record` can render the environment.
+    """
+
+    n_steps: int
+    n_episodes: int
+    reason: Reason
+    last_evaluation: Row | None
+    learning_report: Mapping[str, Any] | None
+    is_warming_up: bool
+    has_pictures: bool
+    scaling: Scaling | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunEvaluation(Evaluation):
-    """The outcome of some greedy episodes of a run's agent.
-
-    Parameters
-    ----------
-    returns, lengths, terminated
-        See `sdnn.agents.Evaluation`.
-    is_warming_up
-        Whether the agent has learned nothing yet: all its actions are random.
-    """
+    """The result of greedy episodes; ``is_warming_up``: all actions of the agent are random."""
 
     is_warming_up: bool
 
 
 class Run:
-    """A run in its folder.
+    """A run in its folder, which `create` and `open` make.
 
-    `create` and `open` make one.
-
-    Attributes
-    ----------
-    folder : Path
-    spec : RunSpec
-        As it was begun.
-    goals : tuple of Goal
-        Goals it was given later, in order.
+    ``spec`` is the specification it was begun with, ``goals`` are those it was given later.
     """
 
     def __init__(self, folder: Path, spec: RunSpec, goals: Iterable[Goal] = ()) -> None:
@@ -98,12 +126,9 @@ class Run:
 
         Raises
         ------
-        ConfigError
-            If environment or agent cannot be made; no folder is made then.
-        RunError
-            If something is there already.
-        OSError
-            If the folder cannot be written.
+        ConfigError, RunError, OSError
+            If environment or agent cannot be made (no folder is made then), something is there
+            already, or the folder cannot be written.
         """
         place = Path(folder)
         if (place / CONFIG).exists():
@@ -119,13 +144,7 @@ class Run:
 
     @classmethod
     def open(cls, folder: str | Path) -> Self:
-        """Read a run's configuration.
-
-        Raises
-        ------
-        RunError
-            If the folder holds no run, or its configuration is damaged: file and key are named.
-        """
+        """Read a run's configuration; RunError that names file and key if it is damaged."""
         place = Path(folder)
         path = place / CONFIG
         if not path.exists():
@@ -154,15 +173,8 @@ class Run:
     ) -> RunOutcome:
         """Learn until the goal is reached, from the beginning or where the run stopped.
 
-        Parameters
-        ----------
-        steps, episodes
-            A new goal, counted from the beginning of the run; a target is dropped with it. By
-            default the goal is as it was.
-        callbacks
-            More of them.
-        repeat_episodes
-            See `sdnn.agents.Training.load`.
+        ``steps`` or ``episodes`` are a new goal, counted from the beginning of the run; a target is
+        dropped with it. ``repeat_episodes``: see `sdnn.agents.Training.load`.
 
         Raises
         ------
@@ -170,7 +182,7 @@ class Run:
             For SIGINT and SIGTERM, once the present step is done and a checkpoint is written.
         RunError
             If a file is damaged, another process trains the run, or the environment differs or
-            gives what cannot be learned: the message then says in which step, and what is saved.
+            gives what cannot be learned: the message then names the step, and what is saved.
         OSError
             If a file cannot be read or written.
         """
@@ -186,8 +198,8 @@ class Run:
             store.reopen(self.key)
             stop = threading.Event()
             task = RunTask(
-                self, store, callbacks, repeat_episodes=repeat_episodes, steps=steps,
-                episodes=episodes, stop=stop,
+                self, store, callbacks, stop,
+                repeat_episodes=repeat_episodes, steps=steps, episodes=episodes,
             )  # fmt: skip
             planned = PlannedTrial(self.key, cast("RunSpec", task))
             with Interrupts(stop.set, (signal.SIGTERM,)) as terminations:
@@ -199,27 +211,24 @@ class Run:
                 raise RunTerminatedError(f"terminated after {training.n_steps} steps")
             if done.interrupted:
                 raise KeyboardInterrupt
-            agent = training.agent
+            agent, env = training.agent, training.env
             agent.save(self.folder / AGENT)
+        evaluations = [row for row in self.rows() if row["kind"] == "evaluation"]
+        has_report = isinstance(agent, SDNNQLearning) and not agent.is_warming_up
+        single: Any = env.envs[0] if isinstance(env, gym.vector.SyncVectorEnv) else env
         return RunOutcome(
             n_steps=training.n_steps,
             n_episodes=training.n_episodes,
             reason=task.trial.reason,
-            last_evaluation=_last_row(self.rows(), "evaluation"),
-            learning_report=_report(agent),
+            last_evaluation=evaluations[-1] if evaluations else None,
+            learning_report=agent.learning_report() if has_report else None,
             is_warming_up=agent.is_warming_up,
-            has_pictures="rgb_array" in render_modes(one_of(training.env)),
+            has_pictures="rgb_array" in render_modes(single),
             scaling=agent.scaling,
         )
 
     def agent(self) -> Agent[Any, Any]:
-        """Load the agent as it is now: that of the last checkpoint.
-
-        Raises
-        ------
-        RunError
-            If there is none yet, or its file is damaged.
-        """
+        """Load the agent of the last checkpoint; RunError if there is none or it is damaged."""
         path = next((p for p in map(self.folder.joinpath, (CHECKPOINT, AGENT)) if p.exists()), None)
         if path is None:
             begins = command_line("sdnn", "resume", self.folder)
@@ -230,20 +239,10 @@ class Run:
             raise RunError(str(error)) from error
 
     def evaluate(self, episodes: int = 10, seed: int | None = None) -> RunEvaluation:
-        """Run greedy episodes with the agent as it is now.
+        """Run greedy episodes; by default with other seeds than the run's own evaluations.
 
-        Parameters
-        ----------
-        episodes
-            How many.
-        seed
-            Root of the episodes' seeds; by default others than those of the run's evaluations.
-
-        Raises
-        ------
-        RunError
-            If there is no checkpoint yet, its file is damaged, or the environment differs or gives
-            what cannot be evaluated.
+        RunError if there is no checkpoint yet, its file is damaged, or the environment differs or
+        gives what cannot be evaluated.
         """
         root = self.fresh_seed if seed is None else seed
         agent = self.agent()
@@ -253,12 +252,7 @@ class Run:
                 found = evaluate(agent, env, episodes, seed=root)
             except UnusableStepError as error:
                 raise RunError(f"{self.spec.task}: {error}") from error
-        return RunEvaluation(
-            returns=found.returns,
-            lengths=found.lengths,
-            terminated=found.terminated,
-            is_warming_up=agent.is_warming_up,
-        )
+        return RunEvaluation(**vars(found), is_warming_up=agent.is_warming_up)
 
     def check_spaces(self, agent: Agent[Any, Any], env: gym.Env[Any, Any]) -> None:
         """Check that the environment still is what the agent learned in; RunError if not."""
@@ -279,17 +273,9 @@ class Run:
         return TrialKey(spec.task, spec.label, 0, spec.seed, spec.config_hash)
 
     def rows(self) -> list[Row]:
-        """Read the rows: episodes and evaluations, in order.
-
-        Raises
-        ------
-        StoreError
-            If they cannot be read.
-        """
+        """Read the rows: episodes and evaluations, in order; StoreError if that fails."""
         with ResultStore(self.folder, read_only=True) as store:
             return store.rows(self.key).to_training()
-
-    # Parts.
 
     @contextmanager
     def evaluation_env(self) -> Iterator[gym.Env[Any, Any] | None]:
@@ -319,14 +305,8 @@ class Run:
         """Write the configuration and the goals."""
         values: dict[str, Any] = {"format": FORMAT, "version": __version__, **self.spec.values()}
         if self.goals:
-            values["goals"] = [
-                {
-                    name: value
-                    for name, value in dataclasses.asdict(goal).items()
-                    if value is not None
-                }
-                for goal in self.goals
-            ]
+            goals = map(dataclasses.asdict, self.goals)
+            values["goals"] = [{k: v for k, v in goal.items() if v is not None} for goal in goals]
         write_whole(self.folder / CONFIG, (json.dumps(values, indent=2) + "\n").encode())
 
     @contextmanager
@@ -341,11 +321,180 @@ class Run:
             os.close(file)
 
 
-def _report(agent: object) -> Mapping[str, Any] | None:
-    if not isinstance(agent, SDNNQLearning) or agent.is_warming_up:
-        return None
-    return agent.learning_report()
+class _Target(StopTrainingOnRewardThreshold):
+    """Stops where the target was reached, also if that was just before the run was killed."""
+
+    def on_start(self, training: Training) -> None:
+        """Look at the evaluation made at the present step."""
+        if self.is_reached(training) and training.evaluations[-1][0] == training.n_steps:
+            training.stop()
 
 
-def _last_row(rows: Iterable[Row], kind: str) -> Row | None:
-    return next((row for row in reversed(list(rows)) if row["kind"] == kind), None)
+class _StoredCheckpoints(CheckpointCallback):
+    """Stores the rows of a run before each checkpoint that counts them; stops at an event."""
+
+    def __init__(self, run: Run, store: ResultStore, stop: threading.Event) -> None:
+        super().__init__(run.folder / CHECKPOINT, run.spec.output.checkpoint_every)
+        self._run, self._results, self._stop = run, store, stop
+        self._rows: list[Row] = []
+
+    def on_start(self, training: Training) -> None:
+        """Remove the rows that were stored after the checkpoint."""
+        self._store(training)
+
+    def on_step(self, training: Training) -> None:
+        """Save where it is due; stop where it is asked for."""
+        if self._stop.is_set():
+            training.stop()
+        super().on_step(training)
+
+    def on_row(self, training: Training, row: Row) -> None:
+        """Keep a row for the next checkpoint."""
+        self._rows.append(row)
+
+    def _save(self, training: Training) -> None:
+        self._store(training)
+        super()._save(training)
+
+    def _store(self, training: Training) -> None:
+        first = training.n_rows - len(self._rows)
+        config = self._run.spec.canonical_json()
+        rows = TrialRows.from_training(self._rows, first)
+        self._results.extend(self._run.key, rows, first, config=config, version=__version__)
+        self._rows = []
+
+
+class RunTrial(TrainingTrial):
+    """The training of a run, whose rows are stored with its checkpoints already."""
+
+    n_evaluated: Callable[[], int]
+
+    @property
+    def n_decisions(self) -> int:
+        """Decisions of the whole run, in learning and evaluations."""
+        return self.training.n_steps + self.n_evaluated()
+
+    def rows(self) -> TrialRows:
+        """Return the rows that are not yet stored: none."""
+        return TrialRows.from_training([])
+
+
+class RunTask:
+    """The training of a run as the specification of a planned trial; see `Run.train`.
+
+    ``trial`` is there once it is made.
+    """
+
+    trial: RunTrial
+    is_compiled = False
+
+    def __init__(
+        self, run: Run, store: ResultStore, callbacks: Iterable[Callback], stop: threading.Event,
+        *, repeat_episodes: bool, steps: int | None, episodes: int | None,
+    ) -> None:  # fmt: skip
+        self._run, self._store, self._given = run, store, tuple(callbacks)
+        self._repeats, self._goal = repeat_episodes, (steps, episodes)
+        self._checkpoints = _StoredCheckpoints(run, store, stop)
+        self._began_at = 0
+
+    @property
+    def length(self) -> int:
+        """Steps or episodes of the whole run."""
+        goal = self._run.goal
+        return goal.steps or goal.episodes or 0
+
+    def canonical_json(self) -> str:
+        """Return what defines the run."""
+        return self._run.spec.canonical_json()
+
+    def make_trial(self, seed: int) -> RunTrial:
+        """Make the training, from the checkpoint if there is one; the run has a seed already."""
+        run, spec = self._run, self._run.spec
+        has_goal = self._goal != (None, None)
+        with ExitStack() as stack:
+            env: Any = stack.enter_context(closing(spec.make_training_env()))
+            evaluation_env = stack.enter_context(run.evaluation_env())
+            target = None
+            if spec.budget.target_return is not None and not (run.goals or has_goal):
+                target = _Target(spec.budget.target_return)
+            told = [target, self._checkpoints, *self._given]
+            if spec.output.tensorboard:
+                told.append(tensorboard_in(run.folder))
+            callbacks = [one for one in told if one is not None]
+            if (run.folder / CHECKPOINT).exists():
+                training = self._loaded(env, evaluation_env, callbacks)
+            else:
+                budget = BudgetSpec(steps=run.goal.steps, episodes=run.goal.episodes)
+                spec = spec.replace(budget=budget)
+                training = training_of(spec, env, evaluation_env, callbacks)
+            if has_goal:
+                self._set_goal(training, *self._goal)
+            self._began_at = training.n_steps
+            stack.pop_all()
+        environments = [one for one in (env, evaluation_env) if one is not None]
+        self.trial = RunTrial(training, environments, target)
+        self.trial.n_evaluated = lambda: self._store.rows(run.key).n_evaluated
+        return self.trial
+
+    def told(self, error: Exception) -> Exception:
+        """Tell what is saved where a step could not be learned."""
+        if not isinstance(error, UnusableStepError):
+            return error
+        n_steps = self._checkpoints.n_saved or self._began_at
+        goes_on = command_line("sdnn", "resume", self._run.folder)
+        saved = f"the first {n_steps} steps are saved: {goes_on} goes on there with a new episode"
+        if n_steps == 0:
+            saved = f"nothing is learned yet: {goes_on} begins again once the environment is fixed"
+        told = RunError(f"{self._run.spec.task}: {error}; {saved}")
+        told.__cause__ = error
+        return told
+
+    def _loaded(
+        self, env: Any, evaluation_env: gym.Env[Any, Any] | None, callbacks: list[Callback]
+    ) -> Training:
+        folder = self._run.folder
+        try:
+            training = Training.load(
+                folder / CHECKPOINT,
+                env,
+                callbacks=callbacks,
+                evaluation_env=evaluation_env,
+                repeat_episodes=self._repeats,
+                reset_options=reset_options(self._run.spec),
+            )
+        except UnrepeatedEpisodeError as error:
+            begins = command_line("sdnn", "resume", folder, "--new-episode")
+            raise RunError(f"{error}; {begins} begins a new one") from error
+        except ValueError as error:
+            raise RunError(str(error)) from error
+        numbers = self._store.rows(self._run.key).table["number"]
+        if len(set(numbers.tolist())) < training.n_rows:
+            raise RunError(
+                f"{folder / STORE_NAME} must have the {training.n_rows} rows that were written"
+                f" before {CHECKPOINT}: it was changed"
+            )
+        return training
+
+    def _set_goal(self, training: Training, steps: int | None, episodes: int | None) -> None:
+        """Note a new goal: in the checkpoint, which is followed, then in the configuration."""
+        if steps is not None and episodes is not None:
+            raise ConfigError("episodes", "must not be given together with steps")
+        name, goal = ("episodes", episodes) if steps is None else ("steps", steps)
+        done: int = getattr(training, f"n_{name}")
+        try:
+            if whole(name, goal, 1, 2**53) < done:
+                raise ConfigError(name, f"must be at least the {done} that are done, got {goal}")
+        except ValueError as error:
+            raise ConfigError(name, problem_of(error)) from None
+        training.steps, training.episodes = steps, episodes
+        if (self._run.folder / CHECKPOINT).exists():
+            training.save(self._run.folder / CHECKPOINT)
+        self._run.add_goal(training.n_steps, steps, episodes)
+
+
+def tensorboard_in(folder: Path) -> TensorBoard:
+    """Make the callback that writes for TensorBoard; ConfigError if its package is missing."""
+    try:
+        return TensorBoard(folder / TENSORBOARD)
+    except ImportError as error:
+        raise ConfigError("output.tensorboard", str(error)) from error

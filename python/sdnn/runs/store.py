@@ -1,4 +1,4 @@
-"""One SQLite file that holds the rows of all runs and measurements.
+"""The SQLite file that holds the rows of all runs, and measurements.
 
 Finished trials and measurements are stored in one transaction each, and so are the rows of a run in
 progress with every checkpoint. The file survives a kill at any instant (SQLite's rollback journal,
@@ -17,13 +17,7 @@ from typing import Any
 import numpy as np
 
 from sdnn.runs.errors import StoreError
-from sdnn.runs.records import (
-    ROW,
-    TrialKey,
-    TrialRecord,
-    TrialRows,
-    TrialTime,
-)
+from sdnn.runs.trial import ROW, TrialKey, TrialRecord, TrialRows, TrialTime
 
 STORE_NAME = "results.sqlite"
 SCHEMA_VERSION = 5
@@ -68,15 +62,7 @@ _ROW_COLUMNS = (
 
 
 class ResultStore:
-    """The result file of a folder, made if it is not there.
-
-    Parameters
-    ----------
-    folder
-        Folder of the file, made if missing.
-    read_only
-        Whether it is only looked at: then nothing is made, and the folder may be one that cannot be
-        written.
+    """The result file of a folder, made if it is not there; with ``read_only``, nothing is made.
 
     Raises
     ------
@@ -132,20 +118,11 @@ class ResultStore:
         """Close the file."""
         self._connection.close()
 
-    # Runs.
-
     def add(self, record: TrialRecord, *, is_exact: bool = True) -> None:
         """Store a finished trial, or finish a run in progress, as a whole or not at all.
 
-        Storing the same trial again (another process was quicker) changes nothing.
-
-        Parameters
-        ----------
-        record
-            The trial; of a run in progress, with the rows that are not yet stored.
-        is_exact
-            Whether it must have the same rows each time, as compiled trials do. The first rows stay
-            where it need not.
+        Storing the same trial again (another process was quicker) changes nothing. With
+        ``is_exact``, as for compiled trials, it must have the same rows each time.
 
         Raises
         ------
@@ -168,26 +145,14 @@ class ResultStore:
             connection.execute(
                 "UPDATE runs SET version = ?, n_decisions = ?, seconds = seconds + ?,"
                 " finished_at = ?, checksum = ? WHERE id = ?",
-                (
-                    record.version,
-                    record.n_decisions,
-                    record.seconds,
-                    record.finished_at,
-                    whole.checksum(),
-                    run_id,
-                ),
-            )
+                (record.version, record.n_decisions, record.seconds, record.finished_at,
+                 whole.checksum(), run_id),
+            )  # fmt: skip
 
     def extend(
         self, key: TrialKey, rows: TrialRows, first: int, *, config: str, version: str
     ) -> None:
-        """Store rows of a run in progress, in the place of those from the number `first` on.
-
-        Raises
-        ------
-        StoreError
-            If the file cannot be written.
-        """
+        """Store rows of a run in progress; they replace those from the number `first` on."""
         with self._writing() as connection:
             run_id = self._run_id(key, config, version)
             connection.execute(_REOPEN, _stored(key))
@@ -281,23 +246,8 @@ class ResultStore:
         ).fetchall()
         return TrialRows(np.array(found, ROW))
 
-    # What is measured beside runs.
-
     def put(self, kind: str, key: str, content: Mapping[str, Any]) -> None:
-        """Store a measurement; one that another process stored first stays.
-
-        Parameters
-        ----------
-        kind, key
-            Which measurement it is.
-        content
-            Values that JSON has.
-
-        Raises
-        ------
-        StoreError
-            If the file cannot be written.
-        """
+        """Store a measurement as JSON; one that another process stored first stays."""
         with self._writing() as connection:
             connection.execute(
                 "INSERT OR IGNORE INTO measurements VALUES (?, ?, ?)",

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sdnn.runs.config_file import ConfigFile
+from sdnn.runs.engine import PlannedTrial, trial_seed
 from sdnn.runs.errors import ConfigError
-from sdnn.runs.planned_trial import PlannedTrial, trial_seed
-from sdnn.runs.records import TrialKey
 from sdnn.runs.settings import possible_words
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.study_file import BASE, KnownCase, Layer, StudyCase, StudyReader, StudyVariant
-from sdnn.runs.trial import opened
+from sdnn.runs.trial import TrialKey, opened
 
 __all__ = ["Combination", "Study", "read_study"]
 

@@ -10,14 +10,12 @@ from pathlib import Path
 
 from sdnn import _core
 from sdnn.runs.comparison import Addition, Comparison, compare, study_json, study_page
-from sdnn.runs.engine import Observer, run_trials
-from sdnn.runs.executor import Executor
+from sdnn.runs.engine import Executor, Observer, PlannedTrial, run_trials
 from sdnn.runs.figures import draw_study, figure_bytes, require_matplotlib
-from sdnn.runs.planned_trial import PlannedTrial
-from sdnn.runs.records import ROW_HEADER, records_digest, trial_rows
 from sdnn.runs.report import Finished, describe_call, json_bytes, require_jinja
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study import Study
+from sdnn.runs.trial import ROW_HEADER, records_digest, trial_rows
 from sdnn.whole_files import csv_pieces, gzip_pieces, remove_abandoned_files, write_whole
 
 

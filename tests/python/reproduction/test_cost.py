@@ -16,8 +16,8 @@ from sdnn.reproduction.cost import (
 )
 from sdnn.reproduction.report import cost_table
 from sdnn.runs import AGENTS, Observer, ResultStore, StoreError
-from sdnn.runs.records import records_digest
 from sdnn.runs.registry import cost_series
+from sdnn.runs.trial import records_digest
 
 SERIES = [series for _, series in cost_series()]
 SMALL = CostConfig(n_inputs=(3, 2), n_rounds=3, round_seconds=0.001, min_steps=1)

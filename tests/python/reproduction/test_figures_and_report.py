@@ -16,9 +16,9 @@ from sdnn.reproduction.reproduce import ReproduceRequest, reproduce
 from sdnn.runs import AGENTS, PlotUnavailableError, ResultStore, measure
 from sdnn.runs.engine import RunOutcome
 from sdnn.runs.figures import COLORS, SMOOTHED_TESTS, agent_colors, colors_of, figure_bytes
-from sdnn.runs.records import ROW_HEADER, records_digest, trial_rows
 from sdnn.runs.report import describe_call, format_estimate
 from sdnn.runs.results import Estimate, running_median
+from sdnn.runs.trial import ROW_HEADER, records_digest, trial_rows
 
 (EXPERIMENT,) = select_experiments("a")
 PICTURES = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}

@@ -10,9 +10,9 @@ from sdnn.reproduction.claims import Verdict
 from sdnn.reproduction.studies import StudyClaims, add_claims
 from sdnn.runs.comparison import compare, study_json, study_page
 from sdnn.runs.figures import draw_study, figure_bytes
-from sdnn.runs.records import TrialRecord, TrialRows
 from sdnn.runs.report import format_estimate
 from sdnn.runs.results import Estimate
+from sdnn.runs.trial import TrialRecord, TrialRows
 
 
 def record(study, case, variant, number, steps, returns=None, interval=10):

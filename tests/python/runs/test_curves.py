@@ -8,8 +8,8 @@ from run_specs import run_spec
 from sdnn.runs import EnvironmentSpec, Goal, Run, RunError
 from sdnn.runs.curves import curves_of, groups_of, write_curves
 from sdnn.runs.figures import draw_curves
-from sdnn.runs.records import TrialRows
 from sdnn.runs.store import ResultStore
+from sdnn.runs.trial import TrialRows
 
 CONFIG = run_spec(environment=EnvironmentSpec(id="CartPole-v1"))
 

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from sdnn.progress import ProgressBars
 from sdnn.runs import Observer, ResultStore, StoreError, WorkerLostError
-from sdnn.runs.executor import Advanced, Failed, Finished, Lost, Noted, Started, ThreadExecutor
+from sdnn.runs.engine import Advanced, Failed, Finished, Lost, Noted, Started, ThreadExecutor
 
 
 class Recorder(Observer):

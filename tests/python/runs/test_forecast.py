@@ -6,7 +6,7 @@ import pytest
 
 from sdnn.runs import AGENTS, BudgetSpec, RunSpec, TrialKey, forecast
 from sdnn.runs.forecast import Durations, wall_seconds
-from sdnn.runs.records import TrialTime
+from sdnn.runs.trial import TrialTime
 
 CONFIG = RunSpec(budget=BudgetSpec(episodes=1005))
 KEY = TrialKey("s4", "sdnn-c", 0, 1, "mine")

@@ -13,8 +13,8 @@ import drifting_env  # noqa: F401
 from run_specs import run_spec
 from sdnn.agents import Callback, Training, load_agent
 from sdnn.runs import ConfigError, EnvironmentSpec, Run, RunError
-from sdnn.runs.records import TrialRows
 from sdnn.runs.store import ResultStore
+from sdnn.runs.trial import TrialRows
 
 SMALL = {
     "approximator": {"n_hidden_units": 60, "n_active_units": 20, "n_pattern_units": 20},

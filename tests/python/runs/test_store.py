@@ -12,7 +12,7 @@ import pytest
 
 from made_records import make_record
 from sdnn.runs import ResultStore, StoreError, TrialRows
-from sdnn.runs.records import records_digest
+from sdnn.runs.trial import records_digest
 
 
 def filled(folder, n_trials=20):

@@ -20,9 +20,8 @@ from sdnn.runs import (
     agent_entry,
     register,
 )
-from sdnn.runs.records import TrialRows
 from sdnn.runs.registry import labels, title_of
-from sdnn.runs.trial import TrainingTrial, training_trial
+from sdnn.runs.trial import TrainingTrial, TrialRows, training_trial
 
 SEED = 11
 
