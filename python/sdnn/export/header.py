@@ -1,4 +1,4 @@
-"""A trained agent's greedy policy as a C header, for processors without an operating system."""
+"""A trained agent's greedy policy as a C header, for small processors."""
 
 from __future__ import annotations
 
@@ -19,8 +19,16 @@ from numpy.typing import NDArray
 from sdnn._core import __version__
 from sdnn.agents import Agent, Scaling, SDNNQLearning
 from sdnn.arguments import path_of, whole
-from sdnn.export.conversions import Input, conversions
-from sdnn.export.tables import Tables, bit_planes, by_dimension, joined, table_lines, wrapped
+from sdnn.export.tables import (
+    Input,
+    Tables,
+    bit_planes,
+    by_dimension,
+    conversions,
+    joined,
+    table_lines,
+    wrapped,
+)
 from sdnn.whole_files import write_whole
 
 __all__ = ["CHeader", "c_header", "export_c_header"]
@@ -29,8 +37,7 @@ _LARGEST_NAME = 40
 _DEFAULT_FRACTION_BITS = 16
 _MOST_FRACTION_BITS = 30
 _MOST_UNITS = 65535  # whose numbers fit 16 bits
-_MOST_WEIGHTS = 2**26  # some hundred megabytes of text; no small processor holds as many
-
+_MOST_WEIGHTS = 2**26  # some hundred megabytes of text
 _BYTES_OF_UNIT = 8
 _BYTES_OF_NETWORK = 28  # a struct of five pointers and two sizes, where pointers have 32 bits
 
@@ -39,22 +46,9 @@ _BYTES_OF_NETWORK = 28  # a struct of five pointers and two sizes, where pointer
 class CHeader:
     """A C header that holds an agent's greedy policy.
 
-    Parameters
-    ----------
-    name
-        What its names begin with; in capitals for macros.
-    text
-        All of it.
-    fraction_bits
-        Readings and actions in fixed point are multiples of 2 to minus this power.
-    flash_bytes
-        Of its constants.
-    weight_bytes
-        Of these, the weights' own.
-    ram_bytes
-        Of arrays on the stack in a decision.
-    n_words
-        Words of 32 bits of weights that a decision reads.
+    ``text`` is the file and ``name`` the prefix of its names. Fixed-point observations and actions
+    are multiples of ``2**-fraction_bits``. ``flash_bytes`` of constants include ``weight_bytes``;
+    a decision takes ``ram_bytes`` of stack and reads ``n_words`` 32-bit words of weights.
     """
 
     name: str
@@ -73,23 +67,10 @@ def export_c_header(
     name: str | None = None,
     fraction_bits: int | None = None,
 ) -> CHeader:
-    """Write an agent's greedy policy as a C header; see `c_header`.
+    """Write an agent's greedy policy as a C header and return it.
 
-    Parameters
-    ----------
-    agent, fraction_bits
-        See `c_header`.
-    path
-        Of the file, there as a whole or not at all.
-    name
-        See `c_header`; by default the file's, without its ending.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    TypeError, ValueError, RuntimeError
-        As `c_header`.
+    The file is written as a whole or not at all. The name is by default the file's, without its
+    ending; everything else is as for `c_header`.
     """
     place = path_of("path", path)
     header = c_header(agent, place.stem if name is None else name, fraction_bits=fraction_bits)
@@ -98,30 +79,29 @@ def export_c_header(
 
 
 def c_header(agent: Agent[Any, Any], name: str, *, fraction_bits: int | None = None) -> CHeader:
-    """Make a C header of an agent's greedy policy.
+    """Return an agent's greedy policy as a C header.
 
-    The header is C99, and C++. It needs ``<stdint.h>`` and nothing else of a C library, no heap,
-    and no floating point. Its action is that of ``agent.act(observation, explore=False)``; where
-    several actions are best and the agent draws one (``tie_rule="uniform"``), the header takes the
-    middle of the widest run of them. See docs/small-processors.md.
+    The header is C99 and C++, needs ``<stdint.h>`` only, no heap and no floating point. Its action
+    is that of ``agent.act(observation, explore=False)``; where the agent would draw one of several
+    best actions, it takes the middle of their widest run. See docs/small-processors.md.
 
     Parameters
     ----------
     agent : SDNNQLearning
         With known ranges of its observations.
     name : str
-        What all names in the header begin with.
+        Prefix of all names in the header.
     fraction_bits : int, optional
-        Of readings and actions in fixed point, 0 to 30; by default 16, or fewer if an observed
-        range or an action needs it.
+        Of observations and actions in fixed point, 0 to 30; by default 16, or fewer if the
+        observed ranges or the actions need it.
 
     Raises
     ------
     TypeError
-        For agents of another kind: they calculate in floating point.
+        For other agents, which calculate in floating point.
     ValueError
-        If ``name`` is no C identifier, ``fraction_bits`` leaves too little room, or the network is
-        beyond 65,535 hidden units or 2^26 weights.
+        If ``name`` is not a C identifier, ``fraction_bits`` is too large, or the network has more
+        than 65,535 hidden units or 2^26 weights.
     RuntimeError
         If the agent is still warming up.
 
@@ -198,7 +178,7 @@ class _Writer:
             raise ValueError(f"actions must begin within 32 bits, got {self.start}")
 
     def _box(self) -> NDArray[Any] | None:
-        """Take the actions of a Box as `act` gives them, shape (n_actions, n_dimensions)."""
+        """Return the actions of a Box as `act` gives them, shape (n_actions, n_dimensions)."""
         if not isinstance(self.agent.action_space, gym.spaces.Box):
             return None
         actions = [self.agent.actions_of(d) for d in range(self.agent.n_dimensions)]
@@ -409,6 +389,7 @@ _TIE_RULES = {
     "lowest": "Of several best actions it takes the lowest, as the agent does.",
 }
 
+# How ties are broken.
 _LOWEST = {
     "counters": "",
     "choose": """\
@@ -431,8 +412,8 @@ _MIDDLE = {
   return middle;
 """,
 }
-"""How ties are broken."""
 
+# Functions that return one number of an action, or fill in several.
 _OF_NUMBERS = {
     "in_each": "",
     "result": "uint32_t",
@@ -441,7 +422,6 @@ _OF_NUMBERS = {
     "call": "return ",
     "act_bins": "  return ${name}_best(&${name}_networks[0], bins);\n",
 }
-"""What functions look like that give the number of an action."""
 
 _OF_VECTORS = {
     "in_each": " in each dimension",
@@ -454,4 +434,3 @@ _OF_VECTORS = {
   for (d = 0; d < ${NAME}_N_DIMENSIONS; ++d) action[d] = ${name}_best(&${name}_networks[d], bins);
 """,
 }
-"""What they look like where an action has several numbers."""

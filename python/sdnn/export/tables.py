@@ -1,16 +1,28 @@
-"""Tables of numbers in C."""
+"""Tables of numbers in C, and the lines that turn observations into bins."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Tables", "bit_planes", "by_dimension", "joined", "table_lines", "wrapped"]
+__all__ = [
+    "Input",
+    "Tables",
+    "bit_planes",
+    "by_dimension",
+    "conversions",
+    "joined",
+    "table_lines",
+    "wrapped",
+]
 
+_DIRECTION_BITS = 30
 _BYTES = {"uint8_t": 1, "uint16_t": 2, "int32_t": 4, "uint32_t": 4}
 
 
@@ -22,7 +34,7 @@ class Tables:
     lines: list[str] = field(default_factory=list)
 
     def add(self, kind: str, name: str, values: NDArray[Any], comment: str = "") -> None:
-        """Add a table of one or two dimensions of a type of C."""
+        """Add a table of one or two dimensions of a C type."""
         self.n_bytes += _BYTES[kind] * values.size
         if comment:
             self.lines.append(f"/* {comment} */")
@@ -47,7 +59,7 @@ def table_lines(declaration: str, values: NDArray[Any], form: str) -> list[str]:
 
 
 def wrapped(words: Iterable[str], width: int = 98) -> list[str]:
-    """Write words with commas in lines."""
+    """Join words with commas in lines."""
     lines, line = [], " "
     for word in words:
         if len(line) + len(word) + 2 > width:
@@ -63,14 +75,14 @@ def joined(lines: Iterable[str]) -> str:
 
 
 def by_dimension(actions: NDArray[Any]) -> NDArray[Any]:
-    """Arrange actions as a table in C, (n_actions,) or (n_dimensions, n_actions)."""
+    """Arrange actions as (n_actions,), or as (n_dimensions, n_actions)."""
     return actions[:, 0] if actions.shape[1] == 1 else actions.T
 
 
 def bit_planes(weights: NDArray[np.int32]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Pack weights (n, D) as bit planes: words, unit by unit; planes and lowest weight of each.
+    """Pack weights (n, D) as bit planes, as many as each unit's range needs.
 
-    A weight minus the lowest one of its unit has as many bits as the unit's range needs.
+    Returns the words, unit by unit, and each unit's number of planes and lowest weight.
     """
     lowest = weights.min(axis=1)
     above = weights - lowest[:, None]
@@ -84,3 +96,107 @@ def bit_planes(weights: NDArray[np.int32]) -> tuple[NDArray[Any], NDArray[Any], 
         return np.zeros(0, np.uint32), n_bits, lowest
     is_needed = np.arange(len(planes)) < n_bits[:, None]
     return np.stack(planes, axis=1)[is_needed].reshape(-1), n_bits, lowest
+
+
+@dataclass(frozen=True)
+class Input:
+    """An input of the network, and the observed numbers that it is made of."""
+
+    kind: str  # "variable", "circular", "angle" or "symbol"
+    at: Sequence[int]  # numbers of the observation
+    low: float  # the range of a variable or a circular one
+    high: float
+    n_bins: int
+
+    def usage(self) -> Iterator[str]:
+        """Describe it to a reader of the header."""
+        first = self.at[0]
+        if self.kind == "angle":
+            yield f"the angle of cosine observation[{first}] and sine"
+            yield f"  observation[{self.at[1]}], from -pi to pi in {self.n_bins} bins"
+        elif self.kind == "symbol":
+            yield f"which of observation[{first}] to observation[{first + self.n_bins - 1}] is 1"
+        else:
+            turn = ", an angle," if self.kind == "circular" else ""
+            ends = f"from {self.low:.6g} to {self.high:.6g} in {self.n_bins} bins"
+            yield f"observation[{first}]{turn} {ends}"
+
+
+def conversions(
+    inputs: Sequence[Input], name: str, fraction_bits: int
+) -> tuple[Tables, list[str], list[str]]:
+    """Write the lines that find the bins of observations, in fixed and in floating point.
+
+    Also return the tables that they use, shared by inputs of one kind and range.
+    """
+    tables, names = Tables(), dict[Any, str]()
+
+    def table(key: Any, word: str, values: NDArray[Any], comment: str) -> str:
+        if key not in names:
+            names[key] = f"{name}_{word}_{len(names)}"
+            tables.add("int32_t", names[key], values, comment)
+        return names[key]
+
+    fixed, double = [], []
+    for one in inputs:
+        n_bins, reading = one.n_bins, f"observation[{one.at[0]}]"
+        unit = f"({reading} - ({one.low!r})) / {one.high - one.low!r}"
+        if one.kind == "angle":
+            about = "Cosine and sine of the angles where bins begin, from bin 1 on."
+            bounds = table(("angle", n_bins), "directions", _directions(n_bins), about)
+            given = f"({bounds}, {n_bins}, {reading}, observation[{one.at[1]}])"
+            fixed.append(f"bin_of_direction{given}")
+            double.append(f"bin_of_doubles{given}")
+        elif one.kind == "symbol":
+            fixed.append(f"symbol_of_fixed(&{reading}, {n_bins})")
+            double.append(f"symbol_of_double(&{reading}, {n_bins})")
+        elif one.kind == "circular":
+            rate, offset = _turns(one.low, one.high, fraction_bits)
+            turn = f"UINT64_C({rate}) * (uint64_t)(int64_t){reading} + UINT64_C({offset})"
+            fixed.append(f"bin_of_turn({turn}, {n_bins})")
+            double.append(f"bin_of_unit({name}_part_of_turn({unit}), {n_bins})")
+        else:
+            about = f"The least reading in each bin of {reading}, from bin 1 on."
+            values = _fixed_bounds(one.low, one.high, n_bins, fraction_bits)
+            bounds = table((one.at[0], n_bins), "bounds", values, about)
+            fixed.append(f"bin_between({bounds}, {n_bins}, {reading})")
+            double.append(f"bin_of_unit({unit}, {n_bins})")
+    in_fixed, in_double = (
+        [f"  bins[{i}] = {name}_{call};" for i, call in enumerate(calls)]
+        for calls in (fixed, double)
+    )
+    return tables, in_fixed, in_double
+
+
+def _fixed_bounds(low: float, high: float, n_bins: int, fraction_bits: int) -> NDArray[Any]:
+    """Find the least observations in bins 1, 2, ... n_bins - 1, integers times 2^-fraction_bits.
+
+    Bins are calculated as for observations, rounding included.
+    """
+    wanted = np.arange(1, n_bins)
+    below = np.full(wanted.shape, -(2**31) - 1)  # not in the bin, or not among the readings
+    least = np.full(wanted.shape, 2**31 - 1)  # in the bin: ranges end before
+    while (least - below > 1).any():
+        middle = (below + least) // 2
+        unit = np.clip((middle / 2.0**fraction_bits - low) / (high - low), 0.0, 1.0)
+        is_in = (unit * n_bins).astype(np.int64) >= wanted
+        least, below = np.where(is_in, middle, least), np.where(is_in, below, middle)
+    return least
+
+
+def _turns(low: float, high: float, fraction_bits: int) -> tuple[int, int]:
+    """Return an observation's unit as a part of a turn, and the place of 0 in it; times 2^64.
+
+    Rounding must not lead from the beginning of a bin into the one before: 2^31 are added.
+    """
+    width = Fraction(high) - Fraction(low)
+    rate = round(2**64 / (width * 2**fraction_bits)) % 2**64
+    return rate, (round(-Fraction(low) / width * 2**64) + 2**31) % 2**64
+
+
+def _directions(n_bins: int) -> NDArray[Any]:
+    """Return cosine and sine of the angles where bins 1, 2, ... begin, shape (n_bins - 1, 2)."""
+    angles = [math.pi * (2 * b - n_bins) / n_bins for b in range(1, n_bins)]
+    ends = np.array([(math.cos(angle), math.sin(angle)) for angle in angles])
+    rounded: NDArray[Any] = np.round(ends.reshape(-1, 2) * 2**_DIRECTION_BITS).astype(np.int64)
+    return rounded
