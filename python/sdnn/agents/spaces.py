@@ -359,10 +359,7 @@ def space_data(space: gym.Space[Any]) -> dict[str, Any]:
     )
 
 
-_TYPES = {
-    np.dtype(one).str
-    for one in ["b1", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "f2", "f4", "f8"]
-}
+_TYPES = ["|b1", "|i1", "<i2", "<i4", "<i8", "|u1", "<u2", "<u4", "<u8", "<f2", "<f4", "<f8"]
 _MOST_VALUES = 2**20
 """Of a space that is read: more would ask for memory without need."""
 

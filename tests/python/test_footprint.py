@@ -1,0 +1,23 @@
+"""How many files a reader must open to follow a command; lower a limit where it can be lower."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+FOOTPRINT = Path(__file__).parent / "reference" / "footprint.py"
+
+
+@pytest.mark.parametrize(
+    ("command", "limit"),
+    [("train CartPole-v1 --steps 60", 33), ("reproduce a --quick", 35)],
+    ids=["train", "reproduce"],
+)
+def test_a_command_runs_through_few_files(tmp_path, command, limit):
+    words = [sys.executable, FOOTPRINT, *command.split(), "--out", tmp_path / "out"]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    files = json.loads(done.stderr.splitlines()[-1])
+    assert "cli/__init__.py" in files
+    assert len(files) <= limit, files
