@@ -13,12 +13,11 @@ from typing import Any
 
 __all__ = ["BenchmarkError", "run_benchmarks"]
 
-
+# NumPy's linear algebra reads these when it is loaded.
 _ONE_THREAD = {
     f"{name}_THREADS": "1"
     for name in ("OPENBLAS_NUM", "MKL_NUM", "OMP_NUM", "BLIS_NUM", "VECLIB_MAXIMUM")
 }
-"""What makes NumPy's linear algebra use one thread; it is read when NumPy is loaded."""
 
 
 class BenchmarkError(Exception):
@@ -29,18 +28,14 @@ def run_benchmarks(*, quick: bool = False) -> dict[str, Any]:
     """Measure everything in a new process and return the results as ``sdnn bench --json`` does.
 
     In that process NumPy's linear algebra has one thread, and nothing else has touched the memory.
-
-    Parameters
-    ----------
-    quick : bool
-        Few repetitions: to see that it works, not how quick it is.
+    With `quick` there are few repetitions: to see that it works, not how quick it is.
 
     Raises
     ------
     BenchmarkError
         If the process fails.
     """
-    command = [sys.executable, "-m", "sdnn.benchmarks", *(["--quick"] if quick else [])]
+    command = [sys.executable, "-m", "sdnn.benchmarks.measurements", *(["--quick"] * quick)]
     done = subprocess.run(
         command, env=os.environ | _ONE_THREAD, capture_output=True, text=True, check=False
     )

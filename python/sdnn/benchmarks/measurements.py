@@ -1,4 +1,4 @@
-"""The measurements: what is repeated how often, and what becomes of the times.
+"""The measurements, and the process that makes them and prints them as JSON.
 
 Other programs disturb every measurement. So everything is repeated often and briefly, things that
 are compared take turns, and medians are taken. The loops are in C++; here are nanoseconds per
@@ -10,7 +10,9 @@ has the quartiles of repetitions as ``lower``, ``median`` and ``upper``.
 
 from __future__ import annotations
 
+import json
 import platform
+import sys
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -35,21 +37,13 @@ Run: TypeAlias = Callable[[int], Nanoseconds]
 """Makes n repetitions and returns the time of each, shape (n,)."""
 
 SEED = 1
-
-NETWORK_INPUTS = (4, 6)
-"""Inputs of the paper's smallest and largest network."""
-
-CASES = ((4, 0.0), (4, 0.02), (6, 0.02))
-"""Inputs and noise of the trials whose decisions are timed."""
-
+NETWORK_INPUTS = (4, 6)  # of the paper's smallest and largest network
+CASES = ((4, 0.0), (4, 0.02), (6, 0.02))  # inputs and noise of trials whose decisions are timed
 THREADS_CASE = (6, 0.02)
 N_THREADS = 2
-
 N_CORRECTED = 5
 """Units corrected by the learning steps that are timed: the mean over those that correct any."""
-
 SELECTIONS_PER_REPETITION = 100
-
 N_COLD = 2
 """Repetitions after which a turn has the caches it would have without the others."""
 
@@ -59,24 +53,12 @@ _MULTIPLES = {"K": 2**10, "M": 2**20, "G": 2**30}
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured.
+    """How much is measured."""
 
-    Parameters
-    ----------
-    n_rounds
-        Turns that everything compared takes.
-    n_repetitions
-        Repetitions per turn; N_COLD more go before them and are not counted.
-    n_episodes
-        Learning episodes of a short trial.
-    n_runs
-        Runs of the same trial.
-    """
-
-    n_rounds: int = 30
-    n_repetitions: int = 10
-    n_episodes: int = 300
-    n_runs: int = 7
+    n_rounds: int = 30  # turns that everything compared takes
+    n_repetitions: int = 10  # per turn; N_COLD more go before them and are not counted
+    n_episodes: int = 300  # learning episodes of a short trial
+    n_runs: int = 7  # of the same trial
 
 
 QUICK = Effort(n_rounds=3, n_repetitions=2, n_episodes=10, n_runs=2)
@@ -141,12 +123,9 @@ def _caches(folder: Path) -> dict[str, int]:
 
 
 def in_turns(runs: Mapping[str, Run], effort: Effort) -> dict[str, Nanoseconds]:
-    """Let everything take turns; the first repetitions of a turn find cold caches and are dropped.
+    """Let everything take turns, and return times by name, (n_rounds * n_repetitions,) each.
 
-    Returns
-    -------
-    dict
-        Times by name, shape (n_rounds * n_repetitions,) each.
+    The first repetitions of a turn find cold caches and are dropped.
     """
     times: dict[str, list[Nanoseconds]] = {name: [] for name in runs}
     for _ in range(effort.n_rounds):
@@ -156,10 +135,8 @@ def in_turns(runs: Mapping[str, Run], effort: Effort) -> dict[str, Nanoseconds]:
 
 
 def spread(times: Nanoseconds, n_parts: int = 1) -> dict[str, float]:
-    """Quartiles, in microseconds, of repetitions that consist of `n_parts` equal parts each.
+    """Return the quartiles, in microseconds, of repetitions of `n_parts` equal parts each.
 
-    Examples
-    --------
     >>> spread(np.array([1000, 2000, 3000, 4000, 5000]))
     {'lower': 2.0, 'median': 3.0, 'upper': 4.0}
     """
@@ -170,17 +147,13 @@ def spread(times: Nanoseconds, n_parts: int = 1) -> dict[str, float]:
 def measure_network(n_inputs: int, effort: Effort) -> dict[str, Any]:
     """Time the parts of a network that has learned a little, beside a dense product of its size.
 
-    Returns
-    -------
-    dict
-        Spreads of ``values`` (all action values of a new state, by instruction set),
-        ``remembered_values`` (of the same state again), ``correction`` (a learning step of a state
-        just asked about), ``selection`` (of its units), ``dense`` (a float32 product of
-        n_hidden_units x n_columns weights, by who computes it) and ``read`` (a buffer of
-        ``weight_bytes``). ``pass_bytes`` are those that a pass has to read, on average, and
-        ``least_time`` their time at the rate of ``read``: no pass can be quicker.
-        ``ratio_to_dense`` is the time of ``values`` over that of the quickest dense product,
-        ``share_of_limit`` ``least_time`` over it.
+    Spreads are those of ``values`` (all action values of a new state, by instruction set),
+    ``remembered_values`` (of the same state again), ``correction`` (a learning step of a state just
+    asked about), ``selection`` (of its units), ``dense`` (a float32 product of n_hidden_units x
+    n_columns weights, by who computes it) and ``read`` (a buffer of ``weight_bytes``).
+    ``pass_bytes`` are those that a pass has to read, on average, and ``least_time`` their time at
+    the rate of ``read``: no pass can be quicker. ``ratio_to_dense`` is the time of ``values`` over
+    that of the quickest dense product, ``share_of_limit`` ``least_time`` over it.
     """
     trial = _short_trial(n_inputs, 0.0, effort.n_episodes)
     trial.advance(effort.n_episodes)
@@ -348,3 +321,7 @@ def _numpy_product(n_rows: int, n_columns: int) -> Run:
         return times
 
     return _run
+
+
+if __name__ == "__main__":
+    json.dump(measure(quick="--quick" in sys.argv[1:]), sys.stdout)

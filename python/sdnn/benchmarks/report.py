@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 QUICK_WARNING = "QUICK LOOK: too few repetitions to mean anything."
 
+_OF_THREADS = (("alone_s", 3), ("together_s", 3), ("speedup", 2))  # with their decimals
 _DENSE_TITLES = {"numpy": "NumPy, 1 thread", "core": "sdnn's own kernel"}
 
 
@@ -47,14 +48,9 @@ def tables(results: Mapping[str, Any]) -> list[Table]:
             ("inputs, weights", "MB weights", "MB read by a pass", "GB/s", "least us",
              f"us ({best})"),
             [
-                (
-                    _size_of(one),
-                    f"{one['weight_bytes'] / 1e6:.2f}",
-                    f"{one['pass_bytes'] / 1e6:.2f}",
-                    f"{one['gigabytes_per_second']:.0f}",
-                    f"{one['least_time']:.1f}",
-                    f"{one['values'][best]['median']:.1f}",
-                )
+                (_size_of(one), f"{one['weight_bytes'] / 1e6:.2f}",
+                 f"{one['pass_bytes'] / 1e6:.2f}", f"{one['gigabytes_per_second']:.0f}",
+                 f"{one['least_time']:.1f}", f"{one['values'][best]['median']:.1f}")
                 for one in networks
             ],
         ),
@@ -74,34 +70,20 @@ def tables(results: Mapping[str, Any]) -> list[Table]:
             f"Trials at once ({threads['n_inputs']} inputs, noise {threads['noise']:g},"
             f" {threads['n_episodes']} episodes each)",
             ("trials", "one alone, s", "all at once, s", "speedup", "core seconds each"),
-            [
-                (
-                    f"{threads['n_threads']} on {threads['n_threads']} threads",
-                    f"{threads['alone_s']:.3f}",
-                    f"{threads['together_s']:.3f}",
-                    f"{threads['speedup']:.2f}",
-                    f"{threads['processor_alone_s']:.3f} alone,"
-                    f" {threads['processor_together_s']:.3f} at once",
-                )
-            ],
+            [(f"{threads['n_threads']} on {threads['n_threads']} threads",
+              *(f"{threads[name]:.{n}f}" for name, n in _OF_THREADS),
+              f"{threads['processor_alone_s']:.3f} alone,"
+              f" {threads['processor_together_s']:.3f} at once")],
         ),
     ]  # fmt: skip
 
 
 def print_results(results: Mapping[str, Any], console: Console) -> None:
     """Print all tables."""
-    from rich.table import Table as RichTable
-
     for line in describe_run(results):
         console.print(line, highlight=False)
     for table in tables(results):
-        shown = RichTable(title=table.title, title_justify="left")
-        for number, word in enumerate(table.header):
-            shown.add_column(word, justify="right" if number else "left")
-        for row in table.rows:
-            shown.add_row(*row)
-        console.print()
-        console.print(shown)
+        table.print(console)
 
 
 def _pass_rows(network: Mapping[str, Any]) -> list[tuple[str, ...]]:

@@ -7,18 +7,14 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sdnn.runs.engine import RunOutcome
     from sdnn.runs.report import Finished
-
-Done = TypeVar("Done")
 
 EXIT_FAILURE = 1
 EXIT_INTERRUPTED = 130
@@ -39,30 +35,36 @@ def _finite(value: Any) -> Any:
     return [_finite(one) for one in value] if isinstance(value, list | tuple) else value
 
 
-def report_outcome(context: click.Context, outcome: RunOutcome, out: Path) -> str:
-    """Tell what failed, exit if interrupted, and say how much is stored."""
+def run_and_report(
+    context: click.Context, run: Callable[..., Finished], request: Any, *, as_json: bool
+) -> None:
+    """Run trials with a line of progress; print the results, what failed and how much is stored."""
+    from rich.console import Console
+
+    from sdnn.progress import ProgressBars
     from sdnn.runs.engine import describe
 
+    with ProgressBars(Console(stderr=True)) as observer:
+        done = run(request, observer=observer)
+    outcome = done.outcome
     n_stored = outcome.n_reused + outcome.n_run
-    stored = f"{n_stored} of {outcome.n_planned} trials are stored in {out}"
+    stored = f"{n_stored} of {outcome.n_planned} trials are stored in {request.out}"
     for failure in outcome.failures:
         message = f"{type(failure.error).__name__}: {failure.error}"
         click.echo(f"Error: {describe(failure.key)} failed: {message}", err=True)
     if outcome.interrupted:
         exit_interrupted(context, f"interrupted; {stored}; the same command goes on from there")
-    return stored
-
-
-def print_finished(done: Finished, stored: str, *, as_json: bool) -> None:
-    """Print the results, as JSON or with what was run and where to look."""
-    if as_json:
+    if done.page is None:
+        click.echo(f"Error: nothing is complete, no figure drawn; {stored}", err=True)
+    elif as_json:
         click.echo(json.dumps(done.table, indent=2))
-        return
-    if done.page is not None:
+    else:
         done.page.print(make_console())
-    page = next(str(file) for file in done.files if file.suffix == ".html")
-    done_now = f"{stored} ({done.outcome.n_run} run now); " if done.outcome.n_planned else ""
-    click.echo(f"{done_now}wrote {len(done.files)} files: see {page}")
+        page = next(str(file) for file in done.files if file.suffix == ".html")
+        done_now = f"{stored} ({outcome.n_run} run now); " if outcome.n_planned else ""
+        click.echo(f"{done_now}wrote {len(done.files)} files: see {page}")
+    if done.page is None or outcome.failures:
+        context.exit(EXIT_FAILURE)
 
 
 def make_console() -> Console:
@@ -85,16 +87,6 @@ def experiment_command(context: click.Context) -> Iterator[None]:
         raise click.ClickException(str(error)) from error
     except KeyboardInterrupt:
         exit_interrupted(context, "interrupted; what was finished is stored")
-
-
-def with_progress(run: Callable[..., Done], request: Any) -> Done:
-    """Run what was asked for, with a line of progress."""
-    from rich.console import Console
-
-    from sdnn.progress import ProgressBars
-
-    with ProgressBars(Console(stderr=True)) as observer:
-        return run(request, observer=observer)
 
 
 def exit_interrupted(context: click.Context, message: str) -> NoReturn:

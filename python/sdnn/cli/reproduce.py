@@ -4,41 +4,30 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from sdnn._core import presets
 from sdnn.cli.executor_options import executor_options
-from sdnn.cli.output import (
-    EXIT_FAILURE,
-    experiment_command,
-    print_finished,
-    report_outcome,
-    with_progress,
-)
-from sdnn.reproduction.cases import (
-    MOST_EPISODES,
-    WORDS,
-    includes_cost,
-    select_experiments,
-)
+from sdnn.cli.output import experiment_command, run_and_report
+from sdnn.reproduction.cases import MOST_EPISODES, WORDS, includes_cost, select_experiments
 
 if TYPE_CHECKING:
     from sdnn.reproduction.reproduce import ReproduceRequest
-    from sdnn.runs.engine import Executor
-    from sdnn.runs.report import Finished
 
 
 @click.command(short_help="Run the paper's experiments and write a report.")
 @click.argument("experiment", type=click.Choice(WORDS), default="all")
 @click.option(
     "--trials",
+    "n_trials",
     type=click.IntRange(1, 100_000),
     help="Trials per case and agent.  [default: 10, as in the paper]",
 )
 @click.option(
     "--episodes",
+    "n_episodes",
     type=click.IntRange(1, MOST_EPISODES),
     help="Learning episodes per trial.  [default: 15000, as in the paper]",
 )
@@ -76,19 +65,7 @@ if TYPE_CHECKING:
 )
 @click.pass_context
 def reproduce(
-    context: click.Context,
-    experiment: str,
-    trials: int | None,
-    episodes: int | None,
-    jobs: int | None,
-    executor: Executor | None,
-    seed: int,
-    out: Path,
-    quick: bool,
-    as_json: bool,
-    dry_run: bool,
-    agents: tuple[str, ...],
-    presets: tuple[str, ...],
+    context: click.Context, /, experiment: str, as_json: bool, dry_run: bool, **options: Any
 ) -> None:
     """Run the paper's experiments and write a report with its figures and claims.
 
@@ -102,17 +79,7 @@ def reproduce(
     from sdnn.reproduction.reproduce import reproduce as run
 
     request = ReproduceRequest(
-        experiments=select_experiments(experiment),
-        cost=includes_cost(experiment),
-        out=out,
-        n_trials=trials,
-        n_episodes=episodes,
-        seed=seed,
-        jobs=jobs,
-        executor=executor,
-        quick=quick,
-        agents=agents,
-        presets=presets,
+        experiments=select_experiments(experiment), cost=includes_cost(experiment), **options
     )
     try:
         _ = request.plan
@@ -122,7 +89,7 @@ def reproduce(
         if dry_run:
             _print_plan(request, as_json)
         else:
-            _finish(context, with_progress(run, request), out, as_json)
+            run_and_report(context, run, request, as_json=as_json)
 
 
 def _print_plan(request: ReproduceRequest, as_json: bool) -> None:
@@ -148,11 +115,3 @@ def _print_plan(request: ReproduceRequest, as_json: bool) -> None:
         )
     if n_costs:
         click.echo(f"cost of a step: {n_costs} measurements, {n_costs_stored} {stored_in}")
-
-
-def _finish(context: click.Context, done: Finished, out: Path, as_json: bool) -> None:
-    stored = report_outcome(context, done.outcome, out)
-    if done.outcome.failures:
-        click.echo(f"Error: no figure drawn; {stored}", err=True)
-        context.exit(EXIT_FAILURE)
-    print_finished(done, stored, as_json=as_json)

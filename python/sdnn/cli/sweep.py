@@ -4,22 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from sdnn.cli.executor_options import executor_options
-from sdnn.cli.output import (
-    EXIT_FAILURE,
-    experiment_command,
-    print_finished,
-    report_outcome,
-    with_progress,
-)
+from sdnn.cli.output import experiment_command, run_and_report
 
 if TYPE_CHECKING:
-    from sdnn.runs.engine import Executor
-    from sdnn.runs.report import Finished
     from sdnn.runs.sweep import SweepRequest
 
 
@@ -49,15 +41,14 @@ if TYPE_CHECKING:
 @click.pass_context
 def sweep(
     context: click.Context,
+    /,
     file: Path,
     trials: int | None,
     seed: int | None,
-    jobs: int | None,
-    executor: Executor | None,
-    out: Path,
     only: tuple[str, ...],
     as_json: bool,
     dry_run: bool,
+    **options: Any,
 ) -> None:
     """Run the study in FILE: variants of any setting, compared trial by trial.
 
@@ -75,11 +66,9 @@ def sweep(
     try:
         request = SweepRequest(
             study=read_study(file, n_trials=trials, seed=seed),
-            out=out,
-            jobs=jobs,
-            executor=executor,
             only=tuple(dict.fromkeys(only)),
             addition=add_claims,
+            **options,
         )
         _ = request.plan
     except (ConfigError, ValueError) as error:
@@ -88,7 +77,7 @@ def sweep(
         if dry_run:
             _print_forecast(request, as_json)
         else:
-            _finish_sweep(context, with_progress(run, request), out, as_json)
+            run_and_report(context, run, request, as_json=as_json)
 
 
 def _print_forecast(request: SweepRequest, as_json: bool) -> None:
@@ -98,13 +87,3 @@ def _print_forecast(request: SweepRequest, as_json: bool) -> None:
     lines = [json.dumps(found, indent=2)] if as_json else forecast_lines(found, request.out)
     for line in lines:
         click.echo(line)
-
-
-def _finish_sweep(context: click.Context, done: Finished, out: Path, as_json: bool) -> None:
-    stored = report_outcome(context, done.outcome, out)
-    if done.page is None:
-        click.echo(f"Error: nothing is complete; {stored}", err=True)
-        context.exit(EXIT_FAILURE)
-    print_finished(done, stored, as_json=as_json)
-    if done.outcome.failures:
-        context.exit(EXIT_FAILURE)

@@ -49,6 +49,20 @@ class Table:
     rows: Sequence[tuple[str, ...]]
     kinds: Mapping[str, str] = field(default_factory=dict)  # color of a text: good, bad, open, none
 
+    def print(self, console: Console) -> None:
+        """Print it."""
+        from rich import box
+        from rich.table import Table as RichTable
+        from rich.text import Text
+
+        title = Text(self.title)
+        shown = RichTable(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+        for column in self.header:
+            shown.add_column(Text(column), overflow="fold")
+        for row in self.rows:
+            shown.add_row(*map(Text, row))
+        console.print(shown)
+
     def to_markdown(self) -> str:
         """Write header and rows as lines of Markdown."""
         rows = [self.header, ("---",) * len(self.header), *self.rows]
@@ -122,20 +136,10 @@ class Page:
 
     def print(self, console: Console) -> None:
         """Print it without figures."""
-        from rich import box
-        from rich.table import Table as RichTable
-        from rich.text import Text
-
         for line in (self.title, self.intro, *self.warnings):
             console.print(line, highlight=False, markup=False)
         for table in self.tables:
-            title = Text(table.title)
-            shown = RichTable(title=title, title_justify="left", box=box.SIMPLE_HEAD)
-            for column in table.header:
-                shown.add_column(Text(column), overflow="fold")
-            for row in table.rows:
-                shown.add_row(*map(Text, row))
-            console.print(shown)
+            table.print(console)
         for note in self.notes:
             console.print(note, style="dim", highlight=False, markup=False)
 
