@@ -59,20 +59,17 @@ def test_help_and_version(invoke):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["reproduce", "z"], "'z' is not one of"),
+        (["reproduce", "z"], "'z'"),
         (["reproduce", "a", "--trials", 0], "--trials"),
         (["reproduce", "a", "--trials", "many"], "--trials"),
         (["reproduce", "a", "--episodes", -5], "--episodes"),
-        (["reproduce", "a", "--episodes", 9], "episodes must be at least 10"),
+        (["reproduce", "a", "--episodes", 9], "episodes"),
         (["reproduce", "a", "--episodes", 3_000_000_000], "--episodes"),
         (["reproduce", "a", "--episodes", 10**8 + 1, "--dry-run"], "--episodes"),
         (["reproduce", "a", "--jobs", 0], "--jobs"),
         (["reproduce", "a", "--seed", -1], "--seed"),
         (["reproduce", "a", "--fast"], "--fast"),
-        (
-            ["reproduce", "a", "--agent", "dqn"],
-            "one of sdnn-c, fuzzy, rbf, sdnn-c-general, sdnn-c-robust, sdnn-c-small, got 'dqn'",
-        ),
+        (["reproduce", "a", "--agent", "dqn"], "sdnn-c-robust"),
         (["learn"], "learn"),
     ],
 )
@@ -99,8 +96,8 @@ def test_quick_run_writes_marked_files_and_one_summary_line(invoke, tmp_path):
     assert result.stderr == ""  # no progress where there is no terminal
     assert "QUICK LOOK" in result.stdout
     assert "not judged" in result.stdout
-    assert "4 of 4 trials are stored in out (4 run now)" in result.stdout.splitlines()[-1]
-    assert "(0 run now)" in invoke("reproduce", "a", "--quick", "--out", "out").stdout
+    assert re.search(r"\b4 of 4 .* out \(4 ", result.stdout.splitlines()[-1])
+    assert "(0 " in invoke("reproduce", "a", "--quick", "--out", "out").stdout
 
 
 @pytest.mark.parametrize(
@@ -174,11 +171,11 @@ def test_all_is_the_default_and_reuses_what_is_stored(invoke, tmp_path, no_costs
     invoke("reproduce", "a", "--quick", "--out", "out")
     assert no_costs == []
     result = invoke("reproduce", "--quick", "--out", "out")
-    assert "18 of 18 trials are stored in out (14 run now)" in result.stdout.splitlines()[-1]
+    assert re.search(r"\b18 of 18 .* out \(14 ", result.stdout.splitlines()[-1])
     assert len(no_costs) == 3 * 7 + 4
     names = {p.name for p in (tmp_path / "out").iterdir()}
     assert names >= {"experiment-b-quick.svg", "cost-quick.png", "cost-quick.csv"}
-    assert "(0 run now)" in invoke("reproduce", "--quick", "--out", "out").stdout
+    assert "(0 " in invoke("reproduce", "--quick", "--out", "out").stdout
     assert len(no_costs) == 3 * 7 + 4
 
 
@@ -264,7 +261,7 @@ def test_other_agents_have_files_of_their_own(invoke, tmp_path, no_costs):
     result = invoke(
         "reproduce", "a", "--quick", "--out", "out", "--agent", "rbf", "--agent", "fuzzy"
     )
-    assert "8 of 8 trials are stored in out (8 run now)" in result.stdout.splitlines()[-1]
+    assert re.search(r"\b8 of 8 .* out \(8 ", result.stdout.splitlines()[-1])
     assert "RBFN, FQL instead of the agents of its cases" in result.stdout
     names = {path.name for path in (tmp_path / "out").iterdir()} - set(before)
     assert names == {
@@ -298,7 +295,7 @@ def test_a_preset_is_drawn_beside_the_papers_agents(invoke, tmp_path, no_costs):
 
 def test_costs_of_other_agents(invoke, no_costs):
     dry = invoke("reproduce", "cost", "--agent", "rbf", "--dry-run")
-    assert dry.stdout == "cost of a step: 14 measurements, 0 of them stored in results\n"
+    assert re.findall(r"\d+", dry.stdout) == ["14", "0"]
     table = json.loads(invoke("reproduce", "cost", "--agent", "rbf", "--quick", "--json").stdout)
     assert {cost["series"] for cost in table["costs"]} == {"rbf", "rbf-plain"}
     assert {series for series, _ in no_costs} == {"rbf", "rbf-plain"}
@@ -385,7 +382,7 @@ def test_a_new_agent_is_one_class_and_one_entry(pumping, tmp_path, monkeypatch):
     assert "Pumping" in (folder / "report-pumping-quick.html").read_text()
     table = json.loads((folder / "table-pumping-quick.json").read_text())
     assert table["claims"] == []  # the paper says nothing about it
-    assert "(0 run now)" in call("b", "--quick", "--agent", "pumping").stdout
+    assert "(0 " in call("b", "--quick", "--agent", "pumping").stdout
     refused = call("cost", "--agent", "pumping")
     assert refused.exit_code == 2
     assert "agents whose cost is measured are sdnn-c, fuzzy, rbf, got pumping" in refused.stderr
@@ -426,8 +423,8 @@ def test_failing_trials_are_exit_code_1(invoke, tmp_path, fake):
 
     result = invoke("reproduce", "a", "--quick", trial=make)
     assert result.exit_code == 1
-    assert "Error: SDNN-C s6, trial 1 failed: RuntimeError: broken" in result.stderr
-    assert "2 of 4 trials are stored" in result.stderr
+    assert re.search("SDNN-C s6.* 1 .*RuntimeError: broken", result.stderr)
+    assert "2 of 4 " in result.stderr
     assert [p.name for p in (tmp_path / "results").iterdir()] == ["results.sqlite"]
 
 
@@ -444,7 +441,7 @@ def test_interruption_is_exit_code_130_and_the_command_goes_on(invoke, fake):
 
     result = invoke("reproduce", "a", "--quick", "--jobs", 1, trial=Interrupting)
     assert result.exit_code == 130
-    assert "interrupted; 0 of 4 trials are stored in results" in result.stderr
+    assert "0 of 4 " in result.stderr
     assert invoke("reproduce", "a", "--quick").exit_code == 0
 
 
