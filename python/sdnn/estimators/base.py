@@ -21,7 +21,7 @@ from sklearn.utils._param_validation import Interval, StrOptions
 from sdnn import _core
 from sdnn.coding import Coding
 from sdnn.estimators.fitted import Fitted
-from sdnn.estimators.inputs import CodedInputs, Pairs, input_pairs
+from sdnn.estimators.inputs import Array, CodedInputs, Floats, Ints, Pairs, input_pairs
 from sdnn.estimators.network import (
     FEW_SAMPLES,
     Network,
@@ -156,34 +156,30 @@ class BaseSDNN(Fitted, CodedInputs):
     @abc.abstractmethod
     def _check_samples(
         self, X: Any, y: Any, reset: bool, in_fit: bool = False
-    ) -> tuple[NDArray[Any], NDArray[Any]]:
+    ) -> tuple[Array, Array]:
         """Return samples and targets, checked by scikit-learn's rules."""
 
     @abc.abstractmethod
-    def _set_outputs(self, y: NDArray[Any]) -> int:
+    def _set_outputs(self, y: Array) -> int:
         """Learn the outputs from targets (or all classes); return the number of units."""
 
     @abc.abstractmethod
-    def _check_outputs(self, y: NDArray[Any], classes: ArrayLike | None) -> None:
+    def _check_outputs(self, y: Array, classes: ArrayLike | None) -> None:
         """Raise ValueError if the outputs are not those of the network."""
 
     @abc.abstractmethod
-    def _targets(self, y: NDArray[Any], at_once: bool = False) -> NDArray[Any]:
+    def _targets(self, y: Array, at_once: bool = False) -> Array:
         """Return targets as learned, one row per sample; may widen the output range."""
 
     @abc.abstractmethod
-    def _rule_arguments(self, targets: NDArray[Any]) -> tuple[Any, ...]:
+    def _rule_arguments(self, targets: Array) -> tuple[Any, ...]:
         """Return (counts,) for the p-delta rule, or (labels, n_classes, scheme) for perceptrons."""
 
     @abc.abstractmethod
-    def _validation_score(
-        self, bins: NDArray[np.int32], targets: NDArray[Any], weights: NDArray[np.float64] | None
-    ) -> float:
+    def _validation_score(self, bins: Ints, targets: Array, weights: Floats | None) -> float:
         """Return the network's score; larger is better."""
 
-    def _presentations(
-        self, targets: NDArray[Any], weights: NDArray[np.float64] | None
-    ) -> NDArray[np.float64] | None:
+    def _presentations(self, targets: Array, weights: Floats | None) -> Floats | None:
         """Return the mean number of presentations per epoch of each sample; None for once."""
         return weights
 
@@ -234,17 +230,11 @@ class BaseSDNN(Fitted, CodedInputs):
         def train(rows: Any, max_iter: int, n_averaged: int) -> tuple[Trainer, History]:
             part = None if weights is None else weights[rows]
             trainer = self._trainer(bins[rows], targets[rows], max_iter)
+            scored = score if self.early_stopping and rows is kept else None
+            times = self._presentations(targets[rows], part)
+            n_samples = len(bins[rows])
             return trainer, run_epochs(
-                self.network_,
-                trainer,
-                len(bins[rows]),
-                max_iter=max_iter,
-                random=random if self.shuffle else None,
-                score=score if self.early_stopping and rows is kept else None,
-                n_iter_no_change=self.n_iter_no_change,
-                weights=self._presentations(targets[rows], part),
-                n_averaged_epochs=n_averaged,
-                verbose=self.verbose,
+                self, trainer, n_samples, max_iter, random, scored, times, n_averaged
             )
 
         is_refitted = self.refit and self.early_stopping
@@ -278,7 +268,7 @@ class BaseSDNN(Fitted, CodedInputs):
         self.__dict__ = work.__dict__
         return self
 
-    def _learn_one(self: Self, x: Any, y: NDArray[Any], classes: ArrayLike | None) -> Self:
+    def _learn_one(self: Self, x: Any, y: Array, classes: ArrayLike | None) -> Self:
         """Learn one sample; y has shape (1,) or (1, n_outputs)."""
         work = self._scratch()
         if hasattr(self, "network_"):
@@ -298,12 +288,7 @@ class BaseSDNN(Fitted, CodedInputs):
         return self
 
     def _begin(
-        self,
-        X: Any,
-        table: NDArray[Any],
-        y: Any,
-        pairs: Pairs | None = None,
-        n_networks: int = 1,
+        self, X: Any, table: Array, y: Any, pairs: Pairs | None = None, n_networks: int = 1
     ) -> np.random.RandomState:
         """Fit the codings, draw tables and weights; return the generator of orders."""
         n_units = self._set_outputs(y)
@@ -326,23 +311,21 @@ class BaseSDNN(Fitted, CodedInputs):
         self._note_inputs(table)
         return random
 
-    def _resume(self, table: NDArray[Any], y: NDArray[Any]) -> np.random.RandomState:
+    def _resume(self, table: Array, y: Array) -> np.random.RandomState:
         """Continue with a copy of the network; return the generator of orders."""
         self._check_outputs(y, None)
         network = self.network_
-        if self._n_networks() > 1:
-            code = network.input_code
+        n_networks, code = self._n_networks(), network.input_code
+        if n_networks > 1:
             self._require_memory(
-                network.n_units, self._n_networks(), code.n_units, code.codings, code.pairs
+                network.n_units, n_networks, code.n_units, code.codings, code.pairs
             )
         self._note_inputs(self._finite(table, self.codings_))
         self.network_ = network.copy()
         random: np.random.RandomState = check_random_state(self.random_state)
         return random
 
-    def _select_pairs(
-        self, X: Any, table: NDArray[Any], y: Any, weights: NDArray[np.float64] | None
-    ) -> Pairs | None:
+    def _select_pairs(self, X: Any, table: Array, y: Any, weights: Floats | None) -> Pairs | None:
         """Return the pairs selected by cross-validation; None without ``pairs="auto"``."""
         if not (isinstance(self.pairs, str) and self.pairs == "auto") or table.shape[1] < 2:
             return None
@@ -395,7 +378,7 @@ class BaseSDNN(Fitted, CodedInputs):
     def _n_threads(self) -> int:
         return int(effective_n_jobs(self.n_jobs))
 
-    def _trainer(self, bins: NDArray[np.int32], targets: NDArray[Any], n_epochs: int) -> Trainer:
+    def _trainer(self, bins: Ints, targets: Array, n_epochs: int) -> Trainer:
         rule = self._rule_arguments(targets)
         kind: Any = _core.PDeltaTrainer if len(rule) == 1 else _core.PerceptronTrainer
         trainer: Trainer = kind(
@@ -409,7 +392,7 @@ class BaseSDNN(Fitted, CodedInputs):
         )
         return trainer
 
-    def _learn(self, bins: NDArray[np.int32], targets: NDArray[Any]) -> None:
+    def _learn(self, bins: Ints, targets: Array) -> None:
         """Present every sample once, in order; all or nothing.
 
         Small numbers are learned in place, so nothing that may fail may follow.
@@ -429,7 +412,7 @@ class BaseSDNN(Fitted, CodedInputs):
         trainer.present(np.arange(len(bins), dtype=np.int32))
         trainer.synchronize()
 
-    def _note_inputs(self, table: NDArray[Any]) -> None:
+    def _note_inputs(self, table: Array) -> None:
         """Count values to learn that are outside their input's range."""
         n_outside, first = self.network_.input_code.outside(table)
         if n_outside == 0:
@@ -450,13 +433,13 @@ class BaseSDNN(Fitted, CodedInputs):
             level, frame = level + 1, frame.f_back
         warnings.warn(message, OutOfRangeWarning, stacklevel=level)
 
-    def _bins(self, X: Any) -> NDArray[np.int32]:
+    def _bins(self, X: Any) -> Ints:
         """Return the bins of samples to predict, checked."""
         codings = self.codings_
         table = self._finite(self._validated(X, reset=False), codings)
         return self.network_.input_code.bins(table)
 
-    def _bins_of_one(self, x: Any) -> NDArray[np.int32]:
+    def _bins_of_one(self, x: Any) -> Ints:
         """Return the bins of one sample to predict, without overhead."""
         network = self._fitted_network
         network.online(self.memory_limit)

@@ -16,6 +16,7 @@ from sklearn.utils.multiclass import check_classification_targets, unique_labels
 
 from sdnn import _core
 from sdnn.estimators.base import BaseSDNN
+from sdnn.estimators.inputs import Array, Floats, Ints
 from sdnn.estimators.training import LARGEST_WEIGHT, sample_weights, weighted_mean
 
 __all__ = ["SDNNClassifier"]
@@ -107,7 +108,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         decision = self._decision(self._bins_of_one(x), n_threads=1)
         return self.classes_[self._winners(decision)[0]]
 
-    def decision_function(self, X: ArrayLike) -> NDArray[np.float64]:
+    def decision_function(self, X: ArrayLike) -> Floats:
         """Return the score of each class, shape (n_samples, n_classes).
 
         The share of its units that fire, the potential of a single unit, or with "one_vs_one" the
@@ -115,17 +116,17 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         """
         return self._decision(self._bins(X), self._n_threads())
 
-    def predict(self, X: ArrayLike) -> NDArray[Any]:
+    def predict(self, X: ArrayLike) -> Array:
         """Predict the labels of samples, shape (n_samples,)."""
         winners = self._winners(self.decision_function(X))  # first: it may raise NotFittedError
-        labels: NDArray[Any] = self.classes_[winners]
+        labels: Array = self.classes_[winners]
         return labels
 
     def _has_several_units(self) -> bool:
         return self.scheme == "one_vs_rest" and self.n_units_per_class != 1
 
     @available_if(_has_several_units)  # type: ignore[untyped-decorator]
-    def predict_proba(self, X: ArrayLike) -> NDArray[np.float64]:
+    def predict_proba(self, X: ArrayLike) -> Floats:
         """Return a softmax of the scores, shape (n_samples, n_classes).
 
         Its steepness is a constant; where calibration matters, see docs/regression.md and
@@ -134,9 +135,9 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         return self._probabilities(self._bins(X), self._n_threads())
 
     @available_if(_has_several_units)  # type: ignore[untyped-decorator]
-    def predict_proba_one(self, x: Any) -> NDArray[np.float64]:
+    def predict_proba_one(self, x: Any) -> Floats:
         """Return `predict_proba` of one sample, given as to `learn_one`, shape (n_classes,)."""
-        of_one: NDArray[np.float64] = self._probabilities(self._bins_of_one(x), n_threads=1)[0]
+        of_one: Floats = self._probabilities(self._bins_of_one(x), n_threads=1)[0]
         return of_one
 
     def _require_classes(self, classes: ArrayLike | None) -> None:
@@ -148,13 +149,13 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
 
     def _check_samples(
         self, X: Any, y: Any, reset: bool, in_fit: bool = False
-    ) -> tuple[NDArray[Any], NDArray[Any]]:
+    ) -> tuple[Array, Array]:
         table, labels = self._validated(X, y, reset=reset, ensure_min_samples=2 if in_fit else 1)
         check_classification_targets(labels)
         return table, labels
 
     def _set_outputs(self, y: ArrayLike) -> int:
-        self.classes_: NDArray[Any] = unique_labels(y)
+        self.classes_: Array = unique_labels(y)
         n_classes = len(self.classes_)
         if n_classes < 2:
             raise ValueError(f"at least two classes are needed, got one class: {self.classes_!r}")
@@ -169,13 +170,13 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         self._n_units_each: int = given
         return _core.n_units_for(self.scheme, n_classes) * given
 
-    def _check_outputs(self, y: NDArray[Any], classes: ArrayLike | None) -> None:
+    def _check_outputs(self, y: Array, classes: ArrayLike | None) -> None:
         if classes is not None and not np.array_equal(unique_labels(classes), self.classes_):
             raise ValueError(
                 f"classes={classes!r} are not those of the first call, {self.classes_!r}"
             )
 
-    def _targets(self, y: NDArray[Any], at_once: bool = False) -> NDArray[np.int32]:
+    def _targets(self, y: Array, at_once: bool = False) -> Ints:
         """Return the indices of labels among the classes."""
         unseen = np.setdiff1d(y, self.classes_)
         if len(unseen):
@@ -184,16 +185,14 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             )
         return np.searchsorted(self.classes_, y).astype(np.int32)
 
-    def _rule_arguments(self, targets: NDArray[np.int32]) -> tuple[Any, ...]:
+    def _rule_arguments(self, targets: Ints) -> tuple[Any, ...]:
         n_classes = len(self.classes_)
         if self._n_units_each == 1:
             return targets, n_classes, self._scheme
         own = targets[:, None] == np.arange(n_classes)
         return (self._n_units_each * np.where(own, OWN_SHARE, 1 - OWN_SHARE),)
 
-    def _presentations(
-        self, targets: NDArray[np.int32], weights: NDArray[np.float64] | None
-    ) -> NDArray[np.float64] | None:
+    def _presentations(self, targets: Ints, weights: Floats | None) -> Floats | None:
         if self.class_weight is None:
             return weights
         present = np.unique(targets)
@@ -208,27 +207,22 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         each = of_class[targets] if weights is None else of_class[targets] * weights
         return sample_weights(each, len(targets), name="class_weight times sample_weight")
 
-    def _validation_score(
-        self,
-        bins: NDArray[np.int32],
-        targets: NDArray[np.int32],
-        weights: NDArray[np.float64] | None,
-    ) -> float:
+    def _validation_score(self, bins: Ints, targets: Ints, weights: Floats | None) -> float:
         winners = self._winners(self._decision(bins, self._n_threads()))
         return weighted_mean(winners == targets, weights)
 
-    def _scores(self, bins: NDArray[np.int32], n_threads: int) -> NDArray[np.float64]:
+    def _scores(self, bins: Ints, n_threads: int) -> Floats:
         """Return the share of each class's units that fire, shape (n_samples, n_classes)."""
         counts = self.network_.counts(bins, len(self.classes_), n_threads)
         return counts / self._n_units_each
 
-    def _probabilities(self, bins: NDArray[np.int32], n_threads: int) -> NDArray[np.float64]:
+    def _probabilities(self, bins: Ints, n_threads: int) -> Floats:
         scores = self._scores(bins, n_threads)
         raised = np.exp(STEEPNESS * (scores - scores.max(axis=1, keepdims=True)))
-        probabilities: NDArray[np.float64] = raised / raised.sum(axis=1, keepdims=True)
+        probabilities: Floats = raised / raised.sum(axis=1, keepdims=True)
         return probabilities
 
-    def _decision(self, bins: NDArray[np.int32], n_threads: int) -> NDArray[np.float64]:
+    def _decision(self, bins: Ints, n_threads: int) -> Floats:
         n_classes = len(self.classes_)
         if self._n_units_each > 1:
             scores = self._scores(bins, n_threads)
@@ -245,11 +239,11 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             votes[np.arange(len(votes)), np.where(leaning[:, unit] > 0, i, j)] += 1
             sums[:, i] += leaning[:, unit]
             sums[:, j] -= leaning[:, unit]
-        decision: NDArray[np.float64] = votes + sums / (3 * (np.abs(sums) + 1))
+        decision: Floats = votes + sums / (3 * (np.abs(sums) + 1))
         return decision
 
     @staticmethod
-    def _winners(decision: NDArray[np.float64]) -> NDArray[np.int64]:
+    def _winners(decision: Floats) -> NDArray[np.int64]:
         if decision.ndim == 1:
             return (decision > 0).astype(np.int64)
         winners: NDArray[np.int64] = np.argmax(decision, axis=1)

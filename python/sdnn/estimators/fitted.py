@@ -14,6 +14,7 @@ from sklearn.utils.validation import check_is_fitted
 from sdnn import _core
 from sdnn.arguments import seed_of
 from sdnn.coding import Coding, from_dict, to_dict
+from sdnn.estimators.inputs import Array, Floats, Ints
 from sdnn.estimators.network import InputCode, Network
 from sdnn.files import Arrays, Description, read_file, write_file
 
@@ -49,7 +50,7 @@ class Fitted(BaseEstimator):
     n_features_in_: int
     n_inputs_out_of_range_: int
     n_corrected_: NDArray[np.int64]
-    validation_scores_: NDArray[np.float64]
+    validation_scores_: Floats
     training_form_: str
     training_memory_: int
     _weight_seed: int
@@ -72,25 +73,25 @@ class Fitted(BaseEstimator):
         return self._fitted_network.input_code.pairs
 
     @property
-    def weights_(self) -> NDArray[np.int32]:
+    def weights_(self) -> Ints:
         """Integer weights, shape (n_units, n_pairs * n_pattern_units)."""
         return self._fitted_network.weights
 
     @property
-    def thresholds_(self) -> NDArray[np.int32]:
+    def thresholds_(self) -> Ints:
         """Integer thresholds, shape (n_units,)."""
         return self._fitted_network.thresholds
 
     @property
-    def pair_importances_(self) -> NDArray[np.float64]:
+    def pair_importances_(self) -> Floats:
         """Squared change of the weights of each pair, normalized, shape (n_pairs,)."""
         network = self._fitted_network
         code = network.input_code
         begun = _core.ParallelPerceptron(code.core, network.n_units, seed=self._weight_seed)
         change = network.weights - begun.weights
         of_pairs = change.reshape(network.n_units, len(code.pairs), code.n_units)
-        squares: NDArray[np.float64] = np.square(of_pairs, dtype=np.float64).sum(axis=(0, 2))
-        shares: NDArray[np.float64] = squares / max(squares.sum(), 1.0)
+        squares: Floats = np.square(of_pairs, dtype=np.float64).sum(axis=(0, 2))
+        shares: Floats = squares / max(squares.sum(), 1.0)
         return shares
 
     def save(self, path: str | Path) -> None:
@@ -176,7 +177,7 @@ def restored(value: Any) -> Any:
     return [restored(item) for item in value] if isinstance(value, list) else value
 
 
-def narrowed(values: NDArray[np.int32]) -> NDArray[Any]:
+def narrowed(values: Ints) -> Array:
     """Return integers in the smallest type that holds them."""
     for kind in (np.int8, np.int16):
         info = np.iinfo(kind)
@@ -185,7 +186,7 @@ def narrowed(values: NDArray[np.int32]) -> NDArray[Any]:
     return values
 
 
-def named(values: NDArray[Any]) -> dict[str, Any]:
+def named(values: Array) -> dict[str, Any]:
     """Describe an array of labels or names with its type."""
     kind = "object" if values.dtype == object else values.dtype.str
     return {"type": kind, "values": values.tolist()}

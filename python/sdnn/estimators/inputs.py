@@ -15,10 +15,23 @@ from sklearn.utils.validation import validate_data
 
 from sdnn.coding import Coding, RandomInverse, WithMissing, coding_named
 
-__all__ = ["PAIR_BUDGET", "CodedInputs", "CodedRegressor", "Pairs", "column_indices", "input_pairs"]
+__all__ = [
+    "PAIR_BUDGET",
+    "Array",
+    "CodedInputs",
+    "CodedRegressor",
+    "Floats",
+    "Ints",
+    "Pairs",
+    "column_indices",
+    "input_pairs",
+]
 
 Columns = int | str | slice | Sequence[int] | Sequence[str] | Sequence[bool] | Callable[[Any], Any]
 Pairs = list[tuple[int, int]]
+Array = NDArray[Any]
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
 Self = TypeVar("Self", bound="CodedInputs")
 PAIR_BUDGET = 500  # pairs that are formed by default
 WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
@@ -187,7 +200,7 @@ class CodedInputs(BaseEstimator):
                 raise ValueError(f"{error}; {WORDS_HINT}") from None
             raise
 
-    def _finite(self, table: NDArray[Any], codings: Sequence[Coding]) -> NDArray[Any]:
+    def _finite(self, table: Array, codings: Sequence[Coding]) -> Array:
         """Check the numbers of a table that also holds words."""
         for index, coding in enumerate(codings):
             if table.dtype != np.float64 and coding.is_numeric:
@@ -202,7 +215,7 @@ class CodedInputs(BaseEstimator):
         names = getattr(self, "feature_names_in_", None)
         return None if names is None else names.tolist()
 
-    def _codings(self, X: Any, table: NDArray[Any]) -> list[Coding]:
+    def _codings(self, X: Any, table: Array) -> list[Coding]:
         """Return the unfitted coding of each input, and check the table's numbers."""
         codings = codings_of_columns(self.coding, self._feature_names(), table.shape[1], X)
         if any(coding.learns for coding in codings):
@@ -210,7 +223,7 @@ class CodedInputs(BaseEstimator):
         self._finite(table, codings)
         return codings
 
-    def _need_two(self, samples: NDArray[Any], what: str) -> None:
+    def _need_two(self, samples: Array, what: str) -> None:
         """Raise ValueError, in scikit-learn's words, for a single sample."""
         if len(samples) < 2:
             raise ValueError(
@@ -218,7 +231,7 @@ class CodedInputs(BaseEstimator):
                 f"{type(self).__name__} to learn {what}"
             )
 
-    def _row(self, x: Any, codings: tuple[Coding, ...], is_numeric: bool) -> NDArray[Any]:
+    def _row(self, x: Any, codings: tuple[Coding, ...], is_numeric: bool) -> Array:
         """Return one sample, a row or a mapping from names, checked, shape (n_features,)."""
         values: Any = self._values_of(x, codings) if isinstance(x, Mapping) else x
         if is_numeric:
@@ -249,13 +262,13 @@ class CodedInputs(BaseEstimator):
             raise ValueError(f"x must have the features {names.tolist()}{but}, got {list(x)}")
         return [x.get(name) for name in names]
 
-    def _first_row(self, x: Any) -> NDArray[Any]:
+    def _first_row(self, x: Any) -> Array:
         """Return the very first sample as a table; a mapping names the features."""
         names = list(x) if isinstance(x, Mapping) else None
         row = np.array(list(x.values()) if isinstance(x, Mapping) else x, dtype=object)
         if row.ndim != 1 or (names is not None and not all(isinstance(n, str) for n in names)):
             raise ValueError(f"x must be a 1-D array, or a mapping with words as keys, got {x!r}")
-        table: NDArray[Any] = self._validated(row[None], reset=True)
+        table: Array = self._validated(row[None], reset=True)
         if names is not None:
             self.feature_names_in_ = np.array(names, dtype=object)
         return table
@@ -270,9 +283,7 @@ class CodedRegressor(RegressorMixin, CodedInputs):
         tags.target_tags.multi_output = True
         return tags
 
-    def _validated_numbers(
-        self, X: Any, y: Any, reset: bool
-    ) -> tuple[NDArray[Any], NDArray[np.float64]]:
+    def _validated_numbers(self, X: Any, y: Any, reset: bool) -> tuple[Array, Floats]:
         if y is None:
             # Here because scikit-learn's message is less clear where several outputs may come.
             raise ValueError(

@@ -7,12 +7,12 @@ from numbers import Real
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.kernel_ridge import KernelRidge
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from sdnn.estimators.inputs import CodedRegressor, input_pairs
+from sdnn.estimators.inputs import CodedRegressor, Floats, input_pairs
 from sdnn.kernel import N_UNITS, AnalyticKernel
 
 __all__ = ["SDNNKernelRidge"]
@@ -96,7 +96,7 @@ class SDNNKernelRidge(CodedRegressor):
         self.ridge_ = KernelRidge(kernel="precomputed", alpha=self.alpha)
         self.ridge_.fit(self.kernel_(table), targets - self.y_mean_)
 
-    def predict(self, X: ArrayLike) -> NDArray[np.float64]:
+    def predict(self, X: ArrayLike) -> Floats:
         """Predict the outputs of samples, shape (n_samples,) or (n_samples, n_outputs)."""
         check_is_fitted(self, "ridge_")
         table = self._finite(self._validated(X, reset=False), self.kernel_.codings)
@@ -104,5 +104,5 @@ class SDNNKernelRidge(CodedRegressor):
             self.ridge_.predict(self.kernel_(table[begin : begin + SAMPLES_AT_ONCE], self.X_fit_))
             for begin in range(0, len(table), SAMPLES_AT_ONCE)
         ]
-        values: NDArray[np.float64] = self.y_mean_ + np.concatenate(parts)
+        values: Floats = self.y_mean_ + np.concatenate(parts)
         return values

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sdnn import _core
 from sdnn.coding import Coding
 from sdnn.coding.symbols import missing_as_nan
-from sdnn.estimators.inputs import PAIR_BUDGET, Pairs
+from sdnn.estimators.inputs import PAIR_BUDGET, Array, Floats, Ints, Pairs
 
 __all__ = ["InputCode", "Network", "code_bytes", "draw_input_code", "units_for_pairs"]
 
@@ -77,7 +77,7 @@ class InputCode:
         """Units per pattern."""
         return self.core.n_units
 
-    def bins(self, table: NDArray[Any]) -> NDArray[np.int32]:
+    def bins(self, table: Array) -> Ints:
         """Return the bins of samples, (n_samples, n_inputs) to (n_samples, n inputs in pairs)."""
         bins = np.empty((len(table), len(self.used)), dtype=np.int32)
         for number, index in enumerate(self.used):
@@ -98,25 +98,25 @@ class InputCode:
         sizes = np.array([self.codings[index].size for index in self.used], dtype=np.int32)
         return slice(None) if every else np.array(self.used), low, high, sizes
 
-    def bins_of_row(self, row: NDArray[Any]) -> NDArray[np.int32]:
+    def bins_of_row(self, row: Array) -> Ints:
         """Return the bins of one sample; equal-width bins are found together, which is faster."""
         if self._even is None or row.dtype != np.float64:
             return self.bins(row[None])
         used, low, high, sizes = self._even
         inside = np.minimum(np.maximum(row[used], low), high)
         where = (inside / 2 - low / 2) / (high / 2 - low / 2)  # as in `sdnn.coding.numeric`
-        bins: NDArray[np.int32] = np.minimum((where * sizes).astype(np.int32), sizes - 1)
+        bins: Ints = np.minimum((where * sizes).astype(np.int32), sizes - 1)
         return bins[None]
 
     @functools.cached_property
-    def _ends(self) -> tuple[list[int], NDArray[np.float64], NDArray[np.float64]]:
+    def _ends(self) -> tuple[list[int], Floats, Floats]:
         """Return the inputs that have a range, and their ranges."""
         ends = {index: self.codings[index].ends() for index in self.used}
         ranges = {index: pair for index, pair in ends.items() if pair is not None}
         low, high = np.array(list(ranges.values()), dtype=np.float64).reshape(-1, 2).T
         return list(ranges), low, high
 
-    def outside(self, table: NDArray[Any]) -> tuple[int, str]:
+    def outside(self, table: Array) -> tuple[int, str]:
         """Return how many values are outside their input's range, and describe the first."""
         indices, low, high = self._ends
         values = table if len(indices) == table.shape[1] else table[:, indices]
@@ -173,8 +173,8 @@ class Network:
         input_code: InputCode,
         n_units: int,
         seed: int = 0,
-        weights: NDArray[np.int32] | None = None,
-        thresholds: NDArray[np.int32] | None = None,
+        weights: Ints | None = None,
+        thresholds: Ints | None = None,
         layer: _core.ParallelPerceptron | None = None,
     ) -> None:
         self.input_code = input_code
@@ -224,9 +224,7 @@ class Network:
                 self._online = self._online or _core.OnlineLayer(self._layer)
         return self._online
 
-    def learn_online(
-        self, bins: NDArray[np.int32], rule: tuple[Any, ...], memory_limit: int
-    ) -> bool:
+    def learn_online(self, bins: Ints, rule: tuple[Any, ...], memory_limit: int) -> bool:
         """Learn samples in place, in order; return False without a layer for single samples.
 
         ``rule`` is (counts,) for the p-delta rule, or (labels, n_classes, scheme). Nothing that may
@@ -243,27 +241,25 @@ class Network:
         return True
 
     @property
-    def weights(self) -> NDArray[np.int32]:
+    def weights(self) -> Ints:
         """Copy of the weights, shape (n_units, n_columns)."""
         return self.layer.weights
 
     @property
-    def thresholds(self) -> NDArray[np.int32]:
+    def thresholds(self) -> Ints:
         """Copy of the thresholds, shape (n_units,)."""
         return self.layer.thresholds
 
-    def potentials(self, bins: NDArray[np.int32], n_threads: int) -> NDArray[np.int32]:
+    def potentials(self, bins: Ints, n_threads: int) -> Ints:
         """Return the potentials, shape (n_samples, n_units)."""
         if self._online is not None and len(bins) <= FEW_SAMPLES:
             return self._online.potentials(bins)
         return self.layer.potentials(bins, n_threads=n_threads)
 
-    def counts(self, bins: NDArray[np.int32], n_groups: int, n_threads: int) -> NDArray[np.int32]:
+    def counts(self, bins: Ints, n_groups: int, n_threads: int) -> Ints:
         """Return the numbers of units that fire, shape (n_samples, n_groups)."""
         if self._online is not None and len(bins) <= FEW_SAMPLES:
             firing = self.potentials(bins, n_threads) > 0
-            counts: NDArray[np.int32] = firing.reshape(len(bins), n_groups, -1).sum(
-                axis=2, dtype=np.int32
-            )
+            counts: Ints = firing.reshape(len(bins), n_groups, -1).sum(axis=2, dtype=np.int32)
             return counts
         return self.layer.counts(bins, n_groups=n_groups, n_threads=n_threads)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import clone, is_classifier
 from sklearn.model_selection import KFold, StratifiedKFold
 from sklearn.utils import _safe_indexing
 
 from sdnn.coding import Coding, CorrelationMatrix, Symbolic, WithMissing
-from sdnn.estimators.inputs import Pairs
+from sdnn.estimators.inputs import Array, Floats, Pairs
 
 __all__ = ["select_pairs", "with_categories"]
 
@@ -19,7 +19,7 @@ N_FOLDS = 5
 STANDARD_ERRORS = 2.0
 
 
-def halved(pairs: Pairs, importances: NDArray[np.float64]) -> Pairs:
+def halved(pairs: Pairs, importances: Floats) -> Pairs:
     """Return the more important half of the pairs; both orders of two inputs stay together.
 
     >>> halved([(0, 1), (1, 0), (0, 2), (2, 0)], np.array([0.1, 0.1, 0.2, 0.6]))
@@ -33,7 +33,7 @@ def halved(pairs: Pairs, importances: NDArray[np.float64]) -> Pairs:
     return [pair for pair in pairs if frozenset(pair) in kept]
 
 
-def with_categories(coding: Coding, column: NDArray[Any]) -> Coding:
+def with_categories(coding: Coding, column: Array) -> Coding:
     """Return a coding with all categories of the column, where it could refuse unknown ones."""
     base = coding.base if isinstance(coding, WithMissing) else coding
     is_strict = not isinstance(coding, WithMissing) or coding.unknown == "error"

@@ -7,11 +7,11 @@ from numbers import Integral
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.utils._param_validation import Interval, StrOptions
 
 from sdnn.estimators.base import BaseSDNN
-from sdnn.estimators.inputs import CodedRegressor
+from sdnn.estimators.inputs import Array, CodedRegressor, Floats, Ints
 from sdnn.estimators.training import weighted_mean
 
 __all__ = ["SDNNRegressor"]
@@ -137,41 +137,36 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
 
     def _check_samples(
         self, X: Any, y: Any, reset: bool, in_fit: bool = False
-    ) -> tuple[NDArray[Any], NDArray[np.float64]]:
+    ) -> tuple[Array, Floats]:
         if in_fit and self.warm_start and self.refit:
             raise ValueError("refit=True trains a new network: it cannot be with warm_start=True")
         return self._validated_numbers(X, y, reset)
 
-    def _set_outputs(self, y: NDArray[np.float64]) -> int:
+    def _set_outputs(self, y: Floats) -> int:
         self._flat: bool = y.ndim == 1
         targets = y.reshape(len(y), -1)
         self.n_outputs_: int = targets.shape[1]
-        self.output_range_: NDArray[np.float64] = self._range_of(targets)
+        self.output_range_: Floats = self._range_of(targets)
         self.n_outputs_out_of_range_: int = 0
         self._earlier = ()
         self._counts_of_range: int = self.n_output_units
         return self.n_outputs_ * self.n_output_units
 
-    def _check_outputs(self, y: NDArray[np.float64], classes: ArrayLike | None) -> None:
+    def _check_outputs(self, y: Floats, classes: ArrayLike | None) -> None:
         n_outputs = y.shape[1] if y.ndim > 1 else 1
         if n_outputs != self.n_outputs_:
             raise ValueError(
                 f"y must have as many outputs as before, {self.n_outputs_}, got {n_outputs}"
             )
 
-    def _rule_arguments(self, targets: NDArray[np.float64]) -> tuple[Any, ...]:
+    def _rule_arguments(self, targets: Floats) -> tuple[Any, ...]:
         return (targets,)
 
-    def _validation_score(
-        self,
-        bins: NDArray[np.int32],
-        targets: NDArray[np.float64],
-        weights: NDArray[np.float64] | None,
-    ) -> float:
+    def _validation_score(self, bins: Ints, targets: Floats, weights: Floats | None) -> float:
         counts = self.network_.counts(bins, self.n_outputs_, self._n_threads())
         return -weighted_mean((targets - counts) ** 2, weights)
 
-    def _range_of(self, targets: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _range_of(self, targets: Floats) -> Floats:
         if self.output_range is not None:
             try:
                 given = np.asarray(self.output_range)
@@ -198,27 +193,27 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         margin = np.where(high > low, MARGIN * (high - low), np.maximum(1.0, np.abs(low)))
         return np.stack([low - margin, high + margin], axis=1)
 
-    def _counts(self, bins: NDArray[np.int32], n_threads: int) -> list[NDArray[np.int32]]:
+    def _counts(self, bins: Ints, n_threads: int) -> list[Ints]:
         """Return the firing counts of each averaged network, shape (n_samples, n_outputs)."""
         networks = (*self._earlier, self.network_)
         return [network.counts(bins, self.n_outputs_, n_threads) for network in networks]
 
-    def _step(self) -> NDArray[np.float64]:
+    def _step(self) -> Floats:
         """Return the change of an output per unit, shape (n_outputs,)."""
-        width: NDArray[np.float64] = self.output_range_[:, 1] - self.output_range_[:, 0]
+        width: Floats = self.output_range_[:, 1] - self.output_range_[:, 0]
         return width / self._counts_of_range
 
-    def _in_counts(self, targets: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _in_counts(self, targets: Floats) -> Floats:
         """Return targets in units of the firing count, not rounded."""
-        counts: NDArray[np.float64] = (targets - self.output_range_[:, 0]) / self._step()
+        counts: Floats = (targets - self.output_range_[:, 0]) / self._step()
         return counts
 
-    def _of_counts(self, counts: NDArray[Any]) -> NDArray[np.float64]:
+    def _of_counts(self, counts: Array) -> Floats:
         """Return the outputs of firing counts, shape (n_samples, n_outputs)."""
-        values: NDArray[np.float64] = self._step() * counts + self.output_range_[:, 0]
+        values: Floats = self._step() * counts + self.output_range_[:, 0]
         return values
 
-    def _targets(self, y: NDArray[np.float64], at_once: bool = False) -> NDArray[np.float64]:
+    def _targets(self, y: Floats, at_once: bool = False) -> Floats:
         """Return targets in counts; those outside the range are clipped, refused, or widen it."""
         targets = y.reshape(len(y), -1)
         counts = self._in_counts(targets)
@@ -251,7 +246,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         counts[begin:] = self._in_counts(targets[begin:])
         return counts
 
-    def _widen(self, targets: NDArray[np.float64]) -> int:
+    def _widen(self, targets: Floats) -> int:
         """Widen the ranges to targets of one sample; return the number of ranges widened."""
         low, high = self.output_range_.T
         new_low = np.where(targets < low, targets - MARGIN * (high - targets), low)

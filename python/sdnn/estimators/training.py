@@ -9,9 +9,10 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sdnn import _core
+from sdnn.estimators.inputs import Array, Floats, Ints
 from sdnn.estimators.network import Network
 
 __all__ = ["History", "Trainer", "run_epochs", "sample_weights", "weighted_mean"]
@@ -50,7 +51,7 @@ def progress_bar(verbose: int, n_epochs: int) -> Iterator[Callable[[int], None]]
 
 def sample_weights(
     weights: ArrayLike | None, n_samples: int, *, name: str = "sample_weight"
-) -> NDArray[np.float64] | None:
+) -> Floats | None:
     """Return checked weights of samples, shape (n_samples,), or None.
 
     They must be in [0, `LARGEST_WEIGHT`], not all 0, with a sum of at most `MOST_PRESENTED`.
@@ -62,29 +63,24 @@ def sample_weights(
         each = np.array(weights, dtype=np.float64)
     except (TypeError, ValueError):
         raise ValueError(f"{wanted}, got {weights!r}") from None
-    if each.ndim == 0:
-        each = np.full(n_samples, each)
-    if each.shape != (n_samples,):
-        raise ValueError(f"{wanted}, got an array of shape {each.shape}")
-    if not np.all((each >= 0) & (each <= LARGEST_WEIGHT)):
+    each = np.full(n_samples, each) if each.ndim == 0 else each
+    if each.shape != (n_samples,) or not np.all((each >= 0) & (each <= LARGEST_WEIGHT)):
         raise ValueError(f"{wanted}, got {weights!r}")
     if not each.any():
         raise ValueError(f"{name} must be above zero for some sample, got zero for all")
     if each.sum() > MOST_PRESENTED:
-        raise ValueError(
-            f"{name} must have a sum of at most {MOST_PRESENTED}, got {each.sum():.4g}"
-        )
+        raise ValueError(f"{name} must sum to at most {MOST_PRESENTED}, got {each.sum():.4g}")
     return each
 
 
-def weighted_mean(values: NDArray[Any], weights: NDArray[np.float64] | None) -> float:
+def weighted_mean(values: Array, weights: Floats | None) -> float:
     """Return the mean over samples, plain without weights or if all of them are 0."""
     if weights is None or not weights.any():
         return float(np.mean(values))
     return float(np.average(values, axis=0, weights=weights).mean())
 
 
-def presented(n_samples: int, weights: NDArray[np.float64] | None, epoch: int) -> NDArray[np.int32]:
+def presented(n_samples: int, weights: Floats | None, epoch: int) -> Ints:
     """Return the samples of an epoch: one of weight 2 twice, one of 1/2 in every other epoch.
 
     >>> [presented(3, np.array([2.0, 0.5, 0.0]), epoch).tolist() for epoch in range(3)]
@@ -98,7 +94,7 @@ def presented(n_samples: int, weights: NDArray[np.float64] | None, epoch: int) -
     return np.repeat(in_order, times.astype(np.int64))
 
 
-def epochs_to_present_all(weights: NDArray[np.float64] | None) -> int:
+def epochs_to_present_all(weights: Floats | None) -> int:
     """Return after how many epochs every sample of a weight above 0 was presented."""
     if weights is None:
         return 1
@@ -107,32 +103,29 @@ def epochs_to_present_all(weights: NDArray[np.float64] | None) -> int:
 
 
 def run_epochs(
-    network: Network,
+    model: Any,
     trainer: Trainer,
     n_samples: int,
-    *,
     max_iter: int,
-    random: np.random.RandomState | None = None,
-    score: Callable[[], float] | None = None,
-    n_iter_no_change: int = 10,
-    weights: NDArray[np.float64] | None = None,
-    n_averaged_epochs: int = 1,
-    verbose: int = 0,
+    random: np.random.RandomState,
+    score: Callable[[], float] | None,
+    weights: Floats | None,
+    n_averaged_epochs: int,
 ) -> History:
     """Train until nothing is corrected, nothing improves, or ``max_iter`` epochs are over.
 
     ``random`` draws the order of every epoch, ``score`` returns the validation score (larger is
     better), ``weights`` are mean presentations per epoch, ``n_averaged_epochs`` networks are kept.
     """
+    network: Network = model.network_
     history = History(network)
     quiet, n_quiet = 0, epochs_to_present_all(weights)
-    best, best_epoch = network, -1
-    best_earlier: tuple[Network, ...] = ()
+    best: tuple[Network, int, tuple[Network, ...]] = network, 0, ()
     kept: deque[Network] = deque(maxlen=n_averaged_epochs - 1)
-    with progress_bar(verbose, max_iter) as advance:
+    with progress_bar(model.verbose, max_iter) as advance:
         for epoch in range(max_iter):
             order = presented(n_samples, weights, epoch)
-            if random is not None:
+            if model.shuffle:
                 order = random.permutation(order)
             n_corrected, _ = trainer.present(order)
             history.n_corrected.append(n_corrected)
@@ -141,9 +134,9 @@ def run_epochs(
                 trainer.synchronize()
             if score is not None:
                 history.scores.append(score())
-                if best_epoch < 0 or history.scores[-1] > history.scores[best_epoch]:
-                    best, best_epoch, best_earlier = network.copy(), epoch, tuple(kept)
-                elif epoch - best_epoch >= n_iter_no_change:
+                if best[1] == 0 or history.scores[-1] > history.scores[best[1] - 1]:
+                    best = network.copy(), epoch + 1, tuple(kept)
+                elif epoch + 1 - best[1] >= model.n_iter_no_change:
                     break
             quiet = quiet + 1 if n_corrected == 0 else 0
             if quiet == n_quiet:
@@ -151,7 +144,6 @@ def run_epochs(
             if n_averaged_epochs > 1 and epoch + 1 < max_iter:
                 kept.append(network.copy())
     trainer.synchronize()
-    history.n_epochs, history.earlier = len(history.n_corrected), tuple(kept)
-    if score is not None:
-        history.network, history.n_epochs, history.earlier = best, best_epoch + 1, best_earlier
+    last = network, len(history.n_corrected), tuple(kept)
+    history.network, history.n_epochs, history.earlier = last if score is None else best
     return history
