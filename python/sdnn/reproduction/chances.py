@@ -26,7 +26,7 @@ from sdnn.reproduction.claims import (
     Verdict,
     judge_claims,
 )
-from sdnn.runs.results import DEFAULT_BOOTSTRAP, Estimate, FloatArray, TrialMeasures, tails
+from sdnn.runs.results import BOOTSTRAP_SEED, Estimate, FloatArray, TrialMeasures, tails
 
 N_DRAWS = 10_000
 _N_RESAMPLES, _N_DRAWS_OF_EACH = 200, 250
@@ -58,7 +58,7 @@ class TenTrials:
                 return None
         met = zip(*map(self._met, checks), strict=True)
         drawn, redrawn = (np.logical_and.reduce(arrays) for arrays in met)
-        lower, upper = tails(redrawn.mean(axis=1), DEFAULT_BOOTSTRAP.confidence)
+        lower, upper = tails(redrawn.mean(axis=1))
         return Estimate(float(drawn.mean()), float(lower), float(upper))
 
     def _draw(self, subject: Subject) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -66,7 +66,7 @@ class TenTrials:
 
         Each subject has a generator of its own, whoever else is drawn.
         """
-        generator = np.random.default_rng([DEFAULT_BOOTSTRAP.seed, *str(subject).encode()])
+        generator = np.random.default_rng([BOOTSTRAP_SEED, *str(subject).encode()])
         size = self._measured[subject].n_trials
         drawn = generator.integers(size, size=(N_DRAWS, PAPER_TRIALS))
         resampled = generator.integers(size, size=(_N_RESAMPLES, size))
@@ -101,9 +101,9 @@ def powers(check: Check, samples: Sequence[FloatArray]) -> tuple[Power, ...]:
     """Draw more trials than these samples of a check, judge each draw, for each of `MULTIPLES`."""
     found = []
     for multiple in MULTIPLES:
-        generator = np.random.default_rng(DEFAULT_BOOTSTRAP.seed)
+        generator = np.random.default_rng(BOOTSTRAP_SEED)
         medians = _difference([drawn_medians(one, multiple, generator) for one in samples])
-        lower, upper = tails(medians, DEFAULT_BOOTSTRAP.confidence)
+        lower, upper = tails(medians)
         holds = (check.contains(lower) & check.contains(upper)).mean()
         fails = check.excludes(lower, upper).mean()
         found.append(Power(multiple * samples[0].size, float(holds), float(fails)))

@@ -151,75 +151,37 @@ def _difference(
 
 
 CLAIMS = (
-    Claim(
-        1,
-        "SDNN-C learns the swing-up within about 150 learning episodes, with 4 and 6 inputs",
-        _medians("episodes_to_learn", ("s4", "s6"), "about 150", at_most=150),
-    ),
-    Claim(
-        2,
-        "At the end SDNN-C reaches the goal within 10 steps in both",
-        _medians("final_steps", ("s4", "s6"), "within 10", at_most=10),
-    ),
-    Claim(
-        3,
-        "FQL learns within about 100 episodes without noise",
-        _medians("episodes_to_learn", ("s4",), "about 100", "fuzzy", at_most=100),
-    ),
-    Claim(
-        4,
-        "FQL never learns a stable swing-up with noise",
-        _medians("final_share_solved", _NOISY, "unstable", "fuzzy", at_most=_BELOW_STABLE),
-    ),
-    Claim(
-        5,
-        "SDNN-C in Case II does as well as in Case I in early episodes, worsens from about episode"
-        " 7,500 and ends not stably solving",
-        (
-            *_difference("early_steps", "s4-noise", "s4", "almost equal", at_most=EQUAL_STEPS),
-            *_medians(
-                "episode_of_collapse", ("s4-noise",), "about 7,500", at_least=5_000, at_most=10_000
-            ),
-            *_medians("final_share_solved", ("s4-noise",), "not stable", at_most=_BELOW_STABLE),
-        ),
-    ),
-    Claim(
-        6,
-        "SDNN-C in Case III keeps solving until later than in Case II",
-        _difference("episode_of_collapse", "s5-noise", "s4-noise", "later", at_least=10),
-    ),
-    Claim(
-        7,
-        "SDNN-C in Case IV ends at about 4 steps, about as in Case I",
-        (
-            *_medians("final_steps", ("s6-noise",), "about 4", at_most=4 + EQUAL_STEPS),
-            *_difference(
-                "final_steps", "s6-noise", "s4", "almost the same",
-                at_least=-EQUAL_STEPS, at_most=EQUAL_STEPS,
-            ),
-        ),
-    ),
-    Claim(
-        8,
-        "The time SDNN-C needs to learn does not grow with redundant inputs",
-        (
-            *_difference("episodes_to_learn", "s6", "s4", "does not grow", at_most=15),
-            *_difference("episodes_to_learn", "s5-noise", "s4-noise", "does not grow", at_most=15),
-            *_difference("episodes_to_learn", "s6-noise", "s4-noise", "does not grow", at_most=15),
-        ),
-    ),
-    Claim(
-        9,
-        "Cost per step grows quadratically with the number of inputs for SDNN-C, exponentially for"
-        " RBFN",
-        (
-            # l (l - 1) groups of columns: 56 / 12 = 4.7 times as many; half and twice that.
-            Check(Growth("sdnn-c", 8, 4), "4.7 times", at_least=2.3, at_most=9.4),
-            # At least twice with each input: 16 times with four more.
-            Check(Growth("rbf", 8, 4), "exponential", at_least=16),
-            Check(Growth("rbf-plain", 8, 4), "exponential", at_least=16),
-        ),
-    ),
+    Claim(1, "SDNN-C learns the swing-up within about 150 learning episodes, with 4 and 6 inputs",
+          _medians("episodes_to_learn", ("s4", "s6"), "about 150", at_most=150)),
+    Claim(2, "At the end SDNN-C reaches the goal within 10 steps in both",
+          _medians("final_steps", ("s4", "s6"), "within 10", at_most=10)),
+    Claim(3, "FQL learns within about 100 episodes without noise",
+          _medians("episodes_to_learn", ("s4",), "about 100", "fuzzy", at_most=100)),
+    Claim(4, "FQL never learns a stable swing-up with noise",
+          _medians("final_share_solved", _NOISY, "unstable", "fuzzy", at_most=_BELOW_STABLE)),
+    Claim(5, "SDNN-C in Case II does as well as in Case I in early episodes, worsens from about"
+          " episode 7,500 and ends not stably solving",
+          (*_difference("early_steps", "s4-noise", "s4", "almost equal", at_most=EQUAL_STEPS),
+           *_medians("episode_of_collapse", ("s4-noise",), "about 7,500", at_least=5_000,
+                     at_most=10_000),
+           *_medians("final_share_solved", ("s4-noise",), "not stable", at_most=_BELOW_STABLE))),
+    Claim(6, "SDNN-C in Case III keeps solving until later than in Case II",
+          _difference("episode_of_collapse", "s5-noise", "s4-noise", "later", at_least=10)),
+    Claim(7, "SDNN-C in Case IV ends at about 4 steps, about as in Case I",
+          (*_medians("final_steps", ("s6-noise",), "about 4", at_most=4 + EQUAL_STEPS),
+           *_difference("final_steps", "s6-noise", "s4", "almost the same", at_least=-EQUAL_STEPS,
+                        at_most=EQUAL_STEPS))),
+    Claim(8, "The time SDNN-C needs to learn does not grow with redundant inputs",
+          (*_difference("episodes_to_learn", "s6", "s4", "does not grow", at_most=15),
+           *_difference("episodes_to_learn", "s5-noise", "s4-noise", "does not grow", at_most=15),
+           *_difference("episodes_to_learn", "s6-noise", "s4-noise", "does not grow", at_most=15))),
+    Claim(9, "Cost per step grows quadratically with the number of inputs for SDNN-C, exponentially"
+          " for RBFN",
+          # l (l - 1) groups of columns: 56 / 12 = 4.7 times as many; half and twice that.
+          (Check(Growth("sdnn-c", 8, 4), "4.7 times", at_least=2.3, at_most=9.4),
+           # At least twice with each input: 16 times with four more.
+           Check(Growth("rbf", 8, 4), "exponential", at_least=16),
+           Check(Growth("rbf-plain", 8, 4), "exponential", at_least=16))),
 )  # fmt: skip
 """The paper's nine claims, by their numbers in method.md's list."""
 

@@ -28,14 +28,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MAX_STEPS = 50
-"""Upper end of the steps axis: an episode's limit."""
-
-START_EPISODES = 500
-"""Learning episodes shown in the panels of the start."""
-
-_PANEL_HEIGHT = 3.3
-_START_HEIGHT = 1.9
+MAX_STEPS = 50  # an episode's limit: the upper end of the steps axis
+START_EPISODES = 500  # learning episodes shown in the panels of the start
+_PANEL_HEIGHT, _START_HEIGHT = 3.3, 1.9
 _WARNING_COLOR = "#a31515"
 _MARKERS = ("o", "s", "^", "v")
 
@@ -82,12 +77,10 @@ def draw_experiment(
         if quick:
             _watermark(axes)
         if with_start:
-            draw_steps(starts[number], shown, colors, smooth=False)
-            starts[number].set(xlim=(0, START_EPISODES), ylim=(0, MAX_STEPS))
-            starts[number].set_title(
-                f"the first {START_EPISODES} learning episodes", fontsize=8.5, loc="left",
-                color=FAINT,
-            )  # fmt: skip
+            start, words = starts[number], f"the first {START_EPISODES} learning episodes"
+            draw_steps(start, shown, colors, smooth=False)
+            start.set(xlim=(0, START_EPISODES), ylim=(0, MAX_STEPS))
+            start.set_title(words, fontsize=8.5, loc="left", color=FAINT)
     for axes in (*panels[len(experiment.cases) :], *starts[len(experiment.cases) :]):
         axes.set_visible(False)
     if len(colors) > 1 or experiment not in EXPERIMENTS:
@@ -166,18 +159,15 @@ def _label(
 ) -> None:
     """Write title, what kind of run it is, and where the rows come from."""
     height = figure.get_figheight()
-    counts = sorted({result.n_trials for result in results})
-    trials = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+    fewest, most = min(r.n_trials for r in results), max(r.n_trials for r in results)
+    trials = f"{fewest}" if fewest == most else f"{fewest} to {most}"
     n_episodes = max(result.last_episode for result in results)
     scale = f"{trials} {'trial' if trials == '1' else 'trials'} x {n_episodes:,} episodes"
     figure.text(0.012, 1 - 0.13 / height, title, fontsize=12, va="top", color=INK)
-    if quick or counts[0] < PAPER_TRIALS or n_episodes < PAPER_EPISODES:
+    if quick or fewest < PAPER_TRIALS or n_episodes < PAPER_EPISODES:
         what = "QUICK LOOK, not the result" if quick else "smaller than the paper's experiment"
-        figure.text(
-            0.012, 1 - 0.36 / height,
-            f"{what}: {scale} instead of {PAPER_TRIALS} x {PAPER_EPISODES:,}",
-            fontsize=9, va="top", color=_WARNING_COLOR,
-        )  # fmt: skip
+        text = f"{what}: {scale} instead of {PAPER_TRIALS} x {PAPER_EPISODES:,}"
+        figure.text(0.012, 1 - 0.36 / height, text, fontsize=9, va="top", color=_WARNING_COLOR)
     hashes = [f"{r.case_id}/{r.agent} {r.config_hash[:8]}" for r in results]
     lines = [", ".join(hashes[i : i + 4]) for i in range(0, len(hashes), 4)]
     lines_are = (

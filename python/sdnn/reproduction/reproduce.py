@@ -53,45 +53,20 @@ class ReproduceRequest:
     """What to run and where to put it.
 
     Files of other agents, presets, trials, episodes or seeds than the default have these in their
-    names, and those of a quick look are marked so.
-
-    Parameters
-    ----------
-    experiments
-        Experiments to run.
-    cost
-        Whether to measure costs too.
-    out
-        Folder of the result file, figures and tables.
-    n_trials
-        Trials per case and agent; default the paper's, or `QUICK_TRIALS`.
-    n_episodes
-        Learning episodes per trial; default the paper's, or `QUICK_EPISODES`.
-    seed
-        Root of all seeds.
-    jobs
-        Trials at the same time; default one for each core.
-    executor
-        Where trials run; default threads of this process. Costs are always measured here.
-    quick
-        Whether this is a look at a fraction.
-    agents
-        Ids of the agents to run in every case instead of the case's own.
-    presets
-        Names of settings under which SDNN-C runs beside the agents of every case.
+    names, and those of a quick look are marked so. Costs are always measured in this process.
     """
 
     experiments: tuple[Experiment, ...]
-    cost: bool = False
-    out: Path
-    n_trials: int | None = None
-    n_episodes: int | None = None
-    seed: int = 0
-    jobs: int | None = None
-    executor: Executor | None = None
-    quick: bool = False
-    agents: tuple[str, ...] = ()
-    presets: tuple[str, ...] = ()
+    cost: bool = False  # whether to measure costs too
+    out: Path  # folder of the result file, figures and tables
+    n_trials: int | None = None  # per case and agent; default the paper's, or `QUICK_TRIALS`
+    n_episodes: int | None = None  # per trial; default the paper's, or `QUICK_EPISODES`
+    seed: int = 0  # root of all seeds
+    jobs: int | None = None  # trials at the same time; default one for each core
+    executor: Executor | None = None  # where trials run; default threads of this process
+    quick: bool = False  # whether this is a look at a fraction
+    agents: tuple[str, ...] = ()  # to run in every case instead of the case's own
+    presets: tuple[str, ...] = ()  # under which SDNN-C runs beside the agents of every case
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "agents", tuple(dict.fromkeys(self.agents)))

@@ -36,20 +36,14 @@ COLORS = (
     "#1f5a96", "#c2542d", "#3c7d4b", "#7a5195", "#8a6d1d", "#4a4a4a",
     "#2a9d9d", "#c65b8e", "#7fa328", "#9b3d3d",
 )  # fmt: skip
-INK = "#2b2b2b"
-FAINT = "#6f6f6f"
-GRID = "#e4e4e4"
+INK, FAINT, GRID = "#2b2b2b", "#6f6f6f", "#e4e4e4"
 
 SMOOTHED_TESTS = 25
 """Test episodes in the running median of a long run, which lies over the thin median curve."""
 
-CASES_PER_ROW = 5
-"""More cases of a study continue below."""
-
-_LINE_HEIGHT = 0.27
-_PANEL_WIDTH = 2.9
-_SPREAD = 0.3
-"""Half the height over which the dots of a variant are spread."""
+CASES_PER_ROW = 5  # more cases of a study continue below
+_LINE_HEIGHT, _PANEL_WIDTH = 0.27, 2.9
+_SPREAD = 0.3  # half the height over which the dots of a variant are spread
 
 _TITLES: dict[MeasureName, str] = {
     "final_share_solved": "share solved at the end",
@@ -160,12 +154,10 @@ def draw_curves(curves: Sequence[Curve]) -> Figure:
     figure = Figure(figsize=(7.5, 3.6 * len(tasks)), layout="constrained")
     panels = figure.subplots(len(tasks), squeeze=False)[:, 0]
     for task, axes in zip(tasks, panels, strict=True):
-        for curve in curves:
-            if curve.task == task:
-                _draw_curve(axes, curve, colors[curve.agent])
+        for curve in (one for one in curves if one.task == task):
+            _draw_curve(axes, curve, colors[curve.agent])
         axes.set_title(task, fontsize=10)
-        axes.set_xlabel("steps")
-        axes.set_ylabel("return")
+        axes.set(xlabel="steps", ylabel="return")
         axes.grid(alpha=0.25)
         axes.legend(fontsize=8, frameon=False)
     return figure
@@ -197,9 +189,8 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
     from matplotlib.figure import Figure
 
     cases = comparison.cases
-    blocks = [cases[i : i + CASES_PER_ROW] for i in range(0, len(cases), CASES_PER_ROW)]
-    n_columns = max(len(block) for block in blocks)
-    n_rows = 2 * len(blocks)
+    n_columns = min(len(cases), CASES_PER_ROW)
+    n_rows = 2 * -(-len(cases) // CASES_PER_ROW)
     panel_height = 0.35 + _LINE_HEIGHT * len(comparison.variants)
     labels = 0.3 + 0.072 * max(len(variant.title) for variant in comparison.variants)
     width = max(6.4, labels + n_columns * _PANEL_WIDTH + 0.3)
@@ -211,22 +202,19 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
         hspace=gap / panel_height, wspace=0.14,
     )  # fmt: skip
     grid = figure.subplots(n_rows, n_columns, squeeze=False)
-    for number, block in enumerate(blocks):
-        for column in range(n_columns):
-            pair = grid[2 * number : 2 * number + 2, column]
-            if column < len(block):
-                _draw_case(pair, comparison, block[column].id, with_names=column == 0)
-                pair[0].set_title(block[column].title, fontsize=9, loc="left", color=INK)
-                continue
-            for axes in pair:
-                axes.set_visible(False)
+    for axes in grid.ravel():
+        axes.set_visible(False)
+    for place, case in enumerate(cases):
+        row, column = divmod(place, CASES_PER_ROW)
+        pair = grid[2 * row : 2 * row + 2, column]
+        _draw_case(pair, comparison, case.id, with_names=column == 0)
+        pair[0].set_title(case.title, fontsize=9, loc="left", color=INK)
     study = comparison.study
     figure.text(0.012, 1 - 0.12 / height, study.title, fontsize=12, va="top", color=INK)
-    figure.text(
-        0.012, 1 - 0.36 / height,
-        f"{study.n_trials} trials per case and variant; compared with {study.reference} (dotted)",
-        fontsize=8.5, va="top", color=FAINT,
-    )  # fmt: skip
+    below = (
+        f"{study.n_trials} trials per case and variant; compared with {study.reference} (dotted)"
+    )
+    figure.text(0.012, 1 - 0.36 / height, below, fontsize=8.5, va="top", color=FAINT)
     # Triangles are drawn where trials differ in length, and so in where they are cut off.
     ends = {one.result.last_episode for one in comparison.measured.values()}
     write_footer(
@@ -249,22 +237,21 @@ def _draw_case(
     reference = comparison.study.reference
     colors = agent_colors(one.result.agent for one in comparison.measured.values())
     ends = {one.result.last_episode for one in measured}
-    for axes, name in zip(
-        pair, _OF_STEPS if "final_steps" in measured[0].result.values else _OF_RETURNS, strict=True
-    ):
+    names = _OF_STEPS if "final_steps" in measured[0].result.values else _OF_RETURNS
+    for axes, name in zip(pair, names, strict=True):
+        axes.set_visible(True)
+        # Where all trials are of one length, what is censored lies at the axis' end.
+        marks_censored = name in CENSORED_MEASURES and len(ends) > 1
         for one in measured:
             if name in one.result.values:
-                # Where all trials are of one length, what is censored lies at the axis' end.
-                marks_censored = name in CENSORED_MEASURES and len(ends) > 1
                 _draw_variant(
                     axes, one, name, lines[one.variant.id], colors[one.result.agent],
                     one.variant.id == reference, marks_censored,
                 )  # fmt: skip
         _label_case(axes, name, max(ends))
         axes.set_ylim(len(lines) - 0.4, -0.6)
-        axes.set_yticks(
-            range(len(lines)), [v.title if with_names else "" for v in comparison.variants]
-        )
+        words = [v.title if with_names else "" for v in comparison.variants]
+        axes.set_yticks(range(len(lines)), words)
         if reference in lines:
             axes.get_yticklabels()[lines[reference]].set_fontweight("bold")
 

@@ -20,7 +20,7 @@ from sdnn import machine
 from sdnn.runs.engine import RunOutcome
 from sdnn.runs.errors import PlotUnavailableError
 from sdnn.runs.results import (
-    DEFAULT_BOOTSTRAP,
+    CONFIDENCE,
     MEASURES,
     RETURN_MEASURES,
     CaseResult,
@@ -31,7 +31,7 @@ from sdnn.runs.results import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-PERCENT = f"{100 * DEFAULT_BOOTSTRAP.confidence:.0f} %"
+PERCENT = f"{100 * CONFIDENCE:.0f} %"
 NOTE = (
     f"Medians over trials with {PERCENT} bootstrap intervals over trials. us/decision: processor"
     " time of sensing, choosing, physics and learning."

@@ -226,16 +226,8 @@ CENSORED_MEASURES: tuple[MeasureName, ...] = ("episodes_to_learn", "episode_of_c
 """Of which it may only be known that they are beyond the last episode: then they are infinite."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class BootstrapConfig:
-    """Share of the distribution inside an interval, number of resamples, and their seed."""
-
-    confidence: float = 0.95
-    n_resamples: int = 10_000
-    seed: int = 2015
-
-
-DEFAULT_BOOTSTRAP = BootstrapConfig()
+CONFIDENCE, BOOTSTRAP_SEED = 0.95, 2015
+_N_RESAMPLES = 10_000
 
 
 def json_number(value: float, last_episode: int | None) -> float | str | None:
@@ -275,16 +267,16 @@ def running_median(values: ArrayLike, window: int) -> FloatArray:
     return np.asarray(np.nanmedian(sliding_window_view(padded, window), axis=1))
 
 
-def estimate_median(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTRAP) -> Estimate:
+def estimate_median(values: ArrayLike) -> Estimate:
     """Return the median of the values of trials, (n_trials,), with its interval.
 
     >>> estimate_median([4.0, 4.0, 4.0])
     Estimate(value=4.0, lower=4.0, upper=4.0)
     """
-    return _estimate(_median, (values,), config)
+    return _estimate(_median, values)
 
 
-def estimate_mean(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTRAP) -> Estimate:
+def estimate_mean(values: ArrayLike) -> Estimate:
     """Return the mean of the values of trials, (n_trials,), with its interval; NaN gives NaN.
 
     A ValueError says that there are no values or an infinite one.
@@ -293,14 +285,13 @@ def estimate_mean(values: ArrayLike, config: BootstrapConfig = DEFAULT_BOOTSTRAP
     Estimate(value=3.0, lower=3.0, upper=3.0)
     """
     _check_finite("averaged", values)
-    return _estimate(lambda sample: np.asarray(np.mean(sample, axis=-1)), (values,), config)
+    return _estimate(lambda sample: np.asarray(np.mean(sample, axis=-1)), values)
 
 
 def estimate_contrast(
     values: ArrayLike,
     others: ArrayLike,
     contrast: Callable[[FloatArray, FloatArray], FloatArray] = np.subtract,
-    config: BootstrapConfig = DEFAULT_BOOTSTRAP,
 ) -> Estimate:
     """Compare the medians of two groups of trials; each group is resampled by itself.
 
@@ -311,11 +302,11 @@ def estimate_contrast(
     """
     _check_finite("compared", values, others)
     return _estimate(
-        lambda first, second: contrast(_median(first), _median(second)), (values, others), config
+        lambda first, second: contrast(_median(first), _median(second)), values, others
     )
 
 
-def tails(distribution: FloatArray, confidence: float) -> FloatArray:
+def tails(distribution: FloatArray, confidence: float = CONFIDENCE) -> FloatArray:
     """Return the ends of the middle part of distributions over the last axis, values of theirs.
 
     >>> tails(np.arange(101.0), 0.9)
@@ -326,9 +317,7 @@ def tails(distribution: FloatArray, confidence: float) -> FloatArray:
     return np.asarray(ends, np.float64)
 
 
-def _estimate(
-    statistic: Callable[..., FloatArray], groups: tuple[ArrayLike, ...], config: BootstrapConfig
-) -> Estimate:
+def _estimate(statistic: Callable[..., FloatArray], *groups: ArrayLike) -> Estimate:
     samples = [np.asarray(values, np.float64) for values in groups]
     for sample in samples:
         if sample.ndim != 1 or sample.size == 0:
@@ -336,12 +325,9 @@ def _estimate(
     value = float(statistic(*samples))
     if min(sample.size for sample in samples) == 1:
         return Estimate(value, math.nan, math.nan)
-    generator = np.random.default_rng(config.seed)
-    drawn = [
-        sample[generator.integers(sample.size, size=(config.n_resamples, sample.size))]
-        for sample in samples
-    ]
-    lower, upper = tails(statistic(*drawn), config.confidence)
+    generator = np.random.default_rng(BOOTSTRAP_SEED)
+    drawn = [s[generator.integers(s.size, size=(_N_RESAMPLES, s.size))] for s in samples]
+    lower, upper = tails(statistic(*drawn))
     return Estimate(value, float(lower), float(upper))
 
 

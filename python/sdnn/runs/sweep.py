@@ -21,29 +21,14 @@ from sdnn.whole_files import csv_pieces, gzip_pieces, remove_abandoned_files, wr
 
 @dataclass(frozen=True, kw_only=True)
 class SweepRequest:
-    """A study and how to run it.
-
-    Parameters
-    ----------
-    study
-        The study.
-    out
-        Folder of the result file, figure, tables and page.
-    jobs
-        Trials at the same time; default one for each core.
-    executor
-        Where trials run; default threads of this process.
-    only
-        Ids of the variants to run; none: all.
-    addition
-        Makes what else the report has, from the comparison.
-    """
+    """A study and how to run it."""
 
     study: Study
-    out: Path
-    jobs: int | None = None
-    executor: Executor | None = None
-    only: tuple[str, ...] = ()
+    out: Path  # folder of the result file, figure, tables and page
+    jobs: int | None = None  # trials at the same time; default one for each core
+    executor: Executor | None = None  # where trials run; default threads of this process
+    only: tuple[str, ...] = ()  # ids of the variants to run; none: all
+    # Makes what else the report has.
     addition: Callable[[Comparison], Addition] = lambda _: Addition()
 
     @cached_property
