@@ -56,8 +56,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         Any that Gymnasium flattens to a vector: Box, Dict, Tuple, Discrete, ...
     action_space : gymnasium.Space
         Box with finite bounds, Discrete, MultiDiscrete or MultiBinary.
-    approximator, learning
-        Settings of the agent's parts.
+    approximator, learning : optional
+        Settings of the agent's parts; sizes are taken from the spaces.
     seed : int
         The root of every random stream of the agent.
     observation_range : (low, high) or "adaptive", optional
@@ -89,30 +89,35 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     _controller: _core.Controller
     _scaling: Scaling | None = None
     _next_episode: int = 0  # of `train` without a seed
+    _tables: Sequence[NDArray[np.int8]] = ()
 
     def __init__(
         self,
         observation_space: gym.Space[Any],
         action_space: gym.Space[Any],
-        approximator: Approximator,
-        learning: Learning,
         *,
+        approximator: Approximator | None = None,
+        learning: Learning | None = None,
         seed: int = 0,
         observation_range: Ranges | None = None,
         angles: Sequence[int] = (),
         angle_pairs: AnglePairs = "none",
         warm_up_steps: int = 1000,
-        tables: Sequence[NDArray[np.int8]] = (),
     ) -> None:
         self._take_spaces(observation_space, action_space)
         try:
             space_data(observation_space)  # what could not be saved had better not be learned
         except TypeError as error:
             raise TypeError(f"observation_space {error}") from None
-        self._take_settings(approximator, learning, seed, warm_up_steps)
+        self._take_settings(
+            self.approximator_type() if approximator is None else approximator,
+            self.learning_type() if learning is None else learning,
+            seed,
+            warm_up_steps,
+        )
         self._observation = self._observations.config(observation_range, angles, angle_pairs)
         self._action = self._actions.config
-        self._make(tables=list(tables))
+        self._make(tables=list(self._tables))
 
     def _take_spaces(self, observations: gym.Space[Any], actions: gym.Space[Any]) -> None:
         self.observation_space = observations
@@ -144,17 +149,15 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
                 **made_of,
             )
         except ValueError as error:
+            text = str(error)
             reasons = {"n_inputs": "n_inputs follows from observation_space"}
             if not self._actions.is_box:
                 reasons["n_actions"] = "n_actions follows from action_space"
             if len(self._action["low"]) > 1:
                 reasons["max_table_bytes"] = "for each dimension of action_space"
-            found = [reason for word, reason in reasons.items() if word in str(error)]
-            if str(error).startswith(("action.", "low ", "high ")):
-                found = [
-                    "of action_space; where a Box has no finite bounds, gymnasium's RescaleAction"
-                    " or ClipAction gives it some"
-                ]
+            found = [reason for word, reason in reasons.items() if word in text]
+            if text.startswith(("action.", "low ", "high ")):
+                found = ["of action_space; gymnasium's RescaleAction gives a Box finite bounds"]
             if not found:
                 raise
             raise ValueError(f"{error} ({', '.join(found)})") from error
@@ -255,8 +258,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         Raises
         ------
         TypeError, ValueError
-            If ``explore`` is no bool, the observation has another shape or holds NaN, or there is
-            no such environment.
+            If an argument is not usable, such as an observation that holds NaN.
         """
         if explore is not True and explore is not False:
             explore = flag("explore", explore)

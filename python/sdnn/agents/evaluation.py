@@ -31,16 +31,10 @@ class Acts(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluation:
-    """The outcome of some greedy episodes.
+    """The result of greedy episodes.
 
-    Parameters
-    ----------
-    returns
-        Undiscounted sums of rewards, shape (n_episodes,).
-    lengths
-        Steps, shape (n_episodes,).
-    terminated
-        Whether each ended in a terminal state, rather than by a time limit.
+    Undiscounted sums of rewards, numbers of steps, and whether each ended in a terminal state
+    rather than by a time limit; shapes (n_episodes,).
     """
 
     returns: NDArray[np.float64]
@@ -79,23 +73,23 @@ def evaluate(
 ) -> Evaluation:
     """Run greedy episodes, in which nothing is learned and nothing of the agent's future changes.
 
-    An episode that seems not to end is warned of.
+    An episode that seems not to end is warned of. Random draws for greedy actions, where several
+    are best or all are random in a warm-up, come from a stream that runs on from call to call and
+    that learning does not use.
 
     Parameters
     ----------
     agent
-        What acts.
+        An agent, or anything with its method `act`.
     env
-        Each episode resets it with a seed of its own: every call meets the same episodes. What an
-        agent draws for its greedy actions, where several are best or all are random in a warm-up,
-        goes on from call to call, in a stream that learning does not use.
+        Each episode resets it with a seed of its own: every call meets the same episodes.
     episodes
         How many.
     seed
         Root of the episodes' seeds. None: resets have no seeds, so that the environment's random
         streams run on from call to call.
     options
-        Of every reset.
+        Options of every reset.
 
     Raises
     ------
@@ -103,8 +97,8 @@ def evaluate(
         If an argument cannot be used, such as ``episodes`` below 1, or the environment's spaces are
         not the agent's.
     UnusableStepError
-        If the environment gives an observation or a reward that cannot be used, or rewards that do
-        not add up to a finite number: a `ValueError` that names step and episode.
+        If an observation or a reward cannot be used, or rewards do not add up to a finite number: a
+        `ValueError` that names step and episode.
     """
     has_methods("agent", agent, "an agent", "act")
     require_single("env", env)

@@ -12,16 +12,15 @@ __all__ = ["FixedRate"]
 
 
 class FixedRate(_core.FixedRate):
-    """Ticks ``hz`` times a second: what a loop that controls a robot iterates over.
+    """A loop at ``hz`` ticks a second, for robots.
 
-    Tick k is at start + k / hz, whatever was before: nothing adds up, so the loop does not drift.
-    The body of the loop has until the next tick. If it takes longer, that is a miss: the ticks that
-    have passed are left out, and the loop goes on with the next one to come. It never catches up in
-    a burst. A sleep that ends too late by a whole period is a miss, too.
+    Tick k is at start + k / hz, so the loop does not drift. Where the body of the loop takes longer
+    than a period, or a sleep ends too late, that is a miss: the ticks that have passed are left
+    out, and the loop never catches up in a burst.
 
-    The operating system decides when a sleeping program runs again, often some 0.1 ms late, and
-    Python's garbage collector may take a few ms: for a loop that must never be late, take the C++
-    class of the same name under a real-time scheduler.
+    The operating system wakes a program often some 0.1 ms late, and Python's garbage collector may
+    take a few ms: for a loop that must never be late, take the C++ class of the same name under a
+    real-time scheduler.
 
     Parameters
     ----------
@@ -32,20 +31,13 @@ class FixedRate(_core.FixedRate):
     sleep : callable
         Waits for so many seconds, or less.
 
-    Raises
-    ------
-    ValueError
-        If ``hz`` is out of range.
-
     Attributes
     ----------
     hz : float
-    n_misses : int
-        How often the body was not done by the next tick.
-    n_skipped : int
-        Ticks that were left out because of it.
+    n_misses, n_skipped : int
+        How often the body was not done by the next tick, and ticks left out because of it.
     worst_lateness : float
-        By how many seconds the worst miss was too late.
+        Seconds of the worst miss.
 
     Examples
     --------

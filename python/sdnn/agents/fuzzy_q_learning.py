@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -10,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn.agents.agent import Agent
-from sdnn.agents.spaces import AnglePairs, Ranges
 from sdnn.arguments import whole
 from sdnn.config import FuzzyQLearningConfig, FuzzyRulesConfig
 
@@ -27,34 +25,9 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     Only the transition of the last exploring `act` in an environment can be learned: which rule
     picked what is known of no other. What a warm-up did is therefore not learned.
 
-    Parameters
-    ----------
-    observation_space : gymnasium.Space
-        See `Agent`.
-    action_space : gymnasium.spaces.Box
-        Finite bounds.
-    approximator : FuzzyRulesConfig, optional
-        ``n_inputs`` is taken from the observation space.
-    learning : FuzzyQLearningConfig, optional
-    seed : int
-        The root of every random stream of the agent.
-    observation_range, angles, angle_pairs, warm_up_steps
-        See `Agent`. An angle is scaled like any other variable: the rules know no circle.
-
-    Raises
-    ------
-    TypeError
-        For spaces of another kind.
-    ValueError
-        For spaces, ranges or settings that are impossible, or a larger table than
-        ``approximator.max_table_bytes`` allows.
-
-    Attributes
-    ----------
-    approximator : FuzzyRulesConfig
-        As used.
-    learning : FuzzyQLearningConfig
-        As used.
+    Parameters are those of `Agent`; ``action_space`` must be a Box. An angle is scaled like any
+    other variable: the rules know no circle. ValueError for a larger table than
+    ``approximator.max_table_bytes`` allows.
 
     Examples
     --------
@@ -77,43 +50,17 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     approximator_type = FuzzyRulesConfig
     learning_type = FuzzyQLearningConfig
 
-    def __init__(
-        self,
-        observation_space: gym.Space[Any],
-        action_space: gym.Space[Any],
-        *,
-        approximator: FuzzyRulesConfig | None = None,
-        learning: FuzzyQLearningConfig | None = None,
-        seed: int = 0,
-        observation_range: Ranges | None = None,
-        angles: Sequence[int] = (),
-        angle_pairs: AnglePairs = "none",
-        warm_up_steps: int = 1000,
-    ) -> None:
-        if not isinstance(action_space, gym.spaces.Box):
-            raise TypeError(f"action_space must be a Box, got {type(action_space).__name__}")
-        super().__init__(
-            observation_space,
-            action_space,
-            FuzzyRulesConfig() if approximator is None else approximator,
-            FuzzyQLearningConfig() if learning is None else learning,
-            seed=seed,
-            observation_range=observation_range,
-            angles=angles,
-            angle_pairs=angle_pairs,
-            warm_up_steps=warm_up_steps,
-        )
+    def _take_spaces(self, observations: gym.Space[Any], actions: gym.Space[Any]) -> None:
+        if not isinstance(actions, gym.spaces.Box):
+            raise TypeError(f"action_space must be a Box, got {type(actions).__name__}")
+        super()._take_spaces(observations, actions)
 
     @property
     def core(self) -> Any:
         """The compiled agent, which shares all that is learned: states [0, 1], actions [-1, 1].
 
         ``core.rules`` is its table of rules. Of the first dimension, where there are several.
-
-        Raises
-        ------
-        RuntimeError
-            While the agent is warming up.
+        RuntimeError while the agent is warming up.
         """
         agent: Any = self._require_warm().agent
         return agent.part(0) if len(self._action["low"]) > 1 else agent

@@ -38,7 +38,7 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
 
 
 class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approximator]):
-    """What Q-learning with any approximator has in common: spaces in, spaces out."""
+    """Q-learning with any approximator."""
 
     learning_type = QLearningConfig
 
@@ -48,11 +48,6 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
 
         May be set, to a number in (0, 1]: it then stays, whatever the progress, also in a saved
         agent. None: it follows the progress again.
-
-        Raises
-        ------
-        ValueError
-            If it is set to anything else.
         """
         return self._controller.learning_rate
 
@@ -77,13 +72,8 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
     def core(self) -> Any:
         """The compiled agent, which shares all that is learned: states in [0, 1], indices.
 
-        ``core.action_value`` is its approximator; where actions have several dimensions,
-        ``core.action_value(dimension)``.
-
-        Raises
-        ------
-        RuntimeError
-            While the agent is warming up.
+        Its approximator is ``core.action_value``, or ``core.action_value(dimension)`` where actions
+        have several dimensions. RuntimeError while the agent is warming up.
         """
         return self._require_warm().agent
 
@@ -100,30 +90,25 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
 
     @property
     def actions(self) -> NDArray[Any]:
-        """The actions in order, shape (n_actions,): what ``q_values`` are the values of.
-
-        Those of the first dimension, where there are several: see `actions_of`.
-        """
+        """The actions of the first dimension in the order of ``q_values``, shape (n_actions,)."""
         return self.actions_of(0)
 
     def actions_of(self, dimension: int) -> NDArray[Any]:
-        """Give the actions of a dimension in order, shape (n_actions[dimension],)."""
+        """Return the actions of a dimension in order, shape (n_actions[dimension],)."""
         n = self._controller.n_actions[self._dimension(dimension)]
         values = [self._controller.action_of(index, dimension) for index in range(n)]
         return np.array(values, np.float64 if self._actions.is_box else np.int64)
 
     def q_values(self, observation: ArrayLike, dimension: int = 0) -> NDArray[np.float64]:
-        """Q(observation, a) of every action of a dimension, shape (n_actions[dimension],).
+        """Return Q(observation, a) of every action of a dimension, shape (n_actions[dimension],).
 
-        By the values that greedy actions follow: those of the averaged weights, where there are.
-        Several threads may ask at once; `learn` waits until they have their answers.
+        Greedy actions follow these values, from the averaged weights where there are any. Several
+        threads may call it at once; `learn` waits for them.
 
         Raises
         ------
-        RuntimeError
-            While the agent is warming up.
-        ValueError
-            If the observation is not usable, or there is no such dimension.
+        RuntimeError, ValueError
+            While the agent is warming up; for arguments that are not usable.
         """
         state = self._state(observation)
         values: NDArray[np.float64] = self.core.q_values(state, self._dimension(dimension))
@@ -133,10 +118,9 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
         return whole("dimension", dimension, 0, self.n_dimensions - 1)
 
     def _network(self, dimension: int) -> Any:
-        """Find the approximator of a dimension."""
-        return (
-            self.core.action_value if self.n_dimensions == 1 else self.core.action_value(dimension)
-        )
+        """Return the approximator of a dimension."""
+        core = self.core
+        return core.action_value if self.n_dimensions == 1 else core.action_value(dimension)
 
 
 class SDNNQLearning(_QLearning[SDNNCConfig]):
@@ -149,38 +133,17 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
 
     Parameters
     ----------
-    observation_space, action_space : gymnasium.Space
+    observation_space, action_space, seed, observation_range, angles, angle_pairs, warm_up_steps
         See `Agent`.
     approximator : SDNNCConfig, optional
-        ``n_inputs`` (and ``n_actions``, unless actions are a Box) are taken from the spaces. By
-        default that of the preset.
+        ``n_inputs`` (and ``n_actions``, unless actions are a Box) are taken from the spaces.
     learning : QLearningConfig, optional
-        By default that of the preset.
-    seed : int
-        The root of every random stream of the agent.
     tables : sequence of array_like, shape (n_bins, n_pattern_units), optional
         Patterns for each input, of any coding; see `sdnn.approximators.SDNNC`. Not where actions
         have several dimensions.
     preset : {"general", "small", "robust", "paper"}
-        What is used where no settings are given: those for any task, the same with a network for
-        small processors, those that stay steady in the paper's task, or the paper's; see
-        `sdnn.agents.PRESETS`.
-    observation_range, angles, angle_pairs, warm_up_steps
-        See `Agent`.
-
-    Raises
-    ------
-    TypeError
-        For spaces of another kind.
-    ValueError
-        For spaces, ranges or settings that are impossible.
-
-    Attributes
-    ----------
-    approximator : SDNNCConfig
-        As used, with the sizes filled in.
-    learning : QLearningConfig
-        As used.
+        Settings where none are given: for any task, the same with a network for small processors,
+        those that stay steady in the paper's task, or the paper's; see `sdnn.agents.PRESETS`.
 
     Examples
     --------
@@ -218,36 +181,34 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         warm_up_steps: int = 1000,
     ) -> None:
         chosen = choice("preset", preset, PRESETS)
+        self._tables = () if tables is None else pattern_tables(tables)
         super().__init__(
             observation_space,
             action_space,
-            chosen.approximator if approximator is None else approximator,
-            chosen.learning if learning is None else learning,
+            approximator=chosen.approximator if approximator is None else approximator,
+            learning=chosen.learning if learning is None else learning,
             seed=seed,
             observation_range=observation_range,
             angles=angles,
             angle_pairs=angle_pairs,
             warm_up_steps=warm_up_steps,
-            tables=() if tables is None else pattern_tables(tables),
         )
 
     def learning_report(self) -> dict[str, Any]:
-        """Say what became of the corrections so far, to find settings that cannot work.
+        """Return statistics of learning so far, to find settings that cannot work.
 
         Returns
         -------
         dict
             ``n_corrections``: transitions learned, times dimensions; ``share_changed``: those that
-            changed weights; ``share_rounded_away``: those that wanted a
-            value between two that the network can give, nearer to the one it gave (a larger
-            ``learning_rate``, more units or another ``rounding`` help);
-            ``share_out_of_range``: those that wanted a value outside ``q_range`` (a wider range, or
-            ``value_range="adaptive"``); ``q_range``: (low, high) as it is; ``share_of_range`` and
-            ``share_beyond_range``: for each observed variable the part of its range in which it was
-            for nine tenths of the last 2,048 observations or so (a small one: ranges are too wide,
-            the network hardly tells values apart), and how often it was outside (a large one: too
-            narrow); None for angles and symbols, and until there are about 160 observations since
-            the agent was made or loaded.
+            changed weights; ``share_rounded_away``: those whose target was between two values of
+            the network, nearer to the present one (a larger ``learning_rate``, more units or
+            another ``rounding`` help); ``share_out_of_range``: those with targets outside
+            ``q_range`` (a wider range, or ``value_range="adaptive"``); ``q_range``: (low, high) as
+            it is; ``share_of_range``: for each observed variable the part of its range that nine
+            tenths of the last 2,048 observations or so were in (a small one: ranges are too wide);
+            ``share_beyond_range``: how often it was outside (a large one: too narrow). Both are
+            None for angles and symbols, and for about 160 observations.
 
         Raises
         ------
@@ -277,32 +238,8 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
     and action, linear weights, gradient Q-learning. Observations and actions are treated as by
     `SDNNQLearning`; the actions of a ``Discrete`` space are taken as evenly spaced.
 
-    Parameters
-    ----------
-    observation_space, action_space : gymnasium.Space
-        See `Agent`.
-    approximator : RBFNetworkConfig, optional
-        ``n_inputs`` (and ``n_actions``, unless actions are a Box) are taken from the spaces.
-    learning : QLearningConfig, optional
-    seed : int
-        The root of every random stream of the agent.
-    observation_range, angles, angle_pairs, warm_up_steps
-        See `Agent`. An angle is scaled like any other variable: the bases know no circle.
-
-    Raises
-    ------
-    TypeError
-        For spaces of another kind.
-    ValueError
-        For spaces, ranges or settings that are impossible, or more weights than
-        ``approximator.max_table_bytes`` allows.
-
-    Attributes
-    ----------
-    approximator : RBFNetworkConfig
-        As used, with ``n_inputs`` and ``n_actions`` filled in.
-    learning : QLearningConfig
-        As used.
+    Parameters are those of `Agent`. An angle is scaled like any other variable: the bases know no
+    circle. ValueError for more weights than ``approximator.max_table_bytes`` allows.
 
     Examples
     --------
@@ -323,28 +260,3 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
 
     kind = "rbf"
     approximator_type = RBFNetworkConfig
-
-    def __init__(
-        self,
-        observation_space: gym.Space[Any],
-        action_space: gym.Space[Any],
-        *,
-        approximator: RBFNetworkConfig | None = None,
-        learning: QLearningConfig | None = None,
-        seed: int = 0,
-        observation_range: Ranges | None = None,
-        angles: Sequence[int] = (),
-        angle_pairs: AnglePairs = "none",
-        warm_up_steps: int = 1000,
-    ) -> None:
-        super().__init__(
-            observation_space,
-            action_space,
-            RBFNetworkConfig() if approximator is None else approximator,
-            QLearningConfig() if learning is None else learning,
-            seed=seed,
-            observation_range=observation_range,
-            angles=angles,
-            angle_pairs=angle_pairs,
-            warm_up_steps=warm_up_steps,
-        )

@@ -1,4 +1,4 @@
-"""What an agent observes where its run scaled the variables of its environment."""
+"""How a run scaled the variables of its environment."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["Scaling", "neighbours"]
 
 
 def neighbours(n_variables: int, n_redundant: int) -> Iterator[tuple[int, int]]:
-    """Give the variables whose means are redundant ones.
+    """Yield the pairs of variables whose means are redundant ones.
 
     >>> list(neighbours(3, 4))
     [(0, 1), (1, 2), (2, 0), (0, 1)]
@@ -26,20 +26,11 @@ def neighbours(n_variables: int, n_redundant: int) -> Iterator[tuple[int, int]]:
 
 @dataclass(frozen=True, kw_only=True)
 class Scaling:
-    """What a run with noise or redundant variables makes of what its environment gives.
+    """How a run with noise or redundant variables scales the observations of its environment.
 
-    Parameters
-    ----------
-    ranges
-        Lowest and highest value of each variable, which become 0 and 1.
-    n_redundant
-        How many means of neighbours follow them: of variables 0 and 1, of 1 and 2, ..., of the last
-        and 0, and so on in a circle.
-
-    Raises
-    ------
-    ValueError
-        For ranges that are not finite, low < high, and numbers out of range.
+    ``ranges`` of the variables become [0, 1]; then follow ``n_redundant`` means of neighbours: of
+    variables 0 and 1, of 1 and 2, ..., of the last and 0, and so on in a circle. ValueError for
+    ranges that are not finite, low < high, and numbers out of range.
 
     Examples
     --------
@@ -68,14 +59,14 @@ class Scaling:
         return low, high
 
     def words(self) -> str:
-        """Say it in a line."""
+        """Return it as a line of text."""
         most = 8
         ranges = [f"{i} from {low:.6g} to {high:.6g}" for i, (low, high) in enumerate(self.ranges)]
         words = ", ".join(ranges[:most]) + (", ..." if len(ranges) > most else "")
         return words + (f", and means of neighbours ({self.n_redundant})" * (self.n_redundant > 0))
 
     def lines(self) -> Iterator[str]:
-        """Say of each observed number what it is."""
+        """Yield a line about each observed number."""
         n_variables = len(self.ranges)
         for i, (low, high) in enumerate(self.ranges):
             yield f"observation[{i}]: variable {i}, from {low!r} to {high!r}"
@@ -84,12 +75,12 @@ class Scaling:
             yield f"observation[{n_variables + i}]: the mean of {means}"
 
     def values(self) -> dict[str, Any]:
-        """Give it as JSON has it."""
+        """Return it as data that JSON can hold."""
         return {"ranges": [list(pair) for pair in self.ranges], "redundant": self.n_redundant}
 
     @classmethod
     def of_values(cls, values: Mapping[str, Any], n_variables: int) -> Scaling:
-        """Make it of what `values` gave; ValueError if it does not fit so many numbers."""
+        """Make it from `values`; ValueError if it does not fit so many numbers."""
         scaling = cls(ranges=values["ranges"], n_redundant=values["redundant"])
         n = len(scaling.ranges) + scaling.n_redundant
         if n != n_variables:
