@@ -15,8 +15,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from sdnn.files import write_whole
 from sdnn.runs.store import STORE_NAME, ResultStore
-from sdnn.whole_files import write_whole
 
 DOCS = Path(__file__).parents[1] / "docs"
 PACKED = "benchmarks.sqlite.xz"

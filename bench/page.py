@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from sdnn.files import write_whole
 from sdnn.runs.report import Table
 from sdnn.runs.results import Estimate
-from sdnn.whole_files import write_whole
 
 PAGE = "benchmarks.md"
 END = "<!-- end of table -->"

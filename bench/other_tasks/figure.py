@@ -9,8 +9,8 @@ from agents import CONTENDERS
 from report import Trials
 from tasks import TASKS
 
+from sdnn.files import write_whole
 from sdnn.runs.figures import figure_bytes, require_matplotlib
-from sdnn.whole_files import write_whole
 
 
 def draw(trials: Trials, path: Path) -> None:

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
+from sdnn.files import write_whole
 from sdnn.reproduction.studies import read_study
 from sdnn.runs.figures import figure_bytes, require_matplotlib
 from sdnn.runs.registry import title_of
 from sdnn.runs.results import SHARE_STABLE, final_share_solved
 from sdnn.runs.store import ResultStore
 from sdnn.runs.study import Study
-from sdnn.whole_files import write_whole
 
 STUDY = Path(__file__).with_name("noise-surface.toml")
 

@@ -20,12 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
+from sdnn.files import write_whole
 from sdnn.reproduction.cases import EXPERIMENTS
 from sdnn.reproduction.reproduce import case_spec
 from sdnn.runs.engine import trial_seed
 from sdnn.runs.results import MeasureConfig, episode_of_collapse
 from sdnn.runs.spec import RunSpec
-from sdnn.whole_files import write_whole
 
 CASE = next(case for case in EXPERIMENTS[1].cases if case.id == "s4-noise")
 N_TRIALS = 10

@@ -22,8 +22,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sdnn._core import __version__
-from sdnn.instruction_sets import instruction_set, set_instruction_set
 from sdnn.lazy import attach
+from sdnn.machine import instruction_set, set_instruction_set
 
 if TYPE_CHECKING:
     from sdnn import (

@@ -1,20 +1,23 @@
-"""The machine: as much about it as the operating system tells."""
+"""The machine, and the vector instructions that the core uses on it.
+
+The core picks the best level that the processor offers when it is first used. The environment
+variable ``SDNN_INSTRUCTION_SET`` (``portable``, ``neon``, ``avx2`` or ``avx512``) or
+`set_instruction_set` choose another one, for the whole process. Results have the same bits on all
+levels; only the time differs.
+"""
 
 from __future__ import annotations
 
 import os
-import platform
-from importlib import metadata
 from pathlib import Path
 
 from sdnn import _core
-from sdnn.instruction_sets import available_instruction_sets, instruction_set
 
 _PROCESSOR_FILE = Path("/proc/cpuinfo")
 
 
 def processor() -> str:
-    """Name of the processor, or "unknown"."""
+    """Return the name of the processor, or "unknown"."""
     try:
         for line in _PROCESSOR_FILE.read_text().splitlines():
             name, _, value = line.partition(":")
@@ -22,6 +25,8 @@ def processor() -> str:
                 return value.strip()
     except OSError:
         pass
+    import platform
+
     return platform.processor() or "unknown"
 
 
@@ -33,12 +38,14 @@ def n_cores() -> int:
 
 
 def description() -> str:
-    """Name the processor and the instruction set in use, as results of times are labelled."""
+    """Return processor and instruction set in use, the label of measured times."""
     return f"{processor()}, {instruction_set()}"
 
 
 def build() -> dict[str, str]:
-    """Tell what a report about a problem needs: versions, compiler, platform, instruction sets."""
+    """Return what a bug report needs: versions, compiler, platform, instruction sets."""
+    import platform
+
     names = ("numpy", "gymnasium", "scikit-learn", "safetensors")
     available = ", ".join(available_instruction_sets())
     return {
@@ -53,7 +60,50 @@ def build() -> dict[str, str]:
 
 
 def _version_of(package: str) -> str:
+    from importlib import metadata
+
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
         return "missing"
+
+
+def instruction_set() -> str:
+    """Return the level in use.
+
+    Raises
+    ------
+    ValueError
+        If the environment variable names a level that does not exist, or not on this processor.
+    """
+    return _core.instruction_set()
+
+
+def available_instruction_sets() -> tuple[str, ...]:
+    """Return the levels that can be chosen here, the best one last.
+
+    Examples
+    --------
+    >>> available_instruction_sets()[0]
+    'portable'
+    """
+    return tuple(_core.available_instruction_sets())
+
+
+def set_instruction_set(name: str) -> None:
+    """Force a level of `available_instruction_sets`, for the whole process.
+
+    Raises
+    ------
+    ValueError
+        If there is no such level, or this processor does not offer it.
+
+    Examples
+    --------
+    >>> before = instruction_set()
+    >>> set_instruction_set("portable")
+    >>> instruction_set()
+    'portable'
+    >>> set_instruction_set(before)
+    """
+    _core.set_instruction_set(name)

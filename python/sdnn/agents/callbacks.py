@@ -11,8 +11,8 @@ from statistics import median
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from sdnn.arguments import path_of, real, whole
+from sdnn.files import write_whole
 from sdnn.progress import ProgressBars
-from sdnn.whole_files import write_whole
 
 if TYPE_CHECKING:
     from rich.console import Console

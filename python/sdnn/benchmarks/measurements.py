@@ -25,12 +25,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.instruction_sets import (
+from sdnn.machine import (
     available_instruction_sets,
     instruction_set,
+    n_cores,
+    processor,
     set_instruction_set,
 )
-from sdnn.machine import n_cores, processor
 
 Nanoseconds: TypeAlias = NDArray[np.int64]
 Run: TypeAlias = Callable[[int], Nanoseconds]

@@ -40,8 +40,8 @@ def export(
     """
     from sdnn.agents import load_agent
     from sdnn.export import c_header
+    from sdnn.files import write_whole
     from sdnn.runs import Run
-    from sdnn.whole_files import write_whole
 
     with run_command(words_of_run(source)):
         try:

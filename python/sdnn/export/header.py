@@ -29,7 +29,7 @@ from sdnn.export.tables import (
     table_lines,
     wrapped,
 )
-from sdnn.whole_files import write_whole
+from sdnn.files import write_whole
 
 __all__ = ["CHeader", "c_header", "export_c_header"]
 

@@ -15,9 +15,9 @@ from importlib.resources import files
 
 import numpy as np
 
+from sdnn.files import csv_bytes
 from sdnn.reproduction.cases import PAPER_EPISODES
 from sdnn.runs.results import STEP_MEASURES, CaseResult, TrialMeasures
-from sdnn.whole_files import csv_bytes
 
 FILE_NAME = "reference-results.csv"
 HEADER = ("case", "agent", "config_hash", "root_seed", "trial", "rows_digest", *STEP_MEASURES)

@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 from sdnn.config import SensorConfig
+from sdnn.files import csv_bytes, remove_abandoned_files, write_whole
 from sdnn.reproduction import cost
 from sdnn.reproduction.cases import (
     EXPERIMENTS,
@@ -32,7 +33,6 @@ from sdnn.runs.results import CaseResult, measure
 from sdnn.runs.spec import PAPER_INTERVAL, AgentSpec, BudgetSpec, RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.trial import ROW_HEADER, TrialKey, TrialRecord, records_digest, trial_rows
-from sdnn.whole_files import csv_bytes, remove_abandoned_files, write_whole
 
 QUICK_TRIALS = 2
 QUICK_EPISODES = 300

@@ -13,11 +13,11 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.files import csv_bytes, write_whole
 from sdnn.interrupts import stay_interrupts
 from sdnn.runs.errors import RunError
 from sdnn.runs.figures import draw_curves
 from sdnn.runs.run import Run
-from sdnn.whole_files import csv_bytes, write_whole
 
 __all__ = ["SUFFIXES", "Curve", "Group", "curves_of", "groups_of", "write_curves"]
 

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from sdnn.agents import Agent, UnusableStepError
 from sdnn.agents.evaluation import greedy_episode
+from sdnn.files import whole_file, write_whole
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
 from sdnn.runs.spec import RunSpec
-from sdnn.whole_files import whole_file, write_whole
 
 __all__ = ["SUFFIXES", "Recording", "record"]
 

@@ -34,6 +34,7 @@ from sdnn.agents import (
 from sdnn.agents.callbacks import Row
 from sdnn.agents.spaces import require_same_kind
 from sdnn.arguments import whole
+from sdnn.files import lock, remove_abandoned_files, write_whole
 from sdnn.interrupts import Interrupts
 from sdnn.runs.config_file import ConfigFile
 from sdnn.runs.engine import PlannedTrial, SerialExecutor, run_trials
@@ -50,7 +51,6 @@ from sdnn.runs.trial import (
     reset_options,
     training_of,
 )
-from sdnn.whole_files import lock, remove_abandoned_files, write_whole
 
 if TYPE_CHECKING:
     from typing_extensions import Self

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 
 from sdnn import _core
+from sdnn.files import csv_pieces, gzip_pieces, remove_abandoned_files, write_whole
 from sdnn.runs.comparison import Addition, Comparison, compare, study_json, study_page
 from sdnn.runs.engine import Executor, Observer, PlannedTrial, run_trials
 from sdnn.runs.figures import draw_study, figure_bytes, require_matplotlib
@@ -16,7 +17,6 @@ from sdnn.runs.report import Finished, describe_call, json_bytes, require_jinja
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study import Study
 from sdnn.runs.trial import ROW_HEADER, records_digest, trial_rows
-from sdnn.whole_files import csv_pieces, gzip_pieces, remove_abandoned_files, write_whole
 
 
 @dataclass(frozen=True, kw_only=True)

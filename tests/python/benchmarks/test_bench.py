@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from sdnn import _core
 from sdnn.benchmarks import BenchmarkError, measurements, report, run_benchmarks
 from sdnn.cli import main
-from sdnn.instruction_sets import available_instruction_sets, instruction_set
+from sdnn.machine import available_instruction_sets, instruction_set
 
 ROOT = Path(__file__).parents[3]
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import sdnn
-from sdnn import _core, instruction_sets
-from sdnn.instruction_sets import (
+from sdnn import _core, machine
+from sdnn.machine import (
     available_instruction_sets,
     instruction_set,
     set_instruction_set,
@@ -107,7 +107,7 @@ def test_the_environment_variable_chooses(value, said):
 
 
 def test_examples():
-    assert doctest.testmod(instruction_sets).failed == 0
+    assert doctest.testmod(machine).failed == 0
 
 
 def test_an_unusable_level_in_the_environment_is_an_error_not_an_abort():

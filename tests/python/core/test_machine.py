@@ -1,6 +1,7 @@
 import os
+import platform
 
-from sdnn import instruction_sets, machine
+from sdnn import machine
 
 
 def test_the_processor_has_the_name_that_the_system_gives(tmp_path, monkeypatch):
@@ -8,12 +9,12 @@ def test_the_processor_has_the_name_that_the_system_gives(tmp_path, monkeypatch)
     monkeypatch.setattr(machine, "_PROCESSOR_FILE", told)
     told.write_text("processor : 0\nmodel name\t: Fast One @ 1 GHz\nmodel name\t: Other\n")
     assert machine.processor() == "Fast One @ 1 GHz"
-    assert machine.description() == f"Fast One @ 1 GHz, {instruction_sets.instruction_set()}"
+    assert machine.description() == f"Fast One @ 1 GHz, {machine.instruction_set()}"
 
 
 def test_a_system_that_tells_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(machine, "_PROCESSOR_FILE", tmp_path / "none")
-    monkeypatch.setattr(machine.platform, "processor", lambda: "")
+    monkeypatch.setattr(platform, "processor", lambda: "")
     assert machine.processor() == "unknown"
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from sdnn import whole_files
-from sdnn.whole_files import (
+from sdnn import files
+from sdnn.files import (
     PARTIAL_SUFFIX,
     csv_bytes,
     csv_pieces,
@@ -21,7 +21,7 @@ from sdnn.whole_files import (
 WRITE_SLOWLY = """
 import sys, time
 from pathlib import Path
-from sdnn.whole_files import whole_file
+from sdnn.files import whole_file
 
 with whole_file(Path(sys.argv[1])) as file:
     file.write(b"half")
@@ -74,7 +74,7 @@ def test_only_what_a_killed_process_left_is_removed(tmp_path):
 
 @pytest.mark.parametrize(("seconds", "stays"), [(0, True), (3600, False)])
 def test_where_files_cannot_be_locked_their_age_counts(tmp_path, monkeypatch, seconds, stays):
-    monkeypatch.setattr(whole_files, "fcntl", None)
+    monkeypatch.setattr(files, "fcntl", None)
     left = tmp_path / f"rows.csv.0123456789abcdef{PARTIAL_SUFFIX}"
     mine = [tmp_path / "mine.txt", tmp_path / f"mine{PARTIAL_SUFFIX}"]
     for path in (left, *mine):
@@ -96,7 +96,7 @@ def test_a_file_removed_before_it_was_locked_is_made_again(tmp_path, monkeypatch
         locks.append(descriptor)
         return True
 
-    monkeypatch.setattr(whole_files, "lock", removed_first)
+    monkeypatch.setattr(files, "lock", removed_first)
     write_whole(tmp_path / "rows.csv", b"whole")
     assert len(locks) == 2
     assert [path.name for path in tmp_path.iterdir()] == ["rows.csv"]
