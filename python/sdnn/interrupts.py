@@ -1,4 +1,4 @@
-"""Ctrl-C that waits for the end of a step, and Ctrl-C that others' code takes for another error."""
+"""Ctrl-C that waits for the end of a step, and Ctrl-C that extensions turn into other errors."""
 
 from __future__ import annotations
 
@@ -16,21 +16,10 @@ __all__ = ["Interrupts", "stay_interrupts"]
 
 
 class Interrupts:
-    """While it is entered, a first signal only asks to stop; a second one does what it always did.
+    """A context in which a first signal calls ``ask_to_stop``; a second one acts as usual.
 
     Signals that somebody else handles, and threads other than the main one, are left alone.
-
-    Parameters
-    ----------
-    ask_to_stop
-        Called by the first signal.
-    signals
-        Which; by default SIGINT, what Ctrl-C sends.
-
-    Attributes
-    ----------
-    received : int or None
-        The signal that came.
+    ``received`` is the signal that came, if any.
     """
 
     def __init__(
@@ -61,15 +50,10 @@ class Interrupts:
 
 @contextmanager
 def stay_interrupts() -> Iterator[None]:
-    """Let a Ctrl-C leave the block as what it is, whatever the code in it makes of it.
+    """Let a Ctrl-C leave the block as KeyboardInterrupt, whatever the code in it makes of it.
 
     Extensions replace the exceptions of the Python code that they call, or forget them: matplotlib
     answers a Ctrl-C with "Invalid affine transformation matrix".
-
-    Raises
-    ------
-    KeyboardInterrupt
-        If Ctrl-C was pressed and the block did not let its exception through.
     """
     usual = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(usual):

@@ -20,11 +20,6 @@ class ProgressBars:
     """Shows a bar for each task on a terminal, and nothing elsewhere; a context manager.
 
     It is an observer of the engine (`sdnn.runs.engine.Observer`), too.
-
-    Parameters
-    ----------
-    console
-        Where to draw.
     """
 
     def __init__(self, console: Console) -> None:
@@ -63,12 +58,12 @@ class ProgressBars:
         self._tasks[key] = self._progress.add_task(title, total=total, news="")
 
     def update(self, key: Hashable, done: int, **fields: Any) -> None:
-        """Move a bar; ``description`` is another title, ``news`` what is written behind it."""
+        """Move a bar; ``description`` is another title, ``news`` the text behind it."""
         if key in self._tasks:
             self._progress.update(self._tasks[key], completed=done, **fields)
 
     def remove(self, key: Hashable) -> None:
-        """Take a bar away."""
+        """Remove a bar."""
         self._progress.remove_task(self._tasks.pop(key))
 
     # As an observer: a bar for each trial, one for all, one for costs.
@@ -89,7 +84,7 @@ class ProgressBars:
         self.update("all", sum(self._done.values()))
 
     def lost(self, planned: Any) -> None:
-        """Take a trial's bar away, and its episodes off the whole one."""
+        """Remove a trial's bar, and its episodes from the whole one."""
         self.advanced(planned, 0)
         self.remove(planned.key)
 

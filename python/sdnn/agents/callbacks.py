@@ -1,4 +1,4 @@
-"""What happens beside learning: rows to files, checkpoints, early stops."""
+"""Callbacks of a training: rows to files, checkpoints, early stops, schedules, progress."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ several environments ``environment``) or an evaluation (``kind``, ``step``, ``ep
 
 
 class Callback:
-    """Is told what happens in a training; every method does nothing unless overridden.
+    """The base of callbacks: every method does nothing unless overridden.
 
     A callback stops the training by ``training.stop()``.
     """
@@ -60,15 +60,7 @@ class Callback:
 
 
 class JSONLines(Callback):
-    """Writes each row as a line of JSON.
-
-    A training that goes on from a checkpoint first takes back the lines written after it.
-
-    Parameters
-    ----------
-    path
-        The file; a new training begins it anew.
-    """
+    """Writes each row as a line of JSON in a file; a resumed training removes later lines first."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = path_of("path", path)
@@ -91,19 +83,9 @@ class JSONLines(Callback):
 
 
 class CheckpointCallback(Callback):
-    """Saves the training, agent and all, from where `Training.load` goes on exactly.
+    """Saves agent and training every so many steps, from where `Training.load` resumes exactly.
 
-    Parameters
-    ----------
-    path
-        The file; each checkpoint takes the place of the one before, as a whole.
-    every
-        Steps between two.
-
-    Attributes
-    ----------
-    n_saved : int or None
-        Steps that the training had learned when it was saved last; None: not yet.
+    ``n_saved`` is the number of steps when it was saved last; None: not yet.
     """
 
     def __init__(self, path: str | Path, every: int = 10_000) -> None:
@@ -127,15 +109,7 @@ class CheckpointCallback(Callback):
 
 
 class StopTrainingOnRewardThreshold(Callback):
-    """Stops when evaluations are good enough.
-
-    Parameters
-    ----------
-    mean_return
-        At which mean return of an evaluation.
-    patience
-        How many evaluations in a row have to reach it.
-    """
+    """Stops when so many evaluations in a row (``patience``) reach a mean return."""
 
     def __init__(self, mean_return: float, patience: int = 1) -> None:
         self.mean_return = real("mean_return", mean_return)
@@ -144,7 +118,7 @@ class StopTrainingOnRewardThreshold(Callback):
         self.patience = whole("patience", patience, 1, 2**53)
 
     def on_row(self, training: Training, row: Row) -> None:
-        """Look at an evaluation, and at those before it."""
+        """Check an evaluation and those before it."""
         if row["kind"] == "evaluation" and self.is_reached(training):
             training.stop()
 
@@ -155,11 +129,10 @@ class StopTrainingOnRewardThreshold(Callback):
 
 
 class Schedule(Callback):
-    """Lets alpha and epsilon follow functions of the progress.
+    """Sets learning rate and epsilon to functions of the progress, before every step.
 
-    After every step, and before the first, they are set to what the functions give. That overrides
-    ``final_learning_rate`` and ``final_epsilon``; an agent keeps the last values when it is saved.
-    A training that is loaded must be given its schedule again.
+    That overrides ``final_learning_rate`` and ``final_epsilon``; a saved agent keeps the last
+    values. A training that is loaded must be given its schedule again.
 
     Parameters
     ----------
@@ -169,10 +142,8 @@ class Schedule(Callback):
 
     Raises
     ------
-    TypeError
-        If something else is given, or the agent has no such rate.
-    ValueError
-        If a function gives another value.
+    TypeError, ValueError
+        For something else, an agent without such a rate, or a function with another value.
 
     Examples
     --------
@@ -213,15 +184,7 @@ class Schedule(Callback):
 
 
 class ProgressBarCallback(Callback):
-    """Shows the bar of one training, with its last returns and evaluation.
-
-    Parameters
-    ----------
-    console
-        Where to draw.
-    title
-        What is learned.
-    """
+    """Shows the bar of one training, with its last returns and evaluation."""
 
     def __init__(self, console: Console, title: str) -> None:
         self._bars = ProgressBars(console)
@@ -244,24 +207,18 @@ class ProgressBarCallback(Callback):
             self._returns.append(row["return"])
 
     def on_step(self, training: Training) -> None:
-        """Move the bar now and then."""
+        """Move the bar every few steps."""
         if training.n_steps % _STEPS_BETWEEN == 0:
             news = f"return {median(self._returns):.4g}" if self._returns else ""
             self._bars.update(self, _done(training), news=news + self._evaluation)
 
     def on_end(self, training: Training) -> None:
-        """Take the bar away."""
+        """Remove the bar."""
         self._bars.__exit__()
 
 
 class TensorBoard(Callback):
-    """Writes the numbers of each row for TensorBoard; needs ``tensorboardX`` or ``torch``.
-
-    Parameters
-    ----------
-    folder
-        For the event files.
-    """
+    """Writes the numbers of each row for TensorBoard; needs ``tensorboardX`` or ``torch``."""
 
     def __init__(self, folder: str | Path) -> None:
         self.folder = path_of("folder", folder)

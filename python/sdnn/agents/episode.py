@@ -340,7 +340,7 @@ class Episodes:
     def saved(
         self, shape: tuple[int, ...], flat: Callable[[Any], NDArray[np.float64]]
     ) -> list[SavedEpisode | None]:
-        """Describe the present episodes; ``shape`` is an action's, ``flat`` makes vectors."""
+        """Return the present episodes for a file; ``shape`` is an action's, ``flat`` flattens."""
         return [
             None
             if episode is None
@@ -359,12 +359,8 @@ class Episodes:
     ) -> None:
         """Bring every environment to where its episode was saved.
 
-        Raises
-        ------
-        UnrepeatedEpisodeError
-            If an environment does not repeat its episode.
-        ValueError
-            If the environments are others, or cannot be reset one by one with seeds.
+        UnrepeatedEpisodeError if an environment does not repeat its episode; ValueError if the
+        environments are others, or cannot be reset one by one with seeds.
         """
         self._require_repeatable(len(saved))
         for i, one in enumerate(saved):
@@ -406,7 +402,7 @@ class Episodes:
     def _replay(self, waiting: Iterable[int]) -> None:
         """Take the actions of all present episodes again, so that all end at the same time.
 
-        Until its own episode begins, an environment does anything.
+        Until its own episode begins, an environment takes any actions.
         """
         present = {i: episode for i, episode in enumerate(self.present) if episode is not None}
         taken = {i: episode.actions.array() for i, episode in present.items()}

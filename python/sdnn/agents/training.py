@@ -233,11 +233,10 @@ class Training:
         Raises
         ------
         KeyboardInterrupt
-            After the end of the step in which it came and the callbacks' ``on_end``; a second one
-            at once.
+            After the step in which it came and the callbacks' ``on_end``; a second one at once.
         UnusableStepError
-            If an observation or a reward cannot be learned, such as NaN or one with which a weight
-            would leave its range: a `ValueError` that names step and episode.
+            If an observation or a reward cannot be learned: a `ValueError` that names step and
+            episode.
         RuntimeError
             If an error of a callback left a step of this training half done before.
         """
@@ -315,19 +314,9 @@ class Training:
     ) -> Self:
         """Read a training that `save` wrote, to resume exactly where it was.
 
-        Parameters
-        ----------
-        path
-            The file.
-        env, evaluation_env
-            As the training had them.
-        callbacks, reset_options
-            As in the constructor.
-        steps, episodes
-            Another goal.
-        repeat_episodes
-            False: begin new episodes, in any number of environments. For robots, which should not
-            repeat what they did, and where equal seeds and actions do not give equal episodes.
+        ``steps`` or ``episodes`` are another goal. Without ``repeat_episodes`` new episodes begin,
+        in any number of environments: for robots, which should not repeat what they did, and where
+        equal seeds and actions do not give equal episodes. The rest is as in the constructor.
 
         Raises
         ------

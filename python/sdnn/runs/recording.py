@@ -35,25 +35,9 @@ _FASTEST_GIF = 50
 
 
 class Recording:
-    """A greedy episode, frame by frame.
+    """A greedy episode, frame by frame, of at most ``max_steps``.
 
-    Parameters
-    ----------
-    agent
-        What acts.
-    env
-        With the render mode ``"rgb_array"`` or ``"rgb_array_list"``.
-    seed
-        Root of the episodes' seeds.
-    max_steps
-        Ends the picture before the episode's end.
-
-    Attributes
-    ----------
-    n_frames
-        So far: with ``"rgb_array"`` one more than steps.
-    total_reward
-        So far.
+    ``n_frames`` and ``total_reward`` are those so far.
     """
 
     def __init__(
@@ -69,14 +53,10 @@ class Recording:
         return self._agent.is_warming_up
 
     def frames(self) -> Iterator[NDArray[np.uint8]]:
-        """Run the episode; give the frames, shape (height, width, 3).
+        """Run the episode and yield the frames, shape (height, width, 3).
 
-        Raises
-        ------
-        RunError
-            If the environment gives something else than pictures.
-        UnusableStepError
-            See `sdnn.agents.evaluate`.
+        RunError if the environment gives something else than pictures; `UnusableStepError` as of
+        `sdnn.agents.evaluate`.
         """
         for now in greedy_episode(self._agent, self._env, self._seed, 0):
             self.total_reward = now.total_reward
@@ -104,27 +84,16 @@ class Recording:
 def record(
     run: Run, path: Path, *, seed: int | None = None, max_steps: int | None = None
 ) -> Recording:
-    """Record a greedy episode of a run's agent as it is now.
+    """Record a greedy episode of a run's agent: the first of `Run.evaluate` with the same seed.
 
-    With what environments show between steps, where they have the render mode
-    ``"rgb_array_list"`` themselves.
-
-    Parameters
-    ----------
-    run
-        The run.
-    path
-        The file, whose end says what it becomes.
-    seed
-        As of `Run.evaluate`, whose first episode this is.
-    max_steps
-        Steps at most.
+    It shows what environments draw between steps, where they have the render mode
+    ``"rgb_array_list"`` themselves. The file's suffix chooses the format.
 
     Raises
     ------
     RunError
-        If the name has another end, a package is missing, the environment cannot be rendered,
-        differs or gives what cannot be evaluated, or there is no agent yet.
+        If the suffix is another, a package is missing, the environment cannot be rendered, differs
+        or gives what cannot be evaluated, or there is no agent yet.
     OSError
         If the file cannot be written.
     """
