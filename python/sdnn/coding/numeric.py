@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import warnings
@@ -63,20 +64,16 @@ def quantile_knots(column: NDArray[np.float64]) -> Knots:
 
 def checked_knots(knots: Any, low: float, high: float) -> Knots:
     """Return given knots, which must rise from (low, 0) to (high, 1)."""
-    ends: tuple[float, ...] = ()
-    is_rising = False
-    try:
+    last = 1.0 if low < high else 0.0
+    with contextlib.suppress(IndexError, TypeError, ValueError):
         values, levels = np.array(knots, dtype=np.float64).T
-        ends = (values[0], levels[0], values[-1], levels[-1])
-        is_rising = bool(np.all(values[1:] > values[:-1]) and np.all(levels[1:] > levels[:-1]))
-    except (IndexError, TypeError, ValueError):
-        pass
-    if not is_rising or ends != (low, 0.0, high, 1.0 if low < high else 0.0):
-        raise ValueError(
-            f"knots must be (value, position) in rising order from ({low}, 0) to ({high}, 1), "
-            f"got {knots!r}"
-        )
-    return tuple(zip(values.tolist(), levels.tolist(), strict=True))
+        is_rising = np.all(values[1:] > values[:-1]) and np.all(levels[1:] > levels[:-1])
+        if is_rising and (values[0], levels[0], values[-1], levels[-1]) == (low, 0.0, high, last):
+            return tuple(zip(values.tolist(), levels.tolist(), strict=True))
+    raise ValueError(
+        f"knots must be (value, position) in rising order from ({low}, 0) to ({high}, 1), "
+        f"got {knots!r}"
+    )
 
 
 class Ranged(Coding):

@@ -17,6 +17,7 @@ from sdnn.config import SensorConfig
 __all__ = ["AcrobotSensors", "NoisySensors", "RedundantSensors", "UnitSensors"]
 
 Observation = NDArray[Any]
+Env = gym.Env[Observation, Any]
 SensorFunction = Callable[[Observation], float]
 Edge = Literal["wrap", "saturate"]
 NoiseStream = Literal["sensor_noise", "evaluation_sensor_noise"]
@@ -32,7 +33,7 @@ class _Sensors(
 ):
     """Wrapper of an environment whose observations are a one-dimensional ``Box``."""
 
-    def __init__(self, env: gym.Env[Observation, Any], **arguments: Any) -> None:
+    def __init__(self, env: Env, **arguments: Any) -> None:
         gym.utils.RecordConstructorArgs.__init__(self, **arguments)
         super().__init__(env)
         space = env.observation_space
@@ -62,7 +63,7 @@ class UnitSensors(_Sensors):
 
     def __init__(
         self,
-        env: gym.Env[Observation, Any],
+        env: Env,
         observation_low: ArrayLike | None = None,
         observation_high: ArrayLike | None = None,
     ) -> None:
@@ -105,7 +106,7 @@ class RedundantSensors(_Sensors):
 
     def __init__(
         self,
-        env: gym.Env[Observation, Any],
+        env: Env,
         functions: Sequence[str | SensorFunction] = ("energy", "height"),
         bounds: Sequence[tuple[float, float]] | None = None,
     ) -> None:
@@ -134,16 +135,12 @@ class RedundantSensors(_Sensors):
 class _RandomSensors(_Sensors):
     """Sensors with a random stream of their own, which ``_restart(seed)`` starts."""
 
-    def __init__(
-        self, env: gym.Env[Observation, Any], *, seed: int, stream: str, **arguments: Any
-    ) -> None:
+    def __init__(self, env: Env, *, seed: int, stream: str, **arguments: Any) -> None:
         super().__init__(env, seed=seed, stream=stream, **arguments)
         one_of("stream", stream, ("sensor_noise", "evaluation_sensor_noise"))
         self._stream = _core.Stream.__members__[stream]
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Observation, Any]:
         """Reset the environment; a ``seed`` also restarts the random stream."""
         if seed is not None:
             self._restart(seed)
@@ -183,7 +180,7 @@ class NoisySensors(_RandomSensors):
 
     def __init__(
         self,
-        env: gym.Env[Observation, Any],
+        env: Env,
         sigma: float = 0.02,
         edge: Edge | Sequence[Edge] | None = None,
         seed: int = 0,
@@ -193,7 +190,7 @@ class NoisySensors(_RandomSensors):
         (n_channels,) = self._space.shape
         if not (np.all(self._space.low >= 0.0) and np.all(self._space.high <= 1.0)):
             raise ValueError("the observation space must lie within [0, 1] in every channel")
-        words: list[str] = ["wrap" if i < 2 else "saturate" for i in range(n_channels)]
+        words = (["wrap"] * 2 + ["saturate"] * n_channels)[:n_channels]
         if edge is not None:
             words = [edge] * n_channels if isinstance(edge, str) else list(edge)
         if len(words) != n_channels:
@@ -234,11 +231,7 @@ class AcrobotSensors(_RandomSensors):
     """
 
     def __init__(
-        self,
-        env: gym.Env[Observation, Any],
-        config: SensorConfig,
-        seed: int = 0,
-        stream: NoiseStream = "sensor_noise",
+        self, env: Env, config: SensorConfig, seed: int = 0, stream: NoiseStream = "sensor_noise"
     ) -> None:
         super().__init__(env, config=config, seed=seed, stream=stream)
         self._config = config

@@ -7,7 +7,6 @@ import dataclasses
 import inspect
 import sys
 import warnings
-from collections.abc import Sequence
 from numbers import Integral, Real
 from typing import Any, ClassVar, TypeVar
 
@@ -19,7 +18,6 @@ from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval, StrOptions
 
 from sdnn import _core
-from sdnn.coding import Coding
 from sdnn.estimators.fitted import Fitted
 from sdnn.estimators.inputs import Array, CodedInputs, Floats, Ints, Pairs, input_pairs
 from sdnn.estimators.network import (
@@ -345,12 +343,7 @@ class BaseSDNN(Fitted, CodedInputs):
         return 1 + (2 if has_best else 1) * n_earlier  # the best ones beside the last ones
 
     def _require_memory(
-        self,
-        n_units: int,
-        n_networks: int,
-        n_pattern_units: int,
-        codings: Sequence[Coding],
-        pairs: Sequence[tuple[int, int]],
+        self, n_units: int, n_networks: int, n_pattern_units: int, codings: Any, pairs: Any
     ) -> None:
         """Raise ValueError if weights and patterns exceed the limit."""
         n_bytes = 4 * n_networks * n_units * len(pairs) * n_pattern_units

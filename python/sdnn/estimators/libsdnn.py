@@ -185,12 +185,12 @@ class LibsdnnParameters:
         """Return the code with LIBSDNN's own tables; needs a seed in the file."""
         if self.pattern_seed is None:
             raise ValueError("random_seed of PC must be a list of numbers, got hardware_entropy")
+        n_tables = 2 * len(self.pairs)
         for one in {self.inputs[index] for pair in self.pairs for index in pair}:
-            n_drawn = 2 * len(self.pairs) * one.n_bins * max(one.n_flipped, self.n_units // 64)
-            if n_drawn > MOST_DRAWN:
+            if n_tables * one.n_bins * max(one.n_flipped, self.n_units // 64) > MOST_DRAWN:
                 raise ValueError(
                     f"q of RANDOM_INVERSE is too large: {one.n_bins} patterns of {self.n_units} "
-                    f"units, {one.n_flipped} flipped, in {2 * len(self.pairs)} tables"
+                    f"units, {one.n_flipped} flipped, in {n_tables} tables"
                 )
         sizes = [(one.n_bins, one.n_flipped) for one in self.inputs]
         pairs = np.array(self.pairs, dtype=np.int32)
@@ -239,18 +239,15 @@ class LibsdnnModel:
         bins = given.bins(inputs)
         if given.task == "regression":
             counts = self.layer.counts(bins, n_threads=n_threads)[:, 0]
-            outputs: npt.NDArray[Any] = given.step_size * counts + given.output_range[0]
-            return outputs
+            return np.asarray(given.step_size * counts + given.output_range[0])
         potentials = self.layer.potentials(bins, n_threads=n_threads)
         if given.scheme == "one_vs_rest":  # class 0 if no unit fires
-            classes: npt.NDArray[Any] = np.maximum(potentials, 0).argmax(axis=1)
-            return classes
+            return np.asarray(np.maximum(potentials, 0).argmax(axis=1))
         votes = np.zeros((len(bins), given.n_classes), dtype=np.int64)
         for unit, (i, j) in enumerate(zip(*np.triu_indices(given.n_classes, 1), strict=True)):
             votes[:, i] += potentials[:, unit] > 0
             votes[:, j] += potentials[:, unit] <= 0
-        winners: npt.NDArray[Any] = votes.argmax(axis=1)
-        return winners
+        return np.asarray(votes.argmax(axis=1))
 
 
 def read_parameter_file(path: str | Path) -> LibsdnnParameters:
