@@ -228,7 +228,10 @@ CONTENDERS = {
     "sdnn-c-brief": _ours(", brief random actions", learning={"max_action_repeat": 1}),
     "sdnn-c-bounds": _ours(", bounds of the space", environment=_own_units, tasks=_LANDER),
     "sdnn-c-seen": _ours(
-        ", ranges seen", agent={"observation_range": "seen"}, environment=_own_units, tasks=_LANDER
+        ", adaptive ranges",
+        agent={"observation_range": "adaptive"},
+        environment=_own_units,
+        tasks=_LANDER,
     ),
     "sdnn-c-fewer-pairs": _ours(
         ", 24 pairs of inputs", approximator={"max_pairs": 24}, tasks=_LANDER

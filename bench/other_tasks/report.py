@@ -195,8 +195,8 @@ def tables(trials: Trials) -> dict[str, str]:
         "processor time", "of which until solved", "memory",
     )  # fmt: skip
     kept = (
-        "sensors", "rival", "task",
-        *(f"{what}, {m}" for m in MIDDLES for what in ("rival", "SDNN-C", "points more")),
+        "sensors", "baseline", "task",
+        *(f"{what}, {m}" for m in MIDDLES for what in ("baseline", "SDNN-C", "points more")),
     )  # fmt: skip
     return {
         "task by task": markdown(each, _task_rows(trials)),
