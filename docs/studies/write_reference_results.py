@@ -11,14 +11,33 @@ new hashes and leaves the measures as they are.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from pathlib import Path
 
+from sdnn.files import csv_bytes
 from sdnn.reproduction import case_spec, plan_trials
-from sdnn.reproduction.cases import PAPER_CASES
-from sdnn.reproduction.reference_results import FILE_NAME, reference_csv, reference_results
-from sdnn.runs import ResultStore, measure
+from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES
+from sdnn.reproduction.reference_results import FILE_NAME, HEADER, reference_results
+from sdnn.runs import CaseResult, ResultStore, measure
+from sdnn.runs.results import STEP_MEASURES
 
 FILE = Path(__file__).parents[2] / "python" / "sdnn" / "reproduction" / FILE_NAME
+
+
+def reference_csv(results: Iterable[CaseResult], root_seed: int) -> bytes:
+    """Make the content of the file; a ValueError if trials have another length than the paper's."""
+    rows = []
+    for result in results:
+        if result.last_episode != PAPER_EPISODES:
+            raise ValueError(
+                f"reference results have {PAPER_EPISODES} learning episodes, those of"
+                f" {result.agent} in {result.case_id} have {result.last_episode}"
+            )
+        names = (result.case_id, result.agent, result.config_hash, root_seed)
+        for number, record in enumerate(result.records):
+            measures = (f"{result.values[name][number]:g}" for name in STEP_MEASURES)
+            rows.append((*names, record.key.trial, record.rows.digest()[:16], *measures))
+    return csv_bytes(HEADER, rows)
 
 
 def rekey() -> None:

@@ -8,16 +8,14 @@ them again.
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
 import numpy as np
 
-from sdnn.files import csv_bytes
 from sdnn.reproduction.cases import PAPER_EPISODES
-from sdnn.runs.results import STEP_MEASURES, CaseResult, TrialMeasures
+from sdnn.runs.results import STEP_MEASURES, TrialMeasures
 
 FILE_NAME = "reference-results.csv"
 HEADER = ("case", "agent", "config_hash", "root_seed", "trial", "rows_digest", *STEP_MEASURES)
@@ -52,19 +50,3 @@ def reference_results() -> tuple[ReferenceResult, ...]:
         )
         for (case_id, agent, config_hash, root_seed), own in groups.items()
     )
-
-
-def reference_csv(results: Iterable[CaseResult], root_seed: int) -> bytes:
-    """Make the content of the file; a ValueError if trials have another length than the paper's."""
-    rows = []
-    for result in results:
-        if result.last_episode != PAPER_EPISODES:
-            raise ValueError(
-                f"reference results have {PAPER_EPISODES} learning episodes, those of"
-                f" {result.agent} in {result.case_id} have {result.last_episode}"
-            )
-        names = (result.case_id, result.agent, result.config_hash, root_seed)
-        for number, record in enumerate(result.records):
-            measures = (f"{result.values[name][number]:g}" for name in STEP_MEASURES)
-            rows.append((*names, record.key.trial, record.rows.digest()[:16], *measures))
-    return csv_bytes(HEADER, rows)

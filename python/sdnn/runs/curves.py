@@ -6,6 +6,7 @@ import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from io import BytesIO
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -221,8 +222,7 @@ def _curves_of_run(group: Group, run: Run, rows: Sequence[Any]) -> list[Curve]:
 def _steps_of_all(all_steps: Sequence[NDArray[np.int64]], is_grid: bool) -> NDArray[np.int64]:
     """Find steps at which all have numbers: shared ones, or a hundred within what all reached."""
     if is_grid:
-        shared = set.intersection(*(set(steps.tolist()) for steps in all_steps))
-        return np.array(sorted(shared), np.int64)
+        return reduce(np.intersect1d, all_steps)
     first = max(int(steps[0]) for steps in all_steps)
     last = min(int(steps[-1]) for steps in all_steps)
     steps = np.linspace(first, last, 100 if first <= last else 0)

@@ -93,18 +93,6 @@ def episodes_to_learn(
     return float(np.asarray(episode)[int(np.argmax(good))]) if good.any() else math.inf
 
 
-def early_steps(
-    episode: ArrayLike, steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES
-) -> float:
-    """Return the median steps of the tests after at most `early_episodes` learning episodes.
-
-    >>> early_steps([1000, 2000, 3000], [4, 6, 50])
-    5.0
-    """
-    early = np.asarray(episode) <= config.early_episodes
-    return float(np.median(np.asarray(steps, np.float64)[early]))
-
-
 def episode_of_collapse(
     episode: ArrayLike, steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES
 ) -> float:
@@ -133,15 +121,6 @@ def episode_of_collapse(
     return float(np.asarray(episode)[last + config.stable_window - 1])
 
 
-def final_steps(steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES) -> float:
-    """Return the median steps of the last `final_window` tests, or of all if there are fewer.
-
-    >>> final_steps(100 * [50] + 50 * [4])
-    4.0
-    """
-    return float(np.median(np.asarray(steps, np.float64)[-config.final_window :]))
-
-
 def final_share_solved(solved: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES) -> float:
     """Return the share solved of the last `final_window` tests, or of all if there are fewer.
 
@@ -149,25 +128,6 @@ def final_share_solved(solved: ArrayLike, config: MeasureConfig = DEFAULT_MEASUR
     0.75
     """
     return float(np.mean(np.asarray(solved, np.float64)[-config.final_window :]))
-
-
-def final_return(episode_return: ArrayLike) -> float:
-    """Return the mean return of the last tenth of the test episodes, at least of one.
-
-    >>> final_return(18 * [-20.0] + [8.0, 9.0])
-    8.5
-    """
-    returns = np.asarray(episode_return, np.float64)
-    return float(np.mean(returns[-max(1, returns.size // 10) :]))
-
-
-def mean_return(episode_return: ArrayLike) -> float:
-    """Return the mean return of all test episodes: the area under the learning curve, per episode.
-
-    >>> mean_return([-20.0, 8.0])
-    -6.0
-    """
-    return float(np.mean(np.asarray(episode_return, np.float64)))
 
 
 def _medians_of_windows(steps: ArrayLike, window: int) -> FloatArray:
@@ -178,40 +138,40 @@ def _medians_of_windows(steps: ArrayLike, window: int) -> FloatArray:
     return np.asarray(np.median(sliding_window_view(taken, window), axis=1))
 
 
-_GOOD = f"{DEFAULT_MEASURES.good_steps:g}"
+_DEFAULT = DEFAULT_MEASURES
+_GOOD = f"{_DEFAULT.good_steps:g}"
 
 MEASURES: dict[MeasureName, tuple[str, Callable[[TrialRows, MeasureConfig], float]]] = {
     "episodes_to_learn": (
         f"learning episodes before the first test of at most {_GOOD} steps that begins"
-        f" {DEFAULT_MEASURES.learned_window} tests in a row with a median of at most {_GOOD}",
+        f" {_DEFAULT.learned_window} tests in a row with a median of at most {_GOOD}",
         lambda rows, config: episodes_to_learn(rows.episode, rows.steps, config),
     ),
     "early_steps": (
-        "median steps of the tests in the first"
-        f" {DEFAULT_MEASURES.early_episodes:,} learning episodes",
-        lambda rows, config: early_steps(rows.episode, rows.steps, config),
+        f"median steps of the tests in the first {_DEFAULT.early_episodes:,} learning episodes",
+        lambda rows, c: float(np.median(rows.steps[rows.episode <= c.early_episodes])),
     ),
     "episode_of_collapse": (
-        f"learning episodes before the end of the last {DEFAULT_MEASURES.stable_window} tests in a"
-        f" row with a median of at most {_GOOD} steps: until then the agent can do the task;"
-        " censored (> the last episode) if it still can at the end",
+        f"learning episodes before the end of the last {_DEFAULT.stable_window} tests in a row with"
+        f" a median of at most {_GOOD} steps: until then the agent can do the task; censored (> the"
+        " last episode) if it still can at the end",
         lambda rows, config: episode_of_collapse(rows.episode, rows.steps, config),
     ),
     "final_steps": (
-        f"median steps of the last {DEFAULT_MEASURES.final_window} tests",
-        lambda rows, config: final_steps(rows.steps, config),
+        f"median steps of the last {_DEFAULT.final_window} tests",
+        lambda rows, config: float(np.median(rows.steps[-config.final_window :])),
     ),
     "final_share_solved": (
-        f"share of the last {DEFAULT_MEASURES.final_window} tests that reach the goal",
+        f"share of the last {_DEFAULT.final_window} tests that reach the goal",
         lambda rows, config: final_share_solved(rows.solved, config),
     ),
     "final_return": (
         "mean return of the last tenth of the tests",
-        lambda rows, _: final_return(rows.episode_return),
+        lambda rows, _: float(np.mean(rows.episode_return[-max(1, rows.episode.size // 10) :])),
     ),
     "mean_return": (
         "mean return of all tests: the area under the learning curve",
-        lambda rows, _: mean_return(rows.episode_return),
+        lambda rows, _: float(np.mean(rows.episode_return)),
     ),
 }
 """What each measure means, for a reader, and how it is taken from the rows of a trial."""

@@ -1,5 +1,7 @@
+import importlib.util
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -31,13 +33,17 @@ from sdnn.reproduction.claims import (
 from sdnn.reproduction.reference_results import (
     HEADER,
     ReferenceResult,
-    reference_csv,
     reference_results,
 )
 from sdnn.reproduction.report import Report
 from sdnn.reproduction.reproduce import reproduce
 from sdnn.runs import Estimate, ResultStore, measure, run_trials
 from sdnn.runs.results import STEP_MEASURES, TrialMeasures
+
+_SCRIPT = Path(__file__).parents[3] / "docs" / "studies" / "write_reference_results.py"
+_SPEC = importlib.util.spec_from_file_location("write_reference_results", _SCRIPT)
+script = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(script)
 
 CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
 
@@ -185,7 +191,7 @@ def fake_results(tmp_path, fake, run):
 
 
 def test_what_is_written_of_trials_is_read_again(monkeypatch, tmp_path, fake_results):
-    content = reference_csv(fake_results, 7)
+    content = script.reference_csv(fake_results, 7)
     (tmp_path / "kept.csv").write_bytes(content)
     assert tuple(content.decode().splitlines()[0].split(",")) == HEADER
     monkeypatch.setattr(reference_module, "files", lambda package: tmp_path)
@@ -203,7 +209,7 @@ def test_what_is_written_of_trials_is_read_again(monkeypatch, tmp_path, fake_res
 def test_short_trials_are_not_kept(fake_results):
     short = replace(fake_results[0], last_episode=300)
     with pytest.raises(ValueError, match="sdnn-c in s4"):
-        reference_csv([short], 7)
+        script.reference_csv([short], 7)
 
 
 def report_of(results, kept=()):

@@ -3,20 +3,27 @@ import math
 import numpy as np
 import pytest
 
+from sdnn.runs import TrialRows
 from sdnn.runs.results import (
+    DEFAULT_MEASURES,
+    MEASURES,
     MeasureConfig,
-    early_steps,
     episode_of_collapse,
     episodes_to_learn,
-    final_return,
     final_share_solved,
-    final_steps,
-    mean_return,
 )
 
 
 def episodes(steps):
     return 10 * np.arange(1, len(steps) + 1)
+
+
+def of_rows(name, steps, returns=None, config=DEFAULT_MEASURES):
+    """A measure of a trial that took so many steps in its tests, or gave these returns."""
+    steps = np.asarray(steps)
+    returns = np.zeros(steps.size) if returns is None else np.asarray(returns)
+    rows = TrialRows.of_tests(episodes(steps), steps, returns, steps < 50)
+    return MEASURES[name][1](rows, config)
 
 
 def learned(steps):
@@ -56,9 +63,9 @@ def test_window_cut_off_by_the_end_does_not_count():
 
 def test_final_measures_use_the_last_fifty_tests():
     steps = [3] * 100 + [50] * 24 + [4] * 26
-    assert final_steps(steps) == 4.0
+    assert of_rows("final_steps", steps) == 4.0
     assert final_share_solved([s < 50 for s in steps]) == 0.52
-    assert final_steps([8, 9]) == 8.5
+    assert of_rows("final_steps", [8, 9]) == 8.5
 
 
 def collapse(steps):
@@ -92,21 +99,25 @@ def test_too_few_tests_for_a_run_say_nothing():
 
 def test_early_steps_are_those_of_the_first_episodes():
     steps = [4] * 150 + [8] * 100 + [50] * 750
-    assert early_steps(episodes(steps), steps) == 4.0
-    assert early_steps(episodes(steps), steps, MeasureConfig(early_episodes=10_000)) == 50.0
+    assert of_rows("early_steps", steps) == 4.0
+    more = MeasureConfig(early_episodes=10_000)
+    assert of_rows("early_steps", steps, config=more) == 50.0
 
 
 @pytest.mark.parametrize("n_tests", [1, 9, 10, 49, 50, 137])
 def test_measures_take_trials_of_any_length(n_tests):
     steps = np.random.default_rng(n_tests).integers(1, 51, n_tests)
     assert episodes_to_learn(episodes(steps), steps) > 0
-    assert 1 <= final_steps(steps) <= 50
+    assert 1 <= of_rows("final_steps", steps) <= 50
     assert 0 <= final_share_solved(steps < 50) <= 1
 
 
 def test_returns_are_averaged_over_all_tests_or_the_last_tenth():
+    def mean_and_final(returns):
+        steps = np.full(len(returns), 50)
+        return [of_rows(name, steps, returns) for name in ("mean_return", "final_return")]
+
     returns = np.arange(40.0)
-    assert mean_return(returns) == 19.5
-    assert final_return(returns) == 37.5  # 36 to 39
-    assert final_return(returns[:19]) == 18.0
-    assert final_return([-3.0]) == mean_return([-3.0]) == -3.0
+    assert mean_and_final(returns) == [19.5, 37.5]  # 36 to 39
+    assert mean_and_final(returns[:19])[1] == 18.0
+    assert mean_and_final([-3.0]) == [-3.0, -3.0]
