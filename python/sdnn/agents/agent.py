@@ -391,11 +391,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     def load(cls, path: str | Path) -> Self:
         """Read an agent that `save` wrote.
 
-        Raises
-        ------
-        OSError, ValueError
-            If the file cannot be read; if it is damaged, of another format, or holds another kind
-            of agent.
+        OSError if the file cannot be read; ValueError if it is damaged, of another format, or holds
+        another kind of agent.
         """
         agent = load_agent(path)
         if not isinstance(agent, cls):

@@ -140,12 +140,9 @@ def greedy_episode(
     number: int,
     options: dict[str, Any] | None = None,
 ) -> Iterator[GreedyEpisode]:
-    """Run an episode of an evaluation: give how far it is after the reset and after every step.
+    """Run an episode of an evaluation; yield how far it is, first after the reset.
 
-    Raises
-    ------
-    UnusableStepError
-        See `evaluate`.
+    UnusableStepError as of `evaluate`.
     """
     own = None if seed is None else episode_seed(seed, EVALUATION, number)
     observation, _ = env.reset(seed=own, options=options)

@@ -431,8 +431,7 @@ class RunTask:
                 self._set_goal(training, *self._goal)
             self._began_at = training.n_steps
             stack.pop_all()
-        environments = [one for one in (env, evaluation_env) if one is not None]
-        self.trial = RunTrial(training, environments, target)
+        self.trial = RunTrial(training, (env, evaluation_env), target)
         self.trial.n_evaluated = lambda: self._store.rows(run.key).n_evaluated
         return self.trial
 

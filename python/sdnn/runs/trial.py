@@ -283,11 +283,11 @@ class TrainingTrial:
     def __init__(
         self,
         training: Training,
-        environments: Iterable[gym.Env[Any, Any]],
+        environments: Iterable[gym.Env[Any, Any] | None],
         target: StopTrainingOnRewardThreshold | None = None,
     ) -> None:
         self.training = training
-        self._open = tuple(environments)
+        self._open = [env for env in environments if env is not None]
         self._target = target
 
     @property
@@ -297,9 +297,8 @@ class TrainingTrial:
 
     @property
     def done(self) -> int:
-        """Learning episodes or steps done, whichever its length is told in."""
-        training = self.training
-        return training.n_episodes if training.steps is None else training.n_steps
+        """Learning episodes or steps done, as its budget counts."""
+        return self.training.n_episodes if self.training.steps is None else self.training.n_steps
 
     @property
     def reason(self) -> Reason:
@@ -333,8 +332,9 @@ class TrainingTrial:
     def test_rows(self) -> dict[str, NDArray[Any]]:
         """Test episodes so far: arrays `episode`, `steps`, `episode_return`, `solved`, (n,)."""
         rows = self.rows()
-        names = ("episode", "steps", "episode_return", "solved")
-        return {name: getattr(rows, name) for name in names}
+        return {
+            name: getattr(rows, name) for name in ("episode", "steps", "episode_return", "solved")
+        }
 
     def rows(self) -> TrialRows:
         """Return all rows so far: learning episodes and evaluations."""
@@ -342,19 +342,16 @@ class TrainingTrial:
 
     def close(self) -> None:
         """Close the environments, if they are open still."""
-        environments, self._open = self._open, ()
+        environments, self._open = self._open, []
         with ExitStack() as stack:
             for env in environments:
                 stack.callback(env.close)
 
 
 def training_trial(spec: RunSpec) -> TrainingTrial:
-    """Make the trial of a specification in Python: the rows of a compiled one, bit for bit.
+    """Make the trial of a specification in Python; ConfigError if a part cannot be made.
 
-    Raises
-    ------
-    ConfigError
-        If environment or agent cannot be made.
+    Its rows are those of the compiled trial, bit for bit.
     """
     target = None
     if spec.budget.target_return is not None:
@@ -368,8 +365,7 @@ def training_trial(spec: RunSpec) -> TrainingTrial:
             stack.callback(evaluation_env.close)
         training = training_of(spec, env, evaluation_env, () if target is None else (target,))
         stack.pop_all()
-    environments = [one for one in (env, evaluation_env) if one is not None]
-    return TrainingTrial(training, environments, target)
+    return TrainingTrial(training, (env, evaluation_env), target)
 
 
 def training_of(
@@ -377,9 +373,8 @@ def training_of(
 ) -> Training:
     """Make the training of a specification in environments that it has made.
 
-    On the paper's acrobot the streams of the sensors' noise run on over all episodes, and resets
-    are told the number of the episode, for the goal that tightens. Elsewhere each episode has a
-    seed of its own.
+    On the paper's acrobot the sensors' noise runs on over all episodes, and resets receive the
+    number of the episode, for the goal that tightens. Elsewhere each episode has its own seed.
     """
     is_acrobot = spec.environment is None
     return agent_entry(spec.agent.name).training(
@@ -399,9 +394,5 @@ def training_of(
 
 
 def reset_options(spec: RunSpec) -> Callable[[int], dict[str, Any]] | None:
-    """Return what resets are told on the paper's acrobot: the number of the episode."""
-    return _episode_number if spec.environment is None else None
-
-
-def _episode_number(episode: int) -> dict[str, Any]:
-    return {"episode": episode}
+    """Return what resets receive on the paper's acrobot: the number of the episode."""
+    return (lambda episode: {"episode": episode}) if spec.environment is None else None

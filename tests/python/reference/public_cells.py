@@ -25,8 +25,8 @@ from sdnn.runs import (
     MeasureConfig,
     ProtocolSpec,
     RunSpec,
-    measures,
 )
+from sdnn.runs.results import episodes_to_learn
 
 ROOMS = ("agents", "approximators", "coding", "environments", "estimators", "reproduction", "runs")
 
@@ -231,7 +231,7 @@ def _environment_used(given):
 
 def _measure_used(given):
     tests = np.arange(30)
-    learned = measures.episodes_to_learn(10 * tests, tests % 12, MeasureConfig(**given))
+    learned = episodes_to_learn(10 * tests, tests % 12, MeasureConfig(**given))
     return "" if learned >= 0 else f"gave {learned}"
 
 
