@@ -47,7 +47,7 @@ class Callback:
     """
 
     def on_start(self, training: Training) -> None:
-        """Before the first step, also of a training that goes on."""
+        """Before the first step, also of a training that is resumed."""
 
     def on_step(self, training: Training) -> None:
         """After every learned step."""

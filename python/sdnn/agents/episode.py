@@ -48,7 +48,7 @@ class UnrepeatedEpisodeError(ValueError):
 
 
 class UnusableStepError(ValueError):
-    """An environment gave what cannot be learned or added up: the message says where."""
+    """An observation or reward cannot be learned or added up; the message names the step."""
 
 
 class Transition(NamedTuple):
@@ -214,7 +214,7 @@ class Episode:
 
     @property
     def last_observation(self) -> Any:
-        """What was observed last, learned or not."""
+        """The last observation, learned or not."""
         return self.observation if self.outcome is None else self.outcome.observation
 
 

@@ -23,7 +23,7 @@ _LONG = 100_000
 
 
 class Acts(Protocol):
-    """What is evaluated."""
+    """The interface of what is evaluated."""
 
     def act(self, observation: Any, explore: bool = True) -> Any:
         """Choose an action."""

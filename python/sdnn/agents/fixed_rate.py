@@ -27,7 +27,7 @@ class FixedRate(_core.FixedRate):
     hz : float
         Ticks a second, in [1e-3, 1e6].
     clock : callable
-        Gives seconds since any fixed moment, and never goes back.
+        Returns seconds since any fixed moment, and never goes back.
     sleep : callable
         Waits for so many seconds, or less.
 

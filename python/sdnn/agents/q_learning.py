@@ -217,14 +217,14 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         """
         networks = [self._network(dimension) for dimension in range(self.n_dimensions)]
         use = self._controller.range_use()
-        changed, rounded_away, out_of_range, asked = np.sum(
+        changed, rounded_away, out_of_range, n_all = np.sum(
             [network.correction_counts for network in networks], axis=0
         ).tolist()
         return {
-            "n_corrections": asked,
-            "share_changed": changed / max(asked, 1),
-            "share_rounded_away": rounded_away / max(asked, 1),
-            "share_out_of_range": out_of_range / max(asked, 1),
+            "n_corrections": n_all,
+            "share_changed": changed / max(n_all, 1),
+            "share_rounded_away": rounded_away / max(n_all, 1),
+            "share_out_of_range": out_of_range / max(n_all, 1),
             "q_range": networks[0].output_range,
             "share_of_range": [one and one[0] for one in use],
             "share_beyond_range": [one and one[1] for one in use],

@@ -214,7 +214,7 @@ class Training:
 
     @property
     def is_finished(self) -> bool:
-        """Whether all that was asked for is done."""
+        """Whether all steps or episodes are done."""
         if self.steps is not None:
             return self.n_steps >= self.steps
         assert self.episodes is not None
@@ -227,7 +227,7 @@ class Training:
     def run(self) -> TrainingResult:
         """Learn until all is done, a callback stops, or the user interrupts.
 
-        What an environment raises is raised after the callbacks' ``on_end``. What has been learned
+        Errors of the environment are raised after the callbacks' ``on_end``; what is learned
         stays. The next ``run`` begins new episodes, or first evaluates where that failed.
 
         Raises
@@ -255,7 +255,7 @@ class Training:
         Closing the generator between two pieces stops the training there, like `stop`.
         """
         if self.is_within_step:
-            raise RuntimeError("a training that was left within a step cannot go on: load it")
+            raise RuntimeError("a training that was left within a step cannot be resumed: load it")
         self._stops = False
         with Interrupts(self.stop) as interrupts, ExitStack() as stack:
             for callback in self.callbacks:

@@ -67,7 +67,7 @@ class _SeparateResets(_Vector):
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
         mask = np.array([i in seeds for i in range(self.n_environments)])
-        # Without the option where it is not needed: some wrappers know complete resets only.
+        # Without the option where it is not needed: some wrappers have complete resets only.
         options = None if mask.all() else {"reset_mask": mask}
         listed: Any = [seeds.get(i) for i in range(self.n_environments)]
         observations, _ = self._env.reset(seed=listed, options=options)

@@ -17,7 +17,7 @@ from sdnn.cli.run_options import (
 )
 
 
-@click.command(short_help="Say how good the agent of a run is now.")
+@click.command(short_help="Evaluate the agent of a run as it is now.")
 @run_argument
 @click.option(
     "--episodes", type=click.IntRange(1, 10**9), default=100, show_default=True, help="How many."
@@ -25,7 +25,7 @@ from sdnn.cli.run_options import (
 @seed_option
 @json_option
 def evaluate(folder: Path, episodes: int, seed: int | None, as_json: bool) -> None:
-    """Say how good the agent of RUN is now: greedy episodes in which nothing is learned."""
+    """Evaluate the agent of RUN as it is now: greedy episodes in which nothing is learned."""
     import numpy as np
 
     from sdnn.runs import Run

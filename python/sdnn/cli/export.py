@@ -22,7 +22,7 @@ from sdnn.cli.run_options import json_option, run_command, words_of_run
     help="A C99 header with the greedy policy, in integers: for small processors.",
 )
 @click.option(
-    "--name", metavar="PREFIX", help="What its names begin with.  [default: FILE without ending]"
+    "--name", metavar="PREFIX", help="Prefix of its names.  [default: FILE without ending]"
 )
 @click.option(
     "--fraction-bits",
@@ -36,7 +36,7 @@ def export(
     """Write the agent of RUN, a run's folder or an agent's file, in a form for other programs.
 
     The header observes what the agent did: with --noise or --redundant, variables scaled to [0, 1].
-    It says from which ranges.
+    Its comments name the ranges.
     """
     from sdnn.agents import load_agent
     from sdnn.export import c_header

@@ -1,4 +1,4 @@
-"""What the commands print, and how they end."""
+"""Output and exit codes of the commands."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def run_and_report(
         message = f"{type(failure.error).__name__}: {failure.error}"
         click.echo(f"Error: {describe(failure.key)} failed: {message}", err=True)
     if outcome.interrupted:
-        exit_interrupted(context, f"interrupted; {stored}; the same command goes on from there")
+        exit_interrupted(context, f"interrupted; {stored}; the same command continues from there")
     if done.page is None:
         click.echo(f"Error: nothing is complete, no figure drawn; {stored}", err=True)
     elif as_json:
@@ -90,6 +90,6 @@ def experiment_command(context: click.Context) -> Iterator[None]:
 
 
 def exit_interrupted(context: click.Context, message: str) -> NoReturn:
-    """Say what is kept, and exit as a command that was interrupted."""
+    """Print what is kept, and exit as a command that was interrupted."""
     click.echo(message, err=True)
     context.exit(EXIT_INTERRUPTED)

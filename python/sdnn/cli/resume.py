@@ -1,4 +1,4 @@
-"""The command ``sdnn resume``: a run goes on where it stopped."""
+"""The command ``sdnn resume``: a run continues where it stopped."""
 
 from __future__ import annotations
 

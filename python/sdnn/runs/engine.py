@@ -1,6 +1,6 @@
 """The engine: runs the trials that a store does not hold yet, in threads or on other machines.
 
-An executor runs trials and reports about them; it knows no store. The calling thread alone writes
+An executor runs trials and reports about them; it has no store. The calling thread alone writes
 the store and calls the observer, and stores a finished trial before it takes the next report. What
 is not stored, whatever happened to it, is missing and runs again. A trial in C++ releases Python's
 lock while it advances, so threads scale over the cores.

@@ -132,8 +132,8 @@ class Run:
         """
         place = Path(folder)
         if (place / CONFIG).exists():
-            goes_on = command_line("sdnn", "resume", place)
-            raise RunError(f"{place} holds a run already: {goes_on} goes on with it")
+            resume = command_line("sdnn", "resume", place)
+            raise RunError(f"{place} holds a run already: {resume} continues it")
         if place.exists() and (not place.is_dir() or any(place.iterdir())):
             raise RunError(f"{place} is there already, and no run: take another folder")
         cls(place, spec).check()
@@ -191,7 +191,7 @@ class Run:
             remove_abandoned_files(self.folder)
             if (self.folder / AGENT).exists() and not (self.folder / CHECKPOINT).exists():
                 raise RunError(
-                    f"{self.folder} was trained, but has no {CHECKPOINT} to go on from: a new run"
+                    f"{self.folder} was trained, but has no {CHECKPOINT} to resume from: a new run"
                     f" needs another folder, {AGENT} would be written over"
                 )
             store = stack.enter_context(ResultStore(self.folder))
@@ -205,7 +205,7 @@ class Run:
             with Interrupts(stop.set, (signal.SIGTERM,)) as terminations:
                 done = run_trials([planned], store, executor=SerialExecutor(), stop=stop)
             for failure in done.failures:
-                raise task.told(failure.error)
+                raise task.explained(failure.error)
             training = task.trial.training
             if terminations.received is not None:
                 raise RunTerminatedError(f"terminated after {training.n_steps} steps")
@@ -343,7 +343,7 @@ class _StoredCheckpoints(CheckpointCallback):
         self._store(training)
 
     def on_step(self, training: Training) -> None:
-        """Save where it is due; stop where it is asked for."""
+        """Stop if the event is set; save where it is due."""
         if self._stop.is_set():
             training.stop()
         super().on_step(training)
@@ -417,10 +417,10 @@ class RunTask:
             target = None
             if spec.budget.target_return is not None and not (run.goals or has_goal):
                 target = _Target(spec.budget.target_return)
-            told = [target, self._checkpoints, *self._given]
+            listed = [target, self._checkpoints, *self._given]
             if spec.output.tensorboard:
-                told.append(tensorboard_in(run.folder))
-            callbacks = [one for one in told if one is not None]
+                listed.append(tensorboard_in(run.folder))
+            callbacks = [one for one in listed if one is not None]
             if (run.folder / CHECKPOINT).exists():
                 training = self._loaded(env, evaluation_env, callbacks)
             else:
@@ -435,18 +435,18 @@ class RunTask:
         self.trial.n_evaluated = lambda: self._store.rows(run.key).n_evaluated
         return self.trial
 
-    def told(self, error: Exception) -> Exception:
-        """Tell what is saved where a step could not be learned."""
+    def explained(self, error: Exception) -> Exception:
+        """Return the error, with what is saved where a step could not be learned."""
         if not isinstance(error, UnusableStepError):
             return error
         n_steps = self._checkpoints.n_saved or self._began_at
-        goes_on = command_line("sdnn", "resume", self._run.folder)
-        saved = f"the first {n_steps} steps are saved: {goes_on} goes on there with a new episode"
+        resume = command_line("sdnn", "resume", self._run.folder)
+        saved = f"the first {n_steps} steps are saved: {resume} continues there with a new episode"
         if n_steps == 0:
-            saved = f"nothing is learned yet: {goes_on} begins again once the environment is fixed"
-        told = RunError(f"{self._run.spec.task}: {error}; {saved}")
-        told.__cause__ = error
-        return told
+            saved = f"nothing is learned yet: {resume} begins again once the environment is fixed"
+        explained = RunError(f"{self._run.spec.task}: {error}; {saved}")
+        explained.__cause__ = error
+        return explained
 
     def _loaded(
         self, env: Any, evaluation_env: gym.Env[Any, Any] | None, callbacks: list[Callback]

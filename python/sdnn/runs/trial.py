@@ -220,8 +220,8 @@ def records_digest(records: Iterable[TrialRecord]) -> str:
     sha = hashlib.sha256()
     for record in sorted(records, key=lambda r: r.key):
         key = record.key
-        told = (key.case_id, key.trial, key.seed, record.n_decisions, record.rows.digest())
-        sha.update(repr(told).encode())
+        parts = (key.case_id, key.trial, key.seed, record.n_decisions, record.rows.digest())
+        sha.update(repr(parts).encode())
     return sha.hexdigest()
 
 
