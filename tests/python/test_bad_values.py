@@ -13,7 +13,7 @@ from sdnn.cli import main
 from watched_cells import failures, faulty_cells
 
 EVERY = {"agents": 41, "core": 41, "classes": 41, "commands": 29, "files": 41}
-"""Primes, so that the sample has all parameters and all values; a few thousand cells in all."""
+"""Primes: the sample walks through the values; it has some hundred cells, not every parameter."""
 
 
 @pytest.mark.parametrize("matrix", MATRICES)
