@@ -47,7 +47,7 @@ ControllerConfig with(AnyApproximatorConfig approximator, AnyLearningConfig lear
 const RBFNetworkConfig kBases{.n_bases = 3, .n_actions = 5, .gradient_rate = 0.5};
 const FuzzyQLearningConfig kTraces{.trace_decay = 0.5};
 
-ControllerConfig rbf() { return with(kBases, QLearningConfig{.n_steps = 3}); }
+ControllerConfig rbf_config() { return with(kBases, QLearningConfig{.n_steps = 3}); }
 ControllerConfig rbf_of_vectors() { return with(kBases, QLearningConfig{}, 2); }
 ControllerConfig sdnn() {
   return with(SDNNCConfig{.n_pattern_units = 16,
@@ -59,7 +59,7 @@ ControllerConfig sdnn() {
                               .max_action_repeat = 4,
                               .value_range = ValueRange::adaptive});
 }
-ControllerConfig fuzzy() { return with(FuzzyRulesConfig{}, kTraces); }
+ControllerConfig fuzzy_config() { return with(FuzzyRulesConfig{}, kTraces); }
 ControllerConfig fuzzy_of_vectors() { return with(FuzzyRulesConfig{.n_sets = 4}, kTraces, 2); }
 
 ControllerConfig whole(ControllerConfig config) {
@@ -106,7 +106,7 @@ void expect_that_it_continues(const ControllerConfig& config, std::size_t n_envi
 
 TEST(Controller, ContinuesAfterItWasSavedAnywhere) {
   for (const ControllerConfig& config :
-       {rbf(), rbf_of_vectors(), sdnn(), fuzzy(), fuzzy_of_vectors()}) {
+       {rbf_config(), rbf_of_vectors(), sdnn(), fuzzy_config(), fuzzy_of_vectors()}) {
     expect_that_it_continues(config);
     expect_that_it_continues(whole(config));
     expect_that_it_continues(with_warm_up(config));
@@ -145,7 +145,7 @@ TEST(Controller, DoesWhatItsAgentDoes) {
 TEST(Controller, OfSeveralRobotsDoesWhatItsAgentDoes) {
   const Numbers observed = {1.0, 0.0, 4.0, 11.0}, state = {0.5, 0.75, 0.25};
   FuzzyQLearning agent(approximators::FuzzyRules({.n_inputs = 3}), kTraces, 3);
-  Controller controller(fuzzy());
+  Controller controller(fuzzy_config());
   agent.set_n_environments(3);
   controller.set_n_environments(3);
   for (std::size_t t = 0; t < 60; ++t) {
@@ -192,7 +192,7 @@ TEST(Controller, RemembersWhichIndexAWholeActionWasWhileItsRobotIsThere) {
 
 TEST(Controller, LearnsTheNearestActionOfABox) {
   const Numbers observed = {1.0, 0.0, 4.0, 11.0};
-  Controller one(rbf()), other(rbf());
+  Controller one(rbf_config()), other(rbf_config());
   one.learn(observed, Numbers{0.9}, 1.0, observed, true);
   other.learn(observed, Numbers{1.0}, 1.0, observed, true);
   EXPECT_EQ(core::state_of(one), core::state_of(other));
@@ -200,7 +200,7 @@ TEST(Controller, LearnsTheNearestActionOfABox) {
 
 TEST(Controller, ABadArgumentChangesNothing) {
   const Numbers good(4, 0.5), shorter(3, 0.5), nan = {0.5, 0.5, testing::kNaN, 0.5};
-  for (ControllerConfig config : {rbf(), rbf_of_vectors(), fuzzy(), fuzzy_of_vectors()}) {
+  for (ControllerConfig config : {rbf_config(), rbf_of_vectors(), fuzzy_config(), fuzzy_of_vectors()}) {
     for (const bool warms_up : {false, true}) {
       Controller controller(warms_up ? with_warm_up(config) : config);
       const auto taken = controller.act(good);
@@ -228,7 +228,7 @@ TEST(Controller, ABadArgumentChangesNothing) {
 
 TEST(Controller, AFuzzyOneLearnsItsLastActionOnly) {
   const Numbers here(4, 0.5), there(4, 0.25);
-  Controller controller(fuzzy());
+  Controller controller(fuzzy_config());
   const Numbers action = {controller.act(here)[0]};
   const core::State before = core::state_of(controller);
   EXPECT_THROW(controller.learn(there, action, 1.0, there, false), std::invalid_argument);
@@ -239,7 +239,7 @@ TEST(Controller, AFuzzyOneLearnsItsLastActionOnly) {
 }
 
 TEST(Controller, TakesRatesOverFromItsWarmUp) {
-  Controller controller(with_warm_up(rbf()));
+  Controller controller(with_warm_up(rbf_config()));
   controller.set_epsilon(0.75);
   controller.set_progress(0.5);
   EXPECT_EQ(controller.epsilon(), 0.75);
@@ -253,7 +253,7 @@ TEST(Controller, TakesRatesOverFromItsWarmUp) {
 }
 
 TEST(Controller, RefusesStatesThatDoNotFit) {
-  for (const ControllerConfig& config : {rbf(), with_warm_up(sdnn()), fuzzy_of_vectors()}) {
+  for (const ControllerConfig& config : {rbf_config(), with_warm_up(sdnn()), fuzzy_of_vectors()}) {
     Controller controller(config);
     core::Random random(5, core::Stream::weights);
     Numbers observed{1.0, 0.0, 0.0, 0.0};
@@ -277,11 +277,11 @@ TEST(Controller, RefusesStatesThatDoNotFit) {
     refused(testing::with_number(good, "progress", 1.5));
     refused(testing::with_number<std::uint8_t>(good, "is_warming_up", 2));
   }
-  Controller controller(rbf());
+  Controller controller(rbf_config());
   (void)controller.act(Numbers(4, 0.5));
   const core::State good = core::state_of(controller);
   const auto refused = [&](const core::State& bad) {
-    EXPECT_THROW((void)Controller::restored(rbf(), bad), std::invalid_argument);
+    EXPECT_THROW((void)Controller::restored(rbf_config(), bad), std::invalid_argument);
   };
   refused(testing::with_number<std::int64_t>(good, "taken.indices", 5));
   refused(testing::with_number<std::int64_t>(good, "taken.indices", -1));
@@ -306,7 +306,7 @@ TEST(Controller, ComparesSizesBeforeMemoryIsAskedFor) {
   config = sdnn();
   std::get<SDNNCConfig>(config.approximator).n_interpolated = 2000000000;
   EXPECT_NE(error_of(config, state).find("n_interpolated"), std::string::npos);
-  config = fuzzy();
+  config = fuzzy_config();
   state = core::state_of(Controller(config));
   std::get<FuzzyRulesConfig>(config.approximator).n_sets = 100000;
   EXPECT_NE(error_of(config, state).find("agent.rules.values"), std::string::npos);
@@ -327,13 +327,13 @@ TEST(Controller, KeepsThePatternsItWasGiven) {
 }
 
 TEST(Controller, FindsImpossibleSettingsBeforeItsWarmUp) {
-  ControllerConfig config = with_warm_up(rbf());
+  ControllerConfig config = with_warm_up(rbf_config());
   std::get<RBFNetworkConfig>(config.approximator).n_bases = 1;
   EXPECT_THROW(Controller{config}, std::invalid_argument);
-  config = with_warm_up(rbf());
+  config = with_warm_up(rbf_config());
   config.warm_up_steps = 1;
   EXPECT_THROW(Controller{config}, std::invalid_argument);
-  config = rbf();
+  config = rbf_config();
   config.learning = kTraces;
   EXPECT_THROW(Controller{config}, std::invalid_argument);
 }
