@@ -57,7 +57,7 @@ def style(session):
     """Check format, lint and the direction of dependencies."""
     session.run("ruff", "check", ".")
     session.run("ruff", "format", "--check", ".")
-    session.run("clang-format", "--dry-run", "-Werror", *cpp_sources(), silent=True)
+    session.run("clang-format", "--dry-run", "-Werror", *cpp_sources(), log=False)
     session.run("lint-imports", env={"PYTHONPATH": str(ROOT / "python")})
 
 

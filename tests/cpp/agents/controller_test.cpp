@@ -200,7 +200,8 @@ TEST(Controller, LearnsTheNearestActionOfABox) {
 
 TEST(Controller, ABadArgumentChangesNothing) {
   const Numbers good(4, 0.5), shorter(3, 0.5), nan = {0.5, 0.5, testing::kNaN, 0.5};
-  for (ControllerConfig config : {rbf_config(), rbf_of_vectors(), fuzzy_config(), fuzzy_of_vectors()}) {
+  for (ControllerConfig config :
+       {rbf_config(), rbf_of_vectors(), fuzzy_config(), fuzzy_of_vectors()}) {
     for (const bool warms_up : {false, true}) {
       Controller controller(warms_up ? with_warm_up(config) : config);
       const auto taken = controller.act(good);
