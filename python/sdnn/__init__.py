@@ -1,12 +1,12 @@
 """Selective desensitization neural networks: exact, online, fast.
 
-Rooms, from the network up (each is imported when first used):
+Packages, from the network up (each is imported when first used):
 
 - ``sdnn.approximators``: SDNN-C, a network that gives Q(s, a) for every action at once
 - ``sdnn.agents``: Q-learning with it, for any Gymnasium environment
 - ``sdnn.SDNNRegressor``, ``sdnn.SDNNClassifier``: the network as scikit-learn estimators
-  (room ``sdnn.estimators``, needs ``sdnn[sklearn]``); ``sdnn.coding``: how inputs become patterns;
-  ``sdnn.kernel``: what generalizes to what
+  (package ``sdnn.estimators``, needs ``sdnn[sklearn]``)
+- ``sdnn.coding``: how inputs become patterns; ``sdnn.kernel``: what generalizes to what
 - ``sdnn.environments``: the acrobot swing-up, redundant and noisy sensors
 - ``sdnn.export``: trained agents as C headers, also as the command ``sdnn export``
 - ``sdnn.reproduction``: the paper's experiments, also as the command ``sdnn reproduce``

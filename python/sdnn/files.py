@@ -235,6 +235,8 @@ def write_file(
     text = json.dumps(about, sort_keys=True, separators=(",", ":"))
     contiguous = {name: np.asarray(array, order="C") for name, array in arrays.items()}
     data = memoryview(save(contiguous, metadata={"sdnn": text}))
+    if data[8 : _CHECKSUM.start] != _BEGINNING:
+        raise RuntimeError("not saved: this version of safetensors orders its header otherwise")
     before, after = data[: _CHECKSUM.start], data[_CHECKSUM.stop :]
     write_whole(path, [before, _checksum(data), after])
 

@@ -1,4 +1,4 @@
-"""The command ``sdnn``, a file per command. They read options and print; the rooms do the work."""
+"""The command ``sdnn``, a file per command. They read options; the packages do the work."""
 
 from __future__ import annotations
 

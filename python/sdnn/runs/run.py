@@ -7,6 +7,7 @@ import json
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
@@ -61,6 +62,7 @@ CONFIG = "config.json"
 LOCK = ".lock"
 CHECKPOINT = "checkpoint.safetensors"
 AGENT = "agent.safetensors"
+STORE_SECONDS = 5.0  # between commits of rows
 TENSORBOARD = "tensorboard"
 
 
@@ -87,9 +89,8 @@ class Goal:
 class RunOutcome:
     """The result of training a run.
 
-    ``reason``: all is done, an evaluation reached the target, or a callback stopped it;
-    ``learning_report``: see `sdnn.agents.SDNNQLearning.learning_report`, None for other agents and
-    while it is warming up; ``has_pictures``: whether `record` can render the environment.
+    ``learning_report``: see `sdnn.agents.SDNNQLearning`, None for other agents and while it is
+    warming up; ``has_pictures``: whether `record` can render the environment.
     """
 
     n_steps: int
@@ -127,8 +128,7 @@ class Run:
         Raises
         ------
         ConfigError, RunError, OSError
-            If environment or agent cannot be made (no folder is made then), something is there
-            already, or the folder cannot be written.
+            If it cannot be made (no folder is made then), is there already, or cannot be written.
         """
         place = Path(folder)
         if (place / CONFIG).exists():
@@ -181,10 +181,8 @@ class Run:
         KeyboardInterrupt, RunTerminatedError
             For SIGINT and SIGTERM, once the present step is done and a checkpoint is written.
         RunError
-            If a file is damaged, another process trains the run, or the environment differs or
-            gives what cannot be learned: the message then names the step, and what is saved.
-        OSError
-            If a file cannot be read or written.
+            If a file is damaged, the run is trained elsewhere, or the environment has changed or
+            gives what cannot be learned.
         """
         with ExitStack() as stack:
             stack.enter_context(self._locked())
@@ -331,12 +329,13 @@ class _Target(StopTrainingOnRewardThreshold):
 
 
 class _StoredCheckpoints(CheckpointCallback):
-    """Stores the rows of a run before each checkpoint that counts them; stops at an event."""
+    """Stores rows every few seconds and before each checkpoint; stops at an event."""
 
     def __init__(self, run: Run, store: ResultStore, stop: threading.Event) -> None:
         super().__init__(run.folder / CHECKPOINT, run.spec.output.checkpoint_every)
         self._run, self._results, self._stop = run, store, stop
         self._rows: list[Row] = []
+        self._stored_at = time.monotonic()
 
     def on_start(self, training: Training) -> None:
         """Remove the rows that were stored after the checkpoint."""
@@ -346,10 +345,12 @@ class _StoredCheckpoints(CheckpointCallback):
         """Stop if the event is set; save where it is due."""
         if self._stop.is_set():
             training.stop()
+        if self._rows and time.monotonic() - self._stored_at > STORE_SECONDS:
+            self._store(training)
         super().on_step(training)
 
     def on_row(self, training: Training, row: Row) -> None:
-        """Keep a row for the next checkpoint."""
+        """Keep a row until it is stored."""
         self._rows.append(row)
 
     def _save(self, training: Training) -> None:
@@ -361,7 +362,7 @@ class _StoredCheckpoints(CheckpointCallback):
         config = self._run.spec.canonical_json()
         rows = TrialRows.from_training(self._rows, first)
         self._results.extend(self._run.key, rows, first, config=config, version=__version__)
-        self._rows = []
+        self._rows, self._stored_at = [], time.monotonic()
 
 
 class RunTrial(TrainingTrial):

@@ -122,6 +122,11 @@ class RunSpec(Settings, frozen=True):
             entry = agent_entry(self.agent.name)
         except ValueError as error:
             raise ConfigError("agent.name", str(error).partition(" ")[2]) from None
+        if self.environment is None:
+            standard = AgentSpec(name=self.agent.name, preset=self.agent.preset)
+            for key in ("observation_range", "angles", "angle_pairs", "warm_up_steps"):
+                if getattr(self.agent, key) != getattr(standard, key):
+                    raise ConfigError(f"agent.{key}", "is for environments: omit it on acrobot")
         preset = self.agent.preset
         if preset is None and entry.presets:
             preset = "paper" if self.environment is None else "general"
@@ -164,6 +169,8 @@ class RunSpec(Settings, frozen=True):
                 else budget.replace(steps=DEFAULT_STEPS)
             )
         self._set(protocol=protocol, budget=budget)
+        if on_acrobot and protocol.n_envs > 1:
+            raise ConfigError("protocol.n_envs", f"must be 1 for acrobot, got {protocol.n_envs}")
         if budget.target_return is not None and not self.is_evaluated:
             raise ConfigError(
                 "budget.target_return", "needs evaluations: evaluate_every must not be 0"
@@ -360,7 +367,7 @@ class RunSpec(Settings, frozen=True):
             return given
         if "observation_range" in given:
             raise ConfigError(
-                "environment.ranges", "must not be given together with ranges that are seen"
+                "environment.ranges", "must not be given together with adaptive ranges"
             )
         return {**given, "observation_range": environment.ends(env)}
 

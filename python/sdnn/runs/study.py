@@ -149,12 +149,26 @@ class Study:
             tried.add(keys[0].config_hash)
             try:
                 with opened(one.spec.make_trial(keys[0].seed)):
-                    pass
+                    _require_comparable(one.spec)
             except Exception as error:  # of whatever agent or environment
                 if not isinstance(error, ConfigError):
                     text = str(error) or type(error).__name__
                     error = ConfigError(one.spec.key_of(error), text)
                 raise self.reader.refusal(one.settings, one.case, one.variant, error) from error
+
+
+def _require_comparable(spec: RunSpec) -> None:
+    """Check that all trials have the same number of evaluations, at least one."""
+    if spec.budget.target_return is not None:
+        raise ConfigError("budget.target_return", "must be omitted in a study")
+    unit = "episodes" if spec.budget.steps is None else "steps"
+    name = "evaluate_every_episodes" if unit == "episodes" else "evaluate_every"
+    budget, every = getattr(spec.budget, unit), getattr(spec.protocol, name)
+    if not 1 <= (every or 0) <= budget:
+        raise ConfigError(
+            f"protocol.{name}",
+            f"a study with budget.{unit} needs protocol.{name} from 1 to {budget}, got {every}",
+        )
 
 
 def read_study(

@@ -214,15 +214,13 @@ class TrialTime:
 def records_digest(records: Iterable[TrialRecord]) -> str:
     """Return the SHA-256 of the results of trials, to compare runs.
 
-    It covers cases, trials, seeds, decisions and rows, in the order of the keys, so runs with other
-    jobs, interruptions, order, names or settings agree.
+    It covers cases, trials, seeds, decisions and rows, sorted, so runs with other jobs,
+    interruptions, order, names or settings agree.
     """
-    sha = hashlib.sha256()
-    for record in sorted(records, key=lambda r: r.key):
-        key = record.key
-        parts = (key.case_id, key.trial, key.seed, record.n_decisions, record.rows.digest())
-        sha.update(repr(parts).encode())
-    return sha.hexdigest()
+    parts = sorted(
+        (r.key.case_id, r.key.trial, r.key.seed, r.n_decisions, r.rows.digest()) for r in records
+    )
+    return hashlib.sha256("".join(map(repr, parts)).encode()).hexdigest()
 
 
 def trial_rows(records: Iterable[TrialRecord]) -> Iterator[tuple[object, ...]]:

@@ -462,7 +462,7 @@ discount = 0.5
         (
             "[agent]\nobservation_range = 'adaptive'\n",
             ["CartPole-v1", "--range", "0:1"],
-            "Error: --range: must not be given together with ranges that are seen",
+            "Error: --range: must not be given together with adaptive ranges",
         ),
         (
             "[approximator]\nn_hidden_units = 1000000000\n",

@@ -285,3 +285,20 @@ def test_folders_that_hold_no_run_or_a_damaged_one(whole, tmp_path):
     config.write_text(config.read_text().replace('"steps": 400', '"steps": "many"', 1))
     with pytest.raises(ConfigError, match=r"config\.json: budget\.steps"):
         Run.open(run.folder)
+
+
+def test_a_run_can_be_watched_before_its_first_checkpoint(tmp_path, whole, monkeypatch):
+    monkeypatch.setattr("sdnn.runs.run.STORE_SECONDS", -1.0)
+    run = Run.create(tmp_path / "run", CONFIG)
+    seen = []
+
+    class Watch(Callback):
+        def on_step(self, training):
+            if training.n_steps == CONFIG.output.checkpoint_every - 1:
+                seen.extend(run.rows())
+                assert not (run.folder / "checkpoint.safetensors").exists()
+
+    run.train(callbacks=[Watch()])
+    assert seen
+    assert seen == run.rows()[: len(seen)]
+    assert contents(run) == contents(whole(CONFIG))

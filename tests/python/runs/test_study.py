@@ -193,6 +193,9 @@ protocol.evaluate_every_episodes = 10
     assert config.label == "sdnn-c-general"
 
 
+RANGES = "environment.ranges.1 = [-4, 4]\nenvironment.ranges.3 = [-4, 4]\n"
+
+
 def test_both_kinds_of_tasks_fit_into_one_study(study):
     found = study(
         """
@@ -485,3 +488,22 @@ def test_what_is_stored_is_not_tried_again(study, monkeypatch):
     found.check(stored=found.keys("s4", "a"))
     with pytest.raises(ConfigError):
         found.check(stored=found.keys("s4", "a")[:1])
+
+
+@pytest.mark.parametrize(
+    ("settings", "key"),
+    [
+        ("budget.steps = 300", "protocol.evaluate_every"),
+        ("budget.episodes = 40\nprotocol.evaluate_every = 0", "protocol.evaluate_every_episodes"),
+        ("budget.target_return = 40.0", "budget.target_return"),
+    ],
+)
+def test_trials_that_could_not_be_compared_are_refused(study, settings, key):
+    with pytest.raises(ConfigError, match=key):
+        study(f"[base]\nenvironment.id = 'CartPole-v1'\n{RANGES}{settings}\n").check()
+
+
+@pytest.mark.parametrize("setting", ["angles = [0]", "angle_pairs = 'find'", "warm_up_steps = 9"])
+def test_what_the_acrobot_does_not_use_is_refused(study, setting):
+    with pytest.raises(ConfigError, match=r"agent\."):
+        study(f"[cases.s4]\n[base]\nagent.{setting}\n").check()
