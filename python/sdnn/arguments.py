@@ -3,14 +3,79 @@
 from __future__ import annotations
 
 import os
+import reprlib
 from collections.abc import Mapping
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, TypeVar
 
-__all__ = ["choice", "flag", "has_methods", "one_of", "path_of", "real", "seed_of", "whole"]
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "array_of",
+    "choice",
+    "flag",
+    "has_methods",
+    "one_of",
+    "path_of",
+    "real",
+    "seed_of",
+    "shown",
+    "whole",
+]
 
 Member = TypeVar("Member")
+
+_REPR = reprlib.Repr()
+_REPR.maxstring = _REPR.maxother = _REPR.maxlong = 200
+_REPR.maxlist = _REPR.maxtuple = _REPR.maxdict = 12
+
+
+def shown(value: Any) -> str:
+    """Return the `repr` of any value for a message, shortened; lists may contain themselves.
+
+    >>> shown(list(range(1000)))
+    '[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, ...]'
+    """
+    try:
+        return _REPR.repr(value)
+    except Exception:  # a whole number of 5,000 digits, a class of a user
+        return object.__repr__(value)
+
+
+def array_of(name: str, value: Any, kinds: str = "fiub", what: str = "numbers") -> NDArray[Any]:
+    """Read an array, or lists of numbers; ValueError that names the argument for others.
+
+    Parameters
+    ----------
+    name
+        The argument.
+    value
+        An array of any library, a number, or lists of such. Masked arrays are refused: their mask
+        would be lost.
+    kinds
+        Letters of the possible types, as in ``numpy.dtype.kind``.
+    what
+        What these are in messages.
+
+    Examples
+    --------
+    >>> array_of("levels", [0.5, "a"])
+    Traceback (most recent call last):
+    ValueError: levels must be numbers, got [0.5, 'a']
+    """
+    if type(value) is np.ndarray and value.dtype.kind in kinds:
+        return value
+    if isinstance(value, np.ma.MaskedArray):
+        raise ValueError(f"{name} must be {what} without a mask, got {shown(value)}")
+    try:
+        array = np.asarray(value)
+    except Exception:  # lists of several lengths, and what arrays of other libraries raise
+        array = np.empty(0, object)
+    if array.dtype.kind not in kinds:
+        raise ValueError(f"{name} must be {what}, got {shown(value)}")
+    return array
 
 
 def choice(name: str, word: Any, members: Mapping[str, Member]) -> Member:
@@ -24,7 +89,7 @@ def choice(name: str, word: Any, members: Mapping[str, Member]) -> Member:
         return members[word]
     except (KeyError, TypeError):
         words = ", ".join(repr(member) for member in members)
-        raise ValueError(f"{name} must be one of {words}, got {word!r}") from None
+        raise ValueError(f"{name} must be one of {words}, got {shown(word)}") from None
 
 
 def one_of(name: str, word: Any, words: tuple[str, ...]) -> str:
@@ -45,7 +110,7 @@ def whole(name: str, value: Any, low: int, high: int) -> int:
     """
     is_whole = isinstance(value, Integral) and not isinstance(value, bool)
     if not is_whole or not low <= value <= high:
-        raise ValueError(f"{name} must be a whole number in [{low}, {high}], got {value!r}")
+        raise ValueError(f"{name} must be a whole number in [{low}, {high}], got {shown(value)}")
     return int(value)
 
 
@@ -64,7 +129,7 @@ def real(name: str, value: Any) -> float:
     if type(value) is float:
         return value
     if not isinstance(value, Real) or isinstance(value, bool):
-        raise ValueError(f"{name} must be a number, got {value!r}")
+        raise ValueError(f"{name} must be a number, got {shown(value)}")
     try:
         return float(value)
     except OverflowError:
@@ -72,17 +137,14 @@ def real(name: str, value: Any) -> float:
 
 
 def flag(name: str, value: Any) -> bool:
-    """Check that an argument is true or false, NumPy's too; TypeError if not.
+    """Check that an argument is a bool, Python's or NumPy's; TypeError if not.
 
     >>> flag("explore", "no")
     Traceback (most recent call last):
     TypeError: explore must be True or False, got 'no'
     """
-    if value is True or value is False:
-        return bool(value)
-    kind = getattr(getattr(value, "dtype", None), "kind", "")
-    if kind != "b" or value.size != 1:
-        raise TypeError(f"{name} must be True or False, got {value!r}")
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(f"{name} must be True or False, got {shown(value)}")
     return bool(value)
 
 
@@ -94,10 +156,10 @@ def path_of(name: str, value: Any) -> Path:
     TypeError: path must be the name of a file, got None
     """
     if not isinstance(value, str | os.PathLike):
-        raise TypeError(f"{name} must be the name of a file, got {value!r}")
+        raise TypeError(f"{name} must be the name of a file, got {shown(value)}")
     text = os.fspath(value)
     if not isinstance(text, str) or not text or "\0" in text:
-        raise ValueError(f"{name} must be the name of a file, got {value!r}")
+        raise ValueError(f"{name} must be the name of a file, got {shown(value)}")
     return Path(text)
 
 
@@ -110,4 +172,4 @@ def has_methods(name: str, value: Any, what: str, *methods: str) -> None:
     """
     is_object = not isinstance(value, type)
     if not (is_object and all(callable(getattr(value, method, None)) for method in methods)):
-        raise TypeError(f"{name} must be {what}, got {value!r}")
+        raise TypeError(f"{name} must be {what}, got {shown(value)}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import copy
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn.agents.files import SavedEpisode
-from sdnn.arguments import real
+from sdnn.arguments import flag, real, shown
 
 __all__ = [
     "EVALUATION",
@@ -29,8 +30,11 @@ __all__ = [
     "Transition",
     "UnrepeatedEpisodeError",
     "UnusableStepError",
+    "checked",
     "episode_seed",
+    "reset_env",
     "reward_of",
+    "step_env",
 ]
 
 _LEARNING, EVALUATION = 0, 1
@@ -38,6 +42,11 @@ _LEARNING, EVALUATION = 0, 1
 
 _PART = 1024
 """Actions in an array."""
+
+_OLD_API = (
+    "; an environment of Gym before 0.26 can be wrapped:"
+    " shimmy.GymV21CompatibilityV0(env=env), from pip install shimmy"
+)
 
 Seeds: TypeAlias = Mapping[int, int | None]
 Options: TypeAlias = dict[str, Any] | None
@@ -48,7 +57,7 @@ class UnrepeatedEpisodeError(ValueError):
 
 
 class UnusableStepError(ValueError):
-    """An observation or reward cannot be learned or added up; the message names the step."""
+    """A step or reset of an environment cannot be used; the message says which and why."""
 
 
 class Transition(NamedTuple):
@@ -86,16 +95,20 @@ def reward_of(reward: Any) -> float:
     """Read a reward: a number of any library, an array of one or a bool; else ValueError."""
     if isinstance(reward, float):  # NumPy's, too
         return float(reward)
-    if isinstance(reward, np.ndarray) and reward.size == 1 and reward.dtype.kind in "fiub":
-        reward = reward.item()
-    is_real = not isinstance(reward, np.ndarray | np.complexfloating)
-    if is_real and hasattr(reward, "__float__"):
+    is_numpy = isinstance(reward, np.ndarray | np.generic)
+    if is_numpy and reward.size == 1 and reward.dtype.kind in "fiub" and not _is_masked(reward):
+        reward, is_numpy = reward.item(), False
+    if not is_numpy and hasattr(reward, "__float__"):
         with suppress(OverflowError, TypeError, ValueError):
             return float(reward)
     try:
         return real("reward", reward)  # for its message
     except OverflowError as error:  # which would say of `Agent.learn` that a weight left its range
         raise ValueError(str(error)) from None
+
+
+def _is_masked(value: Any) -> bool:
+    return isinstance(value, np.ma.MaskedArray)
 
 
 def episode_seed(seed: int, kind: int, episode: int) -> int:
@@ -112,13 +125,51 @@ class StepResult(NamedTuple):
 
     observation: Any
     reward: Any
-    terminated: bool
-    truncated: bool
+    terminated: Any
+    truncated: Any
 
-    @property
-    def ends(self) -> bool:
-        """Whether the episode is over."""
-        return self.terminated or self.truncated
+
+def checked(outcome: StepResult) -> StepResult:
+    """Return an outcome with a finite float as reward and with bools; ValueError if it has none."""
+    seen, reward, terminated, truncated = outcome
+    if type(reward) is not float:
+        reward = reward_of(reward)
+    if not math.isfinite(reward):
+        raise ValueError(f"reward must be finite, got {reward}")
+    if type(terminated) is bool is type(truncated):
+        return StepResult(seen, reward, terminated, truncated)
+    try:
+        ends = flag("terminated", terminated), flag("truncated", truncated)
+    except TypeError as error:
+        raise ValueError(str(error)) from None
+    return StepResult(seen, reward, *ends)
+
+
+def reset_env(env: Any, seed: Any, options: Options) -> Any:
+    """Reset an environment, or a vector; return what is observed first.
+
+    UnusableStepError if it returns something else than an observation and a dictionary.
+    """
+    made = env.reset(seed=seed, options=options)
+    if not (isinstance(made, tuple | list) and len(made) == 2 and isinstance(made[1], Mapping)):
+        raise UnusableStepError(
+            f"env.reset must return (observation, info), info a dictionary, got {shown(made)}"
+            f"{_OLD_API}"
+        )
+    return made[0]
+
+
+def step_env(env: Any, action: Any) -> tuple[Any, Any, Any, Any, Any]:
+    """Step an environment, or a vector; UnusableStepError if it does not return five values."""
+    made = env.step(action)
+    if not (isinstance(made, tuple | list) and len(made) == 5):
+        n = len(made) if isinstance(made, tuple | list) else 1
+        raise UnusableStepError(
+            "env.step must return five values, (observation, reward, terminated, truncated, info),"
+            f" got {n}{_OLD_API}"
+        )
+    seen, reward, terminated, truncated, info = made
+    return seen, reward, terminated, truncated, info
 
 
 def own_copy(value: Any) -> Any:
@@ -160,9 +211,7 @@ class OneEnvironment(EnvironmentAdapter):
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
         """Begin its episode."""
-        return {
-            i: own_copy(self._env.reset(seed=seed, options=options)[0]) for i, seed in seeds.items()
-        }
+        return {i: own_copy(reset_env(self._env, seed, options)) for i, seed in seeds.items()}
 
     def step(self, actions: Sequence[Any]) -> list[StepResult]:
         """Take the only action."""
@@ -171,9 +220,9 @@ class OneEnvironment(EnvironmentAdapter):
     def step_one(self, action: Any) -> StepResult:
         """Take an action."""
         taken = action.copy() if type(action) is np.ndarray else own_copy(action)
-        seen, reward, terminated, truncated, _ = self._env.step(taken)
+        seen, reward, terminated, truncated, _ = step_env(self._env, taken)
         seen = seen.copy() if type(seen) is np.ndarray else own_copy(seen)
-        return StepResult(seen, reward, bool(terminated), bool(truncated))
+        return StepResult(seen, reward, terminated, truncated)
 
 
 class _Taken:
@@ -424,8 +473,8 @@ class Episodes:
                 else longest[t]
                 for i in every
             ]
-            outcomes = self._adapter.step(actions)
-            ended = {i for i, outcome in enumerate(outcomes) if outcome.ends}
+            outcomes = [checked(outcome) for outcome in self._adapter.step(actions)]
+            ended = {i for i, one in enumerate(outcomes) if one.terminated or one.truncated}
             for i, episode in present.items():
                 if t < n_rounds - 1 or i not in waiting:
                     episode.observation = outcomes[i].observation

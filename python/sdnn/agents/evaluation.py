@@ -12,7 +12,15 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents.episode import EVALUATION, UnusableStepError, episode_seed, reward_of
+from sdnn.agents.episode import (
+    EVALUATION,
+    StepResult,
+    UnusableStepError,
+    checked,
+    episode_seed,
+    reset_env,
+    step_env,
+)
 from sdnn.agents.spaces import require_same_kind, require_single
 from sdnn.arguments import has_methods, seed_of, whole
 
@@ -97,7 +105,7 @@ def evaluate(
         If an argument cannot be used, such as ``episodes`` below 1, or the environment's spaces are
         not the agent's.
     UnusableStepError
-        If an observation or a reward cannot be used, or rewards do not add up to a finite number: a
+        If a step or reset cannot be used, or rewards do not add up to a finite number: a
         `ValueError` that names step and episode.
     """
     has_methods("agent", agent, "an agent", "act")
@@ -145,7 +153,7 @@ def greedy_episode(
     UnusableStepError as of `evaluate`.
     """
     own = None if seed is None else episode_seed(seed, EVALUATION, number)
-    observation, _ = env.reset(seed=own, options=options)
+    observation = reset_env(env, own, options)
     n_steps, total, terminated, truncated = 0, 0.0, False, False
 
     def unusable(problem: object) -> UnusableStepError:
@@ -160,12 +168,13 @@ def greedy_episode(
             action = agent.act(observation, explore=False)
         except ValueError as error:
             raise unusable(error) from error
-        observation, reward, terminated, truncated, _ = env.step(action)
+        *outcome, _ = step_env(env, action)
         n_steps += 1
         try:
-            total += reward_of(reward)
+            observation, reward, terminated, truncated = checked(StepResult(*outcome))
         except ValueError as error:
             raise unusable(error) from error
+        total += reward
         if not math.isfinite(total):
             raise unusable(f"rewards of env must add up to a finite number, got {total}")
-        yield GreedyEpisode(n_steps, total, bool(terminated))
+        yield GreedyEpisode(n_steps, total, terminated)

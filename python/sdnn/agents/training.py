@@ -23,7 +23,7 @@ from sdnn.agents.episode import (
     StepResult,
     Transition,
     UnusableStepError,
-    reward_of,
+    checked,
 )
 from sdnn.agents.evaluation import evaluate
 from sdnn.agents.files import SavedTraining, read_training, write_training
@@ -235,8 +235,8 @@ class Training:
         KeyboardInterrupt
             After the step in which it came and the callbacks' ``on_end``; a second one at once.
         UnusableStepError
-            If an observation or a reward cannot be learned: a `ValueError` that names step and
-            episode.
+            If an observation, a reward, ``terminated`` or ``truncated`` cannot be used: a
+            `ValueError` that names step and episode. If `reset` or `step` returns something else.
         RuntimeError
             If an error of a callback left a step of this training half done before.
         """
@@ -271,8 +271,8 @@ class Training:
             while not (self.is_finished or self._stops):
                 self.is_within_step = True
                 try:
-                    i, episode, outcome = next(outcomes)
-                    self._learn_step(i, episode, outcome)
+                    i, episode, given = next(outcomes)
+                    outcome = self._learn_step(i, episode, given)
                 except Exception:
                     self._episodes.leave()
                     self.is_within_step = False
@@ -374,12 +374,12 @@ class Training:
             f" {episode.number}{whose}): {error}"
         )
 
-    def _learn_step(self, i: int, episode: Episode, outcome: StepResult) -> None:
-        next_observation, reward, terminated, truncated = outcome
-        ends = terminated or (truncated and not self.limit_bootstraps)
+    def _learn_step(self, i: int, episode: Episode, outcome: StepResult) -> StepResult:
+        """Learn an outcome and return it, checked."""
         try:
-            if type(reward) is not float:
-                reward = reward_of(reward)
+            outcome = checked(outcome)
+            next_observation, reward, terminated, truncated = outcome
+            ends = terminated or (truncated and not self.limit_bootstraps)
             step = Transition(episode.observation, episode.action, reward, next_observation, ends)
             self.agent.learn(step, **self._place[i])
         except (ValueError, OverflowError) as error:
@@ -387,6 +387,7 @@ class Training:
         episode.observation, episode.outcome = next_observation, None
         episode.sum_of_rewards += reward
         self.n_steps += 1
+        return outcome
 
     def _note_step(self, i: int, episode: Episode, outcome: StepResult) -> Exception | None:
         """Count what ends with the step, evaluate where it is due, and call the callbacks.

@@ -11,7 +11,16 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector.utils import concatenate, create_empty_array, iterate
 
-from sdnn.agents.episode import EnvironmentAdapter, Options, Seeds, StepResult
+from sdnn.agents.episode import (
+    EnvironmentAdapter,
+    Options,
+    Seeds,
+    StepResult,
+    UnusableStepError,
+    reset_env,
+    step_env,
+)
+from sdnn.arguments import array_of
 
 __all__ = ["vector_adapter"]
 
@@ -33,9 +42,12 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         """Return the outcomes, and what is observed after resets in the same step."""
         space = self._env.single_action_space
         batch: Any = create_empty_array(space, self.n_environments)
-        observations, rewards, terminated, truncated, infos = self._env.step(
-            concatenate(space, actions, batch)
+        observations, rewards, terminated, truncated, infos = step_env(
+            self._env, concatenate(space, actions, batch)
         )
+        rewards = self._column("reward", rewards, "fiub", "numbers")
+        terminated = self._column("terminated", terminated, "b", "bools")
+        truncated = self._column("truncated", truncated, "b", "bools")
         seen = self._listed(observations)
         last = list(seen)
         if self._mode == "SAME_STEP":
@@ -47,10 +59,23 @@ class _Vector(EnvironmentAdapter, abc.ABC):
                     )
                 last[i] = copy.deepcopy(infos["final_obs"][i])
         outcomes = [
-            StepResult(last[i], rewards[i], bool(terminated[i]), bool(truncated[i]))
+            StepResult(last[i], rewards[i], terminated[i], truncated[i])
             for i in range(self.n_environments)
         ]
         return outcomes, seen
+
+    def _column(self, name: str, values: Any, kinds: str, what: str) -> list[Any]:
+        """Return one value for each environment; UnusableStepError if there are others."""
+        what = f"{self.n_environments} {what}"
+        try:
+            column = array_of(name, values, kinds, what)
+        except ValueError as error:
+            raise UnusableStepError(f"env.step must return arrays: {error}") from None
+        if column.shape != (self.n_environments,):
+            raise UnusableStepError(
+                f"env.step must return arrays: {name} must be {what}, got shape {column.shape}"
+            )
+        return column.tolist()
 
     def _listed(self, observations: Any) -> list[Any]:
         # A copy: some vector environments write to the same array again.
@@ -70,7 +95,7 @@ class _SeparateResets(_Vector):
         # Without the option where it is not needed: some wrappers have complete resets only.
         options = None if mask.all() else {"reset_mask": mask}
         listed: Any = [seeds.get(i) for i in range(self.n_environments)]
-        observations, _ = self._env.reset(seed=listed, options=options)
+        observations = reset_env(self._env, listed, options)
         seen = self._listed(observations)
         return {i: seen[i] for i in seeds}
 
@@ -90,7 +115,7 @@ class _OwnResets(_Vector):
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
         if self._seen is None:
-            observations, _ = self._env.reset(seed=seeds[0])
+            observations = reset_env(self._env, seeds[0], None)
             self._seen = self._listed(observations)
         elif self._mode != "SAME_STEP":
             return {}

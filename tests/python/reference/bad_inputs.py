@@ -69,6 +69,34 @@ BAD = {
     "a class": lambda: int,
 }
 
+HOSTILE = {
+    "10**5000": lambda: 10**5000,
+    "a number as NumPy text": lambda: np.str_("1"),
+    "masked array": lambda: np.ma.masked_array([0.1, 0.2], [False, True]),
+    "datetime64": lambda: np.datetime64("2020-01-01", "D"),
+    "array of datetime64": lambda: np.array(["2020-01-01", "2020-01-02"], "M8[D]"),
+    "a column": lambda: np.zeros((2, 1)),
+    "a list in itself": lambda: endless(),
+    "lists 100,000 deep": lambda: deep(list),
+    "tuples 100,000 deep": lambda: deep(tuple),
+}
+
+
+def endless():
+    """A list that contains itself."""
+    made = []
+    made.append(made)
+    return made
+
+
+def deep(kind, levels=100_000):
+    """Lists in lists, or tuples in tuples, beyond the depth at which Python gives up."""
+    made = kind()
+    for _ in range(levels):
+        made = kind([made])
+    return made
+
+
 SPACES = {
     "Text": lambda: gym.spaces.Text(3),
     "Sequence": lambda: gym.spaces.Sequence(gym.spaces.Discrete(2)),

@@ -1,0 +1,116 @@
+"""What an environment returns from `step` and `reset` is as the interface says, or refused."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from bad_inputs import BAD, HOSTILE
+from sdnn.agents import RBFQLearning, UnusableStepError, evaluate
+
+PARTS = ("reward", "terminated", "truncated")
+OTHERS = {
+    "a list": [False],
+    "an array": np.array([False]),
+    "a word": "False",
+    "0-d": np.array(False),
+}
+NUMBERS = {"-1", "0", "0.5", "2**20", "2**31", "2**63", "-2**63", "True", "0-d", "an array"}
+"""Rewards; larger ones are numbers, too, but cannot be learned."""
+
+
+class Point(gym.Env):
+    """Stays where it is for four steps; its third step, or its reset, is what a test gives."""
+
+    observation_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
+    action_space = gym.spaces.Discrete(2)
+
+    def __init__(self, change=lambda made: made, change_reset=lambda made: made):
+        self._change, self._change_reset = change, change_reset
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self._n = 0
+        return self._change_reset((np.zeros(2), {}))
+
+    def step(self, action):
+        self._n += 1
+        made = (np.zeros(2), 1.0, False, self._n == 4, {})
+        return self._change(made) if self._n == 3 else made
+
+
+class Points(gym.vector.VectorEnv):
+    """Two points that never end; each step is what a test makes of it."""
+
+    metadata = {"autoreset_mode": "Disabled"}  # noqa: RUF012
+    num_envs = 2
+    single_observation_space = Point.observation_space
+    single_action_space = Point.action_space
+    observation_space = gym.spaces.Box(-1.0, 1.0, (2, 2), np.float64)
+    action_space = gym.spaces.MultiDiscrete([2, 2])
+
+    def __init__(self, **given):
+        self._given = given
+
+    def reset(self, *, seed=None, options=None):
+        return np.zeros((2, 2)), {}
+
+    def step(self, actions):
+        columns = {"reward": np.zeros(2), **dict.fromkeys(PARTS[1:], np.zeros(2, bool))}
+        return np.zeros((2, 2)), *(columns | self._given).values(), {}
+
+
+def trained(env):
+    observations = getattr(env, "single_observation_space", env.observation_space)
+    actions = getattr(env, "single_action_space", env.action_space)
+    return RBFQLearning(observations, actions, seed=1).train(env, steps=20)
+
+
+def evaluated(env):
+    return evaluate(RBFQLearning(env.observation_space, env.action_space, seed=1), env, 2)
+
+
+def with_value(part, value):
+    place = 1 + PARTS.index(part)
+    return lambda made: (*made[:place], value, *made[place + 1 :])
+
+
+def bad_values(part):
+    good = NUMBERS if part == "reward" else {"True"}
+    listed = {word: make() for word, make in (BAD | HOSTILE).items()} | OTHERS
+    return {word: value for word, value in listed.items() if word not in good}
+
+
+@pytest.mark.parametrize("use", [trained, evaluated])
+@pytest.mark.parametrize("part", PARTS)
+def test_what_is_no_reward_and_no_end_is_refused_with_its_step(part, use):
+    for word, value in bad_values(part).items():
+        if part == "reward" and use is evaluated and word in ("1e308", "-1e308"):
+            continue  # which add up to a finite number
+        with pytest.raises(UnusableStepError, match=rf"step 3 of .*\b{part}\b"):
+            use(Point(with_value(part, value)))
+
+
+@pytest.mark.parametrize("part", PARTS[1:])
+def test_bools_of_numpy_end_an_episode_as_those_of_python(part):
+    for use in (trained, evaluated):
+        assert use(Point(with_value(part, np.True_))) is not None
+    assert evaluated(Point(with_value(part, np.True_))).lengths.tolist() == [3, 3]
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_columns_of_a_vector_have_a_value_for_each_environment(part):
+    for word, value in bad_values(part).items():
+        for given in (value, [value] * 3 if word == "0-d" else [value] * 2):
+            with pytest.raises(UnusableStepError, match=rf"\b{part}\b"):
+                trained(Points(**{part: given}))
+    assert trained(Points(**{part: [False, False]})).n_steps == 20
+
+
+@pytest.mark.parametrize("use", [trained, evaluated])
+def test_the_old_interface_is_named(use):
+    for n in (1, 4, 6):
+        with pytest.raises(UnusableStepError, match=rf"five values.* got {n}\b.*Gym before 0\.26"):
+            use(Point(lambda made, n=n: (made * 2)[:n]))
+    for first in (np.zeros(2), (np.zeros(2),), (np.zeros(2), None), (0.0, 0.0)):
+        with pytest.raises(UnusableStepError, match=r"observation, info.*Gym before 0\.26"):
+            use(Point(change_reset=lambda made, first=first: first))
