@@ -19,7 +19,9 @@ import time
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from io import StringIO
+from itertools import chain
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -55,6 +57,9 @@ _ABANDONED_SECONDS = 60
 """After which a file under way is nobody's, where files cannot be locked."""
 
 _PIECE_CHARACTERS = 2**20
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""With which cells begin that a spreadsheet runs, but for numbers."""
+_NUMBER = re.compile(r"[+-]?\.?\d[\d.]*(e[+-]?\d+)?")
 _GZIP = 31
 """A window of 2**15 bytes, with the header of gzip."""
 
@@ -163,7 +168,10 @@ def _sync_folder(folder: Path) -> None:
 
 
 def csv_bytes(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
-    """Return a table as comma-separated values, UTF-8, one line feed after each row."""
+    """Return a table as comma-separated values, UTF-8, one line feed after each row.
+
+    A text that a spreadsheet would run as a formula gets an apostrophe before it; numbers do not.
+    """
     return b"".join(csv_pieces(header, rows))
 
 
@@ -171,14 +179,19 @@ def csv_pieces(header: Sequence[str], rows: Iterable[Sequence[object]]) -> Itera
     """Yield the same in pieces, for tables that fill the memory."""
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    for row in rows:
-        writer.writerow(row)
+    for row in chain([header], rows):
+        writer.writerow([_harmless(cell) if isinstance(cell, str) else cell for cell in row])
         if text.tell() >= _PIECE_CHARACTERS:
             yield text.getvalue().encode()
             text.seek(0)
             text.truncate()
     yield text.getvalue().encode()
+
+
+@lru_cache
+def _harmless(text: str) -> str:
+    is_formula = text.startswith(_FORMULA) and not _NUMBER.fullmatch(text)
+    return f"'{text}" if is_formula else text
 
 
 def gzip_pieces(pieces: Iterable[bytes]) -> Iterator[bytes]:

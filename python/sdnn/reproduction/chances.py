@@ -156,7 +156,7 @@ class SettledClaim:
             return self.best.verdict
         if self.chance.value >= ALWAYS:
             return Verdict.HOLDS
-        return Verdict.FAILS if self.chance.value <= NEVER else Verdict.CHANCE
+        return Verdict.FAILS if self.chance.value <= NEVER else Verdict.INCONCLUSIVE
 
 
 def decide(

@@ -16,7 +16,7 @@ a hundred, leave three claims undecided:
 - more trials of the same settings overrule fewer;
 - a claim that these leave undecided, too, is judged by how often ten of them show it, as the
   paper's ten did (`sdnn.reproduction.chances`): it holds if 95 % of the draws or more show it, does
-  not hold if 5 % or fewer do, and is a matter of *chance* in between.
+  not hold if 5 % or fewer do, and is *inconclusive* in between: it depends on the seeds.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class Median:
         words = f"{self.measure.replace('_', ' ')}: {self.subject}"
         if self.other is None:
             return words
-        return f"{words} less {str(self.other).removeprefix(f'{title_of(self.subject.agent)}, ')}"
+        return f"{words} minus {str(self.other).removeprefix(f'{title_of(self.subject.agent)}, ')}"
 
     @property
     def subjects(self) -> tuple[Subject, ...]:
@@ -191,7 +191,7 @@ class Verdict(Enum):
 
     HOLDS = "holds"
     FAILS = "does not hold"
-    CHANCE = "a matter of chance"
+    INCONCLUSIVE = "inconclusive"
     UNDECIDED = "undecided"
     NOT_JUDGED = "not judged"
     NOT_RUN = "not run"

@@ -59,8 +59,7 @@ CHANCE_NOTE = (
     "Ten trials show it: in how many draws of ten of these trials, as the paper's ten were one, the"
     " medians lie in all ranges of the claim. What these trials leave undecided holds if"
     f" {100 * ALWAYS:.0f} % of the draws or more show it, does not hold if {100 * NEVER:.0f} % or"
-    " fewer do, and is a matter of chance in between: what ten trials then show says nothing for or"
-    " against the paper."
+    " fewer do, and is inconclusive in between: what ten trials show then depends on their seeds."
 )
 POWER_NOTE = (
     "What more trials would say, by drawing so many from those that are there,"
@@ -68,13 +67,13 @@ POWER_NOTE = (
 )
 COST_NOTE = (
     "Median time of a step (acting in a new random state and learning the transition to it, without"
-    " the environment) with the quartiles of rounds, and how often longer than with one input less."
+    " the environment) with the quartiles of rounds, and its ratio to that with one input fewer."
 )
 
 _SHOWN = {
     Verdict.HOLDS: ("good", "hold"),
     Verdict.FAILS: ("bad", "do not hold"),
-    Verdict.CHANCE: ("open", "are a matter of chance with ten trials"),
+    Verdict.INCONCLUSIVE: ("open", "inconclusive"),
     Verdict.UNDECIDED: ("open", "undecided"),
     Verdict.NOT_JUDGED: ("none", "not judged"),
     Verdict.NOT_RUN: ("none", "not judged"),

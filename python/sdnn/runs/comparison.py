@@ -44,7 +44,7 @@ MIN_TRIALS_TO_DIFFER = 6
 """Fewer paired trials are all on one side by chance more often than once in twenty times."""
 
 DIFFERENCE_NOTE = (
-    "Differences are paired: a trial less the reference's trial of the same number, which has the"
+    "Differences are paired: a trial minus the reference's trial of the same number, which has the"
     f" same seed; the mean over trials with its {PERCENT} bootstrap interval over trials, censored"
     f" episodes as the last one. * marks intervals without 0 over at least {MIN_TRIALS_TO_DIFFER}"
     " trials; where nothing differs, about one in twenty of them does so by chance."
@@ -199,7 +199,7 @@ def _case_sections(comparison: Comparison) -> Iterator[Section]:
         ]  # fmt: skip
         header = ("variant", "agent", "trials", *end, *words, *MEASURE_END)
         yield Section(table=Table(case.title, header, rows))
-        title = f"{case.title}: less {comparison.study.reference}, trial by trial"
+        title = f"{case.title}: minus {comparison.study.reference}, trial by trial"
         compared = [m for m in measured if m.differences]
         rows = [(m.variant.title, *(_difference(m, n) for n in names)) for m in compared]
         if rows:
@@ -217,7 +217,7 @@ def _measures(comparison: Comparison) -> Section:
     """Explain the measures shown, and which variants are the same."""
     found, study = comparison.measured.values(), comparison.study
     copies = ((v.id, study.same_as(v.id)) for v in study.variants)
-    notes = [f"{variant} is the same as {first}." for variant, first in copies if first]
+    notes = [f"The variant {variant} is the same as {first}." for variant, first in copies if first]
     notes += [DIFFERENCE_NOTE] if any(m.differences for m in found) else []
     notes += [SOLVED_NOTE] if any(m.solved_at_end is not None for m in found) else []
     shown = {name for m in found for name in m.result.values}

@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import json
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
@@ -39,6 +40,9 @@ NOTE = (
 MEASURE_END = ("decisions", "us/decision")
 """Header of the last `measure_cells`."""
 
+_MARKUP = re.compile(r"[\\`*_#<|~&@]|\](?=[(\[:])|:(?=//)|(?<=www)\.", re.IGNORECASE)
+"""What a Markdown text may not hold as it is; brackets may, where they make no link."""
+
 
 @dataclass(frozen=True)
 class Table:
@@ -66,7 +70,7 @@ class Table:
     def to_markdown(self) -> str:
         """Write header and rows as lines of Markdown."""
         rows = [self.header, ("---",) * len(self.header), *self.rows]
-        texts = (" | ".join(cell.replace("|", "\\|") for cell in row) for row in rows)
+        texts = (" | ".join(map(markdown_text, row)) for row in rows)
         return "".join(f"| {text} |\n" for text in texts)
 
 
@@ -145,12 +149,13 @@ class Page:
 
     def to_markdown(self) -> str:
         """Write it without figures."""
-        lines = [f"# {self.title}", "", self.intro, ""]
+        lines = [f"# {markdown_text(self.title)}", "", markdown_text(self.intro), ""]
         for warning in self.warnings:
-            lines += [f"**{warning}**", ""]
+            lines += [f"**{markdown_text(warning)}**", ""]
         for table in self.tables:
-            lines += [f"## {table.title}", "", table.to_markdown()]
-        return "\n".join([*lines, *(f"- {note}" for note in self.notes), "", self.source, ""])
+            lines += [f"## {markdown_text(table.title)}", "", table.to_markdown()]
+        lines += [f"- {markdown_text(note)}" for note in self.notes]
+        return "\n".join([*lines, "", markdown_text(self.source), ""])
 
     def to_html(self, call: str) -> str:
         """Make it one self-contained HTML page; `call` says how it came about."""
@@ -172,6 +177,15 @@ class Finished:
     page: Page | None = None
     files: tuple[Path, ...] = ()
     table: dict[str, Any] = field(default_factory=dict)
+
+
+def markdown_text(text: str) -> str:
+    r"""Write a text for a line of Markdown, in which it can be no markup, HTML or link.
+
+    >>> markdown_text("<b> [1, 2] | [a](b)")
+    '\\<b> [1, 2] \\| [a\\](b)'
+    """
+    return _MARKUP.sub(r"\\\g<0>", " ".join(text.split()))
 
 
 def require_jinja() -> None:

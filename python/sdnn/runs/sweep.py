@@ -99,7 +99,7 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Finishe
         "figure.svg": svg,
         "results.md": page.to_markdown().encode(),
         "table.json": json_bytes(table),
-        "trials.csv": csv_pieces(*_trial_table(comparison)),
+        "trials.csv": csv_pieces(*trial_table(comparison)),
         "results.csv.gz": gzip_pieces(csv_pieces(("variant", *ROW_HEADER), tests)),
         "report.html": page.to_html(call).encode(),
     }
@@ -109,7 +109,7 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Finishe
     return Finished(outcome, page, tuple(files), table)
 
 
-def _trial_table(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
+def trial_table(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
     """Header and rows of the measures of each trial; what a task does not have is empty."""
     found = comparison.measured.items()
     names = list(dict.fromkeys(name for _, one in found for name in one.result.values))

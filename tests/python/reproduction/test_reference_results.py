@@ -120,8 +120,8 @@ def test_chances_need_trials_of_every_subject():
         ("undecided", "holds", 0.5, "holds"),
         ("holds", "does not hold", 0.5, "does not hold"),  # more trials overrule fewer
         ("undecided", "undecided", 0.95, "holds"),
-        ("undecided", "undecided", 0.94, "a matter of chance"),
-        ("undecided", "undecided", 0.06, "a matter of chance"),
+        ("undecided", "undecided", 0.94, "inconclusive"),
+        ("undecided", "undecided", 0.06, "inconclusive"),
         ("undecided", "undecided", 0.05, "does not hold"),
         ("not judged", "holds", 1.0, "not judged"),
         ("not run", "holds", 1.0, "not run"),
@@ -235,17 +235,17 @@ def test_reports_tell_what_reference_results_say(fake_results):
     tables = report.page(picture).tables
     rows = next(table.rows for table in tables if table.title == "With more trials")
     ends = next(row for row in rows if row[0] == "2")
-    assert ends[5] == "a matter of chance"
+    assert ends[5] == "inconclusive"
     assert ends[6].startswith("3")  # 0.377: six good trials among ten
     checks = rows[rows.index(ends) + 1 : rows.index(ends) + 3]
     assert [row[3:6] for row in checks] == [
         ("20", "27 [4, 50]", "undecided"), ("20", "4 [4, 4]", "holds")
     ]  # fmt: skip
     told = next(one for one in report.to_json()["claims"] if one["number"] == 2)
-    assert (told["verdict"], told["decided"]) == ("holds", "a matter of chance")
+    assert (told["verdict"], told["decided"]) == ("holds", "inconclusive")
     page = report.page(picture).to_html("")
     assert "root seed 7" in page
-    assert "<b>1</b>are a matter of chance with ten trials" in page
+    assert "<b>1</b>inconclusive" in page
 
 
 def test_only_more_trials_of_the_same_settings_are_shown(monkeypatch, tmp_path, fake, use_trial):

@@ -123,7 +123,7 @@ def test_what_only_lasts_longer_does_not_differ(study):
     tables = {table.title: table.rows for table in page_of(found).tables}
     rows = tables["Case I: 4 inputs, no noise"]
     assert [row[6] for row in rows] == [">1000 [>1000, >1000]", ">3000 [>3000, >3000]"]
-    (row,) = tables["Case I: 4 inputs, no noise: less short, trial by trial"]
+    (row,) = tables["Case I: 4 inputs, no noise: minus short, trial by trial"]
     assert not any("*" in cell for cell in row)
     png, _ = figure_bytes(draw_study(found, "footer"))
     assert png.startswith(b"\x89PNG")
@@ -339,15 +339,15 @@ def test_tables_have_a_row_for_each_variant_in_each_case(mixed):
     # The tie rule of c is that of a: the same trials.
     assert [row[0] for row in rows] == ["a", "b", "c"]
     assert rows[0][:5] == ("a", "SDNN-C", "2", "2 of 2", "10 [10, 10]")
-    header, rows = tables["A pendulum: less a, trial by trial"]
+    header, rows = tables["A pendulum: minus a, trial by trial"]
     assert header == ("variant", "final return", "mean return")
     assert rows == [
         ("b", "+10 [+10, +10]", "+10 [+10, +10]"), ("c", "0 [0, 0]", "0 [0, 0]"),
     ]  # fmt: skip
-    assert "c is the same as a." in page_of(mixed).notes
+    assert "The variant c is the same as a." in page_of(mixed).notes
     assert page_of(mixed).warnings == []
     text = page_of(mixed).to_markdown()
-    assert text.startswith("# Both | kinds\n\n3 variants in 2 cases, 2 trials each; reference: a.")
+    assert text.startswith("# Both \\| kinds\n\n3 variants in 2 cases, 2 trials each; reference:")
     assert "| b | +10 [+10, +10] | +10 [+10, +10] |" in text
 
 

@@ -1,0 +1,144 @@
+"""Names out of a stranger's store or study do no harm in tables, pages and figures."""
+
+import csv
+import json
+from html.parser import HTMLParser
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from markdown_it import MarkdownIt
+
+from sdnn.files import csv_bytes
+from sdnn.reproduction.studies import add_claims
+from sdnn.runs.comparison import compare, study_json, study_page
+from sdnn.runs.figures import draw_study, figure_bytes
+from sdnn.runs.report import Folded, Page, Section, Table
+from sdnn.runs.sweep import trial_table
+from sdnn.runs.trial import TrialRecord, TrialRows
+
+FRAGMENTS = (
+    "=1+1", "+2", "-3", "@SUM(A1)", "=cmd|' /C calc'!A0", "\t=4", "|", "\\", "`", "*", "_", "~~",
+    "<script>alert(1)</script>", "<img src=x onerror=y>", "<!--", "&lt;", "\"'>", "](http://x.de)",
+    "[a]", "![i]", "[r]: http://x.de", "http://x.de", "www.x.de", "a@x.de", "{{ 7 * 7 }}", "{% x",
+    "#", "$x$", "\n", "- ", "1. ", " ", "n",
+)  # fmt: skip
+NAMES = st.lists(st.sampled_from(FRAGMENTS), min_size=1, max_size=6).map("".join).filter(str.strip)
+HARMLESS_TAGS = {
+    "strong", "h1", "h2", "p", "ul", "li", "table", "thead", "tbody", "tr", "th", "td",
+}  # fmt: skip
+WORST = "=1|<script>x</script> [a](http://x.de) *b* `c` {{ 1 }}"
+
+
+class Tags(HTMLParser):
+    """The elements, attributes and texts of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.attributes, self.texts = [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        self.attributes += attributes
+
+    def handle_data(self, data):
+        self.texts.append(" ".join(data.split()))
+
+
+def plain(name):
+    return " ".join(name.split())
+
+
+def table_of(name):
+    return Table(name, ("what", name), [(name, "1"), ("b", name)], {name: "good"})
+
+
+@settings(max_examples=40, deadline=None)
+@given(NAMES)
+@example(WORST)
+def test_no_cell_of_a_csv_file_is_a_formula(name):
+    header, *rows = csv.reader(
+        csv_bytes([name], [[name], [-1.5], ["-1.5"]]).decode().splitlines(True)
+    )
+    assert rows[1:] == [["-1.5"], ["-1.5"]]
+    for (cell,) in (header, rows[0]):
+        assert cell.removeprefix("'") == name
+        assert not cell.startswith(("=", "+", "-", "@", "\t", "\r")) or float(cell)
+
+
+@settings(max_examples=40, deadline=None)
+@given(NAMES)
+@example(WORST)
+def test_markdown_shows_names_as_they_are(name):
+    page = Page(
+        title=name, intro=f"About {name}", warnings=[name], source=f"From {name}",
+        sections=[Section(table=table_of(name), notes=[f"About {name}"], terms={"a": name})],
+    )  # fmt: skip
+    rendered = Tags(MarkdownIt("gfm-like", {"linkify": False}).render(page.to_markdown()))
+    assert set(rendered.tags) <= HARMLESS_TAGS, page.to_markdown()
+    assert rendered.tags.count("td") == 4
+    assert rendered.texts.count(plain(name)) >= 5
+
+
+@settings(max_examples=40, deadline=None)
+@given(NAMES)
+@example(WORST)
+def test_html_shows_names_as_they_are(name):
+    table = table_of(name)
+    page = Page(
+        title=name, intro=name, warnings=[name], source=name,
+        sections=[
+            Section(picture=b"<svg/>", alt=name, table=table, notes=[name], terms={name: name}),
+            Section(tally=[("good", 1, name)], title=name),
+            Section(folded=[Folded(summary=name, aside=name, note=name, text=name, table=table)]),
+        ],
+    )  # fmt: skip
+    plain_page = Page(**{**vars(page), **dict.fromkeys(("title", "intro", "source"), "n")})
+    found = Tags(page.to_html(name))
+    assert found.tags == Tags(plain_page.to_html("n")).tags
+    assert {"script", "a"}.isdisjoint(found.tags)
+    assert [value for key, value in found.attributes if key == "alt"] == [name]
+    assert not [key for key, _ in found.attributes if key.startswith("on")]
+    assert sum(plain(name) in text for text in found.texts) >= 12
+
+
+@pytest.mark.parametrize("name", [WORST, "$\\frac{", "&<>\"'", "=1+1", "-x|\\"])
+def test_a_study_of_hostile_names(study, name):
+    mine = study(
+        f"[study]\ntitle = {json.dumps(name)}\ntrials = 2\n"
+        f"[cases.mine]\ntitle = {json.dumps(name)}\n"
+        f"[variants.{json.dumps(name)}]\n[variants.other]\ntitle = {json.dumps(name)}\n"
+        "learning.discount = 0.5\n"
+    )
+    records = [
+        TrialRecord(
+            key=key, config=mine.combinations[pair].spec.canonical_json(), version=name,
+            n_decisions=1, seconds=1.0, finished_at=name, rows=rows_of_tests(),
+        )
+        for pair in mine.combinations
+        for key in mine.keys(*pair)
+    ]  # fmt: skip
+    comparison = compare(mine, records)
+    _, svg = figure_bytes(draw_study(comparison, name))
+    assert "script" not in {element.tag for element in ElementTree.fromstring(svg).iter()}
+    page = study_page(comparison, "abc", add_claims(comparison), svg)
+    assert "script" not in Tags(page.to_html("")).tags
+    markdown = MarkdownIt("gfm-like", {"linkify": False}).render(page.to_markdown())
+    assert set(Tags(markdown).tags) <= HARMLESS_TAGS
+    assert json.loads(json.dumps(study_json(comparison, "abc", add_claims(comparison))))
+    table = csv_bytes(*trial_table(comparison)).decode()
+    cells = {cell for row in csv.reader(table.splitlines(True)) for cell in row}
+    assert {cell for cell in cells if cell.startswith(("=", "+", "-", "@", "\t"))} == set()
+    assert name in {cell.removeprefix("'") for cell in cells}
+
+
+def rows_of_tests():
+    return TrialRows.of_tests(
+        episode=10 * np.arange(1, 21, dtype=np.int32),
+        steps=np.full(20, 4, np.int32),
+        episode_return=np.zeros(20),
+        solved=np.ones(20, bool),
+    )
