@@ -10,6 +10,7 @@ against accidents. Files are data and run no code, whoever wrote them.
 from __future__ import annotations
 
 import csv
+import errno
 import json
 import os
 import re
@@ -23,7 +24,7 @@ from functools import lru_cache
 from io import StringIO
 from itertools import chain
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +42,11 @@ __all__ = [
     "csv_bytes",
     "csv_pieces",
     "gzip_pieces",
+    "is_there",
     "lock",
     "open_regular",
+    "open_to_append",
+    "read_bytes",
     "read_file",
     "remove_abandoned_files",
     "whole_file",
@@ -56,6 +60,12 @@ _NAME_OF_PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial$")
 _ABANDONED_SECONDS = 60
 """After which a file under way is nobody's, where files cannot be locked."""
 
+_FOLDERS_OF_DEVICES = tuple(map(Path, ("/dev", "/dev/fd", "/proc/self/fd")))
+"""What is named there, such as ``/dev/stdout``, is written to under its own name."""
+
+_NO_LINK = getattr(os, "O_NOFOLLOW", 0)
+_NO_WAITING = getattr(os, "O_NONBLOCK", 0)
+
 _PIECE_CHARACTERS = 2**20
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """With which cells begin that a spreadsheet runs, but for numbers."""
@@ -68,19 +78,18 @@ _GZIP = 31
 def whole_file(path: Path) -> Iterator[BinaryIO]:
     """Open a new file in the same folder; at the end it takes the place of ``path``.
 
-    Its name is one that nobody can foresee. A link stays one, to the new file. A device or a pipe
-    is written to, under its own name.
+    Its name is one that nobody can foresee. A link or a pipe of the name ``path`` is replaced:
+    nothing is written to where it leads.
 
     Raises
     ------
     OSError
         If the file cannot be written; one that was there before stays as it was.
     """
-    if path.exists() and not (path.is_file() or path.is_dir()):
+    if path.absolute().parent in _FOLDERS_OF_DEVICES:
         with path.open("wb") as device:
             yield device
         return
-    path = Path(os.path.realpath(path)) if path.is_symlink() else path
     file = _new_file(path)
     partial = Path(file.name)
     try:
@@ -119,12 +128,49 @@ def open_regular(path: Path, max_bytes: int) -> BinaryIO:
         return file
     file.close()
     if stat.S_ISREG(status.st_mode):
-        raise OSError(f"{path} has {status.st_size} bytes, expected at most {max_bytes}")
-    raise OSError(f"{path} is not a regular file")
+        problem = f"must have at most {max_bytes} bytes, has {status.st_size}"
+        raise OSError(errno.EFBIG, problem, str(path))
+    raise OSError(errno.EINVAL, "must be a regular file", str(path))
 
 
 def _open_at_once(name: str, flags: int) -> int:
-    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
+    return os.open(name, flags | _NO_WAITING)
+
+
+def read_bytes(path: Path, max_bytes: int) -> bytes:
+    """Read a regular file that may have so many bytes; OSError as of `open_regular`."""
+    with open_regular(path, max_bytes) as file:
+        return file.read(os.fstat(file.fileno()).st_size)
+
+
+def open_to_append(path: Path) -> TextIO:
+    """Open a regular file, made if it is not there, for lines at its end.
+
+    OSError if it cannot be opened, or is a link, a folder, a device or a pipe.
+    """
+    file: TextIO = open(  # noqa: SIM115
+        path, "a", opener=_open_itself, encoding="utf-8", newline="\n", buffering=1
+    )
+    if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        return file
+    file.close()
+    raise OSError(errno.EINVAL, "must be a regular file", str(path))
+
+
+def _open_itself(name: str, flags: int) -> int:
+    """Open a file, and not what a link leads to; never wait for the reader of a pipe."""
+    return os.open(name, flags | _NO_LINK | _NO_WAITING, 0o666)
+
+
+def is_there(path: Path) -> bool:
+    """Whether a regular file has this name; OSError for a link, a folder, a device or a pipe."""
+    try:
+        mode = path.lstat().st_mode
+    except FileNotFoundError:
+        return False
+    if not stat.S_ISREG(mode):
+        raise OSError(errno.EINVAL, "must be a regular file, not even a link", str(path))
+    return True
 
 
 def lock(descriptor: int) -> bool | None:
@@ -148,7 +194,7 @@ def _new_file(path: Path) -> BinaryIO:
     """Create the file under way, locked while it is open, so that nobody thinks it abandoned."""
     while True:
         name = f"{path.name}.{secrets.token_hex(8)}{PARTIAL_SUFFIX}"
-        file = path.with_name(name).open("xb")  # O_EXCL, which follows no link either
+        file = path.with_name(name).open("xb")  # O_EXCL, which follows no link
         # Another process may have removed it before it was locked.
         if lock(file.fileno()) is not False and os.path.exists(file.name):
             return file
@@ -208,7 +254,7 @@ def remove_abandoned_files(folder: Path) -> None:
         if not _NAME_OF_PARTIAL.search(path.name):
             continue
         with suppress(OSError):  # another process may have removed it, or given it its own name
-            with path.open("rb+") as file:
+            with open(path, "rb+", opener=_open_itself) as file:
                 is_abandoned = lock(file.fileno())
                 if is_abandoned:
                     path.unlink()

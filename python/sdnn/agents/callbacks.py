@@ -11,7 +11,7 @@ from statistics import median
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from sdnn.arguments import path_of, real, whole
-from sdnn.files import write_whole
+from sdnn.files import open_to_append, read_bytes, write_whole
 from sdnn.progress import ProgressBars
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ __all__ = [
     "StopTrainingOnRewardThreshold",
     "TensorBoard",
 ]
+
+MOST_BYTES_OF_ROWS = 2**32
 
 _STEPS_BETWEEN = 64
 """Between two readings of the clock of a training's bar, which cost more than a step."""
@@ -69,9 +71,10 @@ class JSONLines(Callback):
         """Begin the file, or keep as many lines as the training had rows."""
         lines: list[bytes] = []
         if training.n_rows and self.path.exists():
-            lines = self.path.read_bytes().splitlines(keepends=True)[: training.n_rows]
+            content = read_bytes(self.path, MOST_BYTES_OF_ROWS)
+            lines = content.splitlines(keepends=True)[: training.n_rows]
         write_whole(self.path, lines)
-        self._file = self.path.open("a", encoding="utf-8", newline="\n", buffering=1)
+        self._file = open_to_append(self.path)
 
     def on_row(self, training: Training, row: Row) -> None:
         """Write a line."""

@@ -6,7 +6,8 @@ import ast
 import operator
 import re
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -15,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sdnn import _core
+from sdnn.files import read_bytes
 
 __all__ = [
     "LibsdnnInput",
@@ -26,6 +28,10 @@ __all__ = [
 
 Library = Literal["msvc", "libstdc++"]
 
+MOST_BYTES = 2**20  # of parameters
+MOST_BYTES_OF_MODEL = 2**31
+MOST_ITEMS = 100_000  # of a list, and tags around each other
+MOST_PAIRS = 1_000_000
 MOST_DRAWN = 2**27  # flips and 64-unit words of code tables: some seconds
 
 OPERATORS: dict[type, Callable[..., float]] = {
@@ -37,6 +43,15 @@ OPERATORS: dict[type, Callable[..., float]] = {
     ast.UAdd: operator.pos,
     ast.USub: operator.neg,
 }
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Name the file in errors about its content."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
 
 
 def number_of(text: str, what: str) -> float:
@@ -75,10 +90,22 @@ def items_of(text: str, what: str) -> list[str]:
     if not (text.startswith("[") and text.endswith("]")):
         raise ValueError(f"{what} must be a list in brackets, got {text[:80]!r}")
     found: list[str] = []
-    for item in re.split(r",(?![^(]*\))", text[1:-1]):
+    for item in split_outside_brackets(text[1:-1]):
         content, colon, times = item.partition(":")
-        found += [content] * (whole_of(times, f"repeats of {what}", 1, 100000) if colon else 1)
+        found += [content] * (whole_of(times, f"repeats of {what}", 1, MOST_ITEMS) if colon else 1)
+        if len(found) > MOST_ITEMS:
+            raise ValueError(f"{what} must have at most {MOST_ITEMS} items")
     return found
+
+
+def split_outside_brackets(text: str) -> list[str]:
+    """Split at commas that are in no brackets."""
+    depth, commas = 0, [-1]
+    for found in re.finditer(r"[(),]", text):
+        depth += {"(": 1, ")": -1, ",": 0}[found[0]]
+        if found[0] == "," and depth == 0:
+            commas.append(found.start())
+    return [text[i + 1 : j] for i, j in zip(commas, [*commas[1:], len(text)], strict=True)]
 
 
 class Entries(dict[str, str]):
@@ -91,20 +118,20 @@ class Entries(dict[str, str]):
             stripped = re.sub(r"[\s{\0]", "", line.partition("%")[0])
             if "<" in stripped:
                 tags.append(stripped.strip("<>"))
+                if len(tags) > 10:
+                    raise ValueError(f"line {number}: more than 10 tags within each other")
             elif "}" in stripped:
                 if not tags:
-                    raise ValueError(f"{path}, line {number}: }} without a tag")
+                    raise ValueError(f"line {number}: }} without a tag")
                 tags.pop()
             elif "=" in stripped:
                 name, _, value = stripped.partition("=")
                 self["/".join([*tags, name])] = value
             elif stripped:
-                raise ValueError(
-                    f"{path}, line {number}: must be a tag or name = value, got {line[:80]!r}"
-                )
+                raise ValueError(f"line {number}: must be a tag or name = value, got {line[:80]!r}")
 
     def __missing__(self, name: str) -> str:
-        raise ValueError(f"{self.path} must have the entry {name.replace('/', ' / ')}")
+        raise ValueError(f"it must have the entry {name.replace('/', ' / ')}")
 
     def one_of(self, name: str, default: str, *others: str) -> str:
         """Return an entry that is one of some words."""
@@ -253,13 +280,17 @@ class LibsdnnModel:
 def read_parameter_file(path: str | Path) -> LibsdnnParameters:
     """Read a parameter file.
 
-    Raises ValueError if it is not one, lacks an entry, or uses codes by correlation matrix.
+    Raises ValueError if it is not one, lacks an entry, or uses codes by correlation matrix; OSError
+    if it cannot be read or is not a regular file.
     """
     path = Path(path)
-    return _parameters(path.read_text("latin-1"), path)
+    with naming(path):
+        return _parameters(read_bytes(path, MOST_BYTES).decode("latin-1"), path)
 
 
-def read_model_file(path: str | Path, library: Library = "msvc") -> LibsdnnModel:
+def read_model_file(
+    path: str | Path, library: Library = "msvc", *, memory_limit: int = 2**27
+) -> LibsdnnModel:
     """Read a model file: parameters as text, then thresholds and weights.
 
     Parameters
@@ -268,37 +299,48 @@ def read_model_file(path: str | Path, library: Library = "msvc") -> LibsdnnModel
     library : {"msvc", "libstdc++"}
         The C++ library of the program that wrote it, which decides the tables of a seed. LIBSDNN's
         own programs are "msvc"; built with GCC they are "libstdc++".
+    memory_limit : int
+        Bytes that the patterns may take, which the file does not hold.
 
     Raises
     ------
+    OSError
+        If it cannot be read or is not a regular file.
     ValueError
         For another kind of file, a wrong size, or weights too large for exact sums.
     """
     path = Path(path)
-    content = path.read_bytes()
-    length = struct.unpack_from("<i", content)[0] if len(content) >= 4 else -1
-    if not 0 < length <= len(content) - 4:
-        raise ValueError(f"{path} must begin with the length of its parameters, got {length}")
-    parameters = _parameters(content[4 : 4 + length].decode("latin-1"), path)
-    n_units = parameters.n_output_units
-    n_columns = len(parameters.pairs) * parameters.n_units
-    expected = 4 * n_units * (n_columns + 1)
-    if len(content) - 4 - length != expected:
-        raise ValueError(
-            f"{path} must have {expected} bytes of weights for {n_units} units of {n_columns} "
-            f"columns, got {len(content) - 4 - length}"
-        )
-    rows = np.frombuffer(content, "<i4", offset=4 + length).reshape(n_units, n_columns + 1)
-    try:
-        layer = _core.ParallelPerceptron(
-            parameters.make_code(library),
-            n_units,
-            weights=np.ascontiguousarray(rows[:, 1:], dtype=np.int32),
-            thresholds=np.ascontiguousarray(rows[:, 0], dtype=np.int32),
-        )
-    except OverflowError as error:
-        raise ValueError(f"{path} cannot be used: {error}") from None
-    return LibsdnnModel(parameters=parameters, layer=layer)
+    with naming(path):
+        content = read_bytes(path, MOST_BYTES_OF_MODEL)
+        length = struct.unpack_from("<i", content)[0] if len(content) >= 4 else -1
+        if not 0 < length <= len(content) - 4:
+            raise ValueError(f"it must begin with the length of its parameters, got {length}")
+        parameters = _parameters(content[4 : 4 + length].decode("latin-1"), path)
+        n_units = parameters.n_output_units
+        n_columns = len(parameters.pairs) * parameters.n_units
+        expected = 4 * n_units * (n_columns + 1)
+        if len(content) - 4 - length != expected:
+            raise ValueError(
+                f"it must have {expected} bytes of weights for {n_units} units of {n_columns} "
+                f"columns, got {len(content) - 4 - length}"
+            )
+        n_bins = sum(parameters.inputs[index].n_bins for pair in parameters.pairs for index in pair)
+        if n_bins * parameters.n_units > memory_limit:
+            raise ValueError(
+                f"it needs {n_bins * parameters.n_units} bytes for {n_bins} patterns of"
+                f" {parameters.n_units} units, more than memory_limit={memory_limit}"
+            )
+        rows = np.frombuffer(content, "<i4", offset=4 + length).reshape(n_units, n_columns + 1)
+        try:
+            layer = _core.ParallelPerceptron(
+                parameters.make_code(library),
+                n_units,
+                weights=np.ascontiguousarray(rows[:, 1:], dtype=np.int32),
+                thresholds=np.ascontiguousarray(rows[:, 0], dtype=np.int32),
+            )
+        except OverflowError as error:
+            raise ValueError(f"it cannot be used: {error}") from None
+        return LibsdnnModel(parameters=parameters, layer=layer)
 
 
 def _input(text: str, n_units: int) -> LibsdnnInput:
@@ -319,14 +361,20 @@ def _input(text: str, n_units: int) -> LibsdnnInput:
 def _pairs(entries: Entries, n_inputs: int) -> tuple[tuple[int, int], ...]:
     method = entries.one_of("SDNN/SD/combination_setting", "mutual", "saved", "file")
     if method == "mutual":
+        if n_inputs * (n_inputs - 1) > MOST_PAIRS:
+            raise ValueError(f"mutual combinations of {n_inputs} inputs are more than {MOST_PAIRS}")
         return tuple((i, j) for i in range(n_inputs) for j in range(n_inputs) if i != j)
     if method == "saved":
         lines = [item.strip("()") for item in entries.list_of("SDNN/SD/line", "[(0,1),(1,0)]")]
     else:
-        file = entries.path.parent / entries.get("SDNN/SD/filename", "")
-        if not file.is_file():
-            raise ValueError(f"SDNN/SD/filename must be a file beside {entries.path}, got {file}")
-        lines = file.read_text("latin-1").split()
+        name = entries.get("SDNN/SD/filename", "")
+        try:
+            if Path(name).name != name:
+                raise FileNotFoundError(f"not a name: {name!r}")
+            content = read_bytes(entries.path.parent / name, MOST_BYTES)
+        except OSError as error:
+            raise ValueError(f"SDNN/SD/filename must be a file beside it: {error}") from error
+        lines = content.decode("latin-1").split()
     pairs = []
     for line in lines:
         inputs = line.split(",")
@@ -335,7 +383,7 @@ def _pairs(entries: Entries, n_inputs: int) -> tuple[tuple[int, int], ...]:
         mu, nu = (whole_of(item, "an input of a combination", 0, n_inputs - 1) for item in inputs)
         pairs.append((mu, nu))
     if not pairs:
-        raise ValueError(f"{entries.path} must combine at least one pair of inputs")
+        raise ValueError("it must combine at least one pair of inputs")
     return tuple(pairs)
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from sdnn.files import read_bytes
 from sdnn.runs.errors import ConfigError
 
 if sys.version_info >= (3, 11):
@@ -18,6 +19,9 @@ else:
     import tomli as tomllib
 
 __all__ = ["ConfigFile", "KeyPath", "dotted"]
+
+MOST_BYTES = 2**20
+"""Of a file of settings."""
 
 KeyPath: TypeAlias = tuple[str | int, ...]
 """Keys from the top of a document to a value; elements of arrays are numbers from 0."""
@@ -53,8 +57,10 @@ class ConfigFile:
         path = Path(path)
         is_toml = path.suffix == ".toml"
         try:
-            text = path.read_bytes().decode()
+            text = read_bytes(path, MOST_BYTES).decode()
             values = tomllib.loads(text) if is_toml else json.loads(text)
+        except RecursionError:
+            raise ConfigError("", "must be nested less deeply", str(path)) from None
         except OSError as error:
             raise ConfigError("", error.strerror or str(error), str(path)) from error
         except ValueError as error:

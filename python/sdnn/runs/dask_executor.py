@@ -21,6 +21,8 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from sdnn import _core
+from sdnn.files import read_bytes
+from sdnn.runs.config_file import MOST_BYTES
 from sdnn.runs.dask_worker import PROBE_CALL, PROGRESS_TOPIC, probe, run_on_worker
 from sdnn.runs.engine import Advanced, Failed, Finished, Lost, Message, Noted, PlannedTrial, Started
 from sdnn.runs.errors import ClusterError, WorkerLostError
@@ -104,9 +106,7 @@ class DaskExecutor:
         deadline = time.monotonic() + self.scheduler_timeout
         while not stop.is_set():
             try:
-                address, path = self.scheduler, Path(self.scheduler)
-                if path.suffix == ".json" or path.is_file():
-                    address = json.loads(path.read_text())["address"]
+                address = self._address()
                 left = max(0.1, deadline - time.monotonic())
                 return Client(address, timeout=min(CONNECT_SECONDS, left), set_as_default=False)
             except OSError as error:
@@ -119,12 +119,27 @@ class DaskExecutor:
                     is_noted = True
                     yield Noted(f"waiting for the scheduler at {self.scheduler}")
                 stop.wait(WORKERS_SECONDS)
-            except (ValueError, KeyError, TypeError) as error:
-                raise ClusterError(
-                    f"scheduler must be an address or a scheduler file, got {self.scheduler}"
-                    f" ({type(error).__name__}: {error})"
-                ) from error
+            except ValueError as error:
+                raise self._refusal(error) from error
         return None
+
+    def _address(self) -> str:
+        """Return the address, from a scheduler file if it is one; OSError if it is not there."""
+        path = Path(self.scheduler)
+        if path.suffix != ".json" and not path.is_file():
+            return self.scheduler
+        try:
+            return str(json.loads(read_bytes(path, MOST_BYTES))["address"])
+        except FileNotFoundError:  # it may come
+            raise
+        except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
+            raise self._refusal(error) from error
+
+    def _refusal(self, error: Exception) -> ClusterError:
+        return ClusterError(
+            f"scheduler must be an address or a scheduler file, got {self.scheduler}"
+            f" ({type(error).__name__}: {error})"
+        )
 
 
 @contextmanager

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
 import signal
 import threading
 import time
@@ -35,7 +34,7 @@ from sdnn.agents import (
 from sdnn.agents.callbacks import Row
 from sdnn.agents.spaces import require_same_kind
 from sdnn.arguments import whole
-from sdnn.files import lock, remove_abandoned_files, write_whole
+from sdnn.files import lock, open_to_append, remove_abandoned_files, write_whole
 from sdnn.interrupts import Interrupts
 from sdnn.runs.config_file import ConfigFile
 from sdnn.runs.engine import PlannedTrial, SerialExecutor, run_trials
@@ -310,13 +309,10 @@ class Run:
     @contextmanager
     def _locked(self) -> Iterator[None]:
         """Keep other processes from training the same run; a killed one's lock is gone with it."""
-        file = os.open(self.folder / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
-        try:
-            if lock(file) is False:
+        with open_to_append(self.folder / LOCK) as file:
+            if lock(file.fileno()) is False:
                 raise RunError(f"{self.folder} is being trained by another process")
             yield
-        finally:
-            os.close(file)
 
 
 class _Target(StopTrainingOnRewardThreshold):
@@ -493,7 +489,12 @@ class RunTask:
 
 
 def tensorboard_in(folder: Path) -> TensorBoard:
-    """Make the callback that writes for TensorBoard; ConfigError if its package is missing."""
+    """Make the callback that writes for TensorBoard.
+
+    ConfigError if its package is missing, or its folder is a link to another one.
+    """
+    if (folder / TENSORBOARD).is_symlink():
+        raise ConfigError("output.tensorboard", f"{folder / TENSORBOARD} must not be a link")
     try:
         return TensorBoard(folder / TENSORBOARD)
     except ImportError as error:

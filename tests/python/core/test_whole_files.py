@@ -103,28 +103,29 @@ def test_a_file_removed_before_it_was_locked_is_made_again(tmp_path, monkeypatch
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a system of POSIX")
-def test_links_and_pipes_stay_what_they_are(tmp_path):
-    target, link, pipe = tmp_path / "target", tmp_path / "link", tmp_path / "pipe"
+def test_links_and_pipes_are_replaced(tmp_path):
+    target = tmp_path / "target"
     target.write_bytes(b"old")
-    link.symlink_to(target)
-    write_whole(link, b"new")
-    assert link.is_symlink()
-    assert target.read_bytes() == b"new"
-    os.mkfifo(pipe)
-    read = []
-    reader = threading.Thread(target=lambda: read.append(pipe.read_bytes()))
-    reader.start()
-    write_whole(pipe, b"through")
-    reader.join()
-    assert read == [b"through"]
-    assert pipe.is_fifo()
+    names = [tmp_path / name for name in ("link", "dangling", "pipe", "device")]
+    names[0].symlink_to(target)
+    names[1].symlink_to(tmp_path / "nothing")
+    os.mkfifo(names[2])  # without a reader, for which writing would wait
+    names[3].symlink_to("/dev/null")
+    for path in names:
+        write_whole(path, b"new")
+        assert not path.is_symlink()
+        assert path.read_bytes() == b"new"
+    assert target.read_bytes() == b"old"
+    assert len(list(tmp_path.iterdir())) == 5
+
+
+def test_devices_are_written_to_under_their_own_names():
     ends = os.pipe()
-    if Path(f"/dev/fd/{ends[1]}").exists():  # as /dev/stdout: a link to no name
-        write_whole(Path(f"/dev/fd/{ends[1]}"), b"through, too")
-        assert os.read(ends[0], 100) == b"through, too"
+    if Path(f"/dev/fd/{ends[1]}").exists():  # as /dev/stdout
+        write_whole(Path(f"/dev/fd/{ends[1]}"), b"through")
+        assert os.read(ends[0], 100) == b"through"
     for end in ends:
         os.close(end)
-    assert len(list(tmp_path.iterdir())) == 3
 
 
 def test_two_writers_of_one_file_leave_one_of_their_files(tmp_path):

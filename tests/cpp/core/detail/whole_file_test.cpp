@@ -32,15 +32,20 @@ TEST(WholeFile, IsThereWhenItIsFinished) {
   EXPECT_EQ(folder.n_files(), 1U);
 }
 
-TEST(WholeFile, ALinkStaysOne) {
+TEST(WholeFile, ALinkIsReplaced) {
   const testing::Folder folder;
   testing::write_content(folder / "target", "before");
   std::filesystem::create_symlink(folder / "target", folder / "link");
-  WholeFile file(folder / "link");
-  write(file, "after");
-  file.finish();
-  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
-  EXPECT_EQ(testing::content_of(folder / "target"), "after");
+  std::filesystem::create_symlink(folder / "nothing", folder / "dangling");
+  for (const char* name : {"link", "dangling"}) {
+    WholeFile file(folder / name);
+    write(file, "after");
+    file.finish();
+    EXPECT_FALSE(std::filesystem::is_symlink(folder / name));
+    EXPECT_EQ(testing::content_of(folder / name), "after");
+  }
+  EXPECT_EQ(testing::content_of(folder / "target"), "before");
+  EXPECT_EQ(folder.n_files(), 3U);
 }
 
 TEST(WholeFile, ADeviceIsWrittenTo) {

@@ -29,8 +29,9 @@
 
 namespace sdnn::core {
 
-/// A file that is written under another name in the same folder, and gets its own at the end. What
-/// is no file but a device or a pipe is written to.
+/// A file that is written under another name in the same folder, and gets its own at the end. A
+/// link or a pipe of its name is replaced: nothing is written to where it leads. What is named in
+/// /dev, such as /dev/stdout, is written to.
 ///
 /// `write` may be called many times; `finish` makes the file be there. Without it, or after an
 /// error, what was there before stays, and nothing else is left. Throws std::runtime_error naming
@@ -39,7 +40,7 @@ namespace sdnn::core {
 class WholeFile {
  public:
   explicit WholeFile(const std::filesystem::path& path)
-      : path_(target_of(path)), partial_(path_), is_special_(is_special(path_)) {
+      : path_(path), partial_(path), is_special_(is_special(path)) {
     if (!is_special_) partial_ += partial_suffix();
 #if SDNN_HAS_POSIX_FILES
     const int how = is_special_ ? O_TRUNC : O_CREAT | O_EXCL | O_NOFOLLOW;
@@ -98,21 +99,11 @@ class WholeFile {
   }
 
  private:
-  /// What a link leads to: the link stays.
-  static std::filesystem::path target_of(const std::filesystem::path& path) {
-    std::error_code ignored;
-    if (!std::filesystem::is_symlink(path, ignored)) return path;
-    const auto target = std::filesystem::weakly_canonical(path, ignored);
-    return ignored ? path : target;
-  }
-
-  /// Whether it is a device or a pipe, which cannot get another file in its place.
+  /// Whether it is a name of a device, which cannot get a file in its place.
   static bool is_special(const std::filesystem::path& path) {
     std::error_code ignored;
-    const auto kind = std::filesystem::status(path, ignored).type();
-    using std::filesystem::file_type;
-    return kind == file_type::character || kind == file_type::block || kind == file_type::fifo ||
-           kind == file_type::socket;
+    const auto folder = std::filesystem::absolute(path, ignored).lexically_normal().parent_path();
+    return folder == "/dev" || folder == "/dev/fd" || folder == "/proc/self/fd";
   }
 
   /// One that nobody can foresee.
