@@ -15,7 +15,7 @@ a hundred, leave three claims undecided:
 
 - more trials of the same settings overrule fewer;
 - a claim that these leave undecided, too, is judged by how often ten of them show it, as the
-  paper's ten did (`sdnn.reproduction.chances`): it holds if 95 % of the draws or more show it, does
+  paper's ten did (`TenTrials`): it holds if 95 % of the draws or more show it, does
   not hold if 5 % or fewer do, and is *inconclusive* in between: it depends on the seeds.
 """
 
@@ -23,8 +23,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cache, reduce
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -34,6 +35,7 @@ from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS
 from sdnn.reproduction.cost import CostConfig, CostRecord
 from sdnn.runs.registry import cost_series, title_of
 from sdnn.runs.results import (
+    BOOTSTRAP_SEED,
     SHARE_STABLE,
     Estimate,
     FloatArray,
@@ -42,7 +44,17 @@ from sdnn.runs.results import (
     estimate_contrast,
     json_number,
     on_equal_terms,
+    tails,
 )
+
+N_DRAWS = 10_000
+_N_RESAMPLES, _N_DRAWS_OF_EACH = 200, 250
+
+MULTIPLES = (2, 4, 8, 16, 32)
+"""Numbers of trials whose power is estimated, as multiples of those that are there."""
+
+N_POWER_DRAWS = 200
+_N_MEDIANS = 1000
 
 EQUAL_STEPS = 2.0  # by which two agents that do "almost the same" may differ
 
@@ -244,16 +256,33 @@ class CheckOutcome:
 
 @dataclass(frozen=True)
 class ClaimOutcome:
-    """A claim with its checks' outcomes."""
+    """A claim with its checks' outcomes, and what more trials say of it, if there are any.
+
+    `chance` is the share of draws of ten trials, from the most there are, in which it is shown.
+    """
 
     claim: Claim
     checks: tuple[CheckOutcome, ...]
+    more: ClaimOutcome | None = None
+    chance: Estimate | None = None
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict about the whole claim, by the rule of this module."""
+        """The verdict by these checks alone."""
         verdicts = {outcome.verdict for outcome in self.checks}
         return next((verdict for verdict in _DECISIVE if verdict in verdicts), Verdict.HOLDS)
+
+    @property
+    def decided(self) -> Verdict:
+        """The verdict by the whole rule of this module."""
+        if self.verdict in (Verdict.NOT_JUDGED, Verdict.NOT_RUN):
+            return self.verdict
+        best = (self.more or self).verdict
+        if best is not Verdict.UNDECIDED or self.chance is None:
+            return best
+        if self.chance.value >= ALWAYS:
+            return Verdict.HOLDS
+        return Verdict.FAILS if self.chance.value <= NEVER else Verdict.INCONCLUSIVE
 
     def to_json(self) -> dict[str, Any]:
         """Return it as values that JSON can hold."""
@@ -266,17 +295,25 @@ class ClaimOutcome:
 
 
 def judge_claims(
-    measured: Iterable[TrialMeasures], costs: Sequence[CostRecord] = ()
+    measured: Iterable[TrialMeasures],
+    costs: Sequence[CostRecord] = (),
+    reference: Iterable[TrialMeasures] = (),
 ) -> tuple[ClaimOutcome, ...]:
     """Judge the claims that the given results speak about, at least in part.
 
-    A case that experiments share may come more than once.
+    A case that experiments share may come more than once. Beside each claim comes what more trials
+    say, if all that it speaks of is among the reference results.
     """
     by_subject = {Subject(one.case_id, one.agent): one for one in measured}
-    outcomes = (
-        ClaimOutcome(claim, tuple(_judge(check, by_subject, costs) for check in claim.checks))
-        for claim in CLAIMS
-    )
+    more = {Subject(one.case_id, one.agent): one for one in reference}
+    draws = TenTrials(more.values())
+    outcomes = []
+    for claim in CLAIMS:
+        own = ClaimOutcome(claim, tuple(_judge(one, by_subject, costs) for one in claim.checks))
+        better = ClaimOutcome(claim, tuple(_judge(one, more, ()) for one in claim.checks))
+        if better.verdict is not Verdict.NOT_RUN:
+            own = replace(own, more=better, chance=draws.chance(claim))
+        outcomes.append(own)
     return tuple(o for o in outcomes if any(check.estimate is not None for check in o.checks))
 
 
@@ -284,25 +321,114 @@ def _judge(
     check: Check, measured: Mapping[Subject, TrialMeasures], costs: Sequence[CostRecord]
 ) -> CheckOutcome:
     quantity = check.quantity
-    samples: tuple[FloatArray, ...] = ()
-    last_episode = PAPER_EPISODES
     if isinstance(quantity, Growth):
         times = {c.n_inputs: c.microseconds for c in costs if c.series == quantity.series}
         if not {quantity.n_inputs, quantity.n_fewer} <= times.keys():
             return CheckOutcome(check, None, Verdict.NOT_RUN)
         estimate = estimate_contrast(times[quantity.n_inputs], times[quantity.n_fewer], np.divide)
         is_full = all(one.config_hash == CostConfig().config_hash for one in costs)
-    else:
-        if not measured.keys() >= set(quantity.subjects):
-            return CheckOutcome(check, None, Verdict.NOT_RUN)
-        found = [measured[subject] for subject in quantity.subjects]
-        samples = quantity.samples(measured)
-        estimate = (
-            estimate_contrast(samples[0], samples[1])
-            if quantity.other
-            else found[0].medians[quantity.measure]
+        return CheckOutcome(
+            check, estimate, verdict_of(check, estimate) if is_full else Verdict.NOT_JUDGED
         )
-        is_full = all(map(is_paper_scale, found))
-        last_episode = min(one.last_episode for one in found)
-    verdict = verdict_of(check, estimate) if is_full else Verdict.NOT_JUDGED
-    return CheckOutcome(check, estimate, verdict, samples, last_episode)
+    if not measured.keys() >= set(quantity.subjects):
+        return CheckOutcome(check, None, Verdict.NOT_RUN)
+    found = [measured[subject] for subject in quantity.subjects]
+    samples = quantity.samples(measured)
+    estimate = estimate_contrast(*samples) if quantity.other else found[0].medians[quantity.measure]
+    verdict = verdict_of(check, estimate) if all(map(is_paper_scale, found)) else Verdict.NOT_JUDGED
+    return CheckOutcome(check, estimate, verdict, samples, min(one.last_episode for one in found))
+
+
+class TenTrials:
+    """Experiments of ten trials, drawn from more, with replacement: all claims share the draws.
+
+    The paper's ten trials are one draw. A draw shows a claim if the medians lie in the ranges of
+    all its checks, so a claim that the trials leave undecided has a chance, too. This takes the
+    trials for ones like those to come.
+    """
+
+    def __init__(self, measured: Iterable[TrialMeasures]) -> None:
+        self._measured = {Subject(one.case_id, one.agent): one for one in measured}
+        self._draws = cache(self._draw)
+        self._met = cache(self._is_met)
+
+    def chance(self, *claims: Claim) -> Estimate | None:
+        """Return in which share of the draws all the claims are shown.
+
+        The interval is a bootstrap over the trials that are drawn from. It is None where trials of
+        one that a claim speaks of are missing, or a claim is about costs.
+        """
+        checks = [check for claim in claims for check in claim.checks]
+        for quantity in (check.quantity for check in checks):
+            if not isinstance(quantity, Median) or set(quantity.subjects) - self._measured.keys():
+                return None
+        met = zip(*map(self._met, checks), strict=True)
+        drawn, redrawn = (np.logical_and.reduce(arrays) for arrays in met)
+        lower, upper = tails(redrawn.mean(axis=1))
+        return Estimate(float(drawn.mean()), float(lower), float(upper))
+
+    def _draw(self, subject: Subject) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Draw from the trials, (N_DRAWS, 10), and from resamples of them, (..., 10).
+
+        Each subject has a generator of its own, whoever else is drawn.
+        """
+        generator = np.random.default_rng([BOOTSTRAP_SEED, *str(subject).encode()])
+        size = self._measured[subject].n_trials
+        drawn = generator.integers(size, size=(N_DRAWS, PAPER_TRIALS))
+        resampled = generator.integers(size, size=(_N_RESAMPLES, size))
+        shape = (_N_RESAMPLES, _N_DRAWS_OF_EACH * PAPER_TRIALS)
+        redrawn = np.take_along_axis(resampled, generator.integers(size, size=shape), axis=1)
+        return drawn, redrawn.reshape(_N_RESAMPLES, _N_DRAWS_OF_EACH, PAPER_TRIALS)
+
+    def _is_met(self, check: Check) -> tuple[NDArray[np.bool_], ...]:
+        """Find in which draws a check is met, (N_DRAWS,), and in which of resamples."""
+        quantity = check.quantity
+        assert isinstance(quantity, Median)
+        medians = [
+            [np.median(values[drawn], axis=-1) for drawn in self._draws(subject)]
+            for subject, values in zip(
+                quantity.subjects, quantity.samples(self._measured), strict=True
+            )
+        ]
+        return tuple(
+            check.contains(reduce(np.subtract, kind)) for kind in zip(*medians, strict=True)
+        )
+
+
+@dataclass(frozen=True)
+class Power:
+    """Shares of the draws of a number of trials in which a check holds, and does not."""
+
+    n_trials: int
+    holds: float
+    fails: float
+
+
+def powers(check: Check, samples: Sequence[FloatArray]) -> tuple[Power, ...]:
+    """Draw more trials than these samples of a check, judge each draw, for each of `MULTIPLES`."""
+    found = []
+    for multiple in MULTIPLES:
+        generator = np.random.default_rng(BOOTSTRAP_SEED)
+        medians = reduce(np.subtract, [drawn_medians(one, multiple, generator) for one in samples])
+        lower, upper = tails(medians)
+        holds = (check.contains(lower) & check.contains(upper)).mean()
+        fails = check.excludes(lower, upper).mean()
+        found.append(Power(multiple * samples[0].size, float(holds), float(fails)))
+    return tuple(found)
+
+
+def drawn_medians(sample: FloatArray, multiple: int, generator: np.random.Generator) -> FloatArray:
+    """Draw trials repeatedly and return the bootstrap medians of each, (N_POWER_DRAWS, 1000).
+
+    The sorted trials of a resample lie at places that are order statistics of uniform numbers,
+    which are drawn instead of the resamples: of the middle one, and given it of the next.
+    """
+    n = multiple * sample.size
+    drawn = np.sort(sample[generator.integers(sample.size, size=(N_POWER_DRAWS, n))], axis=1)
+    middle = (n + 1) // 2
+    first = generator.beta(middle, n + 1 - middle, _N_MEDIANS)
+    low = drawn[:, (n * first).astype(np.intp)]
+    if n % 2:
+        return low
+    second = first + (1.0 - first) * generator.beta(1, n - middle, _N_MEDIANS)
+    return (low + drawn[:, (n * second).astype(np.intp)]) / 2.0

@@ -13,23 +13,20 @@ import numpy as np
 
 from sdnn import _core
 from sdnn.reproduction.cases import PAPER_EPISODES, PAPER_TRIALS, Experiment
-from sdnn.reproduction.chances import (
-    MULTIPLES,
-    N_POWER_DRAWS,
-    Power,
-    SettledClaim,
-    decide,
-    powers,
-)
 from sdnn.reproduction.claims import (
     ALWAYS,
+    MULTIPLES,
+    N_POWER_DRAWS,
     NEVER,
     CheckOutcome,
     Claim,
+    ClaimOutcome,
     Growth,
+    Power,
     Verdict,
     is_paper_scale,
     judge_claims,
+    powers,
 )
 from sdnn.reproduction.cost import CostRecord
 from sdnn.reproduction.reference_results import ReferenceResult
@@ -45,7 +42,7 @@ from sdnn.runs.report import (
     measures_section,
     settings_section,
 )
-from sdnn.runs.results import STEP_MEASURES, CaseResult, Estimate
+from sdnn.runs.results import STEP_MEASURES, CaseResult
 
 QUICK_WARNING = "QUICK LOOK: a fraction of the experiments, not their result."
 RULE_NOTE = (
@@ -100,17 +97,17 @@ class Report:
         return [result for _, results in self.experiments for result in results]
 
     @cached_property
-    def claims(self) -> tuple[SettledClaim, ...]:
+    def claims(self) -> tuple[ClaimOutcome, ...]:
         """The claims that these results speak about, with what reference results say of them."""
-        return decide(judge_claims(self.results, self.costs), self.reference)
+        return judge_claims(self.results, self.costs, self.reference)
 
     @cached_property
     def powers(self) -> tuple[tuple[Claim, CheckOutcome, tuple[Power, ...]], ...]:
         """What more trials would say of the checks that the most trials leave undecided."""
         return tuple(
-            (one.own.claim, checked, powers(checked.check, checked.samples))
+            (one.claim, checked, powers(checked.check, checked.samples))
             for one in self.claims
-            for checked in one.best.checks
+            for checked in (one.more or one).checks
             if checked.verdict is Verdict.UNDECIDED and checked.samples
         )
 
@@ -142,7 +139,7 @@ class Report:
 
     def _claim_sections(self) -> Iterator[Section]:
         if self.claims:
-            counts = tally(one.verdict for one in self.claims)
+            counts = tally(one.decided for one in self.claims)
             yield Section(tally=counts, table=_claim_table(self.claims), notes=[RULE_NOTE])
         more = _more_table(self.claims)
         if more.rows:
@@ -214,10 +211,10 @@ class Report:
             "costs": [cost.to_json() for cost in self.costs],
             "claims": [
                 {
-                    **one.own.to_json(),
+                    **one.to_json(),
                     "with_more_trials": one.more and one.more.to_json(),
-                    "ten_trials_show_it": chance_json(one.chance),
-                    "decided": one.verdict.value,
+                    "ten_trials_show_it": one.chance and one.chance.to_json(PAPER_EPISODES),
+                    "decided": one.decided.value,
                 }
                 for one in self.claims
             ],
@@ -232,29 +229,29 @@ class Report:
         }
 
 
-def _claim_table(claims: Iterable[SettledClaim]) -> Table:
+def _claim_table(claims: Iterable[ClaimOutcome]) -> Table:
     """Return the verdicts; a claim of several checks has a row of its own before theirs."""
     rows: list[tuple[str, ...]] = []
-    for own in (claim.own for claim in claims):
-        start: tuple[str, str] = (str(own.claim.number), own.claim.text)
-        if len(own.checks) > 1:
-            rows.append((*start, "", "", "", own.verdict.value))
+    for claim in claims:
+        start: tuple[str, str] = (str(claim.claim.number), claim.claim.text)
+        if len(claim.checks) > 1:
+            rows.append((*start, "", "", "", claim.verdict.value))
             start = ("", "")
-        for one in own.checks:
+        for one in claim.checks:
             words = (str(one.check.quantity), one.check.paper, format_quantity(one))
             rows.append((*start, *words, one.verdict.value))
     header = ("claim", "the paper says", "measured", "paper", "ours", "verdict")
     return Table("What the paper claims, and what our data say", header, rows, VERDICT_KINDS)
 
 
-def _more_table(claims: Iterable[SettledClaim]) -> Table:
+def _more_table(claims: Iterable[ClaimOutcome]) -> Table:
     """Return verdicts by reference results: of each claim by the whole rule, then of its checks."""
     rows: list[tuple[str, ...]] = []
     for claim in claims:
-        if claim.more is None or claim.chance is None:
+        if claim.more is None:
             continue
-        start = (str(claim.own.claim.number), claim.own.claim.text, "", "", "")
-        rows.append((*start, claim.verdict.value, format_share(claim.chance)))
+        start = (str(claim.claim.number), claim.claim.text, "", "", "")
+        rows.append((*start, claim.decided.value, format_share(claim.chance)))
         for one in claim.more.checks:
             words = (str(one.check.quantity), str(min(s.size for s in one.samples)))
             rows.append(("", "", *words, format_quantity(one), one.verdict.value, ""))
@@ -268,11 +265,6 @@ def _case_json(experiment: Experiment, result: CaseResult) -> dict[str, Any]:
     figure = next(c.paper_figure for c in experiment.cases if c.id == result.case_id)
     names = {"case": result.case_id, "title": result.title, "paper_figure": figure}
     return names | result.to_json()
-
-
-def chance_json(chance: Estimate | None) -> dict[str, float | str | None] | None:
-    """Return a chance as values that JSON can hold."""
-    return chance.to_json(PAPER_EPISODES) if chance else None
 
 
 def tally(verdicts: Iterable[Verdict]) -> list[tuple[str, int, str]]:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from sdnn.reproduction.cases import PAPER_CASES, PAPER_TRIALS
-from sdnn.reproduction.chances import TenTrials
-from sdnn.reproduction.claims import Claim, ClaimOutcome, Verdict, judge_claims
-from sdnn.reproduction.report import RULE_NOTE, VERDICT_KINDS, chance_json, format_quantity
+from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS
+from sdnn.reproduction.claims import Claim, ClaimOutcome, TenTrials, Verdict, judge_claims
+from sdnn.reproduction.report import RULE_NOTE, VERDICT_KINDS, format_quantity
 from sdnn.runs import study
 from sdnn.runs.comparison import Addition, Comparison
 from sdnn.runs.report import Folded, Section, Table, format_share
@@ -30,11 +29,9 @@ CHANCES_NOTE = (
     " medians lie in all ranges of a claim, and of all claims together; with intervals over the"
     f" trials that are drawn from. Shown from {MIN_TRIALS_TO_DRAW} trials on."
 )
-_KINDS = {
-    "-": "none",
-    **VERDICT_KINDS,
-    **{f"{word} (moved)": kind for word, kind in VERDICT_KINDS.items()},
-}
+_MOVED = " (moved)"
+_KINDS = {"-": "none", **{word + end: kind for word, kind in VERDICT_KINDS.items()
+                          for end in ("", _MOVED)}}  # fmt: skip
 
 
 def read_study(path: Path, *, n_trials: int | None = None, seed: int | None = None) -> Study:
@@ -49,20 +46,6 @@ def read_study(path: Path, *, n_trials: int | None = None, seed: int | None = No
 
 
 @dataclass(frozen=True)
-class VariantClaim:
-    """A claim of the paper about a variant."""
-
-    outcome: ClaimOutcome
-    moved: bool | None  # whether the verdict about the reference is another; None: there is none
-    chance: Estimate | None  # share of draws of ten trials that show it; None: too few trials
-
-    @property
-    def verdict(self) -> str:
-        """The verdict, and whether it moved."""
-        return self.outcome.verdict.value + (" (moved)" if self.moved else "")
-
-
-@dataclass(frozen=True)
 class StudyClaims:
     """The paper's claims about the variants of a study.
 
@@ -73,78 +56,73 @@ class StudyClaims:
     comparison: Comparison
 
     @cached_property
-    def by_variant(self) -> Mapping[str, Mapping[int, VariantClaim]]:
+    def by_variant(self) -> Mapping[str, Mapping[int, ClaimOutcome]]:
         """Claims of which every quantity is measured, by variant and number of the claim."""
-        outcomes = {
+        return {
             variant: {
-                outcome.claim.number: outcome
+                outcome.claim.number: replace(outcome, chance=self._chance(variant, outcome.claim))
                 for outcome in judge_claims(results)
                 if all(checked.estimate is not None for checked in outcome.checks)
             }
             for variant, results in self._results.items()
         }
-        reference = self.comparison.study.reference
-        of_reference = outcomes.get(reference, {})
-        return {
-            variant: {
-                number: VariantClaim(
-                    outcome,
-                    None if variant == reference else _moved(outcome, of_reference.get(number)),
-                    self._chance(variant, outcome.claim),
-                )
-                for number, outcome in of_variant.items()
-            }
-            for variant, of_variant in outcomes.items()
-        }
 
     @cached_property
     def shown(self) -> tuple[Claim, ...]:
         """The claims about any variant."""
-        claims = self.by_variant.values()
-        found = {n: one.outcome.claim for of_one in claims for n, one in of_one.items()}
+        found = {n: one.claim for own in self.by_variant.values() for n, one in own.items()}
         return tuple(found[number] for number in sorted(found))
 
-    def sections(self) -> list[Section]:
-        """Return verdicts about all claims, how often ten trials show them, and the quantities."""
-        sections = []
+    def moved(self, variant: str, outcome: ClaimOutcome) -> bool | None:
+        """Whether the verdict is not the one about the reference; None if one is missing."""
+        reference = self.comparison.study.reference
+        other = self.by_variant.get(reference, {}).get(outcome.claim.number)
+        if variant == reference or other is None:
+            return None
+        if Verdict.NOT_JUDGED in (outcome.verdict, other.verdict):
+            return None
+        return outcome.verdict is not other.verdict
+
+    def sections(self) -> Iterator[Section]:
+        """Make verdicts about all claims, how often ten trials show them, and the quantities."""
         titles = {variant.id: variant.title for variant in self.comparison.variants}
-        found = [
-            (variant, [claims.get(one.number) for one in self.shown])
-            for variant, claims in self.by_variant.items()
-        ]
         header = ("variant", *(f"claim {claim.number}" for claim in self.shown))
+        verdicts, chances = [], []
+        for variant, claims in self.by_variant.items():
+            own = [claims.get(claim.number) for claim in self.shown]
+            verdicts.append((titles[variant], *(self._verdict(variant, one) for one in own)))
+            if together := self._chance(variant, *(one.claim for one in own if one)):
+                shares = (format_share(one.chance if one else None) for one in own)
+                chances.append((titles[variant], *shares, format_share(together)))
         if self.shown:
-            rows = [(titles[v], *(c.verdict if c else "-" for c in own)) for v, own in found]
-            overview = Table("The paper's claims", header, rows, _KINDS)
-            sections.append(Section(table=overview, notes=[CLAIMS_NOTE, RULE_NOTE]))
-        chances = [
-            (titles[v], *(format_share(c.chance if c else None) for c in own), format_share(both))
-            for v, own in found
-            if (both := self._chance(v, *(c.outcome.claim for c in own if c)))
-        ]
+            table = Table("The paper's claims", header, verdicts, _KINDS)
+            yield Section(table=table, notes=[CLAIMS_NOTE, RULE_NOTE])
         if chances:
             title = "How often ten trials show the claims"
             table = Table(title, (*header, "all of these"), chances)
-            sections.append(Section(level=3, table=table, notes=[CHANCES_NOTE]))
+            yield Section(level=3, table=table, notes=[CHANCES_NOTE])
         tables = [self._details(claim, titles) for claim in self.shown]
-        sections.append(Section(folded=[Folded(summary=one.title, table=one) for one in tables]))
-        return sections
+        yield Section(folded=[Folded(summary=one.title, table=one) for one in tables])
+
+    def _verdict(self, variant: str, outcome: ClaimOutcome | None) -> str:
+        if outcome is None:
+            return "-"
+        return outcome.verdict.value + (_MOVED if self.moved(variant, outcome) else "")
 
     def _details(self, claim: Claim, titles: Mapping[str, str]) -> Table:
         rows = []
         for variant, claims in self.by_variant.items():
             if found := claims.get(claim.number):
-                checks = found.outcome.checks
-                cells = (f"{format_quantity(one)}: {one.verdict.value}" for one in checks)
-                rows.append((titles[variant], *cells, found.verdict))
+                cells = (f"{format_quantity(one)}: {one.verdict.value}" for one in found.checks)
+                rows.append((titles[variant], *cells, self._verdict(variant, found)))
         measured = (f"{one.quantity} (paper: {one.paper})" for one in claim.checks)
         header = ("variant", *measured, "verdict")
         return Table(f"Claim {claim.number}: {claim.text}", header, rows)
 
-    def _chance(self, variant_id: str, *claims: Claim) -> Estimate | None:
+    def _chance(self, variant: str, *claims: Claim) -> Estimate | None:
         if self.comparison.study.n_trials < MIN_TRIALS_TO_DRAW or not claims:
             return None
-        return self._ten_trials[variant_id].chance(*claims)
+        return self._ten_trials[variant].chance(*claims)
 
     @cached_property
     def _ten_trials(self) -> dict[str, TenTrials]:
@@ -160,23 +138,17 @@ class StudyClaims:
         return results
 
 
-def _moved(outcome: ClaimOutcome, reference: ClaimOutcome | None) -> bool | None:
-    if reference is None or Verdict.NOT_JUDGED in (outcome.verdict, reference.verdict):
-        return None
-    return outcome.verdict is not reference.verdict
-
-
 def add_claims(comparison: Comparison) -> Addition:
     """Make the addition about the paper's claims to the report of a study."""
     claims = StudyClaims(comparison)
-    told = [
+    shown = [
         {
             "variant": variant,
-            "moved": claim.moved,
-            "ten_trials_show_it": chance_json(claim.chance),
-            **claim.outcome.to_json(),
+            "moved": claims.moved(variant, one),
+            "ten_trials_show_it": one.chance and one.chance.to_json(PAPER_EPISODES),
+            **one.to_json(),
         }
-        for variant, of_variant in claims.by_variant.items()
-        for claim in of_variant.values()
+        for variant, outcomes in claims.by_variant.items()
+        for one in outcomes.values()
     ]
-    return Addition(sections=claims.sections(), json={"claims": told})
+    return Addition(sections=[*claims.sections()], json={"claims": shown})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,43 +18,44 @@ from sdnn.runs.trial import TrialKey, TrialTime, opened
 
 PROBE_SECONDS = 0.3  # processor time of a probe, about
 
+Times = dict[tuple[str, str], tuple[str, list[TrialTime]]]
+"""Times of trials by case and agent, and whether these are stored trials or a probe."""
+
 
 def forecast(request: SweepRequest) -> dict[str, Any]:
     """Count what is to be run and estimate how long it takes, without making any file.
 
-    Returns values that JSON can hold. The ``upper`` seconds are null where trials are longer than
-    those that the estimate is from: later episodes are longer where the task gets harder.
+    Returns values that JSON can hold. The ``upper`` seconds are null where the trials that they are
+    from are shorter: later episodes are longer where the task gets harder.
 
     Raises
     ------
-    ConfigError
-        If a specification is refused.
+    RunError
+        If a specification is refused, a trial that is begun to see how long it takes fails, or the
+        result file cannot be used.
     ValueError
         If there is no variant of that name.
-    StoreError
-        If the result file cannot be used.
-    RunError
-        If a trial that is begun to see how long it takes fails.
     """
-    study, plan = request.study, request.plan
+    study, n_planned = request.study, len(request.plan)
     stored: set[TrialKey] = set()
-    times: tuple[TrialTime, ...] = ()
+    times: Times = {}
     if (request.out / STORE_NAME).exists() or request.out.is_file():
         with ResultStore(request.out, read_only=True) as store:
-            stored, times = store.keys(), store.times()
+            stored = store.keys()
+            for one in store.times():
+                if one.n_episodes:
+                    times.setdefault(one.key[:2], ("stored trial", []))[1].append(one)
     study.check(stored)
-    durations = Durations(times)
-    # The size of a cluster is not known.
-    jobs = 1 if request.executor is not None else request.jobs or n_cores()
     works = []
-    seconds: dict[tuple[str, str], dict[str, Any]] = {}
+    missing: dict[TrialKey, tuple[float, bool]] = {}  # variants that are the same share trials
     for (case, variant), combination in study.combinations.items():
         if request.only and variant not in request.only:
             continue
         keys, spec = study.keys(case, variant), combination.spec
-        n_stored = sum(key in stored for key in keys)
-        if n_stored < len(keys):
-            seconds[case, spec.config_hash] = durations.of_trial(keys[0], spec)
+        left = [key for key in keys if key not in stored]
+        estimate = trial_seconds(keys[0], spec, times) if left else None
+        if estimate:
+            missing |= dict.fromkeys(left, (estimate["lower"], spec.is_compiled))
         works.append(
             {
                 "case": case,
@@ -64,20 +65,19 @@ def forecast(request: SweepRequest) -> dict[str, Any]:
                 "episodes": spec.budget.episodes,
                 "config_hash": spec.config_hash,
                 "planned": len(keys),
-                "stored": n_stored,
-                "seconds_of_a_trial": seconds.get((case, spec.config_hash)),
+                "stored": len(keys) - len(left),
+                "seconds_of_a_trial": estimate,
             }
         )
-    missing = [planned for planned in plan if planned.key not in stored]
-    found = [seconds[one.key.case_id, one.key.config_hash] for one in missing]
-    lower = wall_seconds(
-        [(one["lower"], p.spec.is_compiled) for one, p in zip(found, missing, strict=True)], jobs
-    )
-    upper = None if any(one["upper"] is None for one in found) else lower
+    # The size of a cluster is not known.
+    jobs = 1 if request.executor is not None else request.jobs or n_cores()
+    lower = wall_seconds([*missing.values()], jobs)
+    estimates = [one["seconds_of_a_trial"] for one in works if one["seconds_of_a_trial"]]
+    upper = None if any(one["upper"] is None for one in estimates) else lower
     return {
         "trials": works,
-        "planned": len(plan),
-        "stored": len(plan) - len(missing),
+        "planned": n_planned,
+        "stored": n_planned - len(missing),
         "jobs": jobs,
         "seconds": {"lower": lower, "upper": upper},
     }
@@ -91,8 +91,8 @@ def forecast_lines(found: dict[str, Any], out: Path) -> Iterator[str]:
             f" {one['episodes'] or one['steps']} {'episodes' if one['episodes'] else 'steps'} of"
             f" {one['agent']}, {one['stored']} of them stored in {out}"
         )
-        if seconds := one["seconds_of_a_trial"]:
-            text += f"; a trial takes {_words(seconds)} (by {seconds['source']})"
+        if estimate := one["seconds_of_a_trial"]:
+            text += f"; a trial takes {_words(estimate)} (by {estimate['source']})"
         yield text
     yield (
         f"in all {found['planned']} trials, {found['stored']} of them stored; the rest takes"
@@ -100,45 +100,32 @@ def forecast_lines(found: dict[str, Any], out: Path) -> Iterator[str]:
     )
 
 
-def _words(seconds: dict[str, Any]) -> str:
-    lower = seconds["lower"]
+def _words(estimate: dict[str, Any]) -> str:
+    lower = estimate["lower"]
     text = duration_words(lower) if lower >= 10 else f"{lower:.2g} s"
-    return f"{text} or more" if seconds["upper"] is None else f"about {text}"
+    return f"{text} or more" if estimate["upper"] is None else f"about {text}"
 
 
-class Durations:
-    """Estimates the processor time of trials from those of stored ones.
+def trial_seconds(key: TrialKey, spec: RunSpec, times: Times) -> dict[str, Any]:
+    """Estimate the processor time of a trial from trials of its configuration, else of its agent.
 
-    Trials of the same configuration count first, then those of the same case and agent, of these
-    the ones that are long enough. If there are none, a trial is begun.
+    If there are none of its case and agent, a trial is begun, and added to `times`.
     """
-
-    def __init__(self, times: Iterable[TrialTime]) -> None:
-        self._times = [one for one in times if one.n_episodes]
-        self._probes: dict[tuple[str, str], TrialTime] = {}
-
-    def of_trial(self, key: TrialKey, spec: RunSpec) -> dict[str, Any]:
-        """Estimate the time of a trial; a `RunError` if a probe fails."""
-        every = spec.protocol.evaluate_every_episodes or 1
-        last_test = (spec.budget.episodes or 0) // every * every
-        alike = [t for t in self._times if t.key[:2] == key[:2]]
-        same = [t for t in alike if t.key.config_hash == key.config_hash]
-        found = same or alike
-        found = [t for t in found if t.n_episodes >= last_test] or found
-        words = "this configuration" if same else "this case and agent"
-        source = f"{len(found)} stored trial{'s' if len(found) > 1 else ''} of {words}"
-        if not found:
-            if key[:2] not in self._probes:
-                self._probes[key[:2]] = _probe(key, spec)
-            found, source = [self._probes[key[:2]]], "a probe"
-        in_steps = spec.budget.steps is not None
-        amount = sum(t.n_decisions if in_steps else t.n_episodes for t in found)
-        seconds = sum(t.seconds for t in found) / amount * spec.length
-        shortest = min(t.n_episodes for t in found)
-        if shortest < last_test:
-            source += f": as in the first {shortest} episodes"
-        upper = seconds if shortest >= last_test else None
-        return {"lower": seconds, "upper": upper, "source": source}
+    if key[:2] not in times:
+        times[key[:2]] = "probe", [_probe(key, spec)]
+    kind, alike = times[key[:2]]
+    same = [one for one in alike if one.key.config_hash == key.config_hash]
+    found = same or alike
+    source = f"{len(found)} {kind}{'s' if len(found) > 1 else ''}"
+    source += f" of this {'configuration' if same else 'case and agent'}"
+    amount = sum(t.n_episodes if spec.budget.steps is None else t.n_decisions for t in found)
+    every = spec.protocol.evaluate_every_episodes or 1
+    shortest = min(one.n_episodes for one in found)
+    seconds = sum(one.seconds for one in found) / amount * spec.length
+    if shortest >= (spec.budget.episodes or 0) // every * every:
+        return {"lower": seconds, "upper": seconds, "source": source}
+    source += f": as in the first {shortest} episodes"
+    return {"lower": seconds, "upper": None, "source": source}
 
 
 def _probe(key: TrialKey, spec: RunSpec) -> TrialTime:
@@ -163,5 +150,5 @@ def wall_seconds(trials: list[tuple[float, bool]], jobs: int) -> float:
     no more jobs than cores are any help.
     """
     times = [seconds for seconds, _ in trials]
-    locked = [seconds for seconds, is_compiled in trials if not is_compiled]
-    return max(sum(times) / max(1, min(jobs, n_cores())), max(times, default=0.0), sum(locked, 0.0))
+    locked = sum(seconds for seconds, is_compiled in trials if not is_compiled)
+    return max(sum(times) / max(1, min(jobs, n_cores())), max(times, default=0.0), locked)

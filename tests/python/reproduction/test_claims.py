@@ -5,19 +5,22 @@ import numpy as np
 import pytest
 
 from sdnn.reproduction.cases import EXPERIMENTS
-from sdnn.reproduction.chances import MULTIPLES, Power, drawn_medians, powers
 from sdnn.reproduction.claims import (
     CLAIMS,
+    MULTIPLES,
     Check,
     CheckOutcome,
     Claim,
     ClaimOutcome,
     Growth,
     Median,
+    Power,
     Subject,
     Verdict,
+    drawn_medians,
     is_paper_scale,
     judge_claims,
+    powers,
     verdict_of,
 )
 from sdnn.reproduction.cost import QUICK_COST, CostConfig, CostRecord

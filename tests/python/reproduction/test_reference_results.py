@@ -16,7 +16,6 @@ from sdnn.reproduction import (
     select_experiments,
 )
 from sdnn.reproduction.cases import PAPER_EPISODES
-from sdnn.reproduction.chances import SettledClaim, TenTrials, decide
 from sdnn.reproduction.claims import (
     CLAIMS,
     Check,
@@ -26,6 +25,7 @@ from sdnn.reproduction.claims import (
     Growth,
     Median,
     Subject,
+    TenTrials,
     Verdict,
     is_paper_scale,
     judge_claims,
@@ -128,29 +128,29 @@ def test_chances_need_trials_of_every_subject():
     ],
 )
 def test_what_settles_a_claim(own, more, share, settled):
-    def outcome(word):
+    def outcome(word, **found):
         checked = CheckOutcome(CLAIMS[0].checks[0], None, Verdict(word))
-        return ClaimOutcome(CLAIMS[0], (checked,))
+        return ClaimOutcome(CLAIMS[0], (checked,), **found)
 
-    claim = SettledClaim(
-        outcome(own),
-        None if more is None else outcome(more),
-        None if share is None else Estimate(share, share, share),
+    claim = outcome(
+        own,
+        more=None if more is None else outcome(more),
+        chance=None if share is None else Estimate(share, share, share),
     )
-    assert claim.verdict == Verdict(settled)
+    assert claim.decided == Verdict(settled)
 
 
 def test_claims_are_settled_by_trials_of_all_their_subjects():
     split = [4] * 5 + [50] * 5
     ran = [measured("s4", split), measured("s6", [4] * 10)]
-    outcomes = judge_claims(ran, ())
-    assert next(o for o in outcomes if o.claim.number == 2).verdict == Verdict.UNDECIDED
     kept = [measured("s4", [4] * 15 + [50] * 5), measured("s6", [4] * 20)]
-    settled = {one.own.claim.number: one for one in decide(outcomes, kept)}
+    settled = {one.claim.number: one for one in judge_claims(ran, reference=kept)}
+    assert settled[2].verdict == Verdict.UNDECIDED
     assert settled[2].more.checks[0].estimate.value == 4
-    assert settled[2].verdict == Verdict.HOLDS
+    assert settled[2].decided == Verdict.HOLDS
     assert settled[8].more is None  # the noisy cases are missing
-    assert [one.more for one in decide(outcomes, kept[:1])] == [None] * len(outcomes)
+    alone = judge_claims(ran, reference=kept[:1])
+    assert [one.more for one in alone] == [None] * len(settled)
 
 
 def test_the_reference_results_are_of_the_papers_settings():

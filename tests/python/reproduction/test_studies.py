@@ -140,7 +140,7 @@ def test_claims_are_censored_where_their_own_trials_end(study):
     ]
     found = compare(mine, records)
     claim = StudyClaims(found).by_variant["long"][1]  # of the episodes to learn in both
-    assert [checked.last_episode for checked in claim.outcome.checks] == [3000, 5000]
+    assert [checked.last_episode for checked in claim.checks] == [3000, 5000]
     told = json_of(found)["claims"][0]
     assert [one["ours"]["value"] for one in told["checks"]] == [">3000", ">5000"]
 
@@ -219,9 +219,10 @@ def claimed_records(study, n_trials=10):
 def test_claims_are_judged_for_each_variant(study):
     mine = study(CLAIMED)
     found = compare(mine, claimed_records(mine))
+    judged = StudyClaims(found)
     verdicts = {
-        variant: {n: (c.outcome.verdict, c.moved) for n, c in claims.items()}
-        for variant, claims in StudyClaims(found).by_variant.items()
+        variant: {n: (c.verdict, judged.moved(variant, c)) for n, c in claims.items()}
+        for variant, claims in judged.by_variant.items()
     }
     assert verdicts == {
         "old": {
@@ -278,9 +279,9 @@ def test_small_runs_are_not_judged_and_claims_without_their_cases_not_shown(stud
     found = compare(mine, records)
     claims = StudyClaims(found)
     assert [claim.number for claim in claims.shown] == [3, 5, 7]
-    outcomes = [c for of_variant in claims.by_variant.values() for c in of_variant.values()]
-    assert {c.outcome.verdict for c in outcomes} == {Verdict.NOT_JUDGED}
-    assert {c.moved for c in outcomes} == {None}
+    outcomes = [(name, c) for name, own in claims.by_variant.items() for c in own.values()]
+    assert {c.verdict for _, c in outcomes} == {Verdict.NOT_JUDGED}
+    assert {claims.moved(name, c) for name, c in outcomes} == {None}
 
 
 def claimed_records_of(study, n_trials):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from sdnn.runs import AGENTS, BudgetSpec, RunSpec, TrialKey, forecast
-from sdnn.runs.forecast import Durations, wall_seconds
+from sdnn.runs.forecast import trial_seconds, wall_seconds
 from sdnn.runs.trial import TrialTime
 
 CONFIG = RunSpec(budget=BudgetSpec(episodes=1005))
@@ -18,27 +18,27 @@ def stored(seconds, n_episodes=1000, n_decisions=10_000, **changes):
     )
 
 
+def estimate(times, key=KEY, config=CONFIG):
+    return trial_seconds(key, config, {key[:2]: ("stored trial", times)})
+
+
 def test_trials_of_the_same_configuration_count_first():
-    times = [stored(2.0), stored(4.0), stored(50.0, config_hash="other"), stored(9.0, case_id="x")]
-    found = Durations(times).of_trial(KEY, CONFIG)
+    times = [stored(2.0), stored(4.0), stored(50.0, config_hash="other")]
+    found = estimate(times)
     assert found["lower"] == found["upper"] == pytest.approx(3.0 * 1.005)
     assert found["source"] == "2 stored trials of this configuration"
 
 
 def test_then_those_of_the_same_case_and_agent():
-    times = [stored(50.0, config_hash="other"), stored(9.0, agent="fuzzy")]
-    found = Durations(times).of_trial(KEY, CONFIG)
+    found = estimate([stored(50.0, config_hash="other")])
     assert found["lower"] == found["upper"] == pytest.approx(50.25)
     assert found["source"] == "1 stored trial of this case and agent"
 
 
-def test_shorter_trials_give_the_least_and_count_only_without_whole_ones():
-    short = stored(1.0, n_episodes=100, n_decisions=1000)
-    found = Durations([short]).of_trial(KEY, CONFIG)
+def test_shorter_trials_give_the_least():
+    found = estimate([stored(1.0, n_episodes=100, n_decisions=1000)])
     assert (found["lower"], found["upper"]) == (pytest.approx(10.05), None)
     assert "as in the first 100 episodes" in found["source"]
-    with_whole = Durations([short, stored(3.0)]).of_trial(KEY, CONFIG)
-    assert with_whole["upper"] == pytest.approx(3.0 * 1.005)
 
 
 def test_a_probe_is_made_once_for_a_case_and_agent(fake, monkeypatch):
@@ -56,16 +56,16 @@ def test_a_probe_is_made_once_for_a_case_and_agent(fake, monkeypatch):
     clock = [0.0]
     monkeypatch.setattr(forecast.time, "thread_time", lambda: clock[0])
     monkeypatch.setitem(AGENTS, "sdnn-c", replace(AGENTS["sdnn-c"], core_trial=Probed))
-    durations = Durations([stored(1.0, n_episodes=0)])
-    found = durations.of_trial(KEY, CONFIG)
+    times = {("s4", "fuzzy"): ("stored trial", [stored(9.0, agent="fuzzy")])}
+    found = trial_seconds(KEY, CONFIG, times)
     # 10 episodes in 0.1 s: 0.3 s are reached after 30 or 40.
     assert found["lower"] == pytest.approx(10.05)
     assert found["upper"] is None
-    assert found["source"].startswith("a probe: as in the first ")
+    assert found["source"].startswith("1 probe of this configuration: as in the first ")
     whole = CONFIG.replace(budget=BudgetSpec(episodes=20))
-    assert durations.of_trial(KEY._replace(config_hash="other"), whole) == {
-        "lower": pytest.approx(0.2), "upper": pytest.approx(0.2), "source": "a probe",
-    }  # fmt: skip
+    found = trial_seconds(KEY._replace(config_hash="other"), whole, times)
+    assert found["lower"] == found["upper"] == pytest.approx(0.2)
+    assert found["source"] == "1 probe of this case and agent"
     assert made == [1]
 
 

@@ -174,7 +174,7 @@ def test_dry_run_counts_and_estimates_without_making_a_file(invoke, tmp_path):
     assert lines[0].startswith(
         "s4 base: 2 trials x 300 episodes of sdnn-c, 0 of them stored in results; a trial takes"
     )
-    assert "(by a probe)" in lines[0]
+    assert "(by 1 probe of this configuration)" in lines[0]
     assert lines[-1].startswith("in all 8 trials, 0 of them stored; the rest takes about")
     invoke("sweep", "mine.toml", "--trials", 1)
     lines = invoke("sweep", "mine.toml", "--dry-run").stdout.splitlines()
