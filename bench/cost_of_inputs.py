@@ -1,26 +1,22 @@
-"""How the network's cost grows with the number of inputs: python bench/cost_of_inputs.py.
+"""How the network's cost grows with the number of inputs.
 
-Measures, writes docs/cost-of-inputs.csv and draws docs/cost-of-inputs.png from it; with --redraw
-only draws. The paper's claim is quadratic growth: the network has l (l - 1) groups of columns. The
-fit leaves out the networks that are too large for their place in a shared last-level cache.
+    python bench/cost_of_inputs.py [--only WORD] [--redraw]
+
+Measures what the store lacks and draws docs/cost-of-inputs.png. The paper's claim is quadratic
+growth: the network has l (l - 1) groups of columns. The fit leaves out the networks that are too
+large for their place in a shared last-level cache.
 """
 
 from __future__ import annotations
 
-import argparse
-import csv
-from pathlib import Path
-
 import numpy as np
+from measured import measure_missing, measured, options
 
 from sdnn import _core
 from sdnn.approximators import SDNNCConfig
 from sdnn.benchmarks.measurements import Effort, in_turns, measure_decisions, spread
 
-DOCS = Path(__file__).parents[1] / "docs"
-ROWS = DOCS / "cost-of-inputs.csv"
-FIGURE = DOCS / "cost-of-inputs.png"
-
+KIND = "cost of inputs"
 N_INPUTS = range(2, 11)
 N_CORRECTED = 5
 LARGEST_FITTED = 7
@@ -40,58 +36,44 @@ N_SENSORS = (4, 5, 6)
 """Inputs of the trials."""
 
 
-def measure():
-    """Rows of (part, number of inputs, columns, quartiles in microseconds)."""
-    rows = []
-    for n_inputs in N_INPUTS:
-        config = SDNNCConfig(n_inputs=n_inputs)
-        rng = np.random.default_rng(SEED)
-        network = _core.SDNNC(config, SEED)
-        for _ in range(LEARNING_STEPS):
-            target = float(rng.uniform(config.q_low, config.q_high))
-            network.update(rng.random(n_inputs), int(rng.integers(network.n_actions)), target)
-        parts = _core.NetworkParts(network, SEED)
-
-        def decide(n, parts=parts):
-            return parts.time_values(n) + parts.time_corrections(n, N_CORRECTED)
-
-        times = in_turns({"values": parts.time_values, "decision": decide}, EFFORT)
-        n_columns = config.n_pattern_units * n_inputs * (n_inputs - 1)
-        rows += [
-            (part, n_inputs, n_columns, *spread(taken).values()) for part, taken in times.items()
-        ]
-        print(*(f"{cell:.1f}" if isinstance(cell, float) else cell for cell in rows[-1]))
-    for n_inputs in N_SENSORS:
-        mean = measure_decisions(n_inputs, NOISE, EFFORT)["mean"]
-        rows.append(("trial", n_inputs, 200 * n_inputs * (n_inputs - 1), mean, mean, mean))
-    return rows
+def measure(part, n_inputs):
+    """Columns of the network, and quartiles of its time."""
+    n_columns = SDNNCConfig().n_pattern_units * n_inputs * (n_inputs - 1)
+    if part == "trial":
+        times = [measure_decisions(n_inputs, NOISE, EFFORT)["mean"]] * 3
+    else:
+        times = spread(in_turns({part: timer(part, n_inputs)}, EFFORT)[part]).values()
+    quartiles = zip(("lower_us", "median_us", "upper_us"), times, strict=True)
+    return {"n_columns": n_columns, **{name: round(us, 3) for name, us in quartiles}}
 
 
-def write(rows):
-    """Store the rows."""
-    with ROWS.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("part", "n_inputs", "n_columns", "lower_us", "median_us", "upper_us"))
-        writer.writerows(
-            [cell if not isinstance(cell, float) else f"{cell:.3f}" for cell in row] for row in rows
-        )
+def timer(part, n_inputs):
+    """A function that times a part of a network at work."""
+    config = SDNNCConfig(n_inputs=n_inputs)
+    rng = np.random.default_rng(SEED)
+    network = _core.SDNNC(config, SEED)
+    for _ in range(LEARNING_STEPS):
+        target = float(rng.uniform(config.q_low, config.q_high))
+        network.update(rng.random(n_inputs), int(rng.integers(network.n_actions)), target)
+    parts = _core.NetworkParts(network, SEED)
+    if part == "values":
+        return parts.time_values
+    return lambda n: parts.time_values(n) + parts.time_corrections(n, N_CORRECTED)
 
 
-def draw():
-    """Draw the figure from the stored rows."""
+def draw(found, path):
+    """Draw the figure from the measurements."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with ROWS.open() as file:
-        rows = list(csv.DictReader(file))
     figure = Figure(figsize=(7.2, 4.6), dpi=150, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     for part, (title, color, marker) in PARTS.items():
-        own = [row for row in rows if row["part"] == part]
-        x = np.array([int(row["n_inputs"]) for row in own])
+        own = {key[1]: row for key, row in found.items() if key[0] == part}
+        x = np.array(list(own))
         lower, y, upper = (
-            np.array([float(row[f"{quartile}_us"]) for row in own])
+            np.array([row[f"{quartile}_us"] for row in own.values()])
             for quartile in ("lower", "median", "upper")
         )
         if len(x) > 3:
@@ -120,17 +102,15 @@ def draw():
     axes.set_title(
         "Cost against the number of inputs, 200 (l² - l) columns x 900 units", fontsize=10
     )
-    figure.savefig(FIGURE)
+    figure.savefig(path)
 
 
 def main():
-    """Read the options."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--redraw", action="store_true", help="only draw, from the stored rows")
-    if not parser.parse_args().redraw:
-        write(measure())
-    draw()
-    print(f"wrote {ROWS} and {FIGURE}")
+    given = options(__doc__, seeds=1).parse_args()
+    keys = [(part, n) for part in ("values", "decision") for n in N_INPUTS]
+    measure_missing(KIND, measure, [*keys, *(("trial", n) for n in N_SENSORS)], given)
+    if not given.only:
+        draw(measured(KIND, given.folder), given.folder / "cost-of-inputs.png")
 
 
 if __name__ == "__main__":

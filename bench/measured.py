@@ -1,29 +1,129 @@
-"""What benchmarks measured, in the engine's store: a trial is run once.
+"""Runs what a store of benchmarks lacks, by the engine's loop, and reads what it holds.
 
-The store stands packed in a folder (docs/ has the published one) as benchmarks.sqlite.xz, beside
-which the unpacked one, results.sqlite, is while trials are run. Trials are measured in processes of
-their own, because their processor time and memory are compared.
+The store stands packed in a folder (docs/ has the published one) as benchmarks.sqlite.xz. While
+something runs it is unpacked beside it, and stays so after a kill or an error: the same command
+continues from there, and packs it once it ends.
+
+Each script has the options of `options`. Its work is a list of keys; what the store holds under a
+key is not measured again.
 """
 
 from __future__ import annotations
 
+import argparse
+import importlib
+import json
 import lzma
+import multiprocessing
+import pickle
+import signal
+import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any
 
+from rich.console import Console
+
+import sdnn
 from sdnn.files import write_whole
+from sdnn.progress import ProgressBars
+from sdnn.runs.engine import (
+    POLL_SECONDS,
+    Advanced,
+    Executor,
+    Failed,
+    Finished,
+    PlannedTrial,
+    Started,
+    run_trials,
+)
 from sdnn.runs.store import STORE_NAME, ResultStore
 
 DOCS = Path(__file__).parents[1] / "docs"
 PACKED = "benchmarks.sqlite.xz"
 
-Work = tuple[Any, ...]
-"""Which trial it is: words and, at the end, a seed or a number."""
-Trials = dict[Work, dict[str, Any]]
+Key = tuple[Any, ...]
+"""Which measurement it is, in words and numbers."""
+
+
+def options(doc: str, *, seeds: int, jobs: int = 1) -> argparse.ArgumentParser:
+    """Make the parser of a script."""
+    parser = argparse.ArgumentParser(description=doc.partition("\n")[0])
+    parser.add_argument("--seeds", type=int, default=seeds, help="repetitions (%(default)s)")
+    parser.add_argument("--only", nargs="*", default=(), metavar="WORD", help="words of the keys")
+    parser.add_argument("--jobs", type=int, default=jobs, help="processes (%(default)s)")
+    parser.add_argument("--folder", type=Path, default=DOCS, help="of store, figures and pages")
+    parser.add_argument("--redraw", action="store_true", help="measure nothing")
+    return parser
+
+
+def is_wanted(key: Key, given: argparse.Namespace) -> bool:
+    """Tell whether a key has all the words of --only."""
+    return set(given.only) <= set(" ".join(map(str, key)).split())
+
+
+def measured(kind: str, folder: Path = DOCS) -> dict[Key, dict[str, Any]]:
+    """Read the measurements of a kind, sorted; also while they are being made."""
+    with tempfile.TemporaryDirectory() as unpacked:
+        place = folder if (folder / STORE_NAME).exists() else Path(unpacked)
+        _unpack(folder, place)
+        with ResultStore(place, read_only=True) as store:
+            found = store.measurements(kind)
+    return dict(sorted((tuple(json.loads(key)), content) for key, content in found.items()))
+
+
+def measure_missing(
+    kind: str,
+    measure: Callable[..., Mapping[str, Any]],
+    asked: Iterable[Key],
+    given: argparse.Namespace,
+    *,
+    apart: bool = False,
+) -> None:
+    """Measure what is not stored; each result is stored at once, and an error ends none but itself.
+
+    Parameters
+    ----------
+    kind
+        Of the measurements.
+    measure
+        Gives a measurement from its key.
+    asked
+        The keys.
+    given
+        Options of the command.
+    apart
+        Whether each is measured in a process of its own, `jobs` at a time.
+    """
+    plan = [Work(key, Measure(measure)) for key in asked if is_wanted(key, given)]
+    executor = Processes(_measure, given.jobs) if apart else Here(_measure)
+    if not given.redraw:
+        run_missing(plan, executor, given.folder, lambda store: _Measurements(store, kind))
+
+
+def run_missing(
+    plan: Sequence[PlannedTrial],
+    executor: Executor,
+    folder: Path,
+    view: Callable[[ResultStore], Any],
+) -> None:
+    """Run what is missing in a view of the folder's store; exit if it was interrupted."""
+    with (
+        opened(folder) as store,
+        ProgressBars(Console(stderr=True)) as bars,
+    ):
+        outcome = run_trials(plan, view(store), executor=executor, observer=bars)
+    for failure in outcome.failures:
+        print(f"{failure.key} failed: {failure.error!r}", file=sys.stderr)
+    print(f"{outcome.n_run} measured, {outcome.n_reused} were stored", file=sys.stderr)
+    if outcome.interrupted:
+        raise SystemExit(130)
 
 
 def _unpack(folder: Path, into: Path) -> None:
@@ -31,52 +131,133 @@ def _unpack(folder: Path, into: Path) -> None:
         write_whole(into / STORE_NAME, lzma.decompress((folder / PACKED).read_bytes()))
 
 
-def measured(kind: str, folder: Path) -> Trials:
-    """Read the trials of a benchmark, sorted; also while it runs."""
-    with tempfile.TemporaryDirectory() as unpacked:
-        place = folder if (folder / STORE_NAME).exists() else Path(unpacked)
-        _unpack(folder, place)
-        with ResultStore(place, read_only=True) as store:
-            found = store.measurements(kind)
-    trials = {}
-    for key, content in found.items():
-        *words, seed = key.split()
-        trials[(*words, int(seed))] = content
-    return dict(sorted(trials.items()))
-
-
 @contextmanager
-def _open_store(folder: Path) -> Iterator[ResultStore]:
-    """Unpack the store, and pack it again, whatever happens."""
-    _unpack(folder, folder)
-    try:
-        with ResultStore(folder) as store:
-            yield store
-    finally:
-        unpacked = folder / STORE_NAME
-        write_whole(folder / PACKED, lzma.compress(unpacked.read_bytes(), preset=9))
-        unpacked.unlink()
-
-
-def measure_missing(
-    kind: str,
-    measure: Callable[[Work], dict[str, Any]],
-    asked: Iterable[Work],
-    folder: Path,
-    n_jobs: int = 1,
-) -> None:
-    """Measure the trials that are not stored, side by side; each is stored when it is done."""
-    done = measured(kind, folder)
-    missing = [work for work in asked if work not in done]
-    if not missing:
-        return
+def opened(folder: Path) -> Iterator[ResultStore]:
+    """Unpack the store, and pack it where no error left it in doubt."""
     folder.mkdir(parents=True, exist_ok=True)
-    with (
-        _open_store(folder) as store,
-        ProcessPoolExecutor(n_jobs, max_tasks_per_child=1) as pool,
-    ):
-        futures = {pool.submit(measure, work): work for work in missing}
-        for future in as_completed(futures):
-            name = " ".join(map(str, futures[future]))
-            store.put(kind, name, future.result())
-            print(name, future.result(), flush=True)
+    _unpack(folder, folder)
+    unpacked = folder / STORE_NAME
+    before = unpacked.read_bytes() if unpacked.exists() else b""
+    with ResultStore(folder) as store:
+        yield store
+    content = unpacked.read_bytes()
+    if content != before or not (folder / PACKED).exists():
+        write_whole(folder / PACKED, lzma.compress(content, preset=9))
+    unpacked.unlink()
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What is done for a key, as the engine sees a specification."""
+
+    measure: Callable[..., Mapping[str, Any]]
+    length: int = 1
+    is_compiled: bool = False
+
+
+@dataclass(frozen=True)
+class Work(PlannedTrial):
+    """A measurement, as the engine plans a trial."""
+
+    @property
+    def title(self) -> str:
+        """Its key."""
+        return " ".join(map(str, self.key))
+
+
+def _measure(work: Work, advanced: Callable[[int], None]) -> tuple[Key, dict[str, Any]]:
+    return work.key, {**work.spec.measure(*work.key), "version": sdnn.__version__}
+
+
+@dataclass(frozen=True)
+class _Measurements:
+    """The measurements of a kind, as the engine sees a store."""
+
+    store: ResultStore
+    kind: str
+
+    def keys(self) -> set[Key]:
+        return {tuple(json.loads(key)) for key in self.store.measurements(self.kind)}
+
+    def add(self, found: tuple[Key, dict[str, Any]], *, is_exact: bool) -> None:
+        key, content = found
+        self.store.put(self.kind, json.dumps(key), content)
+
+
+Run = Callable[[Any, Callable[[int], None]], Any]
+"""Gives what is stored of a planned trial; receives a function that reports how far it is."""
+
+
+@dataclass(frozen=True)
+class Here:
+    """Runs in this process, one after the other."""
+
+    run_one: Run
+
+    def run(self, planned: Sequence[PlannedTrial], stop: threading.Event) -> Iterator[Any]:
+        """Run them; see `sdnn.runs.engine.Executor`."""
+        for item in planned:
+            if stop.is_set():
+                return
+            yield Started(item)
+            yield _outcome(self.run_one, item, lambda done: None)
+
+
+@dataclass(frozen=True)
+class Processes:
+    """Runs each in a process of its own, whose memory and processor time are its own.
+
+    What is sent there is unpickled after the modules are imported that register agents.
+    """
+
+    run_one: Run
+    jobs: int
+    imports: tuple[str, ...] = ()
+
+    def run(self, planned: Sequence[PlannedTrial], stop: threading.Event) -> Iterator[Any]:
+        """Run them; see `sdnn.runs.engine.Executor`."""
+        context = multiprocessing.get_context("spawn")
+        waiting, running = deque(planned), {}
+        try:
+            while (waiting or running) and not stop.is_set():
+                while waiting and len(running) < self.jobs:
+                    item = waiting.popleft()
+                    receiver, sender = context.Pipe(duplex=False)
+                    content = pickle.dumps((self.run_one, item))
+                    process = context.Process(target=_work, args=(sender, self.imports, content))
+                    process.start()
+                    sender.close()
+                    running[receiver] = process, item
+                    yield Started(item)
+                for receiver in wait(list(running), POLL_SECONDS):
+                    process, item = running[receiver]
+                    try:
+                        kind, *values = receiver.recv()
+                    except EOFError:
+                        process.join()
+                        kind, values = Failed, [RuntimeError(f"ended with {process.exitcode}")]
+                    if kind is not Advanced:
+                        del running[receiver]
+                    yield kind(item, *values)
+        finally:
+            for process, _ in running.values():
+                process.kill()
+
+
+def _work(sender: Any, imports: Sequence[str], content: bytes) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first process decides
+    try:
+        for module in imports:
+            importlib.import_module(module)
+        run, item = pickle.loads(content)
+        outcome = _outcome(run, item, lambda done: sender.send((Advanced, done)))
+    except Exception as error:
+        outcome = Failed(None, error)
+    sender.send((type(outcome), outcome[1]))
+
+
+def _outcome(run: Run, item: Any, advanced: Callable[[int], None]) -> Finished | Failed:
+    try:
+        return Finished(item, run(item, advanced))
+    except Exception as error:
+        return Failed(item, error)

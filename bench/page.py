@@ -1,4 +1,4 @@
-"""Tables in the page that shows them."""
+"""Tables in the pages that show them."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from sdnn.files import write_whole
-from sdnn.runs.report import Table
 from sdnn.runs.results import Estimate
 
-PAGE = "benchmarks.md"
 END = "<!-- end of table -->"
 
 
 def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table."""
-    return Table("", tuple(header), [tuple(row) for row in rows]).to_markdown()
+    """Return a table, whose cells may have Markdown."""
+    lines = (" | ".join(row) for row in (header, ["---"] * len(header), *rows))
+    return "".join(f"| {line} |\n" for line in lines)
 
 
 def interval(estimate: Estimate, digits: int) -> str:
@@ -29,31 +28,20 @@ def interval(estimate: Estimate, digits: int) -> str:
     return f"{value} [{lower}, {upper}]"
 
 
-def replaced(page: str, begin: str, text: str, end: str = END) -> str:
-    """Replace what stands between a mark and the next end.
-
-    Raises
-    ------
-    ValueError
-        If the mark or its end is missing.
-    """
-    before, begun, rest = page.partition(begin)
-    _, ended, after = rest.partition(end)
-    if not begun or not ended:
-        raise ValueError(f"the page must have the lines {begin} and {end}")
-    return f"{before}{begin}\n\n{text}\n{end}{after}"
-
-
 def with_tables(page: str, tables: Mapping[str, str]) -> str:
-    """Replace each table by its name."""
+    """Replace each table by its name; ValueError if the page has no place for it."""
     for name, table in tables.items():
-        page = replaced(page, f"<!-- table: {name} -->", table)
+        begin = f"<!-- table: {name} -->"
+        before, begun, rest = page.partition(begin)
+        _, ended, after = rest.partition(END)
+        if not begun or not ended:
+            raise ValueError(f"the page must have the lines {begin} and {END}")
+        page = f"{before}{begin}\n\n{table}\n{END}{after}"
     return page
 
 
-def show(tables: Mapping[str, str], folder: Path) -> None:
-    """Print tables, and put them into the page if the folder has it."""
+def show(tables: Mapping[str, str], page: Path) -> None:
+    """Print tables, and put them into the page if it is there."""
     print(*tables.values(), sep="\n")
-    page = folder / PAGE
     if page.exists():
         write_whole(page, with_tables(page.read_text(), tables).encode())

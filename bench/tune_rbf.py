@@ -1,7 +1,9 @@
 """How Q-learning with the RBF network was tuned on the noise-free acrobot with 4 inputs.
 
-python bench/tune_rbf.py [stage ...], all stages without names; trials go to the store
-docs/benchmarks.sqlite.xz, and what is there is not run again. Trials of 15,000 learning episodes.
+    python bench/tune_rbf.py [--only WORD] [--jobs 2] [--redraw]
+
+Runs the trials of 15,000 learning episodes that the store lacks and prints a table for each stage,
+which REPRODUCTION.md quotes.
 
 The criterion was fixed before any trial of this file was run: a trial's score is the mean of two
 shares of solved test episodes, EARLY and END, and a setting's is the median over its trials. The
@@ -15,14 +17,12 @@ The learning rate alpha is not varied: it only ever multiplies the gradient rate
 from __future__ import annotations
 
 import itertools
-import sys
 import time
 from collections import defaultdict
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from measured import DOCS, Trials, Work, measure_missing, measured
+from measured import Key, measure_missing, measured, options
 from page import markdown
 
 from sdnn.agents import QLearningConfig
@@ -48,14 +48,13 @@ SEARCH_SEEDS = (100, 101, 102, 103)
 REPORT_SEEDS = tuple(trial_seed(0, "rbf-4", number) for number in range(10))
 
 
-@dataclass(frozen=True)
-class Setting:
+class Setting(NamedTuple):
     """What is varied."""
 
-    width: float
-    gradient_rate: float
-    tie_rule: str = "uniform"
     n_bases: int = 4
+    width: float = 0.5
+    gradient_rate: float = 3.0
+    tie_rule: str = "uniform"
 
 
 def stability_limit(setting: Setting) -> float:
@@ -71,16 +70,29 @@ def stability_limit(setting: Setting) -> float:
 GRID = [
     setting
     for width, rate in itertools.product((0.25, 0.35, 0.5, 0.7, 1.0), (1.0, 3.0, 10.0, 30.0, 100.0))
-    if rate < stability_limit(setting := Setting(width, rate))
+    if rate < stability_limit(setting := Setting(4, width, rate))
 ]
-FINE_WIDTHS = (0.4, 0.45, 0.55, 0.6)
-FINE_RATES = (2.0, 5.0)
-BEFORE = Setting(1.0, 3.0)
+BEFORE = Setting(4, 1.0, 3.0)
 
 
-def measure(work: Work) -> dict[str, Any]:
+def settings_of(stage: str, best: Setting) -> list[Setting]:
+    """List what a stage compares; ``best`` is the best of the grid, of the paper's 4 bases."""
+    if stage == "grid":
+        return GRID
+    if stage == "fine":
+        widths = [best._replace(width=width) for width in (0.4, 0.45, 0.55, 0.6)]
+        return [*widths, *(best._replace(gradient_rate=rate) for rate in (2.0, 5.0))]
+    if stage == "ties":
+        return [best._replace(tie_rule=rule) for rule in ("lowest", "middle")]
+    if stage == "bases":
+        return [best._replace(n_bases=n) for n in (3, 5, 6, 8)]
+    return [BEFORE, best]
+
+
+def measure(stage: str, *key: Any) -> dict[str, Any]:
     """One trial."""
-    setting, seed = setting_of(work), work[-1]
+    *values, seed = key
+    setting = Setting(*values)
     spec = RunSpec(
         agent=AgentSpec(name="rbf"),
         approximator=RBFNetworkConfig(
@@ -112,74 +124,33 @@ def measure(work: Work) -> dict[str, Any]:
     }
 
 
-def setting_of(work: Work) -> Setting:
-    _, n_bases, width, gradient_rate, tie_rule, _ = work
-    return Setting(float(width), float(gradient_rate), tie_rule, int(n_bases))
-
-
-def work_of(stage: str, setting: Setting, seed: int) -> Work:
-    numbers = setting.n_bases, setting.width, setting.gradient_rate
-    return (stage, *map(str, numbers), setting.tie_rule, seed)
-
-
-def medians(trials: Trials, stage: str) -> dict[Setting, dict[str, float]]:
-    """Per setting the medians over trials, the best score first."""
+def medians(found: dict[Key, dict[str, Any]], stage: str) -> dict[Setting, dict[str, float]]:
+    """Return the medians over trials of each setting, the best score first."""
     groups = defaultdict(list)
-    for work, found in trials.items():
-        if work[0] == stage:
-            groups[setting_of(work)].append(found)
-    found = {
+    for (name, *values, _), one in found.items():
+        if name == stage:
+            groups[Setting(*values)].append(one)
+    middles = {
         setting: {name: float(np.median([one[name] for one in of])) for name in (*WINDOWS, "score")}
         for setting, of in groups.items()
     }
-    return dict(sorted(found.items(), key=lambda item: -item[1]["score"]))
+    return dict(sorted(middles.items(), key=lambda item: -item[1]["score"]))
 
 
-def chosen(trials: Trials) -> Setting:
-    """The best of the grid; the paper's 4 bases."""
-    return next(iter(medians(trials, "grid")))
-
-
-def asked(stage: str, trials: Trials) -> list[Work]:
-    if stage == "grid":
-        settings, seeds = GRID, SEARCH_SEEDS
-    elif stage == "fine":
-        best = chosen(trials)
-        settings = [Setting(width, best.gradient_rate) for width in FINE_WIDTHS]
-        settings += [Setting(best.width, rate) for rate in FINE_RATES]
-        seeds = SEARCH_SEEDS
-    elif stage == "ties":
-        best = chosen(trials)
-        settings, seeds = (
-            [Setting(best.width, best.gradient_rate, rule) for rule in ("lowest", "middle")],
-            SEARCH_SEEDS,
-        )
-    elif stage == "bases":
-        best = chosen(trials)
-        settings, seeds = (
-            [Setting(best.width, best.gradient_rate, n_bases=n) for n in (3, 5, 6, 8)],
-            SEARCH_SEEDS,
-        )
-    elif stage == "report":
-        settings, seeds = list(dict.fromkeys((BEFORE, chosen(trials)))), REPORT_SEEDS
-    else:
-        raise SystemExit(f"no stage {stage}: it is one of {', '.join(STAGES)}")
-    return [work_of(stage, setting, seed) for setting in settings for seed in seeds]
-
-
-def main(stages: list[str]) -> None:
-    for stage in stages or STAGES:
-        measure_missing(KIND, measure, asked(stage, measured(KIND, DOCS)), DOCS, 2)
+def main() -> None:
+    given = options(__doc__ or "", seeds=len(SEARCH_SEEDS), jobs=2).parse_args()
+    for stage in STAGES:
+        grid = medians(measured(KIND, given.folder), "grid")
+        seeds = REPORT_SEEDS if stage == "report" else SEARCH_SEEDS[: given.seeds]
+        best = next(iter(grid), BEFORE)
+        keys = [(stage, *setting, seed) for setting in settings_of(stage, best) for seed in seeds]
+        measure_missing(KIND, measure, keys, given, apart=True)
         rows = [
-            (
-                *map(str, (setting.n_bases, setting.width, setting.gradient_rate)),
-                setting.tie_rule,
-                *(f"{100 * share:.1f} %" for share in of.values()),
-            )
-            for setting, of in medians(measured(KIND, DOCS), stage).items()
+            (*map(str, setting), *(f"{100 * share:.1f} %" for share in of.values()))
+            for setting, of in medians(measured(KIND, given.folder), stage).items()
         ]
         print(markdown((f"{stage}: bases", "width", "rate", "ties", *WINDOWS, "score"), rows))
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -1,19 +1,20 @@
-"""Whole trials of 15,000 episodes against dense products: the table in docs/performance.md.
+"""Whole trials of 15,000 episodes beside dense products: a table of docs/performance.md.
 
-python bench/whole_trials.py [trials per case], about five minutes for 10; they go to
-the store docs/benchmarks.sqlite.xz, and what is there is not run again. Processor time of the
-trial's own thread, two trials at a time; the dense
-product of each network's size is measured between the trials, in the same process.
+    python bench/whole_trials.py [--seeds 10] [--jobs 2] [--redraw]
+
+Some minutes for ten trials of a case. Processor time of a trial's own process, two at a time; the
+dense product of each network's size is measured before and after the trial.
 """
 
 from __future__ import annotations
 
-import sys
 import time
+from collections import defaultdict
 from typing import Any
 
 import numpy as np
-from measured import DOCS, Work, measure_missing, measured
+from measured import measure_missing, measured, options
+from page import markdown, show
 
 from sdnn import _core
 from sdnn.environments import SensorConfig
@@ -22,6 +23,7 @@ from sdnn.runs.engine import trial_seed
 
 KIND = "whole trials"
 CASES = {"s4": (4, 0.0), "s6": (6, 0.0), "s4-noise": (4, 0.02), "s6-noise": (6, 0.02)}
+N_EPISODES = 15_000
 
 
 def dense_microseconds(n_inputs: int) -> float:
@@ -29,18 +31,16 @@ def dense_microseconds(n_inputs: int) -> float:
     return float(np.median(product.run(40)[10:])) / 1000
 
 
-def measure(work: Work) -> dict[str, Any]:
-    case, number = work
+def measure(case: str, number: int) -> dict[str, Any]:
     n_inputs, noise = CASES[case]
     dense = dense_microseconds(n_inputs)
     sensors = SensorConfig(n_sensors=n_inputs, noise=noise)
     trial = RunSpec(sensors=sensors).make_trial(trial_seed(0, case, number))
     start = time.thread_time()
-    trial.advance(15_000)
+    trial.advance(N_EPISODES)
     seconds = time.thread_time() - start
     dense = float(np.median([dense, dense_microseconds(n_inputs)]))
-    counts = trial.cache_counts()
-    n = trial.n_decisions
+    counts, n = trial.cache_counts(), trial.n_decisions
     return {
         "decisions": n,
         "seconds": round(seconds, 3),
@@ -53,28 +53,42 @@ def measure(work: Work) -> dict[str, Any]:
     }
 
 
-def main(n_trials: int) -> None:
-    asked = [(case, number) for number in range(n_trials) for case in CASES]
-    measure_missing(KIND, measure, asked, DOCS, 2)
-    trials = measured(KIND, DOCS)
-    for case in CASES:
-        of = [found for (name, _), found in trials.items() if name == case]
-        ratio = [row["dense_over_decision"] for row in of]
-        seconds = [row["seconds"] for row in of]
-        per_decision = {
-            key: np.average([row[key] for row in of], weights=[row["decisions"] for row in of])
-            for key in ("us_per_decision", "full_passes", "columns_per_decision")
-        }
-        print(
-            f"| {case} | {len(of)} | {sum(row['decisions'] for row in of):,}",
-            f"{np.median(seconds):.1f} ({min(seconds):.1f} - {max(seconds):.1f})",
-            f"{per_decision['us_per_decision']:.1f}",
-            f"{np.median(ratio):.1f} ({min(ratio):.1f} - {max(ratio):.1f})",
-            f"{per_decision['full_passes']:.2f}",
-            f"{per_decision['columns_per_decision']:.0f} |",
-            sep=" | ",
-        )
+def table(found: dict[tuple[Any, ...], dict[str, Any]]) -> str:
+    groups = defaultdict(list)
+    for (case, _), one in found.items():
+        groups[case].append(one)
+
+    def cells(case):
+        of = {name: np.array([one[name] for one in groups[case]]) for name in groups[case][0]
+              if name != "version"}  # fmt: skip
+
+        def spread(name):
+            return f"{np.median(of[name]):.1f} ({of[name].min():.1f} - {of[name].max():.1f})"
+
+        def mean(name, digits):
+            return f"{np.average(of[name], weights=of['decisions']):.{digits}f}"
+
+        return (
+            case, str(len(groups[case])), f"{of['decisions'].sum():,}", spread("seconds"),
+            mean("us_per_decision", 1), spread("dense_over_decision"), mean("full_passes", 2),
+            mean("columns_per_decision", 0),
+        )  # fmt: skip
+
+    header = (
+        "case", "trials", "decisions", "seconds a trial: median (range)", "us a decision",
+        "dense products a decision is quicker by: median (range)", "full passes a decision",
+        "columns added a decision",
+    )  # fmt: skip
+    return markdown(header, [cells(case) for case in CASES if case in groups])
+
+
+def main() -> None:
+    given = options(__doc__ or "", seeds=10, jobs=2).parse_args()
+    keys = [(case, number) for number in range(given.seeds) for case in CASES]
+    measure_missing(KIND, measure, keys, given, apart=True)
+    found = measured(KIND, given.folder)
+    show({"whole trials": table(found)}, given.folder / "performance.md")
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 4)
+    main()

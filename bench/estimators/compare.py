@@ -1,54 +1,43 @@
-"""Measures the rows behind docs/regression.md.
+"""Measures, draws and writes what docs/regression.md shows.
 
-``python bench/estimators/compare.py demonstration|useless|real OUT.csv [N_SEEDS]``; rows are
-appended as they are measured, and a row that is there is not measured again.
+    python bench/estimators/compare.py [--seeds 5] [--only WORD] [--redraw]
+
+The demonstration problem, the same with useless inputs, and data of scikit-learn, beside baselines
+that are tuned by cross-validation; and over 20 seeds the network alone, which
+docs/coming-from-libsdnn.md quotes. Tables are printed. The picture of the demonstration problem
+shows one network, trained here in a few seconds.
 """
 
 from __future__ import annotations
 
-import csv
 import sys
 import time
 import warnings
+from collections import defaultdict
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
 import numpy as np
-from demonstration import errors, lattice, target, training_points
-from rivals import classifiers, regressors, tuned
+from baselines import classifiers, regressors, tuned
+from demonstration import N_TRAINING, errors, lattice, target, training_points
+from figures import COLORS, demonstration_figure, kernel_figure, useless_figure
+from measured import measure_missing, measured, options
+from page import markdown
+from scipy import stats
 from sklearn.datasets import load_breast_cancer, load_diabetes
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.model_selection import RepeatedKFold, RepeatedStratifiedKFold
 
-import sdnn
-from sdnn import SDNNRegressor
+from sdnn import SDNNRegressor, _core
 from sdnn.coding import RandomInverse
 
-ONCE = {"kernel ridge, analytic SDNN kernel", "SVR (RBF)", "Gaussian process (Matern 3/2)"}
-"""Systems without randomness: the demonstration's sample is one and the same."""
-
-
-class Rows:
-    """A CSV file that remembers what has been measured."""
-
-    def __init__(self, path, keys, values):
-        self.path, self.keys = Path(path), keys
-        self.fields = [*keys, *values, "version"]
-        self.known = set()
-        if self.path.exists():
-            with self.path.open(newline="") as file:
-                for row in csv.DictReader(file):
-                    self.known.add(tuple(row[key] for key in keys))
-        else:
-            with self.path.open("w", newline="") as file:
-                csv.writer(file).writerow(self.fields)
-
-    def has(self, *key):
-        return tuple(map(str, key)) in self.known
-
-    def add(self, *row):
-        with self.path.open("a", newline="") as file:
-            csv.writer(file).writerow([*row, sdnn.__version__])
-        print(*row, flush=True)
+ONCE = (
+    "kernel ridge, analytic SDNN kernel", "SVR (RBF)", "Gaussian process (Matern 3/2)",
+    "MLP 256-256",
+)  # fmt: skip
+"""Systems that are fitted once: but for the MLP they have no randomness, and the sample is one."""
+USELESS = (0, 2, 4, 8)
 
 
 def ours(n_units, max_iter, seed):
@@ -65,100 +54,211 @@ def ours(n_units, max_iter, seed):
     )
 
 
+FIXED = {
+    "SDNN, n = 2000, 300 epochs (LIBSDNN's setting)": 2000,
+    "SDNN, n = 8000, 300 epochs": 8000,
+}
+"""Units of settings that are not tuned."""
+
+
 def chosen(model):
     return str(getattr(model, "best_params_", "")).replace("\n", " ")
 
 
-def demonstration(path, n_seeds):
+def timed_fit(model, X, y):
+    """The fitted model, and what every measurement of it says."""
+    begin = time.process_time()
+    model = model.fit(X, y)
+    return model, {"train": round(time.process_time() - begin, 2), "chosen": chosen(model)}
+
+
+# The measurements: keys, and what is measured of each.
+
+
+def demonstration_keys(n_seeds):
+    names = [*FIXED, *regressors(2, noisy=False, seed=0)]
+    names = [name for name in names if name not in ("SDNN (ours)", "linear ridge")]
+    return [
+        (name, seed) for seed in range(n_seeds) for name in names if seed == 0 or name not in ONCE
+    ]
+
+
+def demonstration(name, seed):
     """One training sample, the full lattice."""
-    rows = Rows(path, ("system", "seed"), ("all", "data", "blank", "chosen"))
-    points = lattice()
     X = training_points(2000, seed=0)
-    y = target(X)
-    for seed in range(n_seeds):
-        fixed = {
-            "SDNN, n = 2000, 300 epochs (LIBSDNN's setting)": ours(2000, 300, seed),
-            "SDNN, n = 8000, 300 epochs": ours(8000, 300, seed),
-        }
-        candidates = {
-            **fixed,
-            **{
-                name: tuned(*candidate)
-                for name, candidate in regressors(2, noisy=False, seed=seed).items()
-                if name not in ("SDNN (ours)", "linear ridge")
-            },
-        }
-        for name, model in candidates.items():
-            if rows.has(name, seed) or (seed > 0 and name in ONCE) or (seed > 0 and "MLP" in name):
-                continue
-            model.fit(X, y)
-            predicted = np.concatenate(
-                [
-                    model.predict(part)
-                    for part in np.array_split(points, 1 if "SDNN," in name else 50)
-                ]
-            )
-            wrong = (round(value, 5) for value in errors(points, predicted))
-            rows.add(name, seed, *wrong, chosen(model))
+    if name in FIXED:
+        model, n_parts = ours(FIXED[name], 300, seed), 1
+    else:
+        model, n_parts = tuned(*regressors(2, noisy=False, seed=seed)[name]), 50
+    model.fit(X, target(X))
+    parts = np.array_split(lattice(), n_parts)
+    wrong = errors(lattice(), np.concatenate([model.predict(part) for part in parts]))
+    found = dict(zip(("all", "data", "blank"), (round(one, 5) for one in wrong), strict=True))
+    return {**found, "chosen": chosen(model)}
 
 
-def useless(path, n_seeds):
+def useless_keys(n_seeds):
+    return [(name, n, seed) for seed in range(n_seeds) for n in USELESS for name in COLORS]
+
+
+def useless(name, n_useless, seed):
     """The demonstration problem with inputs that say nothing; a new sample per seed."""
-    rows = Rows(path, ("system", "n_useless", "seed"), ("train", "rmse", "chosen"))
-    names = (
-        "SDNN (ours)",
-        "SVR (RBF)",
-        "Gaussian process (Matern 3/2)",
-        "gradient boosting",
-        "MLP 256-256",
-    )
-    for seed in range(n_seeds):
-        random = np.random.RandomState(1000 + seed)
-        train, test = training_points(1000, seed), training_points(4000, 500 + seed)
-        noise, test_noise = random.uniform(size=(1000, 8)), random.uniform(size=(4000, 8))
-        for n_useless in (0, 2, 4, 8):
-            X = np.hstack([train, noise[:, :n_useless]])
-            Z = np.hstack([test, test_noise[:, :n_useless]])
-            candidates = regressors(2 + n_useless, noisy=False, seed=seed)
-            for name in names:
-                if rows.has(name, n_useless, seed):
-                    continue
-                start = time.process_time()
-                model = tuned(*candidates[name]).fit(X, target(train))
-                spent = time.process_time() - start
-                rmse = float(np.sqrt(np.mean((model.predict(Z) - target(test)) ** 2)))
-                rows.add(name, n_useless, seed, round(spent, 2), round(rmse, 5), chosen(model))
+    random = np.random.RandomState(1000 + seed)
+    train, test = training_points(1000, seed), training_points(4000, 500 + seed)
+    noise, test_noise = random.uniform(size=(1000, 8)), random.uniform(size=(4000, 8))
+    X, Z = np.hstack([train, noise[:, :n_useless]]), np.hstack([test, test_noise[:, :n_useless]])
+    model = tuned(*regressors(2 + n_useless, noisy=False, seed=seed)[name])
+    model, found = timed_fit(model, X, target(train))
+    rmse = np.sqrt(np.mean((model.predict(Z) - target(test)) ** 2))
+    return {**found, "rmse": round(float(rmse), 5)}
 
 
-def real(path, n_repeats):
+REAL = {
+    "diabetes (R2)": (load_diabetes, RepeatedKFold),
+    "breast cancer (accuracy)": (load_breast_cancer, RepeatedStratifiedKFold),
+}
+N_FOLDS, N_REPEATS = 5, 2
+
+
+def real_candidates(data, n_inputs, seed):
+    return regressors(n_inputs, noisy=True, seed=seed) if "R2" in data else classifiers(seed)
+
+
+def real_keys():
+    numbers = [(repeat, fold) for repeat in range(N_REPEATS) for fold in range(N_FOLDS)]
+    names = {data: real_candidates(data, 1, 0) for data in REAL}
+    return [(data, name, *n) for data in REAL for n in numbers for name in names[data]]
+
+
+def real(data, name, repeat, fold):
     """Two data sets of scikit-learn, nested cross-validation: 5 folds outside, 3 inside."""
-    rows = Rows(path, ("data", "system", "repeat", "fold"), ("train", "score", "chosen"))
-    tasks = (
-        ("diabetes (R2)", load_diabetes, RepeatedKFold),
-        ("breast cancer (accuracy)", load_breast_cancer, RepeatedStratifiedKFold),
-    )
-    for data, loader, splitter in tasks:
-        X, y = loader(return_X_y=True)
-        outer = splitter(n_splits=5, n_repeats=n_repeats, random_state=0)
-        for number, (train, test) in enumerate(outer.split(X, y)):
-            repeat, fold = divmod(number, 5)
-            candidates = (
-                regressors(X.shape[1], noisy=True, seed=repeat)
-                if "R2" in data
-                else classifiers(seed=repeat)
-            )
-            for name, candidate in candidates.items():
-                if rows.has(data, name, repeat, fold):
-                    continue
-                start = time.process_time()
-                model = tuned(*candidate).fit(X[train], y[train])
-                spent = time.process_time() - start
-                score = round(float(model.score(X[test], y[test])), 5)
-                rows.add(data, name, repeat, fold, round(spent, 2), score, chosen(model))
+    loader, splitter = REAL[data]
+    X, y = loader(return_X_y=True)
+    folds = splitter(n_splits=N_FOLDS, n_repeats=N_REPEATS, random_state=0).split(X, y)
+    train, test = list(folds)[N_FOLDS * repeat + fold]
+    model = tuned(*real_candidates(data, X.shape[1], repeat)[name])
+    model, found = timed_fit(model, X[train], y[train])
+    return {**found, "score": round(float(model.score(X[test], y[test])), 5)}
+
+
+LOW, STEP, N_UNITS, N_EPOCHS, N_CODES = -0.2, 0.005, 280, 300, 20
+
+
+def bins(points):
+    """Points are multiples of 0.001."""
+    return np.rint(1000 * points).astype(np.int32)
+
+
+def seeds(n_pattern_units, seed):
+    """A training sample and a code of its own for each seed; processor seconds, on one core."""
+    points = training_points(N_TRAINING, seed)
+    n_flipped = round(5 * n_pattern_units / 2000)  # r / n as in LIBSDNN's setting
+    tables = [
+        _core.random_inverse_patterns(n_pattern_units, 1001, n_flipped, 4 * seed + k)
+        for k in range(4)
+    ]
+    code = _core.SelectiveDesensitization(tables[:2], tables[2:], np.array([[0, 1], [1, 0]]))
+    layer = _core.ParallelPerceptron(code, N_UNITS, seed=seed)
+    counts = (target(points)[:, None] - LOW) / STEP
+    start = time.process_time()
+    trainer = _core.PDeltaTrainer(layer, bins(points), counts)
+    for _ in range(N_EPOCHS):
+        trainer.present(np.arange(N_TRAINING))
+    trainer.synchronize()
+    trained = time.process_time()
+    predicted = STEP * layer.counts(bins(lattice()))[:, 0] + LOW
+    times = {"train_s": trained - start, "predict_s": time.process_time() - trained}
+    wrong = dict(zip(("all", "data", "blank"), errors(lattice(), predicted), strict=True))
+    return {
+        "training": trainer.form,
+        **{name: round(value, 3) for name, value in times.items()},
+        **{name: round(value, 5) for name, value in wrong.items()},
+    }
+
+
+# The tables.
+
+
+def grouped(kind, folder, n_words):
+    """Measurements by the first words of their keys."""
+    found = defaultdict(list)
+    for key, row in measured(kind, folder).items():
+        found[key[:n_words]].append(row)
+    return found
+
+
+def spread_of(group, name):
+    values = [row[name] for row in group]
+    text = f"{np.mean(values):.4f}"
+    return f"{text} +- {np.std(values, ddof=1):.4f}" if len(values) > 1 else text
+
+
+def demonstration_table(found):
+    wrong = ("all", "data", "blank")
+    by_error = sorted(found.items(), key=lambda item: np.mean([row["all"] for row in item[1]]))
+    rows = [(name, *(spread_of(group, key) for key in wrong)) for (name,), group in by_error]
+    return markdown(("system", "RMSE all", "data", "blank"), rows)
+
+
+def useless_table(found):
+    rows = [(name, *(spread_of(found[name, n], "rmse") for n in USELESS)) for name in COLORS]
+    return markdown(("system", *map(str, USELESS)), rows)
+
+
+def real_tables(found):
+    """Means over folds; 95 % intervals with Nadeau and Bengio's correction for shared samples."""
+    for data in REAL:
+        rows = []
+        for (where, name), group in found.items():
+            if where != data:
+                continue
+            scores = np.array([row["score"] for row in group])
+            variance = scores.var(ddof=1) * (1 / len(scores) + 1 / 4)
+            half = stats.t.ppf(0.975, len(scores) - 1) * np.sqrt(variance)
+            mean = scores.mean()
+            interval = f"{mean - half:.3f} to {mean + half:.3f}"
+            rows.append((name, f"{mean:.3f}", interval, str(len(scores))))
+        rows.sort(key=lambda row: row[1], reverse=True)
+        yield markdown((data, "mean", "95 % interval", "folds"), rows)
+
+
+def seeds_table(found):
+    names = ("all", "data", "blank")
+    seconds = ("train_s", "predict_s")
+    rows = [
+        (str(n), *(spread_of(group, name) for name in names),
+         *(f"{np.median([row[name] for row in group]):.2f}" for name in seconds))
+        for (n,), group in found.items()
+    ]  # fmt: skip
+    return markdown(("units a pattern", *(f"RMSE {n}" for n in names), *seconds), rows)
+
+
+def main():
+    given = options(__doc__, seeds=5).parse_args()
+    codes = [(n, seed) for n in (2000, 8000) for seed in range(1, N_CODES + 1)]
+    for kind, measure, keys in (
+        ("demonstration", demonstration, demonstration_keys(given.seeds)),
+        ("useless", useless, useless_keys(given.seeds)),
+        ("real", real, real_keys()),
+        ("seeds", seeds, codes),
+    ):
+        measure_missing(f"regression {kind}", measure, keys, given)
+    if given.only:
+        return
+    folder = given.folder
+    print(demonstration_table(grouped("regression demonstration", folder, 1)))
+    print(useless_table(grouped("regression useless", folder, 2)))
+    print(*real_tables(grouped("regression real", folder, 2)), sep="\n")
+    print(seeds_table(grouped("regression seeds", folder, 1)))
+    network = ours(8000, N_EPOCHS, 0)
+    for name, figure in {
+        "demonstration": demonstration_figure(network),
+        "kernels": kernel_figure(),
+        "useless": useless_figure(measured("regression useless", folder)),
+    }.items():
+        figure.savefig(folder / f"regression-{name}.png", dpi=140)
 
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore", ConvergenceWarning)
-    what, out, *count = sys.argv[1:]
-    measure = {"demonstration": demonstration, "useless": useless, "real": real}[what]
-    measure(out, int(count[0]) if count else {"demonstration": 5, "useless": 3, "real": 2}[what])
+    main()

@@ -1,23 +1,14 @@
-"""Draws the figures and prints the tables of docs/regression.md: figures.py ROWS_FOLDER DOCS.
-
-Figures of rows are drawn from rows only. The picture of the demonstration problem shows one
-network, trained here in a few seconds.
-"""
+"""The figures of docs/regression.md, which compare.py draws."""
 
 from __future__ import annotations
 
-import csv
-import sys
 from collections import defaultdict
-from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-from compare import ours
 from demonstration import BLANKS, N_TRAINING, errors, lattice, target, training_points
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from scipy import stats
 
 from sdnn import kernel
 from sdnn.coding import Anchor, Circular, RandomInverse
@@ -31,17 +22,14 @@ COLORS = {
 }
 
 
-def rows_of(path):
-    with Path(path).open(newline="") as file:
-        return list(csv.DictReader(file))
+mpl.rcParams["font.size"] = 9
 
 
-def demonstration_figure():
+def demonstration_figure(model):
     """Target with the sample, prediction, and error."""
     points = lattice()
     X = training_points(N_TRAINING, seed=0)
-    model = ours(8000, 300, 0).fit(X, target(X))
-    predicted = model.predict(points)
+    predicted = model.fit(X, target(X)).predict(points)
     side = (1001, 1001)
     panels = (
         ("target and training sample", target(points), "viridis", (0, 1)),
@@ -94,8 +82,8 @@ def kernel_figure():
 def useless_figure(rows):
     """Error against the number of useless inputs; single seeds as dots, means as lines."""
     found = defaultdict(lambda: defaultdict(list))
-    for row in rows:
-        found[row["system"]][int(row["n_useless"])].append(float(row["rmse"]))
+    for (system, n_useless, _), row in rows.items():
+        found[system][n_useless].append(row["rmse"])
     figure = Figure(figsize=(6.6, 3.8), layout="constrained")
     axes = figure.subplots()
     for shift, (name, (color, marker)) in enumerate(COLORS.items()):
@@ -116,67 +104,3 @@ def useless_figure(rows):
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
-
-
-def demonstration_table(rows):
-    print("\n| system | RMSE all | data | blank |\n|---|---|---|---|")
-    found = defaultdict(list)
-    for row in rows:
-        found[row["system"]].append(row)
-    for name, group in sorted(found.items(), key=lambda item: mean_of(item[1], "all")):
-        wrong = [spread_of(group, key) for key in ("all", "data", "blank")]
-        print("|", " | ".join([name, *wrong]), "|")
-
-
-def mean_of(group, key):
-    return float(np.mean([float(row[key]) for row in group]))
-
-
-def spread_of(group, key):
-    values = [float(row[key]) for row in group]
-    text = f"{np.mean(values):.4f}"
-    return f"{text} +- {np.std(values, ddof=1):.4f}" if len(values) > 1 else text
-
-
-def useless_table(rows):
-    print("\n| system | 0 | 2 | 4 | 8 |\n|---|---|---|---|---|")
-    for name in COLORS:
-        cells = []
-        for number in (0, 2, 4, 8):
-            group = [
-                row for row in rows if row["system"] == name and int(row["n_useless"]) == number
-            ]
-            cells.append(spread_of(group, "rmse") if group else "")
-        print("|", " | ".join([name, *cells]), "|")
-
-
-def real_table(rows):
-    """Means over folds; 95 % intervals with Nadeau and Bengio's correction for shared samples."""
-    found = defaultdict(list)
-    for row in rows:
-        found[row["data"], row["system"]].append(float(row["score"]))
-    for data in dict.fromkeys(row["data"] for row in rows):
-        print(f"\n| {data} | mean | 95 % interval | folds |\n|---|---|---|---|")
-        names = [name for where, name in found if where == data]
-        for name in sorted(names, key=lambda name: -np.mean(found[data, name])):
-            scores = np.array(found[data, name])
-            variance = scores.var(ddof=1) * (1 / len(scores) + 1 / 4)
-            half = stats.t.ppf(0.975, len(scores) - 1) * np.sqrt(variance)
-            mean = scores.mean()
-            interval = f"{mean - half:.3f} to {mean + half:.3f}"
-            print(f"| {name} | {mean:.3f} | {interval} | {len(scores)} |")
-
-
-if __name__ == "__main__":
-    source, docs = map(Path, sys.argv[1:])
-    mpl.rcParams["font.size"] = 9
-    useless = rows_of(source / "regression-useless.csv")
-    for name, figure in {
-        "regression-demonstration": demonstration_figure(),
-        "regression-kernels": kernel_figure(),
-        "regression-useless": useless_figure(useless),
-    }.items():
-        figure.savefig(docs / f"{name}.png", dpi=140)
-    demonstration_table(rows_of(source / "regression-demonstration.csv"))
-    useless_table(useless)
-    real_table(rows_of(source / "regression-real.csv"))

@@ -1,28 +1,28 @@
-"""Problems that nobody tuned for: every estimator as it comes, on some twenty of them.
+"""Problems that nobody tuned for: every estimator with default settings, on some twenty of them.
 
-``python bench/estimators/problems.py docs [N_SEEDS]`` measures what ``docs/problems.csv`` lacks,
-draws ``docs/problems.png`` and writes the tables of ``docs/problems.md``. Needs ``sdnn[river]``,
-whose measured data are in the package.
+    python bench/estimators/problems.py [--seeds 10] [--only WORD] [--redraw]
+
+Measures what the store lacks, draws docs/problems.png and writes the tables of docs/problems.md.
+Needs sdnn[river], whose measured data are in the package.
 """
 
 from __future__ import annotations
 
-import csv
-import itertools
 import sys
 import time
 import warnings
 from collections import defaultdict
+from functools import lru_cache
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
-from compare import Rows
+from baselines import gaussian_process, scaled
 from demonstration import target, training_points
 from matplotlib.figure import Figure
-from page import with_tables
-from rivals import gaussian_process, scaled
+from measured import measure_missing, measured, options
+from page import markdown, show
 from river import datasets
 from sklearn.datasets import (
     load_breast_cancer,
@@ -52,12 +52,11 @@ from sklearn.svm import SVC, SVR
 
 from sdnn import SDNNClassifier, SDNNKernelRidge, SDNNRegressor
 
+KIND = "problems"
 N_TRAINING = 500
 N_TEST = 1000
 MOST_MEASURED = 1500
 """Samples of measured data, drawn anew for each seed; three tenths of them are for the test."""
-
-PAGE = Path(__file__).parents[2] / "docs" / "problems.md"
 
 
 # Problems: inputs and targets of n samples, from a generator of random numbers.
@@ -133,7 +132,7 @@ def rings(random, n):
     return X, np.digitize(np.hypot(X[:, 0], X[:, 1]), [0.4, 0.7])
 
 
-def measured(loader):
+def of_data(loader):
     """Data that are there, all or a part of them; the seed decides which are for the test."""
     X, y = loader()
 
@@ -146,7 +145,7 @@ def measured(loader):
 
 
 def of_scikit_learn(loader):
-    return measured(lambda: loader(return_X_y=True))
+    return of_data(lambda: loader(return_X_y=True))
 
 
 def of_river(dataset):
@@ -154,7 +153,7 @@ def of_river(dataset):
         rows = [(list(x.values()), y) for x, y in dataset]
         return np.array([x for x, _ in rows], dtype=float), np.array([y for _, y in rows])
 
-    return measured(load)
+    return of_data(load)
 
 
 REGRESSION = {
@@ -233,6 +232,7 @@ VARIANTS = ("SDNN, 10 epochs averaged", "SDNN, 4,000 columns")
 TABLES = {"R2": (REGRESSION, REGRESSORS), "accuracy": (CLASSIFICATION, CLASSIFIERS)}
 
 
+@lru_cache(1)
 def samples(problem, seed):
     """Training and test samples: X, X_test, y, y_test."""
     random = np.random.RandomState(seed)
@@ -249,37 +249,32 @@ def coverage(model, X, y):
     return round(float(np.mean(np.abs(y - mean) <= 1.645 * deviation)), 4)
 
 
-def measure_all(path, n_seeds):
-    rows = Rows(path, ("problem", "model", "seed"), ("score", "fit_s", "coverage"))
-    for seed, (problems, models) in itertools.product(range(n_seeds), TABLES.values()):
-        for problem in problems:
-            X, X_test, y, y_test = samples(problem, seed)
-            for name, make in models.items():
-                if rows.has(problem, name, seed):
-                    continue
-                begun = time.process_time()
-                model = make(seed, X.shape[1]).fit(X, y)
-                spent = round(time.process_time() - begun, 3)
-                covered = coverage(model, X_test, y_test) if "averaged" in name else ""
-                score = round(model.score(X_test, y_test), 5)
-                rows.add(problem, name, seed, score, spent, covered)
+def keys(n_seeds):
+    return [
+        (problem, model, seed)
+        for seed in range(n_seeds)
+        for problems, models in TABLES.values()
+        for problem in problems
+        for model in models
+    ]
 
 
-# What is drawn of the rows.
+def measure(problem, name, seed):
+    """Score, seconds, and coverage where the last epochs are averaged."""
+    X, X_test, y, y_test = samples(problem, seed)
+    make = (REGRESSORS if problem in REGRESSION else CLASSIFIERS)[name]
+    begun = time.process_time()
+    model = make(seed, X.shape[1]).fit(X, y)
+    spent = round(time.process_time() - begun, 3)
+    covered = coverage(model, X_test, y_test) if "averaged" in name else None
+    return {"score": round(model.score(X_test, y_test), 5), "fit_s": spent, "coverage": covered}
 
 
-def read(path):
-    """Rows by problem and model: score, seconds and coverage, which is 0 where none is told."""
-    found = defaultdict(list)
-    with path.open(newline="") as file:
-        for row in csv.DictReader(file):
-            numbers = float(row["score"]), float(row["fit_s"]), float(row["coverage"] or 0)
-            found[row["problem"], row["model"]].append(numbers)
-    return found
+# What is drawn of the measurements.
 
 
 def scores(found, problem, model):
-    return np.array([score for score, *_ in found[problem, model]])
+    return np.array([row["score"] for row in found[problem, model]])
 
 
 def ranks(found, problems, models):
@@ -293,32 +288,26 @@ def ranks(found, problems, models):
 
 
 def table(found, problems, models):
-    lines = ["| problem | " + " | ".join(models) + " |", "|---" * (len(models) + 1) + "|"]
+    rows = []
     for problem in problems:
         medians = [np.median(scores(found, problem, model)) for model in models]
-        told = [f"{median:.3f}" for median in medians]
-        best = max(medians)
-        cells = [
-            f"**{cell}**" if median == best else cell
-            for cell, median in zip(told, medians, strict=True)
-        ]
-        lines.append(f"| {problem} | " + " | ".join(cells) + " |")
+        cells = (f"**{m:.3f}**" if m == max(medians) else f"{m:.3f}" for m in medians)
+        rows.append((problem, *cells))
     systems = [model for model in models if model not in VARIANTS]
     rank_of = dict(zip(systems, ranks(found, problems, systems), strict=True))
-    told = [f"*{rank_of[model]:.1f}*" if model in rank_of else "" for model in models]
-    lines.append("| *mean rank* | " + " | ".join(told) + " |")
-    seconds = [
-        np.median([spent for problem in problems for _, spent, _ in found[problem, model]])
-        for model in models
-    ]
-    lines.append("| *fit, s* | " + " | ".join(f"*{spent:.2g}*" for spent in seconds) + " |")
-    return "\n".join(lines)
+    cells = (f"*{rank_of[model]:.1f}*" if model in rank_of else "" for model in models)
+    rows.append(("*mean rank*", *cells))
+    spent = ([row["fit_s"] for p in problems for row in found[p, model]] for model in models)
+    rows.append(("*fit, s*", *(f"*{np.median(seconds):.2g}*" for seconds in spent)))
+    return markdown(("problem", *models), rows)
 
 
 def coverages(found):
     """Between which two shares, of problems' medians, the targets are covered."""
     name = "SDNN, 10 epochs averaged"
-    medians = [np.median([c for *_, c in found[problem, name]]) for problem in REGRESSION]
+    medians = [
+        np.median([row["coverage"] for row in found[problem, name]]) for problem in REGRESSION
+    ]
     return min(medians), max(medians)
 
 
@@ -355,17 +344,19 @@ def draw(found, path):
     figure.savefig(path, dpi=160, metadata={"Software": None})
 
 
-def main(folder, n_seeds):
-    measure_all(folder / "problems.csv", n_seeds)
-    found = read(folder / "problems.csv")
-    draw(found, folder / "problems.png")
-    told = {
-        f"{unit}, bench/estimators/problems.py": table(found, problems, models) + "\n"
-        for unit, (problems, models) in TABLES.items()
-    }
-    PAGE.write_text(with_tables(PAGE.read_text(), told))
+def main():
+    given = options(__doc__, seeds=10).parse_args()
+    measure_missing(KIND, measure, keys(given.seeds), given)
+    if given.only:
+        return
+    found = defaultdict(list)
+    for (problem, model, _), row in measured(KIND, given.folder).items():
+        found[problem, model].append(row)
+    draw(found, given.folder / "problems.png")
+    tables = {unit: table(found, *which) for unit, which in TABLES.items()}
+    show(tables, given.folder / "problems.md")
 
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore", ConvergenceWarning)
-    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 10)
+    main()

@@ -1,13 +1,13 @@
 """Streams that drift, each sample predicted and then learned, beside the models of river.
 
-``python bench/estimators/streams.py docs [N_SEEDS]`` measures what ``docs/streams.csv`` lacks,
-draws ``docs/streams.png`` and writes the table of ``docs/streams.md``. Needs ``sdnn[river]``.
+    python bench/estimators/streams.py [--seeds 10] [--only WORD] [--redraw]
+
+Measures what the store lacks, draws docs/streams.png and writes the table of docs/streams.md. Needs
+sdnn[river].
 """
 
 from __future__ import annotations
 
-import csv
-import itertools
 import sys
 import time
 import warnings
@@ -17,10 +17,10 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
-from compare import Rows
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
-from page import with_tables
+from measured import measure_missing, measured, options
+from page import markdown, show
 from river import datasets, dummy, forest, linear_model, neighbors, preprocessing, stats, tree
 from river.datasets import synth
 from sklearn.exceptions import ConvergenceWarning
@@ -29,11 +29,11 @@ from sklearn.neural_network import MLPRegressor
 from sdnn import SDNNRegressor
 from sdnn.estimators.river import RiverRegressor
 
+KIND = "streams"
 N_SAMPLES = 4000
 N_WINDOWS = 20
 N_FIRST = 100
 """Samples whose predictions do not count: all models know next to nothing."""
-PAGE = Path(__file__).parents[2] / "docs" / "streams.md"
 
 
 # Streams: pairs of a dictionary and a target, from a seed.
@@ -131,10 +131,11 @@ MODELS = {
 }
 
 
-def measure(stream, model):
+def measure(stream, name, seed):
     """R2, the squared errors of windows as shares of the variance, and microseconds a sample."""
+    model = MODELS[name](seed)
     errors, targets, times = [], [], []
-    for x, y in stream:
+    for x, y in STREAMS[stream](seed):
         begin = time.perf_counter()
         guess = model.predict_one(x)
         model.learn_one(x, y)
@@ -142,30 +143,12 @@ def measure(stream, model):
         errors.append((guess or 0.0) - y)  # some say None before they have learned anything
         targets.append(y)
     squares = np.square(errors[N_FIRST:]) / np.var(targets[N_FIRST:])
-    windows = [part.mean() for part in np.array_split(squares, N_WINDOWS)]
-    return 1 - squares.mean(), windows, 1e6 * np.median(times)
+    windows = [float(f"{part.mean():.4g}") for part in np.array_split(squares, N_WINDOWS)]
+    us = round(1e6 * float(np.median(times)), 1)
+    return {"r2": round(float(1 - squares.mean()), 5), "us": us, "windows": windows}
 
 
-def measure_all(path, n_seeds):
-    rows = Rows(path, ("stream", "model", "seed"), ("r2", "us", "windows"))
-    for seed, stream, model in itertools.product(range(n_seeds), STREAMS, MODELS):
-        if not rows.has(stream, model, seed):
-            r2, windows, us = measure(STREAMS[stream](seed), MODELS[model](seed))
-            told = " ".join(f"{window:.4g}" for window in windows)
-            rows.add(stream, model, seed, round(r2, 5), round(us, 1), told)
-
-
-# What is drawn of the rows.
-
-
-def read(path):
-    """Rows by stream and model: lists of (r2, us, windows)."""
-    found = defaultdict(list)
-    with path.open(newline="") as file:
-        for row in csv.DictReader(file):
-            windows = [float(word) for word in row["windows"].split()]
-            found[row["stream"], row["model"]].append((float(row["r2"]), float(row["us"]), windows))
-    return found
+# What is drawn of the measurements.
 
 
 def interval(values):
@@ -175,24 +158,25 @@ def interval(values):
     return told[0] + (f" [{told[1]}, {told[2]}]" if high - low >= 0.005 else "")
 
 
-def tables(found):
-    """Markdown: R2 of every stream and model, and the time of a sample."""
-    lines = ["| model | " + " | ".join(STREAMS) + " | us a sample |"]
-    lines.append("|---" * (len(STREAMS) + 2) + "|")
+def table(found):
+    """R2 of every stream and model, and the time of a sample."""
+
+    def scores(stream, model):
+        return [row["r2"] for row in found[stream, model]]
+
     best = {
-        stream: max(MODELS, key=lambda model: np.median([r for r, _, _ in found[stream, model]]))
+        stream: max(MODELS, key=lambda model: np.median(scores(stream, model)))
         for stream in STREAMS
     }
+    rows = []
     for model in MODELS:
-        cells = []
-        for stream in STREAMS:
-            cell = interval([r2 for r2, _, _ in found[stream, model]])
-            cells.append(f"**{cell}**" if best[stream] == model else cell)
-        times = [us for stream in STREAMS for _, us, _ in found[stream, model]]
-        lines.append(f"| {model} | " + " | ".join(cells) + f" | {np.median(times):,.0f} |")
+        cells = [interval(scores(stream, model)) for stream in STREAMS]
+        bold = (f"**{c}**" if best[s] == model else c for s, c in zip(STREAMS, cells, strict=True))
+        times = [row["us"] for stream in STREAMS for row in found[stream, model]]
+        rows.append((model, *bold, f"{np.median(times):,.0f}"))
     n_seeds = min(map(len, found.values()))
-    told = f"*R2 of the predictions, medians of {n_seeds} seeds; in brackets the middle 80 %."
-    return "\n".join([*lines, "", f"{told} Best in bold.*"])
+    note = f"*R2 of the predictions, medians of {n_seeds} seeds; in brackets the middle 80 %."
+    return markdown(("model", *STREAMS, "us a sample"), rows) + f"\n{note} Best in bold.*\n"
 
 
 def draw(found, path):
@@ -201,7 +185,7 @@ def draw(found, path):
     figure = Figure(figsize=(10, 5.6), layout="constrained")
     for axes, stream in zip(figure.subplots(2, 3).flat, STREAMS, strict=True):
         for model, color in zip(shown, colors, strict=True):
-            windows = np.array([windows for _, _, windows in found[stream, model]])
+            windows = np.array([row["windows"] for row in found[stream, model]])
             low, middle, high = np.quantile(windows, (0.1, 0.5, 0.9), axis=0)
             x = (np.arange(len(middle)) + 0.5) / len(middle)
             axes.fill_between(x, low, high, color=color, alpha=0.15, linewidth=0)
@@ -221,14 +205,19 @@ def draw(found, path):
     figure.savefig(path, dpi=160, metadata={"Software": None})
 
 
-def main(folder, n_seeds):
-    measure_all(folder / "streams.csv", n_seeds)
-    found = read(folder / "streams.csv")
-    draw(found, folder / "streams.png")
-    page = with_tables(PAGE.read_text(), {"bench/estimators/streams.py": tables(found) + "\n"})
-    PAGE.write_text(page)
+def main():
+    given = options(__doc__, seeds=10).parse_args()
+    keys = [(s, m, seed) for seed in range(given.seeds) for s in STREAMS for m in MODELS]
+    measure_missing(KIND, measure, keys, given)
+    if given.only:
+        return
+    found = defaultdict(list)
+    for (stream, model, _), row in measured(KIND, given.folder).items():
+        found[stream, model].append(row)
+    draw(found, given.folder / "streams.png")
+    show({"R2": table(found)}, given.folder / "streams.md")
 
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore", ConvergenceWarning)
-    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 10)
+    main()

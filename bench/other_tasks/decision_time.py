@@ -2,7 +2,7 @@
 
     python bench/other_tasks/decision_time.py [--tasks Pendulum,CartPole] [--steps 20000]
 
-Both calls are timed alone, as a robot's own loop would make them, with the settings as they come. A
+Both calls are timed alone, as a robot's own loop would make them, with default settings. A
 plain loop over the clock is timed beside them and taken off. The environment's steps are timed
 between them: they bound what a quicker agent could gain.
 """
@@ -11,18 +11,19 @@ from __future__ import annotations
 
 import argparse
 import time
+from pathlib import Path
 
 import numpy as np
-from agents import CONTENDERS
 
 from sdnn.agents import Transition
+from sdnn.runs.study import read_study
 
 NANOSECONDS_A_MICROSECOND = 1000.0
 
 
 def decision_times(name: str, steps: int) -> tuple[np.ndarray, np.ndarray]:
     """Microseconds of each step's acting and learning, and of the environment: shapes (steps,)."""
-    spec = CONTENDERS["sdnn-c"].spec(name, "clean", 0)
+    spec = read_study(Path(__file__).with_name("study.toml")).combinations[name, "sdnn-c"].spec
     env = spec.make_env()
     agent = spec.make_agent(env)
     clock = time.perf_counter_ns

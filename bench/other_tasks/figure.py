@@ -1,24 +1,24 @@
-"""The figure of the stored trials."""
+"""The figure of the clean cases' curves."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
-from agents import CONTENDERS
-from report import Trials
+from studies import Curves
 from tasks import TASKS
 
 from sdnn.files import write_whole
 from sdnn.runs.figures import figure_bytes, require_matplotlib
+from sdnn.runs.study import Study
 
 
-def draw(trials: Trials, path: Path) -> None:
+def draw(study: Study, found: Curves, path: Path) -> None:
     """Draw return against steps and against processor time, a column for each task."""
     require_matplotlib()
     from matplotlib.figure import Figure
 
-    names = [n for n in TASKS if any((n, "clean", kind) in trials for kind in CONTENDERS)]
+    names = [name for name in TASKS if any(case == name for case, _ in found)]
     if not names:
         return
     n_columns = min(len(names), 4)
@@ -28,7 +28,7 @@ def draw(trials: Trials, path: Path) -> None:
     for number, name in enumerate(names):
         block, column = divmod(number, n_columns)
         panels = grid[2 * block : 2 * block + 2, column]
-        _draw_task(panels, trials, name)
+        _draw_task(panels, study, found, name)
         if column == 0:
             for panel in panels:
                 panel.set_ylabel("mean return, greedy")
@@ -42,25 +42,23 @@ def draw(trials: Trials, path: Path) -> None:
     write_whole(path, figure_bytes(figure)[0])
 
 
-def _draw_task(panels, trials: Trials, name: str) -> None:
+def _draw_task(panels, study: Study, found: Curves, name: str) -> None:
     """Draw a task's curves into two panels."""
     from matplotlib import colormaps
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     shades = colormaps["tab20"].colors  # each colour dark and light
-    for (kind, contender), color in zip(
-        CONTENDERS.items(), [*shades[::2], *shades[1::2]], strict=False
-    ):
-        looks = trials.get((name, "clean", kind))
-        if not looks:
+    for variant, color in zip(study.variants, [*shades[::2], *shades[1::2]], strict=False):
+        trials = found.get((name, variant.id))
+        if not trials:
             continue
-        returns = np.array([trial["mean_return"] for trial in looks])
+        returns = np.array([trial["mean_return"] for trial in trials])
         lower, median, upper = np.percentile(returns, (25, 50, 75), axis=0)
         for panel, field in zip(panels, ("steps", "cpu_seconds"), strict=True):
-            x = np.median([trial[field] for trial in looks], axis=0)
+            x = np.median([trial[field] for trial in trials], axis=0)
             (line,) = panel.plot(
                 x, median, "-" if x.size > 1 else "o", color=color,
-                label=contender.title, lw=1.6,
+                label=variant.title, lw=1.6,
             )  # fmt: skip
             panel.fill_between(x, lower, upper, color=line.get_color(), alpha=0.2, lw=0)
     for panel in panels:

@@ -1,4 +1,4 @@
-"""Tables from the stored trials."""
+"""Tables from the curves of the study's trials."""
 
 from __future__ import annotations
 
@@ -6,27 +6,17 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from agents import CONTENDERS
 from numpy.typing import NDArray
 from page import interval, markdown
 from scipy.stats import trim_mean
-from tasks import CONDITIONS, TASKS
+from studies import Curves
+from tasks import CLEAN, TASKS, parts_of
 
 from sdnn.runs.results import Estimate, estimate_median
-
-Trials = Mapping[tuple[str, str, str], Sequence[Mapping[str, Any]]]
-"""What was seen in each trial by task, condition and contender, then by seed."""
+from sdnn.runs.study import Study
 
 CONFIDENCE, N_RESAMPLES = 0.95, 2000
 OURS = "sdnn-c"
-
-
-def by_kind(measured: Mapping[tuple[Any, ...], Mapping[str, Any]]) -> Trials:
-    """Put the trials of one kind together, sorted by seed as they are."""
-    trials: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
-    for (name, condition, kind, _), found in measured.items():
-        trials.setdefault((name, condition, kind), []).append(found)
-    return trials
 
 
 def last_returns(trials: Iterable[Mapping[str, Any]]) -> NDArray[np.float64]:
@@ -35,7 +25,7 @@ def last_returns(trials: Iterable[Mapping[str, Any]]) -> NDArray[np.float64]:
 
 
 def seconds_to_solve(trials: Iterable[Mapping[str, Any]], solved: float) -> NDArray[np.float64]:
-    """Processor seconds until a look first finds the task solved, infinite if none does."""
+    """Processor seconds until an evaluation first finds the task solved, infinite if none does."""
     return np.array(
         [
             next(
@@ -85,7 +75,7 @@ def shares(
     Parameters
     ----------
     clean, other
-        Scores of each task, shape (n_seeds,), as it comes and with noise or redundant sensors.
+        Scores of each task, shape (n_seeds,), without and with noise or redundant sensors.
     middle
         Of a task's seeds.
     rng
@@ -109,86 +99,93 @@ def interval_of(draws: NDArray[np.float64]) -> Estimate:
     return Estimate(float(draws[0]), float(lower), float(upper))
 
 
-def _task_rows(trials: Trials) -> Iterator[Sequence[str]]:
+def _task_rows(study: Study, found: Curves) -> Iterator[Sequence[str]]:
     for name, task in TASKS.items():
-        for condition in CONDITIONS:
-            for kind, contender in CONTENDERS.items():
-                looks = trials.get((name, condition, kind))
-                if not looks:
-                    continue
-                returns = last_returns(looks)
-                seconds = np.median(seconds_to_solve(looks, task.solved))
-                n_bytes = np.median([trial["bytes"] for trial in looks])
-                yield (
-                    name,
-                    condition,
-                    contender.title,
-                    str(len(looks)),
-                    f"{looks[0]['steps'][-1]:,}",
-                    interval(estimate_median(returns), 1),
-                    str(int((returns >= task.solved).sum())),
-                    f"{np.median([trial['cpu_seconds'][-1] for trial in looks]):.1f} s",
-                    f"{seconds:.1f} s" if np.isfinite(seconds) else "not reached",
-                    f"{n_bytes / 2**20:.2f} MiB",
-                )
-
-
-def _overall_rows(trials: Trials) -> Iterator[Sequence[str]]:
-    for kind, contender in CONTENDERS.items():
-        for condition in CONDITIONS:
-            names = [n for n in TASKS if (n, condition, kind) in trials]
-            if not names:
+        for (case, variant), trials in found.items():
+            if parts_of(case)[0] != name:
                 continue
-            scores = [_scores(trials, name, condition, kind) for name in names]
+            returns = last_returns(trials)
+            seconds = np.median(seconds_to_solve(trials, task.solved))
+            n_bytes = np.median([trial["bytes"] for trial in trials])
             yield (
-                contender.title,
-                condition,
-                ", ".join(names),
-                interval(interquartile_mean(scores), 2),
+                *parts_of(case),
+                title_of(study, variant),
+                str(len(trials)),
+                f"{trials[0]['steps'][-1]:,}",
+                interval(estimate_median(returns), 1),
+                str(int((returns >= task.solved).sum())),
+                f"{np.median([trial['cpu_seconds'][-1] for trial in trials]):.1f} s",
+                f"{seconds:.1f} s" if np.isfinite(seconds) else "not reached",
+                f"{n_bytes / 2**20:.2f} MiB",
             )
 
 
-def _scores(trials: Trials, name: str, condition: str, kind: str) -> NDArray[np.float64]:
-    return np.vectorize(TASKS[name].score)(last_returns(trials[name, condition, kind]))
+def title_of(study: Study, variant: str) -> str:
+    """Return a variant's title."""
+    return next(one.title for one in study.variants if one.id == variant)
 
 
-def _kept_rows(trials: Trials) -> Iterator[Sequence[str]]:
-    """Tell what a rival and ours keep of their clean scores, task by task and in all of them."""
-    for condition in list(CONDITIONS)[1:]:
-        for kind, contender in CONTENDERS.items():
-            if kind == OURS:
+def conditions_of(study: Study) -> list[str]:
+    """List what is done to sensors, clean ones first."""
+    return list(dict.fromkeys(parts_of(case.id)[1] for case in study.cases))
+
+
+def case_of(name: str, condition: str) -> str:
+    """Return the id of a case."""
+    return name if condition == CLEAN else f"{name} {condition}"
+
+
+def _overall_rows(study: Study, found: Curves) -> Iterator[Sequence[str]]:
+    for variant in study.variants:
+        for condition in conditions_of(study):
+            names = [n for n in TASKS if (case_of(n, condition), variant.id) in found]
+            if names:
+                scores = [_scores(found, name, condition, variant.id) for name in names]
+                estimate = interval(interquartile_mean(scores), 2)
+                yield variant.title, condition, ", ".join(names), estimate
+
+
+def _scores(found: Curves, name: str, condition: str, variant: str) -> NDArray[np.float64]:
+    scores: NDArray[np.float64] = TASKS[name].score(
+        last_returns(found[case_of(name, condition), variant])
+    )
+    return scores
+
+
+def _kept_rows(study: Study, found: Curves) -> Iterator[Sequence[str]]:
+    """Tell what a baseline and ours keep of their clean scores, by task and in all of them."""
+    for condition in conditions_of(study)[1:]:
+        for variant in study.variants:
+            if variant.id == OURS:
                 continue
-            common = [name for name in TASKS if _can_compare(trials, name, condition, kind)]
+            pairs = [(c, who) for c in (CLEAN, condition) for who in (OURS, variant.id)]
+            common = [n for n in TASKS if all((case_of(n, c), w) in found for c, w in pairs)]
             groups = {name: [name] for name in common}
             if len(common) > 1:
                 groups[f"mean of {len(common)}"] = common
             for label, names in groups.items():
-                cells = _kept_cells(trials, names, condition, kind)
-                yield (condition, contender.title, label, *cells)
+                cells = _kept_cells(found, names, condition, variant.id)
+                yield (condition, variant.title, label, *cells)
 
 
-def _can_compare(trials: Trials, name: str, condition: str, kind: str) -> bool:
-    return all((name, c, who) in trials for c in ("clean", condition) for who in (OURS, kind))
-
-
-def _kept_cells(trials: Trials, names: Sequence[str], condition: str, kind: str) -> Iterator[str]:
+def _kept_cells(found: Curves, names: Sequence[str], condition: str, variant: str) -> Iterator[str]:
     rng = np.random.default_rng(2015)
     for middle in MIDDLES.values():
-        ours, rivals = (
+        ours, baseline = (
             100
             * shares(
-                [_scores(trials, name, "clean", who) for name in names],
-                [_scores(trials, name, condition, who) for name in names],
+                [_scores(found, name, CLEAN, who) for name in names],
+                [_scores(found, name, condition, who) for name in names],
                 middle,
                 rng,
             )
-            for who in (OURS, kind)
+            for who in (OURS, variant)
         )
-        yield from (f"{rivals[0]:.1f} %", f"{ours[0]:.1f} %")
-        yield interval(interval_of(ours - rivals), 1)
+        yield from (f"{baseline[0]:.1f} %", f"{ours[0]:.1f} %")
+        yield interval(interval_of(ours - baseline), 1)
 
 
-def tables(trials: Trials) -> dict[str, str]:
+def tables(study: Study, found: Curves) -> dict[str, str]:
     """Give each table by its name in the page."""
     each = (
         "task", "sensors", "agent", "seeds", "steps", "return at the end", "seeds that solve",
@@ -198,8 +195,44 @@ def tables(trials: Trials) -> dict[str, str]:
         "sensors", "baseline", "task",
         *(f"{what}, {m}" for m in MIDDLES for what in ("baseline", "SDNN-C", "points more")),
     )  # fmt: skip
+    overall = ("agent", "sensors", "tasks", "score (IQM)")
     return {
-        "task by task": markdown(each, _task_rows(trials)),
-        "over tasks": markdown(("agent", "sensors", "tasks", "score (IQM)"), _overall_rows(trials)),
-        "share kept": markdown(kept, _kept_rows(trials)),
+        "task by task": markdown(each, _task_rows(study, found)),
+        "over tasks": markdown(overall, _overall_rows(study, found)),
+        "share kept": markdown(kept, _kept_rows(study, found)),
     }
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:,.{0 if ratio >= 10 else 1}f}x" if np.isfinite(ratio) else ""
+
+
+def _solved_rows(study: Study, found: Curves) -> Iterator[Sequence[str]]:
+    for (case, variant), trials in found.items():
+        solved = TASKS[parts_of(case)[0]].solved
+
+        def until(field: str, trials: Any, solved: float = solved) -> NDArray[np.float64]:
+            ends = last_returns(trials) >= solved
+            return np.where(ends, [float(trial[field][-1]) for trial in trials], np.inf)
+
+        steps, seconds = until("steps", trials), until("cpu_seconds", trials)
+        ours = np.median(until("cpu_seconds", found[case, OURS]))
+        spent = [trial["cpu_seconds"][-1] / trial["steps"][-1] for trial in trials]
+        yield (
+            case,
+            title_of(study, variant),
+            f"{np.isfinite(steps).sum()} of {steps.size}",
+            interval(estimate_median(steps), 0),
+            f"{1000 * np.median(spent):.3g} ms",
+            interval(estimate_median(seconds), 1) + " s",
+            _times(float(np.median(seconds) / ours)),
+        )
+
+
+def until_solved_table(study: Study, found: Curves) -> str:
+    """Medians over seeds, with bootstrap intervals; a seed that never solves counts as never."""
+    header = (
+        "task", "agent", "seeds that solve it", "steps until then", "a step", "processor time",
+        "of SDNN-C's",
+    )  # fmt: skip
+    return markdown(header, _solved_rows(study, found))

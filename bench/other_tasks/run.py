@@ -1,59 +1,64 @@
-"""How the agents and their rivals do on Gymnasium's tasks: clean, with noise, with more sensors.
+"""How agents and baselines do on Gymnasium's tasks: clean, with noise, with more sensors.
 
-    python bench/other_tasks/run.py [--seeds 10] [--tasks CartPole,...] [--agents sdnn-c,...]
-        [--conditions clean,...] [--jobs 2] [--folder docs] [--only-table]
+    python bench/other_tasks/run.py [--seeds 10] [--only WORD ...] [--jobs 2] [--folder docs]
+        [--redraw] [--until-solved]
 
-A trial is a training that is looked at 20 times: 20 greedy episodes each time, 100 at the end. They
-take no part in its processor time. It goes to the store docs/benchmarks.sqlite.xz when it is done,
-and is not run again. At the end the tables are printed and put into docs/benchmarks.md, and
-docs/other-tasks.png is drawn, all from the store. In another --folder nothing of docs/ changes.
+The study is study.toml; --only chooses by the words of case and variant: `--only sdnn-c CartPole`.
+With --until-solved a training is evaluated every 1,000 steps by 100 episodes and ends when these
+solve the task; use one job, so that what else the machine does meets all alike. At the end the
+tables are printed and put into benchmarks.md, and other-tasks.png is drawn, all from the store.
 SAC, TD3 and PPO need `pip install stable-baselines3`, LunarLanderContinuous `box2d`.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from agents import CONTENDERS, Trial, trials_of
 from figure import draw
-from looks import Curve
-from measured import DOCS, measure_missing, measured
+from measured import options
 from page import show
-from report import by_kind, tables
-from tasks import CONDITIONS, TASKS
+from report import tables, until_solved_table
+from studies import curves, run_study
+from tasks import TASKS, parts_of
 
-KIND = "other tasks"
+from sdnn.runs import RunSpec
+from sdnn.runs.study import read_study
+
+STUDY = Path(__file__).with_name("study.toml")
+KIND, SOLVED_KIND = "other tasks", "until solved"
 
 
-def measure(trial: Trial) -> dict[str, Any]:
-    """Train and look."""
-    name, condition, kind, seed = trial
-    return Curve(CONTENDERS[kind].spec(name, condition, seed)).learn()
+def until_solved(spec: RunSpec, case: str) -> RunSpec:
+    """Let a training end when it solves its task."""
+    target = TASKS[parts_of(case)[0]].solved
+    return spec.replace(
+        budget=spec.budget.replace(target_return=target),
+        protocol=spec.protocol.replace(evaluate_every=1000, evaluation_episodes=100),
+    )
 
 
 def main() -> None:
-    """Run what is missing, then write table and figure."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=10)
-    parser.add_argument("--tasks", default=",".join(TASKS))
-    parser.add_argument("--agents", default=",".join(CONTENDERS))
-    parser.add_argument("--conditions", default=",".join(CONDITIONS))
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--folder", type=Path, default=DOCS)
-    parser.add_argument("--only-table", action="store_true")
-    options = parser.parse_args()
-    if not options.only_table:
-        lists = (getattr(options, name).split(",") for name in ("conditions", "tasks", "agents"))
-        asked = trials_of(options.seeds, *lists)
-        measure_missing(KIND, measure, asked, options.folder, options.jobs)
-    trials = by_kind(measured(KIND, options.folder))
-    show(tables(trials), options.folder)
-    draw(trials, options.folder / "other-tasks.png")
+    """Run what is missing, then write tables and figure."""
+    parser = options(__doc__ or "", seeds=10, jobs=2)
+    parser.add_argument("--until-solved", action="store_true")
+    given = parser.parse_args()
+    study = read_study(STUDY, n_trials=given.seeds)
+    if given.until_solved:
+        run_study(SOLVED_KIND, study, given, until_solved)
+    else:
+        run_study(KIND, study, given)
+    if given.only:
+        return
+    found = curves(KIND, study, given)
+    shown = tables(study, found)
+    shown["until solved"] = until_solved_table(
+        study, curves(SOLVED_KIND, study, given, until_solved)
+    )
+    show(shown, given.folder / "benchmarks.md")
+    draw(study, found, given.folder / "other-tasks.png")
 
 
 if __name__ == "__main__":

@@ -1,120 +1,127 @@
-"""The tasks of the comparison, clean, with noisy and with redundant sensors."""
+"""What solves the tasks of study.toml, and two tasks of our own with two torques."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from typing import NamedTuple
 
-import two_torques
-
-from sdnn.runs import EnvironmentSpec
-
-CONDITIONS: dict[str, dict[str, Any]] = {
-    "clean": {},
-    "noise": {"noise": 0.02},
-    "redundant": {"redundant": 2},
-}
-"""What is done to the sensors: noise in parts of their ranges, means of neighbouring variables."""
+import gymnasium as gym
+import numpy as np
 
 
-@dataclass(frozen=True, kw_only=True)
-class Task:
-    """An environment and what counts as having learned it.
+class Task(NamedTuple):
+    """Mean returns that solve a task, and of random actions."""
 
-    Parameters
-    ----------
-    id
-        Gymnasium's.
-    steps
-        Transitions that an agent may learn from.
-    solved
-        Mean return that solves it.
-    random
-        Mean return of random actions.
-    kwargs
-        Arguments of the environment.
-    ranges
-        Of variables for which the environment gives none, or ends that no policy comes near, as
-        `EnvironmentSpec` takes them.
-    angle_pairs
-        Cosines and sines, as a user of our agents would say.
-    declares_ranges
-        Whether that user would tell the ranges too.
-    """
-
-    id: str
-    steps: int = 200_000
     solved: float
     random: float
-    kwargs: Mapping[str, Any] = field(default_factory=dict)
-    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    angle_pairs: tuple[tuple[int, int], ...] = ()
-    declares_ranges: bool = False
 
-    def score(self, mean_return: float) -> float:
-        """Put a return on a scale: 0 is that of random actions, 1 solves the task."""
+    def score(self, mean_return):
+        """Put returns on a scale: 0 is that of random actions, 1 solves the task."""
         return (mean_return - self.random) / (self.solved - self.random)
 
-    def environment(
-        self, condition: str, *, own_units: bool = False, with_ranges: bool = True
-    ) -> EnvironmentSpec:
-        """Specify the environment.
-
-        Parameters
-        ----------
-        condition
-            One of `CONDITIONS`; under all but "clean" observations are in [0, 1].
-        own_units
-            Whether they are in their own units there too, for what was tuned to these.
-        with_ranges
-            Whether a learner is told the ranges where observations are as the environment has them.
-        """
-        ranges = self.ranges if with_ranges or condition != "clean" else {}
-        return EnvironmentSpec(
-            id=self.id,
-            kwargs=self.kwargs,
-            ranges=ranges,
-            own_units=own_units and condition != "clean",
-            **CONDITIONS[condition],
-        )
-
-
-# What a landing goes through; the space has speeds up to 10 and turns of 2 pi.
-_LANDING = ((-1, 1), (-0.2, 1.6), (-1, 1), (-1.5, 0.5), (-1, 1), (-1.5, 1.5), (0, 1), (0, 1))
 
 TASKS = {
-    "CartPole": Task(
-        id="CartPole-v1",
-        solved=475.0,
-        random=22.4,
-        ranges={"0": (-2.4, 2.4), "1": (-3.0, 3.0), "2": (-0.21, 0.21), "3": (-3.5, 3.5)},
-    ),
-    "Pendulum": Task(id="Pendulum-v1", solved=-200.0, random=-1208.0, angle_pairs=((0, 1),)),
-    "MountainCar": Task(id="MountainCar-v0", solved=-110.0, random=-200.0),
-    "MountainCarContinuous": Task(id="MountainCarContinuous-v0", solved=90.0, random=-33.1),
-    "Acrobot": Task(
-        id="Acrobot-v1",
-        solved=-100.0,
-        random=-486.5,
-        angle_pairs=((0, 1), (2, 3)),
-    ),
-    "LunarLanderContinuous": Task(
-        id="LunarLander-v3",
-        kwargs={"continuous": True},
-        steps=300_000,
-        solved=200.0,
-        random=-210.4,
-        ranges={str(i): ends for i, ends in enumerate(_LANDING)},
-        declares_ranges=True,
-    ),
+    "CartPole": Task(475.0, 22.4),
+    "Pendulum": Task(-200.0, -1208.0),
+    "MountainCar": Task(-110.0, -200.0),
+    "MountainCarContinuous": Task(90.0, -33.1),
+    "Acrobot": Task(-100.0, -486.5),
+    "LunarLanderContinuous": Task(200.0, -210.4),
     # Solved is what comes near the best of some hundred proportional controllers: -13.6 and -23.6.
-    "Reaching": Task(id=two_torques.REACHING, steps=60_000, solved=-20.0, random=-112.2),
-    "Wheels": Task(
-        id=two_torques.WHEELS,
-        steps=60_000,
-        solved=-30.0,
-        random=-92.7,
-        angle_pairs=((1, 2),),
-    ),
+    "Reaching": Task(-20.0, -112.2),
+    "Wheels": Task(-30.0, -92.7),
 }
+CLEAN = "clean"
+
+
+def parts_of(case: str) -> tuple[str, str]:
+    """Return a case's task, and what is done to its sensors."""
+    name, _, condition = case.partition(" ")
+    return name, condition or CLEAN
+
+
+class ReachingEnv(gym.Env):
+    """An arm of two links of 1 m on a table: bring its tip to a goal and keep it there.
+
+    An episode has 60 steps of 0.1 s; each step's reward is minus the tip's distance in m. Torques
+    work against inertia and friction, and what turns the second link pushes the first one back.
+    """
+
+    action_space = gym.spaces.Box(-1.0, 1.0, (2,))
+    # Angles, their speeds, and by how much the goal's angles are larger.
+    observation_space = gym.spaces.Box(
+        np.array([-2, -2, -2, -2, -4, -4], np.float32), np.array([2, 2, 2, 2, 4, 4], np.float32)
+    )
+
+    def reset(self, *, seed=None, options=None):
+        """Begin anywhere, at rest."""
+        super().reset(seed=seed)
+        self._angles = self.np_random.uniform(-1.5, 1.5, 2)
+        self._goal = self.np_random.uniform(-1.5, 1.5, 2)
+        self._speeds = np.zeros(2)
+        return self._observation(), {}
+
+    def step(self, action):
+        """Apply two torques for 0.1 s."""
+        first, second = np.clip(action, -1.0, 1.0)
+        torques = np.array([first - 0.5 * second, second])
+        self._speeds = np.clip(0.8 * self._speeds + 0.4 * torques, -2.0, 2.0)
+        moved = self._angles + 0.1 * self._speeds
+        self._angles = np.clip(moved, -2.0, 2.0)
+        self._speeds = np.where(moved == self._angles, self._speeds, 0.0)  # at a stop
+        distance = float(np.linalg.norm(self._tip(self._angles) - self._tip(self._goal)))
+        return self._observation(), -distance, False, False, {}
+
+    def _observation(self):
+        missing = self._goal - self._angles
+        return np.concatenate([self._angles, self._speeds, missing]).astype(np.float32)
+
+    @staticmethod
+    def _tip(angles):
+        directions = np.cumsum(angles)
+        return np.array([np.cos(directions).sum(), np.sin(directions).sum()])
+
+
+class WheelsEnv(gym.Env):
+    """A cart with a motor for each of its two wheels: drive to a goal and stop there.
+
+    An episode has 60 steps of 0.1 s; each step's reward is minus the distance in m. Equal torques
+    drive, opposite ones turn: one wheel's torque is good or bad depending on the other's.
+    """
+
+    action_space = gym.spaces.Box(-1.0, 1.0, (2,))
+    # Distance, cosine and sine of the goal's bearing, speed, speed of turning.
+    observation_space = gym.spaces.Box(
+        np.array([0, -1, -1, -1, -4], np.float32), np.array([4, 1, 1, 1, 4], np.float32)
+    )
+
+    def reset(self, *, seed=None, options=None):
+        """Begin 1 m to 2 m from the goal, in any direction, at rest."""
+        super().reset(seed=seed)
+        distance, direction = (
+            self.np_random.uniform(1.0, 2.0),
+            self.np_random.uniform(-np.pi, np.pi),
+        )
+        self._position = distance * np.array([np.cos(direction), np.sin(direction)])
+        self._heading = self.np_random.uniform(-np.pi, np.pi)
+        self._speed = self._turning = 0.0
+        return self._observation(), {}
+
+    def step(self, action):
+        """Apply two torques for 0.1 s."""
+        left, right = np.clip(action, -1.0, 1.0)
+        self._speed = 0.8 * self._speed + 0.2 * (left + right) / 2
+        self._turning = 0.8 * self._turning + 0.8 * (right - left) / 2
+        self._heading += 0.1 * self._turning
+        ahead = np.array([np.cos(self._heading), np.sin(self._heading)])
+        self._position = self._position + 0.1 * self._speed * ahead
+        return self._observation(), -float(np.linalg.norm(self._position)), False, False, {}
+
+    def _observation(self):
+        distance = np.linalg.norm(self._position)
+        bearing = np.arctan2(*-self._position[::-1]) - self._heading
+        seen = [min(distance, 4.0), np.cos(bearing), np.sin(bearing), self._speed, self._turning]
+        return np.array(seen, np.float32)
+
+
+gym.register("bench/Reaching-v0", entry_point=ReachingEnv, max_episode_steps=60)
+gym.register("bench/Wheels-v0", entry_point=WheelsEnv, max_episode_steps=60)

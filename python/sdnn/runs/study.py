@@ -60,7 +60,7 @@ class Study:
     cases, variants
         In the order of the file, but for the reference, which comes first.
     combinations
-        Every variant in every case, by their ids (case, variant).
+        Every variant in every case in which it runs, by their ids (case, variant).
     """
 
     reader: StudyReader
@@ -101,10 +101,9 @@ class Study:
             if name not in known:
                 raise ValueError(f"no variant {name!r}; {possible_words(name, known)}")
         wanted = [
-            (self.combinations[case.id, variant.id].spec, self.keys(case.id, variant.id))
-            for case in self.cases
-            for variant in self.variants
-            if not only or variant.id in only
+            (combination.spec, self.keys(case, variant))
+            for (case, variant), combination in self.combinations.items()
+            if not only or variant in only
         ]
         plan: dict[TrialKey, PlannedTrial] = {}
         for number in range(self.n_trials):
@@ -118,7 +117,7 @@ class Study:
         """Return the first variant before another one that is the same in every case."""
 
         def hashes(variant: str) -> list[TrialKey]:
-            return [self.keys(case.id, variant)[0] for case in self.cases]
+            return [self.keys(case, name)[0] for case, name in self.combinations if name == variant]
 
         mine = hashes(variant_id)
         for variant in self.variants:
@@ -220,5 +219,6 @@ def read_study(
             (case.id, variant.id): Combination(case, variant, *reader.spec(case, variant))
             for case in reader.cases
             for variant in variants
+            if case.id in (variant.only or [case.id])
         },
     )

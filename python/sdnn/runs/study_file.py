@@ -67,6 +67,10 @@ class _Axes(Settings, frozen=True):
     combine: Literal["one_at_a_time", "product"] = "one_at_a_time"
 
 
+class _Only(Settings, frozen=True):
+    only: tuple[str, ...] = ()
+
+
 class Setting(NamedTuple):
     """A value of a study file, and its place in the file."""
 
@@ -123,6 +127,8 @@ class StudyVariant:
         Override even these, in single cases, by their ids.
     where
         Its place in the file.
+    only
+        Ids of the cases in which it runs; none: all.
     """
 
     id: str
@@ -130,6 +136,7 @@ class StudyVariant:
     settings: Layer
     case_settings: Mapping[str, Layer]
     where: KeyPath
+    only: tuple[str, ...] = ()
 
 
 class StudyReader:
@@ -319,9 +326,16 @@ class StudyReader:
         for name, value in self.file.values.get("variants", {}).items():
             where: KeyPath = ("variants", name)
             table = dict(self._table(where, value))
+            known = [case.id for case in self.cases]
+            with self._placed(where):
+                only = read(_Only, {"only": table.pop("only", ())}).only
+            for number, case_id in enumerate(only):
+                if case_id not in known:
+                    words = f"no case {case_id!r}; {possible_words(case_id, known)}"
+                    raise self.file.error((*where, "only", number), words)
             of_cases = self._table((*where, "cases"), table.pop("cases", {}))
             with self._placed((*where, "cases")):
-                check_names(of_cases, [case.id for case in self.cases])
+                check_names(of_cases, only or known)
             in_cases = {
                 case_id: self._layer(
                     (*where, "cases", case_id),
@@ -330,7 +344,7 @@ class StudyReader:
                 for case_id in of_cases
             }
             title, settings = self._titled(where, table, name)
-            variants[name] = StudyVariant(name, title, settings, in_cases, where)
+            variants[name] = StudyVariant(name, title, settings, in_cases, where, only)
         for variant in self._axis_variants():
             if variant.id in variants:
                 words = f"there is a variant {variant.id!r} already"

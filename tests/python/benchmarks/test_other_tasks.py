@@ -1,8 +1,13 @@
-"""Tables of docs/benchmarks.md: from the stored trials, and right in cases worked by hand."""
+"""Benchmarks: pages show what the store holds; scripts are right in cases worked by hand."""
 
+import argparse
+import contextlib
+import os
 import sys
+import time
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -23,9 +28,12 @@ def scripts():
         import page
         import report
         import run
-        import until_solved
+        import studies
 
-        yield measured, page, report, run, until_solved
+        yield argparse.Namespace(
+            measured=measured, page=page, report=report, run=run, studies=studies,
+            study=run.read_study(run.STUDY),
+        )  # fmt: skip
     finally:
         sys.path[:] = path
         AGENTS.clear()
@@ -36,70 +44,143 @@ def scripts():
                 del sys.modules[name]
 
 
+def given(folder, *only, jobs=1):
+    return argparse.Namespace(folder=folder, only=only, jobs=jobs, redraw=False)
+
+
 def test_page_has_the_tables_of_the_stored_trials(scripts):
-    measured, page, report, run, until_solved = scripts
-    tables = report.tables(report.by_kind(measured.measured(run.KIND, DOCS)))
-    solved = report.by_kind(measured.measured(until_solved.KIND, DOCS))
-    tables["until solved"] = until_solved.table(solved)
+    run, report, study = scripts.run, scripts.report, scripts.study
+    tables = report.tables(study, scripts.studies.curves(run.KIND, study, given(DOCS)))
+    solved = scripts.studies.curves(run.SOLVED_KIND, study, given(DOCS), run.until_solved)
+    tables["until solved"] = report.until_solved_table(study, solved)
     text = (DOCS / "benchmarks.md").read_text()
-    assert page.with_tables(text, tables) == text, (
-        "run bench/other_tasks/run.py --only-table, and until_solved.py --only-table"
-    )
+    assert scripts.page.with_tables(text, tables) == text, "run bench/other_tasks/run.py --redraw"
 
 
 def test_every_stored_trial_is_whole_and_of_ten_seeds(scripts):
-    measured, _, _, run, _ = scripts
-    found = measured.measured(run.KIND, DOCS)
-    seeds = {}
-    for *which, seed in found:
-        seeds.setdefault(tuple(which), []).append(seed)
-    assert set(map(tuple, seeds.values())) == {tuple(range(10))}
-    for trial in found.values():
-        assert trial["steps"] == sorted(set(trial["steps"]))
-        lengths = {len(trial[name]) for name in ("steps", "cpu_seconds", "mean_return")}
-        assert lengths == {20}
-        assert trial["bytes"] > 0
+    found = scripts.studies.curves(scripts.run.KIND, scripts.study, given(DOCS))
+    assert len(found) == 78
+    for trials in found.values():
+        assert len(trials) == 10
+        for trial in trials:
+            assert trial["steps"] == sorted(set(trial["steps"]))
+            lengths = {len(trial[name]) for name in ("steps", "cpu_seconds", "mean_return")}
+            assert len(lengths) == 1
+            assert trial["bytes"] > 0
 
 
-def test_every_contender_learns_on_the_engine(scripts, monkeypatch):
+def quick(spec, case):
+    """The same in 40 steps, but for those that learn in pieces of their own."""
+    budget = spec.budget.replace(steps=40)
+    return spec.replace(
+        budget=budget, protocol=spec.protocol.replace(evaluate_every=20, evaluation_episodes=1)
+    )
+
+
+def test_every_agent_learns_on_the_engine(scripts, monkeypatch):
     """As it is specified, but for its budget: those that need no other library."""
-    *_, run, _ = scripts
-    import agents
-    import looks
-    from tasks import TASKS
-
-    monkeypatch.setattr(looks, "N_EPISODES", 1)
-    monkeypatch.setattr(looks, "N_LAST_EPISODES", 2)
-
-    for kind, contender in agents.CONTENDERS.items():
-        names = [name for name in contender.tasks if TASKS[name].steps < 100_000]
-        if not names or kind in ("sac", "td3", "ppo"):
+    monkeypatch.setattr(scripts.studies, "N_LAST_EPISODES", 2)
+    study, tried = scripts.study, set()
+    for (case, variant), one in reversed(study.combinations.items()):
+        if variant in tried or variant in ("sac", "td3", "ppo") or "Lander" in case:
             continue
-        spec = contender.spec(names[-1], "redundant", 1)
-        found = run.Curve(spec.replace(budget=spec.budget.replace(steps=40))).learn()
-        assert found["steps"] == list(range(2, 41, 2))
-        assert np.isfinite(found["mean_return"]).all()
-        assert found["bytes"] > 0
+        tried.add(variant)
+        spec = quick(one.spec, case)
+        key = study.keys(case, variant)[0]._replace(config_hash=spec.config_hash)
+        planned = scripts.studies.PlannedTrial(key, spec)
+        record, curve = scripts.studies.learn(planned, lambda done: None)
+        assert curve["steps"] == [20, 40]
+        assert record.rows.table["kind"].tolist() == 3 * ["evaluation"]
+        assert np.round(record.rows.episode_return, 2).tolist() == curve["mean_return"]
+        assert curve["bytes"] > 0
+    assert len(tried) == 8
 
 
-def test_a_trial_is_measured_once(scripts, tmp_path):
-    measured, *_ = scripts
-    measured.measure_missing("lengths", len, [("a", 1), ("b", "c", 0)], tmp_path)
-    assert measured.measured("lengths", tmp_path) == {("a", 1): 2, ("b", "c", 0): 3}
-    measured.measure_missing("lengths", sum, [("a", 1)], tmp_path)  # which would fail
+def test_a_trial_runs_in_a_process_of_its_own_and_once(scripts, tmp_path):
+    study, studies = scripts.study, scripts.studies
+    options = given(tmp_path, "tiles", "Pendulum", "noise", "1")
+    found = {}
+    for _ in range(2):
+        studies.run_study("x", study, options, quick)
+        found, before = studies.curves("x", study, options, quick), found
+    assert set(found) == {("Pendulum noise", "tiles")}
+    assert found == before
+
+
+def test_evaluations_take_no_part_in_the_processor_time(scripts, monkeypatch):
+    monkeypatch.setattr(scripts.studies, "N_LAST_EPISODES", 2)
+
+    class Slow(gym.Wrapper):
+        def step(self, action):
+            began = time.process_time()
+            while time.process_time() < began + 0.001:
+                pass
+            return super().step(action)
+
+    spec = quick(scripts.study.combinations["Pendulum", "tiles"].spec, "Pendulum")
+    trial = spec.make_trial(1)
+    trial.training.evaluation_env = Slow(trial.training.evaluation_env)
+    clock = scripts.studies.Clock(trial.training)
+    began = time.process_time()
+    trial.training.run()
+    assert time.process_time() - began > 0.6  # 3 episodes of 200 steps
+    assert clock.curve["cpu_seconds"][-1] < 0.3
+
+
+def squared(name, number):
+    if number < 0:
+        raise ValueError("negative")
+    if number == 0:
+        os._exit(3)
+    return {"square": number**2}
+
+
+def fail_in_store(measured, folder):
+    with contextlib.suppress(RuntimeError), measured.opened(folder) as store:
+        store.put("squares", '["c", 3]', {"square": 9})
+        raise RuntimeError
+
+
+def test_what_fails_ends_nothing_else_and_leaves_the_packed_store(scripts, tmp_path, capsys):
+    measured = scripts.measured
+    keys = [("a", 1), ("a b", 2)]
+    measured.measure_missing("squares", squared, [*keys, ("bad", -1)], given(tmp_path))
+    assert "ValueError('negative')" in capsys.readouterr().err
+    found = measured.measured("squares", tmp_path)
+    assert {key: one["square"] for key, one in found.items()} == {("a", 1): 1, ("a b", 2): 4}
     assert [file.name for file in tmp_path.iterdir()] == [measured.PACKED]
+    measured.measure_missing("squares", abs, keys, given(tmp_path))  # which would fail
+    assert measured.measured("squares", tmp_path) == found
+    packed = (tmp_path / measured.PACKED).read_bytes()
+    fail_in_store(measured, tmp_path)
+    assert (tmp_path / measured.PACKED).read_bytes() == packed
+    assert len(measured.measured("squares", tmp_path)) == 3
+
+
+def test_a_process_that_dies_is_reported(scripts, tmp_path, capsys, monkeypatch):
+    monkeypatch.syspath_prepend(Path(__file__).parent)
+    measured = scripts.measured
+    keys = [("x", 0), ("x", 3)]
+    measured.measure_missing("squares", squared, keys, given(tmp_path, jobs=2), apart=True)
+    assert "ended with 3" in capsys.readouterr().err
+    assert list(measured.measured("squares", tmp_path)) == [("x", 3)]
+
+
+def test_only_chooses_by_words(scripts):
+    key = ("SDNN, small", "CartPole", 3)
+    assert scripts.measured.is_wanted(key, given(DOCS, "CartPole", "3"))
+    assert not scripts.measured.is_wanted(key, given(DOCS, "Cart"))
 
 
 def test_page_without_a_mark_is_refused(scripts):
-    _, page, *_ = scripts
     with pytest.raises(ValueError, match="table: here"):
-        page.with_tables("nothing", {"here": "| a |\n"})
+        scripts.page.with_tables("nothing", {"here": "| a |\n"})
     with pytest.raises(ValueError, match="end of table"):
-        page.with_tables("<!-- table: here -->", {"here": "| a |\n"})
+        scripts.page.with_tables("<!-- table: here -->", {"here": "| a |\n"})
 
 
 def test_tables_go_between_their_marks(scripts):
-    _, page, *_ = scripts
+    page = scripts.page
     text = f"before\n<!-- table: here -->\nold\n{page.END}\nafter\n"
     table = page.markdown(("a", "b"), [("1", "2")])
     assert table == "| a | b |\n| --- | --- |\n| 1 | 2 |\n"
@@ -108,7 +189,7 @@ def test_tables_go_between_their_marks(scripts):
 
 
 def test_shares_by_hand(scripts):
-    _, _, report, *_ = scripts
+    report = scripts.report
     clean = [np.array([1.0, 1.0, 4.0]), np.array([2.0])]
     noisy = [np.array([0.5, 0.5, 0.5]), np.array([3.0])]
     rng = np.random.default_rng(0)
@@ -124,6 +205,30 @@ def test_shares_by_hand(scripts):
 
 
 def test_what_was_never_reached_is_written_so(scripts):
-    _, page, report, *_ = scripts
-    estimate = report.Estimate(1234.5, 1.0, np.inf)
-    assert page.interval(estimate, 1) == "1,234.5 [1.0, never]"
+    estimate = scripts.report.Estimate(1234.5, 1.0, np.inf)
+    assert scripts.page.interval(estimate, 1) == "1,234.5 [1.0, never]"
+
+
+def test_sensors_by_their_statistics(scripts):
+    options = {"task": "CartPole-v1", "noise": 0.1, "copies": 2, "irrelevant": 3}
+    env = gym.make("bench/Sensors-v0", correlation=0.95, **options)
+    assert env.observation_space.shape == (4 * 3 + 3,)
+    first = [env.reset(seed=5)[0], *(env.step(i % 2)[0] for i in range(8))]
+    again = [env.reset(seed=5)[0], *(env.step(i % 2)[0] for i in range(8))]
+    assert np.array_equal(first, again)
+    seen = []
+    for seed in range(300):
+        seen.append(env.reset(seed=seed)[0])
+        seen += [env.step(i % 2)[0] for i in range(8)]
+    seen = np.array(seen).reshape(300, 9, 15)
+    # Noise of a copy in the units of a variable: a tenth of its range, 4.8 for the position.
+    apart = (seen[:, :, 0] - seen[:, :, 4]) / np.sqrt(2)
+    assert apart.std() == pytest.approx(0.48, rel=0.05)
+    irrelevant = seen[:, :, 12:]
+    assert irrelevant.std() == pytest.approx(1.0, rel=0.1)
+    pairs = irrelevant[:, :-1].ravel(), irrelevant[:, 1:].ravel()
+    assert np.corrcoef(*pairs)[0, 1] == pytest.approx(0.95, abs=0.02)
+    plain = gym.make("bench/Sensors-v0", task="Pendulum-v1", irrelevant=2)
+    observation, _ = plain.reset(seed=1)
+    assert np.array_equal(observation[:3], gym.make("Pendulum-v1").reset(seed=1)[0])
+    assert np.all(np.abs(observation[3:]) < 1)

@@ -225,6 +225,14 @@ def test_some_variants_only(study):
         found.plan(["discount=0.6"])
 
 
+def test_a_variant_runs_only_in_its_cases(study):
+    found = study(PAPER + "[variants.a]\n[variants.b]\nonly = ['s6']\nlearning.discount = 0.5\n")
+    assert set(configs(found)) == {("s4", "a"), ("s4-noise", "a"), ("s6", "a"), ("s6", "b")}
+    assert len(found.plan()) == 8
+    assert {p.key.case_id for p in found.plan(["b"])} == {"s6"}
+    assert found.same_as("b") is None
+
+
 PLUGIN = """
 from dataclasses import dataclass
 from sdnn.agents import QLearningConfig, RBFQLearning
@@ -323,6 +331,14 @@ WRONG = {
     "import": (
         "[study]\nimports = ['json',\n'not_there_at_all']\n", 2,
         "study.imports[1]: importing not_there_at_all failed: ModuleNotFoundError",
+    ),
+    "only in no case": (
+        "[cases.s4]\n[variants.a]\nonly = ['s4', 's5']\n", 3,
+        "variants.a.only[1]: no case 's5'; possible: s4",
+    ),
+    "settings in another case": (
+        "[cases.s4]\n[cases.x]\n[variants.a]\nonly = ['s4']\ncases.x.learning.epsilon = 0\n", 5,
+        "variants.a.cases.x: unknown key; possible: s4",
     ),
     "agent": (
         "[cases.s4]\n[variants.a]\nagent = 'fuzzyy'\n", 3,

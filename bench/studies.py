@@ -1,0 +1,167 @@
+"""Runs studies of agents, each trial in a process of its own, and clocks what it learns.
+
+The store has the rows of all evaluations, as any trial of the engine, and the curve of each trial:
+at each evaluation its steps, the processor seconds of learning until then, and the mean return; and
+the bytes that are kept in order to continue, at the end.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import gymnasium as gym
+from measured import Processes, is_wanted, measured, run_missing
+
+from sdnn.agents import Callback, Training
+from sdnn.runs import RunSpec
+from sdnn.runs.engine import PlannedTrial, run_to_end
+from sdnn.runs.store import ResultStore
+from sdnn.runs.study import Study
+from sdnn.runs.trial import TrainingTrial, TrialKey, TrialRecord, TrialRows
+
+N_LAST_EPISODES = 100
+"""Greedy episodes of the last evaluation, whatever the others have."""
+
+Curves = Mapping[tuple[str, str], Sequence[Mapping[str, Any]]]
+"""Curves of the trials by case and variant."""
+
+
+class Clock(Callback):
+    """Notes the curve of a training; it stands still during evaluations."""
+
+    def __init__(self, training: Training) -> None:
+        self.curve: dict[str, Any] = {"steps": [], "cpu_seconds": [], "mean_return": []}
+        training.callbacks = (*training.callbacks, self)
+        training.evaluation_env = _Pausing(training.evaluation_env, self)
+        self._expect_last(training)
+        self._began, self._paused = time.process_time(), None
+
+    def pause(self) -> None:
+        """Stand still until the evaluation is noted."""
+        if self._paused is None:
+            self._paused = time.process_time()
+
+    def on_row(self, training: Training, row: Mapping[str, Any]) -> None:
+        """Note an evaluation."""
+        if row["kind"] != "evaluation":
+            return
+        self.curve["steps"].append(training.n_steps)
+        self.curve["cpu_seconds"].append(round(self._paused - self._began, 2))
+        self.curve["mean_return"].append(round(row["mean_return"], 2))
+        if training.is_finished:
+            self.curve["bytes"] = n_bytes(training.agent)
+        self._expect_last(training)
+        self._began += time.process_time() - self._paused
+        self._paused = None
+
+    @staticmethod
+    def _expect_last(training: Training) -> None:
+        if training.n_steps + training.evaluate_every >= training.steps:
+            training.evaluation_episodes = N_LAST_EPISODES
+
+
+class _Pausing(gym.Wrapper):
+    """Tells a clock when an evaluation begins."""
+
+    def __init__(self, env: gym.Env, clock: Clock) -> None:
+        super().__init__(env)
+        self._clock = clock
+
+    def reset(self, **options):
+        self._clock.pause()
+        return super().reset(**options)
+
+
+def n_bytes(agent: Any) -> int:
+    """Count what is kept in order to continue learning."""
+    if hasattr(agent, "n_bytes"):
+        return int(agent.n_bytes)
+    return sum(array.nbytes for array in agent.state().values())
+
+
+class _Clocked:
+    """A specification whose trial is clocked."""
+
+    def __init__(self, spec: RunSpec) -> None:
+        self._spec, self.canonical_json = spec, spec.canonical_json
+
+    def make_trial(self, seed: int) -> TrainingTrial:
+        trial = self._spec.make_trial(seed)
+        self.clock = Clock(trial.training)
+        return trial
+
+
+def learn(planned: PlannedTrial, advanced: Callable[[int], None]) -> tuple[TrialRecord, Any]:
+    """Run a trial; returns the record, of evaluations only, and the curve."""
+    spec = _Clocked(planned.spec)
+    record = run_to_end(PlannedTrial(planned.key, spec), wanted=lambda: True, advanced=advanced)
+    table = record.rows.table
+    rows = TrialRows(table[table["kind"] == "evaluation"])
+    return replace(record, rows=rows), spec.clock.curve
+
+
+@dataclass(frozen=True)
+class _Trials:
+    """Trials and their curves, as the engine sees a store."""
+
+    store: ResultStore
+    kind: str
+
+    def keys(self) -> set[TrialKey]:
+        return self.store.keys()
+
+    def add(self, found: tuple[TrialRecord, Any], *, is_exact: bool) -> None:
+        record, curve = found
+        self.store.put(self.kind, json.dumps(record.key), {**curve, "version": record.version})
+        self.store.add(record, is_exact=False)
+
+
+def run_study(
+    kind: str,
+    study: Study,
+    given: argparse.Namespace,
+    change: Callable[[RunSpec, str], RunSpec] = lambda spec, case: spec,
+) -> None:
+    """Run the trials of a study that are not stored, and store their curves under a kind.
+
+    ``change`` makes another specification of that of a case.
+    """
+    plan = {}
+    for (case, variant), one in study.combinations.items():
+        spec = change(one.spec, case)
+        for key in study.keys(case, variant):
+            if is_wanted((variant, case, key.trial), given):
+                key = key._replace(config_hash=spec.config_hash)
+                plan[key] = PlannedTrial(key, spec)
+    if not given.redraw:
+        executor = Processes(learn, given.jobs, study.reader.header.imports)
+        ordered = sorted(plan.values(), key=lambda planned: planned.key.trial)
+        run_missing(ordered, executor, given.folder, lambda store: _Trials(store, kind))
+
+
+def curves(
+    kind: str,
+    study: Study,
+    given: argparse.Namespace,
+    change: Callable[[RunSpec, str], RunSpec] = lambda spec, case: spec,
+) -> Curves:
+    """Read the curves of a study's trials.
+
+    Trials from before specifications were stored, which have no hash but the variant's name, are
+    read where there are no others.
+    """
+    stored = measured(kind, given.folder)
+    found = {}
+    for (case, variant), one in study.combinations.items():
+        config_hash = change(one.spec, case).config_hash
+        keys = [key._replace(config_hash=config_hash) for key in study.keys(case, variant)]
+        own = [stored[key] for key in keys if key in stored]
+        old = [curve for key, curve in stored.items() if (*key[:2], key[4]) == (case, variant, "")]
+        if own or old:
+            found[case, variant] = own or old
+    return found
