@@ -73,20 +73,13 @@ class ProgressBars:
         self._n_open = n_planned - n_reused
         self.add("all", self._title(), n_episodes)
 
-    def started(self, planned: Any) -> None:
-        """Open a trial's bar."""
-        self.add(planned.key, planned.title, planned.spec.length)
-
     def advanced(self, planned: Any, done: int) -> None:
-        """Move a trial's bar and the whole one."""
+        """Move a trial's bar, which is opened first, and the whole one."""
+        if planned.key not in self._tasks:
+            self.add(planned.key, planned.title, planned.spec.length)
         self._done[planned.key] = done
         self.update(planned.key, done)
         self.update("all", sum(self._done.values()))
-
-    def lost(self, planned: Any) -> None:
-        """Remove a trial's bar, and its episodes from the whole one."""
-        self.advanced(planned, 0)
-        self.remove(planned.key)
 
     def finished(self, planned: Any) -> None:
         """Close a trial's bar and count its episodes as passed."""

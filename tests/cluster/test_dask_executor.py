@@ -31,6 +31,7 @@ from sdnn.runs import (
     WorkerLostError,
     run_trials,
 )
+from sdnn.runs.engine import Failed
 from sdnn.runs.trial import records_digest
 
 
@@ -42,9 +43,6 @@ class Recorder(Observer):
 
     def noted(self, text):
         self.notes.append(text)
-
-    def started(self, planned):
-        self.events.append(("started", planned.key))
 
     def advanced(self, planned, episode):
         self.events.append(("advanced", planned.key, episode))
@@ -77,7 +75,7 @@ def test_rows_are_those_of_a_local_run(pair, tmp_path):
     assert digest == run(tmp_path / "here", plan)[1]
     for planned in plan:
         mine = [event for event in recorder.events if event[1] == planned.key]
-        assert mine[0][0] == "started"
+        assert mine[0] == ("advanced", planned.key, 0)
         assert mine[-2:] == [("advanced", planned.key, 30), ("finished", planned.key)]
     again, _ = run(tmp_path / "cluster", plan, pair)
     assert (again.n_reused, again.n_run) == (6, 0)
@@ -127,10 +125,16 @@ def test_a_long_trial_reports_its_progress(pair, tmp_path):
     messages = []
     for message in DaskExecutor(str(pair.file)).run(plan, stop):
         messages.append(message)
-        if type(message).__name__ == "Advanced":
+        if getattr(message, "episode", 0) > 0:
             stop.set()
     assert 0 < messages[-1].episode < 100_000
-    # An interruption frees the workers: the trials would take minutes.
+    # An interruption frees the workers: the trials would take minutes. The same ones may be wanted
+    # again while a worker still gives them up.
+    stop.clear()
+    for message in DaskExecutor(str(pair.file)).run(plan, stop):
+        assert not isinstance(message, Failed)
+        if getattr(message, "episode", 0) > 0:
+            stop.set()
     begin = time.monotonic()
     assert run(tmp_path, make_plan(1, 10), pair)[0].n_run == 2
     assert time.monotonic() - begin < 20
@@ -142,7 +146,7 @@ def test_a_trial_that_raises_or_cannot_be_sent_fails_and_the_others_are_done(pai
     object.__setattr__(plan[-1], "lock", threading.Lock())
     outcome, _ = run(tmp_path, plan, pair)
     assert outcome.n_run == 2
-    failed = {failure.key: str(failure.error) for failure in outcome.failures}
+    failed = {failure.planned.key: str(failure.error) for failure in outcome.failures}
     assert "seed" in failed[plan[1].key]
     assert "lock" in failed[plan[-1].key]
 
@@ -234,7 +238,7 @@ def test_a_trial_that_kills_its_workers_fails_and_the_others_are_done(cluster, t
     outcome, _ = run(tmp_path, plan, cluster)
     assert outcome.n_run == 5
     (failure,) = outcome.failures
-    assert failure.key == plan[1].key
+    assert failure.planned.key == plan[1].key
     assert isinstance(failure.error, WorkerLostError)
 
 

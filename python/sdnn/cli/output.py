@@ -42,7 +42,6 @@ def run_and_report(
     from rich.console import Console
 
     from sdnn.progress import ProgressBars
-    from sdnn.runs.engine import describe
 
     with ProgressBars(Console(stderr=True)) as observer:
         done = run(request, observer=observer)
@@ -51,7 +50,7 @@ def run_and_report(
     stored = f"{n_stored} of {outcome.n_planned} trials are stored in {request.out}"
     for failure in outcome.failures:
         message = f"{type(failure.error).__name__}: {failure.error}"
-        click.echo(f"Error: {describe(failure.key)} failed: {message}", err=True)
+        click.echo(f"Error: {failure.planned.title} failed: {message}", err=True)
     if outcome.interrupted:
         exit_interrupted(context, f"interrupted; {stored}; the same command continues from there")
     if done.page is None:

@@ -1,7 +1,10 @@
 """Runs trials on a Dask cluster that others have started.
 
-Dask places trials and runs them again when a worker is lost. This module admits workers whose
-build gives the same rows, submits as many trials as those have threads, and collects results.
+Dask places trials and runs them again when a worker is lost. The driver admits workers whose build
+gives the same rows, submits as many trials as those have threads, and collects results.
+
+Trials are sent as bytes: a worker that cannot unpickle a task falls silent, but a task that cannot
+unpickle its argument reports an error.
 """
 
 from __future__ import annotations
@@ -9,13 +12,14 @@ from __future__ import annotations
 import importlib.util
 import json
 import logging
+import math
 import pickle
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
@@ -23,25 +27,86 @@ from typing import TYPE_CHECKING, Any
 from sdnn import _core
 from sdnn.files import read_bytes
 from sdnn.runs.config_file import MOST_BYTES
-from sdnn.runs.dask_worker import PROBE_CALL, PROGRESS_TOPIC, probe, run_on_worker
-from sdnn.runs.engine import Advanced, Failed, Finished, Lost, Message, Noted, PlannedTrial, Started
+from sdnn.runs.engine import (
+    Advanced,
+    Failed,
+    Finished,
+    Message,
+    Noted,
+    PlannedTrial,
+    run_to_end,
+)
 from sdnn.runs.errors import ClusterError, WorkerLostError
-from sdnn.runs.trial import TrialKey
+from sdnn.runs.trial import TrialKey, TrialRecord, TrialRows, opened
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-SCHEDULER_TIMEOUT = 300.0
-ANSWER_SECONDS = 30.0
-"""A scheduler that leaves a question unanswered for so long counts as lost."""
-CONNECT_SECONDS = 5.0
-NOTE_SECONDS = 5.0
-"""How long to wait for a worker before saying so."""
-WORKERS_SECONDS = 1.0
-"""How often the list of workers is read."""
-RESULTS_SECONDS = 0.02
-"""How often results are collected."""
-RESUME = "finished trials are stored, the same command continues from there"
+ANSWER_SECONDS = 30.0  # a scheduler that leaves a question unanswered for so long is lost
+CONNECT_SECONDS = 5.0  # of one attempt
+WORKERS_SECONDS = 1.0  # between two looks at the list of workers
+RESULTS_SECONDS = 0.02  # between two looks at results
+PROGRESS_SECONDS = 2.0  # at least between two reports of a trial's progress
+PROGRESS_TOPIC = "sdnn-progress"
+PROBE_EPISODES = 10  # few, but they use every part of the agent and the task
+
+MISMATCH = f"__import__({__name__!r}, fromlist=['mismatch']).mismatch(version, probes)"
+"""An expression for `eval`, which workers without this library have, too."""
+
+
+def probe(planned: PlannedTrial) -> str:
+    """Return settings and first rows of a trial: equal where all its rows are equal.
+
+    A trial in Python is only made: it may be long, and its libraries may round differently.
+    """
+    with opened(planned.spec.make_trial(planned.key.seed)) as trial:
+        digest = ""
+        if planned.spec.is_compiled:
+            trial.advance(PROBE_EPISODES)
+            digest = TrialRows.of_tests(**trial.test_rows()).digest()
+    return f"{planned.spec.canonical_json()}, {digest}"
+
+
+def mismatch(version: str, probes: Sequence[tuple[bytes, str]]) -> str:
+    """Return why this build gets no trials; nothing if it has the version and gives the probes."""
+    if _core.__version__ != version:
+        return f"it has sdnn {_core.__version__}, this is sdnn {version}"
+    if any(probe(pickle.loads(trial)) != expected for trial, expected in probes):
+        return f"its build of sdnn {version} does not give the rows of this one"
+    return ""
+
+
+def run_on_worker(version: str, pickled: bytes) -> TrialRecord:
+    """Run a trial; Dask places it again if it was cancelled and is wanted once more.
+
+    ClusterError if this worker's version, or the settings it reads, are not the driver's.
+    """
+    from distributed import Reschedule, get_worker
+
+    worker = get_worker()
+    planned: PlannedTrial = pickle.loads(pickled)
+    if (_core.__version__, planned.spec.config_hash) != (version, planned.key.config_hash):
+        raise ClusterError(
+            f"worker {worker.address} (sdnn {_core.__version__}) does not read the settings of"
+            f" this trial as the driver (sdnn {version}) does; install the same build on both"
+        )
+    key = worker.get_current_task()
+    reported = time.monotonic()
+
+    def wanted() -> bool:
+        task = worker.state.tasks.get(key)
+        return task is not None and task.state == "executing"
+
+    def advanced(episode: int) -> None:
+        nonlocal reported
+        if time.monotonic() - reported >= PROGRESS_SECONDS:
+            reported = time.monotonic()
+            worker.log_event(PROGRESS_TOPIC, (key, episode))
+
+    record = run_to_end(planned, wanted=wanted, advanced=advanced)
+    if record is None:
+        raise Reschedule
+    return record
 
 
 class DaskExecutor:
@@ -62,10 +127,10 @@ class DaskExecutor:
         If a value is out of its range.
     """
 
-    def __init__(self, scheduler: str, *, scheduler_timeout: float = SCHEDULER_TIMEOUT) -> None:
+    def __init__(self, scheduler: str, *, scheduler_timeout: float = 300.0) -> None:
         if not scheduler:
             raise ValueError("scheduler must be an address or a scheduler file, got ''")
-        if not 0 < scheduler_timeout < float("inf"):
+        if not 0 < scheduler_timeout < math.inf:
             raise ValueError(
                 f"scheduler_timeout must be finite and above 0, got {scheduler_timeout}"
             )
@@ -91,33 +156,31 @@ class DaskExecutor:
             if client is None:
                 return
             try:
-                yield from _Run(self, client, planned).messages(stop)
+                run = _Run(self, client, list(_probes(planned)), deque(planned))
+                yield from run.messages(stop)
             except (OSError, TimeoutError) as error:
-                raise ClusterError(
-                    f"lost the scheduler at {self.scheduler} ({error}); {RESUME}"
-                ) from error
+                raise self.failure(f"lost the scheduler at {self.scheduler}: {error}") from error
             finally:
                 client.close(timeout=CONNECT_SECONDS)
 
     def _connect(self, stop: threading.Event) -> Generator[Message, None, Client | None]:
+        """Connect, in short attempts, so that Ctrl-C ends them."""
         from distributed import Client
 
-        is_noted = False
-        deadline = time.monotonic() + self.scheduler_timeout
+        begin = time.monotonic()
+        notes = [f"waiting for the scheduler at {self.scheduler}"]
+        attempt = min(CONNECT_SECONDS, self.scheduler_timeout)
         while not stop.is_set():
             try:
-                address = self._address()
-                left = max(0.1, deadline - time.monotonic())
-                return Client(address, timeout=min(CONNECT_SECONDS, left), set_as_default=False)
+                return Client(self._address(), timeout=attempt, set_as_default=False)
             except OSError as error:
-                if time.monotonic() > deadline:
-                    raise ClusterError(
+                if time.monotonic() - begin > self.scheduler_timeout:
+                    raise self.failure(
                         f"no scheduler at {self.scheduler}: {error}; waited"
-                        f" {self.scheduler_timeout:g} s; {RESUME}"
+                        f" {self.scheduler_timeout:g} s"
                     ) from error
-                if not is_noted:
-                    is_noted = True
-                    yield Noted(f"waiting for the scheduler at {self.scheduler}")
+                yield from map(Noted, notes)
+                notes = []
                 stop.wait(WORKERS_SECONDS)
             except ValueError as error:
                 raise self._refusal(error) from error
@@ -141,178 +204,161 @@ class DaskExecutor:
             f" ({type(error).__name__}: {error})"
         )
 
+    def failure(self, problem: str) -> ClusterError:
+        """Return the error that ends the run."""
+        return ClusterError(
+            f"{problem}; finished trials are stored, the same command continues from there"
+        )
+
 
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Silence what Dask logs about lost connections: the run ends with one message about them."""
     import distributed  # noqa: F401  (its import sets the levels)
 
-    loggers = [logging.getLogger(f"distributed{part}") for part in ("", ".client", ".core")]
+    loggers = [logging.getLogger(f"distributed.{part}") for part in ("client", "core")]
     levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
     try:
-        for logger in loggers:
-            logger.setLevel(logging.CRITICAL)
         yield
     finally:
         for logger, level in zip(loggers, levels, strict=True):
             logger.setLevel(level)
 
 
-@dataclass(frozen=True)
-class _Task:
-    planned: PlannedTrial
-    future: Future
-    workers: frozenset[str]
-    is_alone: bool
+def _probes(planned: Iterable[PlannedTrial]) -> Iterator[tuple[bytes, str]]:
+    """Make probes of the first trial of each kind, but of those that will fail anyway."""
+    kinds: dict[tuple[str, bool], PlannedTrial] = {}
+    for one in planned:
+        kinds.setdefault((one.key.agent, one.spec.is_compiled), one)
+    for one in kinds.values():
+        try:
+            yield pickle.dumps(one), probe(one)
+        except Exception:  # reported when it is run, as with every executor
+            continue
 
 
+@dataclass
 class _Run:
-    """The trials of one run."""
+    """The trials of one run.
 
-    def __init__(
-        self, executor: DaskExecutor, client: Client, planned: Sequence[PlannedTrial]
-    ) -> None:
-        from distributed import as_completed
+    Those that were lost with worker after worker are suspects: they run after all others, alone.
+    """
 
-        self._executor, self._client = executor, client
-        self._waiting, self._suspects = deque(planned), deque[PlannedTrial]()
-        self._running: dict[str, _Task] = {}
-        self._n_submitted: Counter[TrialKey] = Counter()
-        self._completed = as_completed(loop=client.loop, with_results=True, raise_errors=False)
-        self._progress: SimpleQueue[tuple[str, int]] = SimpleQueue()
-        self._threads: dict[str, int] = {}  # of the workers that fit
-        self._refused: dict[str, str] = {}
-        self._served = time.monotonic()
-        self._is_noted = False
-        self._probes: list[tuple[bytes, str]] = []
-        probed = set()
-        for one in planned:
-            kind = (one.key.agent, one.spec.is_compiled)
-            if kind not in probed:
-                try:
-                    self._probes.append((pickle.dumps(one), probe(one)))
-                except Exception:  # it fails when it is run, as with every executor
-                    continue
-                probed.add(kind)
+    executor: DaskExecutor
+    client: Client
+    probes: list[tuple[bytes, str]]
+    waiting: deque[PlannedTrial]
+    running: dict[Future, tuple[PlannedTrial, frozenset[str]]] = field(default_factory=dict)
+    suspects: set[TrialKey] = field(default_factory=set)
+    n_submitted: Counter[TrialKey] = field(default_factory=Counter)
+    threads: dict[str, int] = field(default_factory=dict)  # of the workers that fit
+    refused: dict[str, str] = field(default_factory=dict)  # why others do not
+    unserved_since: float | None = None
 
     def messages(self, stop: threading.Event) -> Generator[Message, None, None]:
         """Run until every trial is finished or failed, or `stop` is set."""
-        self._client.subscribe_topic(
-            PROGRESS_TOPIC, lambda event: self._progress.put(tuple(event[1]))
-        )
-        looked = float("-inf")
-        while self._waiting or self._suspects or self._running:
+        from distributed import as_completed
+
+        completed = as_completed(loop=self.client.loop, with_results=True, raise_errors=False)
+        progress: SimpleQueue[tuple[str, int]] = SimpleQueue()
+        self.client.subscribe_topic(PROGRESS_TOPIC, lambda event: progress.put(event[1]))
+        looked = -math.inf
+        while self.waiting or self.running:
             if time.monotonic() - looked > WORKERS_SECONDS:
-                yield from self._look_at_workers()
+                yield from self.look_at_workers()
                 looked = time.monotonic()
-            yield from self._submit()
+            for planned in self.next_trials():
+                yield from self.submit(planned, completed)
             if stop.wait(RESULTS_SECONDS):
                 return
-            while not self._progress.empty():
-                key, episode = self._progress.get()
-                if key in self._running:
-                    yield Advanced(self._running[key].planned, episode)
-            for future, result in self._completed.next_batch(block=False):
-                if future.key in self._running:
-                    yield from self._complete(self._running.pop(future.key), result)
+            trials = {future.key: planned for future, (planned, _) in self.running.items()}
+            while not progress.empty():
+                key, episode = progress.get()
+                if key in trials:
+                    yield Advanced(trials[key], episode)
+            for future, result in completed.next_batch(block=False):
+                if future in self.running:
+                    yield from self.complete(future, result)
 
-    def _look_at_workers(self) -> Generator[Message, None, None]:
-        """Admit new workers that fit, and submit again what waits for lost ones only."""
-        client = self._client
+    def look_at_workers(self) -> Generator[Message, None, None]:
+        """Admit new workers that fit, and take back what waits for lost ones only."""
+        client = self.client
         threads = client.sync(client.scheduler.ncores, callback_timeout=ANSWER_SECONDS)
-        new = [one for one in threads if one not in self._threads and one not in self._refused]
-        found: dict[str, Any] = {}
+        self.threads = {one: n for one, n in threads.items() if one in self.threads}
+        self.refused = {one: why for one, why in self.refused.items() if one in threads}
+        new = threads.keys() - self.threads.keys() - self.refused.keys()
+        given = {"version": _core.__version__, "probes": self.probes}
+        answers: dict[str, Any] = {}
         if new:
-            given = {"trials": [trial for trial, _ in self._probes]}
-            found = client.run(eval, PROBE_CALL, given, workers=new, on_error="return")
-        self._threads = {one: threads[one] for one in threads if one in self._threads}
-        for worker, answer in found.items():
-            if isinstance(answer, OSError):
-                continue  # it was lost meanwhile
-            reason = self._mismatch(answer)
-            if reason:
-                self._refused[worker] = f"worker {worker} was refused, {reason}"
-                yield Noted(self._refused[worker])
-            else:
-                self._threads[worker] = threads[worker]
-        for key, task in list(self._running.items()):
-            if task.workers.isdisjoint(self._threads):
-                del self._running[key]
-                task.future.cancel()
-                yield Lost(task.planned)
-                (self._suspects if task.is_alone else self._waiting).appendleft(task.planned)
-        if self._threads:
-            self._served = time.monotonic()
-            self._is_noted = False
+            answers = client.run(eval, MISMATCH, given, workers=list(new), on_error="return")
+        for worker, answer in answers.items():
+            if answer == "":
+                self.threads[worker] = threads[worker]
+            elif not isinstance(answer, OSError):  # else it was lost meanwhile
+                if isinstance(answer, BaseException):
+                    answer = f"it cannot run these trials: {type(answer).__name__}: {answer}"
+                self.refused[worker] = f"worker {worker} was refused, {answer}"
+                yield Noted(self.refused[worker])
+        for future, (planned, workers) in list(self.running.items()):
+            if workers.isdisjoint(self.threads):
+                del self.running[future]
+                future.cancel()
+                self.waiting.appendleft(planned)
+        if self.threads:
+            self.unserved_since = None
+        elif self.unserved_since is None:
+            self.unserved_since = time.monotonic()
+            yield Noted(f"waiting for workers at {self.executor.scheduler}")
+        elif time.monotonic() - self.unserved_since > self.executor.scheduler_timeout:
+            fits = f" fits: {'; '.join(self.refused.values())}" if self.refused else ""
+            waited = f"waited {self.executor.scheduler_timeout:g} s"
+            raise self.executor.failure(f"no worker at {self.executor.scheduler}{fits}; {waited}")
+
+    def next_trials(self) -> Iterator[PlannedTrial]:
+        """Yield a trial for each free thread; suspects, which come last, one by one."""
+        n_threads = sum(self.threads.values())
+        while self.waiting:
+            is_alone = self.waiting[0].key in self.suspects
+            if len(self.running) >= (min(1, n_threads) if is_alone else n_threads):
+                return
+            yield self.waiting.popleft()
+
+    def submit(self, planned: PlannedTrial, completed: Any) -> Generator[Message, None, None]:
+        """Submit a trial; its identity is its key, so that drivers with the same trial share it."""
+        # A trial that is submitted again has a number, because Dask remembers how a key ended.
+        number = self.n_submitted[planned.key]
+        self.n_submitted[planned.key] += 1
+        yield Advanced(planned, 0)
+        try:
+            pickled = pickle.dumps(planned)
+        except Exception as error:
+            yield Failed(planned, error)
             return
-        waited = time.monotonic() - self._served
-        if waited > NOTE_SECONDS and not self._is_noted:
-            self._is_noted = True
-            yield Noted(f"waiting for workers at {self._executor.scheduler}")
-        if waited > self._executor.scheduler_timeout:
-            refusals = [text for one, text in self._refused.items() if one in threads]
-            raise ClusterError(
-                f"no worker at {self._executor.scheduler}{' fits: ' * bool(refusals)}"
-                f"{'; '.join(refusals)}; waited {self._executor.scheduler_timeout:g} s; {RESUME}"
-            )
+        key = "-".join(map(str, ("trial", _core.__version__, *planned.key, number)))
+        future = self.client.submit(
+            run_on_worker, _core.__version__, pickled, key=key, workers=list(self.threads)
+        )
+        self.running[future] = planned, frozenset(self.threads)
+        completed.add(future)
 
-    def _mismatch(self, answer: Any) -> str:
-        """Return why a worker gets no trials, or nothing if it fits."""
-        if isinstance(answer, BaseException):
-            return f"it cannot run these trials: {type(answer).__name__}: {answer}"
-        version, probes = answer
-        if version != _core.__version__:
-            return f"it has sdnn {version}, this is sdnn {_core.__version__}"
-        if isinstance(probes, str):
-            return f"it cannot run these trials: {probes}"
-        if probes != [ours for _, ours in self._probes]:
-            return f"its build of sdnn {version} does not give the rows of this one"
-        return ""
-
-    def _submit(self) -> Generator[Message, None, None]:
-        """Submit a trial for each free thread; suspects one by one, when all others are done."""
-        is_alone = not self._waiting and not self._running
-        trials = self._suspects if is_alone else self._waiting
-        n_free = sum(self._threads.values()) - len(self._running)
-        for _ in range(min(n_free, 1 if is_alone else n_free, len(trials))):
-            planned = trials.popleft()
-            yield Started(planned)
-            try:
-                settings, trial = planned.spec.canonical_json(), pickle.dumps(planned)
-            except Exception as error:
-                yield Failed(planned, error)
-                continue
-            # The identity of a trial is its key: drivers with the same trial share its result. A
-            # trial that is submitted again has a number, because Dask remembers how a key ended.
-            again = self._n_submitted[planned.key]
-            self._n_submitted[planned.key] += 1
-            key = "-".join(map(str, ("trial", _core.__version__, *planned.key, again)))
-            future = self._client.submit(
-                run_on_worker, _core.__version__, settings, trial,
-                key=key, workers=list(self._threads), allow_other_workers=False,
-            )  # fmt: skip
-            self._running[key] = _Task(planned, future, frozenset(self._threads), is_alone)
-            self._completed.add(future)
-
-    def _complete(self, task: _Task, result: Any) -> Generator[Message, None, None]:
-        """Tell how a trial ended."""
+    def complete(self, future: Future, result: Any) -> Generator[Message, None, None]:
+        """Report how a trial ended."""
         from distributed.scheduler import KilledWorker
 
-        planned, status = task.planned, task.future.status
-        task.future.release()
-        if status == "error" and not isinstance(result[1], KilledWorker):
-            yield Failed(planned, result[1])
-        elif status == "error" and task.is_alone:
-            lost = f"worker after worker was lost with this trial: {result[1]}"
-            yield Failed(planned, WorkerLostError(lost))
-        elif status == "error":
-            yield Lost(planned)
-            self._suspects.append(planned)
-        elif status != "finished":
-            raise OSError("it does not know the trials any more")
-        elif result is None:  # another driver cancelled it
-            yield Lost(planned)
-            self._waiting.append(planned)
-        else:
+        planned, _ = self.running.pop(future)
+        status = future.status
+        future.release()
+        if status == "finished":
             yield Advanced(planned, planned.spec.length)
             yield Finished(planned, result)
+        elif status != "error":
+            raise OSError("it does not know the trials any more")
+        elif not isinstance(result[1], KilledWorker):
+            yield Failed(planned, result[1])
+        elif planned.key in self.suspects:
+            yield Failed(planned, WorkerLostError(f"worker after worker was lost: {result[1]}"))
+        else:
+            self.suspects.add(planned.key)
+            self.waiting.append(planned)

@@ -15,13 +15,11 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from datetime import datetime, timezone
 from queue import Empty, SimpleQueue
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from sdnn import _core
 from sdnn.interrupts import Interrupts
 from sdnn.machine import n_cores
 from sdnn.runs.registry import title_of
@@ -53,17 +51,6 @@ def trial_seed(root_seed: int, case_id: str, trial: int) -> int:
     return int(word) >> 1
 
 
-def describe(key: TrialKey) -> str:
-    """Return the name of a trial for a reader; trials count from 1.
-
-    Examples
-    --------
-    >>> describe(TrialKey("s4", "sdnn-c", 0, 1, ""))
-    'SDNN-C s4, trial 1'
-    """
-    return f"{title_of(key.agent)} {key.case_id}, trial {key.trial + 1}"
-
-
 @dataclass(frozen=True)
 class PlannedTrial:
     """A trial that a run needs: where its result is stored, and what is run with the key's seed."""
@@ -73,30 +60,18 @@ class PlannedTrial:
 
     @property
     def title(self) -> str:
-        """Its name for a reader."""
-        return describe(self.key)
+        """Its name for a reader, such as ``"SDNN-C s4, trial 1"``; trials count from 1."""
+        return f"{title_of(self.key.agent)} {self.key.case_id}, trial {self.key.trial + 1}"
 
 
 # The reports of executors.
 
 
-class Started(NamedTuple):
-    """A trial starts."""
-
-    planned: PlannedTrial
-
-
 class Advanced(NamedTuple):
-    """A trial has done so many learning episodes."""
+    """A trial has done so many learning episodes: first 0, and 0 again when it begins again."""
 
     planned: PlannedTrial
     episode: int
-
-
-class Lost(NamedTuple):
-    """A trial was lost with what ran it; it starts again later, or fails."""
-
-    planned: PlannedTrial
 
 
 class Finished(NamedTuple):
@@ -119,11 +94,7 @@ class Noted(NamedTuple):
     text: str
 
 
-class _Abandoned(NamedTuple):
-    """A trial was given up after a stop."""
-
-
-Message = Started | Advanced | Lost | Finished | Failed | Noted
+Message = Advanced | Finished | Failed | Noted
 
 
 class Executor(Protocol):
@@ -144,14 +115,6 @@ class Executor(Protocol):
         """
 
 
-@dataclass(frozen=True)
-class Failure:
-    """A trial that raised, or was lost too often."""
-
-    key: TrialKey
-    error: Exception
-
-
 @dataclass(frozen=True, kw_only=True)
 class RunOutcome:
     """The result of `run_trials`.
@@ -163,7 +126,7 @@ class RunOutcome:
     n_planned: int
     n_reused: int
     n_run: int
-    failures: tuple[Failure, ...]
+    failures: tuple[Failed, ...]
     interrupted: bool
 
 
@@ -173,14 +136,8 @@ class Observer:
     def begun(self, n_planned: int, n_reused: int, n_episodes: int) -> None:
         """Note that the run begins, with `n_episodes` learning episodes before it."""
 
-    def started(self, planned: PlannedTrial) -> None:
-        """Note that a trial starts."""
-
     def advanced(self, planned: PlannedTrial, episode: int) -> None:
-        """Note how many learning episodes a trial has done."""
-
-    def lost(self, planned: PlannedTrial) -> None:
-        """Note that a trial was lost with its worker; it starts again later, or fails."""
+        """Note how many learning episodes a trial has done: 0 when it begins."""
 
     def finished(self, planned: PlannedTrial) -> None:
         """Note that a trial is stored."""
@@ -247,25 +204,21 @@ def run_trials(
     n_reused = len(planned) - len(missing)
     watcher.begun(len(planned), n_reused, sum(p.spec.length for p in missing))
     stop = threading.Event() if stop is None else stop
-    failures: list[Failure] = []
+    failures: list[Failed] = []
     n_run = 0
     if missing:
         # An exception at any instruction could lose a result between queue and store.
         with Interrupts(stop.set), closing(executor.run(missing, stop)) as messages:
             for message in messages:
                 match message:
-                    case Started(trial):
-                        watcher.started(trial)
                     case Advanced(trial, episode):
                         watcher.advanced(trial, episode)
-                    case Lost(trial):
-                        watcher.lost(trial)
                     case Finished(trial, record):
                         store.add(record, is_exact=trial.spec.is_compiled)
                         n_run += 1
                         watcher.finished(trial)
                     case Failed(trial, error):
-                        failures.append(Failure(trial.key, error))
+                        failures.append(message)
                         watcher.failed(trial, error)
                     case Noted(text):
                         watcher.noted(text)
@@ -306,10 +259,8 @@ def run_to_end(
     return TrialRecord(
         key=planned.key,
         config=planned.spec.canonical_json(),
-        version=_core.__version__,
         n_decisions=int(trial.n_decisions),
         seconds=time.thread_time() - begin,
-        finished_at=datetime.now(timezone.utc).isoformat(timespec="seconds"),
         rows=rows,
     )
 
@@ -350,61 +301,37 @@ class ThreadExecutor:
         self, planned: Sequence[PlannedTrial], stop: threading.Event
     ) -> Generator[Message, None, None]:
         """Run the trials; see `Executor`."""
-        messages: SimpleQueue[Message | _Abandoned] = SimpleQueue()
+        messages: SimpleQueue[Message | None] = SimpleQueue()
         with (
             ThreadPoolExecutor(self.jobs, thread_name_prefix="trial") as pool,
             _set_at_exit(stop),
         ):
             for item in planned:
                 pool.submit(_run_one, item, messages, stop)
-            # Every submitted trial sends one last message, also after a stop.
+            # Every submitted trial sends one last message, None if it was given up after a stop.
             n_open = len(planned)
             while n_open:
                 try:
                     message = messages.get(timeout=POLL_SECONDS)
                 except Empty:
                     continue
-                n_open -= not isinstance(message, Started | Advanced)
-                if not isinstance(message, _Abandoned):
+                n_open -= not isinstance(message, Advanced)
+                if message is not None:
                     yield message
 
 
-class SerialExecutor:
-    """Runs trials one after another in the calling thread, as an environment may need it."""
-
-    def run(
-        self, planned: Sequence[PlannedTrial], stop: threading.Event
-    ) -> Generator[Message, None, None]:
-        """Run the trials; see `Executor`."""
-        for item in planned:
-            yield Started(item)
-            try:
-                record = run_to_end(
-                    item, wanted=lambda: not stop.is_set(), advanced=lambda episode: None
-                )
-            except Exception as error:
-                yield Failed(item, error)
-                continue
-            if stop.is_set() and record is None:
-                return
-            if record is not None:
-                yield Finished(item, record)
-
-
 def _run_one(
-    planned: PlannedTrial, messages: SimpleQueue[Message | _Abandoned], stop: threading.Event
+    planned: PlannedTrial, messages: SimpleQueue[Message | None], stop: threading.Event
 ) -> None:
     """Run one trial; runs in a worker thread."""
-    if stop.is_set():
-        messages.put(_Abandoned())
-        return
+    record = None
     try:
-        messages.put(Started(planned))
-        record = run_to_end(
-            planned,
-            wanted=lambda: not stop.is_set(),
-            advanced=lambda episode: messages.put(Advanced(planned, episode)),
-        )
+        if not stop.is_set():
+            record = run_to_end(
+                planned,
+                wanted=lambda: not stop.is_set(),
+                advanced=lambda episode: messages.put(Advanced(planned, episode)),
+            )
     except Exception as error:
         messages.put(Failed(planned, error))
     except BaseException as error:  # SystemExit and the like end a thread without a word
@@ -412,7 +339,7 @@ def _run_one(
         failure.__cause__ = error
         messages.put(Failed(planned, failure))
     else:
-        messages.put(_Abandoned() if record is None else Finished(planned, record))
+        messages.put(None if record is None else Finished(planned, record))
 
 
 @contextmanager

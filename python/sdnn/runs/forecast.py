@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from sdnn.machine import n_cores
-from sdnn.runs.engine import describe
+from sdnn.runs.engine import PlannedTrial
 from sdnn.runs.errors import RunError
 from sdnn.runs.report import duration_words
 from sdnn.runs.spec import RunSpec
@@ -139,7 +139,9 @@ def _probe(key: TrialKey, spec: RunSpec) -> TrialTime:
                 seconds = time.thread_time() - begin
             n_episodes, n_decisions = int(trial.episode), int(trial.n_decisions)
     except Exception as error:  # whatever a trial raises
-        raise RunError(f"{describe(key)} fails: {type(error).__name__}: {error}") from error
+        raise RunError(
+            f"{PlannedTrial(key, spec).title} fails: {type(error).__name__}: {error}"
+        ) from error
     return TrialTime(key=key, seconds=seconds, n_episodes=n_episodes, n_decisions=n_decisions)
 
 

@@ -7,11 +7,11 @@ import json
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 
@@ -23,7 +23,6 @@ from sdnn.agents import (
     Evaluation,
     Scaling,
     SDNNQLearning,
-    StopTrainingOnRewardThreshold,
     TensorBoard,
     Training,
     UnrepeatedEpisodeError,
@@ -37,7 +36,6 @@ from sdnn.arguments import whole
 from sdnn.files import lock, open_to_append, remove_abandoned_files, write_whole
 from sdnn.interrupts import Interrupts
 from sdnn.runs.config_file import ConfigFile
-from sdnn.runs.engine import PlannedTrial, SerialExecutor, run_trials
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line, problem_of
 from sdnn.runs.spec import BudgetSpec, RunSpec
@@ -47,9 +45,10 @@ from sdnn.runs.trial import (
     Reason,
     TrainingTrial,
     TrialKey,
+    TrialRecord,
     TrialRows,
-    reset_options,
-    training_of,
+    closing_evaluation_env,
+    training_trial,
 )
 
 if TYPE_CHECKING:
@@ -157,7 +156,14 @@ class Run:
 
     def check(self) -> None:
         """Make all that is needed once, to see that it works; ConfigError if not."""
-        with closing(self.spec.make_env()) as env, self.evaluation_env():
+        if self.spec.environment is None:
+            raise ConfigError(
+                "environment",
+                "must be given for a run in a folder: the paper's acrobot has sensor noise that"
+                " runs on over episodes, so that none can be repeated. Studies and `sdnn reproduce`"
+                " run it; sdnn.environments:sdnn/AcrobotSwingUp-v0 is the same acrobot",
+            )
+        with closing(self.spec.make_env()) as env, closing_evaluation_env(self.spec):
             self.spec.make_agent(env)
         if self.spec.output.tensorboard:
             tensorboard_in(self.folder)
@@ -183,6 +189,10 @@ class Run:
             If a file is damaged, the run is trained elsewhere, or the environment has changed or
             gives what cannot be learned.
         """
+        if steps is not None and episodes is not None:
+            raise ConfigError("episodes", "must not be given together with steps")
+        goal = {"steps": steps, "episodes": episodes}
+        stop = threading.Event()
         with ExitStack() as stack:
             stack.enter_context(self._locked())
             remove_abandoned_files(self.folder)
@@ -192,21 +202,33 @@ class Run:
                     f" needs another folder, {AGENT} would be written over"
                 )
             store = stack.enter_context(ResultStore(self.folder))
-            store.reopen(self.key)
-            stop = threading.Event()
-            task = RunTask(
-                self, store, callbacks, stop,
-                repeat_episodes=repeat_episodes, steps=steps, episodes=episodes,
-            )  # fmt: skip
-            planned = PlannedTrial(self.key, cast("RunSpec", task))
-            with Interrupts(stop.set, (signal.SIGTERM,)) as terminations:
-                done = run_trials([planned], store, executor=SerialExecutor(), stop=stop)
-            for failure in done.failures:
-                raise task.explained(failure.error)
-            training = task.trial.training
-            if terminations.received is not None:
+            checkpoints = _StoredCheckpoints(self, store, stop)
+            listed = [checkpoints, *callbacks]
+            if self.spec.output.tensorboard:
+                listed.append(tensorboard_in(self.folder))
+            has_goal = steps is not None or episodes is not None
+            trial = self._trial(listed, has_goal=has_goal, repeat_episodes=repeat_episodes)
+            stack.enter_context(closing(trial))
+            training = trial.training
+            if training.n_rows > len(store.rows(self.key).to_training()):
+                raise RunError(
+                    f"{self.folder / STORE_NAME} must have the {training.n_rows} rows that were"
+                    f" written before {CHECKPOINT}: it was changed"
+                )
+            if has_goal:
+                self._set_goal(training, goal)
+            began_at = training.n_steps
+            try:
+                with Interrupts(stop.set, (signal.SIGINT, signal.SIGTERM)) as signals:
+                    if trial.reason != "target":  # reached just before the run was killed
+                        training.run()
+            except UnusableStepError as error:
+                raise self._explained(error, checkpoints.n_saved or began_at) from error
+            if trial.finished:
+                checkpoints.finish(training)
+            if signals.received == signal.SIGTERM:
                 raise RunTerminatedError(f"terminated after {training.n_steps} steps")
-            if done.interrupted:
+            if signals.received is not None:
                 raise KeyboardInterrupt
             agent, env = training.agent, training.env
             agent.save(self.folder / AGENT)
@@ -216,7 +238,7 @@ class Run:
         return RunOutcome(
             n_steps=training.n_steps,
             n_episodes=training.n_episodes,
-            reason=task.trial.reason,
+            reason=trial.reason,
             last_evaluation=evaluations[-1] if evaluations else None,
             learning_report=agent.learning_report() if has_report else None,
             is_warming_up=agent.is_warming_up,
@@ -274,29 +296,10 @@ class Run:
         with ResultStore(self.folder, read_only=True) as store:
             return store.rows(self.key).to_training()
 
-    @contextmanager
-    def evaluation_env(self) -> Iterator[gym.Env[Any, Any] | None]:
-        """Make an environment for evaluations where there are any; there may be one robot only."""
-        if not self.spec.is_evaluated:
-            yield None
-            return
-        try:
-            env = self.spec.make_env("evaluation_sensor_noise")
-        except ConfigError as error:
-            problem = f"needs a second environment, or must be 0: {error.problem}"
-            raise ConfigError("protocol.evaluate_every", problem) from error
-        with closing(env):
-            yield env
-
     @property
     def goal(self) -> Goal | BudgetSpec:
         """How many steps or episodes it is to learn in all."""
         return self.goals[-1] if self.goals else self.spec.budget
-
-    def add_goal(self, at_step: int, steps: int | None, episodes: int | None) -> None:
-        """Note a new goal in the configuration."""
-        self.goals += (Goal(at_step=at_step, steps=steps, episodes=episodes),)
-        self.write_config()
 
     def write_config(self) -> None:
         """Write the configuration and the goals."""
@@ -314,14 +317,58 @@ class Run:
                 raise RunError(f"{self.folder} is being trained by another process")
             yield
 
+    def _trial(
+        self, callbacks: list[Callback], *, has_goal: bool, repeat_episodes: bool
+    ) -> TrainingTrial:
+        """Make the training, from the checkpoint if there is one; its budget is the goal."""
+        spec = self.spec
+        if self.goals or has_goal:
+            spec = spec.replace(budget=spec.budget.replace(target_return=None))
+        if not (self.folder / CHECKPOINT).exists():
+            trial = training_trial(spec, callbacks)
+            trial.training.steps, trial.training.episodes = self.goal.steps, self.goal.episodes
+            return trial
 
-class _Target(StopTrainingOnRewardThreshold):
-    """Stops where the target was reached, also if that was just before the run was killed."""
+        def load(
+            _spec: RunSpec, env: Any, evaluation_env: Any, callbacks: Iterable[Callback]
+        ) -> Training:
+            return Training.load(
+                self.folder / CHECKPOINT, env, callbacks=callbacks, evaluation_env=evaluation_env,
+                repeat_episodes=repeat_episodes,
+            )  # fmt: skip
 
-    def on_start(self, training: Training) -> None:
-        """Look at the evaluation made at the present step."""
-        if self.is_reached(training) and training.evaluations[-1][0] == training.n_steps:
-            training.stop()
+        try:
+            return training_trial(spec, callbacks, load)
+        except UnrepeatedEpisodeError as error:
+            begins = command_line("sdnn", "resume", self.folder, "--new-episode")
+            raise RunError(f"{error}; {begins} begins a new one") from error
+        except ValueError as error:
+            raise RunError(str(error)) from error
+
+    def _set_goal(self, training: Training, goal: dict[str, int | None]) -> None:
+        """Note a new goal: in the checkpoint, which is followed, then in the configuration."""
+        for name, value in goal.items():
+            done: int = getattr(training, f"n_{name}")
+            try:
+                if value is not None and whole(name, value, 1, 2**53) < done:
+                    raise ConfigError(
+                        name, f"must be at least the {done} that are done, got {value}"
+                    )
+            except ValueError as error:
+                raise ConfigError(name, problem_of(error)) from None
+        training.steps, training.episodes = goal["steps"], goal["episodes"]
+        if (self.folder / CHECKPOINT).exists():
+            training.save(self.folder / CHECKPOINT)
+        self.goals += (Goal(at_step=training.n_steps, **goal),)
+        self.write_config()
+
+    def _explained(self, error: Exception, n_saved: int) -> RunError:
+        """Return the error of a step that could not be learned, with what is saved."""
+        resume = command_line("sdnn", "resume", self.folder)
+        saved = f"the first {n_saved} steps are saved: {resume} continues there with a new episode"
+        if n_saved == 0:
+            saved = f"nothing is learned yet: {resume} begins again once the environment is fixed"
+        return RunError(f"{self.spec.task}: {error}; {saved}")
 
 
 class _StoredCheckpoints(CheckpointCallback):
@@ -329,9 +376,11 @@ class _StoredCheckpoints(CheckpointCallback):
 
     def __init__(self, run: Run, store: ResultStore, stop: threading.Event) -> None:
         super().__init__(run.folder / CHECKPOINT, run.spec.output.checkpoint_every)
-        self._run, self._results, self._stop = run, store, stop
+        self._key, self._config = run.key, run.spec.canonical_json()
+        self._results, self._stop = store, stop
         self._rows: list[Row] = []
         self._stored_at = time.monotonic()
+        self._clock = time.thread_time()
 
     def on_start(self, training: Training) -> None:
         """Remove the rows that were stored after the checkpoint."""
@@ -349,143 +398,34 @@ class _StoredCheckpoints(CheckpointCallback):
         """Keep a row until it is stored."""
         self._rows.append(row)
 
+    def finish(self, training: Training) -> None:
+        """Note in the store that the run is finished."""
+        record = TrialRecord(
+            key=self._key,
+            config=self._config,
+            n_decisions=training.n_steps + self._results.rows(self._key).n_evaluated,
+            seconds=self._seconds(),
+            rows=TrialRows.from_training([]),
+        )
+        self._results.add(record, is_exact=False)
+
     def _save(self, training: Training) -> None:
         self._store(training)
         super()._save(training)
 
     def _store(self, training: Training) -> None:
         first = training.n_rows - len(self._rows)
-        config = self._run.spec.canonical_json()
         rows = TrialRows.from_training(self._rows, first)
-        self._results.extend(self._run.key, rows, first, config=config, version=__version__)
+        self._results.extend(
+            self._key, rows, first, config=self._config, version=__version__,
+            seconds=self._seconds(),
+        )  # fmt: skip
         self._rows, self._stored_at = [], time.monotonic()
 
-
-class RunTrial(TrainingTrial):
-    """The training of a run, whose rows are stored with its checkpoints already."""
-
-    n_evaluated: Callable[[], int]
-
-    @property
-    def n_decisions(self) -> int:
-        """Decisions of the whole run, in learning and evaluations."""
-        return self.training.n_steps + self.n_evaluated()
-
-    def rows(self) -> TrialRows:
-        """Return the rows that are not yet stored: none."""
-        return TrialRows.from_training([])
-
-
-class RunTask:
-    """The training of a run as the specification of a planned trial; see `Run.train`.
-
-    ``trial`` is there once it is made.
-    """
-
-    trial: RunTrial
-    is_compiled = False
-
-    def __init__(
-        self, run: Run, store: ResultStore, callbacks: Iterable[Callback], stop: threading.Event,
-        *, repeat_episodes: bool, steps: int | None, episodes: int | None,
-    ) -> None:  # fmt: skip
-        self._run, self._store, self._given = run, store, tuple(callbacks)
-        self._repeats, self._goal = repeat_episodes, (steps, episodes)
-        self._checkpoints = _StoredCheckpoints(run, store, stop)
-        self._began_at = 0
-
-    @property
-    def length(self) -> int:
-        """Steps or episodes of the whole run."""
-        goal = self._run.goal
-        return goal.steps or goal.episodes or 0
-
-    def canonical_json(self) -> str:
-        """Return what defines the run."""
-        return self._run.spec.canonical_json()
-
-    def make_trial(self, seed: int) -> RunTrial:
-        """Make the training, from the checkpoint if there is one; the run has a seed already."""
-        run, spec = self._run, self._run.spec
-        has_goal = self._goal != (None, None)
-        with ExitStack() as stack:
-            env: Any = stack.enter_context(closing(spec.make_training_env()))
-            evaluation_env = stack.enter_context(run.evaluation_env())
-            target = None
-            if spec.budget.target_return is not None and not (run.goals or has_goal):
-                target = _Target(spec.budget.target_return)
-            listed = [target, self._checkpoints, *self._given]
-            if spec.output.tensorboard:
-                listed.append(tensorboard_in(run.folder))
-            callbacks = [one for one in listed if one is not None]
-            if (run.folder / CHECKPOINT).exists():
-                training = self._loaded(env, evaluation_env, callbacks)
-            else:
-                budget = BudgetSpec(steps=run.goal.steps, episodes=run.goal.episodes)
-                spec = spec.replace(budget=budget)
-                training = training_of(spec, env, evaluation_env, callbacks)
-            if has_goal:
-                self._set_goal(training, *self._goal)
-            self._began_at = training.n_steps
-            stack.pop_all()
-        self.trial = RunTrial(training, (env, evaluation_env), target)
-        self.trial.n_evaluated = lambda: self._store.rows(run.key).n_evaluated
-        return self.trial
-
-    def explained(self, error: Exception) -> Exception:
-        """Return the error, with what is saved where a step could not be learned."""
-        if not isinstance(error, UnusableStepError):
-            return error
-        n_steps = self._checkpoints.n_saved or self._began_at
-        resume = command_line("sdnn", "resume", self._run.folder)
-        saved = f"the first {n_steps} steps are saved: {resume} continues there with a new episode"
-        if n_steps == 0:
-            saved = f"nothing is learned yet: {resume} begins again once the environment is fixed"
-        explained = RunError(f"{self._run.spec.task}: {error}; {saved}")
-        explained.__cause__ = error
-        return explained
-
-    def _loaded(
-        self, env: Any, evaluation_env: gym.Env[Any, Any] | None, callbacks: list[Callback]
-    ) -> Training:
-        folder = self._run.folder
-        try:
-            training = Training.load(
-                folder / CHECKPOINT,
-                env,
-                callbacks=callbacks,
-                evaluation_env=evaluation_env,
-                repeat_episodes=self._repeats,
-                reset_options=reset_options(self._run.spec),
-            )
-        except UnrepeatedEpisodeError as error:
-            begins = command_line("sdnn", "resume", folder, "--new-episode")
-            raise RunError(f"{error}; {begins} begins a new one") from error
-        except ValueError as error:
-            raise RunError(str(error)) from error
-        numbers = self._store.rows(self._run.key).table["number"]
-        if len(set(numbers.tolist())) < training.n_rows:
-            raise RunError(
-                f"{folder / STORE_NAME} must have the {training.n_rows} rows that were written"
-                f" before {CHECKPOINT}: it was changed"
-            )
-        return training
-
-    def _set_goal(self, training: Training, steps: int | None, episodes: int | None) -> None:
-        """Note a new goal: in the checkpoint, which is followed, then in the configuration."""
-        if steps is not None and episodes is not None:
-            raise ConfigError("episodes", "must not be given together with steps")
-        name, goal = ("episodes", episodes) if steps is None else ("steps", steps)
-        done: int = getattr(training, f"n_{name}")
-        try:
-            if whole(name, goal, 1, 2**53) < done:
-                raise ConfigError(name, f"must be at least the {done} that are done, got {goal}")
-        except ValueError as error:
-            raise ConfigError(name, problem_of(error)) from None
-        training.steps, training.episodes = steps, episodes
-        if (self._run.folder / CHECKPOINT).exists():
-            training.save(self._run.folder / CHECKPOINT)
-        self._run.add_goal(training.n_steps, steps, episodes)
+    def _seconds(self) -> float:
+        """Return the processor time since the last call."""
+        before, self._clock = self._clock, time.thread_time()
+        return self._clock - before
 
 
 def tensorboard_in(folder: Path) -> TensorBoard:

@@ -53,7 +53,6 @@ CREATE TABLE measurements (
 """
 
 _KEY = "case_id = ? AND agent = ? AND trial = ? AND seed = ? AND config_hash = ?"
-_REOPEN = f"UPDATE runs SET finished_at = NULL, checksum = NULL WHERE {_KEY}"
 _KEY_COLUMNS = "case_id, agent, trial, seed, config_hash"
 _ROW_COLUMNS = (
     'number, part, kind, episode, ifnull(step, -1), length, "return", terminated,'
@@ -150,19 +149,22 @@ class ResultStore:
             )  # fmt: skip
 
     def extend(
-        self, key: TrialKey, rows: TrialRows, first: int, *, config: str, version: str
-    ) -> None:
-        """Store rows of a run in progress; they replace those from the number `first` on."""
+        self, key: TrialKey, rows: TrialRows, first: int, *, config: str, version: str,
+        seconds: float,
+    ) -> None:  # fmt: skip
+        """Store rows of a run in progress; they replace those from the number `first` on.
+
+        ``seconds`` is the processor time since rows were stored last. A finished run is in progress
+        again.
+        """
         with self._writing() as connection:
             run_id = self._run_id(key, config, version)
-            connection.execute(_REOPEN, _stored(key))
+            connection.execute(
+                "UPDATE runs SET finished_at = NULL, checksum = NULL, seconds = seconds + ?"
+                " WHERE id = ?", (seconds, run_id),
+            )  # fmt: skip
             connection.execute("DELETE FROM rows WHERE run_id = ? AND number >= ?", (run_id, first))
             self._insert(run_id, rows)
-
-    def reopen(self, key: TrialKey) -> None:
-        """Let a finished run be in progress again; its rows stay."""
-        with self._writing() as connection:
-            connection.execute(_REOPEN, _stored(key))
 
     def rows(self, key: TrialKey) -> TrialRows:
         """Return the rows of a run, finished or in progress; none if it is not stored."""

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass, field
+from datetime import datetime, timezone
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
 
@@ -17,9 +18,11 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sdnn._core import __version__
 from sdnn.agents import Callback, Evaluation, StopTrainingOnRewardThreshold, Training
 from sdnn.agents.callbacks import Row
 from sdnn.arguments import whole
+from sdnn.runs.errors import ConfigError
 from sdnn.runs.registry import agent_entry
 
 if TYPE_CHECKING:
@@ -194,10 +197,12 @@ class TrialRecord:
 
     key: TrialKey
     config: str
-    version: str
+    version: str = __version__
     n_decisions: int
     seconds: float
-    finished_at: str
+    finished_at: str = field(
+        default_factory=lambda: datetime.now(timezone.utc).isoformat(timespec="seconds")
+    )
     rows: TrialRows
 
 
@@ -346,24 +351,44 @@ class TrainingTrial:
                 stack.callback(env.close)
 
 
-def training_trial(spec: RunSpec) -> TrainingTrial:
+MakeTraining: TypeAlias = Callable[
+    ["RunSpec", Any, "gym.Env[Any, Any] | None", Iterable[Callback]], Training
+]
+"""Makes or loads a training, from specification, environments and callbacks."""
+
+
+def training_trial(
+    spec: RunSpec, callbacks: Iterable[Callback] = (), make: MakeTraining | None = None
+) -> TrainingTrial:
     """Make the trial of a specification in Python; ConfigError if a part cannot be made.
 
-    Its rows are those of the compiled trial, bit for bit.
+    Its rows are those of the compiled trial, bit for bit. ``make`` is `training_of` by default.
     """
     target = None
     if spec.budget.target_return is not None:
         target = StopTrainingOnRewardThreshold(spec.budget.target_return)
+        callbacks = (target, *callbacks)
     with ExitStack() as stack:
-        env: Any = spec.make_training_env()
-        stack.callback(env.close)
-        evaluation_env = None
-        if spec.is_evaluated:
-            evaluation_env = spec.make_env("evaluation_sensor_noise")
-            stack.callback(evaluation_env.close)
-        training = training_of(spec, env, evaluation_env, () if target is None else (target,))
+        env: Any = stack.enter_context(closing(spec.make_training_env()))
+        evaluation_env = stack.enter_context(closing_evaluation_env(spec))
+        training = (make or training_of)(spec, env, evaluation_env, callbacks)
         stack.pop_all()
     return TrainingTrial(training, (env, evaluation_env), target)
+
+
+@contextmanager
+def closing_evaluation_env(spec: RunSpec) -> Iterator[gym.Env[Any, Any] | None]:
+    """Make an environment for evaluations where there are any; there may be one robot only."""
+    if not spec.is_evaluated:
+        yield None
+        return
+    try:
+        env = spec.make_env("evaluation_sensor_noise")
+    except ConfigError as error:
+        problem = f"needs a second environment, or must be 0: {error.problem}"
+        raise ConfigError("protocol.evaluate_every", problem) from error
+    with closing(env):
+        yield env
 
 
 def training_of(
@@ -387,10 +412,5 @@ def training_of(
         evaluation_env=evaluation_env,
         evaluation_episodes=spec.protocol.evaluation_episodes or 1,
         limit_bootstraps=spec.protocol.limit_bootstraps,
-        reset_options=reset_options(spec),
+        reset_options=(lambda episode: {"episode": episode}) if is_acrobot else None,
     )
-
-
-def reset_options(spec: RunSpec) -> Callable[[int], dict[str, Any]] | None:
-    """Return what resets receive on the paper's acrobot: the number of the episode."""
-    return (lambda episode: {"episode": episode}) if spec.environment is None else None

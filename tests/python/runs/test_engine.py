@@ -8,7 +8,7 @@ from rich.console import Console
 
 from sdnn.progress import ProgressBars
 from sdnn.runs import Observer, ResultStore, StoreError, WorkerLostError
-from sdnn.runs.engine import Advanced, Failed, Finished, Lost, Noted, Started, ThreadExecutor
+from sdnn.runs.engine import Advanced, Failed, Finished, Noted, ThreadExecutor
 
 
 class Recorder(Observer):
@@ -18,17 +18,11 @@ class Recorder(Observer):
     def begun(self, n_planned, n_reused, n_episodes):
         self.events.append(("begun", n_planned, n_reused, n_episodes))
 
-    def started(self, planned):
-        self.events.append(("started", planned.key))
-
     def advanced(self, planned, episode):
         self.events.append(("advanced", planned.key, episode))
 
     def finished(self, planned):
         self.events.append(("finished", planned.key))
-
-    def lost(self, planned):
-        self.events.append(("lost", planned.key))
 
     def failed(self, planned, error):
         self.events.append(("failed", planned.key))
@@ -74,7 +68,7 @@ def test_observer_hears_every_trial_from_the_calling_thread(tmp_path, fake, run)
     assert recorder.events[0] == ("begun", 4, 0, 1200)
     for planned in fake.make_plan(2):
         mine = [event for event in recorder.events[1:] if event[1] == planned.key]
-        assert mine[0][0] == "started"
+        assert mine[0] == ("advanced", planned.key, 0)
         assert mine[-1][0] == "finished"
         episodes = [event[2] for event in mine if event[0] == "advanced"]
         assert episodes == sorted(episodes)
@@ -92,7 +86,7 @@ def test_failing_trial_does_not_stop_the_others(tmp_path, fake, run):
     recorder = Recorder()
     outcome, _ = run(tmp_path, plan, make, observer=recorder)
     assert outcome.n_run == 5
-    assert [(f.key, str(f.error)) for f in outcome.failures] == [(plan[0].key, "broken")]
+    assert [(f.planned.key, str(f.error)) for f in outcome.failures] == [(plan[0].key, "broken")]
     assert ("failed", plan[0].key) in recorder.events
     assert run(tmp_path, plan)[0].n_run == 1
 
@@ -193,24 +187,21 @@ def test_an_executor_tells_and_the_engine_stores(tmp_path, fake, run, record):
     lost = WorkerLostError("gone")
     script = (
         lambda a, b: Noted("hear"),
-        lambda a, b: Started(a),
-        lambda a, b: Started(b),
+        lambda a, b: Advanced(a, 0),
         lambda a, b: Advanced(a, 100),
-        lambda a, b: Lost(a),
-        lambda a, b: Started(a),
+        lambda a, b: Advanced(a, 0),
         lambda a, b: Failed(b, lost),
         lambda a, b: Finished(a, record),
     )
     recorder = Recorder()
     outcome, _ = run(tmp_path, plan, executor=Scripted(*script), observer=recorder)
     assert (outcome.n_run, outcome.interrupted) == (1, False)
-    assert [(f.key, f.error) for f in outcome.failures] == [(plan[1].key, lost)]
+    assert [(f.planned.key, f.error) for f in outcome.failures] == [(plan[1].key, lost)]
     first, second = (planned.key for planned in plan)
     assert recorder.events[1:] == [
-        ("noted", "hear"), ("started", first), ("started", second), ("advanced", first, 100),
-        ("lost", first), ("started", first), ("failed", second), ("finished", first),
+        ("noted", "hear"), ("advanced", first, 0), ("advanced", first, 100), ("advanced", first, 0),
+        ("failed", second), ("finished", first),
     ]  # fmt: skip
-    # On a terminal, bars of lost trials go and come again.
     text = io.StringIO()
     with ProgressBars(Console(file=text, force_terminal=True, width=80)) as observer:
         run(tmp_path / "shown", plan, executor=Scripted(*script), observer=observer)

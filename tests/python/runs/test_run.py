@@ -4,15 +4,17 @@ import os
 import random
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
 import drifting_env  # noqa: F401
 from run_specs import run_spec
 from sdnn.agents import Callback, Training, load_agent
-from sdnn.runs import ConfigError, EnvironmentSpec, Run, RunError
+from sdnn.runs import ConfigError, EnvironmentSpec, Run, RunError, RunSpec
 from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrialRows
 
@@ -214,6 +216,36 @@ def test_what_was_learned_is_not_written_over_by_a_new_beginning(tmp_path):
     assert [path.read_bytes() for path in sorted(run.folder.iterdir())] == before
 
 
+def test_a_run_that_cannot_be_resumed_stays_finished(tmp_path, monkeypatch):
+    run = Run.create(tmp_path / "run", run_spec(CONFIG, steps=50))
+    run.train()
+    with pytest.raises(ConfigError, match="steps"):
+        run.train(steps=20)
+    monkeypatch.delitem(gym.registry, "tests/Drifting-v0")
+    with pytest.raises(ConfigError, match=r"environment\.id"):
+        Run.open(run.folder).train(steps=100)
+    with ResultStore(run.folder, read_only=True) as store:
+        assert store.keys() == {run.key}
+
+
+def test_a_run_counts_the_time_of_all_its_parts(tmp_path):
+    run = Run.create(tmp_path / "run", CONFIG)
+    parts = []
+    for step in (150, 300, 400):
+        before = time.thread_time()
+        run.train(callbacks=[StopAt(step)])
+        parts.append(time.thread_time() - before)
+    with ResultStore(run.folder, read_only=True) as store:
+        (record,) = store.load()
+    assert max(parts) < record.seconds < sum(parts)
+
+
+def test_the_paper_s_acrobot_is_no_run_in_a_folder(tmp_path):
+    with pytest.raises(ConfigError, match="environment"):
+        Run.create(tmp_path / "run", RunSpec())
+    assert not (tmp_path / "run").exists()
+
+
 def test_nothing_is_written_for_what_cannot_work(tmp_path):
     wrong = run_spec(CONFIG, environment=EnvironmentSpec(id="Nothing-v0"))
     with pytest.raises(ConfigError):
@@ -262,7 +294,7 @@ def test_folders_that_hold_no_run_or_a_damaged_one(whole, tmp_path):
     path = run.folder / "results.sqlite"
     kept = path.read_bytes()
     with ResultStore(run.folder) as store:
-        store.extend(run.key, TrialRows.from_training([]), 2, config="{}", version="0.1")
+        store.extend(run.key, TrialRows.from_training([]), 2, config="{}", version="0.1", seconds=0)
     with pytest.raises(RunError, match=r"results\.sqlite"):
         run.train(steps=200)
     path.write_bytes(b"cake\n" + kept)

@@ -140,7 +140,7 @@ TRAINED = [
 
 def test_a_run_in_progress_grows_and_is_finished(tmp_path):
     key = make_record().key._replace(seed=2**64 - 1)
-    told = {"config": "{}", "version": "0.1"}
+    told = {"config": "{}", "version": "0.1", "seconds": 1.5}
     with ResultStore(tmp_path) as store:
         store.extend(key, TrialRows.from_training(TRAINED[:2]), 0, **told)
         assert (store.keys(), store.load()) == (set(), ())
@@ -149,9 +149,10 @@ def test_a_run_in_progress_grows_and_is_finished(tmp_path):
         store.extend(key, TrialRows.from_training(TRAINED[1:], 1), 1, **told)
         assert store.rows(key).to_training() == TRAINED
         nothing = TrialRows.from_training([])
-        store.add(replace(make_record(), key=key, rows=nothing))
+        store.add(replace(make_record(seconds=2.0), key=key, rows=nothing))
         assert store.keys() == {key}
         (record,) = store.load()
+        assert record.seconds == 5.0
         assert record.rows.to_training() == TRAINED
         assert record.rows.episode.tolist() == [1]
         assert record.rows.steps.tolist() == [5.5]
