@@ -150,7 +150,7 @@ class ResultStore:
 
     def extend(
         self, key: TrialKey, rows: TrialRows, first: int, *, config: str, version: str,
-        seconds: float,
+        seconds: float = 0.0,
     ) -> None:  # fmt: skip
         """Store rows of a run in progress; they replace those from the number `first` on.
 

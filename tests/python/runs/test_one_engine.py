@@ -43,7 +43,7 @@ def imports(name):
 def test_one_loop_steps_environments_and_learns():
     steps, acts, learns = map(modules_with, map(calls, ("step", "act", "learn")))
     outside = {name for name in steps if not name.startswith("environments/")}
-    assert outside == {"agents/episode", "agents/vectors", "agents/evaluation"}
+    assert outside == {"agents/episode"}
     agents = {"agents/agent", "agents/q_learning", "agents/fuzzy_q_learning"}
     assert learns - agents == {"agents/training"}
     assert acts - agents == {"agents/training", "agents/evaluation"}

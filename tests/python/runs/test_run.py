@@ -294,7 +294,7 @@ def test_folders_that_hold_no_run_or_a_damaged_one(whole, tmp_path):
     path = run.folder / "results.sqlite"
     kept = path.read_bytes()
     with ResultStore(run.folder) as store:
-        store.extend(run.key, TrialRows.from_training([]), 2, config="{}", version="0.1", seconds=0)
+        store.extend(run.key, TrialRows.from_training([]), 2, config="{}", version="0.1")
     with pytest.raises(RunError, match=r"results\.sqlite"):
         run.train(steps=200)
     path.write_bytes(b"cake\n" + kept)
