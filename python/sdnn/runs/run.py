@@ -47,7 +47,7 @@ from sdnn.runs.trial import (
     TrialKey,
     TrialRecord,
     TrialRows,
-    closing_evaluation_env,
+    make_evaluation_env,
     training_trial,
 )
 
@@ -163,7 +163,10 @@ class Run:
                 " runs on over episodes, so that none can be repeated. Studies and `sdnn reproduce`"
                 " run it; sdnn.environments:sdnn/AcrobotSwingUp-v0 is the same acrobot",
             )
-        with closing(self.spec.make_env()) as env, closing_evaluation_env(self.spec):
+        with closing(self.spec.make_env()) as env:
+            evaluation_env = make_evaluation_env(self.spec)
+            if evaluation_env is not None:
+                evaluation_env.close()
             self.spec.make_agent(env)
         if self.spec.output.tensorboard:
             tensorboard_in(self.folder)

@@ -370,25 +370,23 @@ def training_trial(
         callbacks = (target, *callbacks)
     with ExitStack() as stack:
         env: Any = stack.enter_context(closing(spec.make_training_env()))
-        evaluation_env = stack.enter_context(closing_evaluation_env(spec))
+        evaluation_env = make_evaluation_env(spec)
+        if evaluation_env is not None:
+            stack.callback(evaluation_env.close)
         training = (make or training_of)(spec, env, evaluation_env, callbacks)
         stack.pop_all()
     return TrainingTrial(training, (env, evaluation_env), target)
 
 
-@contextmanager
-def closing_evaluation_env(spec: RunSpec) -> Iterator[gym.Env[Any, Any] | None]:
+def make_evaluation_env(spec: RunSpec) -> gym.Env[Any, Any] | None:
     """Make an environment for evaluations where there are any; there may be one robot only."""
     if not spec.is_evaluated:
-        yield None
-        return
+        return None
     try:
-        env = spec.make_env("evaluation_sensor_noise")
+        return spec.make_env("evaluation_sensor_noise")
     except ConfigError as error:
         problem = f"needs a second environment, or must be 0: {error.problem}"
         raise ConfigError("protocol.evaluate_every", problem) from error
-    with closing(env):
-        yield env
 
 
 def training_of(
