@@ -212,16 +212,18 @@ def test_json_is_the_file(invoke, tmp_path):
 def test_dry_run_makes_nothing_and_counts_what_is_stored(invoke, tmp_path):
     result = invoke("reproduce", "a", "--dry-run")
     assert result.exit_code == 0
-    assert result.stdout.splitlines() == [
-        "s4 sdnn-c: 10 trials x 15000 episodes, 0 of them stored in results",
-        "s6 sdnn-c: 10 trials x 15000 episodes, 0 of them stored in results",
-    ]
+    lines = result.stdout.splitlines()
+    assert len(lines) == 3
+    for case, line in zip(("s4", "s6"), lines, strict=False):
+        start = f"{case} sdnn-c: 10 trials x 15000 episodes of sdnn-c, 0 of them stored in results"
+        assert line.startswith(f"{start}; a trial takes")
+    assert lines[2].startswith("in all 20 trials, 0 of them stored; the rest takes")
     assert list(tmp_path.iterdir()) == []
     invoke("reproduce", "a", "--quick")
     plan = json.loads(
         invoke("reproduce", "a", "--quick", "--trials", 5, "--dry-run", "--json").stdout
     )
-    assert plan["n_learning_episodes"] == 300
+    assert {row["episodes"] for row in plan["trials"]} == {300}
     assert [(row["planned"], row["stored"]) for row in plan["trials"]] == [(5, 2), (5, 2)]
 
 
@@ -237,7 +239,7 @@ def test_dry_run_opens_the_store_for_reading_only(invoke, tmp_path, monkeypatch)
     real_connect = sqlite3.connect
     monkeypatch.setattr("sdnn.runs.store.sqlite3.connect", connect)
     result = invoke("reproduce", "a", "--quick", "--dry-run")
-    assert result.stdout.count("2 trials x 300 episodes, 2 of them stored in results") == 2
+    assert result.stdout.count("2 trials x 300 episodes of sdnn-c, 2 of them") == 2
     assert opened
     assert all(place.endswith("?mode=ro") for place in opened)
     assert sorted((tmp_path / "results").iterdir()) == files
@@ -289,7 +291,7 @@ def test_a_preset_is_drawn_beside_the_papers_agents(invoke, tmp_path, no_costs):
     ]  # fmt: skip
     assert (tmp_path / "out" / "experiment-a-robust-quick.png").exists()
     again = invoke("reproduce", "a", "--quick", "--out", "out", "--preset", "paper", "--dry-run")
-    assert again.stdout.count("2 trials x 300 episodes, 2 of them stored") == 2
+    assert again.stdout.count("2 trials x 300 episodes of sdnn-c, 2 of them stored") == 2
     assert "robust" not in again.stdout
 
 

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from sdnn._core import presets
 from sdnn.cli.executor_options import executor_options
-from sdnn.cli.output import experiment_command, run_and_report
+from sdnn.cli.output import experiment_command, print_forecast, run_and_report
 from sdnn.reproduction.cases import MOST_EPISODES, WORDS, includes_cost, select_experiments
-
-if TYPE_CHECKING:
-    from sdnn.reproduction.reproduce import ReproduceRequest
 
 
 @click.command(short_help="Run the paper's experiments and write a report.")
@@ -48,7 +44,7 @@ if TYPE_CHECKING:
     help="A look at a fraction: 2 trials x 300 episodes. Not the result.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
-@click.option("--dry-run", is_flag=True, help="Only say what would be run.")
+@click.option("--dry-run", is_flag=True, help="Only say what would be run, and how long it takes.")
 @click.option(
     "--agent",
     "agents",
@@ -87,31 +83,13 @@ def reproduce(
         raise click.UsageError(str(error)) from error
     with experiment_command(context):
         if dry_run:
-            _print_plan(request, as_json)
+            planned, stored = request.count_costs()
+            costs = {"planned": planned, "stored": stored}
+            print_forecast(request, as_json=as_json, more={"costs": costs})
+            if planned and not as_json:
+                click.echo(
+                    f"cost of a step: {planned} measurements, {stored} of them stored in"
+                    f" {request.out}"
+                )
         else:
             run_and_report(context, run, request, as_json=as_json)
-
-
-def _print_plan(request: ReproduceRequest, as_json: bool) -> None:
-    from sdnn.reproduction.reproduce import count_stored
-
-    trials, (n_costs, n_costs_stored) = count_stored(request)
-    n_episodes = request.n_learning_episodes
-    if as_json:
-        plan = {
-            "n_learning_episodes": n_episodes,
-            "trials": [
-                {"case": case, "agent": agent, "planned": planned, "stored": stored}
-                for (case, agent), (planned, stored) in trials.items()
-            ],
-            "costs": {"planned": n_costs, "stored": n_costs_stored},
-        }
-        click.echo(json.dumps(plan, indent=2))
-        return
-    stored_in = f"of them stored in {request.out}"
-    for (case, agent), (planned, stored) in trials.items():
-        click.echo(
-            f"{case} {agent}: {planned} trials x {n_episodes} episodes, {stored} {stored_in}"
-        )
-    if n_costs:
-        click.echo(f"cost of a step: {n_costs} measurements, {n_costs_stored} {stored_in}")

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from sdnn.cli.executor_options import executor_options
-from sdnn.cli.output import experiment_command, run_and_report
-
-if TYPE_CHECKING:
-    from sdnn.runs.sweep import SweepRequest
+from sdnn.cli.output import experiment_command, print_forecast, run_and_report
 
 
 @click.command(short_help="Run a study: variants of any setting, trial by trial.")
@@ -75,15 +71,6 @@ def sweep(
         raise click.UsageError(str(error)) from error
     with experiment_command(context):
         if dry_run:
-            _print_forecast(request, as_json)
+            print_forecast(request, as_json=as_json, check=request.study.check)
         else:
             run_and_report(context, run, request, as_json=as_json)
-
-
-def _print_forecast(request: SweepRequest, as_json: bool) -> None:
-    from sdnn.runs.forecast import forecast, forecast_lines
-
-    found = forecast(request)
-    lines = [json.dumps(found, indent=2)] if as_json else forecast_lines(found, request.out)
-    for line in lines:
-        click.echo(line)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from sdnn.arguments import whole
 from sdnn.config import SensorConfig
-from sdnn.files import csv_bytes, remove_abandoned_files, write_whole
+from sdnn.files import csv_bytes, remove_abandoned_files
 from sdnn.reproduction import cost
 from sdnn.reproduction.cases import (
     EXPERIMENTS,
@@ -25,10 +25,10 @@ from sdnn.reproduction.cost import CostConfig, CostKey, CostRecord
 from sdnn.reproduction.figures import draw_cost, draw_experiment
 from sdnn.reproduction.reference_results import reference_results
 from sdnn.reproduction.report import Report
-from sdnn.runs.engine import Executor, Observer, PlannedTrial, run_trials, trial_seed
+from sdnn.runs.engine import Executor, Observer, PlannedTrial, plan_of, run_trials
 from sdnn.runs.figures import figure_bytes, require_matplotlib
-from sdnn.runs.registry import cost_series, label_of, split_label
-from sdnn.runs.report import Finished, describe_call, json_bytes, require_jinja
+from sdnn.runs.registry import cost_series, split_label
+from sdnn.runs.report import Finished, describe_call, require_jinja
 from sdnn.runs.results import CaseResult, measure
 from sdnn.runs.spec import PAPER_INTERVAL, AgentSpec, BudgetSpec, RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
@@ -80,16 +80,9 @@ class ReproduceRequest:
 
     @cached_property
     def n_learning_episodes(self) -> int:
-        """Learning episodes of a trial; a ValueError if they are too few or too many."""
+        """Learning episodes of a trial, of which a test needs at least ten; else a ValueError."""
         n_episodes = self.n_episodes or self._defaults[1]
-        if n_episodes < PAPER_INTERVAL:
-            raise ValueError(
-                f"episodes must be at least {PAPER_INTERVAL}, the distance of test episodes, got"
-                f" {n_episodes}"
-            )
-        if n_episodes > MOST_EPISODES:
-            raise ValueError(f"episodes must be at most {MOST_EPISODES}, got {n_episodes}")
-        return n_episodes
+        return whole("episodes", n_episodes, PAPER_INTERVAL, MOST_EPISODES)
 
     @cached_property
     def plan(self) -> Plan:
@@ -124,6 +117,22 @@ class ReproduceRequest:
         )
 
     @property
+    def groups(self) -> dict[tuple[str, str], list[PlannedTrial]]:
+        """The trials of each agent in each case, by their ids."""
+        groups: dict[tuple[str, str], list[PlannedTrial]] = {}
+        for planned in self.plan.trials:
+            groups.setdefault(planned.key[:2], []).append(planned)
+        return groups
+
+    def count_costs(self) -> tuple[int, int]:
+        """Count the costs that are planned, and those that are stored, without making any file."""
+        measured: set[CostKey] = set()
+        if (self.out / STORE_NAME).exists():
+            with ResultStore(self.out, read_only=True) as store:
+                measured = {one.key for one in _costs(self, store)}
+        return len(self.plan.costs), len(measured.intersection(self.plan.costs))
+
+    @property
     def cost_config(self) -> CostConfig:
         """How thoroughly costs are measured."""
         return cost.QUICK_COST if self.quick else CostConfig()
@@ -147,28 +156,6 @@ class ReproduceRequest:
         return "-".join([stem, *marks]) + f".{kind}"
 
 
-def count_stored(
-    request: ReproduceRequest,
-) -> tuple[dict[tuple[str, str], tuple[int, int]], tuple[int, int]]:
-    """Count what is planned and what of it is stored, without making any file.
-
-    Returns pairs (planned, stored): of the trials of each case and agent, and of all costs.
-    """
-    keys: set[TrialKey] = set()
-    measured: set[CostKey] = set()
-    if (request.out / STORE_NAME).exists() or request.out.is_file():
-        with ResultStore(request.out, read_only=True) as store:
-            keys = store.keys()
-            measured = {one.key for one in _costs(request, store)}
-    planned = [one.key for one in request.plan.trials]
-    all_trials, stored = (
-        Counter(key[:2] for key in found) for found in (planned, keys.intersection(planned))
-    )
-    trials = {pair: (n, stored[pair]) for pair, n in all_trials.items()}
-    costs = request.plan.costs
-    return trials, (len(costs), len(measured.intersection(costs)))
-
-
 def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) -> Finished:
     """Run what is missing; when all is there, draw the figures and write tables and page.
 
@@ -179,12 +166,9 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
     ------
     ValueError
         If nothing can be run as the request says.
-    PlotUnavailableError
-        If matplotlib or Jinja is not installed; no trial is run then.
-    StoreError
-        If the result file cannot be used.
-    ClusterError
-        If the cluster cannot run trials any more; what was finished is stored.
+    RunError
+        Before any trial if matplotlib or Jinja is not installed or the result file cannot be used;
+        later if the cluster cannot run trials any more: what was finished is stored.
     """
     require_matplotlib()
     require_jinja()
@@ -204,25 +188,19 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
         f"experiment-{experiment.id}": draw_experiment(experiment, results, quick=request.quick)
         for experiment, results in report.experiments
     }
+    contents: dict[str, bytes] = {}
     if report.costs:
         drawn["cost"] = draw_cost(report.costs, quick=request.quick)
-    contents: dict[str, bytes] = {}
+        contents["cost.csv"] = csv_bytes(cost.COST_ROW_HEADER, cost.round_rows(report.costs))
     for name, figure in drawn.items():
         contents[f"{name}.png"], contents[f"{name}.svg"] = figure_bytes(figure)
-    page = report.page({name: contents[f"{name}.svg"] for name in drawn})
-    table = report.to_json()
-    contents["results.md"] = page.to_markdown().encode()
-    contents["table.json"] = json_bytes(table)
     contents["results.csv"] = csv_bytes(ROW_HEADER, trial_rows(records))
-    if report.costs:
-        contents["cost.csv"] = csv_bytes(cost.COST_ROW_HEADER, cost.round_rows(report.costs))
-    seconds = sum(record.seconds for record in records)
-    call = describe_call(outcome, time.monotonic() - begin, seconds)
-    contents["report.html"] = page.to_html(call).encode()
-    files = {request.out / request.file_name(name): text for name, text in contents.items()}
-    for path, content in files.items():
-        write_whole(path, content)
-    return Finished(outcome, page, tuple(files), table)
+    page = report.page({name: contents[f"{name}.svg"] for name in drawn})
+    return Finished(outcome, page, table=report.to_json()).write(
+        contents,
+        lambda name: request.out / request.file_name(name),
+        describe_call(outcome, time.monotonic() - begin, records),
+    )
 
 
 def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[TrialRecord, ...]]:
@@ -287,19 +265,11 @@ def case_spec(case: Case, agent: str, n_episodes: int = PAPER_EPISODES) -> RunSp
 def plan_trials(
     cases: Iterable[Case], n_trials: int, root_seed: int, n_episodes: int = PAPER_EPISODES
 ) -> tuple[PlannedTrial, ...]:
-    """List the trials of all agents in the given cases, each once.
+    """List the trials of all agents in the given cases; see `sdnn.runs.engine.plan_of`.
 
-    The first trial of every case comes first, so an interrupted run covers all cases evenly.
     Experiments share the trials of cases that have the same id.
     """
-    plan: dict[TrialKey, PlannedTrial] = {}
-    pairs = [
-        (case, agent, case_spec(case, agent, n_episodes)) for case in cases for agent in case.agents
-    ]
-    hashes = [spec.config_hash for _, _, spec in pairs]
-    for trial in range(n_trials):
-        for (case, agent, spec), config_hash in zip(pairs, hashes, strict=True):
-            seed = trial_seed(root_seed, case.id, trial)
-            key = TrialKey(case.id, label_of(*split_label(agent)), trial, seed, config_hash)
-            plan.setdefault(key, PlannedTrial(key, spec))
-    return tuple(plan.values())
+    specs = (
+        (case.id, case_spec(case, agent, n_episodes)) for case in cases for agent in case.agents
+    )
+    return plan_of(specs, n_trials, root_seed)

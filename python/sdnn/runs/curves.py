@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +30,6 @@ SUFFIXES = (".png", ".svg", ".pdf")
 HEADER = ("task", "agent", "kind", "n_runs", "run", "step", "value", "low", "high")
 
 Kind: TypeAlias = Literal["return", "running median", "evaluation"]
-_Series: TypeAlias = tuple[NDArray[np.int64], NDArray[np.float64]]
-_NOTHING = "no episode and no evaluation"
 
 _CHANGES_NOTHING = ("seed", "output")  # of a configuration: may differ within a group
 _NOT_NAMED = ("0", "0.0", "none", "false", "null")  # values that a name leaves out
@@ -48,32 +45,23 @@ class Group:
 
 
 def groups_of(runs: Sequence[Run]) -> list[Group]:
-    """Put runs together that differ in their seeds only, in the order of the first of each."""
+    """Put runs together that differ in their seeds only, in the order of the first of each.
+
+    Names have the settings that are not the default; agents of the same name on the same task are
+    told apart by all that differs.
+    """
     groups: dict[tuple[tuple[str, str], ...], list[Run]] = {}
     for run in runs:
         values = {k: v for k, v in run.spec.full_values().items() if k not in _CHANGES_NOTHING}
         definition = dict(_flat(values)) | {"goals": ", then ".join(_goals(run))}
         groups.setdefault(tuple(sorted(definition.items())), []).append(run)
-    names = [_names(dict(_flat(members[0].spec.values()))) for members in groups.values()]
-    names = _told_apart(names, [dict(definition) for definition in groups])
-    names = _told_apart(names, [{"folder": str(own[0].folder)} for own in groups.values()])
-    return [
-        Group(task=task, agent=agent, runs=tuple(members))
-        for (task, agent), members in zip(names, groups.values(), strict=True)
-    ]
-
-
-def _told_apart(
-    names: Sequence[tuple[str, str]], definitions: Sequence[Mapping[str, str]]
-) -> list[tuple[str, str]]:
-    """Add the values in which they differ to the agents of equal names."""
-    counts = Counter(names)
+    names = [_names(members[0]) for members in groups.values()]
     found = []
-    for name, own in zip(names, definitions, strict=True):
-        others = [one for other, one in zip(names, definitions, strict=True) if other == name]
-        keys = sorted({key for one in others for key in one if one[key] != own.get(key)})
-        words = [_word(key, own[key]) for key in keys if key in own]
-        found.append((name[0], ", ".join([name[1], *words])) if counts[name] > 1 else name)
+    for name, own, members in zip(names, groups, groups.values(), strict=True):
+        others = [dict(one) for other, one in zip(names, groups, strict=True) if other == name]
+        words = [_word(k, v) for k, v in own if any(one.get(k, v) != v for one in others)]
+        agent = ", ".join([name[1], *words])
+        found.append(Group(task=name[0], agent=agent, runs=tuple(members)))
     return found
 
 
@@ -85,34 +73,33 @@ def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, st
             yield f"{prefix}{name}", value if isinstance(value, str) else json.dumps(value)
 
 
-def _names(values: Mapping[str, str]) -> tuple[str, str]:
+def _names(run: Run) -> tuple[str, str]:
     """Return the name of the task and that of the agent."""
-    task = [values.get("environment.id", "acrobot")]
-    agent = [" ".join(values[key] for key in ("agent.name", "agent.preset") if key in values)]
-    for key, value in values.items():
-        table, _, name = key.partition(".")
-        if table in ("environment", "acrobot", "goal", "sensors") and name != "id":
-            task += [_word(key, value)] * (value not in _NOT_NAMED)
-        if table in ("agent", "approximator", "learning") and name not in ("name", "preset"):
+    task, agent = [run.spec.task], [f"{run.spec.agent.name} {run.spec.agent.preset or ''}".strip()]
+    for key, value in _flat(run.spec.values()):
+        table = key.partition(".")[0]
+        if key in ("environment.id", "agent.name", "agent.preset"):
+            continue
+        if table in ("environment", "acrobot", "goal", "sensors") and value not in _NOT_NAMED:
+            task.append(_word(key, value))
+        if table in ("agent", "approximator", "learning"):
             agent.append(_word(key, value))
     return ", ".join(task), ", ".join(agent)
 
 
 def _word(key: str, value: str) -> str:
-    return value if key in ("goals", "folder") else f"{key.rpartition('.')[2]}={value}"
+    return value if key == "goals" else f"{key.rpartition('.')[2]}={value}"
 
 
-def _goals(run: Run) -> list[str]:
+def _goals(run: Run) -> Iterator[str]:
     """Write its goals, each after the step where it was given, if that was the user's choice."""
     budget = run.spec.budget
-    words = [f"{budget.episodes} episodes" if budget.steps is None else f"{budget.steps} steps"]
+    yield f"{budget.episodes} episodes" if budget.steps is None else f"{budget.steps} steps"
     due = None if budget.target_return is not None else budget.steps
     for goal in run.goals:
-        text = f"{goal.episodes} episodes" if goal.steps is None else f"{goal.steps} steps"
-        is_early = due is not None and goal.at_step < due
-        words.append(f"from {goal.at_step} on {text}" if is_early else text)
+        start = "" if due is None or goal.at_step >= due else f"from {goal.at_step} on "
+        yield start + (f"{goal.episodes} episodes" if goal.steps is None else f"{goal.steps} steps")
         due = goal.steps
-    return words
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -174,19 +161,15 @@ def write_curves(curves: Sequence[Curve], path: Path) -> tuple[Path, Path]:
 def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
     """Make the curves of one run, or the one of several, and notes on what it leaves out."""
     rows = {run: run.rows() for run in group.runs}
-    if len(rows) == 1:
-        (run,) = rows
-        made = _curves_of_run(group, run, rows[run])
-        return made, [] if made else [f"{run.folder}: {_NOTHING} is whole yet"]
     kind: Kind = "evaluation"
-    series = {run: _series(own, "evaluation") for run, own in rows.items()}
+    series = {run: _series(own, kind) for run, own in rows.items()}
     if not any(len(steps) for steps, _ in series.values()):
         kind = "running median"
-        for run, own in rows.items():
-            steps, returns = _series(own, "episode")
-            series[run] = steps, _running_median(returns)
-    what = "no evaluation" if kind == "evaluation" else _NOTHING
-    notes = [f"{run.folder}: {what} is whole yet" for run in series if not len(series[run][0])]
+        series = {run: _series(own, kind) for run, own in rows.items()}
+    what = "no evaluation" if kind == "evaluation" else "no episode and no evaluation"
+    notes = [
+        f"{run.folder}: {what} is whole yet" for run, (steps, _) in series.items() if not len(steps)
+    ]
     series = {run: one for run, one in series.items() if len(one[0])}
     if len(series) < 2:
         return [curve for run in series for curve in _curves_of_run(group, run, rows[run])], notes
@@ -203,19 +186,17 @@ def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
 
 
 def _curves_of_run(group: Group, run: Run, rows: Sequence[Any]) -> list[Curve]:
-    names: dict[str, Any] = {"task": group.task, "agent": group.agent, "run": str(run.folder)}
     curves = []
-    steps, returns = _series(rows, "episode")
-    if len(steps):
-        medians = _running_median(returns)
-        curves.append(Curve(**names, kind="return", steps=steps, values=returns))
-        curves.append(Curve(**names, kind="running median", steps=steps, values=medians))
-    steps, means = _series(rows, "evaluation")
-    if len(steps):
-        evaluations = (row["returns"] for row in rows if row["kind"] == "evaluation")
-        low, high = np.array([np.percentile(one, (25, 75)) for one in evaluations]).T
-        bounds = {"low": low, "high": high}
-        curves.append(Curve(**names, kind="evaluation", steps=steps, values=means, **bounds))
+    for kind in get_args(Kind):
+        steps, values = _series(rows, kind)
+        bounds = {}
+        if kind == "evaluation" and len(steps):
+            evaluations = (row["returns"] for row in rows if row["kind"] == "evaluation")
+            low, high = np.array([np.percentile(one, (25, 75)) for one in evaluations]).T
+            bounds = {"low": low, "high": high}
+        if len(steps):
+            names: dict[str, Any] = {"task": group.task, "agent": group.agent, "kind": kind}
+            curves.append(Curve(**names, run=str(run.folder), steps=steps, values=values, **bounds))
     return curves
 
 
@@ -229,17 +210,18 @@ def _steps_of_all(all_steps: Sequence[NDArray[np.int64]], is_grid: bool) -> NDAr
     return np.unique(steps.astype(np.int64))
 
 
-def _series(rows: Sequence[Any], kind: Literal["episode", "evaluation"]) -> _Series:
-    """Return the steps and returns of rows of a kind."""
-    name = "return" if kind == "episode" else "mean_return"
-    own = [row for row in rows if row["kind"] == kind]
+def _series(rows: Sequence[Any], kind: Kind) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the steps of a curve of a run, and its values."""
+    wanted, name = "episode", "return"
+    if kind == "evaluation":
+        wanted, name = "evaluation", "mean_return"
+    own = [row for row in rows if row["kind"] == wanted]
     steps = np.array([row["step"] for row in own], np.int64)
-    return steps, np.array([row[name] for row in own], np.float64)
-
-
-def _running_median(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Median of each number and those before it, `WINDOW` in all."""
-    return np.array([np.median(values[max(0, i + 1 - WINDOW) : i + 1]) for i in range(len(values))])
+    values = np.array([row[name] for row in own], np.float64)
+    if kind == "running median":
+        ends = range(1, len(values) + 1)
+        values = np.array([np.median(values[max(0, end - WINDOW) : end]) for end in ends])
+    return steps, values
 
 
 def _csv_rows(curves: Sequence[Curve]) -> Iterable[tuple[object, ...]]:
@@ -248,5 +230,5 @@ def _csv_rows(curves: Sequence[Curve]) -> Iterable[tuple[object, ...]]:
         names = (curve.task, curve.agent, curve.kind, curve.n_runs, curve.run)
         columns = (curve.values, curve.low, curve.high)
         for place, step in enumerate(curve.steps):
-            numbers = ("" if c is None else repr(float(c[place])) for c in columns)
+            numbers = ("" if c is None else float(c[place]) for c in columns)
             yield (*names, int(step), *numbers)

@@ -1,9 +1,9 @@
-"""What a study still needs, and how long that takes: the body of ``sdnn sweep --dry-run``."""
+"""What experiments still need, and how long that takes: the body of ``--dry-run``."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,6 @@ from sdnn.runs.errors import RunError
 from sdnn.runs.report import duration_words
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
-from sdnn.runs.sweep import SweepRequest
 from sdnn.runs.trial import TrialKey, TrialTime, opened
 
 PROBE_SECONDS = 0.3  # processor time of a probe, about
@@ -22,40 +21,55 @@ Times = dict[tuple[str, str], tuple[str, list[TrialTime]]]
 """Times of trials by case and agent, and whether these are stored trials or a probe."""
 
 
-def forecast(request: SweepRequest) -> dict[str, Any]:
+def forecast(
+    out: Path,
+    groups: Mapping[tuple[str, str], Sequence[PlannedTrial]],
+    jobs: int,
+    check: Callable[[set[TrialKey]], None] = lambda stored: None,
+) -> dict[str, Any]:
     """Count what is to be run and estimate how long it takes, without making any file.
 
-    Returns values that JSON can hold. The ``upper`` seconds are null where the trials that they are
-    from are shorter: later episodes are longer where the task gets harder.
+    Parameters
+    ----------
+    out
+        Folder of the result file.
+    groups
+        Trials of one specification each, by the ids of the case and of what runs in it.
+    jobs
+        Trials at the same time.
+    check
+        Receives what is stored before any trial is begun, and may raise.
+
+    Returns
+    -------
+    dict
+        Values that JSON can hold. The ``upper`` seconds are null where the trials that they are
+        from are shorter: later episodes are longer where the task gets harder.
 
     Raises
     ------
     RunError
-        If a specification is refused, a trial that is begun to see how long it takes fails, or the
-        result file cannot be used.
-    ValueError
-        If there is no variant of that name.
+        If a trial that is begun to see how long it takes fails, or the result file cannot be used.
     """
-    study, n_planned = request.study, len(request.plan)
     stored: set[TrialKey] = set()
     times: Times = {}
-    if (request.out / STORE_NAME).exists() or request.out.is_file():
-        with ResultStore(request.out, read_only=True) as store:
+    if (out / STORE_NAME).exists() or out.is_file():
+        with ResultStore(out, read_only=True) as store:
             stored = store.keys()
             for one in store.times():
                 if one.n_episodes:
                     times.setdefault(one.key[:2], ("stored trial", []))[1].append(one)
-    study.check(stored)
+    check(stored)
     works = []
+    planned: set[TrialKey] = set()
     missing: dict[TrialKey, tuple[float, bool]] = {}  # variants that are the same share trials
-    for (case, variant), combination in study.combinations.items():
-        if request.only and variant not in request.only:
-            continue
-        keys, spec = study.keys(case, variant), combination.spec
+    for (case, variant), group in groups.items():
+        keys, spec = [one.key for one in group], group[0].spec
         left = [key for key in keys if key not in stored]
         estimate = trial_seconds(keys[0], spec, times) if left else None
         if estimate:
             missing |= dict.fromkeys(left, (estimate["lower"], spec.is_compiled))
+        planned.update(keys)
         works.append(
             {
                 "case": case,
@@ -69,15 +83,13 @@ def forecast(request: SweepRequest) -> dict[str, Any]:
                 "seconds_of_a_trial": estimate,
             }
         )
-    # The size of a cluster is not known.
-    jobs = 1 if request.executor is not None else request.jobs or n_cores()
     lower = wall_seconds([*missing.values()], jobs)
     estimates = [one["seconds_of_a_trial"] for one in works if one["seconds_of_a_trial"]]
     upper = None if any(one["upper"] is None for one in estimates) else lower
     return {
         "trials": works,
-        "planned": n_planned,
-        "stored": n_planned - len(missing),
+        "planned": len(planned),
+        "stored": len(planned) - len(missing),
         "jobs": jobs,
         "seconds": {"lower": lower, "upper": upper},
     }
@@ -94,6 +106,8 @@ def forecast_lines(found: dict[str, Any], out: Path) -> Iterator[str]:
         if estimate := one["seconds_of_a_trial"]:
             text += f"; a trial takes {_words(estimate)} (by {estimate['source']})"
         yield text
+    if not found["trials"]:
+        return
     yield (
         f"in all {found['planned']} trials, {found['stored']} of them stored; the rest takes"
         f" {_words(found['seconds'])} with {found['jobs']} at the same time"

@@ -9,8 +9,8 @@ import base64
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sdnn import machine
+from sdnn.files import write_whole
 from sdnn.runs.engine import RunOutcome
 from sdnn.runs.errors import PlotUnavailableError
 from sdnn.runs.results import (
@@ -31,6 +32,8 @@ from sdnn.runs.results import (
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from sdnn.runs.trial import TrialRecord
 
 PERCENT = f"{100 * CONFIDENCE:.0f} %"
 NOTE = (
@@ -178,6 +181,24 @@ class Finished:
     files: tuple[Path, ...] = ()
     table: dict[str, Any] = field(default_factory=dict)
 
+    def write(
+        self,
+        contents: Mapping[str, bytes | Iterable[bytes]],
+        path_of: Callable[[str], Path],
+        call: str,
+    ) -> Finished:
+        """Write the page, its table and other contents, each under its name, and return this."""
+        assert self.page is not None
+        everything = dict(contents) | {
+            "results.md": self.page.to_markdown().encode(),
+            "table.json": (json.dumps(self.table, indent=2, allow_nan=False) + "\n").encode(),
+            "report.html": self.page.to_html(call).encode(),
+        }
+        files = {path_of(name): content for name, content in everything.items()}
+        for path, content in files.items():
+            write_whole(path, content)
+        return replace(self, files=tuple(files))
+
 
 def markdown_text(text: str) -> str:
     r"""Write a text for a line of Markdown, in which it can be no markup, HTML or link.
@@ -196,8 +217,9 @@ def require_jinja() -> None:
         )
 
 
-def describe_call(outcome: RunOutcome, seconds: float, processor_seconds: float) -> str:
-    """Write how a page came about: wall time of the call, processor time of all trials shown."""
+def describe_call(outcome: RunOutcome, seconds: float, shown: Iterable[TrialRecord]) -> str:
+    """Write how a page came about: wall time of the call, processor time of the trials shown."""
+    processor_seconds = sum(record.seconds for record in shown)
     text = f"Processor time of the trials shown: {duration_words(processor_seconds)}."
     n_stored = outcome.n_planned - outcome.n_run
     if n_stored > 0:
@@ -206,11 +228,6 @@ def describe_call(outcome: RunOutcome, seconds: float, processor_seconds: float)
     else:
         text = f"Everything asked for was run in {duration_words(seconds)}. {text}"
     return f"{text} Made on {machine.description()}."
-
-
-def json_bytes(values: object) -> bytes:
-    """Return the content of a JSON file."""
-    return (json.dumps(values, indent=2, allow_nan=False) + "\n").encode()
 
 
 def measures_section(names: Iterable[MeasureName], notes: Sequence[str] = ()) -> Section:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sdnn.runs.config_file import ConfigFile
-from sdnn.runs.engine import PlannedTrial, trial_seed
+from sdnn.runs.engine import PlannedTrial, plan_of
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.settings import possible_words
 from sdnn.runs.spec import RunSpec
@@ -77,41 +77,30 @@ class Study:
         """The file it was read from."""
         return self.reader.file
 
-    def keys(self, case_id: str, variant_id: str) -> tuple[TrialKey, ...]:
+    def trials(self, case_id: str, variant_id: str) -> tuple[PlannedTrial, ...]:
         """List the trials of a variant in a case."""
         spec = self.combinations[case_id, variant_id].spec
-        config_hash = spec.config_hash
-        return tuple(
-            TrialKey(case_id, spec.label, n, trial_seed(self.seed, case_id, n), config_hash)
-            for n in range(self.n_trials)
-        )
+        return plan_of([(case_id, spec)], self.n_trials, self.seed)
 
-    def plan(self, only: Collection[str] = ()) -> tuple[PlannedTrial, ...]:
-        """List the trials of some variants (default: all), each once.
+    def keys(self, case_id: str, variant_id: str) -> tuple[TrialKey, ...]:
+        """List where the results of the trials of a variant in a case are stored."""
+        return tuple(planned.key for planned in self.trials(case_id, variant_id))
 
-        The first trial of every combination comes first, so an interrupted run covers all evenly.
+    def chosen(self, only: Collection[str] = ()) -> tuple[tuple[str, str], ...]:
+        """List the ids of case and variant of some variants (default: all).
 
-        Raises
-        ------
-        ValueError
-            If there is no such variant.
+        A ValueError says that there is no such variant.
         """
         known = [variant.id for variant in self.variants]
         for name in only:
             if name not in known:
                 raise ValueError(f"no variant {name!r}; {possible_words(name, known)}")
-        wanted = [
-            (combination.spec, self.keys(case, variant))
-            for (case, variant), combination in self.combinations.items()
-            if not only or variant in only
-        ]
-        plan: dict[TrialKey, PlannedTrial] = {}
-        for number in range(self.n_trials):
-            for spec, keys in wanted:
-                key = keys[number]
-                if key not in plan:
-                    plan[key] = PlannedTrial(key, spec)
-        return tuple(plan.values())
+        return tuple(pair for pair in self.combinations if not only or pair[1] in only)
+
+    def plan(self, only: Collection[str] = ()) -> tuple[PlannedTrial, ...]:
+        """List the trials of some variants (default: all), each once; see `chosen`."""
+        specs = ((pair[0], self.combinations[pair].spec) for pair in self.chosen(only))
+        return plan_of(specs, self.n_trials, self.seed)
 
     def same_as(self, variant_id: str) -> str | None:
         """Return the first variant before another one that is the same in every case."""

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from sdnn import _core
-from sdnn.files import csv_pieces, gzip_pieces, remove_abandoned_files, write_whole
+from sdnn.files import csv_pieces, gzip_pieces, remove_abandoned_files
 from sdnn.runs.comparison import Addition, Comparison, compare, study_json, study_page
 from sdnn.runs.engine import Executor, Observer, PlannedTrial, run_trials
 from sdnn.runs.figures import draw_study, figure_bytes, require_matplotlib
-from sdnn.runs.report import Finished, describe_call, json_bytes, require_jinja
+from sdnn.runs.report import Finished, describe_call, require_jinja
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study import Study
 from sdnn.runs.trial import ROW_HEADER, records_digest, trial_rows
@@ -30,6 +30,11 @@ class SweepRequest:
     only: tuple[str, ...] = ()  # ids of the variants to run; none: all
     # Makes what else the report has.
     addition: Callable[[Comparison], Addition] = lambda _: Addition()
+
+    @property
+    def groups(self) -> dict[tuple[str, str], tuple[PlannedTrial, ...]]:
+        """The trials of each variant in each case, by the ids of case and variant."""
+        return {pair: self.study.trials(*pair) for pair in self.study.chosen(self.only)}
 
     @cached_property
     def plan(self) -> tuple[PlannedTrial, ...]:
@@ -84,29 +89,27 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Finishe
     name = study.file.path.name
     footer = f"{name}; sdnn {_core.__version__}; digest of the rows {digest[:16]}"
     png, svg = figure_bytes(draw_study(comparison, footer))
-    page = study_page(comparison, digest, addition, svg)
-    table = study_json(comparison, digest, addition)
-    seconds = sum(record.seconds for record in shown)
-    call = describe_call(outcome, time.monotonic() - begin, seconds)
+    done = Finished(
+        outcome,
+        page=study_page(comparison, digest, addition, svg),
+        table=study_json(comparison, digest, addition),
+    )
     # Test episodes of variants that are the same come more than once.
     tests = (
         (variant, *row)
         for (_, variant), measured in comparison.measured.items()
         for row in trial_rows(measured.result.records)
     )
-    contents: dict[str, bytes | Iterator[bytes]] = {
-        "figure.png": png,
-        "figure.svg": svg,
-        "results.md": page.to_markdown().encode(),
-        "table.json": json_bytes(table),
-        "trials.csv": csv_pieces(*trial_table(comparison)),
-        "results.csv.gz": gzip_pieces(csv_pieces(("variant", *ROW_HEADER), tests)),
-        "report.html": page.to_html(call).encode(),
-    }
-    files = {request.out / f"{study.file.path.stem}-{end}": c for end, c in contents.items()}
-    for path, content in files.items():
-        write_whole(path, content)
-    return Finished(outcome, page, tuple(files), table)
+    return done.write(
+        {
+            "figure.png": png,
+            "figure.svg": svg,
+            "trials.csv": csv_pieces(*trial_table(comparison)),
+            "results.csv.gz": gzip_pieces(csv_pieces(("variant", *ROW_HEADER), tests)),
+        },
+        lambda end: request.out / f"{study.file.path.stem}-{end}",
+        describe_call(outcome, time.monotonic() - begin, shown),
+    )
 
 
 def trial_table(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:

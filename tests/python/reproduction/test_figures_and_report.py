@@ -259,7 +259,7 @@ def test_page_is_one_file_with_everything(report, monkeypatch):
     outcome = RunOutcome(n_planned=6, n_reused=0, n_run=6, failures=(), interrupted=False)
     monkeypatch.setattr("sdnn.machine.description", lambda: "a <machine>")
     page = report.page(PICTURES)
-    html = page.to_html(describe_call(outcome, 61, 7))
+    html = page.to_html(describe_call(outcome, 61, ()))
     assert html.startswith("<!doctype html>")
     assert (
         "data:image/svg+xml;base64," + base64.b64encode(PICTURES["experiment-a"]).decode() in html
@@ -274,5 +274,5 @@ def test_page_is_one_file_with_everything(report, monkeypatch):
     for result in report.results:
         assert result.config_hash in html
         assert all(str(record.key.seed) in html for record in result.records)
-    later = page.to_html(describe_call(replace(outcome, n_run=2), 61, 7))
+    later = page.to_html(describe_call(replace(outcome, n_run=2), 61, ()))
     assert "4 of 6 trials were stored before" in later
