@@ -30,7 +30,7 @@ class InstantTrial:
 
     def __init__(self, *, protocol, seed, **_others):
         self._n_episodes = protocol.n_learning_episodes
-        self._interval = protocol.test_interval
+        self._interval = protocol.evaluate_every_episodes
         self._seed = seed
         self.episode = 0
         self.n_decisions = 0

@@ -17,6 +17,9 @@ HEAD = """# Settings of a run
 The keys of files for `sdnn train --config FILE`, of `--set KEY=VALUE`, and of [studies](sweep.md).
 `approximator.*` and `learning.*` are those of the agent; defaults are the paper's, before the
 agent's preset. `sdnn train --schema` prints the same as JSON Schema.
+
+A study without an environment is about the paper's acrobot, where some defaults differ: the preset
+is `paper`, the budget 15,000 episodes, and every 10 episodes there is an evaluation of one episode.
 """
 
 

@@ -229,8 +229,9 @@ void bind_controller(py::module_& module) {
   const auto ends_of = [array_of](const Controller& self) {
     return std::pair(array_of(self.observations().low()), array_of(self.observations().high()));
   };
-  py::class_<Controller>(module, "Controller", "An agent in the units of its task")
-      .def(py::init([config_of](const agents::AnyApproximatorConfig& approximator,
+  py::class_<Controller> type(module, "Controller", "An agent in the units of its task");
+  type.attr("fields") = bindings::described_fields<ControllerConfig>();
+  type.def(py::init([config_of](const agents::AnyApproximatorConfig& approximator,
                                 const agents::AnyLearningConfig& learning, std::uint64_t seed,
                                 const agents::ObservationConfig& observation,
                                 const agents::ActionConfig& action, int warm_up_steps,
@@ -243,7 +244,8 @@ void bind_controller(py::module_& module) {
              return Controller(std::move(config), bindings::tables_of(tables));
            }),
            py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"),
-           py::arg("observation"), py::arg("action"), py::arg("warm_up_steps") = 1000,
+           py::arg("observation"), py::arg("action"),
+           py::arg("warm_up_steps") = ControllerConfig{}.warm_up_steps,
            py::arg("tables") = std::vector<ArrayArgument<std::int8_t>>(),
            py::arg("state") = py::none(), "New, or as it was when `state` was taken")
       .def_property_readonly("approximator", &Controller::approximator)

@@ -1,4 +1,4 @@
-// The extension's table of contents: one line per room, floor by floor.
+// The extension's table of contents: one line per package, layer by layer.
 #include <pybind11/pybind11.h>
 
 #include <exception>
@@ -20,7 +20,7 @@ std::string compiler() {
 #endif
 }
 
-void set_error(PyObject* kind, const sdnn::core::ArgumentError& error) {
+void set_error(PyObject* kind, const auto& error) {
   namespace py = pybind11;
   py::object raised = py::handle(kind)(error.what());
   raised.attr("argument") = error.name();
@@ -36,13 +36,15 @@ void translate(std::exception_ptr error) {
     set_error(PyExc_TypeError, e);
   } catch (const sdnn::core::ArgumentError& e) {
     set_error(PyExc_ValueError, e);
+  } catch (const sdnn::core::SizeError& e) {
+    set_error(PyExc_ValueError, e);
   }
 }
 
 }  // namespace
 
 PYBIND11_MODULE(_core, module) {
-  module.doc() = "The compiled core of sdnn; use it through the package's rooms.";
+  module.doc() = "The compiled core of sdnn; use it through the packages above it.";
   module.attr("__version__") = SDNN_VERSION;
   module.attr("compiler") = compiler();
   pybind11::register_exception_translator(&translate);

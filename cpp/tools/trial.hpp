@@ -28,23 +28,22 @@ namespace sdnn::tools {
 /// How long a trial is, and how often the agent is tested (section 4.2).
 struct ProtocolConfig {
   int n_learning_episodes = 15000;
-  int test_interval = 10;
+  int evaluate_every_episodes = 10;
   bool limit_bootstraps = true;
-  bool noisy_tests = true;
+  bool noisy_evaluations = true;
 
   static constexpr auto fields() noexcept {
     return std::tuple(
         core::field("n_learning_episodes", &ProtocolConfig::n_learning_episodes,
                     "Learning episodes in a trial.", core::within(1, 1 << 30)),
-        core::field("test_interval", &ProtocolConfig::test_interval,
-                    "One test episode follows every so many learning episodes.",
+        core::field("evaluate_every_episodes", &ProtocolConfig::evaluate_every_episodes,
+                    "Learning episodes between evaluations of one episode.",
                     core::within(1, 1 << 30)),
         core::field("limit_bootstraps", &ProtocolConfig::limit_bootstraps,
-                    "Whether the last transition before the time limit bootstraps, as one that "
-                    "goes on; else it counts as terminated. A reading."),
-        core::field("noisy_tests", &ProtocolConfig::noisy_tests,
-                    "Whether the sensors are as noisy in test episodes as in learning ones. A "
-                    "reading."));
+                    "Whether the last transition before a time limit bootstraps, as if the "
+                    "episode continued; else it counts as terminated."),
+        core::field("noisy_evaluations", &ProtocolConfig::noisy_evaluations,
+                    "Whether the sensors are as noisy in evaluations as in learning."));
   }
   bool operator==(const ProtocolConfig&) const = default;
 };
@@ -87,11 +86,13 @@ class AcrobotTrial {
                   agent_.n_inputs());
     // No decision is to wait for memory it is the first to use: that of the agent, room for rows.
     if constexpr (requires { agent_.warm_caches(); }) agent_.warm_caches();
-    core::require_bytes("n_learning_episodes / test_interval", "the rows of the test episodes",
+    core::require_bytes("n_learning_episodes / evaluate_every_episodes",
+                        "the rows of the test episodes",
                         sizeof(TestRow) * static_cast<double>(protocol.n_learning_episodes) /
-                            protocol.test_interval,
+                            protocol.evaluate_every_episodes,
                         core::kDefaultMaxTableBytes);
-    rows_.resize(static_cast<std::size_t>(protocol.n_learning_episodes / protocol.test_interval));
+    rows_.resize(
+        static_cast<std::size_t>(protocol.n_learning_episodes / protocol.evaluate_every_episodes));
     rows_.clear();
   }
 
@@ -107,8 +108,8 @@ class AcrobotTrial {
 
   /// Runs up to `n_episodes` more learning episodes, with the test episodes that fall due.
   ///
-  /// Long work: may be stopped between episodes and then go on, and within a long one. Whatever is
-  /// thrown within an episode ends the trial: it cannot be taken up there, and advance throws
+  /// Long work: may be stopped between episodes and then resumed, and within a long one. Whatever
+  /// is thrown within an episode ends the trial: it cannot be taken up there, and advance throws
   /// std::logic_error from then on.
   void advance(int n_episodes) {
     advance(n_episodes, [] {});
@@ -130,7 +131,7 @@ class AcrobotTrial {
       }
       ++episode_;
       run_episode(sensors_, true, after_decision);
-      if (episode_ % protocol_.test_interval == 0) {
+      if (episode_ % protocol_.evaluate_every_episodes == 0) {
         rows_.push_back(run_episode(test_sensors_, false, after_decision));
       }
     }
@@ -139,7 +140,7 @@ class AcrobotTrial {
  private:
   static environments::SensorConfig of_tests(environments::SensorConfig sensors,
                                              const ProtocolConfig& protocol) noexcept {
-    if (!protocol.noisy_tests) sensors.noise = 0.0;
+    if (!protocol.noisy_evaluations) sensors.noise = 0.0;
     return sensors;
   }
 

@@ -1,5 +1,5 @@
 """
-The compiled core of sdnn; use it through the package's rooms.
+The compiled core of sdnn; use it through the packages above it.
 """
 from __future__ import annotations
 import collections.abc
@@ -62,9 +62,9 @@ class SDNNCConfig:
     n_interpolated : int
         Patterns between neighbouring anchors (section 3.1: 44). There are (n_anchor_patterns - 1) (n_interpolated + 1) bins, 360 in the paper. Must be in [0, 10000].
     balanced_anchors : bool
-        Whether anchors have as many +1 as -1. A reading: the paper says "random".
+        Whether anchors have as many +1 as -1. An assumption: the paper says "random".
     circular : tuple[bool, ...]
-        Per input, whether the last anchor equals the first, as angles want it; empty: none. A reading: the paper does not say.
+        Per input, whether the last anchor equals the first, as angles want it; empty: none. An assumption: the paper does not say.
     n_symbols : tuple[int, ...]
         Per input, how many symbols it may be, each with a random pattern of its own: symbol k of n is a value of (k + 0.5) / n. 0 for a number; empty: numbers only. Not in the paper. Must be in [0, 16777216].
     n_hidden_units : int
@@ -88,11 +88,11 @@ class SDNNCConfig:
     initial_threshold : float
         The "large" initial threshold, in units of c: a multiple of 1 / lattice. A reading. Must be finite and at least 0.
     initial_weights : {'ternary', 'uniform'}
-        The "small random" initial weights: `ternary`: one lattice step down, none, or up with probabilities 1/4, 1/2, 1/4; `uniform`: within initial_weight_limit, rounded to the lattice. A reading.
+        The "small random" initial weights: `ternary`: one lattice step down, none, or up with probabilities 1/4, 1/2, 1/4; `uniform`: within initial_weight_limit, rounded to the lattice. An assumption.
     initial_weight_limit : float
         Of `uniform` initial weights, in units of c. Must be finite and at least 0.
     rounding : {'half_up', 'random', 'away'}
-        Of the number of units that are to fire. `half_up`: to the nearest; `random`: up or down at random in proportion, so that no small change is lost on average; `away`: in the direction of the change by at least one unit. A reading.
+        Of the number of units that are to fire. `half_up`: to the nearest; `random`: up or down at random in proportion, so that no small change is lost on average; `away`: in the direction of the change by at least one unit. An assumption.
     averaging_interval : int
         With more than 0 the network keeps an average of its weights, by which greedy actions are chosen; learning continues with the weights themselves. Snapshots for it are taken after so many corrections, 100 for example, or after every 64th part of all, whichever is more; what was learned last counts most. The weights take four times the memory. Not in the paper, which has 0. Must be in [0, 1000000000].
     max_table_bytes : int
@@ -131,12 +131,12 @@ class SDNNCConfig:
     @property
     def balanced_anchors(self) -> bool:
         """
-        Whether anchors have as many +1 as -1. A reading: the paper says "random".
+        Whether anchors have as many +1 as -1. An assumption: the paper says "random".
         """
     @property
     def circular(self) -> tuple[bool, ...]:
         """
-        Per input, whether the last anchor equals the first, as angles want it; empty: none. A reading: the paper does not say.
+        Per input, whether the last anchor equals the first, as angles want it; empty: none. An assumption: the paper does not say.
         """
     @property
     def initial_threshold(self) -> float:
@@ -151,7 +151,7 @@ class SDNNCConfig:
     @property
     def initial_weights(self) -> typing.Literal['ternary', 'uniform']:
         """
-        The "small random" initial weights: `ternary`: one lattice step down, none, or up with probabilities 1/4, 1/2, 1/4; `uniform`: within initial_weight_limit, rounded to the lattice. A reading.
+        The "small random" initial weights: `ternary`: one lattice step down, none, or up with probabilities 1/4, 1/2, 1/4; `uniform`: within initial_weight_limit, rounded to the lattice. An assumption.
         """
     @property
     def lattice(self) -> int:
@@ -236,7 +236,7 @@ class SDNNCConfig:
     @property
     def rounding(self) -> typing.Literal['half_up', 'random', 'away']:
         """
-        Of the number of units that are to fire. `half_up`: to the nearest; `random`: up or down at random in proportion, so that no small change is lost on average; `away`: in the direction of the change by at least one unit. A reading.
+        Of the number of units that are to fire. `half_up`: to the nearest; `random`: up or down at random in proportion, so that no small change is lost on average; `away`: in the direction of the change by at least one unit. An assumption.
         """
     @property
     def u_high(self) -> int | None:
@@ -529,7 +529,7 @@ class GoalScheduleConfig:
     Parameters
     ----------
     kind : {'inverse_linear', 'inverse_sqrt', 'constant'}
-        `inverse_linear`: 1 / (1 + k / scale); `inverse_sqrt`: 1 / sqrt(1 + k); or `constant`: constant_value. A reading: the formula is garbled in print.
+        `inverse_linear`: 1 / (1 + k / scale); `inverse_sqrt`: 1 / sqrt(1 + k); or `constant`: constant_value. An assumption: the formula is garbled in print.
     scale : float
         Episodes; of `inverse_linear`. Must be a finite number greater than 0.
     last_episode : int
@@ -577,7 +577,7 @@ class GoalScheduleConfig:
     @property
     def kind(self) -> typing.Literal['inverse_linear', 'inverse_sqrt', 'constant']:
         """
-        `inverse_linear`: 1 / (1 + k / scale); `inverse_sqrt`: 1 / sqrt(1 + k); or `constant`: constant_value. A reading: the formula is garbled in print.
+        `inverse_linear`: 1 / (1 + k / scale); `inverse_sqrt`: 1 / sqrt(1 + k); or `constant`: constant_value. An assumption: the formula is garbled in print.
         """
     @property
     def last_episode(self) -> int:
@@ -636,13 +636,13 @@ class AcrobotConfig:
     goal_velocity_2 : float
         rad/s. Limit of |theta2_dot|: times the goal tolerance in the goal, as it is in the penalty. Must be a finite number greater than 0.
     goal_test : {'every_step', 'decision_instant'}
-        When the goal is tested: `every_step`: after every integration step, and the episode ends there; `decision_instant`: only when the next decision is due. A reading.
+        When the goal is tested: `every_step`: after every integration step, and the episode ends there; `decision_instant`: only when the next decision is due. An assumption.
     goal_reward : float
         Reward at the goal.
     penalty : float
         Reward for idling or too much speed at a decision instant; it ends nothing.
     idle_angle : float
-        rad: |theta1| below it is idling; 0 turns the rule off. A reading: 5 degrees; pi / 5 is the alternative. Must be in [0, 3.14159].
+        rad: |theta1| below it is idling; 0 turns the rule off. An assumption: 5 degrees; pi / 5 is the alternative. Must be in [0, 3.14159].
     
     Raises
     ------
@@ -697,7 +697,7 @@ class AcrobotConfig:
     @property
     def goal_test(self) -> typing.Literal['every_step', 'decision_instant']:
         """
-        When the goal is tested: `every_step`: after every integration step, and the episode ends there; `decision_instant`: only when the next decision is due. A reading.
+        When the goal is tested: `every_step`: after every integration step, and the episode ends there; `decision_instant`: only when the next decision is due. An assumption.
         """
     @property
     def goal_velocity_1(self) -> float:
@@ -717,7 +717,7 @@ class AcrobotConfig:
     @property
     def idle_angle(self) -> float:
         """
-        rad: |theta1| below it is idling; 0 turns the rule off. A reading: 5 degrees; pi / 5 is the alternative.
+        rad: |theta1| below it is idling; 0 turns the rule off. An assumption: 5 degrees; pi / 5 is the alternative.
         """
     @property
     def inertia_1(self) -> float:
@@ -836,7 +836,7 @@ class SensorConfig:
     noise : float
         Standard deviation of the noise on every sensor; 0.02 in the paper's noisy cases. Must be finite and at least 0.
     noise_entry : {'every_sensor', 'basic_sensors'}
-        Where noise enters: `every_sensor`: s5 and s6 are computed from the true s1..s4 and get noise of their own; `basic_sensors`: they are computed from the noisy ones. A reading.
+        Where noise enters: `every_sensor`: s5 and s6 are computed from the true s1..s4 and get noise of their own; `basic_sensors`: they are computed from the noisy ones. An assumption.
     n_constant : int
         Useless inputs besides: always 1/2, with noise as on the sensors. Not in the paper. Must be in [0, 100].
     n_random : int
@@ -895,7 +895,7 @@ class SensorConfig:
     @property
     def noise_entry(self) -> typing.Literal['every_sensor', 'basic_sensors']:
         """
-        Where noise enters: `every_sensor`: s5 and s6 are computed from the true s1..s4 and get noise of their own; `basic_sensors`: they are computed from the noisy ones. A reading.
+        Where noise enters: `every_sensor`: s5 and s6 are computed from the true s1..s4 and get noise of their own; `basic_sensors`: they are computed from the noisy ones. An assumption.
         """
 class AcrobotSensors:
     """
@@ -1005,7 +1005,7 @@ class EpsilonGreedyConfig:
     n_greedy_steps : int
         First steps of an episode in which epsilon is 0. Must be in [0, 1073741824].
     tie_rule : {'uniform', 'lowest', 'middle'}
-        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. A reading.
+        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
     tie_tolerance : float
         Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau. Must be finite and at least 0.
     
@@ -1047,7 +1047,7 @@ class EpsilonGreedyConfig:
     @property
     def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
         """
-        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. A reading.
+        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
         """
     @property
     def tie_tolerance(self) -> float:
@@ -1077,7 +1077,7 @@ class QLearningConfig:
     n_greedy_steps : int
         First steps of an episode in which epsilon is 0. Must be in [0, 1073741824].
     tie_rule : {'uniform', 'lowest', 'middle'}
-        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. A reading.
+        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
     tie_tolerance : float
         Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau. Must be finite and at least 0.
     n_steps : int
@@ -1184,7 +1184,7 @@ class QLearningConfig:
     @property
     def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
         """
-        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. A reading.
+        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
         """
     @property
     def tie_tolerance(self) -> float:
@@ -1203,7 +1203,7 @@ class FuzzyQLearningConfig:
     Parameters
     ----------
     learning_coefficient : float
-        c_fql. A reading: the paper does not give it; 0.1 and 1.0 are alternatives. Must be in (0, 1].
+        c_fql. An assumption: the paper does not give it; 0.1 and 1.0 are alternatives. Must be in (0, 1].
     discount : float
         gamma. Must be in [0, 1].
     trace_decay : float
@@ -1213,7 +1213,7 @@ class FuzzyQLearningConfig:
     n_greedy_steps : int
         First steps of an episode in which epsilon is 0. Must be in [0, 1073741824].
     tie_rule : {'uniform', 'lowest', 'middle'}
-        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. A reading.
+        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
     tie_tolerance : float
         Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau. Must be finite and at least 0.
     
@@ -1255,7 +1255,7 @@ class FuzzyQLearningConfig:
     @property
     def learning_coefficient(self) -> float:
         """
-        c_fql. A reading: the paper does not give it; 0.1 and 1.0 are alternatives.
+        c_fql. An assumption: the paper does not give it; 0.1 and 1.0 are alternatives.
         """
     @property
     def n_greedy_steps(self) -> int:
@@ -1265,7 +1265,7 @@ class FuzzyQLearningConfig:
     @property
     def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
         """
-        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. A reading.
+        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
         """
     @property
     def tie_tolerance(self) -> float:
@@ -1703,6 +1703,7 @@ class Controller:
     """
     An agent in the units of its task
     """
+    fields: typing.ClassVar[tuple] = (('warm_up_steps', 'int', 1000, 'Random steps before learning, where ranges are not known.', 2.0, 10000000.0, False))
     def __init__(self, *, approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig, learning: QLearningConfig | FuzzyQLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex, observation: ObservationConfig, action: ActionConfig, warm_up_steps: typing.SupportsInt | typing.SupportsIndex = 1000, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = [], state: dict | None = None) -> None:
         """
         New, or as it was when `state` was taken
@@ -1786,12 +1787,12 @@ class ProtocolConfig:
     ----------
     n_learning_episodes : int
         Learning episodes in a trial. Must be in [1, 1073741824].
-    test_interval : int
-        One test episode follows every so many learning episodes. Must be in [1, 1073741824].
+    evaluate_every_episodes : int
+        Learning episodes between evaluations of one episode. Must be in [1, 1073741824].
     limit_bootstraps : bool
-        Whether the last transition before the time limit bootstraps, as one that goes on; else it counts as terminated. A reading.
-    noisy_tests : bool
-        Whether the sensors are as noisy in test episodes as in learning ones. A reading.
+        Whether the last transition before a time limit bootstraps, as if the episode continued; else it counts as terminated.
+    noisy_evaluations : bool
+        Whether the sensors are as noisy in evaluations as in learning.
     
     Raises
     ------
@@ -1806,7 +1807,7 @@ class ProtocolConfig:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, n_learning_episodes: int = ..., test_interval: int = ..., limit_bootstraps: bool = ..., noisy_tests: bool = ...) -> None:
+    def __init__(self, *, n_learning_episodes: int = ..., evaluate_every_episodes: int = ..., limit_bootstraps: bool = ..., noisy_evaluations: bool = ...) -> None:
         ...
     def __replace__(self, **changes: typing.Any) -> ProtocolConfig:
         ...
@@ -1819,9 +1820,14 @@ class ProtocolConfig:
         Return a copy with other values of some fields.
         """
     @property
+    def evaluate_every_episodes(self) -> int:
+        """
+        Learning episodes between evaluations of one episode.
+        """
+    @property
     def limit_bootstraps(self) -> bool:
         """
-        Whether the last transition before the time limit bootstraps, as one that goes on; else it counts as terminated. A reading.
+        Whether the last transition before a time limit bootstraps, as if the episode continued; else it counts as terminated.
         """
     @property
     def n_learning_episodes(self) -> int:
@@ -1829,14 +1835,9 @@ class ProtocolConfig:
         Learning episodes in a trial.
         """
     @property
-    def noisy_tests(self) -> bool:
+    def noisy_evaluations(self) -> bool:
         """
-        Whether the sensors are as noisy in test episodes as in learning ones. A reading.
-        """
-    @property
-    def test_interval(self) -> int:
-        """
-        One test episode follows every so many learning episodes.
+        Whether the sensors are as noisy in evaluations as in learning.
         """
 class AcrobotTrial:
     """

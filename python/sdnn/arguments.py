@@ -1,4 +1,4 @@
-"""Checks of arguments: each message names the argument, what it must be, and what came."""
+"""Checks of arguments: each message names the argument, what was expected and what was given."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "argument_error",
     "array_of",
+    "blamed",
     "choice",
     "flag",
     "has_methods",
@@ -68,14 +70,39 @@ def array_of(name: str, value: Any, kinds: str = "fiub", what: str = "numbers") 
     if type(value) is np.ndarray and value.dtype.kind in kinds:
         return value
     if isinstance(value, np.ma.MaskedArray):
-        raise ValueError(f"{name} must be {what} without a mask, got {shown(value)}")
+        raise argument_error(name, f"must be {what} without a mask, got {shown(value)}")
     try:
         array = np.asarray(value)
     except Exception:  # lists of several lengths, and what arrays of other libraries raise
         array = np.empty(0, object)
     if array.dtype.kind not in kinds:
-        raise ValueError(f"{name} must be {what}, got {shown(value)}")
+        raise argument_error(name, f"must be {what}, got {shown(value)}")
     return array
+
+
+def argument_error(name: str, problem: str, kind: type[Exception] = ValueError) -> Exception:
+    """Make an error about an argument, whose name is its attribute ``argument``.
+
+    Errors of the core have this attribute, too.
+
+    >>> argument_error("n_bins", "must be at least 2, got 1")
+    ValueError('n_bins must be at least 2, got 1')
+    """
+    error: Any = kind(f"{name} {problem}")
+    error.argument = name
+    return error  # type: ignore[no-any-return]
+
+
+def blamed(error: BaseException) -> tuple[str, str]:
+    """Return the argument that an error is about, and its message without the name.
+
+    >>> blamed(argument_error("n_bins", "must be at least 2, got 1"))
+    ('n_bins', 'must be at least 2, got 1')
+    >>> blamed(KeyError())
+    ('', 'KeyError')
+    """
+    name: str = getattr(error, "argument", "")
+    return name, (str(error) or type(error).__name__).removeprefix(f"{name} ")
 
 
 def choice(name: str, word: Any, members: Mapping[str, Member]) -> Member:
@@ -89,7 +116,7 @@ def choice(name: str, word: Any, members: Mapping[str, Member]) -> Member:
         return members[word]
     except (KeyError, TypeError):
         words = ", ".join(repr(member) for member in members)
-        raise ValueError(f"{name} must be one of {words}, got {shown(word)}") from None
+        raise argument_error(name, f"must be one of {words}, got {shown(word)}") from None
 
 
 def one_of(name: str, word: Any, words: tuple[str, ...]) -> str:
@@ -110,7 +137,7 @@ def whole(name: str, value: Any, low: int, high: int) -> int:
     """
     is_whole = isinstance(value, Integral) and not isinstance(value, bool)
     if not is_whole or not low <= value <= high:
-        raise ValueError(f"{name} must be a whole number in [{low}, {high}], got {shown(value)}")
+        raise argument_error(name, f"must be a whole number in [{low}, {high}], got {shown(value)}")
     return int(value)
 
 
@@ -129,11 +156,12 @@ def real(name: str, value: Any) -> float:
     if type(value) is float:
         return value
     if not isinstance(value, Real) or isinstance(value, bool):
-        raise ValueError(f"{name} must be a number, got {shown(value)}")
+        raise argument_error(name, f"must be a number, got {shown(value)}")
     try:
         return float(value)
     except OverflowError:
-        raise OverflowError(f"{name} must be a number of less than 1.8e308, got more") from None
+        problem = "must be a number of less than 1.8e308, got more"
+        raise argument_error(name, problem, OverflowError) from None
 
 
 def flag(name: str, value: Any) -> bool:
@@ -143,8 +171,11 @@ def flag(name: str, value: Any) -> bool:
     Traceback (most recent call last):
     TypeError: explore must be True or False, got 'no'
     """
-    if not isinstance(value, bool | np.bool_):
-        raise TypeError(f"{name} must be True or False, got {shown(value)}")
+    if value is True or value is False:
+        return bool(value)
+    kind = getattr(getattr(value, "dtype", None), "kind", "")
+    if kind != "b" or value.size != 1:
+        raise argument_error(name, f"must be True or False, got {shown(value)}", TypeError)
     return bool(value)
 
 
@@ -156,10 +187,10 @@ def path_of(name: str, value: Any) -> Path:
     TypeError: path must be the name of a file, got None
     """
     if not isinstance(value, str | os.PathLike):
-        raise TypeError(f"{name} must be the name of a file, got {shown(value)}")
+        raise argument_error(name, f"must be the name of a file, got {shown(value)}", TypeError)
     text = os.fspath(value)
     if not isinstance(text, str) or not text or "\0" in text:
-        raise ValueError(f"{name} must be the name of a file, got {shown(value)}")
+        raise argument_error(name, f"must be the name of a file, got {shown(value)}")
     return Path(text)
 
 
@@ -172,4 +203,4 @@ def has_methods(name: str, value: Any, what: str, *methods: str) -> None:
     """
     is_object = not isinstance(value, type)
     if not (is_object and all(callable(getattr(value, method, None)) for method in methods)):
-        raise TypeError(f"{name} must be {what}, got {shown(value)}")
+        raise argument_error(name, f"must be {what}, got {shown(value)}", TypeError)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from sdnn._core import (
     AcrobotConfig,
+    Controller,
     FuzzyQLearningConfig,
     FuzzyRulesConfig,
     GoalScheduleConfig,
@@ -20,6 +21,7 @@ from sdnn._core import (
 )
 
 __all__ = [
+    "WARM_UP",
     "AcrobotConfig",
     "Field",
     "FuzzyQLearningConfig",
@@ -86,6 +88,9 @@ def _complete(kind: Any) -> None:
     ]
     kind.__signature__ = inspect.Signature(parameters)
 
+
+(WARM_UP,) = fields_of(Controller)
+"""The number of steps of a warm-up, which agents and specifications share."""
 
 for _name in __all__:
     if _name.endswith("Config"):

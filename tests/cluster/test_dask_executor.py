@@ -161,7 +161,7 @@ def test_an_unwritable_store_ends_the_run(pair, tmp_path):
 
 
 def test_an_agent_that_workers_do_not_know_is_named(pair, tmp_path, monkeypatch):
-    entry = replace(AGENTS["sdnn-c"], id="mine", core_trial=None, costs=())
+    entry = replace(AGENTS["sdnn-c"], id="mine", core_trial=None)
     monkeypatch.setitem(AGENTS, "mine", entry)
     plan = []
     for key, spec in ((one.key, one.spec) for one in make_plan(1, 10)):

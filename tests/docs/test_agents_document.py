@@ -7,7 +7,7 @@ import gymnasium as gym
 
 from sdnn.agents import PRESETS
 from sdnn.cli import main
-from sdnn.runs.spec_file import read_spec
+from sdnn.runs.config_file import read_spec
 
 TEXT = (Path(__file__).parents[2] / "docs" / "agents.md").read_text()
 

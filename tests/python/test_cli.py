@@ -158,7 +158,7 @@ def no_costs(monkeypatch):
 
     asked = []
 
-    def measure(entry, series, n_inputs, config):
+    def measure(series, n_inputs, config):
         asked.append((series.id, n_inputs))
         times = float(n_inputs) * np.ones(config.n_rounds)
         return tuple(times.tolist()), 1, 1

@@ -27,7 +27,8 @@ from sdnn.agents.spaces import (
     space_of,
 )
 from sdnn.agents.training import Training, TrainingResult
-from sdnn.arguments import flag, path_of, real, seed_of, whole
+from sdnn.arguments import argument_error, blamed, flag, path_of, real, seed_of, whole
+from sdnn.config import WARM_UP
 from sdnn.files import Arrays, Description, write_file
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         observation_range: Ranges | None = None,
         angles: Sequence[int] = (),
         angle_pairs: AnglePairs = "none",
-        warm_up_steps: int = 1000,
+        warm_up_steps: int = WARM_UP.default,
     ) -> None:
         self._take_spaces(observation_space, action_space)
         try:
@@ -132,7 +133,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
                 raise TypeError(f"{name} must be a {kind.__name__}, got {part!r}")
         self._approximator, self.learning = approximator, learning
         self.seed = seed_of(seed)
-        self._warm_up_steps = whole("warm_up_steps", steps, 2, 10**7)
+        self._warm_up_steps = whole("warm_up_steps", steps, int(WARM_UP.low), int(WARM_UP.high))
 
     def _make(self, **made_of: Any) -> None:
         """Make the core's controller; errors about sizes name the space they follow from."""
@@ -149,18 +150,18 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
                 **made_of,
             )
         except ValueError as error:
-            text = str(error)
+            argument, problem = blamed(error)
             reasons = {"n_inputs": "n_inputs follows from observation_space"}
             if not self._actions.is_box:
                 reasons["n_actions"] = "n_actions follows from action_space"
             if len(self._action["low"]) > 1:
                 reasons["max_table_bytes"] = "for each dimension of action_space"
-            found = [reason for word, reason in reasons.items() if word in text]
-            if text.startswith(("action.", "low ", "high ")):
+            found = [reason for word, reason in reasons.items() if word in str(error)]
+            if argument in ("low", "high") or argument.startswith("action."):
                 found = ["of action_space; gymnasium's RescaleAction gives a Box finite bounds"]
-            if not found:
+            if not (argument and found):
                 raise
-            raise ValueError(f"{error} ({', '.join(found)})") from error
+            raise argument_error(argument, f"{problem} ({', '.join(found)})") from error
 
     @property
     def approximator(self) -> Approximator:

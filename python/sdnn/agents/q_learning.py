@@ -16,7 +16,7 @@ from sdnn.agents.agent import Agent
 from sdnn.agents.spaces import AnglePairs, Ranges
 from sdnn.approximators.sdnn_c import pattern_tables
 from sdnn.arguments import choice, real, whole
-from sdnn.config import QLearningConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.config import WARM_UP, QLearningConfig, RBFNetworkConfig, SDNNCConfig
 
 __all__ = ["PRESETS", "Preset", "RBFQLearning", "SDNNQLearning"]
 
@@ -178,7 +178,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         observation_range: Ranges | None = None,
         angles: Sequence[int] = (),
         angle_pairs: AnglePairs = "none",
-        warm_up_steps: int = 1000,
+        warm_up_steps: int = WARM_UP.default,
     ) -> None:
         chosen = choice("preset", preset, PRESETS)
         self._tables = () if tables is None else pattern_tables(tables)

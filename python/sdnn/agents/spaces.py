@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sdnn.arguments import has_methods, whole
+from sdnn.arguments import argument_error, has_methods, whole
 from sdnn.bounds import flat_bounds, with_infinities
 
 __all__ = [
@@ -64,9 +64,8 @@ class Observations:
         low, high = _ranges(self._low, self._high, None if is_adaptive else ranges)
         is_word = isinstance(angle_pairs, str)
         if is_word and angle_pairs not in ("none", "find"):
-            raise ValueError(
-                f"angle_pairs must be 'none', 'find' or pairs of variables, got {angle_pairs!r}"
-            )
+            problem = f"must be 'none', 'find' or pairs of variables, got {angle_pairs!r}"
+            raise argument_error("angle_pairs", problem)
         pairs = () if is_word else _listed("angle_pairs", angle_pairs)
         return {
             "low": [None if np.isnan(x) else x for x in low.tolist()],
@@ -99,11 +98,13 @@ class Observations:
         try:
             return whole(name, number, 0, last)
         except ValueError:
-            raise ValueError(f"{name} must be variables from 0 to {last}, got {number!r}") from None
+            problem = f"must be variables from 0 to {last}, got {number!r}"
+            raise argument_error(name, problem) from None
 
     def _pair(self, pair: Any) -> list[int]:
         if isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2:
-            raise ValueError(f"angle_pairs must be pairs (cosine, sine) of variables, got {pair!r}")
+            problem = f"must be pairs (cosine, sine) of variables, got {pair!r}"
+            raise argument_error("angle_pairs", problem)
         return [self._variable("angle_pairs", variable) for variable in pair]
 
 
@@ -157,7 +158,7 @@ def _listed(name: str, values: Any) -> tuple[Any, ...]:
     try:
         return tuple(values)
     except TypeError:
-        raise TypeError(f"{name} must be a list, got {values!r}") from None
+        raise argument_error(name, f"must be a list, got {values!r}", TypeError) from None
 
 
 def _ranges(
@@ -184,7 +185,7 @@ def _ranges(
         if ranges is None:
             name = "observation_space"
             way_out = (
-                f"; give observation_range (--range {i}=LOW:HIGH) where the variable is constant"
+                f"; give observation_range (environment.ranges.{i} of a run) where it is constant"
             )
         raise ValueError(
             f"{name} must have low < high, got {low[i]} to {high[i]} of variable {i}{way_out}"

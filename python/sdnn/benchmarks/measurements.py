@@ -289,7 +289,9 @@ def _short_trial(n_inputs: int, noise: float, n_episodes: int) -> _core.AcrobotT
         acrobot=_core.AcrobotConfig(),
         goal=_core.GoalScheduleConfig(),
         sensors=_core.SensorConfig(n_sensors=n_inputs, noise=noise),
-        protocol=_core.ProtocolConfig(n_learning_episodes=n_episodes, test_interval=n_episodes + 1),
+        protocol=_core.ProtocolConfig(
+            n_learning_episodes=n_episodes, evaluate_every_episodes=n_episodes + 1
+        ),
         seed=SEED,
     )
 

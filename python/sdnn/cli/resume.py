@@ -15,26 +15,26 @@ from sdnn.cli.run_options import (
 )
 
 
-@click.command(short_help="Go on with a run, from its last checkpoint.")
+@click.command(short_help="Resume a run from its last checkpoint.")
 @run_argument
 @click.option(
-    "--steps", type=click.IntRange(min=1), help="A new goal: steps in all, whatever the target."
+    "--steps", type=click.IntRange(min=1), help="A new goal: steps in all; a target is dropped."
 )
 @click.option("--episodes", type=click.IntRange(min=1), help="The same in episodes.")
 @click.option(
     "--new-episode", is_flag=True,
-    help="Begin a new episode instead of repeating the present one: for robots, and where"
-    " environments do not repeat themselves.",
+    help="Begin a new episode instead of repeating the present one: for robots, and for"
+    " environments that do not repeat themselves.",
 )  # fmt: skip
 @json_option
 def resume(
     folder: Path, steps: int | None, episodes: int | None, new_episode: bool, as_json: bool
 ) -> None:
-    """Go on with RUN, a folder of `sdnn train`, from its last checkpoint.
+    """Resume RUN, a folder of `sdnn train`, from its last checkpoint.
 
-    It becomes what it would have been without the stop, bit for bit: the episode in which it
-    stopped is repeated first, with the actions that were taken. A run that is done stays as it is
-    unless --steps or --episodes says more.
+    The result is that of a run without the stop, bit for bit: the episode in which it stopped is
+    repeated first, with the actions that were taken. A run that is done stays as it is unless
+    --steps or --episodes is larger.
     """
     from sdnn.runs import Run
 

@@ -1,4 +1,4 @@
-"""What the commands on run folders have in common: texts to values, and how errors are told."""
+"""What the commands on runs share: options made from a specification, values, errors, outcomes."""
 
 from __future__ import annotations
 
@@ -18,6 +18,14 @@ if TYPE_CHECKING:
     from sdnn.agents.scaling import Scaling
     from sdnn.runs import ConfigError, Run, RunOutcome
 
+KEYS = (
+    "agent.name", "agent.preset", "budget.steps", "budget.episodes", "budget.target_return", "seed",
+    "protocol.n_envs", "protocol.evaluate_every", "protocol.evaluate_every_episodes",
+    "protocol.evaluation_episodes", "environment.noise", "environment.redundant",
+    "agent.angle_pairs", "output.checkpoint_every", "output.tensorboard",
+)  # fmt: skip
+"""Settings with an option of their own; ``--set KEY=VALUE`` sets any."""
+
 EXIT_TERMINATED = 143
 
 WARMING_UP = "the agent is still warming up: it acts at random and has learned nothing yet"
@@ -35,15 +43,87 @@ seed_option = click.option(
 )
 
 
-def option_words(error: ConfigError) -> str:
-    """Tell an error in the option that gave the value."""
-    from sdnn.cli.spec_options import option_of
+class SpecCommand(click.Command):
+    """A command with the options of `KEYS`, which are made when they are first needed."""
 
+    _made: list[click.Parameter] | None = None
+
+    @property
+    def params(self) -> list[click.Parameter]:
+        """All parameters; those of a specification come after the command's own."""
+        if self._made is None:
+            self._made = [*self._own, *_options()]
+        return self._made
+
+    @params.setter
+    def params(self, own: list[click.Parameter]) -> None:
+        self._own = own
+        self._made = None
+
+
+def _options() -> Iterator[click.Option]:
+    """Make the options of `KEYS` from the schema of the specification's fields."""
+    import msgspec
+
+    from sdnn.runs import RunSpec
+
+    _, schemas = msgspec.json.schema_components([RunSpec])
+    for key in KEYS:
+        found: dict[str, Any] = {"$ref": "RunSpec"}
+        for name in key.split("."):
+            parts = (found, *found.get("anyOf", ()))
+            table = next(one["$ref"] for one in parts if "$ref" in one).rpartition("/")[2]
+            found = schemas[table]["properties"][name]
+        kind = next((one for one in found.get("anyOf", ()) if one.get("type") != "null"), found)
+        is_flag, default = kind.get("type") == "boolean", found.get("default")
+        shown = "" if default is None or is_flag else f"  [default: {default}]"
+        yield click.Option(
+            [option_of(key), key.replace(".", "_")],
+            type=None if is_flag else _option_type(kind),
+            is_flag=is_flag,
+            default=None,
+            help=found["description"].replace("`", "") + shown,
+        )
+
+
+def _option_type(kind: Mapping[str, Any]) -> Any:
+    low, high = kind.get("minimum"), kind.get("maximum")
+    if "enum" in kind:
+        return click.Choice([word for word in kind["enum"] if word is not None])
+    if kind.get("type") == "integer":
+        return click.IntRange(low, None if high == 2**53 else high)
+    if kind.get("type") == "number":
+        return click.FLOAT if low is None else click.FloatRange(low, high)
+    return click.STRING
+
+
+def given_values(options: dict[str, Any]) -> dict[str, Any]:
+    """Take the options of a specification out of those of a command: given values by their keys."""
+    found = {key: options.pop(key.replace(".", "_")) for key in KEYS}
+    return {key: value for key, value in found.items() if value is not None and value is not False}
+
+
+def option_of(key: str) -> str:
+    """Return the option that sets a key of a specification, or the argument."""
+    key = key.partition("[")[0]
+    if key == "agent.name":
+        return "--agent"
+    if key in (*KEYS, "steps", "episodes"):
+        return "--" + key.rpartition(".")[2].replace("_", "-")
+    if key.startswith("environment.kwargs"):
+        return " ".join(["--env-arg", *key.split(".")[2:]])
+    if key.startswith("environment.ranges"):
+        return " ".join(["--range", *key.split(".")[2:]])
+    return "ENV_ID" if key in ("environment", "environment.id") else f"--set {key}"
+
+
+def option_words(error: ConfigError) -> str:
+    """Return an error's message with the option that gave the value."""
     return f"{option_of(error.key)}: {error.problem}"
 
 
 def words_of_run(folder: Path) -> Callable[[ConfigError], str]:
-    """Tell errors in what a run's own configuration says; its goal may be an option."""
+    """Return the function for messages about a run's own configuration; its goal is an option."""
 
     def words(error: ConfigError) -> str:
         if error.key in ("steps", "episodes"):
@@ -54,10 +134,7 @@ def words_of_run(folder: Path) -> Callable[[ConfigError], str]:
 
 
 def value_of(text: str) -> Any:
-    """Read a value as TOML has it, such as 0.5, true or [1, 2]; anything else is a text.
-
-    True and False are as Python writes them, too.
-    """
+    """Read a value as TOML has it, such as 0.5, true or [1, 2], or True; others are texts."""
     if sys.version_info >= (3, 11):
         import tomllib
     else:
@@ -91,10 +168,10 @@ def named_values(option: str, pairs: Iterable[str]) -> Iterator[tuple[str, str]]
 def run_command(
     words: Callable[[ConfigError], str], *, folder: Path | None = None
 ) -> Iterator[None]:
-    """Let environments be modules of the present folder, and tell errors that users can mend.
+    """Let environments be modules of the present folder; make errors a line and an exit code.
 
-    They become a line and an exit code. ``words`` tells those of a configuration that do not say
-    where it stands; ``folder`` is what an interrupted run goes on from.
+    ``words`` returns the message about a configuration whose file is not known. ``folder`` is the
+    run that is resumed after an interrupt.
     """
     from sdnn.runs import ConfigError, RunError, RunTerminatedError
 
@@ -125,7 +202,7 @@ def run_command(
 
 
 def _tell_failure(folder: Path | None) -> None:
-    """Of an environment, whose author needs all of the error, too."""
+    """Print how to resume beside the traceback, which the environment's author needs."""
     if folder is not None and folder.exists():
         _tell_how_to_resume("failed", folder)
 
@@ -142,8 +219,8 @@ def _tell_how_to_resume(what: str, folder: Path | None) -> None:
     from sdnn.runs.errors import command_line
 
     is_begun = folder is not None and folder.exists()
-    goes_on = f"; {command_line('sdnn', 'resume', folder)} goes on" if is_begun else ""
-    click.echo(what + goes_on, err=True)
+    way = f"; {command_line('sdnn', 'resume', folder)} continues it" if is_begun else ""
+    click.echo(what + way, err=True)
 
 
 def train_run(
@@ -154,7 +231,7 @@ def train_run(
     episodes: int | None = None,
     repeat_episodes: bool = True,
 ) -> None:
-    """Train a run, with a line of progress on a terminal, and print what came of it."""
+    """Train a run, with a line of progress on a terminal, and print the result."""
     callbacks = []
     if sys.stderr.isatty():
         from rich.console import Console
@@ -173,7 +250,7 @@ def train_run(
 
 
 def outcome_values(outcome: RunOutcome) -> Mapping[str, Any]:
-    """Give an outcome as JSON has it."""
+    """Return an outcome as JSON has it."""
     report = outcome.learning_report
     return {
         "n_steps": outcome.n_steps,
@@ -208,7 +285,7 @@ def _lines_of_ranges(report: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _lines_of_scaling(run: Run, scaling: Scaling | None) -> Iterator[str]:
-    """Say what the agent needs wherever else it acts."""
+    """Describe the observations that the agent needs elsewhere."""
     if scaling is not None:
         yield (
             f"the agent observes variables scaled to [0, 1], {scaling.words()}: elsewhere it needs"
@@ -235,7 +312,7 @@ def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
     if outcome.is_warming_up:
         yield (
             f"{WARMING_UP}; that takes {run.spec.agent.warm_up_steps} steps:"
-            f" {command_line('sdnn', 'resume', run.folder, '--steps', 'N')} goes on"
+            f" {command_line('sdnn', 'resume', run.folder, '--steps', 'N')} continues it"
         )
     row = outcome.last_evaluation
     if row is not None:

@@ -10,18 +10,19 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sdnn.cli.run_options import (
+    SpecCommand,
+    given_values,
     json_option,
     named_values,
+    option_of,
     option_words,
     run_command,
     train_run,
     value_of,
 )
-from sdnn.cli.spec_options import SpecCommand, given_values
 
 if TYPE_CHECKING:
     from sdnn.runs import ConfigError, RunSpec
-    from sdnn.runs.spec_file import SpecSource
 
 
 @click.command(cls=SpecCommand, short_help="Learn in a Gymnasium environment.")
@@ -82,59 +83,67 @@ def train(
 
         click.echo(json.dumps(spec_schema(), indent=2))
         return
+    from sdnn.runs import Run, RunSpec
+    from sdnn.runs.config_file import ConfigFile
+    from sdnn.runs.errors import command_line
+    from sdnn.runs.spec import overridden
+
+    given = _given(env_id, options)
     with run_command(option_words):
-        source = _source(env_id, file, options)
+        source = None if file is None else ConfigFile.read(file)
 
     def words(error: ConfigError) -> str:
-        located = source.located(error)
+        located = error if source is None else source.located(error, given)
         return str(located) if located.place else option_words(error)
 
     with run_command(words):
-        spec = source.read()
+        values = {} if source is None else source.specification()
+        spec = RunSpec.from_values(overridden(values, given))
         if spec.environment is None:
             raise click.UsageError("ENV_ID must be given, or a --config that names an environment")
         folder = out or _folder_of(spec)
         if dry_run:
-            from sdnn.runs import Run
-
             Run(folder, spec).check()
             click.echo(json.dumps({"folder": str(folder), **spec.values()}, indent=2))
             return
     with run_command(words, folder=folder):
-        from sdnn.runs import Run
-        from sdnn.runs.errors import command_line
-
         if (folder / "config.json").exists():
-            continues = command_line("sdnn", "resume", folder)
-            raise click.UsageError(
-                f"--out: {folder} holds a run already: {continues} goes on with it"
-            )
+            resume = command_line("sdnn", "resume", folder)
+            raise click.UsageError(f"--out: {folder} holds a run already: {resume} continues it")
         run = Run.create(folder, spec)
         train_run(run, as_json)
 
 
-def _source(env_id: str | None, file: Path | None, options: dict[str, Any]) -> SpecSource:
-    """Return the file, and the options that override it."""
-    from sdnn.runs.spec_file import SpecSource
-
+def _given(env_id: str | None, options: dict[str, Any]) -> dict[str, Any]:
+    """Return the values of the options by their keys; UsageError if two options set the same."""
     given = given_values(options)
+    by_option = {key: (option_of(key), value) for key, value in given.items()}
+
+    def give(option: str, key: str, value: Any) -> None:
+        other, before = by_option.setdefault(key, (option, value))
+        if other != option:
+            raise click.UsageError(
+                f"{option} must not set {key}, which {other} sets: got {value!r} and {before!r}"
+            )
+        given[key] = value
+
+    if env_id is not None:
+        give("ENV_ID", "environment.id", env_id)
+    for name, text in named_values("--env-arg", options["kwargs"]):
+        give(f"--env-arg {name}", f"environment.kwargs.{name}", value_of(text))
+    for text in options["ranges"]:
+        if text == "adaptive":
+            give("--range", "agent.observation_range", "adaptive")
+        else:
+            name, ends = _range(text)
+            give(f"--range {name}", f"environment.ranges.{name}", ends)
     for name, text in named_values("--set", options["settings"]):
         if "." not in name:
             raise click.UsageError(f"--set {name}: must be TABLE.NAME, such as learning.discount")
-        given[name] = value_of(text)
-    if env_id is not None:
-        given["environment.id"] = env_id
-    for name, text in named_values("--env-arg", options["kwargs"]):
-        given[f"environment.kwargs.{name}"] = value_of(text)
-    for text in options["ranges"]:
-        if text == "adaptive":
-            given["agent.observation_range"] = "adaptive"
-        else:
-            name, ends = _range(text)
-            given[f"environment.ranges.{name}"] = ends
+        give(f"--set {name}", name, value_of(text))
     if "budget.steps" in given and "budget.episodes" in given:
         raise click.UsageError("--steps and --episodes must not be given together")
-    return SpecSource(file, given)
+    return given
 
 
 def _range(text: str) -> tuple[str, list[float]]:

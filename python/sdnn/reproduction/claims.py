@@ -32,8 +32,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS
-from sdnn.reproduction.cost import CostConfig, CostRecord
-from sdnn.runs.registry import cost_series, title_of
+from sdnn.reproduction.cost import SERIES, CostConfig, CostRecord
+from sdnn.runs.registry import title_of
 from sdnn.runs.results import (
     BOOTSTRAP_SEED,
     SHARE_STABLE,
@@ -112,7 +112,7 @@ class Growth:
     n_fewer: int
 
     def __str__(self) -> str:
-        title = next(series.title for _, series in cost_series() if series.id == self.series)
+        title = next(series.title for series in SERIES if series.id == self.series)
         return f"time per step, {self.n_inputs} inputs / {self.n_fewer} inputs: {title}"
 
 

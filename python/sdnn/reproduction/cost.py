@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.spaces import Box
 
 from sdnn import _core, machine
+from sdnn.config import RBFNetworkConfig
 from sdnn.runs.engine import Observer
-from sdnn.runs.registry import AgentEntry, CostSeries, cost_series
+from sdnn.runs.registry import AGENTS, split_label
 from sdnn.runs.store import ResultStore
 
 SEED = 1
@@ -28,6 +29,72 @@ COST_ROW_HEADER = (
     "series", "n_inputs", "round", "microseconds", "n_steps", "table_bytes", "version", "machine"
 )  # fmt: skip
 """Columns of the file of all rounds of cost measurements."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CostSeries:
+    """A curve in the figure of costs: an agent of the core, evaluated in one way.
+
+    Agents in Python have none: their time would be the interpreter's.
+    """
+
+    id: str  # the word used in the result file
+    title: str
+    agent: str
+    growth: str  # what the number of operations is proportional to (mathtext)
+    learned_bytes: Callable[[Any], int]  # of the approximator's settings
+    settings: Mapping[str, Any] = field(default_factory=dict)  # that are not the default
+    core_agent: Callable[..., Any] | None = None  # None: that inside the Python agent
+    is_plain: bool = False  # its product structure is unused: seconds a step with many inputs
+
+
+def _rbf_bytes(network: RBFNetworkConfig) -> int:
+    return int(8 * network.n_bases ** (network.n_inputs + 1))
+
+
+SERIES = (
+    CostSeries(
+        id="sdnn-c",
+        title="SDNN-C",
+        agent="sdnn-c",
+        growth="$d(d-1)$ groups of columns",
+        learned_bytes=lambda one: one.n_pattern_units * one.n_pairs * one.n_hidden_units,
+    ),
+    CostSeries(
+        id="fuzzy",
+        title="FQL",
+        agent="fuzzy",
+        growth="$2^d$ fired rules of $9^d$",
+        learned_bytes=lambda one: 4 * one.n_sets**one.n_inputs * one.n_actions,
+        settings={"max_table_bytes": 2**32},  # with 8 inputs it has 3.6 GB, nearly all untouched
+    ),
+    CostSeries(
+        id="rbf",
+        title="RBFN, factored",
+        agent="rbf",
+        growth="$4^{d+1}$ weights",
+        learned_bytes=_rbf_bytes,
+    ),
+    CostSeries(
+        id="rbf-plain",
+        title="RBFN, plain",
+        agent="rbf",
+        growth="$601 \\cdot 4^{d+1}$ basis values",
+        learned_bytes=_rbf_bytes,
+        core_agent=_core.PlainRBFQLearning,
+        is_plain=True,
+    ),
+)
+"""All curves, in the order of the figure."""
+
+
+def cost_series(agents: Iterable[str] | None = None) -> tuple[CostSeries, ...]:
+    """Return the curves of some agents (default: all); ValueError if there is no such agent."""
+    if agents is None:
+        return SERIES
+    pairs = [split_label(word) for word in agents]
+    chosen = [name for name, preset in pairs if preset is None]
+    return tuple(series for name in chosen for series in SERIES if series.agent == name)
 
 
 class CostKey(NamedTuple):
@@ -111,7 +178,7 @@ def cost_keys(config: CostConfig, agents: Iterable[str] | None = None) -> tuple[
     """Return the keys of all measurements of some agents (default: all), series by series."""
     return tuple(
         CostKey(series.id, n_inputs, config.config_hash)
-        for _, series in cost_series(agents)
+        for series in cost_series(agents)
         for n_inputs in sorted(config.n_inputs)
         if not series.is_plain or n_inputs <= config.most_plain_inputs
     )
@@ -124,10 +191,10 @@ def measure_costs(
     stored = {record.key for record in load_costs(store, config.config_hash)}
     missing = [key for key in keys if key not in stored]
     observer.costs_begun(len(missing))
-    by_id = {series.id: (entry, series) for entry, series in cost_series()}
+    by_id = {series.id: series for series in SERIES}
     for key in missing:
-        entry, series = by_id[key.series]
-        measured = measure_steps(entry, series, key.n_inputs, config)
+        series = by_id[key.series]
+        measured = measure_steps(series, key.n_inputs, config)
         if measured is not None:
             names = ("microseconds", "n_steps", "table_bytes")
             made = {"machine": machine.description(), "version": _core.__version__}
@@ -137,13 +204,14 @@ def measure_costs(
 
 
 def measure_steps(
-    entry: AgentEntry, series: CostSeries, n_inputs: int, config: CostConfig
+    series: CostSeries, n_inputs: int, config: CostConfig
 ) -> tuple[tuple[float, ...], int, int] | None:
     """Measure a step of an agent of the paper's sizes: acting in a new state and learning.
 
     Returns microseconds in each round, steps in a round, and bytes of what the agent learns; None
     where there is no memory for the agent.
     """
+    entry = AGENTS[series.agent]
     approximator = entry.approximator(**(dict(series.settings) | {"n_inputs": n_inputs}))
     given: dict[str, Any] = {"approximator": approximator, "learning": entry.learning()}
     try:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sdnn.reproduction.cases import EXPERIMENTS, PAPER_EPISODES, PAPER_TRIALS, Experiment
-from sdnn.reproduction.cost import CostRecord
+from sdnn.reproduction.cost import SERIES, CostRecord
 from sdnn.runs.figures import (
     FAINT,
     INK,
@@ -21,7 +21,6 @@ from sdnn.runs.figures import (
     style,
     write_footer,
 )
-from sdnn.runs.registry import cost_series
 from sdnn.runs.results import CaseResult
 
 if TYPE_CHECKING:
@@ -105,8 +104,8 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
     figure = Figure(figsize=(9.4, 4.7))
     figure.subplots_adjust(left=0.085, right=0.7, top=0.9, bottom=0.2)
     axes = figure.add_subplot()
-    colors = colors_of(range(len(cost_series())))
-    for number, (_, series) in enumerate(cost_series()):
+    colors = colors_of(range(len(SERIES)))
+    for number, series in enumerate(SERIES):
         own = sorted((c for c in costs if c.series == series.id), key=lambda c: c.n_inputs)
         if not own:
             continue

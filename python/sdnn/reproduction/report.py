@@ -28,9 +28,9 @@ from sdnn.reproduction.claims import (
     judge_claims,
     powers,
 )
-from sdnn.reproduction.cost import CostRecord
+from sdnn.reproduction.cost import SERIES, CostRecord
 from sdnn.reproduction.reference_results import ReferenceResult
-from sdnn.runs.registry import cost_series, title_of
+from sdnn.runs.registry import title_of
 from sdnn.runs.report import (
     MEASURE_END,
     Page,
@@ -292,14 +292,13 @@ def format_quantity(checked: CheckOutcome) -> str:
 def cost_table(costs: Sequence[CostRecord]) -> Table:
     """Return the table of costs: a row for each number of inputs, a column for each series."""
     by_key = {(cost.series, cost.n_inputs): cost for cost in costs}
-    series = [series for _, series in cost_series()]
     rows = []
     for n_inputs in sorted({cost.n_inputs for cost in costs}):
         table = by_key.get(("fuzzy", n_inputs))
         size = "-" if table is None else _scaled(table.table_bytes, _BYTES, "B")
-        found = [(by_key.get((s.id, n_inputs)), by_key.get((s.id, n_inputs - 1))) for s in series]
+        found = [(by_key.get((s.id, n_inputs)), by_key.get((s.id, n_inputs - 1))) for s in SERIES]
         rows.append((str(n_inputs), *(_cost(*pair) for pair in found), size))
-    return Table("Cost of a step", ("inputs", *(one.title for one in series), "FQL's table"), rows)
+    return Table("Cost of a step", ("inputs", *(one.title for one in SERIES), "FQL's table"), rows)
 
 
 def _cost(cost: CostRecord | None, with_one_less: CostRecord | None) -> str:

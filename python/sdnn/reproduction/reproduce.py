@@ -27,7 +27,7 @@ from sdnn.reproduction.reference_results import reference_results
 from sdnn.reproduction.report import Report
 from sdnn.runs.engine import Executor, Observer, PlannedTrial, plan_of, run_trials
 from sdnn.runs.figures import figure_bytes, require_matplotlib
-from sdnn.runs.registry import cost_series, split_label
+from sdnn.runs.registry import split_label
 from sdnn.runs.report import Finished, describe_call, require_jinja
 from sdnn.runs.results import CaseResult, measure
 from sdnn.runs.spec import PAPER_INTERVAL, AgentSpec, BudgetSpec, RunSpec
@@ -103,7 +103,7 @@ class ReproduceRequest:
         wanted = {pair for e in known if e.id in asked for pair in e.pairs}
         costs = cost.cost_keys(self.cost_config, self.agents or None) if self.cost else ()
         if self.cost and not (wanted or costs):
-            measured = dict.fromkeys(entry.id for entry, _ in cost_series())
+            measured = dict.fromkeys(series.agent for series in cost.SERIES)
             raise ValueError(
                 f"agents whose cost is measured are {', '.join(measured)},"
                 f" got {', '.join(self.agents)}"
@@ -208,7 +208,7 @@ def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[
     stored = store.keys()
     complete = [(e, keys) for e, keys in request.plan.experiments if stored.issuperset(keys)]
     records = store.load(key for _, keys in complete for key in keys)
-    shown = {series.id for _, series in cost_series(request.agents or None)}
+    shown = {series.id for series in cost.cost_series(request.agents or None)}
     experiments = tuple((e, collect(e, records)) for e, _ in complete)
     n_run = {
         (one.case_id, one.agent, one.config_hash): one.n_trials

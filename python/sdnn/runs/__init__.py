@@ -3,7 +3,7 @@
 A run is one agent that learns in one environment, in a folder of its own, and can be resumed.
 
 A folder holds ``config.json`` (all that defines the run), ``results.sqlite`` (its episodes and
-evaluations), ``checkpoint.safetensors`` (where it goes on) and, once it is finished,
+evaluations), ``checkpoint.safetensors`` (where it is resumed) and, once it is finished,
 ``agent.safetensors``. The commands ``sdnn train``, ``resume``, ``evaluate``, ``plot`` and
 ``record`` work on such folders.
 """
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
         StoreError,
         WorkerLostError,
     )
-    from sdnn.runs.registry import AGENTS, AgentEntry, CostSeries, agent_entry, register
+    from sdnn.runs.registry import AGENTS, AgentEntry, agent_entry, register
     from sdnn.runs.results import CaseResult, Estimate, MeasureConfig, measure
     from sdnn.runs.run import Goal, Run, RunEvaluation, RunOutcome
     from sdnn.runs.spec import AgentSpec, BudgetSpec, OutputSpec, ProtocolSpec, RunSpec
@@ -49,7 +49,6 @@ __all__ = [
     "CaseResult",
     "ClusterError",
     "ConfigError",
-    "CostSeries",
     "DaskExecutor",
     "EnvironmentSpec",
     "Estimate",

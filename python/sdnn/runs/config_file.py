@@ -6,19 +6,24 @@ import bisect
 import json
 import re
 import sys
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from sdnn.files import read_bytes
 from sdnn.runs.errors import ConfigError
+from sdnn.runs.spec import RunSpec
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
-__all__ = ["ConfigFile", "KeyPath", "dotted"]
+__all__ = ["FORMAT", "ConfigFile", "KeyPath", "dotted", "read_spec"]
+
+FORMAT = "sdnn-run-2"
+"""Of the configuration in a run's folder."""
 
 MOST_BYTES = 2**20
 """Of a file of settings."""
@@ -34,7 +39,7 @@ class ConfigFile:
     Parameters
     ----------
     path
-        TOML if its name ends in ``.toml``, else JSON.
+        Its name ends in ``.toml`` or ``.json``.
     text
         Its content.
     values
@@ -55,6 +60,8 @@ class ConfigFile:
             If it cannot be read, or holds no table; file and line are named.
         """
         path = Path(path)
+        if path.suffix not in (".toml", ".json"):
+            raise ConfigError("", "must be a file whose name ends in .toml or .json", str(path))
         is_toml = path.suffix == ".toml"
         try:
             text = read_bytes(path, MOST_BYTES).decode()
@@ -71,6 +78,27 @@ class ConfigFile:
         if not isinstance(values, dict):
             raise ConfigError("", f"must hold a table, got {values!r}", str(path))
         return cls(path, text, values)
+
+    def specification(self) -> dict[str, Any]:
+        """Return the values of a specification: all but what only a run's configuration has.
+
+        Raises
+        ------
+        ConfigError
+            If it is the configuration of a run of another format.
+        """
+        if (found := self.values.get("format", FORMAT)) != FORMAT:
+            raise ConfigError("format", f"must be {FORMAT}, got {found!r}: begin a new run")
+        others = ("format", "version", "goals")
+        return {name: value for name, value in self.values.items() if name not in others}
+
+    def located(self, error: ConfigError, options: Collection[str] = ()) -> ConfigError:
+        """Add file and line to an error, unless it is about one of the options, given by keys."""
+        key = tuple(error.key.partition("[")[0].split("."))
+        for name in (error.key, key[0] if key[0] not in self.values else error.key):
+            if any(f"{name}.".startswith(f"{o}.") or o.startswith(f"{name}.") for o in options):
+                return error
+        return error if error.place else ConfigError(error.key, error.problem, self.place(key))
 
     def place(self, key: KeyPath) -> str:
         """Return the file and, in TOML, the line of a key, or of the nearest table around it.
@@ -90,6 +118,21 @@ class ConfigFile:
     def error(self, key: KeyPath, problem: str) -> ConfigError:
         """Make the error that names file, line and key."""
         return ConfigError(dotted(key), problem, self.place(key))
+
+
+def read_spec(path: str | Path) -> RunSpec:
+    """Read a specification from a TOML or JSON file.
+
+    Raises
+    ------
+    ConfigError
+        If something is unknown or impossible; the message names file, line (of TOML) and key.
+    """
+    file = ConfigFile.read(path)
+    try:
+        return RunSpec.from_values(file.specification())
+    except ConfigError as error:
+        raise file.located(error) from error
 
 
 def _begins(lines: list[str], n: int, key: KeyPath) -> bool:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import json
+import sys
 from contextlib import AbstractContextManager, closing
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -161,9 +163,10 @@ class EnvironmentSpec(Settings, frozen=True):
             if unknown.size:
                 variables = ", ".join(map(str, unknown))
                 raise ConfigError(
-                    "environment.ranges",
-                    f"noise and redundant need the range of every variable; {self.id} gives none of"
-                    f" variables {variables} of {low.size} (from 0): --range {unknown[0]}=LOW:HIGH",
+                    f"environment.ranges.{unknown[0]}",
+                    "must be given, as lowest and highest value: noise and redundant need the range"
+                    f" of every variable, and {self.id} has none of variables {variables} of"
+                    f" {low.size} (from 0)",
                 )
             env = UnitSensors(env, low, high)
             if self.redundant:
@@ -181,6 +184,24 @@ class EnvironmentSpec(Settings, frozen=True):
         except BaseException:
             env.close()
             raise
+
+    def imported(self) -> bool:
+        """Import the module that ``id`` names; False if there is none, or it was imported before.
+
+        Raises
+        ------
+        ConfigError
+            If it cannot be imported.
+        """
+        module, colon, _ = self.id.rpartition(":")
+        if not colon or module in sys.modules:
+            return False
+        try:
+            importlib.import_module(module)
+        except Exception as error:  # whatever is in a user's module
+            words = f"no environment {self.id!r}: {type(error).__name__}: {error}"
+            raise ConfigError("environment.id", words) from error
+        return True
 
     def opened(self) -> AbstractContextManager[gym.Env[Any, Any]]:
         """Make the bare environment, for a block that looks at it."""

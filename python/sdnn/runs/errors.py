@@ -1,4 +1,4 @@
-"""The errors that a user can cause and mend."""
+"""The errors that a user can cause and correct."""
 
 from __future__ import annotations
 
@@ -13,23 +13,22 @@ __all__ = [
     "StoreError",
     "WorkerLostError",
     "command_line",
-    "problem_of",
 ]
 
 
 class RunError(Exception):
-    """Base of the errors whose message alone tells a user what to mend."""
+    """Base of the errors whose message alone is enough to correct them."""
 
 
 class ConfigError(RunError):
-    """A run's configuration says something that cannot be run.
+    """A run's configuration cannot be run.
 
     Parameters
     ----------
     key
-        Of what is wrong, with dots between tables: ``"environment.noise"``.
+        The setting, with dots between tables: ``"environment.noise"``.
     problem
-        What was expected and what came.
+        What was expected and what was given.
     place
         The file, and the line if it is known.
     """
@@ -41,12 +40,12 @@ class ConfigError(RunError):
         super().__init__(": ".join(part for part in (place, key, problem) if part))
 
     def __reduce__(self) -> tuple[type[ConfigError], tuple[str, str, str]]:
-        """Be pickled as it was made: exceptions come back from other processes so."""
+        """Pickle it by its parts: exceptions come back from other processes."""
         return type(self), (self.key, self.problem, self.place)
 
 
 class RunTerminatedError(RunError):
-    """SIGTERM came; the run was saved after the present step."""
+    """SIGTERM was received; the run was saved after the present step."""
 
 
 class StoreError(RunError):
@@ -58,24 +57,15 @@ class PlotUnavailableError(RunError):
 
 
 class ClusterError(RunError):
-    """A cluster was asked for, but it cannot be reached or has no worker that fits."""
+    """A cluster cannot be reached, or has no worker that fits."""
 
 
 class WorkerLostError(RunError):
-    """A trial was given up because worker after worker was lost while running it."""
-
-
-def problem_of(error: ValueError) -> str:
-    """Give the message of a check in `sdnn.arguments` without the argument's name, its first word.
-
-    >>> problem_of(ValueError("steps must be at least 1, got 0"))
-    'must be at least 1, got 0'
-    """
-    return str(error).partition(" ")[2]
+    """A trial was given up after several workers were lost while running it."""
 
 
 def command_line(*words: object) -> str:
-    """Write a command as a shell takes it, whatever is in its words.
+    """Return a command with its words quoted for a shell.
 
     >>> command_line("sdnn", "plot", "my runs/first")
     "sdnn plot 'my runs/first'"

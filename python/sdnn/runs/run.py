@@ -35,11 +35,10 @@ from sdnn.agents.spaces import require_same_kind
 from sdnn.arguments import whole
 from sdnn.files import lock, open_to_append, remove_abandoned_files, write_whole
 from sdnn.interrupts import Interrupts
-from sdnn.runs.config_file import ConfigFile
+from sdnn.runs.config_file import FORMAT, ConfigFile, read_spec
 from sdnn.runs.environment import render_modes
-from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line, problem_of
+from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line
 from sdnn.runs.spec import BudgetSpec, RunSpec
-from sdnn.runs.spec_file import FORMAT, read_spec
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.trial import (
     Reason,
@@ -192,9 +191,8 @@ class Run:
             If a file is damaged, the run is trained elsewhere, or the environment has changed or
             gives what cannot be learned.
         """
-        if steps is not None and episodes is not None:
-            raise ConfigError("episodes", "must not be given together with steps")
         goal = {"steps": steps, "episodes": episodes}
+        BudgetSpec(**goal)  # refuses what is no goal
         stop = threading.Event()
         with ExitStack() as stack:
             stack.enter_context(self._locked())
@@ -205,6 +203,12 @@ class Run:
                     f" needs another folder, {AGENT} would be written over"
                 )
             store = stack.enter_context(ResultStore(self.folder))
+            begun = store.keys(unfinished=True)
+            if begun and self.key not in begun:
+                raise RunError(
+                    f"{self.folder / CONFIG} differs from the specification in {STORE_NAME}: undo"
+                    " the edit, or begin a new run with --config and another --out"
+                )
             checkpoints = _StoredCheckpoints(self, store, stop)
             listed = [checkpoints, *callbacks]
             if self.spec.output.tensorboard:
@@ -352,13 +356,8 @@ class Run:
         """Note a new goal: in the checkpoint, which is followed, then in the configuration."""
         for name, value in goal.items():
             done: int = getattr(training, f"n_{name}")
-            try:
-                if value is not None and whole(name, value, 1, 2**53) < done:
-                    raise ConfigError(
-                        name, f"must be at least the {done} that are done, got {value}"
-                    )
-            except ValueError as error:
-                raise ConfigError(name, problem_of(error)) from None
+            if value is not None and value < done:
+                raise ConfigError(name, f"must be at least the {done} that are done, got {value}")
         training.steps, training.episodes = goal["steps"], goal["episodes"]
         if (self.folder / CHECKPOINT).exists():
             training.save(self.folder / CHECKPOINT)

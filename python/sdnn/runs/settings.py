@@ -6,6 +6,7 @@ import dataclasses
 import difflib
 import functools
 import math
+import types
 import typing
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -13,11 +14,23 @@ from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 import msgspec
 import numpy as np
+from msgspec import Meta
 
-from sdnn.config import Field, fields_of
+from sdnn.arguments import blamed, shown
+from sdnn.config import WARM_UP, ProtocolConfig, fields_of
 from sdnn.runs.errors import ConfigError
 
-__all__ = ["Settings", "changed", "checked", "kinds_of", "possible_words", "read", "values_of"]
+__all__ = [
+    "AgentSpec",
+    "BudgetSpec",
+    "OutputSpec",
+    "ProtocolSpec",
+    "Settings",
+    "changed",
+    "names_of",
+    "possible_words",
+    "read",
+]
 
 AnySettings = TypeVar("AnySettings", bound="Settings")
 
@@ -35,6 +48,7 @@ _WORDS = {
     "<": "less than",
     "Expected ": "",
 }
+"""Words for those of msgspec's messages."""
 
 
 class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -42,6 +56,7 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     A subclass declares each setting as a field: its type with bounds and a description, and its
     default. Constructor, files, command-line options, JSON Schema and the documentation follow.
+    Tables in it may be given as settings or as mappings.
 
     Raises
     ------
@@ -50,10 +65,9 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """
 
     def __post_init__(self) -> None:
-        for name, kind in kinds_of(type(self)).items():
+        for name, kind in _kinds_of(type(self)).items():
             value = getattr(self, name)
-            with within(name):
-                made = checked(kind, value)
+            made = checked(kind, value, name)
             if made is not value:
                 msgspec.structs.force_setattr(self, name, made)
 
@@ -62,31 +76,25 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return msgspec.structs.replace(self, **changes)
 
 
-def kinds_of(kind: Any) -> Mapping[str, Any]:
-    """Return the types of the fields of a class of settings, with their bounds."""
-    return _kinds_of(kind)
-
-
 @functools.cache
-def _kinds_of(kind: Any) -> Mapping[str, Any]:
-    if fields := fields_of(kind):
-        return {field.name: _kind_of(field) for field in fields}
+def _kinds_of(kind: type[Any]) -> Mapping[str, Any]:
+    """Return the types of the fields of a class, with their bounds."""
     try:
         hints = typing.get_type_hints(kind, include_extras=True)
     except (NameError, TypeError):  # an agent from elsewhere: its values are taken as they are
         hints = {}
+    return {name: hints.get(name, Any) for name in names_of(kind)}
+
+
+def names_of(kind: type[Any]) -> tuple[str, ...]:
+    """Return the names of the fields of a class of settings, or of another dataclass."""
     if issubclass(kind, msgspec.Struct):
-        return {name: hints.get(name, Any) for name in kind.__struct_fields__}
-    return {one.name: hints.get(one.name, Any) for one in dataclasses.fields(kind) if one.init}
+        return kind.__struct_fields__
+    return tuple(field.name for field in dataclasses.fields(kind) if field.init)
 
 
-def _kind_of(field: Field) -> Any:
-    """Return the type of a setting of the core; the core itself checks its bounds."""
-    return Annotated[field.type, msgspec.Meta(description=field.doc)]
-
-
-def checked(kind: Any, value: Any, key: str = "") -> Any:
-    """Return a value as its type has it: arrays as tuples, 1 as 1.0.
+def checked(kind: Any, value: Any, key: str) -> Any:
+    """Return a value as its type has it: arrays as tuples, 1 as 1.0, tables as settings.
 
     Raises
     ------
@@ -95,32 +103,44 @@ def checked(kind: Any, value: Any, key: str = "") -> Any:
     """
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
+    possible = _alternatives(kind)
+    if isinstance(value, Mapping):
+        for one in possible:
+            if isinstance(one, type) and issubclass(one, Settings):
+                return read(one, value, key)
+            if get_origin(one) is dict:
+                for name, item in value.items():
+                    checked(get_args(one)[1], item, f"{key}.{name}")
     try:
         made = msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
         text, _, path = str(error).partition(" - at `$")
-        raise ConfigError((key + path[:-1]).lstrip("."), _problem(kind, text, value)) from None
+        problem = _problem(possible if not path else (), text)
+        raise ConfigError(key + path[:-1], f"{problem}, got {shown(value)}") from None
     if isinstance(made, float) and not math.isfinite(made):
         raise ConfigError(key, f"must be finite, got {made}")
     return made
 
 
-def _problem(kind: Any, text: str, value: Any) -> str:
-    words = _literals(kind)
+def _alternatives(kind: Any) -> tuple[Any, ...]:
+    """Return the types of a union, or the only one, without annotations."""
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return _alternatives(inner[0])
+    if origin in (typing.Union, types.UnionType):
+        return tuple(one for part in inner for one in _alternatives(part))
+    return (kind,)
+
+
+def _problem(possible: Iterable[Any], text: str) -> str:
+    words = [repr(w) for one in possible if get_origin(one) is Literal for w in get_args(one)]
     if words:
-        return f"must be one of {', '.join(map(repr, words))}, got {value!r}"
+        others = " or an array" if any(get_origin(one) is tuple for one in possible) else ""
+        return f"must be one of {', '.join(words)}{others}"
     expected = text.partition(", got")[0]
     for name, word in _WORDS.items():
         expected = expected.replace(name, word)
-    given = "a table" if isinstance(value, Mapping) else repr(value)
-    return f"must be {expected[:1].lower() + expected[1:]}, got {given}"
-
-
-def _literals(kind: Any) -> tuple[Any, ...]:
-    """Return the words that a type consists of, without None; none for other types."""
-    if get_origin(kind) is Literal:
-        return get_args(kind)
-    return tuple(word for inner in get_args(kind) for word in _literals(inner))
+    return f"must be {expected[:1].lower() + expected[1:]}"
 
 
 def possible_words(word: str, possible: Iterable[str]) -> str:
@@ -136,13 +156,6 @@ def possible_words(word: str, possible: Iterable[str]) -> str:
     return "possible: " + (", ".join([*near, *(w for w in known if w not in near)]) or "none")
 
 
-def table(values: Any, where: str) -> Mapping[str, Any]:
-    """Check that a value is a table; ConfigError if it is none."""
-    if not isinstance(values, Mapping):
-        raise ConfigError(where, f"must be a table, got {values!r}")
-    return values
-
-
 def check_names(values: Any, possible: Iterable[str], where: str = "", hint: str = "") -> None:
     """Check that a table has no other keys than the possible ones.
 
@@ -151,8 +164,10 @@ def check_names(values: Any, possible: Iterable[str], where: str = "", hint: str
     ConfigError
         If it has, or is no table; the most similar possible keys come first.
     """
+    if not isinstance(values, Mapping):
+        raise ConfigError(where, f"must be a table, got {shown(values)}")
     known = tuple(possible)
-    for name in table(values, where):
+    for name in values:
         if name not in known:
             words = possible_words(str(name), known)
             raise ConfigError(_path(where, name), f"unknown key; {words}{hint}")
@@ -175,21 +190,12 @@ def read(kind: type[AnySettings], values: Any, where: str = "") -> AnySettings:
     ConfigError
         If a key is unknown or missing, or a value does not fit.
     """
-    kinds = kinds_of(kind)
+    check_names(values, kind.__struct_fields__, where)
     with within(where):
-        check_names(values, kinds)
         for field in msgspec.structs.fields(kind):
             if field.required and field.name not in values:
                 raise ConfigError(field.name, "must be given")
-        return kind(**{name: _part(kinds[name], value, name) for name, value in values.items()})
-
-
-def _part(kind: Any, value: Any, name: str) -> Any:
-    """Return the value of a field: settings, where its type is a class of them."""
-    inner = _settings_in(kind)
-    if inner is None or value is None or isinstance(value, inner):
-        return value
-    return read(inner, value, name)
+        return kind(**values)
 
 
 def changed(base: Any, values: Any, where: str, hint: str = "") -> Any:
@@ -198,47 +204,32 @@ def changed(base: Any, values: Any, where: str, hint: str = "") -> Any:
     Parameters
     ----------
     base
-        Settings of an agent's part: those of the core, or a frozen dataclass.
+        Settings of an agent's part: those of the core, which check themselves, or a frozen
+        dataclass.
     values
         A table of the changes.
     where
         Its key.
     hint
-        What to say about unknown keys.
+        Appended to an error about unknown keys.
 
     Raises
     ------
     ConfigError
         If a key is unknown, follows from others, or a value does not fit.
     """
-    kinds = kinds_of(type(base))
-    if "n_inputs" in table(values, where):
+    names = names_of(type(base))
+    if isinstance(values, Mapping) and "n_inputs" in values:
         raise ConfigError(f"{where}.n_inputs", "follows from the observations: omit it")
-    check_names(values, (name for name in kinds if name != "n_inputs"), where, hint)
-    made = {name: checked(kinds[name], v, f"{where}.{name}") for name, v in values.items()}
+    check_names(values, [name for name in names if name != "n_inputs"], where, hint)
+    if not fields_of(type(base)):
+        kinds = _kinds_of(base.__class__)
+        values = {name: checked(kinds[name], v, f"{where}.{name}") for name, v in values.items()}
     try:
-        return dataclasses.replace(base, **made)
+        return dataclasses.replace(base, **values)
     except Exception as error:  # of whatever settings an agent has
-        key = argument_of(error)
-        raise ConfigError(
-            f"{where}.{key}" if key in kinds else where, str(error) or type(error).__name__
-        ) from error
-
-
-def values_of(config: Any) -> dict[str, Any]:
-    """Return the values of settings by their names, those of their parts as well."""
-    made = {}
-    for name in kinds_of(type(config)):
-        value = getattr(config, name)
-        is_part = dataclasses.is_dataclass(value) or isinstance(value, msgspec.Struct)
-        made[name] = values_of(value) if is_part else msgspec.to_builtins(value)
-    return made
-
-
-def argument_of(error: BaseException) -> str:
-    """Return the name of the argument that an error is about: else its message's first word."""
-    name = getattr(error, "argument", None)
-    return name if isinstance(name, str) else str(error).partition(" ")[0].partition("[")[0]
+        name, problem = blamed(error)
+        raise ConfigError(f"{where}.{name}" if name in names else where, problem) from error
 
 
 @contextmanager
@@ -250,12 +241,114 @@ def within(table: str) -> Iterator[None]:
         raise ConfigError(_path(table, error.key), error.problem, error.place) from error
 
 
-def _settings_in(kind: Any) -> type[Settings] | None:
-    """Return the class of settings that a type is, or may be; None for other types."""
-    if isinstance(kind, type):
-        return kind if issubclass(kind, Settings) else None
-    return next(filter(None, map(_settings_in, get_args(kind))), None)
-
-
 def _path(table: str, name: str) -> str:
     return f"{table}{'.' * bool(table and name and name[0] != '[')}{name}"
+
+
+# The tables of a specification but those of the core and the environment.
+
+Count = Annotated[int, Meta(ge=1, le=2**53)]
+Index = Annotated[int, Meta(ge=0)]
+
+_CORE = {field.name: field for field in fields_of(ProtocolConfig)}
+
+
+class AgentSpec(Settings, frozen=True):
+    """Who learns."""
+
+    name: Annotated[
+        str, Meta(description="The agent: `sdnn-c`, `rbf`, `fuzzy`, or one that was registered.")
+    ] = "sdnn-c"
+    preset: Annotated[
+        str | None,
+        Meta(
+            description="Named settings of the agent `sdnn-c`: `general`, `robust`, `small` or"
+            " `paper`. By default `general`."
+        ),
+    ] = None
+    observation_range: Annotated[
+        Literal["adaptive"] | None,
+        Meta(description="`adaptive`: ranges of the observed variables come from a warm-up."),
+    ] = None
+    angles: Annotated[
+        tuple[Index, ...],
+        Meta(description="Observed variables, from 0, that are angles: their ranges wrap around."),
+    ] = ()
+    angle_pairs: Annotated[
+        Literal["none", "find"] | tuple[tuple[Index, Index], ...],
+        Meta(
+            description="Which cosines and sines of an angle become one input: pairs of observed"
+            " variables, from 0, or those that the warm-up finds."
+        ),
+    ] = "none"
+    warm_up_steps: Annotated[
+        Annotated[int, Meta(ge=int(WARM_UP.low), le=int(WARM_UP.high))],
+        Meta(description=WARM_UP.doc),
+    ] = WARM_UP.default
+
+
+class ProtocolSpec(Settings, frozen=True):
+    """How it learns and is evaluated."""
+
+    n_envs: Annotated[
+        Annotated[int, Meta(ge=1, le=4096)],
+        Meta(description="Environments to learn in, in turn; steps are counted over all."),
+    ] = 1
+    evaluate_every: Annotated[
+        Annotated[int, Meta(ge=0, le=2**53)] | None,
+        Meta(
+            description="Steps between evaluations; 0: none. By default 10,000, or none if"
+            " `evaluate_every_episodes` is given."
+        ),
+    ] = None
+    evaluate_every_episodes: Annotated[
+        Count | None,
+        Meta(description="Learning episodes between evaluations, instead of steps."),
+    ] = None
+    evaluation_episodes: Annotated[
+        Annotated[int, Meta(ge=1, le=10**9)] | None,
+        Meta(description="Greedy episodes in each evaluation. By default 10."),
+    ] = None
+    limit_bootstraps: Annotated[bool, Meta(description=_CORE["limit_bootstraps"].doc)] = _CORE[
+        "limit_bootstraps"
+    ].default
+    noisy_evaluations: Annotated[bool, Meta(description=_CORE["noisy_evaluations"].doc)] = _CORE[
+        "noisy_evaluations"
+    ].default
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.evaluate_every is not None and self.evaluate_every_episodes is not None:
+            raise ConfigError(
+                "evaluate_every_episodes", "must not be given together with evaluate_every"
+            )
+
+
+class BudgetSpec(Settings, frozen=True):
+    """How long it learns."""
+
+    steps: Annotated[
+        Count | None,
+        Meta(description="Steps to learn. By default 200,000, or none if `episodes` is given."),
+    ] = None
+    episodes: Annotated[
+        Annotated[int, Meta(ge=1, le=2**30)] | None,
+        Meta(description="Episodes to learn, instead of steps."),
+    ] = None
+    target_return: Annotated[
+        float | None, Meta(description="Stop when an evaluation has this mean return.")
+    ] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.steps is not None and self.episodes is not None:
+            raise ConfigError("episodes", "must not be given together with steps")
+
+
+class OutputSpec(Settings, frozen=True):
+    """What is written besides the rows; it changes none of them."""
+
+    checkpoint_every: Annotated[Count, Meta(description="Steps between checkpoints.")] = 10_000
+    tensorboard: Annotated[bool, Meta(description="Write the numbers for TensorBoard, too.")] = (
+        False
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 from collections.abc import Mapping
@@ -14,6 +15,7 @@ from msgspec import Meta
 
 from sdnn.agents import Agent
 from sdnn.agents.episode import Learner
+from sdnn.arguments import blamed
 from sdnn.config import ProtocolConfig
 from sdnn.environments import (
     AcrobotConfig,
@@ -26,9 +28,17 @@ from sdnn.environments import (
 )
 from sdnn.runs.environment import EnvironmentSpec, Stream
 from sdnn.runs.errors import ConfigError
-from sdnn.runs.registry import agent_entry, label_of, split_label
-from sdnn.runs.settings import Settings, argument_of, changed, kinds_of, read, values_of
-from sdnn.runs.spec_parts import AgentSpec, BudgetSpec, OutputSpec, ProtocolSpec
+from sdnn.runs.registry import AgentEntry, agent_entry, label_of, split_label
+from sdnn.runs.settings import (
+    AgentSpec,
+    BudgetSpec,
+    OutputSpec,
+    ProtocolSpec,
+    Settings,
+    changed,
+    names_of,
+    read,
+)
 from sdnn.runs.trial import TrainingTrial, Trial, training_trial
 
 __all__ = [
@@ -37,6 +47,7 @@ __all__ = [
     "OutputSpec",
     "ProtocolSpec",
     "RunSpec",
+    "overridden",
 ]
 
 HASH_DIGITS = 16
@@ -46,10 +57,25 @@ DEFAULT_STEPS = 200_000
 PAPER_EPISODES = 15_000
 PAPER_INTERVAL = 10
 
+SHORTHANDS = {"environment": "id", "agent": "name"}
+"""Tables that may be given as the value of one of their keys."""
+
 _ALWAYS = ("id", "name", "preset", "steps", "episodes")
 """Settings that are written also where they are the default."""
 
 _ACROBOT = {"acrobot": AcrobotConfig, "goal": GoalScheduleConfig, "sensors": SensorConfig}
+
+_OF_SPACES = ("observation_range", "angles", "angle_pairs", "warm_up_steps")
+"""Settings of agents in environments."""
+
+_REPLACED = {
+    "budget.steps": "budget.episodes",
+    "budget.episodes": "budget.steps",
+    "protocol.evaluate_every": "protocol.evaluate_every_episodes",
+    "protocol.evaluate_every_episodes": "protocol.evaluate_every",
+    "agent.name": "agent.preset",
+}
+"""What an option replaces in a file, besides its own key."""
 
 
 class RunSpec(Settings, frozen=True):
@@ -95,10 +121,17 @@ class RunSpec(Settings, frozen=True):
     )
 
     def __post_init__(self) -> None:
+        for name, key in SHORTHANDS.items():
+            if isinstance(value := getattr(self, name), str):
+                self._set(**{name: {key: value}})
         super().__post_init__()
         if self.seed >= 2**64:
             raise ConfigError("seed", f"must be at most 2**64 - 1, got {self.seed}")
-        self._fill_task()
+        for name, kind in _ACROBOT.items():
+            if self.environment is None:
+                self._set(**{name: self._part(name, kind())})
+            elif getattr(self, name) is not None:
+                raise ConfigError(name, "is the acrobot's: it does not go with an environment")
         self._fill_agent()
         self._fill_protocol()
 
@@ -106,68 +139,64 @@ class RunSpec(Settings, frozen=True):
         for name, value in values.items():
             msgspec.structs.force_setattr(self, name, value)
 
-    def _fill_task(self) -> None:
-        for name, kind in _ACROBOT.items():
-            value = getattr(self, name)
-            if self.environment is not None:
-                if value is not None:
-                    raise ConfigError(name, "is the acrobot's: it does not go with an environment")
-            elif isinstance(value, Mapping) or value is None:
-                self._set(**{name: changed(kind(), value or {}, name)})
-            elif not isinstance(value, kind):
-                raise ConfigError(name, f"must be a table or a {kind.__name__}, got {value!r}")
+    def _part(self, name: str, base: Any, hint: str = "") -> Any:
+        """Return settings of a part: as given, or those of ``base`` with the given changes."""
+        value = getattr(self, name)
+        if value is None or isinstance(value, Mapping):
+            return changed(base, value or {}, name, hint)
+        if isinstance(value, type(base)):
+            return value
+        words = f"must be a table or a {type(base).__name__}{hint}"
+        raise ConfigError(name, f"{words}, got {value!r}")
 
     def _fill_agent(self) -> None:
-        try:
-            entry = agent_entry(self.agent.name)
-        except ValueError as error:
-            raise ConfigError("agent.name", str(error).partition(" ")[2]) from None
-        if self.environment is None:
-            standard = AgentSpec(name=self.agent.name, preset=self.agent.preset)
-            for key in ("observation_range", "angles", "angle_pairs", "warm_up_steps"):
-                if getattr(self.agent, key) != getattr(standard, key):
-                    raise ConfigError(f"agent.{key}", "is for environments: omit it on acrobot")
-        preset = self.agent.preset
+        entry, preset = self._chosen_agent()
+        for name in self._of_spaces() if self.environment is None else ():
+            raise ConfigError(f"agent.{name}", "is for environments: omit it on acrobot")
         if preset is None and entry.presets:
             preset = "paper" if self.environment is None else "general"
-            self._set(agent=self.agent.replace(preset=preset))
         if preset is not None and preset not in entry.presets:
             words = f"one of {', '.join(map(repr, entry.presets))}" if entry.presets else "omitted"
             raise ConfigError(
                 "agent.preset", f"must be {words} for the agent {entry.id!r}, got {preset!r}"
             )
+        self._set(agent=self.agent.replace(name=entry.id, preset=preset))
         defaults = entry.parts(preset)
-        hint = f" (agent {entry.id})"
         for name, base in zip(("approximator", "learning"), defaults, strict=True):
-            value = getattr(self, name)
-            if isinstance(value, Mapping) or value is None:
-                value = changed(base, value or {}, name, hint)
-            elif not isinstance(value, type(base)):
-                words = f"must be a table, or the {type(base).__name__} of {entry.id}"
-                raise ConfigError(name, f"{words}, got {value!r}")
-            if name == "approximator" and self.environment is None:
-                n_inputs = self.sensors.n_inputs
-                value = changed_size(value, n_inputs)
-            self._set(**{name: value})
+            self._set(**{name: self._part(name, base, f" (agent {entry.id})")})
+        if self.environment is None:
+            self._set(approximator=changed_size(self.approximator, self.sensors.n_inputs))
+
+    def _chosen_agent(self) -> tuple[AgentEntry, str | None]:
+        """Return the agent and the preset; a name such as ``"sdnn-c-robust"`` has both."""
+        word, preset = self.agent.name, self.agent.preset
+        try:
+            name, named = split_label(word)
+        except ValueError as error:
+            if self.environment is None or not self.environment.imported():
+                raise ConfigError("agent.name", blamed(error)[1]) from None
+            return self._chosen_agent()  # which the environment's module may have registered
+        if named is not None and preset not in (None, named):
+            raise ConfigError("agent.preset", f"must be that of {word!r}, got {preset!r}")
+        return agent_entry(name), named or preset
+
+    def _of_spaces(self) -> dict[str, Any]:
+        """Return the settings for environments that are not the default."""
+        given = {name: getattr(self.agent, name) for name in _OF_SPACES}
+        default = AgentSpec()
+        return {name: value for name, value in given.items() if value != getattr(default, name)}
 
     def _fill_protocol(self) -> None:
-        on_acrobot = self.environment is None
+        on_acrobot, environment = self.environment is None, self.environment
         protocol, budget = self.protocol, self.budget
-        if protocol.evaluate_every is not None and protocol.evaluate_every_episodes is not None:
-            raise ConfigError(
-                "protocol.evaluate_every_episodes", "must not be given together with evaluate_every"
-            )
-        if protocol.evaluate_every is None and protocol.evaluate_every_episodes is None:
+        if protocol.evaluate_every is protocol.evaluate_every_episodes is None:
             name = "evaluate_every_episodes" if on_acrobot else "evaluate_every"
             protocol = protocol.replace(**{name: PAPER_INTERVAL if on_acrobot else 10_000})
         if protocol.evaluation_episodes is None:
             protocol = protocol.replace(evaluation_episodes=1 if on_acrobot else 10)
-        if budget.steps is None and budget.episodes is None:
-            budget = (
-                budget.replace(episodes=PAPER_EPISODES)
-                if on_acrobot
-                else budget.replace(steps=DEFAULT_STEPS)
-            )
+        if budget.steps is budget.episodes is None:
+            name = "episodes" if on_acrobot else "steps"
+            budget = budget.replace(**{name: PAPER_EPISODES if on_acrobot else DEFAULT_STEPS})
         self._set(protocol=protocol, budget=budget)
         if on_acrobot and protocol.n_envs > 1:
             raise ConfigError("protocol.n_envs", f"must be 1 for acrobot, got {protocol.n_envs}")
@@ -181,12 +210,7 @@ class RunSpec(Settings, frozen=True):
                 "budget.episodes",
                 f"must be at least evaluate_every_episodes ({every}), got {budget.episodes}",
             )
-        environment = self.environment
-        if (
-            self.agent.angle_pairs == "find"
-            and environment is not None
-            and environment.changes_observations
-        ):
+        if self.agent.angle_pairs == "find" and environment and environment.changes_observations:
             raise ConfigError(
                 "agent.angle_pairs",
                 "finds no angles in scaled observations: not together with noise or redundant",
@@ -213,20 +237,11 @@ class RunSpec(Settings, frozen=True):
         return label_of(self.agent.name, self.agent.preset)
 
     @property
-    def max_episode_steps(self) -> int | None:
-        """Steps in an episode at most; None if nobody knows."""
-        if self.environment is None:
-            return int(self.acrobot.max_decisions)
-        with self.environment.opened() as env:
-            return None if env.spec is None else env.spec.max_episode_steps
-
-    @property
     def is_compiled(self) -> bool:
-        """Whether the whole run can be done in C++, by `core_trial`, where it holds no GIL."""
+        """Whether the whole run can be done in C++, by `core_trial`, without the GIL."""
         return (
             self.environment is None
             and agent_entry(self.agent.name).core_trial is not None
-            and self.protocol.n_envs == 1
             and self.protocol.evaluation_episodes == 1
             and self.protocol.evaluate_every_episodes is not None
             and self.budget.episodes is not None
@@ -238,12 +253,8 @@ class RunSpec(Settings, frozen=True):
     def core_trial(self) -> Trial:
         """Make the trial in C++: the rows of the training loop, bit for bit.
 
-        It releases the GIL while it advances.
-
-        Raises
-        ------
-        ValueError
-            If a value is out of its range, or not `is_compiled`.
+        It releases the GIL while it advances. ValueError if a value is out of its range, or if it
+        is not `is_compiled`.
         """
         entry = agent_entry(self.agent.name)
         if not self.is_compiled or entry.core_trial is None:
@@ -251,26 +262,21 @@ class RunSpec(Settings, frozen=True):
         parts = {name: getattr(self, name) for name in (*_ACROBOT, "approximator", "learning")}
         protocol = ProtocolConfig(
             n_learning_episodes=self.budget.episodes or 0,
-            test_interval=self.protocol.evaluate_every_episodes or 0,
+            evaluate_every_episodes=self.protocol.evaluate_every_episodes or 0,
             limit_bootstraps=self.protocol.limit_bootstraps,
-            noisy_tests=self.protocol.noisy_evaluations,
+            noisy_evaluations=self.protocol.noisy_evaluations,
         )
         return entry.core_trial(**parts, protocol=protocol, seed=self.seed)
 
     @property
     def length(self) -> int:
-        """Episodes or steps to learn, in which progress is told."""
+        """Episodes or steps to learn, in which progress is counted."""
         return self.budget.episodes or self.budget.steps or 0
 
     def make_trial(self, seed: int) -> Trial | TrainingTrial:
         """Make the trial of a seed: in C++ if that can do the whole run, else a training.
 
-        Raises
-        ------
-        ConfigError
-            If environment or agent cannot be made.
-        ValueError
-            If a value is out of its range.
+        ConfigError if environment or agent cannot be made; ValueError if a value is out of range.
         """
         spec = self.replace(seed=seed)
         return spec.core_trial() if spec.is_compiled else training_trial(spec)
@@ -305,7 +311,7 @@ class RunSpec(Settings, frozen=True):
         if self.environment is not None:
             environment = self.environment.replace(noise=0.0) if is_quiet else self.environment
             return environment.make(stream, render_mode, seed)
-        sensors = changed(self.sensors, {"noise": 0.0} if is_quiet else {}, "sensors")
+        sensors = replace(self.sensors, noise=0.0) if is_quiet else self.sensors
         env = AcrobotSwingUpEnv(config=self.acrobot, dtype="float64", render_mode=render_mode)
         tightening = TighteningGoal(env, GoalSchedule(self.goal))
         return AcrobotSensors(tightening, sensors, seed=self.seed, stream=stream)
@@ -351,18 +357,14 @@ class RunSpec(Settings, frozen=True):
                 **self._agent_options(env),
             )
         except (TypeError, ValueError, OverflowError, MemoryError) as error:
-            raise ConfigError(self.key_of(error), str(error)) from error
+            raise self.refusal(error) from error
         if isinstance(agent, Agent) and self.environment is not None:
             agent.scaling = self.environment.scaling(env)
         return agent
 
     def _agent_options(self, env: gym.Env[Any, Any]) -> dict[str, Any]:
         """Return the arguments that only some agents have: those that are not the default."""
-        defaults = AgentSpec()
-        names = ("observation_range", "angles", "angle_pairs", "warm_up_steps")
-        given = {name: getattr(self.agent, name) for name in names}
-        given = {name: v for name, v in given.items() if v != getattr(defaults, name)}
-        environment = self.environment
+        given, environment = self._of_spaces(), self.environment
         if environment is None or not environment.ranges or environment.has_other_sensors:
             return given
         if "observation_range" in given:
@@ -371,13 +373,17 @@ class RunSpec(Settings, frozen=True):
             )
         return {**given, "observation_range": environment.ends(env)}
 
-    def key_of(self, error: BaseException) -> str:
-        """Return the key of the setting that an error is about; else of the task."""
-        name = argument_of(error)
-        for section in ("approximator", "learning", "agent"):
-            if name != "n_inputs" and name in kinds_of(type(getattr(self, section))):
-                return f"{section}.{name}"
-        return "environment.id" if self.environment is not None else "agent.name"
+    def refusal(self, error: Exception) -> ConfigError:
+        """Return an error as one about the setting that it names, or about the task."""
+        if isinstance(error, ConfigError):
+            return error
+        name, problem = blamed(error)
+        tables = ("approximator", "learning", "agent", *(_ACROBOT if self.acrobot else ()))
+        for table in tables:
+            if name != "n_inputs" and name in names_of(type(getattr(self, table))):
+                return ConfigError(f"{table}.{name}", problem)
+        key = "environment.id" if self.environment is not None else "agent.name"
+        return ConfigError(key, str(error) or type(error).__name__)
 
     # Files and stores.
 
@@ -405,7 +411,8 @@ class RunSpec(Settings, frozen=True):
 
     def full_values(self) -> dict[str, Any]:
         """Return all values as JSON has them."""
-        values = {name: value for name, value in values_of(self).items() if value is not None}
+        values: dict[str, Any] = msgspec.to_builtins(self)
+        values = {name: value for name, value in values.items() if value is not None}
         values["approximator"].pop("n_inputs", None)
         return values
 
@@ -421,14 +428,7 @@ class RunSpec(Settings, frozen=True):
         ConfigError
             If a key is unknown or missing, or a value cannot be used.
         """
-        given = dict(values)
-        if isinstance(given.get("environment"), str):
-            given["environment"] = {"id": given["environment"]}
-        if isinstance(given.get("agent"), str):
-            given["agent"] = {"name": given["agent"]}
-        if isinstance(given.get("agent"), Mapping):
-            given["agent"] = _with_preset(given["agent"])
-        return read(cls, given)
+        return read(cls, values)
 
     def canonical_json(self) -> str:
         """Return what fixes the rows but the seed, as one line of JSON: sorted keys, 1 for 1.0.
@@ -452,23 +452,38 @@ class RunSpec(Settings, frozen=True):
         return hashlib.sha256(self.canonical_json().encode()).hexdigest()[:HASH_DIGITS]
 
 
-def _with_preset(agent: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Take the preset out of an agent's name, such as ``"sdnn-c-robust"``."""
-    name = agent.get("name")
-    try:
-        short, preset = split_label(name) if isinstance(name, str) else (name, None)
-    except ValueError:
-        return agent  # which is refused by its name
-    if preset is None:
-        return agent
-    if agent.get("preset", preset) != preset:
-        raise ConfigError("agent.preset", f"must be that of {name!r}, got {agent['preset']!r}")
-    return {**agent, "name": short, "preset": preset}
+def overridden(values: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of a specification with others in their place.
+
+    Parameters
+    ----------
+    values
+        As a file has them.
+    options
+        Values by their keys, with dots between tables.
+    """
+    made = copy.deepcopy(dict(values))
+    for name, key in SHORTHANDS.items():
+        if isinstance(made.get(name), str):
+            made[name] = {key: made[name]}
+    for key in options:
+        table, _, name = _REPLACED.get(key, "").partition(".")
+        if isinstance(made.get(table), dict):
+            made[table].pop(name, None)
+    for key, value in options.items():
+        *tables, last = key.split(".")
+        place = made
+        for table in tables:
+            if not isinstance(place.get(table), dict):
+                place[table] = {}
+            place = place[table]
+        place[last] = value
+    return made
 
 
 def changed_size(approximator: Any, n_inputs: int) -> Any:
     """Return the settings of an approximator for so many inputs, if these are among them."""
-    if "n_inputs" not in kinds_of(type(approximator)):
+    if "n_inputs" not in names_of(type(approximator)):
         return approximator
     return replace(approximator, n_inputs=n_inputs)
 

@@ -1,4 +1,4 @@
-"""The JSON Schema of a run's specification: for editors, command-line options and documentation."""
+"""The JSON Schema of a run's specification: for editors and documentation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from sdnn.config import (
 )
 from sdnn.runs.spec import RunSpec
 
-__all__ = ["property_of", "spec_schema"]
+__all__ = ["CORE", "spec_schema"]
 
 CORE = {
     "acrobot": (AcrobotConfig,),
@@ -58,16 +58,6 @@ def spec_schema() -> dict[str, Any]:
         }
         properties[table]["anyOf"] = [*inner.get("anyOf", [inner]), {"type": "string"}]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **top, "$defs": components}
-
-
-def property_of(schema: dict[str, Any], key: str) -> dict[str, Any]:
-    """Return the schema of a setting by its key, such as ``"budget.steps"``."""
-    made = schema["$defs"]["RunSpec"]
-    for name in key.split("."):
-        found = made["properties"][name]
-        refs = [one["$ref"] for one in (found, *found.get("anyOf", ())) if "$ref" in one]
-        made = schema["$defs"][refs[0].rpartition("/")[2]] if refs else found
-    return dict(made)
 
 
 def _struct(kind: Any) -> Any:

@@ -172,11 +172,11 @@ class ResultStore:
             found = self._find(key, "id")
             return TrialRows(np.zeros(0, ROW)) if found is None else self._rows(found[0])
 
-    def keys(self) -> set[TrialKey]:
-        """Return the keys of all finished trials."""
+    def keys(self, *, unfinished: bool = False) -> set[TrialKey]:
+        """Return the keys of all finished trials, and if wanted of those in progress."""
         with _as_store_error(self.path):
             found = self._connection.execute(
-                f"SELECT {_KEY_COLUMNS} FROM runs WHERE checksum IS NOT NULL"
+                f"SELECT {_KEY_COLUMNS} FROM runs WHERE ? OR checksum IS NOT NULL", (unfinished,)
             )
             return {_key_of(row) for row in found}
 

@@ -139,10 +139,8 @@ class Study:
                 with opened(one.spec.make_trial(keys[0].seed)):
                     _require_comparable(one.spec)
             except Exception as error:  # of whatever agent or environment
-                if not isinstance(error, ConfigError):
-                    text = str(error) or type(error).__name__
-                    error = ConfigError(one.spec.key_of(error), text)
-                raise self.reader.refusal(one.settings, one.case, one.variant, error) from error
+                refusal = one.spec.refusal(error)
+                raise self.reader.refusal(one.settings, one.case, one.variant, refusal) from error
 
 
 def _require_comparable(spec: RunSpec) -> None:

@@ -7,24 +7,23 @@ import itertools
 import json
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 from msgspec import Meta
 
-from sdnn.runs.config_file import ConfigFile, KeyPath
+from sdnn.runs.config_file import ConfigFile, KeyPath, dotted
 from sdnn.runs.errors import ConfigError
-from sdnn.runs.registry import AGENTS, split_label
+from sdnn.runs.registry import labels, split_label
 from sdnn.runs.settings import Settings, check_names, possible_words, read
-from sdnn.runs.spec import RunSpec
+from sdnn.runs.spec import SHORTHANDS, RunSpec
 
 BASE = "base"
 """The variant without overrides, where axes are varied one at a time or nothing varies."""
 
 TABLES = ("study", "base", "agents", "cases", "variants", "axes")
 _NAMED_VALUES = (("environment", "kwargs"), ("environment", "ranges"))
-_SHORTHANDS = {("environment",): "id", ("agent",): "name"}
 
 
 class StudyHeader(Settings, frozen=True):
@@ -91,21 +90,9 @@ class KnownCase(NamedTuple):
 
 @dataclass(frozen=True)
 class StudyCase:
-    """A task, with settings of its own.
+    """A task, with settings that override those of the base and of the agent."""
 
-    Parameters
-    ----------
-    id
-        The word used in the result file; seeds are derived from it.
-    title
-        For a reader.
-    settings
-        Override those of the base and of the agent.
-    where
-        Its place in the file.
-    """
-
-    id: str
+    id: str  # the word used in the result file; seeds are derived from it
     title: str
     settings: Layer
     where: KeyPath
@@ -113,30 +100,14 @@ class StudyCase:
 
 @dataclass(frozen=True)
 class StudyVariant:
-    """A named set of overrides.
-
-    Parameters
-    ----------
-    id
-        Its name.
-    title
-        For a reader.
-    settings
-        Override all others.
-    case_settings
-        Override even these, in single cases, by their ids.
-    where
-        Its place in the file.
-    only
-        Ids of the cases in which it runs; none: all.
-    """
+    """A named set of settings that override all others."""
 
     id: str
     title: str
     settings: Layer
-    case_settings: Mapping[str, Layer]
     where: KeyPath
-    only: tuple[str, ...] = ()
+    case_settings: Mapping[str, Layer] = field(default_factory=dict)  # override even these
+    only: tuple[str, ...] = ()  # ids of the cases in which it runs; none: all
 
 
 class StudyReader:
@@ -152,24 +123,22 @@ class StudyReader:
     Raises
     ------
     ConfigError
-        If the file cannot be read, or says something unknown or impossible; the message names
+        If the file cannot be read, or something in it is unknown or impossible; the message names
         file, line and key.
     """
 
     def __init__(self, path: Path, known_cases: Mapping[str, KnownCase]) -> None:
         self.file = ConfigFile.read(path)
-        values = self.file.values
-        with self._placed(()):
-            check_names(values, TABLES)
-        for name, value in values.items():
-            self._table((name,), value)
-        with self._placed(("study",)):
-            self.header = read(StudyHeader, values.get("study", {}))
-        self._import()
-        self.base = self._layer((BASE,), values.get(BASE, {}))
-        self.agents = dict(self._read_agents())
-        self.cases = self._read_cases(known_cases)
-        self.variants = self._read_variants()
+        try:
+            check_names(self.file.values, TABLES)
+            self.header = read(StudyHeader, self.file.values.get("study", {}), "study")
+            self._import()
+            self.base = self._layer((BASE,), self._table(BASE))
+            self.agents = dict(self._read_agents())
+            self.cases = self._read_cases(known_cases)
+            self.variants = self._read_variants()
+        except ConfigError as error:
+            raise self.file.located(error) from error
 
     def spec(self, case: StudyCase, variant: StudyVariant) -> tuple[RunSpec, Layer]:
         """Put the layers of a variant in a case together; returns the settings as well.
@@ -180,19 +149,17 @@ class StudyReader:
             If a setting is unknown, has the wrong type or does not go with another.
         """
         own = (case.settings, variant.settings, variant.case_settings.get(case.id, {}))
-        layers = [self.base, *own]
-        label = next(
-            (layer["agent", "name"] for layer in reversed(layers) if ("agent", "name") in layer),
-            Setting("sdnn-c", ()),
-        )
-        name = str(label.value)
-        try:
-            of_agent = [self.agents.get(one, {}) for one in (split_label(name)[0], name)]
-        except ValueError:
-            words = possible_words(name, AGENTS)
-            raise self.file.error(label.where, f"no agent {name!r}; {words}") from None
         settings: Layer = {}
-        for layer in (self.base, *of_agent, *own):
+        for layer in (self.base, *own):
+            settings |= layer
+        chosen = settings.get(("agent", "name"))
+        label = "sdnn-c" if chosen is None else str(chosen.value)
+        try:
+            words = [split_label(label)[0], label]
+        except ValueError:  # refused with the specification
+            words = []
+        settings = {}
+        for layer in (self.base, *(self.agents.get(word, {}) for word in words), *own):
             settings |= layer
         try:
             return RunSpec.from_values(nested(settings)), settings
@@ -203,19 +170,23 @@ class StudyReader:
         self, settings: Layer, case: StudyCase, variant: StudyVariant, error: ConfigError
     ) -> ConfigError:
         """Make the error about a variant in a case, at the setting that has the error's key."""
-        where = _place_in(settings, error.key)
-        if where is None:
-            where = variant.where or case.where
         text = f"{error.problem} (case {case.id}, variant {variant.id})"
-        return self.file.error(where, text)
+        name = tuple(error.key.partition("[")[0].split("."))
+        for own in (name, *settings):
+            if own in settings and (own[: len(name)] == name or name[: len(own)] == own):
+                return self.file.error(settings[own].where, text)
+        near = [setting.where for own, setting in settings.items() if own[0] == name[0]]
+        where = next(iter(near), variant.where or case.where)
+        return ConfigError(error.key, text, self.file.place(where))
 
-    def _placed(self, table: KeyPath) -> _Placed:
-        return _Placed(self.file, table)
-
-    def _table(self, where: KeyPath, value: Any) -> dict[str, Any]:
-        if not isinstance(value, dict):
-            raise self.file.error(where, f"must be a table, got {value!r}")
-        return value
+    def _table(self, *where: str) -> dict[str, Any]:
+        """Return a table of the file; an empty one where there is none."""
+        values: Any = self.file.values
+        for number, key in enumerate(where, 1):
+            values = values.get(key, {})
+            if not isinstance(values, dict):
+                raise self.file.error(where[:number], f"must be a table, got {values!r}")
+        return dict(values)
 
     def _layer(self, where: KeyPath, table: Mapping[str, Any]) -> Layer:
         """Read a table of settings: nested, with dotted keys, or with quoted dotted keys."""
@@ -237,8 +208,8 @@ class StudyReader:
                 raise self.file.error(place, f"must be {words}, got {'.'.join(name)}")
             if name[0] in ("seed", "output"):
                 raise self.file.error(place, "is no setting of a study: see [study]")
-            if name in _SHORTHANDS:
-                name = (*name, _SHORTHANDS[name])
+            if len(name) == 1 and name[0] in SHORTHANDS:
+                name = (*name, SHORTHANDS[name[0]])
             if name in found:
                 raise self.file.error(place, f"{'.'.join(name)} is set twice")
             found[name] = Setting(value, place)
@@ -257,22 +228,18 @@ class StudyReader:
                 ) from error
 
     def _read_agents(self) -> Iterator[tuple[str, Layer]]:
-        for agent, table in self.file.values.get("agents", {}).items():
-            where = ("agents", agent)
-            try:
-                split_label(agent)
-            except ValueError:
-                words = possible_words(agent, AGENTS)
-                raise self.file.error(where, f"no such agent; {words}") from None
-            layer = self._layer(where, self._table(where, table))
+        for agent in self._table("agents"):
+            if agent not in labels():
+                words = possible_words(agent, labels())
+                raise self.file.error(("agents", agent), f"no such agent; {words}")
+            layer = self._layer(("agents", agent), self._table("agents", agent))
             if ("agent", "name") in layer:
                 place = layer["agent", "name"].where
                 raise self.file.error(place, "settings of an agent cannot choose another one")
             yield agent, layer
 
     def _read_cases(self, known_cases: Mapping[str, KnownCase]) -> tuple[StudyCase, ...]:
-        tables = self.file.values.get("cases", {})
-        listed = self.header.cases
+        tables, listed = self._table("cases"), self.header.cases
         known = list(dict.fromkeys([*tables, *known_cases]))
         for number, case_id in enumerate(listed or ()):
             if case_id not in known:
@@ -299,8 +266,9 @@ class StudyReader:
 
     def _read_case(self, case_id: str, known: KnownCase | None) -> StudyCase:
         where: KeyPath = ("cases", case_id)
-        table = self._table(where, self.file.values.get("cases", {}).get(case_id, {}))
-        title, settings = self._titled(where, table, known.title if known else case_id)
+        table = self._table("cases", case_id)
+        title = self._title(where, table, known.title if known else case_id)
+        settings = self._layer(where, table)
         if known is None:
             return StudyCase(case_id, title, settings, where)
         fixed = {tuple(name.split(".")): value for name, value in known.settings.items()}
@@ -314,53 +282,47 @@ class StudyReader:
         own = {name: Setting(value, where) for name, value in fixed.items()}
         return StudyCase(case_id, title, own | settings, where)
 
-    def _titled(self, where: KeyPath, table: Mapping[str, Any], title: str) -> tuple[str, Layer]:
-        table = dict(table)
-        title = table.pop("title", title)
+    def _title(self, where: KeyPath, table: dict[str, Any], default: str) -> str:
+        """Take the title out of a table."""
+        title = table.pop("title", default)
         if not isinstance(title, str):
             raise self.file.error((*where, "title"), f"must be a text, got {title!r}")
-        return title, self._layer(where, table)
+        return title
 
     def _read_variants(self) -> tuple[StudyVariant, ...]:
         variants: dict[str, StudyVariant] = {}
-        for name, value in self.file.values.get("variants", {}).items():
-            where: KeyPath = ("variants", name)
-            table = dict(self._table(where, value))
+        for name in self._table("variants"):
+            where = ("variants", name)
+            table, of_cases = self._table(*where), self._table(*where, "cases")
+            table.pop("cases", None)
             known = [case.id for case in self.cases]
-            with self._placed(where):
-                only = read(_Only, {"only": table.pop("only", ())}).only
+            only = read(_Only, {"only": table.pop("only", ())}, dotted(where)).only
             for number, case_id in enumerate(only):
                 if case_id not in known:
                     words = f"no case {case_id!r}; {possible_words(case_id, known)}"
                     raise self.file.error((*where, "only", number), words)
-            of_cases = self._table((*where, "cases"), table.pop("cases", {}))
-            with self._placed((*where, "cases")):
-                check_names(of_cases, only or known)
+            check_names(of_cases, only or known, dotted((*where, "cases")))
             in_cases = {
                 case_id: self._layer(
-                    (*where, "cases", case_id),
-                    self._table((*where, "cases", case_id), of_cases[case_id]),
+                    (*where, "cases", case_id), self._table(*where, "cases", case_id)
                 )
                 for case_id in of_cases
             }
-            title, settings = self._titled(where, table, name)
-            variants[name] = StudyVariant(name, title, settings, in_cases, where, only)
+            title = self._title(where, table, name)
+            settings = self._layer(where, table)
+            variants[name] = StudyVariant(name, title, settings, where, in_cases, only)
         for variant in self._axis_variants():
             if variant.id in variants:
                 words = f"there is a variant {variant.id!r} already"
                 raise self.file.error(variant.where, words)
             variants[variant.id] = variant
-        if not variants:
-            variants[BASE] = StudyVariant(BASE, BASE, {}, {}, ())
-        return tuple(variants.values())
+        return tuple(variants.values()) or (StudyVariant(BASE, BASE, {}, ()),)
 
     def _axis_variants(self) -> Iterator[StudyVariant]:
         """Make the variants of the axes: the base and every value alone, or all combinations."""
-        table = dict(self.file.values.get("axes", {}))
-        with self._placed(("axes",)):
-            combine = read(
-                _Axes, {"combine": table.pop("combine")} if "combine" in table else {}
-            ).combine
+        table = self._table("axes")
+        how = {"combine": table.pop("combine")} if "combine" in table else {}
+        combine = read(_Axes, how, "axes").combine
         axes = self._layer(("axes",), table)
         if not axes:
             return
@@ -369,43 +331,25 @@ class StudyReader:
             for chosen in itertools.product(*values):
                 layer = {name: setting for _, part in chosen for name, setting in part.items()}
                 words = ", ".join(word for word, _ in chosen)
-                yield StudyVariant(words, words, layer, {}, ("axes",))
+                yield StudyVariant(words, words, layer, ("axes",))
             return
-        yield StudyVariant(BASE, BASE, {}, {}, ("axes",))
+        yield StudyVariant(BASE, BASE, {}, ("axes",))
         for word, layer in itertools.chain.from_iterable(values):
             (setting,) = layer.values()
-            yield StudyVariant(word, word, layer, {}, setting.where)
+            yield StudyVariant(word, word, layer, setting.where)
 
     def _axis_values(self, axes: Layer, name: tuple[str, ...]) -> Iterator[tuple[str, Layer]]:
         axis = axes[name]
         if not isinstance(axis.value, list) or not axis.value:
             raise self.file.error(axis.where, f"must be an array of values, got {axis.value!r}")
-        shown = name[:1] if name[0] in ("agent",) and name[1] == "name" else name
-        lasts = [one[-1] for one in axes]
-        word = shown[-1] if lasts.count(name[-1]) == 1 else ".".join(shown)
+        shown = name[:1] if name == ("agent", "name") else name
+        is_unique = [one[-1] for one in axes].count(name[-1]) == 1
+        word = shown[-1] if is_unique else ".".join(shown)
         words = [f"{word}={_value_words(value)}" for value in axis.value]
         if len(set(words)) < len(words):
             raise self.file.error(axis.where, f"must be different values, got {axis.value!r}")
         for number, value in enumerate(axis.value):
             yield words[number], {name: Setting(value, (*axis.where, number))}
-
-
-class _Placed:
-    """Gives errors about the values of a table their places in the file."""
-
-    def __init__(self, file: ConfigFile, table: KeyPath) -> None:
-        self._file = file
-        self._table = table
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, _kind: Any, error: BaseException | None, _trace: Any) -> None:
-        if isinstance(error, ConfigError) and not error.place:
-            key: list[str | int] = []
-            for word in error.key.replace("[", ".[").split(".") if error.key else []:
-                key.append(int(word[1:-1]) if word.startswith("[") else word)
-            raise self._file.error((*self._table, *key), error.problem) from error
 
 
 def _value_words(value: Any) -> str:
@@ -424,15 +368,3 @@ def nested(settings: Layer) -> dict[str, Any]:
         else:
             table[name[-1]] = setting.value
     return tables
-
-
-def _place_in(settings: Layer, key: str) -> KeyPath | None:
-    """Find the setting with the key of an error, or the nearest one; None if there is none."""
-    name = tuple(key.partition("[")[0].split("."))
-    if name in settings:
-        return settings[name].where
-    for length in range(len(name), 0, -1):
-        for own, setting in settings.items():
-            if own[:length] == name[:length] or own == name[:length]:
-                return setting.where
-    return None

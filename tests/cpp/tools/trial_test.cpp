@@ -171,9 +171,9 @@ TEST(AcrobotTrial, PiecesEqualTheWhole) {
 TEST(AcrobotTrial, TestEpisodesDoNotChangeWhatIsLearned) {
   for (const double noise : {0.0, 0.02}) {
     Setting setting{.sensors = {.noise = noise}};
-    setting.protocol.test_interval = 1;
+    setting.protocol.evaluate_every_episodes = 1;
     auto often = table_trial(setting);
-    setting.protocol.test_interval = 1000;
+    setting.protocol.evaluate_every_episodes = 1000;
     auto never = table_trial(setting);
     often.advance(100);
     never.advance(100);
@@ -184,7 +184,7 @@ TEST(AcrobotTrial, TestEpisodesDoNotChangeWhatIsLearned) {
 }
 
 TEST(AcrobotTrial, EpisodesAreCountedAndTestedWhenDue) {
-  auto run = table_trial({.protocol = {.n_learning_episodes = 25, .test_interval = 10}});
+  auto run = table_trial({.protocol = {.n_learning_episodes = 25, .evaluate_every_episodes = 10}});
   EXPECT_EQ(run.episode(), 0);
   EXPECT_FALSE(run.finished());
   run.advance(9);
@@ -269,10 +269,10 @@ TEST(AcrobotTrial, TheTimeLimitIsATerminationOnlyIfAskedFor) {
 
 TEST(AcrobotTrial, TestsAreNoisyUnlessSaidOtherwise) {
   for (const bool noisy : {true, false}) {
-    auto run =
-        agent_trial(Recorder{}, {.acrobot = {.max_decisions = 1},
-                                 .sensors = {.noise = 0.02},
-                                 .protocol = {.n_learning_episodes = 10, .noisy_tests = noisy}});
+    auto run = agent_trial(Recorder{},
+                           {.acrobot = {.max_decisions = 1},
+                            .sensors = {.noise = 0.02},
+                            .protocol = {.n_learning_episodes = 10, .noisy_evaluations = noisy}});
     run.advance(10);
     ASSERT_EQ(run.agent().tested.size(), 1U);
     EXPECT_EQ(run.agent().tested[0] == std::vector<double>(4, 0.5), !noisy);
@@ -316,8 +316,8 @@ std::string message(Make make) {
 TEST(AcrobotTrial, NamesWhatIsImpossible) {
   EXPECT_EQ(message([] { table_trial({.protocol = {.n_learning_episodes = 0}}); }),
             "n_learning_episodes must be in [1, 1073741824], got 0");
-  EXPECT_EQ(message([] { table_trial({.protocol = {.test_interval = 0}}); }),
-            "test_interval must be in [1, 1073741824], got 0");
+  EXPECT_EQ(message([] { table_trial({.protocol = {.evaluate_every_episodes = 0}}); }),
+            "evaluate_every_episodes must be in [1, 1073741824], got 0");
   EXPECT_EQ(message([] { trial(LookupTable(5, 2, 3), {}); }),
             "n_inputs must be the number of inputs of the sensors, 4, got 5");
   EXPECT_EQ(message([] { trial(LookupTable(4, 2, 3), {.sensors = {.n_sensors = 7}}); }),

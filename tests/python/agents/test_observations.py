@@ -177,7 +177,7 @@ def test_impossible_arguments_are_named(options, name):
 
 def test_a_space_without_a_range_names_a_remedy():
     constant = gym.spaces.Box(np.array([0.0, 1.0]), np.array([1.0, 1.0]), dtype=np.float64)
-    with pytest.raises(ValueError, match=r"observation_space .*--range 1="):
+    with pytest.raises(ValueError, match=r"observation_space .*environment.ranges.1 "):
         config(constant)
 
 

@@ -20,8 +20,8 @@ from sdnn.coding import Symbolic, WithMissing
 from sdnn.estimators import libsdnn
 from sdnn.reproduction.studies import read_study
 from sdnn.runs import ResultStore, StoreError
+from sdnn.runs.config_file import read_spec
 from sdnn.runs.errors import RunError
-from sdnn.runs.spec_file import read_spec
 
 ROOT = Path(__file__).parents[3]
 X = np.random.RandomState(0).uniform(size=(40, 2))

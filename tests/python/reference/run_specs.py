@@ -1,8 +1,9 @@
 """Specifications of runs by the names of their options."""
 
-from sdnn.cli.spec_options import KEYS
+import msgspec
+
+from sdnn.cli.run_options import KEYS
 from sdnn.runs import RunSpec
-from sdnn.runs.settings import values_of
 
 _KEYS = {"agent" if key == "agent.name" else key.rpartition(".")[2]: key for key in KEYS}
 _OTHERS = {"steps": "episodes", "episodes": "steps"}
@@ -12,7 +13,7 @@ def run_spec(base=None, settings=None, environment=None, **options):
     """A specification like another one, but for options and tables of settings."""
     values = {} if base is None else base.values()
     if environment is not None:
-        values["environment"] = values_of(environment)
+        values["environment"] = msgspec.to_builtins(environment)
     for table, own in (settings or {}).items():
         values[table] = {**values.get(table, {}), **own}
     for name, value in options.items():

@@ -23,10 +23,9 @@ from sdnn.reproduction.claims import (
     powers,
     verdict_of,
 )
-from sdnn.reproduction.cost import QUICK_COST, CostConfig, CostRecord
+from sdnn.reproduction.cost import QUICK_COST, SERIES, CostConfig, CostRecord
 from sdnn.reproduction.report import POWER_NOTE, Report
 from sdnn.runs import Estimate, TrialKey, TrialRecord, TrialRows, measure
-from sdnn.runs.registry import cost_series
 from sdnn.runs.results import estimate_contrast, estimate_median
 
 PICTURES = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}
@@ -110,7 +109,7 @@ def test_a_claim_is_as_good_as_its_checks(parts, whole):
 def test_the_claims_are_the_nine_of_the_paper_and_know_their_subjects():
     assert [claim.number for claim in CLAIMS] == list(range(1, 10))
     planned = {(case.id, agent) for e in EXPERIMENTS for case in e.cases for agent in case.agents}
-    series = {series.id for _, series in cost_series()}
+    series = {series.id for series in SERIES}
     for check in (check for claim in CLAIMS for check in claim.checks):
         quantity = check.quantity
         if isinstance(quantity, Growth):

@@ -9,17 +9,17 @@ from sdnn import _core, machine
 from sdnn.reproduction import CostConfig, draw_cost
 from sdnn.reproduction.cost import (
     QUICK_COST,
+    SERIES,
     cost_keys,
+    cost_series,
     load_costs,
     measure_costs,
     measure_steps,
 )
 from sdnn.reproduction.report import cost_table
 from sdnn.runs import AGENTS, Observer, ResultStore, StoreError
-from sdnn.runs.registry import cost_series
 from sdnn.runs.trial import records_digest
 
-SERIES = [series for _, series in cost_series()]
 SMALL = CostConfig(n_inputs=(3, 2), n_rounds=3, round_seconds=0.001, min_steps=1)
 
 
@@ -30,7 +30,7 @@ class FakeMeasure:
         self.asked = []
         self._last = ends_after
 
-    def __call__(self, entry, series, n_inputs, config):
+    def __call__(self, series, n_inputs, config):
         self.asked.append((series.id, n_inputs))
         if n_inputs > self._last:
             return None
@@ -140,25 +140,24 @@ def test_figure_holds_the_stored_rows(tmp_path, measured):
     assert "quick" in json.dumps([t.get_text() for t in draw_cost(costs, quick=True).axes[0].texts])
 
 
-@pytest.mark.parametrize(
-    ("entry", "series"), cost_series(), ids=[series.id for _, series in cost_series()]
-)
-def test_real_agents_are_measured(entry, series):
-    times = measure_steps(entry, series, 2, SMALL)
+@pytest.mark.parametrize("series", SERIES, ids=[series.id for series in SERIES])
+def test_real_agents_are_measured(series):
+    times = measure_steps(series, 2, SMALL)
     microseconds, n_steps, table_bytes = times
     assert len(microseconds) == 3
     assert min(microseconds) > 0
     assert n_steps >= 1
     sizes = {"sdnn-c": 2 * 200 * 900, "fuzzy": 9**2 * 21 * 4, "rbf": 4**3 * 8}
-    assert table_bytes == sizes[entry.id]
+    assert table_bytes == sizes[series.agent]
 
 
-def test_what_there_is_no_memory_for_is_left_out():
+def test_what_there_is_no_memory_for_is_left_out(monkeypatch):
     def refuse(*_arguments, **_options):
         raise MemoryError
 
-    entry = replace(AGENTS["fuzzy"], agent=refuse)
-    assert measure_steps(entry, entry.costs[0], 2, SMALL) is None
+    monkeypatch.setitem(AGENTS, "fuzzy", replace(AGENTS["fuzzy"], agent=refuse))
+    (series,) = cost_series(["fuzzy"])
+    assert measure_steps(series, 2, SMALL) is None
 
 
 def test_costs_of_some_agents():

@@ -18,7 +18,7 @@ class FakeTrial:
 
     def __init__(self, *, protocol, seed, **_others):
         self._protocol = protocol
-        n_tests = protocol.n_learning_episodes // protocol.test_interval
+        n_tests = protocol.n_learning_episodes // protocol.evaluate_every_episodes
         generator = np.random.default_rng(seed)
         learned = generator.integers(2, 8)
         self._steps = np.where(
@@ -39,10 +39,11 @@ class FakeTrial:
         self.episode = min(self.episode + n, self._protocol.n_learning_episodes)
 
     def test_rows(self):
-        n_tests = self.episode // self._protocol.test_interval
+        n_tests = self.episode // self._protocol.evaluate_every_episodes
         steps = self._steps[:n_tests]
         return {
-            "episode": np.arange(1, n_tests + 1, dtype=np.int32) * self._protocol.test_interval,
+            "episode": np.arange(1, n_tests + 1, dtype=np.int32)
+            * self._protocol.evaluate_every_episodes,
             "steps": steps,
             "episode_return": self._returns[:n_tests],
             "solved": steps < 50,

@@ -14,7 +14,7 @@ from pathlib import Path
 import drifting_env  # noqa: F401
 from sdnn.agents import Training
 from sdnn.runs import Run
-from sdnn.runs.spec_file import read_spec
+from sdnn.runs.config_file import read_spec
 
 
 def steps_done(run):

@@ -24,11 +24,10 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.cli import main
-from sdnn.cli.run_options import value_of
-from sdnn.cli.spec_options import option_of
+from sdnn.cli.run_options import option_of, value_of
 from sdnn.environments import UnitSensors
 from sdnn.export import c_header
-from sdnn.runs import Run, RunSpec
+from sdnn.runs import AGENTS, Run, RunSpec
 
 SMALL = (
     "--set", "approximator.n_hidden_units=60", "--set", "approximator.n_active_units=20",
@@ -295,6 +294,56 @@ def test_options_come_before_a_file(invoke, tmp_path):
     assert RunSpec.from_values(again) == Run.open("one").spec
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--steps", 9, "--set", "budget.steps=7"], ["--set budget.steps", "--steps", "7", "9"]),
+        (["--set", "environment.id="], ["--set environment.id", "ENV_ID", "''", "CartPole-v1"]),
+        (["--range", "0:1", "--set", "environment.ranges.all=[0, 2]"], ["--range all", "[0, 2]"]),
+        (["--agent", "rbf", "--set", "agent.name=rbf"], ["--set agent.name", "--agent"]),
+    ],
+)
+def test_two_options_do_not_set_the_same(invoke, options, words):
+    result = invoke("train", "CartPole-v1", *options, "--dry-run")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert all(word in result.stderr for word in words), result.stderr
+
+
+def test_help_names_the_defaults_of_environments(invoke):
+    text = " ".join(invoke("train", "--help").stdout.split())
+    assert "acrobot" not in text
+    assert "By default 200,000" in text
+
+
+def test_the_module_of_an_environment_may_register_the_agent(invoke, tmp_path, monkeypatch):
+    (tmp_path / "my_room.py").write_text(
+        "import gymnasium as gym\nfrom dataclasses import replace\n"
+        "from sdnn.runs import AGENTS, register\n"
+        "register(replace(AGENTS['rbf'], id='roomy', core_trial=None))\n"
+        "gym.register('my/Room-v0', 'drifting_env:DriftingEnv', max_episode_steps=40)\n"
+    )
+    monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
+    short = ("--steps", 60, "--evaluate-every", 50, "--set", "agent.warm_up_steps=20")
+    try:
+        done = invoke("train", "my_room:my/Room-v0", "--agent", "roomy", *short, "--out", "one")
+        assert done.exit_code == 0, done.output
+        del AGENTS["roomy"], sys.modules["my_room"], gym.registry["my/Room-v0"]
+        done = invoke("resume", "one", "--steps", 70)
+        assert done.exit_code == 0, done.output
+    finally:
+        AGENTS.pop("roomy", None)
+        sys.modules.pop("my_room", None)
+        gym.registry.pop("my/Room-v0", None)
+
+
+def test_a_specification_is_toml_or_json(invoke, tmp_path):
+    (tmp_path / "mine.sh").write_text("echo")
+    for command in (["train", "--config", "mine.sh"], ["sweep", "mine.sh"]):
+        result = invoke(*command)
+        assert result.exit_code == 2
+        assert re.search(r"mine\.sh: .*\.toml or \.json", result.stderr)
+
+
 def test_several_environments_are_learned_in(invoke):
     done = invoke("train", DRIFTING, *SHORT, "--n-envs", 4, "--out", "four", "--json")
     assert done.exit_code == 0, done.output
@@ -332,7 +381,7 @@ def test_several_environments_are_learned_in(invoke):
         (["CartPole-v1", "--config", "missing.toml"], "--config"),
         (["CartPole-v1", "--noise", -1], "--noise"),
         (["CartPole-v1", "--noise", "nan"], "--noise"),
-        (["CartPole-v1", "--noise", 0.1], "--range: noise and redundant need the range"),
+        (["CartPole-v1", "--noise", 0.1], "--range 1: must be given"),
         (["CartPole-v1", "--redundant", -1], "--redundant"),
         (["CartPole-v1", "--redundant", 5000, "--range", "0:1"], "--redundant"),
         (
@@ -348,16 +397,16 @@ def test_several_environments_are_learned_in(invoke):
             "--range: must not be given togeth",
         ),
         (["CartPole-v1", "--range", "a:b"], "--range must be"),
-        (["CartPole-v1", "--range", "4:3"], "--range: must be finite, low < high"),
-        (["CartPole-v1", "--range", "9=3:4"], "--range: CartPole-v1 has the variables 0 to 3"),
-        (["CartPole-v1", "--range", "x=3:4"], "--range: must be of 'all' or a number"),
+        (["CartPole-v1", "--range", "4:3"], "--range all: must be finite, low < high"),
+        (["CartPole-v1", "--range", "9=3:4"], "--range 9: CartPole-v1 has the variables 0 to 3"),
+        (["CartPole-v1", "--range", "x=3:4"], "--range x: must be of"),
         (["CartPole-v1", "--set", "learning.discount"], "--set must be NAME=VALUE"),
         (["CartPole-v1", "--set", "discount=1"], "--set discount: must be TABLE.NAME"),
         (["CartPole-v1", "--set", "learning.discont=1"], "--set learning.discont: unknown"),
         (["CartPole-v1", "--set", "a.b=1"], "--set a: unknown key"),
         (["CartPole-v1", "--set", "learning.discount=x"], "--set learning.discount: must be a"),
-        (["CartPole-v1", "--set", "learning.discount=2"], "--set learning.discount: discount"),
-        (["CartPole-v1", "--set", "agent.angles=[7]"], "--set agent.angles: angles must"),
+        (["CartPole-v1", "--set", "learning.discount=2"], "--set learning.discount: must"),
+        (["CartPole-v1", "--set", "agent.angles=[7]"], "--set agent.angles: must"),
         (["CartPole-v1", "--env-arg", "5"], "--env-arg must be NAME=VALUE"),
         (["CartPole-v1", "--env-arg", "color=5"], "--env-arg: CartPole-v1 cannot be made"),
         (["CartPole-v1", "--evaluate-every", -1], "--evaluate-every"),
@@ -445,19 +494,19 @@ discount = 0.5
         (
             FILE.replace("0.5", "1.5"),
             [],
-            "mine.toml:7: learning.discount: discount must be in [0, 1], got 1.5",
+            "mine.toml:7: learning.discount: must be in [0, 1], got 1.5",
         ),
         (
             FILE.replace("kwargs.colour", "# ").replace("9 =", "3 ="),
             ["--set", "learning.discount=2"],
-            "Error: --set learning.discount: discount must be in [0, 1], got 2",
+            "Error: --set learning.discount: must be in [0, 1], got 2",
         ),
         (
             FILE.replace("kwargs.colour", "# ").replace("9 =", "3 ="),
             ["--range", "8=0:1"],
-            "Error: --range: CartPole-v1 has the variables 0 to 3, got 8",
+            "Error: --range 8: CartPole-v1 has the variables 0 to 3, got 8",
         ),
-        (NOISY_FILE, [], "mine.toml:1: environment.ranges: noise and redundant need the range"),
+        (NOISY_FILE, [], "mine.toml:1: environment.ranges.1: must be given"),
         (NOISY_FILE, ["--range", "0:1=1"], "Error: --range must be"),
         (
             "[agent]\nobservation_range = 'adaptive'\n",
@@ -485,12 +534,22 @@ def test_mistakes_in_a_runs_own_configuration_name_its_file(invoke, tmp_path):
     assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
     path = Path("one/config.json")
     path.write_text(path.read_text().replace("Drifting-v0", "Gone-v0"))
-    for command in (["resume", "one"], ["evaluate", "one"], ["record", "one", "x.gif"]):
+    for command in (["evaluate", "one"], ["record", "one", "x.gif"]):
         result = invoke(*command)
         assert result.exit_code == 2
         assert f"{path}: environment.id: " in result.stderr
+
+
+def test_a_run_is_resumed_with_the_specification_that_it_began_with(invoke):
+    assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
+    path = Path("one/config.json")
+    text = path.read_text()
+    path.write_text(text.replace('"n_hidden_units": 60', '"n_hidden_units": 61'))
     result = invoke("resume", "one", "--steps", 170)
-    assert f"{path}: environment.id: " in result.stderr
+    assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
+    assert f"{path} differs from the specification in results.sqlite" in result.stderr
+    path.write_text(text)
+    assert invoke("resume", "one", "--steps", 170).exit_code == 0
 
 
 class WiderEnv(drifting_env.DriftingEnv):
@@ -649,7 +708,7 @@ def test_a_warm_up_that_is_not_over_is_told(invoke):
     told = "the agent is still warming up: it acts at random and has learned nothing yet"
     begun = ("--steps", 59, "--evaluate-every", 50, "--evaluation-episodes", 1, *SMALL)
     lines = invoke("train", DRIFTING, *begun, "--out", "one").stdout.splitlines()
-    assert lines[1] == f"{told}; that takes 60 steps: sdnn resume one --steps N goes on"
+    assert lines[1] == f"{told}; that takes 60 steps: sdnn resume one --steps N continues it"
     assert invoke("evaluate", "one", "--episodes", 1).stdout.splitlines()[-1] == told
     assert invoke("record", "one", "x.gif", "--steps", 2).stdout.splitlines()[-1] == told
     evaluate = ("evaluate", "one", "--episodes", 1, "--json")
@@ -721,7 +780,7 @@ def test_values_are_as_toml_has_them_or_texts(text, value):
     [
         ("learning.discount", "--set learning.discount"),
         ("environment.kwargs", "--env-arg"),
-        ("environment.ranges.3", "--range"),
+        ("environment.ranges.3", "--range 3"),
         ("environment.noise", "--noise"),
         ("environment.id", "ENV_ID"),
         ("protocol.evaluate_every", "--evaluate-every"),
@@ -753,7 +812,7 @@ def test_a_signal_ends_the_step_and_the_run_goes_on_exactly(invoke, tmp_path, nu
     process.send_signal(number)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == code, errors
-    assert errors == f"{word}; sdnn resume cut goes on\n"
+    assert errors == f"{word}; sdnn resume cut continues it\n"
     assert not (tmp_path / "cut" / "agent.safetensors").exists()
     cut_at = Run.open("cut").rows()[-1]["step"]
     assert cut_at < 3000

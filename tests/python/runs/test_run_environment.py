@@ -95,8 +95,8 @@ def test_observations_of_any_shape_are_flattened():
         ({"id": "Nothing-v0"}, "environment.id", "Nothing-v0"),
         ({"id": "nowhere:a/B-v0"}, "environment.id", "nowhere:a/B-v0"),
         ({"id": "CartPole-v1", "kwargs": {"colour": 1}}, "environment.kwargs", "colour"),
-        ({"id": "CartPole-v1", "noise": 0.1}, "environment.ranges", "1, 3"),
-        ({"id": "CartPole-v1", "redundant": 1}, "environment.ranges", "--range 1=LOW:HIGH"),
+        ({"id": "CartPole-v1", "noise": 0.1}, "environment.ranges.1", "1, 3"),
+        ({"id": "CartPole-v1", "redundant": 1}, "environment.ranges.1", "lowest and highest"),
         (
             {"id": "CartPole-v1", "noise": 0.1, "ranges": {"4": (0, 1)}},
             "environment.ranges.4",

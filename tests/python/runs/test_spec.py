@@ -145,7 +145,7 @@ def test_an_agent_brings_its_own_training():
             self.n_steps = self.steps
             yield
 
-    entry = replace(agent_entry("sdnn-c"), id="told", costs=(), training=Told)
+    entry = replace(agent_entry("sdnn-c"), id="told", training=Told)
     register(entry)
     try:
         spec = RunSpec(environment=CART_POLE, agent=AgentSpec(name="told"))
@@ -200,11 +200,11 @@ def test_agents_are_made_with_preset_and_settings():
     ("values", "key", "words"),
     [
         ({"learning": {"discount": 2.0}}, "learning.discount", "in [0, 1]"),
-        ({"agent": {"angles": [9]}}, "agent.angles", "angles must be variables"),
+        ({"agent": {"angles": [9]}}, "agent.angles", "must be variables from 0 to 3"),
         (
             {"approximator": {"n_hidden_units": 10}},
             "approximator.n_active_units",
-            "n_active_units must be in",
+            "must be in [1, 10]",
         ),
         ({"agent": "fuzzy"}, "environment.id", "action_space must be a Box"),
     ],

@@ -118,7 +118,7 @@ def test_only_some_variants(invoke):
     ("study", "words"),
     [
         (STUDY.replace("trials", "trails"), "mine.toml:4: study.trails: unknown key"),
-        (STUDY.replace("0.8", "1.8"), "mine.toml:9: axes.learning.discount[0]: discount must be"),
+        (STUDY.replace("0.8", "1.8"), "mine.toml:9: axes.learning.discount[0]: must be"),
     ],
 )
 def test_wrong_files_are_exit_code_2_and_leave_nothing(invoke, tmp_path, study, words):

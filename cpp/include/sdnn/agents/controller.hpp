@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -21,7 +22,9 @@
 #include "sdnn/agents/range_use.hpp"
 #include "sdnn/agents/warm_up.hpp"
 #include "sdnn/coding/pattern_table.hpp"
+#include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/state.hpp"
 
 namespace sdnn::agents {
@@ -33,7 +36,14 @@ struct ControllerConfig {
   std::uint64_t seed = 0;
   ObservationConfig observation = {};
   ActionConfig action = {};
-  int warm_up_steps = 1000;  ///< transitions, where ranges are not known; in [2, 10^7]
+  int warm_up_steps = 1000;
+
+  /// The plain values.
+  static constexpr auto fields() noexcept {
+    return std::tuple(core::field("warm_up_steps", &ControllerConfig::warm_up_steps,
+                                  "Random steps before learning, where ranges are not known.",
+                                  core::within(2, 10'000'000)));
+  }
 };
 
 /// An agent of any kind that observes variables and chooses actions in the units of its task.
@@ -231,7 +241,7 @@ class Controller {
         actions_(config_.action, n_actions_in_box(approximator_)),
         notes_(n_variables()),
         taken_(n_dimensions()) {
-    core::require_in_range("warm_up_steps", config_.warm_up_steps, 2, 10'000'000);
+    core::check_fields(config_);
     action_.resize(n_dimensions());
     indices_.resize(n_dimensions());
   }

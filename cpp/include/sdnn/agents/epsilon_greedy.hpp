@@ -46,7 +46,7 @@ struct EpsilonGreedyConfig {
         core::field("tie_rule", &EpsilonGreedyConfig::tie_rule,
                     "Which of several best actions is taken: `uniform`: any with the same "
                     "probability; `lowest`: the one with the lowest index; `middle`: the middle "
-                    "of the widest run of neighbours. A reading."),
+                    "of the widest run of neighbours. An assumption."),
         core::field("tie_tolerance", &EpsilonGreedyConfig::tie_tolerance,
                     "Values at most this far below the best tie with it. Not in the paper: with "
                     "`middle` the agent acts from the middle of the widest high plateau.",

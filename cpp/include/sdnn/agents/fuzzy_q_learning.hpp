@@ -37,7 +37,7 @@ struct FuzzyQLearningConfig {
         std::tuple(
             core::field(
                 "learning_coefficient", &FuzzyQLearningConfig::learning_coefficient,
-                "c_fql. A reading: the paper does not give it; 0.1 and 1.0 are alternatives.",
+                "c_fql. An assumption: the paper does not give it; 0.1 and 1.0 are alternatives.",
                 core::above_up_to(0, 1)),
             core::field("discount", &FuzzyQLearningConfig::discount, "gamma.", core::within(0, 1)),
             core::field(

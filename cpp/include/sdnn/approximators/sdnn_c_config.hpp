@@ -81,11 +81,12 @@ struct SDNNCConfig {
                     "Patterns between neighbouring anchors (section 3.1: 44). There are "
                     "(n_anchor_patterns - 1) (n_interpolated + 1) bins, 360 in the paper.",
                     core::within(0, 10000)),
-        core::field("balanced_anchors", &SDNNCConfig::balanced_anchors,
-                    "Whether anchors have as many +1 as -1. A reading: the paper says \"random\"."),
+        core::field(
+            "balanced_anchors", &SDNNCConfig::balanced_anchors,
+            "Whether anchors have as many +1 as -1. An assumption: the paper says \"random\"."),
         core::field("circular", &SDNNCConfig::circular,
                     "Per input, whether the last anchor equals the first, as angles want it; "
-                    "empty: none. A reading: the paper does not say."),
+                    "empty: none. An assumption: the paper does not say."),
         core::field("n_symbols", &SDNNCConfig::n_symbols,
                     "Per input, how many symbols it may be, each with a random pattern of its "
                     "own: symbol k of n is a value of (k + 0.5) / n. 0 for a number; empty: "
@@ -128,14 +129,14 @@ struct SDNNCConfig {
         core::field("initial_weights", &SDNNCConfig::initial_weights,
                     "The \"small random\" initial weights: `ternary`: one lattice step down, "
                     "none, or up with probabilities 1/4, 1/2, 1/4; `uniform`: within "
-                    "initial_weight_limit, rounded to the lattice. A reading."),
+                    "initial_weight_limit, rounded to the lattice. An assumption."),
         core::field("initial_weight_limit", &SDNNCConfig::initial_weight_limit,
                     "Of `uniform` initial weights, in units of c.", core::at_least(0)),
         core::field("rounding", &SDNNCConfig::rounding,
                     "Of the number of units that are to fire. `half_up`: to the nearest; "
                     "`random`: up or down at random in proportion, so that no small change is "
                     "lost on average; `away`: in the direction of the change by at least one "
-                    "unit. A reading."),
+                    "unit. An assumption."),
         core::field("averaging_interval", &SDNNCConfig::averaging_interval,
                     "With more than 0 the network keeps an average of its weights, by which "
                     "greedy actions are chosen; learning continues with the weights themselves. "

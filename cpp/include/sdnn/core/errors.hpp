@@ -28,6 +28,19 @@ class ArgumentError : public std::invalid_argument {
   std::string name_;
 };
 
+/// An argument, or a field of a configuration, asks for more memory than is allowed.
+class SizeError : public std::length_error {
+ public:
+  SizeError(std::string name, const std::string& message)
+      : std::length_error(message), name_(std::move(name)) {}
+
+  /// Of the argument or field to reduce; where several would do, the first one.
+  const std::string& name() const noexcept { return name_; }
+
+ private:
+  std::string name_;
+};
+
 #if !SDNN_EXCEPTIONS
 
 /// Gets the message of an error, and does not return: it restarts the processor, say.

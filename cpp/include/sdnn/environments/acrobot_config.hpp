@@ -84,12 +84,12 @@ struct AcrobotConfig {
         core::field("goal_test", &AcrobotConfig::goal_test,
                     "When the goal is tested: `every_step`: after every integration step, and the "
                     "episode ends there; `decision_instant`: only when the next decision is due. "
-                    "A reading."),
+                    "An assumption."),
         core::field("goal_reward", &AcrobotConfig::goal_reward, "Reward at the goal."),
         core::field("penalty", &AcrobotConfig::penalty,
                     "Reward for idling or too much speed at a decision instant; it ends nothing."),
         core::field("idle_angle", &AcrobotConfig::idle_angle,
-                    "rad: |theta1| below it is idling; 0 turns the rule off. A reading: 5 "
+                    "rad: |theta1| below it is idling; 0 turns the rule off. An assumption: 5 "
                     "degrees; pi / 5 is the alternative.",
                     core::within(0, core::kPi)));
   }

@@ -122,7 +122,7 @@ struct SensorConfig {
         core::field("noise_entry", &SensorConfig::noise_entry,
                     "Where noise enters: `every_sensor`: s5 and s6 are computed from the true "
                     "s1..s4 and get noise of their own; `basic_sensors`: they are computed from "
-                    "the noisy ones. A reading."),
+                    "the noisy ones. An assumption."),
         core::field("n_constant", &SensorConfig::n_constant,
                     "Useless inputs besides: always 1/2, with noise as on the sensors. Not in the "
                     "paper.",

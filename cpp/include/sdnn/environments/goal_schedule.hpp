@@ -34,7 +34,7 @@ struct GoalScheduleConfig {
     return std::tuple(
         core::field("kind", &GoalScheduleConfig::kind,
                     "`inverse_linear`: 1 / (1 + k / scale); `inverse_sqrt`: 1 / sqrt(1 + k); or "
-                    "`constant`: constant_value. A reading: the formula is garbled in print."),
+                    "`constant`: constant_value. An assumption: the formula is garbled in print."),
         core::field("scale", &GoalScheduleConfig::scale, "Episodes; of `inverse_linear`.",
                     core::above(0)),
         core::field("last_episode", &GoalScheduleConfig::last_episode,

@@ -6,7 +6,7 @@
 #include <iomanip>
 #include <limits>
 #include <sstream>
-#include <stdexcept>
+#include <string>
 #include <string_view>
 
 #include "sdnn/core/detail/floating_point.hpp"
@@ -17,7 +17,13 @@ namespace sdnn::core {
 /// The default of every max_table_bytes: 1 GiB.
 inline constexpr std::uint64_t kDefaultMaxTableBytes = std::uint64_t{1} << 30;
 
-/// Throws std::length_error "<sizes> must be smaller: <what> need <bytes> bytes, but
+/// Throws SizeError "<sizes> must be smaller: ..."; `sizes` are names: "n_sets or n_inputs".
+[[noreturn]] inline void fail_for_size(std::string_view sizes, const std::ostringstream& message) {
+  const std::string_view first = sizes.substr(0, sizes.find_first_of(" ,"));
+  fail(SizeError(std::string(first), message.str()));
+}
+
+/// Throws SizeError "<sizes> must be smaller: <what> need <bytes> bytes, but
 /// max_table_bytes is ..." if they are more. To be asked before memory is; a double, which no
 /// product overflows.
 inline void require_table_bytes(std::string_view sizes, std::string_view what, double bytes,
@@ -26,7 +32,7 @@ inline void require_table_bytes(std::string_view sizes, std::string_view what, d
   std::ostringstream message;
   message << sizes << " must be smaller: " << what << " need " << std::fixed << std::setprecision(0)
           << bytes << " bytes, but max_table_bytes is " << max_table_bytes;
-  fail(std::length_error(message.str()));
+  fail_for_size(sizes, message);
 }
 
 /// The same where no setting allows more: "... bytes, but at most <most> are allowed".
@@ -36,14 +42,14 @@ inline void require_bytes(std::string_view sizes, std::string_view what, double 
   std::ostringstream message;
   message << sizes << " must be smaller: " << what << " need " << std::fixed << std::setprecision(0)
           << bytes << " bytes, but at most " << most << " are allowed";
-  fail(std::length_error(message.str()));
+  fail_for_size(sizes, message);
 }
 
 /// n_per_dimension ^ n_dimensions, when a table with `bytes_per_cell` for each is allowed.
 ///
 /// A grid grows exponentially with its dimensions; asked before memory is requested, so that the
 /// answer is a message and not an exhausted machine. Requires n_per_dimension, bytes_per_cell > 0.
-/// Throws std::length_error naming the `sizes` to reduce ("n_sets or n_inputs"), the number of
+/// Throws SizeError naming the `sizes` to reduce ("n_sets or n_inputs"), the number of
 /// `cells` ("rules"), the bytes and max_table_bytes.
 inline std::size_t grid_cells(std::string_view sizes, std::string_view cells,
                               std::size_t n_per_dimension, std::size_t n_dimensions,
@@ -68,7 +74,7 @@ inline std::size_t grid_cells(std::string_view sizes, std::string_view cells,
     message << "2^64 bytes or more";
   }
   message << ", but max_table_bytes is " << max_table_bytes;
-  fail(std::length_error(message.str()));
+  fail_for_size(sizes, message);
 }
 
 }  // namespace sdnn::core
