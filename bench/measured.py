@@ -40,7 +40,6 @@ from sdnn.runs.engine import (
     Failed,
     Finished,
     PlannedTrial,
-    Started,
     run_trials,
 )
 from sdnn.runs.store import STORE_NAME, ResultStore
@@ -199,7 +198,7 @@ class Here:
         for item in planned:
             if stop.is_set():
                 return
-            yield Started(item)
+            yield Advanced(item, 0)
             yield _outcome(self.run_one, item, lambda done: None)
 
 
@@ -228,7 +227,7 @@ class Processes:
                     process.start()
                     sender.close()
                     running[receiver] = process, item
-                    yield Started(item)
+                    yield Advanced(item, 0)
                 for receiver in wait(list(running), POLL_SECONDS):
                     process, item = running[receiver]
                     try:

@@ -44,6 +44,7 @@ __all__ = [
     "gzip_pieces",
     "is_there",
     "lock",
+    "naming",
     "open_regular",
     "open_to_append",
     "read_bytes",
@@ -87,13 +88,13 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
         If the file cannot be written; one that was there before stays as it was.
     """
     if path.absolute().parent in _FOLDERS_OF_DEVICES:
-        with path.open("wb") as device:
+        with naming(path), path.open("wb") as device:
             yield device
         return
     file = _new_file(path)
     partial = Path(file.name)
     try:
-        with file:
+        with naming(path), file:
             yield file
             file.flush()
             os.fsync(file.fileno())
@@ -103,6 +104,17 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
         _sync_folder(path.parent)
     finally:
         partial.unlink(missing_ok=True)
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Let errors of writing name the file, as those of opening do: a disk may be full."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno is not None and error.filename is None:
+            error.filename = str(path)
+        raise
 
 
 def write_whole(path: Path, content: bytes | Iterable[bytes | memoryview]) -> None:

@@ -76,7 +76,10 @@ def instruction_set() -> str:
     ValueError
         If the environment variable names a level that does not exist, or not on this processor.
     """
-    return _core.instruction_set()
+    try:
+        return _core.instruction_set()
+    except ValueError as error:
+        raise ValueError(f"SDNN_INSTRUCTION_SET: {error}") from None
 
 
 def available_instruction_sets() -> tuple[str, ...]:

@@ -430,19 +430,20 @@ def test_failing_trials_are_exit_code_1(invoke, tmp_path, fake):
     assert [p.name for p in (tmp_path / "results").iterdir()] == ["results.sqlite"]
 
 
-def test_interruption_is_exit_code_130_and_the_command_goes_on(invoke, fake):
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_command_that_a_signal_ends_has_its_exit_code_and_goes_on(invoke, fake, number, code):
     class Interrupting(fake.FakeTrial):
         """Interrupts the run when it starts, and never ends by itself."""
 
         def __init__(self, **parts):
             super().__init__(**parts)
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), number)
 
         def advance(self, n):
             time.sleep(0.001)
 
     result = invoke("reproduce", "a", "--quick", "--jobs", 1, trial=Interrupting)
-    assert result.exit_code == 130
+    assert result.exit_code == code
     assert "0 of 4 " in result.stderr
     assert invoke("reproduce", "a", "--quick").exit_code == 0
 
@@ -462,6 +463,16 @@ def test_module_is_the_command(tmp_path):
     wrong = python("-m", "sdnn", "reproduce", "a", "--trials", "0", cwd=tmp_path)
     assert wrong.returncode == 2
     assert "Traceback" not in wrong.stderr
+
+
+@pytest.mark.parametrize("words", [["train", "CartPole-v1"], ["reproduce"], ["--version"]])
+def test_a_wrong_instruction_set_is_named_by_its_variable(tmp_path, monkeypatch, words):
+    monkeypatch.setenv("SDNN_INSTRUCTION_SET", "sse9")
+    done = python("-m", "sdnn", *words, cwd=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.startswith("Error: SDNN_INSTRUCTION_SET: ")
+    assert done.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_cmakedir_is_the_installed_package():

@@ -43,8 +43,8 @@ WAYS = {
 END_SECONDS = 60.0
 """In which a command that was asked to end must have ended."""
 
-ENDINGS = {0, 130, *(-number for number in (1, 2, 9, 15))}
-"""Done, interrupted, or ended by a signal that nobody handles."""
+ENDINGS = {0, 130, 143, *(-number for number in (1, 2, 9, 15))}
+"""Done, interrupted, terminated, or ended by a signal that nobody handles."""
 
 CRASHES = ("terminate called", "Fatal Python error", "FATAL:", "core dumped")
 

@@ -11,7 +11,7 @@ from statistics import median
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from sdnn.arguments import path_of, real, whole
-from sdnn.files import open_to_append, read_bytes, write_whole
+from sdnn.files import naming, open_to_append, read_bytes, write_whole
 from sdnn.progress import ProgressBars
 
 if TYPE_CHECKING:
@@ -78,11 +78,13 @@ class JSONLines(Callback):
 
     def on_row(self, training: Training, row: Row) -> None:
         """Write a line."""
-        self._file.write(json.dumps(row) + "\n")
+        with naming(self.path):
+            self._file.write(json.dumps(row) + "\n")
 
     def on_end(self, training: Training) -> None:
         """Close the file."""
-        self._file.close()
+        with naming(self.path):
+            self._file.close()
 
 
 class CheckpointCallback(Callback):

@@ -22,10 +22,21 @@ from sdnn.cli.train import train
 __all__ = ["main"]
 
 
+def _check_instruction_set() -> None:
+    """Name the environment variable if it is wrong, before something else is blamed for it."""
+    from sdnn.machine import instruction_set
+
+    try:
+        instruction_set()
+    except ValueError as error:
+        raise click.ClickException(str(error)) from error
+
+
 def _print_version(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
     if value:
         from sdnn.machine import build
 
+        _check_instruction_set()
         for name, found in build().items():
             click.echo(f"{name} {found}")
         context.exit()
@@ -80,6 +91,7 @@ class _Commands(click.Group):
 )
 def main() -> None:
     """Learn with selective desensitization neural networks, and reproduce the paper about them."""
+    _check_instruction_set()
 
 
 for command in (train, resume, evaluate, plot, record, export, reproduce, sweep, bench):

@@ -7,6 +7,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from signal import SIGINT, SIGTERM
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from sdnn.runs.report import Finished
 
 EXIT_FAILURE = 1
-EXIT_INTERRUPTED = 130
 PLAIN_WIDTH = 160
 """Width of tables that go to a file or pipe."""
 
@@ -52,7 +52,9 @@ def run_and_report(
         message = f"{type(failure.error).__name__}: {failure.error}"
         click.echo(f"Error: {failure.planned.title} failed: {message}", err=True)
     if outcome.interrupted:
-        exit_interrupted(context, f"interrupted; {stored}; the same command continues from there")
+        what = "terminated" if outcome.signal == SIGTERM else "interrupted"
+        message = f"{what}; {stored}; the same command continues from there"
+        exit_interrupted(context, message, outcome.signal)
     if done.page is None:
         click.echo(f"Error: nothing is complete, no figure drawn; {stored}", err=True)
     elif as_json:
@@ -103,7 +105,12 @@ def experiment_command(context: click.Context) -> Iterator[None]:
         exit_interrupted(context, "interrupted; what was finished is stored")
 
 
-def exit_interrupted(context: click.Context, message: str) -> NoReturn:
-    """Print what is kept, and exit as a command that was interrupted."""
+def exit_interrupted(context: click.Context, message: str, number: int | None = None) -> NoReturn:
+    """Print what is kept, and exit as a command that a signal, by default Ctrl-C, has ended."""
     click.echo(message, err=True)
-    context.exit(EXIT_INTERRUPTED)
+    context.exit(exit_code(number or SIGINT))
+
+
+def exit_code(number: int) -> int:
+    """Return the exit code of a command that a signal has ended, as shells have it."""
+    return 128 + number

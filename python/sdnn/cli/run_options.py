@@ -8,11 +8,12 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from signal import SIGINT, SIGTERM
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from sdnn.cli.output import EXIT_INTERRUPTED, json_text
+from sdnn.cli.output import exit_code, json_text
 
 if TYPE_CHECKING:
     from sdnn.agents.scaling import Scaling
@@ -25,8 +26,6 @@ KEYS = (
     "agent.angle_pairs", "output.checkpoint_every", "output.tensorboard",
 )  # fmt: skip
 """Settings with an option of their own; ``--set KEY=VALUE`` sets any."""
-
-EXIT_TERMINATED = 143
 
 WARMING_UP = "the agent is still warming up: it acts at random and has learned nothing yet"
 
@@ -183,12 +182,12 @@ def run_command(
         raise click.UsageError(str(error) if error.place else words(error)) from error
     except RunTerminatedError as error:
         _tell_how_to_resume("terminated", folder)
-        raise click.exceptions.Exit(EXIT_TERMINATED) from error
+        raise click.exceptions.Exit(exit_code(SIGTERM)) from error
     except RunError as error:
         raise click.ClickException(str(error)) from error
     except KeyboardInterrupt as error:
         _tell_how_to_resume("interrupted", folder)
-        raise click.exceptions.Exit(EXIT_INTERRUPTED) from error
+        raise click.exceptions.Exit(exit_code(SIGINT)) from error
     except (click.ClickException, click.exceptions.Exit):
         raise
     except OSError as error:

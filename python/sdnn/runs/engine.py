@@ -16,12 +16,13 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
+from signal import SIGINT, SIGTERM
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from sdnn.interrupts import Interrupts
-from sdnn.machine import n_cores
+from sdnn.machine import instruction_set, n_cores
 from sdnn.runs.registry import title_of
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
@@ -137,7 +138,8 @@ class RunOutcome:
     """The result of `run_trials`.
 
     ``n_planned`` trials were needed, of which ``n_reused`` were stored before and ``n_run`` are
-    finished and stored now; ``interrupted`` is whether it was stopped before its end.
+    finished and stored now; ``interrupted`` is whether it was stopped before its end, ``signal``
+    the signal that did it, if any.
     """
 
     n_planned: int
@@ -145,6 +147,7 @@ class RunOutcome:
     n_run: int
     failures: tuple[Failed, ...]
     interrupted: bool
+    signal: int | None = None
 
 
 class Observer:
@@ -183,7 +186,8 @@ def run_trials(
 ) -> RunOutcome:
     """Run the planned trials that are not stored, and store each as soon as it is finished.
 
-    Ctrl-C ends the run after the chunks under way; finished trials are stored before it returns.
+    Ctrl-C and SIGTERM end the run after the chunks under way; finished trials are stored before it
+    returns.
     A trial that raises does not stop the others.
 
     Parameters
@@ -204,12 +208,13 @@ def run_trials(
     Raises
     ------
     ValueError
-        If `jobs` is less than 1, or is given beside an executor.
+        If `jobs` is less than 1, or is given beside an executor; if SDNN_INSTRUCTION_SET is wrong.
     StoreError
         If the store cannot be read or written; running trials are given up.
     RunError
         If the executor can run no trial any more; what was finished is stored.
     """
+    instruction_set()
     if executor is None:
         executor = ThreadExecutor(jobs)
     elif jobs is not None:
@@ -223,9 +228,10 @@ def run_trials(
     stop = threading.Event() if stop is None else stop
     failures: list[Failed] = []
     n_run = 0
+    signals = Interrupts(stop.set, (SIGINT, SIGTERM))
     if missing:
         # An exception at any instruction could lose a result between queue and store.
-        with Interrupts(stop.set), closing(executor.run(missing, stop)) as messages:
+        with signals, closing(executor.run(missing, stop)) as messages:
             for message in messages:
                 match message:
                     case Advanced(trial, episode):
@@ -245,6 +251,7 @@ def run_trials(
         n_run=n_run,
         failures=tuple(failures),
         interrupted=stop.is_set(),
+        signal=signals.received,
     )
 
 

@@ -35,6 +35,7 @@ from sdnn.agents.spaces import require_same_kind
 from sdnn.arguments import whole
 from sdnn.files import lock, open_to_append, remove_abandoned_files, write_whole
 from sdnn.interrupts import Interrupts
+from sdnn.machine import instruction_set
 from sdnn.runs.config_file import FORMAT, ConfigFile, read_spec
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line
@@ -155,6 +156,7 @@ class Run:
 
     def check(self) -> None:
         """Make all that is needed once, to see that it works; ConfigError if not."""
+        instruction_set()  # whose variable may be wrong
         if self.spec.environment is None:
             raise ConfigError(
                 "environment",

@@ -1,3 +1,4 @@
+import errno
 import gzip
 import os
 import subprocess
@@ -174,3 +175,21 @@ def test_pieces_that_fail_leave_no_file(tmp_path):
     with pytest.raises(ValueError, match="second"):
         write_whole(tmp_path / "rows.csv", pieces())
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_names_the_file(tmp_path, monkeypatch):
+    def full(_descriptor):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    path = tmp_path / "rows.csv"
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match=r"rows\.csv") as caught:
+        write_whole(path, b"much")
+    assert (caught.value.errno, caught.value.filename) == (errno.ENOSPC, str(path))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no such device here")
+def test_a_full_device_is_named():
+    with pytest.raises(OSError, match="/dev/full"):
+        write_whole(Path("/dev/full"), b"much")
