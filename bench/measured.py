@@ -119,7 +119,7 @@ def run_missing(
     ):
         outcome = run_trials(plan, view(store), executor=executor, observer=bars)
     for failure in outcome.failures:
-        print(f"{failure.key} failed: {failure.error!r}", file=sys.stderr)
+        print(f"{failure.planned.key} failed: {failure.error!r}", file=sys.stderr)
     print(f"{outcome.n_run} measured, {outcome.n_reused} were stored", file=sys.stderr)
     if outcome.interrupted:
         raise SystemExit(130)
