@@ -14,12 +14,11 @@ from sdnn.runs.figures import (
     INK,
     SMOOTHED_TESTS,
     agent_colors,
-    as_written,
     colors_of,
     draw_steps,
+    label,
     require_matplotlib,
     style,
-    write_footer,
 )
 from sdnn.runs.results import CaseResult
 
@@ -51,15 +50,10 @@ def draw_experiment(
     with_start = experiment.start_panels and smooth
     heights = (_PANEL_HEIGHT, _START_HEIGHT) if with_start else (_PANEL_HEIGHT,)
     height = 1.1 + n_rows * sum(heights)
-    figure = Figure(figsize=(5.4 * n_columns, height))
-    figure.subplots_adjust(
-        left=0.133 / n_columns, right=0.97, top=1 - 0.82 / height, bottom=0.86 / height,
-        wspace=0.1, hspace=0.4,
-    )  # fmt: skip
+    figure = Figure(figsize=(5.4 * n_columns, height), layout="constrained")
     grid = figure.subplots(
-        n_rows * len(heights), n_columns, sharey=True, squeeze=False,
-        gridspec_kw={"height_ratios": heights * n_rows},
-    )  # fmt: skip
+        n_rows * len(heights), n_columns, sharey=True, squeeze=False, height_ratios=heights * n_rows
+    )
     panels = grid[:: len(heights)].ravel()
     starts = grid[1::2].ravel() if with_start else ()
     colors = agent_colors(result.agent for result in results)
@@ -86,10 +80,10 @@ def draw_experiment(
         lines, titles = panels[0].get_legend_handles_labels()
         figure.legend(
             lines[::-1], titles[::-1], frameon=False, fontsize=9.5, loc="upper right",
-            bbox_to_anchor=(0.975, 1 - 0.08 / height), ncols=len(colors),
+            bbox_to_anchor=(0.99, 1 - 0.08 / height), ncols=len(colors),
         )  # fmt: skip
     _label(figure, experiment.title, results, smooth=smooth, quick=quick)
-    return as_written(figure)
+    return figure
 
 
 def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
@@ -101,8 +95,7 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
     require_matplotlib()
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9.4, 4.7))
-    figure.subplots_adjust(left=0.085, right=0.7, top=0.9, bottom=0.2)
+    figure = Figure(figsize=(9.4, 4.7), layout="constrained")
     axes = figure.add_subplot()
     colors = colors_of(range(len(SERIES)))
     for number, series in enumerate(SERIES):
@@ -130,18 +123,16 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
     axes.set_xlabel("number of inputs d")
     axes.set_ylabel("time of a step [µs]")
     style(axes)
-    axes.legend(
-        frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.01, 1.02), labelspacing=1.0
-    )  # fmt: skip
+    figure.legend(frameon=False, fontsize=9, loc="outside right upper", labelspacing=1.0)
     axes.set_title("Cost of a step against the number of inputs", loc="left", color=INK)
     if quick:
         _watermark(axes)
     machines = ", ".join(sorted({cost.machine for cost in costs}))
-    write_footer(
-        figure,
+    footer = (
         "Medians, bars: quartiles of rounds. A step: acting in a new random state and learning the"
-        f" transition to it.\nsdnn {costs[0].version}; {machines}; one thread.",
+        f" transition to it.\nsdnn {costs[0].version}; {machines}; one thread."
     )
+    figure.supxlabel(footer, x=0.012, ha="left", fontsize=6.5, color=FAINT, linespacing=1.4)
     return figure
 
 
@@ -157,16 +148,14 @@ def _label(
     figure: Figure, title: str, results: Sequence[CaseResult], *, smooth: bool, quick: bool
 ) -> None:
     """Write title, what kind of run it is, and where the rows come from."""
-    height = figure.get_figheight()
     fewest, most = min(r.n_trials for r in results), max(r.n_trials for r in results)
     trials = f"{fewest}" if fewest == most else f"{fewest} to {most}"
     n_episodes = max(result.last_episode for result in results)
     scale = f"{trials} {'trial' if trials == '1' else 'trials'} x {n_episodes:,} episodes"
-    figure.text(0.012, 1 - 0.13 / height, title, fontsize=12, va="top", color=INK)
+    below = ""
     if quick or fewest < PAPER_TRIALS or n_episodes < PAPER_EPISODES:
         what = "QUICK LOOK, not the result" if quick else "smaller than the paper's experiment"
-        text = f"{what}: {scale} instead of {PAPER_TRIALS} x {PAPER_EPISODES:,}"
-        figure.text(0.012, 1 - 0.36 / height, text, fontsize=9, va="top", color=_WARNING_COLOR)
+        below = f"{what}: {scale} instead of {PAPER_TRIALS} x {PAPER_EPISODES:,}"
     hashes = [f"{r.case_id}/{r.agent} {r.config_hash[:8]}" for r in results]
     lines = [", ".join(hashes[i : i + 4]) for i in range(0, len(hashes), 4)]
     lines_are = (
@@ -176,8 +165,5 @@ def _label(
         else "Line: median over trials; band: quartiles."
     )
     versions = ", ".join(sorted({one.version for result in results for one in result.records}))
-    write_footer(
-        figure,
-        f"{lines_are} {scale} per case and agent.\nsdnn {versions}; configuration "
-        + ",\n".join(lines),
-    )
+    footer = f"{lines_are} {scale} per case and agent.\nsdnn {versions}; configuration "
+    label(figure, title, below, footer + ",\n".join(lines), _WARNING_COLOR)

@@ -92,15 +92,6 @@ def figure_bytes(figure: Figure) -> tuple[bytes, bytes]:
     return png.getvalue(), svg.getvalue()
 
 
-def as_written(figure: Figure) -> Figure:
-    """Leave dollar signs in a figure's words as they are: the user's titles hold no formulas."""
-    from matplotlib.text import Text
-
-    for text in figure.findobj(Text):
-        text.set_parse_math(False)
-    return figure
-
-
 def style(axes: Axes, grid: Literal["x", "y"] = "y") -> None:
     """Draw a panel in the style of all figures of trials, with grid lines across one axis."""
     axes.grid(axis=grid, color=GRID, linewidth=0.7)
@@ -109,12 +100,19 @@ def style(axes: Axes, grid: Literal["x", "y"] = "y") -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def write_footer(figure: Figure, text: str) -> None:
-    """Write small lines at the lower left."""
-    figure.text(
-        0.012, 0.07 / figure.get_figheight(), text, fontsize=6.5, va="bottom", color=FAINT,
-        linespacing=1.4,
-    )  # fmt: skip
+def label(figure: Figure, title: str, below: str, footer: str, color: str = FAINT) -> None:
+    """Write a title, a line below it, and small lines at the foot, for which panels make room.
+
+    Dollar signs stay as they are: the user's titles hold no formulas.
+    """
+    from matplotlib.text import Text
+
+    figure.suptitle(f"{title}\n", x=0.012, ha="left", fontsize=12, color=INK)
+    y = 1 - 0.32 / figure.get_figheight()
+    figure.text(0.012, y, below, fontsize=8.5, va="top", color=color)
+    figure.supxlabel(footer, x=0.012, ha="left", fontsize=6.5, color=FAINT, linespacing=1.4)
+    for text in figure.findobj(Text):
+        text.set_parse_math(False)
 
 
 def draw_steps(
@@ -191,16 +189,10 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
     cases = comparison.cases
     n_columns = min(len(cases), CASES_PER_ROW)
     n_rows = 2 * -(-len(cases) // CASES_PER_ROW)
-    panel_height = 0.35 + _LINE_HEIGHT * len(comparison.variants)
-    labels = 0.3 + 0.072 * max(len(variant.title) for variant in comparison.variants)
-    width = max(6.4, labels + n_columns * _PANEL_WIDTH + 0.3)
-    top, bottom, gap = 0.95, 0.95, 0.75
-    height = top + bottom + n_rows * panel_height + (n_rows - 1) * gap
-    figure = Figure(figsize=(width, height))
-    figure.subplots_adjust(
-        left=labels / width, right=1 - 0.3 / width, top=1 - top / height, bottom=bottom / height,
-        hspace=gap / panel_height, wspace=0.14,
-    )  # fmt: skip
+    names = 0.3 + 0.072 * max(len(variant.title) for variant in comparison.variants)
+    width = max(6.4, names + n_columns * _PANEL_WIDTH)
+    panel_height = 1.0 + _LINE_HEIGHT * len(comparison.variants)
+    figure = Figure(figsize=(width, 1.2 + n_rows * panel_height), layout="constrained")
     grid = figure.subplots(n_rows, n_columns, squeeze=False)
     for axes in grid.ravel():
         axes.set_visible(False)
@@ -210,15 +202,12 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
         _draw_case(pair, comparison, case.id, with_names=column == 0)
         pair[0].set_title(case.title, fontsize=9, loc="left", color=INK)
     study = comparison.study
-    figure.text(0.012, 1 - 0.12 / height, study.title, fontsize=12, va="top", color=INK)
-    below = (
-        f"{study.n_trials} trials per case and variant; compared with {study.reference} (dotted)"
-    )
-    figure.text(0.012, 1 - 0.36 / height, below, fontsize=8.5, va="top", color=FAINT)
     # Triangles are drawn where trials differ in length, and so in where they are cut off.
     ends = {one.result.last_episode for one in comparison.measured.values()}
-    write_footer(
+    label(
         figure,
+        study.title,
+        f"{study.n_trials} trials per case and variant; compared with {study.reference} (dotted)",
         "Faint dots: trials. Large dot: their median (of the share solved: mean) with its 95 %"
         " interval; filled: the reference, and what\ndiffers from it trial by trial (the interval"
         " of the mean paired difference leaves 0 out)."
@@ -226,7 +215,7 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
         + ("Triangles: beyond the last episode. " if len(ends) > 1 else "")
         + footer,
     )
-    return as_written(figure)
+    return figure
 
 
 def _draw_case(
