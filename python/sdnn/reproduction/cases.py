@@ -36,15 +36,11 @@ class Case:
 
 @dataclass(frozen=True)
 class Experiment:
-    """One figure with a panel for each case.
-
-    With `start_panels` a small panel below each case shows its first episodes again.
-    """
+    """One figure with a panel for each case."""
 
     id: str
     title: str
     cases: tuple[Case, ...]
-    start_panels: bool = False
 
     @property
     def pairs(self) -> frozenset[tuple[str, str]]:
@@ -72,7 +68,6 @@ EXPERIMENTS = (
             Case("s4", "4 inputs", 4, 0.0, ("sdnn-c",), "Fig. 4a"),
             Case("s6", "6 inputs, 2 of them redundant", 6, 0.0, ("sdnn-c",), "Fig. 4b"),
         ),
-        start_panels=True,
     ),
     Experiment(
         id="b",
@@ -83,7 +78,6 @@ EXPERIMENTS = (
             Case("s5-noise", "Case III: 5 noisy inputs", 5, SENSOR_NOISE, BOTH, "Fig. 6b"),
             Case("s6-noise", "Case IV: 6 noisy inputs", 6, SENSOR_NOISE, BOTH, "Fig. 6c"),
         ),
-        start_panels=True,
     ),
 )
 """The paper's experiments, A and B."""

@@ -395,26 +395,20 @@ class TenTrials:
         )
 
 
-@dataclass(frozen=True)
-class Power:
-    """Shares of the draws of a number of trials in which a check holds, and does not."""
+def powers(check: Check, samples: Sequence[FloatArray]) -> list[dict[str, float]]:
+    """Draw more trials than these samples of a check, judge each draw, for each of `MULTIPLES`.
 
-    n_trials: int
-    holds: float
-    fails: float
-
-
-def powers(check: Check, samples: Sequence[FloatArray]) -> tuple[Power, ...]:
-    """Draw more trials than these samples of a check, judge each draw, for each of `MULTIPLES`."""
+    Returns, for each number of trials, the shares of the draws in which the check holds and fails.
+    """
     found = []
     for multiple in MULTIPLES:
         generator = np.random.default_rng(BOOTSTRAP_SEED)
         medians = reduce(np.subtract, [drawn_medians(one, multiple, generator) for one in samples])
         lower, upper = tails(medians)
-        holds = (check.contains(lower) & check.contains(upper)).mean()
-        fails = check.excludes(lower, upper).mean()
-        found.append(Power(multiple * samples[0].size, float(holds), float(fails)))
-    return tuple(found)
+        holds = float((check.contains(lower) & check.contains(upper)).mean())
+        fails = float(check.excludes(lower, upper).mean())
+        found.append({"n_trials": multiple * samples[0].size, "holds": holds, "fails": fails})
+    return found
 
 
 def drawn_medians(sample: FloatArray, multiple: int, generator: np.random.Generator) -> FloatArray:

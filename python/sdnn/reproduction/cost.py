@@ -14,10 +14,9 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from gymnasium.spaces import Box
 
 from sdnn import _core, machine
-from sdnn.config import RBFNetworkConfig
+from sdnn.config import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.runs.engine import Observer
 from sdnn.runs.registry import AGENTS, split_label
 from sdnn.runs.store import ResultStore
@@ -31,7 +30,7 @@ COST_ROW_HEADER = (
 """Columns of the file of all rounds of cost measurements."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class CostSeries:
     """A curve in the figure of costs: an agent of the core, evaluated in one way.
 
@@ -42,10 +41,18 @@ class CostSeries:
     title: str
     agent: str
     growth: str  # what the number of operations is proportional to (mathtext)
+    core_agent: Callable[..., Any]
     learned_bytes: Callable[[Any], int]  # of the approximator's settings
     settings: Mapping[str, Any] = field(default_factory=dict)  # that are not the default
-    core_agent: Callable[..., Any] | None = None  # None: that inside the Python agent
     is_plain: bool = False  # its product structure is unused: seconds a step with many inputs
+
+
+def _sdnn_bytes(network: SDNNCConfig) -> int:
+    return network.n_pattern_units * network.n_pairs * network.n_hidden_units
+
+
+def _rules_bytes(rules: FuzzyRulesConfig) -> int:
+    return int(4 * rules.n_sets**rules.n_inputs * rules.n_actions)
 
 
 def _rbf_bytes(network: RBFNetworkConfig) -> int:
@@ -53,38 +60,16 @@ def _rbf_bytes(network: RBFNetworkConfig) -> int:
 
 
 SERIES = (
-    CostSeries(
-        id="sdnn-c",
-        title="SDNN-C",
-        agent="sdnn-c",
-        growth="$d(d-1)$ groups of columns",
-        learned_bytes=lambda one: one.n_pattern_units * one.n_pairs * one.n_hidden_units,
-    ),
-    CostSeries(
-        id="fuzzy",
-        title="FQL",
-        agent="fuzzy",
-        growth="$2^d$ fired rules of $9^d$",
-        learned_bytes=lambda one: 4 * one.n_sets**one.n_inputs * one.n_actions,
-        settings={"max_table_bytes": 2**32},  # with 8 inputs it has 3.6 GB, nearly all untouched
-    ),
-    CostSeries(
-        id="rbf",
-        title="RBFN, factored",
-        agent="rbf",
-        growth="$4^{d+1}$ weights",
-        learned_bytes=_rbf_bytes,
-    ),
-    CostSeries(
-        id="rbf-plain",
-        title="RBFN, plain",
-        agent="rbf",
-        growth="$601 \\cdot 4^{d+1}$ basis values",
-        learned_bytes=_rbf_bytes,
-        core_agent=_core.PlainRBFQLearning,
-        is_plain=True,
-    ),
-)
+    CostSeries("sdnn-c", "SDNN-C", "sdnn-c", "$d(d-1)$ groups of columns",
+               _core.SDNNQLearning, _sdnn_bytes),
+    CostSeries("fuzzy", "FQL", "fuzzy", "$2^d$ fired rules of $9^d$",
+               _core.FuzzyQLearning, _rules_bytes,
+               {"max_table_bytes": 2**32}),  # with 8 inputs it has 3.6 GB, nearly all untouched
+    CostSeries("rbf", "RBFN, factored", "rbf", "$4^{d+1}$ weights",
+               _core.RBFQLearning, _rbf_bytes),
+    CostSeries("rbf-plain", "RBFN, plain", "rbf", "$601 \\cdot 4^{d+1}$ basis values",
+               _core.PlainRBFQLearning, _rbf_bytes, is_plain=True),
+)  # fmt: skip
 """All curves, in the order of the figure."""
 
 
@@ -156,7 +141,6 @@ class CostConfig:
     n_inputs: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 8)
     n_rounds: int = 5
     round_seconds: float = 0.1
-    min_steps: int = 1  # in a round
     n_learned: int = 500  # steps before the first round, so that no weights are fresh
     most_plain_inputs: int = 8  # of plain evaluations, seconds a step with 8 inputs
 
@@ -166,12 +150,12 @@ class CostConfig:
 
         Times of another machine or version are no part of one comparison.
         """
-        told = {**asdict(self), "version": _core.__version__, "machine": machine.description()}
-        text = json.dumps(told, sort_keys=True, separators=(",", ":"))
+        values = {**asdict(self), "version": _core.__version__, "machine": machine.description()}
+        text = json.dumps(values, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-QUICK_COST = CostConfig(n_rounds=3, round_seconds=0.01, min_steps=1, most_plain_inputs=5)
+QUICK_COST = CostConfig(n_rounds=3, round_seconds=0.01, most_plain_inputs=5)
 
 
 def cost_keys(config: CostConfig, agents: Iterable[str] | None = None) -> tuple[CostKey, ...]:
@@ -213,14 +197,8 @@ def measure_steps(
     """
     entry = AGENTS[series.agent]
     approximator = entry.approximator(**(dict(series.settings) | {"n_inputs": n_inputs}))
-    given: dict[str, Any] = {"approximator": approximator, "learning": entry.learning()}
     try:
-        if series.core_agent is not None:
-            agent = series.core_agent(**given, seed=SEED)
-        else:
-            spaces = Box(0.0, 1.0, (n_inputs,), np.float64), Box(-1.0, 1.0, (1,), np.float64)
-            made: Any = entry.agent(*spaces, **given, seed=SEED)
-            agent = made.core
+        agent = series.core_agent(approximator=approximator, learning=entry.learning(), seed=SEED)
     except MemoryError:
         return None
     step_seconds = float(_core.time_agent_steps(agent, 1, SEED)[0]) / 1e9
@@ -229,7 +207,7 @@ def measure_steps(
     learning = _core.time_agent_steps(agent, n_learned, SEED + 1)
     if n_learned:
         in_a_round = int(config.round_seconds * 1e9 / float(np.median(learning)))
-    n_steps = max(config.min_steps, in_a_round)
+    n_steps = max(1, in_a_round)
     medians = tuple(
         float(np.median(_core.time_agent_steps(agent, n_steps, SEED + 2 + number))) / 1e3
         for number in range(config.n_rounds)

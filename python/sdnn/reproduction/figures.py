@@ -38,6 +38,7 @@ def draw_experiment(
 ) -> Figure:
     """Draw an experiment: a panel per case, a line and an interquartile band per agent.
 
+    Long runs have a small panel below each case, which shows the first episodes again.
     With `quick` the figure is marked as a quick look, which is no result.
     """
     require_matplotlib()
@@ -46,30 +47,29 @@ def draw_experiment(
     n_columns = min(2, len(experiment.cases))
     n_rows = -(-len(experiment.cases) // n_columns)
     # The start is too small a part of the panels to be seen in those of a long run.
-    smooth = max(result.last_episode for result in results) >= 4 * START_EPISODES
-    with_start = experiment.start_panels and smooth
-    heights = (_PANEL_HEIGHT, _START_HEIGHT) if with_start else (_PANEL_HEIGHT,)
+    is_long = max(result.last_episode for result in results) >= 4 * START_EPISODES
+    heights = (_PANEL_HEIGHT, _START_HEIGHT) if is_long else (_PANEL_HEIGHT,)
     height = 1.1 + n_rows * sum(heights)
     figure = Figure(figsize=(5.4 * n_columns, height), layout="constrained")
     grid = figure.subplots(
         n_rows * len(heights), n_columns, sharey=True, squeeze=False, height_ratios=heights * n_rows
     )
     panels = grid[:: len(heights)].ravel()
-    starts = grid[1::2].ravel() if with_start else ()
+    starts = grid[1::2].ravel() if is_long else ()
     colors = agent_colors(result.agent for result in results)
     for number, (case, axes) in enumerate(zip(experiment.cases, panels, strict=False)):
         shown = [result for result in results if result.case_id == case.id]
         axes.set_title(case.title, fontsize=10.5, loc="left", color=INK)
         axes.set_title(f"paper: {case.paper_figure}", fontsize=8, loc="right", color=FAINT)
-        draw_steps(axes, shown, colors, smooth=smooth)
+        draw_steps(axes, shown, colors, smooth=is_long)
         axes.set_ylim(0, MAX_STEPS)
         if number % n_columns == 0:
             axes.set_ylabel("steps per test episode")
-        if with_start or number >= len(experiment.cases) - n_columns:
+        if is_long or number >= len(experiment.cases) - n_columns:
             axes.set_xlabel("learning episodes")
         if quick:
             _watermark(axes)
-        if with_start:
+        if is_long:
             start, words = starts[number], f"the first {START_EPISODES} learning episodes"
             draw_steps(start, shown, colors, smooth=False)
             start.set(xlim=(0, START_EPISODES), ylim=(0, MAX_STEPS))
@@ -82,7 +82,7 @@ def draw_experiment(
             lines[::-1], titles[::-1], frameon=False, fontsize=9.5, loc="upper right",
             bbox_to_anchor=(0.99, 1 - 0.08 / height), ncols=len(colors),
         )  # fmt: skip
-    _label(figure, experiment.title, results, smooth=smooth, quick=quick)
+    _label(figure, experiment.title, results, smooth=is_long, quick=quick)
     return figure
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -22,7 +22,6 @@ from sdnn.reproduction.claims import (
     Claim,
     ClaimOutcome,
     Growth,
-    Power,
     Verdict,
     is_paper_scale,
     judge_claims,
@@ -102,7 +101,7 @@ class Report:
         return judge_claims(self.results, self.costs, self.reference)
 
     @cached_property
-    def powers(self) -> tuple[tuple[Claim, CheckOutcome, tuple[Power, ...]], ...]:
+    def powers(self) -> tuple[tuple[Claim, CheckOutcome, list[dict[str, float]]], ...]:
         """What more trials would say of the checks that the most trials leave undecided."""
         return tuple(
             (one.claim, checked, powers(checked.check, checked.samples))
@@ -153,7 +152,7 @@ class Report:
         if self.powers:
             rows = [
                 (str(claim.number), str(checked.check.quantity), format_quantity(checked),
-                 *(f"{100 * one.holds:.0f} / {100 * one.fails:.0f} %" for one in found))
+                 *(f"{100 * one['holds']:.0f} / {100 * one['fails']:.0f} %" for one in found))
                 for claim, checked, found in self.powers
             ]  # fmt: skip
             header = ("claim", "measured", "ours", *(f"{n} x the trials" for n in MULTIPLES))
@@ -219,11 +218,7 @@ class Report:
                 for one in self.claims
             ],
             "powers": [
-                {
-                    "claim": claim.number,
-                    "measured": str(checked.check.quantity),
-                    "with": [asdict(one) for one in found],
-                }
+                {"claim": claim.number, "measured": str(checked.check.quantity), "with": found}
                 for claim, checked, found in self.powers
             ],
         }

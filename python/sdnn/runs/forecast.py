@@ -29,27 +29,11 @@ def forecast(
 ) -> dict[str, Any]:
     """Count what is to be run and estimate how long it takes, without making any file.
 
-    Parameters
-    ----------
-    out
-        Folder of the result file.
-    groups
-        Trials of one specification each, by the ids of the case and of what runs in it.
-    jobs
-        Trials at the same time.
-    check
-        Receives what is stored before any trial is begun, and may raise.
-
-    Returns
-    -------
-    dict
-        Values that JSON can hold. The ``upper`` seconds are null where the trials that they are
-        from are shorter: later episodes are longer where the task gets harder.
-
-    Raises
-    ------
-    RunError
-        If a trial that is begun to see how long it takes fails, or the result file cannot be used.
+    `groups` are trials of one specification each, by the ids of the case and of what runs in it;
+    `check` receives what is stored in `out` before any trial is begun, and may raise. Returns
+    values that JSON can hold. The ``upper`` seconds are null where the trials that they are from
+    are shorter: later episodes are longer where the task gets harder. A RunError says that a trial
+    that is begun to see how long it takes fails, or that the result file cannot be used.
     """
     stored: set[TrialKey] = set()
     times: Times = {}

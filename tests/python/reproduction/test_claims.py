@@ -14,7 +14,6 @@ from sdnn.reproduction.claims import (
     ClaimOutcome,
     Growth,
     Median,
-    Power,
     Subject,
     Verdict,
     drawn_medians,
@@ -195,22 +194,22 @@ def powers_of(outcome):
 def test_power_is_repeatable():
     undecided = outcome_of([3, 4, 5, 9], at_most=5)
     assert undecided.verdict == Verdict.UNDECIDED
-    assert [one.n_trials for one in powers_of(undecided)] == [4 * n for n in MULTIPLES]
+    assert [one["n_trials"] for one in powers_of(undecided)] == [4 * n for n in MULTIPLES]
     assert powers_of(undecided) == powers_of(undecided)
 
 
 def test_power_says_what_more_trials_would_decide():
     mostly_good = powers_of(outcome_of([4] * 7 + [math.inf] * 3, at_most=5))
-    assert [one.fails for one in mostly_good] == [0.0] * len(MULTIPLES)
-    assert mostly_good[0].holds < 0.9
-    assert mostly_good[-1].holds == 1.0
+    assert [one["fails"] for one in mostly_good] == [0.0] * len(MULTIPLES)
+    assert mostly_good[0]["holds"] < 0.9
+    assert mostly_good[-1]["holds"] == 1.0
     mostly_bad = powers_of(outcome_of([4] * 4 + [50] * 8, at_most=5))
-    assert mostly_bad[-1] == Power(12 * MULTIPLES[-1], 0.0, 1.0)
+    assert mostly_bad[-1] == {"n_trials": 12 * MULTIPLES[-1], "holds": 0.0, "fails": 1.0}
     for one in powers_of(outcome_of([4] * 5 + [50] * 5, at_most=5)):  # a coin, however often thrown
-        assert one.holds + one.fails < 0.2
+        assert one["holds"] + one["fails"] < 0.2
     apart = powers_of(outcome_of([9, 10, 11, 30], [5, 8, 9, 10], at_least=1))
-    assert apart[-1].holds > 0.95
-    assert apart[-1].fails == 0.0
+    assert apart[-1]["holds"] > 0.95
+    assert apart[-1]["fails"] == 0.0
 
 
 @pytest.mark.parametrize("multiple", [1, 3, 4])

@@ -82,8 +82,6 @@ def test_start_has_panels_of_its_own_in_long_runs(results):
     for axes, start in zip(figure.axes[:2], figure.axes[2:], strict=True):
         assert start.get_xlim() == (0, 500)
         np.testing.assert_array_equal(curves_of(start)[0][1], curves_of(axes)[-1][1])
-    without = replace(EXPERIMENT, start_panels=False)
-    assert len(draw_experiment(without, results).axes) == 2
 
 
 def test_only_the_planned_trials_are_drawn(results):
