@@ -28,7 +28,7 @@ def with_infinities(ends: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def flat_bounds(space: gym.Space[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give the bounds of the vector to which Gymnasium flattens a space; infinite: it has none.
+    """Return the bounds of the vector to which Gymnasium flattens a space; infinite: none.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def flat_bounds(space: gym.Space[Any]) -> tuple[NDArray[np.float64], NDArray[np.
     n_variables = _n_variables(space)
     if n_variables == 0:
         return np.empty(0), np.empty(0)
-    if n_variables > _MOST_VARIABLES:  # asked before memory is
+    if n_variables > _MOST_VARIABLES:  # before memory is allocated
         raise ValueError(
             f"observation_space must have at most {_MOST_VARIABLES} variables, got {n_variables}"
         )
@@ -51,7 +51,7 @@ def flat_bounds(space: gym.Space[Any]) -> tuple[NDArray[np.float64], NDArray[np.
 
 
 def _ends_of_parts(space: gym.Space[Any]) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
-    """Give the bounds of the parts in the order in which Gymnasium flattens them."""
+    """Yield the bounds of the parts in the order in which Gymnasium flattens them."""
     if isinstance(space, gym.spaces.Dict | gym.spaces.Tuple):
         parts = space.spaces.values() if isinstance(space, gym.spaces.Dict) else space.spaces
         for part in parts:

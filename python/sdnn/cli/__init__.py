@@ -9,9 +9,9 @@ from typing import Any
 import click
 
 from sdnn.cli.bench import bench
+from sdnn.cli.common import exit_interrupted
 from sdnn.cli.evaluate import evaluate
 from sdnn.cli.export import export
-from sdnn.cli.output import exit_interrupted
 from sdnn.cli.plot import plot
 from sdnn.cli.record import record
 from sdnn.cli.reproduce import reproduce
@@ -60,14 +60,14 @@ class _Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; Ctrl-C has its exit code also while nothing has begun.
 
-        What cannot be read or written, also what is printed, is told in a line.
+        Errors in reading and writing files, also standard output, become a line.
         """
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:
-            exit_interrupted(ctx, "Interrupted.")
+            exit_interrupted("Interrupted.")
         except OSError as error:
-            if error.errno == errno.EPIPE:  # nobody reads on: Click ends quietly
+            if error.errno == errno.EPIPE:  # the reader has ended: Click ends quietly
                 raise
             raise click.ClickException(str(error)) from error
 

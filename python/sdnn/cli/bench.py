@@ -6,7 +6,7 @@ import json
 
 import click
 
-from sdnn.cli.output import make_console
+from sdnn.cli.common import make_console
 
 
 @click.command(short_help="Measure how quick the library is on this machine.")

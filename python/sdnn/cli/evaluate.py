@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.output import json_text
-from sdnn.cli.run_options import (
+from sdnn.cli.common import (
     WARMING_UP,
     json_option,
+    json_text,
     run_argument,
     run_command,
     seed_option,

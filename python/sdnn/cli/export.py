@@ -7,8 +7,7 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.output import json_text
-from sdnn.cli.run_options import json_option, run_command, words_of_run
+from sdnn.cli.common import json_option, json_text, run_command, words_of_run
 
 
 @click.command(short_help="Write a run's policy as a C header, for small processors.")

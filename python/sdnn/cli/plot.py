@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.run_options import check_ending, option_words, run_command
+from sdnn.cli.common import check_ending, option_words, run_command
 
 
 @click.command(short_help="Draw the learning curves of runs.")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.run_options import (
+from sdnn.cli.common import (
     WARMING_UP,
     check_ending,
     run_argument,

@@ -8,8 +8,8 @@ from typing import Any
 import click
 
 from sdnn._core import presets
+from sdnn.cli.common import errors_in_a_line, print_forecast, run_and_report
 from sdnn.cli.executor_options import executor_options
-from sdnn.cli.output import experiment_command, print_forecast, run_and_report
 from sdnn.reproduction.cases import MOST_EPISODES, WORDS, includes_cost, select_experiments
 
 
@@ -41,10 +41,10 @@ from sdnn.reproduction.cases import MOST_EPISODES, WORDS, includes_cost, select_
 @click.option(
     "--quick",
     is_flag=True,
-    help="A look at a fraction: 2 trials x 300 episodes. Not the result.",
+    help="A fraction of it: 2 trials x 300 episodes. Not the result.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
-@click.option("--dry-run", is_flag=True, help="Only say what would be run, and how long it takes.")
+@click.option("--dry-run", is_flag=True, help="Print what would be run and how long it takes.")
 @click.option(
     "--agent",
     "agents",
@@ -81,7 +81,7 @@ def reproduce(
         _ = request.plan
     except ValueError as error:
         raise click.UsageError(str(error)) from error
-    with experiment_command(context):
+    with errors_in_a_line():
         if dry_run:
             planned, stored = request.count_costs()
             costs = {"planned": planned, "stored": stored}

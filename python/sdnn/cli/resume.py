@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.run_options import (
+from sdnn.cli.common import (
     json_option,
     run_argument,
     run_command,

@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
+from sdnn.cli.common import errors_in_a_line, print_forecast, run_and_report
 from sdnn.cli.executor_options import executor_options
-from sdnn.cli.output import experiment_command, print_forecast, run_and_report
 
 
 @click.command(short_help="Run a study: variants of any setting, trial by trial.")
@@ -33,7 +33,7 @@ from sdnn.cli.output import experiment_command, print_forecast, run_and_report
     "--only", metavar="VARIANT", multiple=True, help="Run this variant only; may be repeated."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
-@click.option("--dry-run", is_flag=True, help="Only say what would be run, and how long it takes.")
+@click.option("--dry-run", is_flag=True, help="Print what would be run and how long it takes.")
 @click.pass_context
 def sweep(
     context: click.Context,
@@ -69,7 +69,7 @@ def sweep(
         _ = request.plan
     except (ConfigError, ValueError) as error:
         raise click.UsageError(str(error)) from error
-    with experiment_command(context):
+    with errors_in_a_line():
         if dry_run:
             print_forecast(request, as_json=as_json, check=request.study.check)
         else:

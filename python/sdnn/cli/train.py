@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from sdnn.cli.run_options import (
-    SpecCommand,
-    given_values,
+from sdnn.cli.common import (
+    KEYS,
     json_option,
     named_values,
     option_of,
@@ -23,6 +23,66 @@ from sdnn.cli.run_options import (
 
 if TYPE_CHECKING:
     from sdnn.runs import ConfigError, RunSpec
+
+
+class SpecCommand(click.Command):
+    """A command with the options of `KEYS`, which are made when they are first needed."""
+
+    _made: list[click.Parameter] | None = None
+
+    @property
+    def params(self) -> list[click.Parameter]:
+        """All parameters; those of a specification come after the command's own."""
+        if self._made is None:
+            self._made = [*self._own, *_options()]
+        return self._made
+
+    @params.setter
+    def params(self, own: list[click.Parameter]) -> None:
+        self._own = own
+        self._made = None
+
+
+def _options() -> Iterator[click.Option]:
+    """Make the options of `KEYS` from the schema of the specification's fields."""
+    import msgspec
+
+    from sdnn.runs import RunSpec
+
+    _, schemas = msgspec.json.schema_components([RunSpec])
+    for key in KEYS:
+        found: dict[str, Any] = {"$ref": "RunSpec"}
+        for name in key.split("."):
+            parts = (found, *found.get("anyOf", ()))
+            table = next(one["$ref"] for one in parts if "$ref" in one).rpartition("/")[2]
+            found = schemas[table]["properties"][name]
+        kind = next((one for one in found.get("anyOf", ()) if one.get("type") != "null"), found)
+        is_flag, default = kind.get("type") == "boolean", found.get("default")
+        shown = "" if default is None or is_flag else f"  [default: {default}]"
+        yield click.Option(
+            [option_of(key), key.replace(".", "_")],
+            type=None if is_flag else _option_type(kind),
+            is_flag=is_flag,
+            default=None,
+            help=found["description"].replace("`", "") + shown,
+        )
+
+
+def _option_type(kind: Mapping[str, Any]) -> Any:
+    low, high = kind.get("minimum"), kind.get("maximum")
+    if "enum" in kind:
+        return click.Choice([word for word in kind["enum"] if word is not None])
+    if kind.get("type") == "integer":
+        return click.IntRange(low, None if high == 2**53 else high)
+    if kind.get("type") == "number":
+        return click.FLOAT if low is None else click.FloatRange(low, high)
+    return click.STRING
+
+
+def given_values(options: dict[str, Any]) -> dict[str, Any]:
+    """Take the options of a specification out of those of a command: given values by their keys."""
+    found = {key: options.pop(key.replace(".", "_")) for key in KEYS}
+    return {key: value for key, value in found.items() if value is not None and value is not False}
 
 
 @click.command(cls=SpecCommand, short_help="Learn in a Gymnasium environment.")

@@ -1,4 +1,4 @@
-"""The environment of a run: any of Gymnasium's, with noisy and redundant sensors if wanted."""
+"""The environment of a run: any of Gymnasium's, with noisy and redundant sensors."""
 
 from __future__ import annotations
 
@@ -204,11 +204,11 @@ class EnvironmentSpec(Settings, frozen=True):
         return True
 
     def opened(self) -> AbstractContextManager[gym.Env[Any, Any]]:
-        """Make the bare environment, for a block that looks at it."""
+        """Make the bare environment, which is closed after the block."""
         return closing(self._bare(None))
 
     def scaled_ranges(self) -> Ends:
-        """Give the lowest and highest values of the variables that are scaled to [0, 1].
+        """Return the lowest and highest values of the variables that are scaled to [0, 1].
 
         With noise or redundant variables the agent knows no others. Where it acts without them,
         it needs ``UnitSensors(env, low, high)``.
@@ -234,7 +234,7 @@ class EnvironmentSpec(Settings, frozen=True):
             return self.ends(env)
 
     def scaling(self, env: gym.Env[Any, Any] | None = None) -> Scaling | None:
-        """Say how what an agent observes is scaled; None: not at all.
+        """Return how observations are scaled; None: not at all.
 
         Without an environment that `make` gave, one is made.
         """
@@ -245,7 +245,7 @@ class EnvironmentSpec(Settings, frozen=True):
         return Scaling(ranges=ranges, n_redundant=self.redundant)
 
     def ends(self, env: gym.Env[Any, Any]) -> Ends:
-        """Give the lowest and highest values of the flattened observation; infinite: not known.
+        """Return the lowest and highest values of the flattened observation; infinite: not known.
 
         Raises
         ------
@@ -315,7 +315,7 @@ def _scaled_from(env: gym.Env[Any, Any]) -> Ends:
 
 
 def render_modes(env: gym.Env[Any, Any]) -> tuple[str, ...]:
-    """Give the render modes that an environment says it has; none where it says nothing."""
+    """Return the render modes in the metadata of an environment; none where there are none."""
     return tuple((env.metadata or {}).get("render_modes") or ())
 
 

@@ -420,8 +420,8 @@ class RunSpec(Settings, frozen=True):
     def from_values(cls, values: Mapping[str, Any]) -> RunSpec:
         """Make it of values as JSON or TOML has them.
 
-        ``environment`` may be the id of one, and ``agent`` the name of one, with its preset if
-        wanted: ``"sdnn-c-robust"``.
+        ``environment`` may be the id of one, and ``agent`` the name of one, perhaps with a preset:
+        ``"sdnn-c-robust"``.
 
         Raises
         ------

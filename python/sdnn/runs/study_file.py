@@ -17,7 +17,7 @@ from sdnn.runs.config_file import ConfigFile, KeyPath, dotted
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.registry import labels, split_label
 from sdnn.runs.settings import Settings, check_names, possible_words, read
-from sdnn.runs.spec import SHORTHANDS, RunSpec
+from sdnn.runs.spec import SHORTHANDS, RunSpec, overridden
 
 BASE = "base"
 """The variant without overrides, where axes are varied one at a time or nothing varies."""
@@ -162,7 +162,8 @@ class StudyReader:
         for layer in (self.base, *(self.agents.get(word, {}) for word in words), *own):
             settings |= layer
         try:
-            return RunSpec.from_values(nested(settings)), settings
+            values = {".".join(name): setting.value for name, setting in settings.items()}
+            return RunSpec.from_values(overridden({}, values)), settings
         except ConfigError as error:
             raise self.refusal(settings, case, variant, error) from error
 
@@ -208,7 +209,9 @@ class StudyReader:
                 raise self.file.error(place, f"must be {words}, got {'.'.join(name)}")
             if name[0] in ("seed", "output"):
                 raise self.file.error(place, "is no setting of a study: see [study]")
-            if len(name) == 1 and name[0] in SHORTHANDS:
+            if len(name) == 1:
+                if name[0] not in SHORTHANDS:
+                    raise self.file.error(place, f"must be a table, got {value!r}")
                 name = (*name, SHORTHANDS[name[0]])
             if name in found:
                 raise self.file.error(place, f"{'.'.join(name)} is set twice")
@@ -354,17 +357,3 @@ class StudyReader:
 
 def _value_words(value: Any) -> str:
     return value if isinstance(value, str) else json.dumps(value, default=str)
-
-
-def nested(settings: Layer) -> dict[str, Any]:
-    """Return settings as the tables of a specification."""
-    tables: dict[str, Any] = {}
-    for name, setting in settings.items():
-        table = tables
-        for word in name[:-1]:
-            table = table.setdefault(word, {})
-            if not isinstance(table, dict):
-                break
-        else:
-            table[name[-1]] = setting.value
-    return tables

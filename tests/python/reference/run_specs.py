@@ -2,7 +2,7 @@
 
 import msgspec
 
-from sdnn.cli.run_options import KEYS
+from sdnn.cli.common import KEYS
 from sdnn.runs import RunSpec
 
 _KEYS = {"agent" if key == "agent.name" else key.rpartition(".")[2]: key for key in KEYS}

@@ -24,7 +24,7 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.cli import main
-from sdnn.cli.run_options import option_of, value_of
+from sdnn.cli.common import option_of, value_of
 from sdnn.environments import UnitSensors
 from sdnn.export import c_header
 from sdnn.runs import AGENTS, Run, RunSpec

@@ -1,7 +1,9 @@
-"""What the commands on runs share: options made from a specification, values, errors, outcomes."""
+"""What the commands share: options and values, errors and exit codes, and what is printed."""
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import sys
 import traceback
@@ -9,15 +11,21 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from signal import SIGINT, SIGTERM
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from sdnn.cli.output import exit_code, json_text
-
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from sdnn.agents.scaling import Scaling
     from sdnn.runs import ConfigError, Run, RunOutcome
+    from sdnn.runs.report import Finished
+
+EXIT_FAILURE = 1
+PLAIN_WIDTH = 160
+"""Width of tables that go to a file or pipe."""
+
 
 KEYS = (
     "agent.name", "agent.preset", "budget.steps", "budget.episodes", "budget.target_return", "seed",
@@ -40,66 +48,6 @@ seed_option = click.option(
     type=click.IntRange(min=0, max=2**64 - 1),
     help="Root of the episodes' seeds.  [default: others than those of the training]",
 )
-
-
-class SpecCommand(click.Command):
-    """A command with the options of `KEYS`, which are made when they are first needed."""
-
-    _made: list[click.Parameter] | None = None
-
-    @property
-    def params(self) -> list[click.Parameter]:
-        """All parameters; those of a specification come after the command's own."""
-        if self._made is None:
-            self._made = [*self._own, *_options()]
-        return self._made
-
-    @params.setter
-    def params(self, own: list[click.Parameter]) -> None:
-        self._own = own
-        self._made = None
-
-
-def _options() -> Iterator[click.Option]:
-    """Make the options of `KEYS` from the schema of the specification's fields."""
-    import msgspec
-
-    from sdnn.runs import RunSpec
-
-    _, schemas = msgspec.json.schema_components([RunSpec])
-    for key in KEYS:
-        found: dict[str, Any] = {"$ref": "RunSpec"}
-        for name in key.split("."):
-            parts = (found, *found.get("anyOf", ()))
-            table = next(one["$ref"] for one in parts if "$ref" in one).rpartition("/")[2]
-            found = schemas[table]["properties"][name]
-        kind = next((one for one in found.get("anyOf", ()) if one.get("type") != "null"), found)
-        is_flag, default = kind.get("type") == "boolean", found.get("default")
-        shown = "" if default is None or is_flag else f"  [default: {default}]"
-        yield click.Option(
-            [option_of(key), key.replace(".", "_")],
-            type=None if is_flag else _option_type(kind),
-            is_flag=is_flag,
-            default=None,
-            help=found["description"].replace("`", "") + shown,
-        )
-
-
-def _option_type(kind: Mapping[str, Any]) -> Any:
-    low, high = kind.get("minimum"), kind.get("maximum")
-    if "enum" in kind:
-        return click.Choice([word for word in kind["enum"] if word is not None])
-    if kind.get("type") == "integer":
-        return click.IntRange(low, None if high == 2**53 else high)
-    if kind.get("type") == "number":
-        return click.FLOAT if low is None else click.FloatRange(low, high)
-    return click.STRING
-
-
-def given_values(options: dict[str, Any]) -> dict[str, Any]:
-    """Take the options of a specification out of those of a command: given values by their keys."""
-    found = {key: options.pop(key.replace(".", "_")) for key in KEYS}
-    return {key: value for key, value in found.items() if value is not None and value is not False}
 
 
 def option_of(key: str) -> str:
@@ -164,6 +112,36 @@ def named_values(option: str, pairs: Iterable[str]) -> Iterator[tuple[str, str]]
 
 
 @contextmanager
+def errors_in_a_line(
+    words: Callable[[ConfigError], str] = str,
+    then: Callable[[], str] = lambda: "; what was finished is stored",
+) -> Iterator[None]:
+    """Make a line and an exit code of errors that users can correct, and of signals.
+
+    ``words`` returns the message about a configuration whose file is not known, ``then`` what
+    becomes of a run after a signal.
+    """
+    from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
+
+    try:
+        yield
+    except ConfigError as error:
+        raise click.UsageError(str(error) if error.place else words(error)) from error
+    except RunTerminatedError:
+        exit_interrupted("terminated" + then(), SIGTERM)
+    except RunError as error:
+        raise click.ClickException(str(error)) from error
+    except KeyboardInterrupt:
+        exit_interrupted("interrupted" + then())
+
+
+def exit_interrupted(message: str, number: int = SIGINT) -> NoReturn:
+    """Print what is kept, and exit as a command that a signal has ended, as shells have it."""
+    click.echo(message, err=True)
+    raise click.exceptions.Exit(128 + number)
+
+
+@contextmanager
 def run_command(
     words: Callable[[ConfigError], str], *, folder: Path | None = None
 ) -> Iterator[None]:
@@ -172,38 +150,22 @@ def run_command(
     ``words`` returns the message about a configuration whose file is not known. ``folder`` is the
     run that is resumed after an interrupt.
     """
-    from sdnn.runs import ConfigError, RunError, RunTerminatedError
+    from sdnn.runs.errors import RunError
 
     if not {"", os.getcwd()} & set(sys.path):
         sys.path.append(os.getcwd())
-    try:
-        yield
-    except ConfigError as error:
-        raise click.UsageError(str(error) if error.place else words(error)) from error
-    except RunTerminatedError as error:
-        _tell_how_to_resume("terminated", folder)
-        raise click.exceptions.Exit(exit_code(SIGTERM)) from error
-    except RunError as error:
-        raise click.ClickException(str(error)) from error
-    except KeyboardInterrupt as error:
-        _tell_how_to_resume("interrupted", folder)
-        raise click.exceptions.Exit(exit_code(SIGINT)) from error
-    except (click.ClickException, click.exceptions.Exit):
-        raise
-    except OSError as error:
-        if not _is_of_environment(error):
-            raise  # a file's of ours
-        _tell_failure(folder)
-        raise RuntimeError(f"the environment failed: {error}") from error
-    except Exception:
-        _tell_failure(folder)
-        raise
-
-
-def _tell_failure(folder: Path | None) -> None:
-    """Print how to resume beside the traceback, which the environment's author needs."""
-    if folder is not None and folder.exists():
-        _tell_how_to_resume("failed", folder)
+    with errors_in_a_line(words, lambda: _how_to_resume(folder)):
+        try:
+            yield
+        except (RunError, click.ClickException, click.exceptions.Exit):
+            raise
+        except Exception as error:  # of an environment, whose author needs the traceback, too
+            is_of_file = isinstance(error, OSError) and not _is_of_environment(error)
+            if not is_of_file and (way := _how_to_resume(folder)):
+                click.echo("failed" + way, err=True)
+            if is_of_file or not isinstance(error, OSError):
+                raise
+            raise RuntimeError(f"the environment failed: {error}") from error
 
 
 def _is_of_environment(error: BaseException) -> bool:
@@ -214,12 +176,11 @@ def _is_of_environment(error: BaseException) -> bool:
     return any(isinstance(frame.f_locals.get("self"), gym.Env) for frame, _ in frames)
 
 
-def _tell_how_to_resume(what: str, folder: Path | None) -> None:
+def _how_to_resume(folder: Path | None) -> str:
     from sdnn.runs.errors import command_line
 
     is_begun = folder is not None and folder.exists()
-    way = f"; {command_line('sdnn', 'resume', folder)} continues it" if is_begun else ""
-    click.echo(what + way, err=True)
+    return f"; {command_line('sdnn', 'resume', folder)} continues it" if is_begun else ""
 
 
 def train_run(
@@ -242,23 +203,11 @@ def train_run(
         steps=steps, episodes=episodes, callbacks=callbacks, repeat_episodes=repeat_episodes
     )
     if as_json:
-        click.echo(json_text({"folder": str(run.folder), **outcome_values(outcome)}))
+        shown = {k: v for k, v in vars(outcome).items() if k not in ("has_pictures", "scaling")}
+        click.echo(json_text({"folder": str(run.folder), **shown}))
         return
     for line in _outcome_lines(run, outcome):
         click.echo(line)
-
-
-def outcome_values(outcome: RunOutcome) -> Mapping[str, Any]:
-    """Return an outcome as JSON has it."""
-    report = outcome.learning_report
-    return {
-        "n_steps": outcome.n_steps,
-        "n_episodes": outcome.n_episodes,
-        "reason": outcome.reason,
-        "is_warming_up": outcome.is_warming_up,
-        "last_evaluation": outcome.last_evaluation,
-        "learning_report": None if report is None else dict(report),
-    }
 
 
 _LITTLE_OF_A_RANGE = 0.1
@@ -293,13 +242,8 @@ def _lines_of_scaling(run: Run, scaling: Scaling | None) -> Iterator[str]:
         )
 
 
-def _listed(words: Sequence[str]) -> str:
-    most = 8
-    return ", ".join(words[:most]) + (", ..." if len(words) > most else "")
-
-
 def _variables(numbers: Sequence[int]) -> str:
-    named = _listed([str(number) for number in numbers])
+    named = ", ".join(map(str, numbers[:8])) + (", ..." if len(numbers) > 8 else "")
     return f"observed variable{'s' if len(numbers) > 1 else ''} {named}"
 
 
@@ -333,3 +277,71 @@ def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
     if outcome.has_pictures:
         commands.append(("record", run.folder, "x.gif"))
     yield "next: " + ", ".join(command_line("sdnn", *words) for words in commands)
+
+
+def json_text(values: Any) -> str:
+    """Write values as JSON; numbers that it does not have, NaN and infinite ones, as null."""
+    return json.dumps(_finite(values), indent=2, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {name: _finite(one) for name, one in value.items()}
+    return [_finite(one) for one in value] if isinstance(value, list | tuple) else value
+
+
+def run_and_report(
+    context: click.Context, run: Callable[..., Finished], request: Any, *, as_json: bool
+) -> None:
+    """Run trials with a line of progress; print the results, what failed and how much is stored."""
+    from rich.console import Console
+
+    from sdnn.progress import ProgressBars
+
+    with ProgressBars(Console(stderr=True)) as observer:
+        done = run(request, observer=observer)
+    outcome = done.outcome
+    n_stored = outcome.n_reused + outcome.n_run
+    stored = f"{n_stored} of {outcome.n_planned} trials are stored in {request.out}"
+    for failure in outcome.failures:
+        message = f"{type(failure.error).__name__}: {failure.error}"
+        click.echo(f"Error: {failure.planned.title} failed: {message}", err=True)
+    if outcome.interrupted:
+        what = "terminated" if outcome.signal == SIGTERM else "interrupted"
+        message = f"{what}; {stored}; the same command continues from there"
+        exit_interrupted(message, outcome.signal or SIGINT)
+    if done.page is None:
+        click.echo(f"Error: nothing is complete, no figure drawn; {stored}", err=True)
+    elif as_json:
+        click.echo(json.dumps(done.table, indent=2))
+    else:
+        done.page.print(make_console())
+        page = next(str(file) for file in done.files if file.suffix == ".html")
+        done_now = f"{stored} ({outcome.n_run} run now); " if outcome.n_planned else ""
+        click.echo(f"{done_now}wrote {len(done.files)} files: see {page}")
+    if done.page is None or outcome.failures:
+        context.exit(EXIT_FAILURE)
+
+
+def print_forecast(
+    request: Any, *, as_json: bool, more: Mapping[str, Any] | None = None, **options: Any
+) -> None:
+    """Print what is still to be run and how long that takes; as JSON with more values."""
+    from sdnn.machine import n_cores
+    from sdnn.runs.forecast import forecast, forecast_lines
+
+    # The size of a cluster is not known.
+    jobs = 1 if request.executor is not None else request.jobs or n_cores()
+    found = forecast(request.out, request.groups, jobs, **options) | dict(more or {})
+    lines = [json.dumps(found, indent=2)] if as_json else forecast_lines(found, request.out)
+    for line in lines:
+        click.echo(line)
+
+
+def make_console() -> Console:
+    """Make the console that tables are printed on: as wide as the terminal, if it is one."""
+    from rich.console import Console
+
+    return Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
