@@ -19,7 +19,7 @@ from measured import Processes, is_wanted, measured, run_missing
 
 from sdnn.agents import Callback, Training
 from sdnn.runs import RunSpec
-from sdnn.runs.engine import PlannedTrial, run_to_end
+from sdnn.runs.engine import PlannedTrial, plan_of, run_to_end
 from sdnn.runs.store import ResultStore
 from sdnn.runs.study import Study
 from sdnn.runs.trial import TrainingTrial, TrialKey, TrialRecord, TrialRows
@@ -131,17 +131,15 @@ def run_study(
 
     ``change`` makes another specification of that of a case.
     """
-    plan = {}
-    for (case, variant), one in study.combinations.items():
-        spec = change(one.spec, case)
-        for key in study.keys(case, variant):
-            if is_wanted((variant, case, key.trial), given):
-                key = key._replace(config_hash=spec.config_hash)
-                plan[key] = PlannedTrial(key, spec)
+    specs = [
+        (case, change(one.spec, case))
+        for (case, variant), one in study.combinations.items()
+        if is_wanted((variant, case), given)
+    ]
     if not given.redraw:
         executor = Processes(learn, given.jobs, study.reader.header.imports)
-        ordered = sorted(plan.values(), key=lambda planned: planned.key.trial)
-        run_missing(ordered, executor, given.folder, lambda store: _Trials(store, kind))
+        plan = plan_of(specs, study.n_trials, study.seed)
+        run_missing(plan, executor, given.folder, lambda store: _Trials(store, kind))
 
 
 def curves(
@@ -158,9 +156,8 @@ def curves(
     stored = measured(kind, given.folder)
     found = {}
     for (case, variant), one in study.combinations.items():
-        config_hash = change(one.spec, case).config_hash
-        keys = [key._replace(config_hash=config_hash) for key in study.keys(case, variant)]
-        own = [stored[key] for key in keys if key in stored]
+        plan = plan_of([(case, change(one.spec, case))], study.n_trials, study.seed)
+        own = [stored[planned.key] for planned in plan if planned.key in stored]
         old = [curve for key, curve in stored.items() if (*key[:2], key[4]) == (case, variant, "")]
         if own or old:
             found[case, variant] = own or old

@@ -81,7 +81,7 @@ def test_every_agent_learns_on_the_engine(scripts, monkeypatch):
     """As it is specified, but for its budget: those that need no other library."""
     monkeypatch.setattr(scripts.studies, "N_LAST_EPISODES", 2)
     study, tried = scripts.study, set()
-    for (case, variant), one in reversed(study.combinations.items()):
+    for (case, variant), one in study.combinations.items():
         if variant in tried or variant in ("sac", "td3", "ppo") or "Lander" in case:
             continue
         tried.add(variant)
@@ -93,12 +93,13 @@ def test_every_agent_learns_on_the_engine(scripts, monkeypatch):
         assert record.rows.table["kind"].tolist() == 3 * ["evaluation"]
         assert np.round(record.rows.episode_return, 2).tolist() == curve["mean_return"]
         assert curve["bytes"] > 0
-    assert len(tried) == 8
+    assert len(tried) == 11
 
 
 def test_a_trial_runs_in_a_process_of_its_own_and_once(scripts, tmp_path):
-    study, studies = scripts.study, scripts.studies
-    options = given(tmp_path, "tiles", "Pendulum", "noise", "1")
+    studies = scripts.studies
+    study = scripts.run.read_study(scripts.run.STUDY, n_trials=1)
+    options = given(tmp_path, "tiles", "Pendulum", "noise")
     found = {}
     for _ in range(2):
         studies.run_study("x", study, options, quick)
@@ -232,3 +233,123 @@ def test_sensors_by_their_statistics(scripts):
     observation, _ = plain.reset(seed=1)
     assert np.array_equal(observation[:3], gym.make("Pendulum-v1").reset(seed=1)[0])
     assert np.all(np.abs(observation[3:]) < 1)
+
+
+def test_tiles_of_pairs_tables_and_hashes(scripts):
+    tiles = sys.modules["tile_coding"]
+    pairs, joint = tiles.PairTiles(3, 4, 2), tiles.TileCoding(2, 4, 2)
+    assert pairs.n_tiles == 3 * joint.n_tiles
+    unit = np.array([0.1, 0.5, 0.9])
+    expected = [
+        joint(unit[[a, b]]) + n * joint.n_tiles for n, (a, b) in enumerate([(0, 1), (0, 2), (1, 2)])
+    ]
+    assert pairs(unit).tolist() == np.concatenate(expected).tolist()
+    hashed = tiles.HashedTiles(12, 8, 16, 1000)
+    some = np.random.default_rng(1).random((50, 12))
+    found = np.array([hashed(one) for one in some])
+    assert found.shape == (50, 16)
+    assert found.min() >= 0
+    assert found.max() < 1000
+    assert len(np.unique(found)) > 400
+    assert hashed(some[0]).tolist() == hashed(some[0] + 1e-6).tolist()
+    assert tiles.Table(5)(3).tolist() == [3]
+
+
+def test_swift_sarsa_is_true_online_where_step_sizes_are_fixed(scripts):
+    """Sutton and Barto (2018), section 12.5, with binary features; in all else SwiftTD differs."""
+    tiles = sys.modules["tile_coding"]
+    settings = tiles.SwiftConfig(
+        step_size=0.05, meta_step_size=0.0, largest_rate=1.0, step_size_decay=1.0,
+        trace_decay=0.9, smallest_trace=0.0,
+    )  # fmt: skip
+    spaces = gym.spaces.Box(0, 1, (1,)), gym.spaces.Discrete(2)
+    sizes = tiles.TilesConfig(n_bins=4, n_tilings=4)
+    agent = tiles.SwiftSarsa(*spaces, approximator=sizes, learning=settings, seed=1)
+    weights, random = np.zeros(agent.weights.size), np.random.default_rng(0)
+    for _ in range(3):
+        agent.begin_episode()
+        trace, old, before = np.zeros(weights.size), 0.0, None
+        for step in range(60):
+            active = (
+                random.choice(weights.size, 4, replace=False) if step < 59 else np.zeros(0, int)
+            )
+            reward = float(random.normal())
+            agent.step(active, reward)
+            x = np.zeros(weights.size)
+            x[active] = 1.0
+            if before is not None:
+                decayed = 0.99 * 0.9 * trace
+                trace = decayed + 0.05 * (1 - decayed @ before) * before
+                value, following = weights @ before, weights @ x
+                error = reward + 0.99 * following - value
+                weights += (error + value - old) * trace - 0.05 * (value - old) * before
+                old = following
+            before = x
+        assert np.allclose(agent.weights.ravel(), weights, atol=1e-12)
+        assert np.abs(weights).max() > 0.01
+
+
+@pytest.mark.parametrize(
+    ("settings", "values"),
+    [
+        ((0.01, 0.001, 0.1, 0.999), [0.0191506256, 1.91424491, 36.9045477, 39.5607346]),
+        ((0.001, 0.01, 0.5, 0.9), [0.00193799828, 0.423024012, 42.5330134, 39.3531971]),
+        ((0.05, 0.0, 1.0, 1.0), [0.09028176, 8.03872742, 42.4742184, 39.5957511]),
+    ],
+)
+def test_swift_sarsa_has_the_values_of_its_author(scripts, settings, values):
+    """Of SwiftTDBinaryFeatures, compiled with doubles, after 10, 100, 1,000 and 3,000 steps."""
+    tiles = sys.modules["tile_coding"]
+    names = ("step_size", "meta_step_size", "largest_rate", "step_size_decay")
+    learning = tiles.SwiftConfig(**dict(zip(names, settings, strict=True)))
+    spaces = gym.spaces.Box(0, 1, (1,)), gym.spaces.Discrete(2)
+    sizes = tiles.TilesConfig(n_bins=4, n_tilings=4)
+    agent = tiles.SwiftSarsa(*spaces, approximator=sizes, learning=learning, seed=1)
+    agent.begin_episode()
+    random, found = np.random.default_rng(0), []
+    for _ in range(3000):
+        active = np.sort(random.choice(40, 4, replace=False))
+        agent.step(active, float(active[0] < 5))
+        found.append(agent._value)
+    assert [found[n] for n in (9, 99, 999, 2999)] == pytest.approx(values, rel=1e-8)
+
+
+def test_stream_q_follows_the_gradient_of_its_value(scripts):
+    streaming = sys.modules["streaming"]
+    env = gym.make("Pendulum-v1")
+    spaces = env.observation_space, env.action_space
+    agent = streaming.StreamQ(*spaces, approximator=None, learning=None, seed=2)
+    agent.progress = 1.0
+    observation, _ = env.reset(seed=1)
+    agent.begin_episode()
+    for n in range(200):
+        action = agent.act(observation)
+        following, reward, *_ = env.step(action)
+        if n > 20 and agent._is_greedy:
+            break
+        agent.learn(streaming_transition(observation, action, reward, following))
+        observation = following
+    (network,), agent_action = agent.networks, agent._chosen
+    network.end_episode()
+    state, before = agent._state.copy(), network.parameters.copy()
+    agent.learn(streaming_transition(observation, action, reward, following))
+    agent.act(following)
+    moved = network.parameters - before
+    network.parameters[:] = before
+    largest = np.argsort(-np.abs(moved))[:20]
+    slopes = []
+    for place in largest:
+        ends = []
+        for change in (1e-3, -1e-3):
+            network.parameters[place] = before[place] + change
+            ends.append(float(network.outputs(state)[agent_action]))
+        network.parameters[place] = before[place]
+        slopes.append((ends[0] - ends[1]) / 2e-3)
+    ratios = moved[largest] / np.array(slopes)
+    assert np.allclose(ratios, np.median(ratios), rtol=0.05)
+
+
+def streaming_transition(observation, action, reward, following):
+    from sdnn.agents import Transition
+
+    return Transition(observation, action, reward, following, False)

@@ -1,11 +1,11 @@
-"""Stream AC(lambda): actor-critic that learns one step at a time without replay, as ours does.
+"""Stream AC(lambda) and stream Q(lambda): networks that learn one step at a time without replay.
 
 Source: Elsayed, M., Vasan, G., Mahmood, A. R. (2024). Streaming deep reinforcement learning finally
 works (arXiv:2410.14606), with the settings of its experiments. Written in NumPy, because on
 networks of this size a step takes a fraction of a millisecond, where automatic differentiation
-takes several; 200 steps of it gave PyTorch's weights after the authors' updates to the last digits
-of a float. Like the other learners here it observes no time, so a time limit does not end an
-episode for the critic; actions are in parts of half their range, as the paper's are.
+takes several; 200 steps of stream AC gave PyTorch's weights after the authors' updates to the last
+digits of a float. Like the other learners here they observe no time, so a time limit does not end
+an episode for the critic; actions are in parts of half their range, as the paper's are.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import gymnasium as gym
 import numpy as np
+from tile_coding import listed_actions
 
 from sdnn.runs.registry import AgentEntry, register
 
@@ -22,6 +23,9 @@ DISCOUNT, TRACE_DECAY = 0.99, 0.8
 ENTROPY = 0.01
 KAPPA_ACTOR, KAPPA_CRITIC = 3.0, 2.0
 N_UNITS, SPARSITY, SLOPE = 128, 0.9, 0.01
+N_UNITS_Q, KAPPA_Q = 32, 2.0
+EPSILON, FINAL_EPSILON, EXPLORATION = 1.0, 0.01, 0.05
+"""Of stream Q: chance of a random action at first, at last, and the share of a training between."""
 LAYER_EPSILON, MOMENTS_EPSILON = 1e-5, 1e-8
 
 
@@ -48,10 +52,12 @@ class Moments:
 class Network:
     """Two layers of normalized leaky units, linear outputs, and a trace of their gradients."""
 
-    def __init__(self, n_inputs: int, n_outputs: int, kappa: float, generator) -> None:
+    def __init__(
+        self, n_inputs: int, n_outputs: int, kappa: float, generator, n_units: int = N_UNITS
+    ) -> None:
         self._kappa = kappa
         shapes = []
-        for rows, columns in ((N_UNITS, n_inputs), (N_UNITS, N_UNITS), (n_outputs, N_UNITS)):
+        for rows, columns in ((n_units, n_inputs), (n_units, n_units), (n_outputs, n_units)):
             shapes += [(rows, columns), (rows,)]
         sizes = [math.prod(shape) for shape in shapes]
         self.parameters, self._gradient, self._trace, self._scratch = np.zeros(
@@ -76,7 +82,7 @@ class Network:
         for layer in range(2):
             sums = self._weights[2 * layer] @ inputs + self._weights[2 * layer + 1]
             sums -= sums.mean()
-            deviation = math.sqrt(float(sums @ sums) / N_UNITS + LAYER_EPSILON)
+            deviation = math.sqrt(float(sums @ sums) / sums.size + LAYER_EPSILON)
             sums /= deviation
             inputs = np.maximum(sums, SLOPE * sums)
             kept += [sums, deviation, inputs]
@@ -114,7 +120,7 @@ class Network:
 def _before_unit(slopes, normalized, deviation):
     """Slopes of a layer's sums, given those of its leaky units."""
     slopes = np.where(normalized > 0, slopes, SLOPE * slopes)
-    along = float(slopes @ normalized) / N_UNITS
+    along = float(slopes @ normalized) / slopes.size
     return (slopes - slopes.mean() - normalized * along) / deviation
 
 
@@ -177,56 +183,56 @@ class Normal:
 
 @dataclass(frozen=True, kw_only=True)
 class NetworksConfig:
-    """Settings of actor and critic: the paper's, which is why there is nothing to set."""
+    """Settings of the networks: the paper's, which is why there is nothing to set."""
 
     n_inputs: int = 1
 
 
 @dataclass(frozen=True, kw_only=True)
-class StreamACConfig:
+class StreamingConfig:
     """Settings of the learning: the paper's."""
 
 
-class StreamAC:
-    """Learns a step when it is known whether the episode ended with it: before the next one."""
+class Streaming:
+    """What both have: a step is learned when it is known whether the episode ended with it."""
 
-    def __init__(self, observation_space, action_space, *, approximator, learning, seed) -> None:
+    def __init__(self, observation_space, seed, networks) -> None:
+        self._space = observation_space
+        n_inputs = gym.spaces.flatdim(observation_space)
         self._rng = np.random.default_rng(seed)
-        is_listed = isinstance(action_space, gym.spaces.Discrete)
-        self._choice = Softmax(action_space) if is_listed else Normal(action_space)
-        n_inputs = observation_space.shape[0]
-        self._actor = Network(n_inputs, self._choice.n_outputs, KAPPA_ACTOR, self._rng)
-        self._critic = Network(n_inputs, 1, KAPPA_CRITIC, self._rng)
+        self.networks = [Network(n_inputs, *sizes) for sizes in networks(self._rng)]
         self._seen, self._returns, self._discounted = Moments((n_inputs,)), Moments(), 0.0
         self._state = self._step = None
 
     @property
     def n_bytes(self) -> int:
         """Bytes of weights, and of as many traces."""
-        return 2 * (self._actor.parameters.nbytes + self._critic.parameters.nbytes)
+        return 2 * sum(network.parameters.nbytes for network in self.networks)
 
     def _normalized(self, observation):
         return ((observation - self._seen.mean) / self._seen.deviation).astype(np.float32)
 
     def _see(self, observation):
+        observation = gym.spaces.flatten(self._space, observation)
         self._seen.update(observation)
         return self._normalized(observation)
 
     def begin_episode(self) -> None:
         """Learn the last step of the one before, and forget the traces."""
         self._learn_waiting(is_over=True)
-        self._actor.end_episode()
-        self._critic.end_episode()
+        for network in self.networks:
+            network.end_episode()
         self._state = None
 
     def act(self, observation, explore=True):
-        """Draw an action; without `explore` the likeliest one."""
+        """Draw an action; without `explore` the best one."""
         if not explore:
-            return self._choice.greedy(self._actor.outputs(self._normalized(observation)))
+            observation = gym.spaces.flatten(self._space, observation)
+            return self._greedy(self.networks[0].outputs(self._normalized(observation)))
         self._learn_waiting(is_over=False)
         if self._state is None:
             self._state = self._see(observation)
-        return self._choice.sample(self._actor.outputs(self._state, keep=True), self._rng)
+        return self._sample(self.networks[0].outputs(self._state, keep=True))
 
     def learn(self, transition) -> None:
         """Keep a step."""
@@ -239,25 +245,83 @@ class StreamAC:
         self._discounted = DISCOUNT * self._discounted * (not is_over) + reward
         self._returns.update(self._discounted)
         next_state = self._see(observation)
-        value = float(self._critic.outputs(self._state, keep=True)[0])
-        target = reward / float(self._returns.deviation)
-        if not terminated:
-            target += DISCOUNT * float(self._critic.outputs(next_state)[0])
-        error = target - value
-        self._critic.add_gradient(np.ones(1, np.float32))
-        slopes = self._choice.slopes(ENTROPY * np.sign(error))
-        self._actor.add_gradient(slopes.astype(np.float32))
-        self._critic.follow_trace(error)
-        self._actor.follow_trace(error)
+        scaled = reward / float(self._returns.deviation)
+        self._update(scaled, next_state, DISCOUNT * (not terminated))
         self._state = next_state
 
 
-register(
-    AgentEntry(
-        id="stream-ac",
-        title="stream AC",
-        approximator=NetworksConfig,
-        learning=StreamACConfig,
-        agent=StreamAC,
+class StreamAC(Streaming):
+    """Actor and critic."""
+
+    def __init__(self, observation_space, action_space, *, approximator, learning, seed) -> None:
+        is_listed = isinstance(action_space, gym.spaces.Discrete)
+        self._choice = Softmax(action_space) if is_listed else Normal(action_space)
+        n_outputs = self._choice.n_outputs
+        super().__init__(
+            observation_space,
+            seed,
+            lambda rng: ((n_outputs, KAPPA_ACTOR, rng), (1, KAPPA_CRITIC, rng)),
+        )
+
+    def _greedy(self, outputs):
+        return self._choice.greedy(outputs)
+
+    def _sample(self, outputs):
+        return self._choice.sample(outputs, self._rng)
+
+    def _update(self, reward, next_state, discount) -> None:
+        actor, critic = self.networks
+        error = reward - float(critic.outputs(self._state, keep=True)[0])
+        if discount:
+            error += discount * float(critic.outputs(next_state)[0])
+        critic.add_gradient(np.ones(1, np.float32))
+        slopes = self._choice.slopes(ENTROPY * np.sign(error))
+        actor.add_gradient(slopes.astype(np.float32))
+        critic.follow_trace(error)
+        actor.follow_trace(error)
+
+
+class StreamQ(Streaming):
+    """Values of listed actions, of a Box's 5 in each dimension; Watkins's traces."""
+
+    progress = 0.0
+
+    def __init__(self, observation_space, action_space, *, approximator, learning, seed) -> None:
+        self._actions = listed_actions(action_space)
+        sizes = len(self._actions), KAPPA_Q
+        super().__init__(observation_space, seed, lambda rng: ((*sizes, rng, N_UNITS_Q),))
+
+    def _greedy(self, outputs):
+        return self._actions[int(np.argmax(outputs))]
+
+    def _sample(self, outputs):
+        fall = (FINAL_EPSILON - EPSILON) / EXPLORATION
+        greedy = self._chosen = int(np.argmax(outputs))
+        if self._rng.random() < max(EPSILON + fall * self.progress, FINAL_EPSILON):
+            self._chosen = int(self._rng.integers(len(self._actions)))
+        self._is_greedy = self._chosen == greedy
+        return self._actions[self._chosen]
+
+    def _update(self, reward, next_state, discount) -> None:
+        (network,) = self.networks
+        slopes = np.zeros(len(self._actions), np.float32)
+        slopes[self._chosen] = 1.0
+        error = reward - float(network.outputs(self._state, keep=True)[self._chosen])
+        if discount:
+            error += discount * float(network.outputs(next_state).max())
+        network.add_gradient(slopes)
+        network.follow_trace(error)
+        if not self._is_greedy:
+            network.end_episode()
+
+
+for name, title, agent in (("stream-ac", "stream AC", StreamAC), ("stream-q", "stream Q", StreamQ)):
+    register(
+        AgentEntry(
+            id=name,
+            title=title,
+            approximator=NetworksConfig,
+            learning=StreamingConfig,
+            agent=agent,
+        )
     )
-)
