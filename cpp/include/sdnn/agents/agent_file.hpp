@@ -248,15 +248,15 @@ class AgentFile {
   static constexpr std::string_view kOfTraining = "training.";
 
   AgentFile(core::FileContent content, const std::string& name)
-      : controller(controller_in(content, name)), content_(std::move(content)) {
-    std::erase_if(content_.tensors, [](const auto& item) {  // the controller has them
-      return !item.first.starts_with(kOfTraining);
-    });
-  }
+      : controller(controller_in(content, name)), content_(std::move(content)) {}
 
-  static Controller controller_in(const core::FileContent& content, const std::string& name) {
-    core::State state = content.tensors;
-    std::erase_if(state, [](const auto& item) { return item.first.starts_with(kOfTraining); });
+  /// Takes the controller's tensors out of the content.
+  static Controller controller_in(core::FileContent& content, const std::string& name) {
+    core::State state = std::exchange(content.tensors, {});
+    for (auto tensor = state.begin(); tensor != state.end();) {
+      const auto present = tensor++;
+      if (present->first.starts_with(kOfTraining)) content.tensors.insert(state.extract(present));
+    }
     try {
       return Controller::restored(detail::controller_config_in(content.description), state);
     } catch (const std::exception& error) {

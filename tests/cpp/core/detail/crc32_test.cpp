@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
+
+#include "sdnn/core/instruction_set.hpp"
 
 namespace sdnn::core::detail {
 namespace {
@@ -25,6 +28,32 @@ TEST(Crc32, ContinuesWithTheBytesThatFollow) {
   for (std::size_t n = 0; n <= text.size(); ++n) {
     EXPECT_EQ(crc32_of(text.substr(n), crc32_of(text.substr(0, n))), crc32_of(text)) << n;
   }
+}
+
+// The register as its definition has it, bit by bit.
+std::uint32_t crc32_by_bits(const std::string& text) {
+  std::uint32_t crc = ~0U;
+  for (const char letter : text) {
+    crc ^= static_cast<unsigned char>(letter);
+    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ ((crc & 1U) != 0 ? 0xedb88320U : 0U);
+  }
+  return ~crc;
+}
+
+TEST(Crc32, IsTheSameOnAllInstructionSetsAndForAllLengths) {
+  std::string text;
+  const InstructionSet before = instruction_set();
+  for (std::uint32_t n = 0, x = 1; n < 300; ++n, x = x * 1103515245U + 12345U) {
+    const std::uint32_t expected = crc32_by_bits(text);
+    for (const InstructionSet level : kInstructionSets) {
+      if (!offers(level)) continue;
+      set_instruction_set(name_of(level));
+      EXPECT_EQ(crc32_of(text), expected) << n << " bytes, " << name_of(level);
+      EXPECT_EQ(crc32_of(text.substr(n / 3), crc32_of(text.substr(0, n / 3))), expected) << n;
+    }
+    text.push_back(static_cast<char>(x >> 16));
+  }
+  set_instruction_set(name_of(before));
 }
 
 }  // namespace
