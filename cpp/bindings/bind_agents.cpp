@@ -211,6 +211,40 @@ void wait_for_readers_of(agents::Controller& controller) {
   std::visit([](auto& agent) { bindings::wait_for_readers(agent); }, controller.agent());
 }
 
+/// What an agent has in each dimension.
+template <class Agent>
+auto parts_of(const Agent& agent) {
+  if constexpr (requires { agent.part(0); }) {
+    return std::span(&agent.part(0), agent.n_dimensions());
+  } else if constexpr (requires { agent.action_value().part(0); }) {
+    return std::span(&agent.action_value().part(0), agent.n_dimensions());
+  } else {
+    return std::span(&agent, 1);
+  }
+}
+
+/// Whether there are threads that could run Python while this one works without the GIL.
+bool has_other_threads() {
+  return PyThreadState_Next(PyInterpreterState_ThreadHead(PyInterpreterState_Get())) != nullptr;
+}
+
+/// The action of act without `explore`, after the warm-up. Other threads run meanwhile, and may
+/// read the same controller.
+std::span<const double> best_action(agents::Controller& controller,
+                                    std::span<const double> observation) {
+  const agents::Controller& read = controller;
+  const auto variables = bindings::copied(observation);
+  auto& workspace = bindings::workspace_of(read);
+  std::visit(
+      [&](const auto& agent) {
+        const auto parts = parts_of(agent);
+        const bindings::WithoutGIL unlocked(read, parts);
+        read.read(variables, workspace);
+      },
+      read.agent());
+  return controller.best_of(workspace);  // which draws, and so needs the lock
+}
+
 void bind_controller(py::module_& module) {
   using agents::Controller;
   using agents::ControllerConfig;
@@ -295,7 +329,11 @@ void bind_controller(py::module_& module) {
           "act",
           [array_of](Controller& self, const ArrayArgument<double>& observation, bool explore,
                      std::size_t environment) {
-            return array_of(self.act(bindings::flat(observation), explore, environment));
+            const auto variables = bindings::flat(observation);
+            const bool is_reader = !explore && has_other_threads() && !self.is_warming_up() &&
+                                   environment < self.n_environments();
+            return array_of(is_reader ? best_action(self, variables)
+                                      : self.act(variables, explore, environment));
           },
           py::arg("observation"), py::arg("explore") = true, py::arg("environment") = 0)
       .def(

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -46,6 +47,13 @@ struct Use {
   static Use of(const void* owner, Object& object) noexcept {
     const auto* const begin = reinterpret_cast<const std::byte*>(&object);
     return {owner, begin, begin + sizeof(Object), !std::is_const_v<Object>};
+  }
+
+  /// Of parts that an object holds elsewhere.
+  template <class Part>
+  static Use of(const void* owner, const std::span<Part>& parts) noexcept {
+    const auto bytes = std::as_bytes(parts);
+    return {owner, bytes.data(), bytes.data() + bytes.size(), !std::is_const_v<Part>};
   }
 
   static std::vector<Use>& all() {

@@ -421,7 +421,7 @@ class FuzzyRules:
         ...
 class RBFNetworkConfig:
     """
-    The sizes of an RBF network: normalized Gaussians on an even grid, linear in the weights. The paper gives 4 bases per dimension and 601 actions; the rest are readings.
+    The sizes of an RBF network: normalized Gaussians on an even grid, linear in the weights. The paper gives 4 bases per dimension and 601 actions; the rest are assumptions.
     
     Parameters
     ----------
@@ -974,7 +974,7 @@ class PDeltaTrainer:
         """
 class PerceptronTrainer:
     """
-    Trains units to tell classes apart
+    Trains units to separate classes
     """
     def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_classes: typing.SupportsInt | typing.SupportsIndex, scheme: str, form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, n_epochs: typing.SupportsInt | typing.SupportsIndex = 30) -> None:
         ...
@@ -2049,7 +2049,7 @@ def log(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.An
     ...
 def n_units_for(scheme: str, n_classes: typing.SupportsInt | typing.SupportsIndex) -> int:
     """
-    Units that tell so many classes apart
+    Units that separate so many classes
     """
 def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -15,6 +16,7 @@
 
 #include "sdnn/core/random.hpp"
 #include "states.hpp"
+#include "threads.hpp"
 
 namespace sdnn::agents {
 namespace {
@@ -140,6 +142,42 @@ TEST(Controller, DoesWhatItsAgentDoes) {
   }
   EXPECT_EQ(core::state_of(std::get<QLearning<Decoupled<RBFNetwork>>>(controller.agent())),
             core::state_of(agent));
+}
+
+// Each with a workspace and random numbers of its own; and what the controller itself would do.
+TEST(Controller, IsReadByManyThreads) {
+  for (const ControllerConfig& config :
+       {rbf_config(), rbf_of_vectors(), sdnn(), fuzzy_config(), fuzzy_of_vectors()}) {
+    Controller controller(config);
+    core::Random random(5, core::Stream::weights);
+    Numbers observed{1.0, 0.0, 0.0, 0.0};
+    for (int t = 0; t < 60; ++t) step(controller, random, observed, false);
+    const Controller& read = controller;
+    const auto best = [&](std::size_t i) -> Numbers {
+      auto workspace = read.workspace();
+      core::Random ties(i % 2, core::Stream::ties), places(7, core::Stream::weights);
+      Numbers actions;
+      for (int t = 0; t < 50; ++t) {
+        const Numbers seen{1.0, 0.0, 16.0 * places.uniform() - 8.0, 10.0 + 4.0 * places.uniform()};
+        const auto action = read.best_action(seen, workspace, ties);
+        actions.insert(actions.end(), action.begin(), action.end());
+      }
+      return actions;
+    };
+    const std::array alone{best(0), best(1)};
+    const auto found = testing::in_threads(4, best);
+    for (std::size_t i = 0; i < found.size(); ++i) EXPECT_EQ(found[i], alone[i % 2]);
+
+    Controller same = controller;
+    auto workspace = controller.workspace();
+    core::Random places(7, core::Stream::weights);
+    for (int t = 0; t < 50; ++t) {
+      const Numbers seen{1.0, 0.0, 16.0 * places.uniform() - 8.0, 10.0 + 4.0 * places.uniform()};
+      controller.read(seen, workspace);
+      EXPECT_TRUE(std::ranges::equal(controller.best_of(workspace), same.act(seen, false)));
+    }
+    EXPECT_EQ(core::state_of(controller), core::state_of(same));
+  }
 }
 
 TEST(Controller, OfSeveralRobotsDoesWhatItsAgentDoes) {

@@ -173,6 +173,17 @@ TEST(ActionValue, AnyNumberOfWorkspacesFollowsAModel) {
   expect_that_workspaces_follow(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
 }
 
+#ifndef NDEBUG
+TEST(ActionValueDeathTest, ForeignWorkspacesOfAnotherSizeAreRefused) {
+  SDNNCConfig config = small_network();
+  const SDNNC network(config, 3);
+  config.n_hidden_units += 8;
+  auto foreign = SDNNC(config, 3).workspace();
+  std::vector<double> row(network.n_actions());
+  EXPECT_DEATH(network.values(some_states(1)[0], foreign, row), "fits");
+}
+#endif
+
 // The average is rounded once, by the thread that asks first.
 TEST(ActionValue, ManyThreadsMayReadAnAverage) {
   SDNNCConfig config = small_network();

@@ -1,6 +1,7 @@
 """Several threads read one agent at once, and get the bits that one alone gets."""
 
 import threading
+from functools import partial
 
 import gymnasium as gym
 import numpy as np
@@ -18,13 +19,14 @@ AVERAGING = SDNNCConfig(
     n_pattern_units=50, n_hidden_units=200, n_active_units=60, n_actions=9, averaging_interval=10
 )
 AGENTS = {
-    "sdnn": lambda: SDNNQLearning(OBSERVATIONS, ONE, approximator=SIZES, seed=1),
-    "averaging": lambda: SDNNQLearning(OBSERVATIONS, ONE, approximator=AVERAGING, seed=1),
-    "decoupled": lambda: SDNNQLearning(OBSERVATIONS, TWO, approximator=SIZES, seed=1),
-    "rbf": lambda: RBFQLearning(
-        OBSERVATIONS, ONE, learning=QLearningConfig(n_greedy_steps=0), seed=1
+    "sdnn": partial(SDNNQLearning, OBSERVATIONS, ONE, approximator=SIZES, seed=1),
+    "averaging": partial(SDNNQLearning, OBSERVATIONS, ONE, approximator=AVERAGING, seed=1),
+    "decoupled": partial(SDNNQLearning, OBSERVATIONS, TWO, approximator=SIZES, seed=1),
+    "rbf": partial(
+        RBFQLearning, OBSERVATIONS, ONE, learning=QLearningConfig(n_greedy_steps=0), seed=1
     ),
-    "fuzzy": lambda: FuzzyQLearning(OBSERVATIONS, ONE, seed=1),
+    "fuzzy": partial(FuzzyQLearning, OBSERVATIONS, ONE, seed=1),
+    "fuzzy vectors": partial(FuzzyQLearning, OBSERVATIONS, TWO, seed=1),
 }
 
 
@@ -43,6 +45,11 @@ def read(agent, seed=0):
     observations = np.random.default_rng(seed).random((60, N_INPUTS))
     ask = agent.value if isinstance(agent, FuzzyQLearning) else agent.q_values
     return np.array([ask(observation) for observation in observations])
+
+
+def greedy(agent, seed=0):
+    observations = np.random.default_rng(seed).random((60, N_INPUTS))
+    return np.array([agent.act(observation, explore=False) for observation in observations])
 
 
 def in_threads(*works):
@@ -70,6 +77,16 @@ def test_threads_read_what_one_reads_alone(kind):
         expected = read(agent)
         for values in in_threads(*[lambda: read(agent)] * 4):
             np.testing.assert_array_equal(values, expected)
+
+
+@pytest.mark.parametrize("kind", AGENTS)
+def test_threads_take_the_actions_that_one_takes_alone(kind):
+    # Without draws, whose order would be that of the threads.
+    agent = AGENTS[kind](learning=AGENTS[kind]().learning.replace(tie_rule="middle"))
+    live(agent, 100, 1)
+    expected = greedy(agent)
+    for actions in in_threads(*[lambda: greedy(agent)] * 4):
+        np.testing.assert_array_equal(actions, expected)
 
 
 @pytest.mark.parametrize("kind", AGENTS)

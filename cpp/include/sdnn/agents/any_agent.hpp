@@ -31,6 +31,15 @@ using AnyAgent = std::variant<QLearning<approximators::SDNNC>,
                               QLearning<approximators::Decoupled<approximators::RBFNetwork>>,
                               FuzzyQLearning, VectorFuzzyQLearning>;
 
+/// What one reader of such an agent needs.
+template <class Agents>
+struct WorkspacesOf;
+template <class... Agent>
+struct WorkspacesOf<std::variant<Agent...>> {
+  using type = std::variant<typename Agent::Workspace...>;
+};
+using AnyWorkspace = WorkspacesOf<AnyAgent>::type;
+
 /// The settings of its parts. Fuzzy rules belong to fuzzy Q-learning.
 using AnyApproximatorConfig =
     std::variant<approximators::SDNNCConfig, approximators::RBFNetworkConfig,

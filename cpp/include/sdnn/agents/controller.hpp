@@ -25,6 +25,8 @@
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/check_fields.hpp"
+#include "sdnn/core/detail/identity.hpp"
+#include "sdnn/core/random.hpp"
 #include "sdnn/core/state.hpp"
 
 namespace sdnn::agents {
@@ -52,9 +54,16 @@ struct ControllerConfig {
 /// while, takes the ranges from what it observed, and then learns what it did, in order; fuzzy
 /// Q-learning, which can learn its own actions only, begins anew. From then on the ranges stay.
 ///
-/// An object must not be used by two threads at once.
+/// Thread safety: const functions may be called by many threads at once, with a workspace each.
 class Controller {
  public:
+  /// What one reader owns, once the warm-up is over: for that controller and what it becomes.
+  struct Workspace {
+    AnyWorkspace agent;
+    std::vector<double> state, action;
+    std::vector<std::size_t> indices;
+  };
+
   /// With SDNN-C, `tables` are patterns of each input. Throws std::invalid_argument naming the
   /// field that is impossible; std::length_error as the approximator does.
   explicit Controller(ControllerConfig config, std::vector<coding::PatternTable> tables = {})
@@ -163,15 +172,57 @@ class Controller {
       const auto draw = [this](core::Pcg64& random, std::vector<double>& action) {
         draw_action(random, action);
       };
-      take(warm_up_->act(draw, explore, environment));
+      take(warm_up_->act(draw, explore, environment), action_, indices_);
       return action_;
     }
     observations_.scale(observation, state_);
-    std::visit([&](auto& agent) { take(agent.act(state_, explore, environment)); }, *agent_);
+    std::visit(
+        [&](auto& agent) { take(agent.act(state_, explore, environment), action_, indices_); },
+        *agent_);
     if (explore && !is_fuzzy(approximator_)) {
       taken_.note(environment, action_, indices_);
     }
     return action_;
+  }
+
+  /// For a reader. Requires that the warm-up is over.
+  Workspace workspace() const {
+    return {std::visit([](const auto& agent) { return AnyWorkspace(agent.workspace()); }, *agent_),
+            std::vector<double>(state_.size()), std::vector<double>(n_dimensions()),
+            std::vector<std::size_t>(n_dimensions())};
+  }
+  /// A number that no other controller has.
+  std::uint64_t identity() const noexcept { return identity_.number(); }
+
+  /// The action of act without `explore`; `ties` decides between several best ones. Valid until
+  /// the workspace is used again. Requires that the warm-up is over. Throws as act.
+  std::span<const double> best_action(std::span<const double> observation, Workspace& workspace,
+                                      core::Random& ties) const {
+    observations_.scale(observation, workspace.state);
+    std::visit(
+        [&](const auto& agent) {
+          auto& own = own_workspace(agent, workspace);
+          take(agent.best_action(workspace.state, own, ties), workspace.action, workspace.indices);
+        },
+        *agent_);
+    return workspace.action;
+  }
+
+  /// The two steps of act without `explore`: `read` takes the time and is for many threads;
+  /// `best_of` gives the action for the observation that was read last.
+  void read(std::span<const double> observation, Workspace& workspace) const {
+    observations_.scale(observation, workspace.state);
+    std::visit(
+        [&](const auto& agent) { agent.read(workspace.state, own_workspace(agent, workspace)); },
+        *agent_);
+  }
+  std::span<const double> best_of(Workspace& workspace) {
+    std::visit(
+        [&](auto& agent) {
+          take(agent.best_of(own_workspace(agent, workspace)), workspace.action, workspace.indices);
+        },
+        *agent_);
+    return workspace.action;
   }
 
   /// Learns a transition. The action is any of the task's, of a box the nearest one that can be
@@ -339,10 +390,17 @@ class Controller {
     }
   }
 
-  /// Takes an agent's action: an index, or a number in [-1, 1], for each dimension.
+  template <class Agent>
+  static typename Agent::Workspace& own_workspace(const Agent&, Workspace& workspace) {
+    return std::get<typename Agent::Workspace>(workspace.agent);
+  }
+
+  /// Writes an agent's action, an index, or a number in [-1, 1], for each dimension, in the units
+  /// of the task, and its indices.
   template <class Action>
-  void take(const Action& action) {
-    for (std::size_t d = 0; d < action_.size(); ++d) {
+  void take(const Action& action, std::vector<double>& in_units,
+            std::vector<std::size_t>& indices) const {
+    for (std::size_t d = 0; d < in_units.size(); ++d) {
       const auto number = [&] {
         if constexpr (std::is_arithmetic_v<Action>)
           return action;
@@ -350,10 +408,10 @@ class Controller {
           return action[d];
       }();
       if (actions_.n_actions()[d] == 0) {
-        action_[d] = actions_.of_normalized(static_cast<double>(number), d);
+        in_units[d] = actions_.of_normalized(static_cast<double>(number), d);
       } else {
-        indices_[d] = static_cast<std::size_t>(number);
-        action_[d] = actions_.of_index(indices_[d], d);
+        indices[d] = static_cast<std::size_t>(number);
+        in_units[d] = actions_.of_index(indices[d], d);
       }
     }
   }
@@ -393,7 +451,7 @@ class Controller {
     std::visit(
         [&](auto& agent) {
           if constexpr (kIsFuzzy<std::remove_cvref_t<decltype(agent)>>) {
-            take(agent.last_action(environment));
+            take(agent.last_action(environment), action_, indices_);
             core::require(
                 agent.explored_in(state_, environment) && std::ranges::equal(action, action_),
                 "observation and action", "those of the last exploring act", "others");
@@ -485,6 +543,7 @@ class Controller {
   std::vector<double> state_, next_state_, action_;
   std::vector<std::size_t> indices_;
   detail::TakenActions taken_;
+  core::Identity identity_;
 };
 
 }  // namespace sdnn::agents

@@ -131,23 +131,19 @@ class FuzzyQLearning {
   /// Shape: state (d,) in [0, 1]. Throws std::invalid_argument otherwise, and nothing has changed.
   double act(std::span<const double> state, bool explore = true, std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
-    auto& fired = explore ? episode.fired : workspace_;
-    rules_.fire(state, fired);
-    if (explore) {
-      std::copy(state.begin(), state.end(), episode.state.begin());
-      episode.picked.clear();
+    if (!explore) {
+      read(state, workspace_);
+      return best_of(workspace_);
     }
-    const double action = clamped_mean(fired, [&](std::size_t i) {
-      const std::size_t picked =
-          policy_.select(rules_.values(fired.rules[i]), episode.step, explore);
-      if (explore) episode.picked.push_back(picked);
-      return picked;
+    rules_.fire(state, episode.fired);
+    std::copy(state.begin(), state.end(), episode.state.begin());
+    episode.picked.clear();
+    episode.action = clamped_mean(episode.fired, [&](std::size_t i) {
+      return episode.picked.emplace_back(
+          policy_.select(rules_.values(episode.fired.rules[i]), episode.step, true));
     });
-    if (explore) {
-      ++episode.step;
-      episode.action = action;
-    }
-    return action;
+    ++episode.step;
+    return episode.action;
   }
 
   /// The action itself: act gives a number in [-1, 1].
@@ -172,6 +168,17 @@ class FuzzyQLearning {
     rules_.fire(state, workspace);
     return clamped_mean(workspace, [&](std::size_t i) {
       return policy_.best_action(rules_.values(workspace.rules[i]), ties);
+    });
+  }
+
+  /// The two steps of act without `explore`: `read` is for many threads, as value is; `best_of`
+  /// gives the action in the state that was read last.
+  void read(std::span<const double> state, Workspace& workspace) const {
+    rules_.fire(state, workspace);
+  }
+  double best_of(const Workspace& workspace) {
+    return clamped_mean(workspace, [&](std::size_t i) {
+      return policy_.select(rules_.values(workspace.rules[i]), 0, false);
     });
   }
 

@@ -175,23 +175,36 @@ class QLearning {
   /// A best action, as act without `explore` gives it; `ties` decides between several.
   Action best_action(std::span<const double> state, Workspace& workspace,
                      core::Random& ties) const {
-    return each_best([&](std::size_t d) {
-      return policy_.best_action(averaged_values(state, workspace, d), ties);
-    });
+    read(state, workspace);
+    return each_best([&](std::size_t d) { return policy_.best_action(workspace.values[d], ties); });
+  }
+
+  /// The two steps of act without `explore`: `read` takes the time and is for many threads, as
+  /// values is; `best_of` gives the action in the state that was read last.
+  void read(std::span<const double> state, Workspace& workspace) const {
+    for (std::size_t d = 0; d < n_dimensions(); ++d) averaged_values(state, workspace, d);
+  }
+  Action best_of(const Workspace& workspace) {
+    return each_best(
+        [&](std::size_t d) { return policy_.best_action(workspace.values[d], false); });
   }
 
   /// The action to take in `state`; without `explore` a best one, by the average of the weights
   /// where the approximator keeps one. Shape: state (l,) in [0, 1].
   Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
-    if (!explore) return best_action(state, false);
+    if (!explore) {
+      read(state, workspace_);
+      return best_of(workspace_);
+    }
     core::require_unit_values("state", state, n_inputs());  // before anything is drawn
     // Evaluating is no step of the episode: it must not move the end of the greedy phase.
     const int step = episode.step++;
     const bool at_random = n_random_left_ > 0;
     if (at_random) --n_random_left_;
     if (episode.n_kept == 0 && !at_random && !policy_.explores(step)) {
-      return best_action(state, true);
+      return each_best(
+          [&](std::size_t d) { return policy_.best_action(values(state, workspace_, d), true); });
     }
     std::vector<std::size_t>& kept = episode.kept;
     if (episode.n_kept > 0) {
@@ -388,14 +401,12 @@ class QLearning {
   }
 
   /// As values, by the average of the weights where the approximator keeps one.
-  std::span<const double> averaged_values(std::span<const double> state, Workspace& workspace,
-                                          std::size_t d) const {
+  void averaged_values(std::span<const double> state, Workspace& workspace, std::size_t d) const {
     std::vector<double>& row = workspace.values[d];
     if constexpr (requires { part(d).averaged_values(state, part(workspace, d), row); }) {
       part(d).averaged_values(state, part(workspace, d), row);
-      return row;
     } else {
-      return values(state, workspace, d);
+      part(d).values(state, part(workspace, d), row);
     }
   }
 
@@ -409,13 +420,6 @@ class QLearning {
     } else {
       return best(0);
     }
-  }
-
-  Action best_action(std::span<const double> state, bool explore) {
-    return each_best([&](std::size_t d) {
-      return policy_.best_action(
-          explore ? values(state, workspace_, d) : averaged_values(state, workspace_, d), explore);
-    });
   }
 
   double state_value(std::span<const double> state) {

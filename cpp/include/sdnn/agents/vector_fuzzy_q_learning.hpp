@@ -107,6 +107,18 @@ class VectorFuzzyQLearning {
     return action;
   }
 
+  /// The two steps of act without `explore`, as of a part.
+  void read(std::span<const double> state, Workspace& workspace) const {
+    for (std::size_t d = 0; d < parts_.size(); ++d) parts_[d].read(state, workspace[d]);
+  }
+  std::vector<double> best_of(const Workspace& workspace) {
+    std::vector<double> action;
+    for (std::size_t d = 0; d < parts_.size(); ++d) {
+      action.push_back(parts_[d].best_of(workspace[d]));
+    }
+    return action;
+  }
+
   /// Learns the transition that began with the last exploring act in the environment. Throws as the
   /// parts do; where it is for a value that would leave its range, the parts before have learned.
   void learn(std::span<const double> state, std::span<const double> action, double reward,

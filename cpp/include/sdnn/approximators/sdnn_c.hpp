@@ -55,8 +55,8 @@ struct CorrectionCounts {
 class SDNNC {
  public:
   /// What one user owns to read a network, or to let it learn: the potentials of recent states, and
-  /// room to compute in. For that network, whatever it becomes, and for its copies. Sized once, so
-  /// that a step allocates nothing.
+  /// room to compute in. For that network, whatever it becomes, and for its copies, which an
+  /// assertion checks. Sized once, so that a step allocates nothing.
   class Workspace {
    public:
     const ActivationCache& cache() const noexcept { return cache_; }
@@ -143,6 +143,7 @@ class SDNNC {
                        std::span<double> out) const {
     if (!has_average()) return values(state, workspace, out);
     require_row(out);
+    assert(fits(workspace));
     code_->bins_of(state, workspace.bins_);
     const auto averaged = averaged_layer();
     ActivationCache& cache = workspace.averaged_cache(*this);
@@ -310,6 +311,13 @@ class SDNNC {
     log_.restart();
   }
 
+  /// Whether the workspace is of a network of these sizes.
+  bool fits(const Workspace& workspace) const noexcept {
+    return workspace.bins_.size() == n_inputs() &&
+           workspace.cache_.n_units() == actions_.n_hidden_units() &&
+           workspace.moves_.size() == actions_.n_hidden_units() - actions_.n_active_units();
+  }
+
   void require_row(std::span<double> out) const {
     if (out.size() == n_actions()) return;  // only a bad one's text costs memory
     core::require(false, "out", std::to_string(n_actions()) + " values", out.size());
@@ -377,6 +385,7 @@ class SDNNC {
   }
 
   Cached recall(std::span<const double> state, Workspace& workspace) const {
+    assert(fits(workspace));
     code_->bins_of(state, workspace.bins_);
     return workspace.cache_.recall(*code_, hidden_layer_, log_, workspace.bins_);
   }

@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "sdnn/core/instruction_set.hpp"
+#include "instruction_sets.hpp"
 
 namespace sdnn::core::detail {
 namespace {
@@ -42,18 +42,14 @@ std::uint32_t crc32_by_bits(const std::string& text) {
 
 TEST(Crc32, IsTheSameOnAllInstructionSetsAndForAllLengths) {
   std::string text;
-  const InstructionSet before = instruction_set();
   for (std::uint32_t n = 0, x = 1; n < 300; ++n, x = x * 1103515245U + 12345U) {
     const std::uint32_t expected = crc32_by_bits(text);
-    for (const InstructionSet level : kInstructionSets) {
-      if (!offers(level)) continue;
-      set_instruction_set(name_of(level));
-      EXPECT_EQ(crc32_of(text), expected) << n << " bytes, " << name_of(level);
+    testing::on_every_instruction_set([&](auto name) {
+      EXPECT_EQ(crc32_of(text), expected) << n << " bytes, " << name;
       EXPECT_EQ(crc32_of(text.substr(n / 3), crc32_of(text.substr(0, n / 3))), expected) << n;
-    }
+    });
     text.push_back(static_cast<char>(x >> 16));
   }
-  set_instruction_set(name_of(before));
 }
 
 }  // namespace

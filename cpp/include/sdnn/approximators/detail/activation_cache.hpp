@@ -75,6 +75,7 @@ class ActivationCache {
   }
 
   const Counts& counts() const noexcept { return counts_; }
+  std::size_t n_units() const noexcept { return n_units_; }
 
   /// The potentials of the state with these bins, for the layer's present weights; valid until the
   /// next call. `log`: all corrections of the layer.
