@@ -10,9 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import ClassifierMixin
 from sklearn.utils._param_validation import Interval, StrOptions
-from sklearn.utils.class_weight import compute_class_weight
+from sklearn.utils.class_weight import compute_sample_weight
 from sklearn.utils.metaestimators import available_if
-from sklearn.utils.multiclass import check_classification_targets, unique_labels
+from sklearn.utils.multiclass import (
+    _ovr_decision_function,
+    check_classification_targets,
+    unique_labels,
+)
 
 from sdnn import _core
 from sdnn.estimators.base import BaseSDNN
@@ -166,8 +170,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             )
         if given is None:
             given = min(UNITS_EACH, max(2, MOST_UNITS // n_classes)) if several else 1
-        self._scheme: str = self.scheme
-        self._n_units_each: int = given
+        self._scheme = self.scheme
+        self._n_units_each = given
         return _core.n_units_for(self.scheme, n_classes) * given
 
     def _check_outputs(self, y: Array, classes: ArrayLike | None) -> None:
@@ -195,16 +199,13 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     def _presentations(self, targets: Ints, weights: Floats | None) -> Floats | None:
         if self.class_weight is None:
             return weights
-        present = np.unique(targets)
-        of_class = np.ones(len(self.classes_))
-        of_class[present] = compute_class_weight(
-            self.class_weight, classes=self.classes_[present], y=self.classes_[targets]
-        )
-        if not np.all((of_class >= 0) & (of_class <= LARGEST_WEIGHT)):
+        each = compute_sample_weight(self.class_weight, self.classes_[targets])
+        if not np.all((each >= 0) & (each <= LARGEST_WEIGHT)):
             raise ValueError(
                 f"class_weight must be numbers in [0, {LARGEST_WEIGHT}], got {self.class_weight!r}"
             )
-        each = of_class[targets] if weights is None else of_class[targets] * weights
+        if weights is not None:
+            each = each * weights
         return sample_weights(each, len(targets), name="class_weight times sample_weight")
 
     def _validation_score(self, bins: Ints, targets: Ints, weights: Floats | None) -> float:
@@ -234,12 +235,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         leaning = scores - 0.5
         if n_classes == 2:
             return -leaning[:, 0]
-        votes, sums = np.zeros((2, len(leaning), n_classes))
-        for unit, (i, j) in enumerate(zip(*np.triu_indices(n_classes, 1), strict=True)):
-            votes[np.arange(len(votes)), np.where(leaning[:, unit] > 0, i, j)] += 1
-            sums[:, i] += leaning[:, unit]
-            sums[:, j] -= leaning[:, unit]
-        decision: Floats = votes + sums / (3 * (np.abs(sums) + 1))
+        decision: Floats = _ovr_decision_function(leaning <= 0, -leaning, n_classes)
         return decision
 
     @staticmethod

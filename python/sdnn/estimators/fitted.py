@@ -22,38 +22,36 @@ __all__ = ["Fitted"]
 
 Self = TypeVar("Self", bound="Fitted")
 
-ATTRIBUTES = (
-    "n_corrected_",
-    "n_features_in_",
-    "n_inputs_out_of_range_",
-    "n_iter_",
-    "n_outputs_",
-    "n_outputs_out_of_range_",
-    "output_range_",
-    "training_form_",
-    "training_memory_",
-    "validation_scores_",
-    "_counts_of_range",
-    "_flat",
-    "_n_units_each",
-    "_scheme",
-    "_weight_seed",
-)
 NAMES = ("classes_", "feature_names_in_")  # arrays whose type may be text
 
 
-class Fitted(BaseEstimator):
+class Learned:
+    """What is in files as it is: numbers, words and arrays of numbers."""
+
+    n_corrected_: NDArray[np.int64]
+    n_features_in_: int
+    n_inputs_out_of_range_: int
+    n_iter_: int
+    n_outputs_: int
+    n_outputs_out_of_range_: int
+    output_range_: Floats
+    training_form_: str
+    training_memory_: int
+    validation_scores_: Floats
+    _counts_of_range: int
+    _flat: bool
+    _n_units_each: int
+    _scheme: str
+    _weight_seed: int
+
+
+ATTRIBUTES = tuple(Learned.__annotations__)
+
+
+class Fitted(Learned, BaseEstimator):
     """Attributes of an estimator that holds a network, and its file."""
 
     network_: Network
-    n_iter_: int
-    n_features_in_: int
-    n_inputs_out_of_range_: int
-    n_corrected_: NDArray[np.int64]
-    validation_scores_: Floats
-    training_form_: str
-    training_memory_: int
-    _weight_seed: int
     _earlier: tuple[Network, ...] = ()
 
     @property
@@ -201,8 +199,8 @@ def read_estimator(description: Description, arrays: Arrays, kind: type[Self]) -
     held |= {name: attributes[name] for name in ATTRIBUTES if name in attributes}
     for name in NAMES:
         if name in description["names"]:
-            told = description["names"][name]
-            held[name] = np.array(told["values"], dtype=told["type"])
+            stored = description["names"][name]
+            held[name] = np.array(stored["values"], dtype=stored["type"])
     estimator.network_, *earlier = read_networks(description, arrays)
     if "n_outputs_" in held:
         held["_earlier"] = tuple(earlier)

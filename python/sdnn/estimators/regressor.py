@@ -143,13 +143,13 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         return self._validated_numbers(X, y, reset)
 
     def _set_outputs(self, y: Floats) -> int:
-        self._flat: bool = y.ndim == 1
+        self._flat = y.ndim == 1
         targets = y.reshape(len(y), -1)
-        self.n_outputs_: int = targets.shape[1]
-        self.output_range_: Floats = self._range_of(targets)
-        self.n_outputs_out_of_range_: int = 0
+        self.n_outputs_ = targets.shape[1]
+        self.output_range_ = self._range_of(targets)
+        self.n_outputs_out_of_range_ = 0
         self._earlier = ()
-        self._counts_of_range: int = self.n_output_units
+        self._counts_of_range = self.n_output_units
         return self.n_outputs_ * self.n_output_units
 
     def _check_outputs(self, y: Floats, classes: ArrayLike | None) -> None:
