@@ -154,7 +154,7 @@ void bind_rbf_network(py::module_& module) {
       module, "RBFNetworkConfig",
       "The sizes of an RBF network: normalized Gaussians on an even grid, linear in the weights. "
       "The "
-      "paper gives 4 bases per dimension and 601 actions; the rest are readings.");
+      "paper gives 4 bases per dimension and 601 actions; the rest are assumptions.");
 
   bind_network<RBFNetwork>(module, "RBFNetwork", "Q(s, a) linear in normalized Gaussian bases")
       .def(py::init<const RBFNetworkConfig&>(), py::arg("config"))

@@ -235,7 +235,7 @@ void bind_estimators(py::module_& module) {
       [](const std::string& scheme, std::size_t n_classes) {
         return estimators::n_units_for(estimators::class_scheme_named(scheme), n_classes);
       },
-      py::arg("scheme"), py::arg("n_classes"), "Units that tell so many classes apart");
+      py::arg("scheme"), py::arg("n_classes"), "Units that separate so many classes");
 
   using estimators::PDeltaTrainer;
   py::class_<PDeltaTrainer, std::shared_ptr<PDeltaTrainer>> p_delta(
@@ -255,7 +255,7 @@ void bind_estimators(py::module_& module) {
 
   using estimators::PerceptronTrainer;
   py::class_<PerceptronTrainer, std::shared_ptr<PerceptronTrainer>> perceptron(
-      module, "PerceptronTrainer", "Trains units to tell classes apart");
+      module, "PerceptronTrainer", "Trains units to separate classes");
   perceptron.def(
       py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
                   const ArrayArgument<std::int32_t>& labels, std::size_t n_classes,

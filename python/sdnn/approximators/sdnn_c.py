@@ -37,7 +37,7 @@ class SDNNC:
     Parameters
     ----------
     config : SDNNCConfig, optional
-        Sizes and readings; by default the paper's, with 4 inputs.
+        Sizes and assumptions; by default the paper's, with 4 inputs.
     seed : int
         Code books, permutations and initial weights follow from it (0 to 2**64 - 1).
     tables : sequence of array_like, shape (n_bins, n_pattern_units), optional

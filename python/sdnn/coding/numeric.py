@@ -185,7 +185,7 @@ class RandomInverse(Ranged):
             warnings.warn(
                 f"length_scale={self.length_scale} with patterns of {n_units} units leaves "
                 f"{n_bins} bins of the range; more n_pattern_units or a shorter length_scale "
-                "tell more values apart",
+                "distinguish more values",
                 CoarseCodeWarning,
                 stacklevel=2,
             )

@@ -239,7 +239,7 @@ class AgentFile {
     core::write_file(path, content);
   }
 
-  /// All that the file says but its tensors.
+  /// The content of the file but for its tensors.
   const nlohmann::json& description() const noexcept { return content_.description; }
 
   Controller controller;

@@ -358,7 +358,7 @@ class Controller {
         },
         *agent_);
   }
-  /// What Q-learning says; `otherwise` where there is no such agent.
+  /// What Q-learning returns; `otherwise` where there is no such agent.
   template <class Call>
   double of_q_learning(const Call& call, double otherwise) const {
     if (!agent_) return otherwise;

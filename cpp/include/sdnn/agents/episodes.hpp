@@ -43,7 +43,7 @@ class Episodes {
   }
 
   /// Lists what `list(episode)` lists of each: the first one's as if there were no others, so that
-  /// states do not tell an agent that can have several environments from one that cannot.
+  /// the states of an agent that can have several environments and of one that cannot are alike.
   template <class Self, class Archive, class Make, class List>
   static void serialize(Self& self, Archive& archive, const Make& make, const List& list) {
     if constexpr (Archive::kReads) self.resize(archive.n_numbered("environment") + 1, make);

@@ -18,7 +18,7 @@
 
 namespace sdnn::agents {
 
-/// Which of several best actions is taken (reading: the paper does not say).
+/// Which of several best actions is taken (an assumption: the paper does not specify it).
 enum class TieRule {
   uniform,  ///< each with the same probability
   lowest,   ///< the one with the lowest index
@@ -74,7 +74,7 @@ Value best_value(std::span<const Value> values) noexcept {
 /// Epsilon-greedy selection over a row of action values.
 ///
 /// Learning and evaluation break ties by different random streams, so evaluating an agent never
-/// changes how it goes on learning.
+/// changes what it learns later.
 class EpsilonGreedy {
  public:
   /// Throws std::invalid_argument naming the field that is out of range.
@@ -111,7 +111,7 @@ class EpsilonGreedy {
   std::size_t random_action(std::size_t n_actions) noexcept {
     return static_cast<std::size_t>(exploration_.below(n_actions));
   }
-  /// One of the best actions; several are told apart by the streams of learning or evaluation, or
+  /// One of the best actions; ties are broken by the streams of learning or evaluation, or
   /// by those that the caller owns. Shape: values (n_actions,). Throws as select does.
   std::size_t best_action(std::span<const double> values, bool explore) {
     return greedy(values, explore ? ties_ : evaluation_ties_);

@@ -116,7 +116,7 @@ class FuzzyQLearning {
     return !episode.picked.empty() && std::ranges::equal(state, episode.state);
   }
 
-  /// Starts counting the steps of an episode anew and forgets the traces. The caller says when:
+  /// Starts counting the steps of an episode anew and forgets the traces. The caller decides when:
   /// learning a terminated transition ends the traces only. Throws std::invalid_argument if there
   /// is no such environment.
   void begin_episode(std::size_t environment = 0) {
@@ -126,7 +126,7 @@ class FuzzyQLearning {
   }
 
   /// The action to take in `state`, in [-1, 1]. Without `explore` every rule picks a best action
-  /// and nothing is remembered: the learning step goes on with the last exploring act.
+  /// and nothing is remembered: the learning step uses the last exploring act.
   ///
   /// Shape: state (d,) in [0, 1]. Throws std::invalid_argument otherwise, and nothing has changed.
   double act(std::span<const double> state, bool explore = true, std::size_t environment = 0) {

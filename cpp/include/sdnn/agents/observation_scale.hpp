@@ -28,7 +28,7 @@ enum class ObservedKind { variable, angle, circular, symbol };
 struct ObservedInput {
   ObservedKind kind;
   std::size_t first;
-  std::size_t second;  ///< of an angle; how many variables tell a symbol
+  std::size_t second;  ///< of an angle; how many variables encode a symbol
 };
 
 /// Scales what is observed, with a range for each observed variable.
@@ -98,8 +98,8 @@ class ObservationScale {
       return (core::atan2(observation[input.second], observation[i]) + core::kPi) / core::kTwoPi;
     }
     if (input.kind == ObservedKind::symbol) {
-      const auto told = observation.subspan(i, input.second);
-      const auto k = std::ranges::max_element(told) - told.begin();
+      const auto one_hot = observation.subspan(i, input.second);
+      const auto k = std::ranges::max_element(one_hot) - one_hot.begin();
       return (static_cast<double>(k) + 0.5) / static_cast<double>(input.second);
     }
     const double u = (observation[i] - low_[i]) / (high_[i] - low_[i]);

@@ -17,7 +17,7 @@ struct Preset {
 /// As in the paper (section 4.2): the defaults.
 inline Preset paper_preset(int n_inputs) { return {.approximator = {.n_inputs = n_inputs}}; }
 
-/// For any task: a full step each time, then, as progress is told, ever smaller ones, which
+/// For any task: a full step each time, then, as progress is set, ever smaller ones, which
 /// rounding stills one by one; targets of five steps; exploration that goes somewhere; greedy
 /// actions by an average of the weights; values in steps half as large as the paper's
 /// (docs/benchmarks.md).

@@ -137,9 +137,9 @@ class QLearning {
   std::size_t n_environments() const noexcept { return episodes_.size(); }
 
   /// Starts counting the steps of an episode anew, for the greedy first steps, and learns what
-  /// still waits of an episode that did not terminate. The caller says when: learning a terminated
-  /// transition does not. Throws std::invalid_argument if there is no such environment, and as
-  /// learn does.
+  /// still waits of an episode that did not terminate. The caller decides when: learning a
+  /// terminated transition does not. Throws std::invalid_argument if there is no such environment,
+  /// and as learn does.
   void begin_episode(std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
     episode.step = 0;

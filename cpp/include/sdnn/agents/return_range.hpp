@@ -21,7 +21,7 @@ class ReturnRange {
   double low() const noexcept { return low_; }
   double high() const noexcept { return high_; }
 
-  /// Adds a finite reward to the sum of its episode, which begins with 0; says whether the range
+  /// Adds a finite reward to the sum of its episode, which begins with 0; returns whether the range
   /// has grown.
   bool note(double reward, double& sum) noexcept {
     sum = std::clamp(reward + discount_ * sum, -kLargest, kLargest);

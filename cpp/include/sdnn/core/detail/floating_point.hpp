@@ -1,7 +1,7 @@
 /// Refuses flags under which floating-point results would depend on the compiler or the processor.
 ///
 /// The CMake target sdnn::sdnn compiles with those that are needed. Without CMake: the option
-/// -ffp-contract=off of g++ and clang, told to the headers by -DSDNN_NO_CONTRACTION, since a
+/// -ffp-contract=off of g++ and clang, which the headers know by -DSDNN_NO_CONTRACTION, since a
 /// compiler does not show it; /fp:precise of MSVC is the default.
 #pragma once
 

@@ -1,10 +1,10 @@
 /// Kernels: functions that are compiled for every instruction set and choose when they are called.
 ///
-/// The one way to an instruction set. A kernel `name` in a room's namespace has a version for each
-/// level in the nested namespace `detail`: name_portable, name_neon, name_avx2, name_avx512. It is
-/// exact: sums of integers, or floating-point operations in a fixed order, so that all versions
-/// give the same bits. SDNN_KERNEL makes all versions from one body; a version that is worth
-/// writing by hand is written, the others are made by SDNN_KERNEL_PORTABLE, SDNN_KERNEL_NEON,
+/// The one way to an instruction set. A kernel `name` in a package's namespace has a version for
+/// each level in the nested namespace `detail`: name_portable, name_neon, name_avx2, name_avx512.
+/// It is exact: sums of integers, or floating-point operations in a fixed order, so that all
+/// versions give the same bits. SDNN_KERNEL makes all versions from one body; a version that is
+/// worth writing by hand is written, the others are made by SDNN_KERNEL_PORTABLE, SDNN_KERNEL_NEON,
 /// SDNN_KERNEL_AVX2 and SDNN_KERNEL_AVX512, and SDNN_DISPATCH makes the function that chooses.
 /// Another level is an enumerator of core::InstructionSet, a macro like these and a line in
 /// SDNN_DISPATCH.
