@@ -33,6 +33,7 @@ __all__ = [
     "SDNNCConfig",
     "SensorConfig",
     "fields_of",
+    "values_of",
 ]
 
 
@@ -62,6 +63,11 @@ def fields_of(kind: Any) -> tuple[Field, ...]:
     ['n_inputs', 'n_sets', 'n_actions', 'max_table_bytes']
     """
     return tuple(Field(*field) for field in getattr(kind, "fields", ()))
+
+
+def values_of(config: Any) -> dict[str, Any]:
+    """Return the values of all settings by name, as data that JSON can hold."""
+    return {field.name: getattr(config, field.name) for field in fields_of(type(config))}
 
 
 def _complete(kind: Any) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import abc
-import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.agents.episode import Transition, reward_of
-from sdnn.agents.files import ARRAYS_OF_TRAINING, read_agent, register
+from sdnn.agents.files import read_agent, register
 from sdnn.agents.scaling import Scaling
 from sdnn.agents.spaces import (
     Actions,
@@ -28,7 +27,7 @@ from sdnn.agents.spaces import (
 )
 from sdnn.agents.training import Training, TrainingResult
 from sdnn.arguments import argument_error, blamed, flag, path_of, real, seed_of, whole
-from sdnn.config import WARM_UP
+from sdnn.config import WARM_UP, values_of
 from sdnn.files import Arrays, Description, write_file
 
 if TYPE_CHECKING:
@@ -144,8 +143,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
                 approximator=approximator,
                 learning=learning,
                 seed=self.seed,
-                observation=_core.ObservationConfig(**self._observation),
-                action=_core.ActionConfig(**self._action),
+                observation=self._observation,
+                action=self._action,
                 warm_up_steps=self._warm_up_steps,
                 **made_of,
             )
@@ -154,10 +153,10 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             reasons = {"n_inputs": "n_inputs follows from observation_space"}
             if not self._actions.is_box:
                 reasons["n_actions"] = "n_actions follows from action_space"
-            if len(self._action["low"]) > 1:
+            if len(self._action.low) > 1:
                 reasons["max_table_bytes"] = "for each dimension of action_space"
             found = [reason for word, reason in reasons.items() if word in str(error)]
-            if argument in ("low", "high") or argument.startswith("action."):
+            if argument.startswith("action."):
                 found = ["of action_space; gymnasium's RescaleAction gives a Box finite bounds"]
             if not (argument and found):
                 raise
@@ -409,10 +408,10 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             "class": type(self).__name__,
             "kind": self.kind,
             "seed": self.seed,
-            "approximator": dataclasses.asdict(self._approximator),  # type: ignore[call-overload]
-            "learning": dataclasses.asdict(self.learning),  # type: ignore[call-overload]
-            "observation": self._observation,
-            "action": self._action,
+            "approximator": values_of(self._approximator),
+            "learning": values_of(self.learning),
+            "observation": values_of(self._observation),
+            "action": values_of(self._action),
             "warm_up_steps": self._warm_up_steps,
             "observation_space": space_data(self.observation_space),
             "action_space": space_data(self.action_space),
@@ -427,7 +426,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     def rebuild(cls, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Self:
         """Make an agent from its `description` and `state`; ValueError if they do not fit."""
         agent = cls.__new__(cls)
-        agent._observation, agent._action = description["observation"], description["action"]
+        agent._observation = _core.ObservationConfig(**description["observation"])
+        agent._action = _core.ActionConfig(**description["action"])
         if "observation_space" in description:
             observations = space_of(description["observation_space"])
             actions = space_of(description["action_space"])
@@ -435,17 +435,13 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             observations = observation_space_of(agent._observation)
             actions = action_space_of(agent._action)
         agent._take_spaces(observations, actions)
-        approximator = dict(description["approximator"])
-        for name in {"circular", "n_symbols"} & approximator.keys():
-            approximator[name] = tuple(approximator[name])
         agent._take_settings(
-            cls.approximator_type(**approximator),
+            cls.approximator_type(**description["approximator"]),
             cls.learning_type(**description["learning"]),
             description["seed"],
             description["warm_up_steps"],
         )
-        own = {name: a for name, a in arrays.items() if not name.startswith(ARRAYS_OF_TRAINING)}
-        agent._make(state=own)
+        agent._make(state=dict(arrays))
         n_variables = agent._observations.n_variables
         if agent._controller.n_variables != n_variables:
             raise ValueError(f"observation must be of {n_variables} variables")

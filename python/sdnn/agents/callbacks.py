@@ -33,7 +33,7 @@ __all__ = [
 MOST_BYTES_OF_ROWS = 2**32
 
 _STEPS_BETWEEN = 64
-"""Between two readings of the clock of a training's bar, which cost more than a step."""
+"""Between two updates of a training's bar, which cost more than a step."""
 
 Row: TypeAlias = Mapping[str, Any]
 """An episode (``kind``, ``step``, ``episode``, ``return``, ``length``, ``terminated``, and with

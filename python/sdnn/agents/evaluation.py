@@ -120,7 +120,7 @@ def evaluate(
         for now in greedy_episode(agent, env, root, episode, options):
             if now.n_steps == _LONG:
                 warnings.warn(
-                    f"an evaluation's episode has had {_LONG:,} steps and goes on; an environment"
+                    f"an evaluation's episode has had {_LONG:,} steps and continues; an environment"
                     " whose episodes may never end needs a time limit (max_episode_steps)",
                     RuntimeWarning,
                     stacklevel=2,

@@ -14,7 +14,6 @@ from sdnn.arguments import seed_of
 from sdnn.files import Arrays, Description, read_file, write_file
 
 __all__ = [
-    "ARRAYS_OF_TRAINING",
     "SavedEpisode",
     "SavedTraining",
     "read_agent",
@@ -23,9 +22,9 @@ __all__ = [
     "write_training",
 ]
 
-ARRAYS_OF_TRAINING = "training."
+_ARRAYS_OF_TRAINING = "training."
 """How the names of arrays begin that are not the agent's."""
-_EVALUATIONS = ARRAYS_OF_TRAINING + "evaluations"
+_EVALUATIONS = _ARRAYS_OF_TRAINING + "evaluations"
 
 _CLASSES: dict[str, type[Any]] = {}
 
@@ -68,8 +67,9 @@ def read_agent(path: Path, *kinds: str) -> tuple[Any, Description, Arrays]:
     name = description.get("class")
     if str(name) not in _CLASSES:
         raise ValueError(f"{path} holds an agent of an unknown class, {name!r}")
+    own = {key: a for key, a in arrays.items() if not key.startswith(_ARRAYS_OF_TRAINING)}
     try:
-        return _CLASSES[str(name)].rebuild(description, arrays), description, arrays
+        return _CLASSES[str(name)].rebuild(description, own), description, arrays
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is damaged: {error}") from error
 
@@ -123,8 +123,8 @@ def write_training(path: Path, agent: Any, training: SavedTraining) -> None:
     arrays[_EVALUATIONS] = training.evaluations
     for i, episode in enumerate(training.present):
         if episode is not None:
-            arrays[f"{ARRAYS_OF_TRAINING}{i}.actions"] = episode.actions
-            arrays[f"{ARRAYS_OF_TRAINING}{i}.observation"] = episode.observation
+            arrays[f"{_ARRAYS_OF_TRAINING}{i}.actions"] = episode.actions
+            arrays[f"{_ARRAYS_OF_TRAINING}{i}.observation"] = episode.observation
     values = msgspec.to_builtins(training, enc_hook=_without_arrays)
     write_file(path, "training", arrays, {**agent.description(), "training": values})
 
@@ -162,8 +162,8 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
         episode
         and msgspec.structs.replace(
             episode,
-            actions=array(f"{ARRAYS_OF_TRAINING}{i}.actions"),
-            observation=array(f"{ARRAYS_OF_TRAINING}{i}.observation"),
+            actions=array(f"{_ARRAYS_OF_TRAINING}{i}.actions"),
+            observation=array(f"{_ARRAYS_OF_TRAINING}{i}.observation"),
         )
         for i, episode in enumerate(saved.present)
     ]

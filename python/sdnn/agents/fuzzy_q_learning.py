@@ -32,16 +32,11 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     Examples
     --------
     >>> import gymnasium as gym, sdnn
-    >>> from sdnn.agents import FuzzyQLearning, Transition
+    >>> from sdnn.agents import FuzzyQLearning
     >>> env = gym.make("sdnn.environments:sdnn/AcrobotSwingUp-v0")
     >>> agent = FuzzyQLearning(env.observation_space, env.action_space, seed=1)
-    >>> observation, _ = env.reset(seed=1)
-    >>> agent.begin_episode()
-    >>> for _ in range(3):
-    ...     action = agent.act(observation)
-    ...     next_observation, reward, terminated, truncated, _ = env.step(action)
-    ...     agent.learn(Transition(observation, action, reward, next_observation, terminated))
-    ...     observation = next_observation
+    >>> agent.train(env, steps=3).n_steps
+    3
     >>> agent.n_rules
     6561
     """
@@ -63,7 +58,7 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
         RuntimeError while the agent is warming up.
         """
         agent: Any = self._require_warm().agent
-        return agent.part(0) if len(self._action["low"]) > 1 else agent
+        return agent.part(0) if len(self._action.low) > 1 else agent
 
     @property
     def n_rules(self) -> int:

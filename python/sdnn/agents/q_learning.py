@@ -80,7 +80,7 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
     @property
     def n_dimensions(self) -> int:
         """Dimensions of an action."""
-        return len(self._action["low"])
+        return len(self._action.low)
 
     @property
     def n_actions(self) -> int | list[int]:
@@ -244,16 +244,12 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
     Examples
     --------
     >>> import gymnasium as gym, sdnn
-    >>> from sdnn.agents import RBFQLearning, Transition
+    >>> from sdnn.agents import RBFQLearning
     >>> env = gym.make("sdnn.environments:sdnn/AcrobotSwingUp-v0")
     >>> agent = RBFQLearning(env.observation_space, env.action_space, seed=1)
+    >>> agent.train(env, steps=3).n_steps
+    3
     >>> observation, _ = env.reset(seed=1)
-    >>> agent.begin_episode()
-    >>> for _ in range(3):
-    ...     action = agent.act(observation)
-    ...     next_observation, reward, terminated, truncated, _ = env.step(action)
-    ...     agent.learn(Transition(observation, action, reward, next_observation, terminated))
-    ...     observation = next_observation
     >>> agent.q_values(observation).shape
     (601,)
     """

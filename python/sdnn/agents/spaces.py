@@ -9,7 +9,8 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sdnn.arguments import argument_error, has_methods, whole
+from sdnn import _core
+from sdnn.arguments import argument_error, has_methods
 from sdnn.bounds import flat_bounds, with_infinities
 
 __all__ = [
@@ -58,24 +59,25 @@ class Observations:
 
     def config(
         self, ranges: Ranges | None, angles: Sequence[int], angle_pairs: AnglePairs
-    ) -> dict[str, Any]:
-        """Return the fields of the core's ``ObservationConfig``; see `sdnn.agents.Agent`."""
+    ) -> _core.ObservationConfig:
+        """Return the core's settings for these arguments of `sdnn.agents.Agent`."""
         is_adaptive = isinstance(ranges, str) and ranges == "adaptive"
         low, high = _ranges(self._low, self._high, None if is_adaptive else ranges)
-        is_word = isinstance(angle_pairs, str)
-        if is_word and angle_pairs not in ("none", "find"):
-            problem = f"must be 'none', 'find' or pairs of variables, got {angle_pairs!r}"
-            raise argument_error("angle_pairs", problem)
-        pairs = () if is_word else _listed("angle_pairs", angle_pairs)
-        return {
-            "low": [None if np.isnan(x) else x for x in low.tolist()],
-            "high": [None if np.isnan(x) else x for x in high.tolist()],
-            "adaptive": is_adaptive,
-            "angles": [self._variable("angles", one) for one in _listed("angles", angles)],
-            "angle_pairs": [self._pair(pair) for pair in pairs],
-            "find_angle_pairs": is_word and angle_pairs == "find",
-            "symbols": [list(symbol) for symbol in _symbols_of(self._space)],
-        }
+        pairs: Any = angle_pairs
+        if isinstance(angle_pairs, str):
+            pairs = ()
+            if angle_pairs not in ("none", "find"):
+                problem = f"must be 'none', 'find' or pairs of variables, got {angle_pairs!r}"
+                raise argument_error("angle_pairs", problem)
+        return _core.ObservationConfig(
+            low=[None if np.isnan(x) else x for x in low.tolist()],
+            high=[None if np.isnan(x) else x for x in high.tolist()],
+            adaptive=is_adaptive,
+            angles=angles,
+            angle_pairs=pairs,
+            find_angle_pairs=isinstance(angle_pairs, str) and angle_pairs == "find",
+            symbols=list(_symbols_of(self._space)),
+        )
 
     def vector(self, name: str, observation: Any) -> NDArray[np.float64]:
         """Return the variables of an observation, in any shape; ValueError if it is none."""
@@ -92,20 +94,6 @@ class Observations:
         if values.shape != self._shape:
             raise ValueError(f"{name} must have shape {self._shape}, got {values.shape}")
         return values
-
-    def _variable(self, name: str, number: Any) -> int:
-        last = self.n_variables - 1
-        try:
-            return whole(name, number, 0, last)
-        except ValueError:
-            problem = f"must be variables from 0 to {last}, got {number!r}"
-            raise argument_error(name, problem) from None
-
-    def _pair(self, pair: Any) -> list[int]:
-        if isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2:
-            problem = f"must be pairs (cosine, sine) of variables, got {pair!r}"
-            raise argument_error("angle_pairs", problem)
-        return [self._variable("angle_pairs", variable) for variable in pair]
 
 
 def _check_parts(space: gym.Space[Any], observation: Any) -> None:
@@ -154,13 +142,6 @@ def _numbers(name: str, values: Any) -> NDArray[np.float64]:
     return array.astype(np.float64, copy=False)
 
 
-def _listed(name: str, values: Any) -> tuple[Any, ...]:
-    try:
-        return tuple(values)
-    except TypeError:
-        raise argument_error(name, f"must be a list, got {values!r}", TypeError) from None
-
-
 def _ranges(
     low: NDArray[np.float64], high: NDArray[np.float64], ranges: Any
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -204,8 +185,8 @@ class Actions:
     Attributes
     ----------
     is_box : bool
-    config : dict
-        The fields of the core's ``ActionConfig``.
+    config : ActionConfig
+        The core's settings.
     """
 
     def __init__(self, space: gym.Space[Any]) -> None:
@@ -222,18 +203,22 @@ class Actions:
                 "action_space must be a Box, Discrete, MultiDiscrete or MultiBinary,"
                 f" got {type(space).__name__}"
             )
+        if not np.isfinite([low, high]).all():
+            problem = f"must have finite bounds, got {_line(space)}"
+            remedy = "gymnasium's RescaleAction gives a Box finite bounds"
+            raise argument_error("action_space", f"{problem}: {remedy}")
         dtype = np.dtype(space.dtype)
         self._dtype = dtype
         self._type: Any = dtype.type
         self._shape = space.shape or ()
         self._is_vector = len(self._shape) == 1
-        number = {"f2": "float16", "f4": "float32"}.get(dtype.str[1:], "float64")
-        self.config: dict[str, Any] = {
-            "low": low.astype(np.float64).tolist(),
-            "high": high.astype(np.float64).tolist(),
-            "discrete": not self.is_box,
-            "number": number if dtype.kind == "f" else "whole",
-        }
+        number: Any = {"f2": "float16", "f4": "float32"}.get(dtype.str[1:], "float64")
+        self.config = _core.ActionConfig(
+            low=low.astype(np.float64).tolist(),
+            high=high.astype(np.float64).tolist(),
+            discrete=not self.is_box,
+            number=number if dtype.kind == "f" else "whole",
+        )
 
     def element(self, numbers: NDArray[np.float64]) -> Any:
         """Make the element of the space that has these numbers."""
@@ -400,18 +385,18 @@ def space_of(data: Mapping[str, Any]) -> gym.Space[Any]:
     return gym.spaces.Tuple([space_of(part) for part in data["tuple"]])
 
 
-def observation_space_of(config: Mapping[str, Any]) -> gym.Space[Any]:
+def observation_space_of(config: _core.ObservationConfig) -> gym.Space[Any]:
     """Make the observation space of an agent that was made in C++: real numbers."""
-    low = np.array([-np.inf if x is None else x for x in config["low"]], np.float64)
-    high = np.array([np.inf if x is None else x for x in config["high"]], np.float64)
+    low = np.array([-np.inf if x is None else x for x in config.low], np.float64)
+    high = np.array([np.inf if x is None else x for x in config.high], np.float64)
     return gym.spaces.Box(low, high, dtype=np.float64)
 
 
-def action_space_of(config: Mapping[str, Any]) -> gym.Space[Any]:
+def action_space_of(config: _core.ActionConfig) -> gym.Space[Any]:
     """Make the action space of an agent that was made in C++: Box, Discrete or MultiDiscrete."""
-    low, high = np.array(config["low"], np.float64), np.array(config["high"], np.float64)
-    if not config["discrete"]:
-        dtype = np.int64 if config["number"] == "whole" else np.dtype(config["number"]).type
+    low, high = np.array(config.low, np.float64), np.array(config.high, np.float64)
+    if not config.discrete:
+        dtype = np.int64 if config.number == "whole" else np.dtype(config.number).type
         return gym.spaces.Box(low.astype(dtype), high.astype(dtype), dtype=dtype)
     start, n = low.astype(np.int64), (high - low + 1).astype(np.int64)
     if start.size == 1:

@@ -172,7 +172,7 @@ def test_impossible_settings_are_named(change, message):
         (gym.spaces.Box(0, 1, (0,)), TORQUES, ValueError, "observation_space"),
         (gym.spaces.Box(0, 0, (2,)), TORQUES, ValueError, "low < high"),
         (OBSERVATIONS, gym.spaces.Text(2), TypeError, "action_space"),
-        (OBSERVATIONS, gym.spaces.Box(0, np.inf, (1,)), ValueError, "of action_space"),
+        (OBSERVATIONS, gym.spaces.Box(0, np.inf, (1,)), ValueError, "action_space"),
         (OBSERVATIONS, gym.spaces.Discrete(92), ValueError, "n_actions"),
     ],
 )
