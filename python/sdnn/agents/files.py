@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -24,7 +23,6 @@ __all__ = [
 
 _ARRAYS_OF_TRAINING = "training."
 """How the names of arrays begin that are not the agent's."""
-_EVALUATIONS = _ARRAYS_OF_TRAINING + "evaluations"
 
 _CLASSES: dict[str, type[Any]] = {}
 
@@ -92,8 +90,8 @@ class SavedEpisode(msgspec.Struct, frozen=True, kw_only=True):
 class SavedTraining(msgspec.Struct, frozen=True, kw_only=True):
     """The state that `sdnn.agents.Training` resumes.
 
-    ``present`` has an entry for each environment, ``evaluations`` steps and mean returns, shape
-    (n, 2); ``next_episode`` is the number of the first that has not begun.
+    ``present`` has an entry for each environment, ``evaluations`` steps and mean returns;
+    ``next_episode`` is the number of the first that has not begun.
     """
 
     steps: _Period | None
@@ -107,8 +105,8 @@ class SavedTraining(msgspec.Struct, frozen=True, kw_only=True):
     evaluate_every_episodes: _Period | None
     evaluation_episodes: Annotated[int, msgspec.Meta(ge=1, le=10**9)]
     limit_bootstraps: bool
-    present: Sequence[SavedEpisode | None]
-    evaluations: Any = None
+    evaluations: list[tuple[_Count, float]]
+    present: list[SavedEpisode | None]
 
     def __post_init__(self) -> None:
         if (self.steps is None) == (self.episodes is None):
@@ -120,7 +118,6 @@ class SavedTraining(msgspec.Struct, frozen=True, kw_only=True):
 def write_training(path: Path, agent: Any, training: SavedTraining) -> None:
     """Write both in one file; OSError if it cannot be written."""
     arrays = agent.state()
-    arrays[_EVALUATIONS] = training.evaluations
     for i, episode in enumerate(training.present):
         if episode is not None:
             arrays[f"{_ARRAYS_OF_TRAINING}{i}.actions"] = episode.actions
@@ -155,9 +152,6 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
         saved = msgspec.convert(description.get("training"), SavedTraining)
     except msgspec.ValidationError as error:
         raise ValueError(f"{path} is damaged: training: {error}") from None
-    evaluations = array(_EVALUATIONS)
-    if evaluations.ndim != 2 or evaluations.shape[1] != 2:
-        raise ValueError(f"{path} is damaged: {_EVALUATIONS} must have shape (n, 2)")
     present = [
         episode
         and msgspec.structs.replace(
@@ -167,4 +161,4 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
         )
         for i, episode in enumerate(saved.present)
     ]
-    return agent, msgspec.structs.replace(saved, evaluations=evaluations, present=present)
+    return agent, msgspec.structs.replace(saved, present=present)

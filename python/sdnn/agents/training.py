@@ -41,7 +41,7 @@ __all__ = ["Training", "TrainingResult"]
 _SETTINGS = (
     "seed", "evaluate_every", "evaluate_every_episodes", "evaluation_episodes", "limit_bootstraps"
 )  # fmt: skip
-_COUNTS = ("n_steps", "n_episodes", "n_rows")
+_STATE = ("n_steps", "n_episodes", "n_rows", "evaluations")
 """Attributes that are saved as they are."""
 
 
@@ -289,10 +289,9 @@ class Training:
 
     def save(self, path: str | Path) -> None:
         """Write agent and training in one file for `load`; OSError if it cannot be written."""
-        names = ("steps", "episodes", "next_episode", *_SETTINGS, *_COUNTS)
+        names = ("steps", "episodes", "next_episode", *_SETTINGS, *_STATE)
         saved = SavedTraining(
             **{name: getattr(self, name) for name in names},
-            evaluations=np.array(self.evaluations, np.float64).reshape(-1, 2),
             present=self._episodes.saved(
                 self.agent.action_space.shape or (), self.agent.flat_observation
             ),
@@ -342,9 +341,8 @@ class Training:
             reset_options=reset_options,
             **{name: getattr(saved, name) for name in _SETTINGS},
         )
-        for name in _COUNTS:
+        for name in _STATE:
             setattr(training, name, getattr(saved, name))
-        training.evaluations = [(int(step), mean) for step, mean in saved.evaluations.tolist()]
         if does_repeat:
             training._episodes.repeat(saved.present, agent.flat_observation)
         return training
