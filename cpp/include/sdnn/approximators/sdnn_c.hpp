@@ -271,10 +271,7 @@ class SDNNC {
       for (const std::int32_t threshold : thresholds) {
         archive.expect(HiddenLayer::is_threshold(threshold), "thresholds", "of less than 2^30");
       }
-      archive.taking("weights", [&] {
-        self.replace_parameters(std::vector<std::int32_t>(weights.begin(), weights.end()),
-                                thresholds);
-      });
+      archive.taking("weights", [&] { self.replace_parameters(std::span(weights), thresholds); });
       self.averaged_.reset();
     }
   }
@@ -299,8 +296,8 @@ class SDNNC {
 
   /// Shapes: weights (n, D), in the paper's order, thresholds (n,). Throws std::invalid_argument
   /// for a weight or threshold out of range, and then nothing has changed.
-  void replace_parameters(std::span<const std::int32_t> weights,
-                          std::span<const std::int32_t> thresholds) {
+  template <class Weight>
+  void replace_parameters(std::span<Weight> weights, std::span<const std::int32_t> thresholds) {
     const std::size_t n_columns = code_->n_columns();
     hidden_layer_ = paired_layer(
         *code_, actions_.n_hidden_units(),
