@@ -251,7 +251,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         ----------
         observation : element of the observation space
         explore : bool
-            False: always a best action, and no effect on the agent's later learning.
+            False: always a best action, and no effect on the agent's later learning. Several
+            threads may call it so at once; `learn` waits for them.
         environment : int
             In which environment, below `n_environments`.
 

@@ -75,7 +75,7 @@ class _Vector(EnvironmentAdapter, abc.ABC):
             raise UnusableStepError(
                 f"env.step must return arrays: {name} must be {what}, got shape {column.shape}"
             )
-        return column.tolist()
+        return list(column.tolist())
 
     def _listed(self, observations: Any) -> list[Any]:
         # A copy: some vector environments write to the same array again.
