@@ -201,8 +201,9 @@ def _given(env_id: str | None, options: dict[str, Any]) -> dict[str, Any]:
         if "." not in name:
             raise click.UsageError(f"--set {name}: must be TABLE.NAME, such as learning.discount")
         give(f"--set {name}", name, value_of(text))
-    if "budget.steps" in given and "budget.episodes" in given:
-        raise click.UsageError("--steps and --episodes must not be given together")
+    both = [by_option[key][0] for key in ("budget.steps", "budget.episodes") if key in given]
+    if len(both) == 2:
+        raise click.UsageError(f"{' and '.join(both)} must not be given together")
     return given
 
 

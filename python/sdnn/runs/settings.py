@@ -42,6 +42,7 @@ _WORDS = {
     "`str`": "a text",
     "`array`": "an array",
     "`object`": "a table",
+    "of length >= 1": "that is not empty",
     ">=": "of at least",
     "<=": "of at most",
     ">": "greater than",
@@ -86,6 +87,11 @@ def _kinds_of(kind: type[Any]) -> Mapping[str, Any]:
     return {name: hints.get(name, Any) for name in names_of(kind)}
 
 
+@functools.cache
+def _required_names(kind: type[Settings]) -> tuple[str, ...]:
+    return tuple(field.name for field in msgspec.structs.fields(kind) if field.required)
+
+
 def names_of(kind: type[Any]) -> tuple[str, ...]:
     """Return the names of the fields of a class of settings, or of another dataclass."""
     if issubclass(kind, msgspec.Struct):
@@ -103,9 +109,8 @@ def checked(kind: Any, value: Any, key: str) -> Any:
     """
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
-    possible = _alternatives(kind)
     if isinstance(value, Mapping):
-        for one in possible:
+        for one in _alternatives(kind):
             if isinstance(one, type) and issubclass(one, Settings):
                 return read(one, value, key)
             if get_origin(one) is dict:
@@ -115,7 +120,7 @@ def checked(kind: Any, value: Any, key: str) -> Any:
         made = msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
         text, _, path = str(error).partition(" - at `$")
-        problem = _problem(possible if not path else (), text)
+        problem = _problem(_alternatives(kind) if not path else (), text)
         raise ConfigError(key + path[:-1], f"{problem}, got {shown(value)}") from None
     if isinstance(made, float) and not math.isfinite(made):
         raise ConfigError(key, f"must be finite, got {made}")
@@ -192,9 +197,9 @@ def read(kind: type[AnySettings], values: Any, where: str = "") -> AnySettings:
     """
     check_names(values, kind.__struct_fields__, where)
     with within(where):
-        for field in msgspec.structs.fields(kind):
-            if field.required and field.name not in values:
-                raise ConfigError(field.name, "must be given")
+        for name in _required_names(kind):
+            if name not in values:
+                raise ConfigError(name, "must be given")
         return kind(**values)
 
 
