@@ -57,7 +57,7 @@ def test_the_agent_of_the_page_runs(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "name",
     [
-        "runs.config_file", "runs.engine", "runs.registry", "runs.settings",
+        "runs.config_file", "runs.engine", "runs.environment", "runs.registry", "runs.settings",
         "runs.spec",
         "runs.report", "runs.results", "reproduction.report",
     ],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 import sys
-from contextlib import AbstractContextManager, closing
+from contextlib import closing
 from typing import Annotated, Any, Literal, TypeAlias
 
 import gymnasium as gym
@@ -203,46 +203,38 @@ class EnvironmentSpec(Settings, frozen=True):
             raise ConfigError("environment.id", words) from error
         return True
 
-    def opened(self) -> AbstractContextManager[gym.Env[Any, Any]]:
-        """Make the bare environment, which is closed after the block."""
-        return closing(self._bare(None))
+    def scaling(self, env: gym.Env[Any, Any] | None = None) -> Scaling | None:
+        """Return how observations are scaled; None: not at all.
 
-    def scaled_ranges(self) -> Ends:
-        """Return the lowest and highest values of the variables that are scaled to [0, 1].
+        Where the agent acts without the noisy or redundant sensors of its run, it needs
+        ``UnitSensors(env, *scaling.ends)``.
 
-        With noise or redundant variables the agent knows no others. Where it acts without them,
-        it needs ``UnitSensors(env, low, high)``.
-
-        Returns
-        -------
-        low, high : numpy.ndarray
-            Shapes (n_variables,).
+        Parameters
+        ----------
+        env
+            An environment that `make` gave. By default one is made.
 
         Raises
         ------
         ConfigError
-            As `make`; or if nothing is scaled, since there is neither noise nor redundancy.
+            As `make`.
 
         Examples
         --------
-        >>> EnvironmentSpec(id="MountainCar-v0", noise=0.1).scaled_ranges()[1].round(2).tolist()
+        >>> scaling = EnvironmentSpec(id="MountainCar-v0", noise=0.1).scaling()
+        >>> scaling.ends[1].round(2).tolist()
         [0.6, 0.07]
         """
         if not self.changes_observations:
-            raise ConfigError("environment.ranges", "scale nothing without noise or redundant")
-        with self.opened() as env:
-            return self.ends(env)
-
-    def scaling(self, env: gym.Env[Any, Any] | None = None) -> Scaling | None:
-        """Return how observations are scaled; None: not at all.
-
-        Without an environment that `make` gave, one is made.
-        """
-        if not self.changes_observations:
             return None
-        low, high = self.scaled_ranges() if env is None else _scaled_from(env)
-        ranges = tuple(zip(low.tolist(), high.tolist(), strict=True))
-        return Scaling(ranges=ranges, n_redundant=self.redundant)
+        if env is None:
+            with closing(self.make()) as made:
+                return self.scaling(made)
+        while not isinstance(env, UnitSensors):
+            assert isinstance(env, gym.Wrapper)  # make puts it there
+            env = env.env
+        pairs = zip(env.observation_low.tolist(), env.observation_high.tolist(), strict=True)
+        return Scaling(ranges=tuple(pairs), n_redundant=self.redundant)
 
     def ends(self, env: gym.Env[Any, Any]) -> Ends:
         """Return the lowest and highest values of the flattened observation; infinite: not known.
@@ -305,13 +297,6 @@ def _in_own_units(
     return gym.wrappers.TransformObservation(
         env, lambda unit: (low + unit * (high - low)).astype(np.float32), space
     )
-
-
-def _scaled_from(env: gym.Env[Any, Any]) -> Ends:
-    while not isinstance(env, UnitSensors):
-        assert isinstance(env, gym.Wrapper)  # make puts it there
-        env = env.env
-    return env.observation_low, env.observation_high
 
 
 def render_modes(env: gym.Env[Any, Any]) -> tuple[str, ...]:

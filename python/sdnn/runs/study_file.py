@@ -16,7 +16,7 @@ from msgspec import Meta
 from sdnn.runs.config_file import ConfigFile, KeyPath, dotted
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.registry import labels, split_label
-from sdnn.runs.settings import Settings, check_names, possible_words, read
+from sdnn.runs.settings import Settings, check_names, checked, possible_words, read
 from sdnn.runs.spec import SHORTHANDS, RunSpec, overridden
 
 BASE = "base"
@@ -60,14 +60,6 @@ class StudyHeader(Settings, frozen=True):
         tuple[str, ...],
         Meta(description="Modules to import, which may register agents and environments."),
     ] = ()
-
-
-class _Axes(Settings, frozen=True):
-    combine: Literal["one_at_a_time", "product"] = "one_at_a_time"
-
-
-class _Only(Settings, frozen=True):
-    only: tuple[str, ...] = ()
 
 
 class Setting(NamedTuple):
@@ -270,7 +262,8 @@ class StudyReader:
     def _read_case(self, case_id: str, known: KnownCase | None) -> StudyCase:
         where: KeyPath = ("cases", case_id)
         table = self._table("cases", case_id)
-        title = self._title(where, table, known.title if known else case_id)
+        default = known.title if known else case_id
+        title = checked(str, table.pop("title", default), dotted((*where, "title")))
         settings = self._layer(where, table)
         if known is None:
             return StudyCase(case_id, title, settings, where)
@@ -285,13 +278,6 @@ class StudyReader:
         own = {name: Setting(value, where) for name, value in fixed.items()}
         return StudyCase(case_id, title, own | settings, where)
 
-    def _title(self, where: KeyPath, table: dict[str, Any], default: str) -> str:
-        """Take the title out of a table."""
-        title = table.pop("title", default)
-        if not isinstance(title, str):
-            raise self.file.error((*where, "title"), f"must be a text, got {title!r}")
-        return title
-
     def _read_variants(self) -> tuple[StudyVariant, ...]:
         variants: dict[str, StudyVariant] = {}
         for name in self._table("variants"):
@@ -299,7 +285,7 @@ class StudyReader:
             table, of_cases = self._table(*where), self._table(*where, "cases")
             table.pop("cases", None)
             known = [case.id for case in self.cases]
-            only = read(_Only, {"only": table.pop("only", ())}, dotted(where)).only
+            only = checked(tuple[str, ...], table.pop("only", ()), dotted((*where, "only")))
             for number, case_id in enumerate(only):
                 if case_id not in known:
                     words = f"no case {case_id!r}; {possible_words(case_id, known)}"
@@ -311,7 +297,7 @@ class StudyReader:
                 )
                 for case_id in of_cases
             }
-            title = self._title(where, table, name)
+            title = checked(str, table.pop("title", name), dotted((*where, "title")))
             settings = self._layer(where, table)
             variants[name] = StudyVariant(name, title, settings, where, in_cases, only)
         for variant in self._axis_variants():
@@ -324,8 +310,8 @@ class StudyReader:
     def _axis_variants(self) -> Iterator[StudyVariant]:
         """Make the variants of the axes: the base and every value alone, or all combinations."""
         table = self._table("axes")
-        how = {"combine": table.pop("combine")} if "combine" in table else {}
-        combine = read(_Axes, how, "axes").combine
+        ways = Literal["one_at_a_time", "product"]
+        combine = checked(ways, table.pop("combine", "one_at_a_time"), "axes.combine")
         axes = self._layer(("axes",), table)
         if not axes:
             return
