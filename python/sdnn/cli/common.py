@@ -329,12 +329,10 @@ def print_forecast(
     request: Any, *, as_json: bool, more: Mapping[str, Any] | None = None, **options: Any
 ) -> None:
     """Print what is still to be run and how long that takes; as JSON with more values."""
-    from sdnn.machine import n_cores
     from sdnn.runs.forecast import forecast, forecast_lines
 
-    # The size of a cluster is not known.
-    jobs = 1 if request.executor is not None else request.jobs or n_cores()
-    found = forecast(request.out, request.groups, jobs, **options) | dict(more or {})
+    found = forecast(request.out, request.groups, request.executor.jobs, **options)
+    found = {**found, **(more or {})}
     lines = [json.dumps(found, indent=2)] if as_json else forecast_lines(found, request.out)
     for line in lines:
         click.echo(line)

@@ -10,6 +10,7 @@ import click
 
 if TYPE_CHECKING:
     from sdnn.runs.dask_executor import DaskExecutor
+    from sdnn.runs.engine import ThreadExecutor
 
 EXECUTORS = ("threads", "dask")
 
@@ -45,29 +46,30 @@ _OF_DASK = ("scheduler", "scheduler_timeout")
 
 
 def executor_options(command: Function) -> Function:
-    """Add the options to a command, which is given `jobs` and `executor`.
-
-    They are what `run_trials` takes: without an executor, threads of this process.
-    """
+    """Add the options to a command, which receives an `executor`."""
 
     @functools.wraps(command)
     def wrapped(*arguments: Any, where: str, jobs: int | None, **options: Any) -> Any:
         of_dask = {name: options.pop(name) for name in _OF_DASK}
         given = {name: value for name, value in of_dask.items() if value is not None}
         executor = _make_executor(where, jobs, given)
-        return command(*arguments, jobs=jobs, executor=executor, **options)
+        return command(*arguments, executor=executor, **options)
 
     for option in reversed(_OPTIONS):
         wrapped = option(wrapped)
     return wrapped
 
 
-def _make_executor(where: str, jobs: int | None, of_dask: dict[str, Any]) -> DaskExecutor | None:
+def _make_executor(
+    where: str, jobs: int | None, of_dask: dict[str, Any]
+) -> ThreadExecutor | DaskExecutor:
     if where == "threads":
         if of_dask:
             name = next(iter(of_dask)).replace("_", "-")
             raise click.UsageError(f"--{name} needs --executor dask")
-        return None
+        from sdnn.runs.engine import ThreadExecutor
+
+        return ThreadExecutor(jobs)
     if jobs is not None:
         raise click.UsageError("--jobs is for threads; a cluster runs one trial a worker thread")
     if "scheduler" not in of_dask:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -25,7 +25,7 @@ from sdnn.reproduction.cost import CostConfig, CostKey, CostRecord
 from sdnn.reproduction.figures import draw_cost, draw_experiment
 from sdnn.reproduction.reference_results import reference_results
 from sdnn.reproduction.report import Report
-from sdnn.runs.engine import Executor, Observer, PlannedTrial, plan_of, run_trials
+from sdnn.runs.engine import Executor, Observer, PlannedTrial, ThreadExecutor, plan_of, run_trials
 from sdnn.runs.figures import figure_bytes, require_matplotlib
 from sdnn.runs.registry import split_label
 from sdnn.runs.report import Finished, describe_call, require_jinja
@@ -62,8 +62,7 @@ class ReproduceRequest:
     n_trials: int | None = None  # per case and agent; default the paper's, or `QUICK_TRIALS`
     n_episodes: int | None = None  # per trial; default the paper's, or `QUICK_EPISODES`
     seed: int = 0  # root of all seeds
-    jobs: int | None = None  # trials at the same time; default one for each core
-    executor: Executor | None = None  # where trials run; default threads of this process
+    executor: Executor = field(default_factory=ThreadExecutor)
     quick: bool = False  # whether this is a look at a fraction
     agents: tuple[str, ...] = ()  # to run in every case instead of the case's own
     presets: tuple[str, ...] = ()  # under which SDNN-C runs beside the agents of every case
@@ -177,9 +176,7 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
     plan = request.plan
     with ResultStore(request.out) as store:
         remove_abandoned_files(request.out)
-        outcome = run_trials(
-            plan.trials, store, executor=request.executor, jobs=request.jobs, observer=watcher
-        )
+        outcome = run_trials(plan.trials, store, executor=request.executor, observer=watcher)
         if outcome.failures or outcome.interrupted:
             return Finished(outcome)
         cost.measure_costs(plan.costs, request.cost_config, store, watcher)

@@ -37,7 +37,7 @@ from sdnn.runs.engine import (
     run_to_end,
 )
 from sdnn.runs.errors import ClusterError, WorkerLostError
-from sdnn.runs.trial import TrialKey, TrialRecord, TrialRows, opened
+from sdnn.runs.trial import TrialKey, TrialRecord, opened, rows_of
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -60,11 +60,9 @@ def probe(planned: PlannedTrial) -> str:
     A trial in Python is only made: it may be long, and its libraries may round differently.
     """
     with opened(planned.spec.make_trial(planned.key.seed)) as trial:
-        digest = ""
         if planned.spec.is_compiled:
             trial.advance(PROBE_EPISODES)
-            digest = TrialRows.of_tests(**trial.test_rows()).digest()
-    return f"{planned.spec.canonical_json()}, {digest}"
+        return f"{planned.spec.canonical_json()}, {rows_of(trial).digest()}"
 
 
 def mismatch(version: str, probes: Sequence[tuple[bytes, str]]) -> str:
@@ -126,6 +124,8 @@ class DaskExecutor:
     ValueError
         If a value is out of its range.
     """
+
+    jobs = 1  # the size of the cluster is not known
 
     def __init__(self, scheduler: str, *, scheduler_timeout: float = 300.0) -> None:
         if not scheduler:

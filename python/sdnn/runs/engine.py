@@ -26,7 +26,7 @@ from sdnn.machine import instruction_set, n_cores
 from sdnn.runs.registry import title_of
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
-from sdnn.runs.trial import TrainingTrial, Trial, TrialKey, TrialRecord, TrialRows, opened
+from sdnn.runs.trial import TrainingTrial, Trial, TrialKey, TrialRecord, opened, rows_of
 
 CHUNK_SECONDS = 0.1
 """A trial reports about this often; it is also how long an interruption waits."""
@@ -116,7 +116,9 @@ Message = Advanced | Finished | Failed | Noted
 
 
 class Executor(Protocol):
-    """Runs trials somewhere."""
+    """Runs trials somewhere, ``jobs`` at the same time as far as it knows."""
+
+    jobs: int
 
     def run(
         self, planned: Sequence[PlannedTrial], stop: threading.Event
@@ -180,15 +182,12 @@ def run_trials(
     store: ResultStore,
     *,
     executor: Executor | None = None,
-    jobs: int | None = None,
-    stop: threading.Event | None = None,
     observer: Observer | None = None,
 ) -> RunOutcome:
     """Run the planned trials that are not stored, and store each as soon as it is finished.
 
     Ctrl-C and SIGTERM end the run after the chunks under way; finished trials are stored before it
-    returns.
-    A trial that raises does not stop the others.
+    returns. A trial that raises does not stop the others.
 
     Parameters
     ----------
@@ -197,35 +196,28 @@ def run_trials(
     store
         Where they go.
     executor
-        Where they run; default threads of this process.
-    jobs
-        Threads of the default executor; default one for each core.
-    stop
-        Ends the run when it is set, as Ctrl-C does.
+        Where they run; default threads of this process, one for each core.
     observer
         Notified of what happens.
 
     Raises
     ------
     ValueError
-        If `jobs` is less than 1, or is given beside an executor; if SDNN_INSTRUCTION_SET is wrong.
+        If the environment variable SDNN_INSTRUCTION_SET is wrong.
     StoreError
         If the store cannot be read or written; running trials are given up.
     RunError
         If the executor can run no trial any more; what was finished is stored.
     """
     instruction_set()
-    if executor is None:
-        executor = ThreadExecutor(jobs)
-    elif jobs is not None:
-        raise ValueError(f"jobs must be left out where an executor is given, got {jobs}")
+    executor = ThreadExecutor() if executor is None else executor
     watcher = Observer() if observer is None else observer
     planned = tuple(plan)
     stored = store.keys()
     missing = tuple(p for p in planned if p.key not in stored)
     n_reused = len(planned) - len(missing)
     watcher.begun(len(planned), n_reused, sum(p.spec.length for p in missing))
-    stop = threading.Event() if stop is None else stop
+    stop = threading.Event()
     failures: list[Failed] = []
     n_run = 0
     signals = Interrupts(stop.set, (SIGINT, SIGTERM))
@@ -275,11 +267,7 @@ def run_to_end(
                     return None
         if not trial.finished:
             return None
-        rows = (
-            trial.rows()
-            if isinstance(trial, TrainingTrial)
-            else TrialRows.of_tests(**trial.test_rows())
-        )
+        rows = rows_of(trial)
     return TrialRecord(
         key=planned.key,
         config=planned.spec.canonical_json(),

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 from sdnn import _core
 from sdnn.files import csv_pieces, gzip_pieces, remove_abandoned_files
 from sdnn.runs.comparison import Addition, Comparison, compare, study_json, study_page
-from sdnn.runs.engine import Executor, Observer, PlannedTrial, run_trials
+from sdnn.runs.engine import Executor, Observer, PlannedTrial, ThreadExecutor, run_trials
 from sdnn.runs.figures import draw_study, figure_bytes, require_matplotlib
 from sdnn.runs.report import Finished, describe_call, require_jinja
 from sdnn.runs.store import STORE_NAME, ResultStore
@@ -25,8 +25,7 @@ class SweepRequest:
 
     study: Study
     out: Path  # folder of the result file, figure, tables and page
-    jobs: int | None = None  # trials at the same time; default one for each core
-    executor: Executor | None = None  # where trials run; default threads of this process
+    executor: Executor = field(default_factory=ThreadExecutor)
     only: tuple[str, ...] = ()  # ids of the variants to run; none: all
     # Makes what else the report has.
     addition: Callable[[Comparison], Addition] = lambda _: Addition()
@@ -73,9 +72,7 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Finishe
         if not is_new:
             study.check(store.keys())
         remove_abandoned_files(request.out)
-        outcome = run_trials(
-            plan, store, executor=request.executor, jobs=request.jobs, observer=observer
-        )
+        outcome = run_trials(plan, store, executor=request.executor, observer=observer)
         if outcome.interrupted:
             return Finished(outcome)
         records = store.load({key for pair in study.combinations for key in study.keys(*pair)})

@@ -276,6 +276,13 @@ def opened(trial: _AnyTrial) -> Iterator[_AnyTrial]:
 Reason: TypeAlias = Literal["done", "target", "stopped"]
 
 
+def rows_of(trial: Trial | TrainingTrial) -> TrialRows:
+    """Return the rows of a trial so far; of a compiled one, its test episodes."""
+    if isinstance(trial, TrainingTrial):
+        return trial.rows()
+    return TrialRows.of_tests(**trial.test_rows())
+
+
 class TrainingTrial:
     """A `sdnn.agents.Training` as a trial; its evaluations are the test episodes.
 
@@ -331,13 +338,6 @@ class TrainingTrial:
     def pieces(self, seconds: float) -> Generator[None, None, None]:
         """Learn to the end, in pieces of about so many seconds."""
         return self.training.pieces(seconds)
-
-    def test_rows(self) -> dict[str, NDArray[Any]]:
-        """Test episodes so far: arrays `episode`, `steps`, `episode_return`, `solved`, (n,)."""
-        rows = self.rows()
-        return {
-            name: getattr(rows, name) for name in ("episode", "steps", "episode_return", "solved")
-        }
 
     def rows(self) -> TrialRows:
         """Return all rows so far: learning episodes and evaluations."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sdnn.reproduction import EXPERIMENTS, plan_trials
-from sdnn.runs import AGENTS, Observer, ResultStore, run_trials
+from sdnn.runs import AGENTS, Observer, ResultStore, ThreadExecutor, run_trials
 
 CASES = EXPERIMENTS[0].cases
 
@@ -73,4 +73,4 @@ def agents_with(core_trial):
 if __name__ == "__main__":
     AGENTS.update(agents_with(SlowTrial))
     with ResultStore(Path(sys.argv[1])) as store:
-        run_trials(make_plan(6, 100), store, jobs=2, observer=_Speaker())
+        run_trials(make_plan(6, 100), store, executor=ThreadExecutor(2), observer=_Speaker())

@@ -32,7 +32,7 @@ class Recorder(Observer):
 
 
 def test_jobs_do_not_change_the_content(tmp_path, run):
-    digests = {run(tmp_path / str(jobs), jobs=jobs)[1] for jobs in (1, 2, 5)}
+    digests = {run(tmp_path / str(jobs), executor=ThreadExecutor(jobs))[1] for jobs in (1, 2, 5)}
     assert len(digests) == 1
 
 
@@ -124,7 +124,7 @@ def test_interruption_keeps_what_is_finished(tmp_path, fake, run):
 
         sent = False
 
-    outcome, _ = run(tmp_path, None, Interrupting, jobs=1)
+    outcome, _ = run(tmp_path, None, Interrupting, executor=ThreadExecutor(1))
     assert outcome.interrupted
     assert outcome.n_run == 1
     assert signal.getsignal(signal.SIGINT) is before
@@ -149,15 +149,13 @@ def test_unwritable_store_stops_the_run(tmp_path, fake, use_trial):
 
     use_trial(Counted)
     with Full(tmp_path) as store, pytest.raises(StoreError, match="disk full"):
-        run_trials(fake.make_plan(10, 50), store, jobs=1)
+        run_trials(fake.make_plan(10, 50), store, executor=ThreadExecutor(1))
     assert len(made) < 20
 
 
-def test_jobs_must_be_positive(tmp_path, run):
+def test_jobs_must_be_positive():
     with pytest.raises(ValueError, match="jobs"):
-        run(tmp_path, jobs=0)
-    with pytest.raises(ValueError, match="jobs"):
-        run(tmp_path, executor=ThreadExecutor(), jobs=2)
+        ThreadExecutor(0)
 
 
 class Scripted:
