@@ -334,7 +334,11 @@ def _judge(
         return CheckOutcome(check, None, Verdict.NOT_RUN)
     found = [measured[subject] for subject in quantity.subjects]
     samples = quantity.samples(measured)
-    estimate = estimate_contrast(*samples) if quantity.other else found[0].medians[quantity.measure]
+    estimate = (
+        estimate_contrast(samples[0], samples[1])
+        if quantity.other
+        else found[0].medians[quantity.measure]
+    )
     verdict = verdict_of(check, estimate) if all(map(is_paper_scale, found)) else Verdict.NOT_JUDGED
     return CheckOutcome(check, estimate, verdict, samples, min(one.last_episode for one in found))
 

@@ -44,7 +44,7 @@ def forecast(
                 if one.n_episodes:
                     times.setdefault(one.key[:2], ("stored trial", []))[1].append(one)
     check(stored)
-    works = []
+    works: list[dict[str, Any]] = []
     planned: set[TrialKey] = set()
     missing: dict[TrialKey, tuple[float, bool]] = {}  # variants that are the same share trials
     for (case, variant), group in groups.items():
