@@ -12,7 +12,7 @@ from sdnn.reproduction.claims import Claim, ClaimOutcome, TenTrials, Verdict, ju
 from sdnn.reproduction.report import RULE_NOTE, VERDICT_KINDS, format_quantity
 from sdnn.runs import study
 from sdnn.runs.comparison import Addition, Comparison
-from sdnn.runs.report import Folded, Section, Table, format_share
+from sdnn.runs.report import Section, Table, format_share
 from sdnn.runs.results import CaseResult, Estimate
 from sdnn.runs.study import Study
 from sdnn.runs.study_file import KnownCase
@@ -102,7 +102,7 @@ class StudyClaims:
             table = Table(title, (*header, "all of these"), chances)
             yield Section(level=3, table=table, notes=[CHANCES_NOTE])
         tables = [self._details(claim, titles) for claim in self.shown]
-        yield Section(folded=[Folded(summary=one.title, table=one) for one in tables])
+        yield Section(folded=[Section(table=table) for table in tables])
 
     def _verdict(self, variant: str, outcome: ClaimOutcome | None) -> str:
         if outcome is None:

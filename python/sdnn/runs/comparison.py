@@ -14,7 +14,6 @@ from sdnn.runs.registry import title_of
 from sdnn.runs.report import (
     MEASURE_END,
     PERCENT,
-    Folded,
     Page,
     Section,
     Table,
@@ -163,7 +162,7 @@ def study_page(comparison: Comparison, digest: str, addition: Addition, picture:
         " trials and are left out."
     )
     alt = f"{study.title}: each variant in each case, trial by trial"
-    file = Folded(summary=study.file.path.name, text=study.file.text)
+    file = Section(title=study.file.path.name, text=study.file.text)
     titles = (
         (f"{m.variant.title}, {m.result.title}, {title_of(m.result.agent)}", m.result)
         for m in comparison.measured.values()

@@ -78,22 +78,12 @@ class Table:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Folded:
-    """A part of an HTML page that opens on demand, shown in the order of its fields."""
-
-    summary: str
-    aside: str = ""
-    note: str = ""
-    text: str = ""
-    table: Table | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
 class Section:
     """A part of a page, shown in the order of its fields; what is empty is left out.
 
     The title is that of the table by default; one of level 0 is a faint paragraph. A tally has
-    counts: how one is colored, the number, and what is counted. A picture is an SVG.
+    counts: how one is colored, the number, and what is counted. A picture is an SVG. Folded
+    sections, of notes, text and table, open on demand.
     """
 
     title: str = ""
@@ -105,7 +95,8 @@ class Section:
     table: Table | None = None
     notes: Sequence[str] = ()
     terms: Mapping[str, str] = field(default_factory=dict)
-    folded: Sequence[Folded] = ()
+    text: str = ""
+    folded: Sequence[Section] = ()
 
     @property
     def heading(self) -> str:
@@ -239,11 +230,12 @@ def measures_section(names: Iterable[MeasureName], notes: Sequence[str] = ()) ->
 def settings_section(results: Iterable[tuple[str, CaseResult]]) -> Section:
     """Return the section of what fixes the rows of results, each with a title."""
     folded = [
-        Folded(
-            summary=title,
-            aside=f"· configuration {result.config_hash}",
-            note=f"sdnn {', '.join(sorted({one.version for one in result.records}))}; seeds of"
-            f" the trials: {', '.join(str(one.key.seed) for one in result.records)}",
+        Section(
+            title=f"{title} · configuration {result.config_hash}",
+            notes=[
+                f"sdnn {', '.join(sorted({one.version for one in result.records}))}; seeds of the"
+                f" trials: {', '.join(str(one.key.seed) for one in result.records)}"
+            ],
             text=json.dumps(json.loads(result.records[0].config), indent=2),
         )
         for title, result in results
