@@ -73,11 +73,13 @@ def export(
 
 
 def _usage_error(error: ValueError, is_named: bool) -> click.ClickException:
-    """Name the option of an argument, the first word of its error."""
-    word, _, problem = str(error).partition(" ")
-    if word == "name" and not is_named:
+    """Return an error about an argument as one about its option."""
+    from sdnn.arguments import blamed
+
+    name, problem = blamed(error)
+    if name == "name" and not is_named:
         return click.UsageError(f"--c-header gives no name; use --name, which {problem}")
-    option = {"name": "--name", "fraction_bits": "--fraction-bits"}.get(word)
+    option = {"name": "--name", "fraction_bits": "--fraction-bits"}.get(name)
     if option is None:
         return click.ClickException(str(error))
     return click.UsageError(f"{option} {problem}")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from sdnn._core import __version__
 from sdnn.agents import Agent, Scaling, SDNNQLearning
-from sdnn.arguments import path_of, whole
+from sdnn.arguments import argument_error, path_of, whole
 from sdnn.export.tables import (
     Input,
     Tables,
@@ -125,9 +125,10 @@ def c_header(agent: Agent[Any, Any], name: str, *, fraction_bits: int | None = N
         )
     fits = isinstance(name, str) and re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name)
     if not fits or len(name) > _LARGEST_NAME:
-        raise ValueError(
-            "name must be a C identifier of letters, digits and single underscores between them,"
-            f" at most {_LARGEST_NAME} long, got {name!r}"
+        raise argument_error(
+            "name",
+            "must be a C identifier of letters, digits and single underscores between them,"
+            f" at most {_LARGEST_NAME} long, got {name!r}",
         )
     return _Writer(agent, name, fraction_bits).header()
 
@@ -202,10 +203,8 @@ class _Writer:
             return min(most, _DEFAULT_FRACTION_BITS)
         bits = whole("fraction_bits", given, 0, _MOST_FRACTION_BITS)
         if bits > most:
-            raise ValueError(
-                f"fraction_bits must be at most {most}, so that {largest:g} fits 32 bits,"
-                f" got {bits}"
-            )
+            problem = f"must be at most {most}, so that {largest:g} fits 32 bits, got {bits}"
+            raise argument_error("fraction_bits", problem)
         return bits
 
     def header(self) -> CHeader:

@@ -1,9 +1,14 @@
 import doctest
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
 from sdnn import arguments
+from sdnn.agents import RBFQLearning, SDNNQLearning
+from sdnn.approximators import RBFNetworkConfig, SDNNCConfig
+
+BOX = gym.spaces.Box(-1.0, 1.0, (4,))
 
 
 def test_the_examples_run():
@@ -49,3 +54,36 @@ def test_seeds_that_the_core_does_not_take(seed):
     with pytest.raises(ValueError, match=r"\bseed\b"):
         arguments.seed_of(seed)
     assert arguments.seed_of(2**64 - 1) == 2**64 - 1
+
+
+@pytest.mark.parametrize(
+    ("check", "problem"),
+    [
+        (lambda: arguments.whole("one", 0, 1, 2), "must be a whole number in [1, 2], got 0"),
+        (lambda: arguments.real("one", "x"), "must be a number, got 'x'"),
+        (lambda: arguments.flag("one", 5), "must be True or False, got 5"),
+        (lambda: arguments.path_of("one", None), "must be the name of a file, got None"),
+        (lambda: arguments.array_of("one", ["a"]), "must be numbers, got ['a']"),
+    ],
+)
+def test_errors_carry_the_argument(check, problem):
+    with pytest.raises((TypeError, ValueError)) as caught:
+        check()
+    assert arguments.blamed(caught.value) == ("one", problem)
+
+
+@pytest.mark.parametrize(
+    ("make", "argument"),
+    [
+        (lambda: SDNNCConfig(n_hidden_units=-1), "n_hidden_units"),
+        (lambda: SDNNCConfig(circular=5), "circular"),
+        (lambda: RBFQLearning(BOX, BOX, approximator=RBFNetworkConfig(n_bases=500)), "n_bases"),
+        (lambda: SDNNQLearning(BOX, BOX, angles=[0, 0]), "angles"),
+        (lambda: SDNNQLearning(BOX, gym.spaces.Discrete(5000)), "n_actions"),
+    ],
+)
+def test_errors_of_the_core_carry_the_argument(make, argument):
+    with pytest.raises((TypeError, ValueError)) as caught:
+        make()
+    assert caught.value.argument == argument
+    assert argument in str(caught.value)
