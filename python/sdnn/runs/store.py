@@ -7,24 +7,32 @@ full synchronization). Runs under different settings live side by side under dif
 
 from __future__ import annotations
 
+import hashlib
 import json
+import os
 import sqlite3
+import zlib
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
+from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 
+from sdnn.files import is_there
 from sdnn.runs.errors import StoreError
+from sdnn.runs.spec import HASH_DIGITS
 from sdnn.runs.trial import ROW, TrialKey, TrialRecord, TrialRows, TrialTime
 
 STORE_NAME = "results.sqlite"
-SCHEMA_VERSION = 5
+SCHEMA_VERSION = 6
 APPLICATION_ID = int.from_bytes(b"sdnn", "big")
 """Marks a SQLite file as ours (SQLite's header field of that name)."""
 BUSY_SECONDS = 60.0
 """How long to wait for another process that writes the same file."""
+MOST_BYTES_OF_VALUE = 2**24
+"""Of a text in the file."""
 
 _SCHEMA = """
 CREATE TABLE runs (
@@ -32,7 +40,9 @@ CREATE TABLE runs (
   case_id TEXT NOT NULL, agent TEXT NOT NULL, trial INTEGER NOT NULL, seed INTEGER NOT NULL,
   config_hash TEXT NOT NULL, config TEXT NOT NULL, version TEXT NOT NULL,
   n_decisions INTEGER NOT NULL, seconds REAL NOT NULL,
-  finished_at TEXT, checksum TEXT, -- NULL while it is in progress
+  finished_at TEXT, -- NULL while it is in progress
+  checksum TEXT NOT NULL, -- of its rows
+  crc INTEGER NOT NULL, -- of the columns before this one
   UNIQUE (case_id, agent, trial, seed, config_hash)
 );
 CREATE TABLE rows (
@@ -48,26 +58,58 @@ CREATE VIEW labelled_rows AS
   FROM rows JOIN runs ON runs.id = rows.run_id;
 CREATE TABLE measurements (
   kind TEXT NOT NULL, key TEXT NOT NULL, content TEXT NOT NULL,
+  crc INTEGER NOT NULL, -- of the columns before this one
   PRIMARY KEY (kind, key)
 ) WITHOUT ROWID;
 """
 
 _KEY = "case_id = ? AND agent = ? AND trial = ? AND seed = ? AND config_hash = ?"
-_KEY_COLUMNS = "case_id, agent, trial, seed, config_hash"
-_ROW_COLUMNS = (
-    'number, part, kind, episode, ifnull(step, -1), length, "return", terminated,'
-    " ifnull(environment, -1)"
-)
+_ROW_COLUMNS = {
+    "number": (int,), "part": (int,), "kind": (str,), "episode": (int,),
+    "ifnull(step, -1)": (int,), "length": (int,), '"return"': (float,), "terminated": (int,),
+    "ifnull(environment, -1)": (int,),
+}  # fmt: skip
+_MEASUREMENT_COLUMNS = {"kind": (str,), "key": (str,), "content": (str,), "crc": (int,)}
+
+
+class _Run(NamedTuple):
+    """A row of the table of runs."""
+
+    id: int
+    case_id: str
+    agent: str
+    trial: int
+    seed: int
+    config_hash: str
+    config: str
+    version: str
+    n_decisions: int
+    seconds: float
+    finished_at: str | None
+    checksum: str
+    crc: int
+
+    @property
+    def key(self) -> TrialKey:
+        """Its key, whose seed has no sign."""
+        key = TrialKey(*self[1:6])
+        return key._replace(seed=key.seed % 2**64)
+
+
+_RUN_COLUMNS = {name: get_args(kind) or (kind,) for name, kind in get_type_hints(_Run).items()}
 
 
 class ResultStore:
     """The result file of a folder, made if it is not there; with ``read_only``, nothing is made.
 
+    What is read is checked: the tables are those of this version, every value has its column's
+    type and the checksum beside it, and a configuration has its hash.
+
     Raises
     ------
     StoreError
-        If the folder is a file, or the file in it is damaged, of another program or of another
-        version of this one's schema. Such a file is left as it is.
+        If the folder is a file, or the file in it is a link, damaged, of another program or of
+        another version of this one's schema. Such a file is left as it is.
     """
 
     def __init__(self, folder: str | Path, *, read_only: bool = False) -> None:
@@ -75,15 +117,15 @@ class ResultStore:
         self.path = folder / STORE_NAME
         if folder.exists() and not folder.is_dir():
             raise StoreError(f"the output must be a folder, but {folder} is a file")
+        self._hashes: dict[int, Any] = {}  # of the rows of runs in progress
         with _as_store_error(self.path):
             if not read_only:
                 folder.mkdir(parents=True, exist_ok=True)
             is_new = _inspect(self.path)
             if read_only and not is_new:
-                self._connection = _connect_to_read(self.path)
+                self._connection = _connect(self.path, read_only=True)
                 return
-            place = ":memory:" if read_only else self.path
-            self._connection = sqlite3.connect(place, timeout=BUSY_SECONDS)
+            self._connection = _connect(None if read_only else self.path)
             try:
                 self._prepare(is_new)
             except BaseException:
@@ -128,25 +170,26 @@ class ResultStore:
         StoreError
             If the file cannot be written, or holds other rows of an exact trial.
         """
-        rows = record.rows
-        with self._writing() as connection:
-            known = self._find(record.key, "id, checksum")
-            if known is not None and known[1] is not None:
-                if is_exact and known[1] != rows.checksum():
+        with self._writing():
+            run = self._begun(record.key, record.config, record.version)
+            if run.finished_at is not None:
+                if is_exact and run.checksum != record.rows.checksum():
                     raise StoreError(
                         f"{self.path} already holds other rows for {record.key}:"
                         " the same trial gave two results"
                     )
                 return
-            run_id = self._run_id(record.key, record.config, record.version)
-            self._insert(run_id, rows)
-            whole = rows if known is None else self._rows(run_id)
-            connection.execute(
-                "UPDATE runs SET version = ?, n_decisions = ?, seconds = seconds + ?,"
-                " finished_at = ?, checksum = ? WHERE id = ?",
-                (record.version, record.n_decisions, record.seconds, record.finished_at,
-                 whole.checksum(), run_id),
-            )  # fmt: skip
+            checksum = self._rows(run).hashed()
+            self._insert(run.id, record.rows)
+            self._update(
+                run._replace(
+                    version=record.version,
+                    n_decisions=record.n_decisions,
+                    seconds=run.seconds + record.seconds,
+                    finished_at=record.finished_at,
+                    checksum=record.rows.hashed(checksum).hexdigest(),
+                )
+            )
 
     def extend(
         self, key: TrialKey, rows: TrialRows, first: int, *, config: str, version: str,
@@ -157,41 +200,48 @@ class ResultStore:
         ``seconds`` is the processor time since rows were stored last. A finished run is in progress
         again.
         """
-        with self._writing() as connection:
-            run_id = self._run_id(key, config, version)
-            connection.execute(
-                "UPDATE runs SET finished_at = NULL, checksum = NULL, seconds = seconds + ?"
-                " WHERE id = ?", (seconds, run_id),
-            )  # fmt: skip
-            connection.execute("DELETE FROM rows WHERE run_id = ? AND number >= ?", (run_id, first))
-            self._insert(run_id, rows)
+        with self._writing():
+            run = self._begun(key, config, version)
+            hashed = rows.hashed(self._hash_before(run, first))
+            self._insert(run.id, rows)
+            self._update(
+                run._replace(
+                    seconds=run.seconds + seconds,
+                    finished_at=None,
+                    checksum=hashed.hexdigest(),
+                )
+            )
+            self._hashes[run.id] = hashed
 
     def rows(self, key: TrialKey) -> TrialRows:
         """Return the rows of a run, finished or in progress; none if it is not stored."""
         with _as_store_error(self.path):
-            found = self._find(key, "id")
-            return TrialRows(np.zeros(0, ROW)) if found is None else self._rows(found[0])
+            for run in self._runs(key):
+                return self._rows(run)
+            return TrialRows(np.zeros(0, ROW))
 
     def keys(self, *, unfinished: bool = False) -> set[TrialKey]:
         """Return the keys of all finished trials, and if wanted of those in progress."""
         with _as_store_error(self.path):
-            found = self._connection.execute(
-                f"SELECT {_KEY_COLUMNS} FROM runs WHERE ? OR checksum IS NOT NULL", (unfinished,)
-            )
-            return {_key_of(row) for row in found}
+            runs = self._runs()
+            return {run.key for run in runs if unfinished or run.finished_at is not None}
 
     def times(self) -> tuple[TrialTime, ...]:
         """Return how long the finished trials took, without reading their rows."""
+        columns = {"run_id": (int,), "max(episode)": (int,)}
         with _as_store_error(self.path):
-            found = self._connection.execute(
-                f"SELECT {_KEY_COLUMNS}, seconds, n_decisions,"
-                " (SELECT max(episode) FROM rows WHERE run_id = runs.id)"
-                " FROM runs WHERE checksum IS NOT NULL ORDER BY id"
-            ).fetchall()
-        return tuple(
-            TrialTime(key=_key_of(row), seconds=row[5], n_decisions=row[6], n_episodes=row[7] or 0)
-            for row in found
-        )
+            read = self._read("rows", columns, "GROUP BY run_id")
+            n_episodes = dict(zip(*read, strict=True))
+            return tuple(
+                TrialTime(
+                    key=run.key,
+                    seconds=run.seconds,
+                    n_decisions=run.n_decisions,
+                    n_episodes=n_episodes.get(run.id, 0),
+                )
+                for run in self._runs()
+                if run.finished_at is not None
+            )
 
     def load(self, keys: Iterable[TrialKey] | None = None) -> tuple[TrialRecord, ...]:
         """Return the finished trials of the given keys (default: all), sorted by key.
@@ -203,38 +253,82 @@ class ResultStore:
         StoreError
             If the rows of a trial are not the ones that were stored.
         """
-        wanted = sorted(self.keys() if keys is None else self.keys() & set(keys))
         with _as_store_error(self.path):
-            return tuple(self._load_one(key) for key in wanted)
+            found = {run.key: run for run in self._runs() if run.finished_at is not None}
+            wanted = sorted(found if keys is None else found.keys() & set(keys))
+            return tuple(self._record(found[key]) for key in wanted)
 
-    def _load_one(self, key: TrialKey) -> TrialRecord:
-        names = ("config", "version", "n_decisions", "seconds", "finished_at")
-        run_id, checksum, *values = self._find(key, ", ".join(("id", "checksum", *names)))
-        rows = self._rows(run_id)
-        if rows.checksum() != checksum:
-            raise StoreError(f"{self.path} is damaged: the rows of {key} have changed")
-        return TrialRecord(key=key, rows=rows, **dict(zip(names, values, strict=True)))
+    def _record(self, run: _Run) -> TrialRecord:
+        return TrialRecord(
+            key=run.key,
+            config=run.config,
+            version=run.version,
+            n_decisions=run.n_decisions,
+            seconds=run.seconds,
+            finished_at=str(run.finished_at),
+            rows=self._rows(run),
+        )
 
     @contextmanager
-    def _writing(self) -> Iterator[sqlite3.Connection]:
+    def _writing(self) -> Iterator[None]:
         with _as_store_error(self.path), self._connection as connection:
             connection.execute("BEGIN IMMEDIATE")
-            yield connection
+            yield
 
-    def _find(self, key: TrialKey, columns: str) -> Any:
-        return self._connection.execute(
-            f"SELECT {columns} FROM runs WHERE {_KEY}", _stored(key)
-        ).fetchone()
+    def _read(
+        self,
+        table: str,
+        columns: Mapping[str, tuple[type[Any], ...]],
+        rest: str = "",
+        values: tuple[Any, ...] = (),
+    ) -> list[tuple[Any, ...]]:
+        """Read columns of a table; every value has a type that its column may have."""
+        found = self._connection.execute(
+            f"SELECT {', '.join(columns)} FROM {table} {rest}", values
+        ).fetchall()
+        read = list(zip(*found, strict=True)) or [()] * len(columns)
+        for (name, kinds), column in zip(columns.items(), read, strict=True):
+            wrong = set(map(type, column)).difference(kinds)
+            if wrong:
+                words = f"{kinds[0].__name__}, got {wrong.pop().__name__}"
+                raise StoreError(f"{self.path} is damaged: {table}.{name} must be {words}")
+        return read
 
-    def _run_id(self, key: TrialKey, config: str, version: str) -> int:
-        """Return the id of a run, which is begun if it is not there."""
-        self._connection.execute(
-            f"INSERT OR IGNORE INTO runs ({_KEY_COLUMNS}, config, version, n_decisions, seconds)"
-            " VALUES (?, ?, ?, ?, ?, ?, ?, 0, 0.0)",
-            (*_stored(key), config, version),
+    def _runs(self, key: TrialKey | None = None) -> list[_Run]:
+        """Read the run of a key, if it is stored; by default all runs."""
+        rest = "ORDER BY id" if key is None else f"WHERE {_KEY}"
+        read = self._read("runs", _RUN_COLUMNS, rest, () if key is None else _stored(key))
+        runs = list(map(_Run, *read))
+        for run in runs:
+            problem = _problem_of_config(run.config, run.config_hash)
+            if run.crc != _crc(run[:-1]):
+                problem = "a value does not fit its checksum, crc"
+            if problem:
+                raise StoreError(f"{self.path} is damaged: runs, id {run.id}: {problem}")
+        return runs
+
+    def _begun(self, key: TrialKey, config: str, version: str) -> _Run:
+        """Return a run, which is begun if it is not there."""
+        for run in self._runs(key):
+            return run
+        nothing = (config, version, 0, 0.0, None, TrialRows(np.zeros(0, ROW)).checksum())
+        names = ", ".join(_Run._fields[1:])
+        marks = ", ".join("?" * len(_Run._fields[1:]))
+        values = (*_stored(key), *nothing)
+        cursor = self._connection.execute(
+            f"INSERT INTO runs ({names}) VALUES ({marks})", (*values, 0)
         )
-        run_id: int = self._find(key, "id")[0]
-        return run_id
+        run = _Run(cursor.lastrowid or 0, *values, crc=0)
+        self._update(run)
+        return run
+
+    def _update(self, run: _Run) -> None:
+        """Store what may change of a run."""
+        self._connection.execute(
+            "UPDATE runs SET version = ?, n_decisions = ?, seconds = ?, finished_at = ?,"
+            " checksum = ?, crc = ? WHERE id = ?",
+            (*run[7:-1], _crc(run[:-1]), run.id),
+        )
 
     def _insert(self, run_id: int, rows: TrialRows) -> None:
         self._connection.executemany(
@@ -242,27 +336,64 @@ class ResultStore:
             ((run_id, *row) for row in rows.table.tolist()),
         )
 
-    def _rows(self, run_id: int) -> TrialRows:
-        found = self._connection.execute(
-            f"SELECT {_ROW_COLUMNS} FROM rows WHERE run_id = ? ORDER BY number, part", (run_id,)
-        ).fetchall()
-        return TrialRows(np.array(found, ROW))
+    def _rows(self, run: _Run) -> TrialRows:
+        read = self._read("rows", _ROW_COLUMNS, "WHERE run_id = ? ORDER BY number, part", run[:1])
+        table = np.zeros(len(read[0]), ROW)
+        for name, column in zip(table.dtype.names or (), read, strict=True):
+            table[name] = column
+        rows = TrialRows(table)
+        if rows.checksum() != run.checksum:
+            raise StoreError(f"{self.path} is damaged: the rows of {run.key} have changed")
+        return rows
+
+    def _hash_before(self, run: _Run, first: int) -> Any:
+        """Return the hash of a run's rows before a number, and remove the others."""
+        hashed = self._hashes.get(run.id)
+        later = "FROM rows WHERE run_id = ? AND number >= ?"
+        (n_later,) = self._connection.execute(
+            f"SELECT count(*) {later}", (run.id, first)
+        ).fetchone()
+        if n_later == 0 and hashed is not None and hashed.hexdigest() == run.checksum:
+            return hashed
+        rows = self._rows(run).table
+        self._connection.execute(f"DELETE {later}", (run.id, first))
+        return TrialRows(rows[rows["number"] < first]).hashed()
 
     def put(self, kind: str, key: str, content: Mapping[str, Any]) -> None:
         """Store a measurement as JSON; one that another process stored first stays."""
-        with self._writing() as connection:
-            connection.execute(
-                "INSERT OR IGNORE INTO measurements VALUES (?, ?, ?)",
-                (kind, key, json.dumps(content)),
+        values = (kind, key, json.dumps(content))
+        with self._writing():
+            self._connection.execute(
+                "INSERT OR IGNORE INTO measurements VALUES (?, ?, ?, ?)", (*values, _crc(values))
             )
 
     def measurements(self, kind: str) -> dict[str, Any]:
         """Return the contents of all measurements of a kind, by their keys, which are sorted."""
         with _as_store_error(self.path):
-            found = self._connection.execute(
-                "SELECT key, content FROM measurements WHERE kind = ? ORDER BY key", (kind,)
-            )
-            return {key: json.loads(content) for key, content in found}
+            read = self._read("measurements", _MEASUREMENT_COLUMNS, "ORDER BY kind, key")
+            for *values, crc in zip(*read, strict=True):
+                if crc != _crc(tuple(values)):
+                    words = f"measurements, kind {values[0]}, key {values[1]}"
+                    problem = "a value does not fit its checksum, crc"
+                    raise StoreError(f"{self.path} is damaged: {words}: {problem}")
+            rows = zip(*read[:3], strict=True)
+            return {key: json.loads(content) for of, key, content in rows if of == kind}
+
+
+def _crc(values: tuple[Any, ...]) -> int:
+    return zlib.crc32(repr(values).encode("utf-8", "surrogatepass"))
+
+
+@lru_cache(maxsize=1024)
+def _problem_of_config(config: str, config_hash: str) -> str:
+    """Say what is wrong with a configuration, or nothing."""
+    if hashlib.sha256(config.encode()).hexdigest()[:HASH_DIGITS] != config_hash:
+        return "config does not have the hash beside it, config_hash"
+    try:
+        is_table = isinstance(json.loads(config), dict)
+    except (RecursionError, ValueError):
+        is_table = False
+    return "" if is_table else "config must be a table in JSON"
 
 
 def _stored(key: TrialKey) -> TrialKey:
@@ -270,17 +401,14 @@ def _stored(key: TrialKey) -> TrialKey:
     return key._replace(seed=key.seed - 2**64 if key.seed >= 2**63 else key.seed)
 
 
-def _key_of(row: tuple[Any, ...]) -> TrialKey:
-    key = TrialKey(*row[:5])
-    return key._replace(seed=key.seed % 2**64)
-
-
 @contextmanager
 def _as_store_error(path: Path) -> Iterator[None]:
     """Turn errors of SQLite and the file system into one that names the file."""
     try:
         yield
-    except (sqlite3.DatabaseError, OSError, ValueError, TypeError, OverflowError) as error:
+    except (
+        sqlite3.DatabaseError, OSError, ValueError, TypeError, OverflowError, RecursionError,
+    ) as error:  # fmt: skip
         if isinstance(error, sqlite3.OperationalError | OSError):
             raise StoreError(f"cannot use {path}: {error}") from error
         raise StoreError(
@@ -295,19 +423,26 @@ def _inspect(path: Path) -> bool:
     The file is opened for reading only: what is not ours stays as it is, to the byte. Only what a
     killed process left half written is rolled back first, by SQLite's own journal.
     """
-    if path.with_name(f"{path.name}-journal").exists():
-        with closing(sqlite3.connect(path, timeout=BUSY_SECONDS)) as connection:
-            connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
-    if not path.exists() or path.stat().st_size == 0:
+    journal, log = (path.with_name(path.name + end) for end in ("-journal", "-wal"))
+    if is_there(log):
+        raise sqlite3.DatabaseError(f"there is a log of another program, {log.name}")
+    if is_there(journal):
+        _require_own(journal)
+        with closing(_connect(path)) as connection:
+            connection.execute("PRAGMA user_version").fetchone()
+    if not is_there(path) or path.stat().st_size == 0:
         return True
     with path.open("rb") as file:
-        if file.read(16) != b"SQLite format 3\0":
-            raise sqlite3.DatabaseError("no SQLite file")
-    with closing(_connect_to_read(path)) as connection:
+        header = file.read(20)
+    if not header.startswith(b"SQLite format 3\0"):
+        raise sqlite3.DatabaseError("no SQLite file")
+    if header[18:] != b"\1\1":
+        raise sqlite3.DatabaseError("a SQLite file of another journal mode")
+    with closing(_connect(path, read_only=True)) as connection:
         application_id = connection.execute("PRAGMA application_id").fetchone()[0]
         version = connection.execute("PRAGMA user_version").fetchone()[0]
-        n_objects = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
-        if application_id == 0 and n_objects == 0:
+        objects = _objects(connection)
+        if application_id == 0 and not objects:
             return True  # killed before the schema was written
         if application_id != APPLICATION_ID:
             raise StoreError(
@@ -318,11 +453,51 @@ def _inspect(path: Path) -> bool:
                 f"{path} has schema version {version}, and this version of sdnn reads"
                 f" {SCHEMA_VERSION}: choose another output folder"
             )
+        if objects != _own_objects():  # before any query that a view or a trigger could change
+            raise sqlite3.DatabaseError("it has other tables, views or triggers")
         findings = connection.execute("PRAGMA integrity_check").fetchall()
         if findings != [("ok",)]:
             raise sqlite3.DatabaseError(str(findings[0][0]))
         return False
 
 
-def _connect_to_read(path: Path) -> sqlite3.Connection:
-    return sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=BUSY_SECONDS)
+def _require_own(journal: Path) -> None:
+    """Refuse a journal that names another file, which SQLite would remove; ours never do."""
+    # Another process may have finished with it.
+    with suppress(FileNotFoundError), journal.open("rb") as file:
+        file.seek(max(0, file.seek(0, os.SEEK_END) - len(_MAGIC_OF_JOURNAL)))
+        if file.read() == _MAGIC_OF_JOURNAL:
+            raise sqlite3.DatabaseError(f"{journal.name} is a journal of another program")
+
+
+_MAGIC_OF_JOURNAL = bytes.fromhex("d9d505f920a163d7")
+"""A journal begins with it, and ends with it if it names another file."""
+
+
+def _objects(connection: sqlite3.Connection) -> set[tuple[str | None, ...]]:
+    found = connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_master")
+    return set(found.fetchall())
+
+
+@cache
+def _own_objects() -> set[tuple[str | None, ...]]:
+    with closing(sqlite3.connect(":memory:")) as connection:
+        connection.executescript(_SCHEMA)
+        return _objects(connection)
+
+
+def _connect(path: Path | None, *, read_only: bool = False) -> sqlite3.Connection:
+    """Open a file, or a database in memory, in which nothing but its data counts."""
+    place = ":memory:"
+    if path is not None:
+        place = f"{path.absolute().as_uri()}?mode={'ro' if read_only else 'rwc'}"
+    connection = sqlite3.connect(place, uri=path is not None, timeout=BUSY_SECONDS)
+    for setting in (
+        "trusted_schema = OFF", "cell_size_check = ON", "mmap_size = 0",
+        f"query_only = {int(read_only)}",
+    ):  # fmt: skip
+        connection.execute(f"PRAGMA {setting}")
+    if hasattr(connection, "setlimit"):  # since Python 3.11
+        connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES_OF_VALUE)
+        connection.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
+    return connection

@@ -180,7 +180,13 @@ class TrialRows:
 
     def checksum(self) -> str:
         """Return the SHA-256 of all rows."""
-        return hashlib.sha256(repr(self.table.tolist()).encode()).hexdigest()
+        return str(self.hashed().hexdigest())
+
+    def hashed(self, before: Any = None) -> Any:
+        """Return the hash whose digest is `checksum`, of rows that follow hashed ones if given."""
+        sha = hashlib.sha256() if before is None else before.copy()
+        sha.update(self.table.astype(ROW.newbyteorder("<")).tobytes())
+        return sha
 
 
 _BYTES = ("<i4", "<i4", "<f8", "u1")

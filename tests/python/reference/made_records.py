@@ -1,5 +1,6 @@
 """A stored trial, made up."""
 
+import hashlib
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,11 @@ import numpy as np
 from sdnn.runs import TrialKey, TrialRecord, TrialRows
 
 
-def make_record(trial=0, config_hash="aa", steps=(50, 7), **changes):
+def hash_of(config):
+    return hashlib.sha256(config.encode()).hexdigest()[:16]
+
+
+def make_record(trial=0, config="{}", steps=(50, 7), **changes):
     n = len(steps)
     rows = TrialRows.of_tests(
         episode=10 * np.arange(1, n + 1, dtype=np.int32),
@@ -16,8 +21,8 @@ def make_record(trial=0, config_hash="aa", steps=(50, 7), **changes):
         solved=np.array(steps) < 50,
     )
     record = TrialRecord(
-        key=TrialKey("s4", "sdnn-c", trial, 2**63 - 1, config_hash),
-        config="{}",
+        key=TrialKey("s4", "sdnn-c", trial, 2**63 - 1, hash_of(config)),
+        config=config,
         version="0.1",
         n_decisions=57,
         seconds=0.5,

@@ -127,7 +127,7 @@ def test_a_run_plans_once_and_reads_its_trials_once(monkeypatch, tmp_path, fake,
         return call
 
     monkeypatch.setattr(reproduce_module, "plan_trials", counted("plan", plan_trials))
-    monkeypatch.setattr(ResultStore, "_load_one", counted("trial", ResultStore._load_one))
+    monkeypatch.setattr(ResultStore, "_record", counted("trial", ResultStore._record))
     request = ReproduceRequest(experiments=select_experiments("all"), out=tmp_path, quick=True)
     done = reproduce(request)
     # SDNN-C in Case I belongs to both figures.

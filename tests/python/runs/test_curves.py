@@ -40,7 +40,13 @@ def make(folder, config, returns=(), evaluations=(), every=20):
         for n, values in enumerate(evaluations)
     ]
     with ResultStore(folder) as store:
-        store.extend(run.key, TrialRows.from_training(rows), 0, config="{}", version="0.1")
+        store.extend(
+            run.key,
+            TrialRows.from_training(rows),
+            0,
+            config=run.spec.canonical_json(),
+            version="0.1",
+        )
     return run
 
 

@@ -1,0 +1,221 @@
+"""Files made to harm: every reader refuses them at once, by name, and none is written through."""
+
+import os
+import sqlite3
+import struct
+import subprocess
+import sys
+import zlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from made_records import hash_of, make_record
+from sdnn.runs import ResultStore, StoreError, TrialRows
+from sdnn.runs.store import STORE_NAME
+
+TRAINED = [
+    {"kind": "episode", "step": 3 * n, "episode": n, "return": -1.5, "length": 3,
+     "terminated": True}
+    for n in range(40)
+]  # fmt: skip
+
+
+def make_store(folder):
+    """Finished trials, one in progress, and measurements."""
+    with ResultStore(folder) as store:
+        for trial in range(4):
+            store.add(make_record(trial, steps=range(1, 40)))
+        key = make_record(7).key
+        rows = TrialRows.from_training(TRAINED)
+        store.extend(key, rows, 0, config="{}", version="0.1")
+        store.put("cost", "a", {"value": [1, None]})
+        return store.path
+
+
+def content_of(folder):
+    """Everything that a store gives."""
+    with ResultStore(folder) as store:
+        records = store.load()
+        return (
+            [
+                (r.key, r.config, r.version, r.n_decisions, r.seconds, r.finished_at)
+                for r in records
+            ],
+            [r.rows.table.tolist() for r in records],
+            store.rows(make_record(7).key).table.tolist(),
+            store.keys(),
+            store.times(),
+            store.measurements("cost"),
+        )
+
+
+def test_no_flipped_bit_changes_what_a_store_gives(tmp_path):
+    path = make_store(tmp_path)
+    content, expected = path.read_bytes(), content_of(tmp_path)
+    rng = np.random.default_rng(5)
+    n_noticed = 0
+    for place in rng.integers(0, len(content), 300):
+        flipped = bytearray(content)
+        flipped[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(flipped)
+        try:
+            found = content_of(tmp_path)
+        except StoreError as error:
+            n_noticed += str(path) in str(error)
+        else:
+            assert found == expected, "a bit of no meaning"
+    assert n_noticed > 50
+
+
+def crc_of(values):
+    return zlib.crc32(repr(values).encode())
+
+
+def change(path, *statements):
+    connection = sqlite3.connect(path)
+    connection.executescript(";".join(statements))
+    connection.close()
+
+
+ENDLESS = "WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) SELECT"
+
+
+@pytest.mark.parametrize(
+    "statements",
+    [
+        ("ALTER TABLE measurements RENAME TO old",
+         f"CREATE VIEW measurements AS {ENDLESS} 'cost' AS kind, x AS key, x AS content, x FROM n"),
+        ("ALTER TABLE rows RENAME TO old",
+         f"CREATE VIEW rows AS {ENDLESS} 1 AS run_id, x AS number, 0 AS part FROM n"),
+        ("CREATE TRIGGER t AFTER INSERT ON runs BEGIN DELETE FROM runs; END",),
+        ("CREATE TRIGGER t INSTEAD OF INSERT ON labelled_rows BEGIN DELETE FROM rows; END",),
+        ("CREATE VIRTUAL TABLE more USING fts5(x)",),
+        ("CREATE INDEX more ON rows (length)",),
+        ("CREATE TABLE more (x)",),
+        ("ALTER TABLE runs ADD COLUMN more AS (hex(zeroblob(1000000000)))",),
+        ("PRAGMA journal_mode = WAL",),
+    ],
+)  # fmt: skip
+def test_a_store_with_another_schema_is_refused_before_any_query(tmp_path, statements):
+    path = make_store(tmp_path)
+    change(path, *statements)
+    content = path.read_bytes()
+    for read_only in (False, True):
+        with pytest.raises(StoreError, match=r"results\.sqlite"):
+            ResultStore(tmp_path, read_only=read_only)
+    assert path.read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    ("statement", "column"),
+    [
+        ("UPDATE runs SET seconds = 'long'", "seconds"),
+        ("UPDATE runs SET n_decisions = x'00ff'", "n_decisions"),
+        ("UPDATE runs SET trial = 1.5 WHERE id = 1", "trial"),
+        ("UPDATE runs SET version = x'00'", "version"),
+        ("UPDATE runs SET finished_at = x'00'", "finished_at"),
+        ("UPDATE runs SET n_decisions = 58", "crc"),
+        ("UPDATE rows SET length = 'long'", "length"),
+        ("UPDATE rows SET \"return\" = x'00'", "return"),
+        ("UPDATE rows SET kind = x'00'", "kind"),
+        ("UPDATE rows SET step = 0.5", "step"),
+        ("UPDATE rows SET length = length + 1", "rows"),
+        ("DELETE FROM rows WHERE number = 39", "rows"),
+        ("UPDATE measurements SET content = 5", "measurements"),
+        ("UPDATE measurements SET content = x'00'", "content"),
+    ],
+)
+def test_a_store_with_other_values_is_refused_by_column(tmp_path, statement, column):
+    path = make_store(tmp_path)
+    change(path, statement)
+    with pytest.raises(StoreError, match=rf"results\.sqlite.*{column}"):
+        content_of(tmp_path)
+
+
+@pytest.mark.parametrize("config", ["", "[]", "nothing", "[" * 100_000, '{"a":' * 100_000])
+def test_a_configuration_of_a_store_is_a_table_in_json(tmp_path, config):
+    with ResultStore(tmp_path) as store:
+        store.add(make_record(config=config))
+        assert make_record(config=config).key.config_hash == hash_of(config)
+        with pytest.raises(StoreError, match=r"results\.sqlite.*config"):
+            store.load()
+
+
+def test_a_configuration_of_a_store_has_the_hash_beside_it(tmp_path):
+    record = make_record()
+    with ResultStore(tmp_path) as store:
+        store.add(replace(record, key=record.key._replace(config_hash="0" * 16)))
+        with pytest.raises(StoreError, match=r"results\.sqlite.*config_hash"):
+            store.load()
+
+
+def hot_journal(path):
+    """Leave the journal of a process that was killed while it wrote."""
+    script = (
+        "import os, sqlite3, sys\n"
+        "connection = sqlite3.connect(sys.argv[1], isolation_level=None)\n"
+        "connection.execute('PRAGMA cache_size = 1')\n"
+        "connection.execute('BEGIN IMMEDIATE')\n"
+        "for i in range(300):\n"
+        "    connection.execute(f'CREATE TABLE t{i} (x)')\n"
+        "os._exit(0)\n"
+    )
+    subprocess.run([sys.executable, "-c", script, str(path)], check=True)
+    return path.with_name(f"{path.name}-journal")
+
+
+def test_a_journal_of_a_store_rolls_back_and_removes_no_other_file(tmp_path):
+    path, victim = make_store(tmp_path), tmp_path / "mine.txt"
+    expected = content_of(tmp_path)
+    journal = hot_journal(path)
+    whole, rest = journal.read_bytes(), path.read_bytes()
+    assert content_of(tmp_path) == expected, "rolled back"
+    # SQLite removes the file that a journal names as that of a transaction over several files.
+    victim.write_bytes(b"mine")
+    name = os.fsencode(victim)
+    checksum = sum(struct.unpack(f"{len(name)}b", name)) % 2**32
+    page = struct.pack(">I", 0x40000000 // 4096 + 1)
+    journal.write_bytes(whole + page + name + struct.pack(">II", len(name), checksum) + whole[:8])
+    path.write_bytes(rest)
+    for read_only in (True, False):
+        with pytest.raises(StoreError, match="journal"):
+            ResultStore(tmp_path, read_only=read_only)
+    assert victim.read_bytes() == b"mine"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a system of POSIX")
+@pytest.mark.parametrize("end", ["", "-journal", "-wal"])
+@pytest.mark.parametrize("kind", ["link", "pipe", "folder", "dangling"])
+def test_a_store_and_its_journal_are_files(tmp_path, end, kind):
+    folder, other = tmp_path / "run", tmp_path / "other"
+    folder.mkdir()
+    other.mkdir()
+    target = make_store(other)
+    content = target.read_bytes()
+    if end:
+        make_store(folder)
+    path = folder / (STORE_NAME + end)
+    {
+        "link": lambda: path.symlink_to(target),
+        "dangling": lambda: path.symlink_to(tmp_path / "nothing"),
+        "pipe": lambda: os.mkfifo(path),
+        "folder": path.mkdir,
+    }[kind]()
+    for read_only in (True, False):
+        with pytest.raises(StoreError, match=path.name):
+            ResultStore(folder, read_only=read_only)
+    assert target.read_bytes() == content
+    assert not (tmp_path / "nothing").exists()
+
+
+def test_measurements_are_json(tmp_path):
+    with ResultStore(tmp_path) as store:
+        store.put("cost", "b", {})
+        values = ("cost", "b", "[" * 100_000)
+        change(
+            store.path, f"UPDATE measurements SET content = '{values[2]}', crc = {crc_of(values)}"
+        )
+        with pytest.raises(StoreError, match=r"results\.sqlite"):
+            store.measurements("cost")
