@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -150,10 +149,10 @@ def run_command(
     ``words`` returns the message about a configuration whose file is not known. ``folder`` is the
     run that is resumed after an interrupt.
     """
+    from sdnn.runs.environment import search_folder
     from sdnn.runs.errors import RunError
 
-    if not {"", os.getcwd()} & set(sys.path):
-        sys.path.append(os.getcwd())
+    search_folder(Path.cwd())
     with errors_in_a_line(words, lambda: _how_to_resume(folder)):
         try:
             yield

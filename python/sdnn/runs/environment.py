@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import json
 import sys
 from contextlib import closing
+from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
 import gymnasium as gym
@@ -20,7 +21,17 @@ from sdnn.environments import NoisySensors, RedundantSensors, UnitSensors
 from sdnn.runs.errors import ConfigError, RunError
 from sdnn.runs.settings import Settings
 
-__all__ = ["ALL", "Ends", "EnvironmentSpec", "MeanOfNeighbours", "Stream", "render_modes"]
+__all__ = [
+    "ALL",
+    "Ends",
+    "EnvironmentSpec",
+    "MeanOfNeighbours",
+    "Stream",
+    "find_module",
+    "render_modes",
+    "search_folder",
+]
+
 
 ALL = "all"
 """The key of the range of all variables that have no other."""
@@ -196,6 +207,7 @@ class EnvironmentSpec(Settings, frozen=True):
         module, colon, _ = self.id.rpartition(":")
         if not colon or module in sys.modules:
             return False
+        find_module(module)
         try:
             importlib.import_module(module)
         except Exception as error:  # whatever is in a user's module
@@ -269,6 +281,7 @@ class EnvironmentSpec(Settings, frozen=True):
         options = {"disable_env_checker": True, **self.kwargs}
         if render_mode is not None:
             options["render_mode"] = render_mode
+        find_module(self.id.rpartition(":")[0])
         try:
             return gym.make(self.id, **options)
         except gym.error.DependencyNotInstalled as error:
@@ -285,6 +298,26 @@ class EnvironmentSpec(Settings, frozen=True):
             raise ConfigError(
                 key, f"{self.id} cannot be made: {type(error).__name__}: {error}"
             ) from error
+
+
+_folders: list[str] = []
+
+
+def search_folder(folder: Path) -> None:
+    """Let modules that are named be found in a folder, after all others; see `find_module`."""
+    if str(folder) not in _folders:
+        _folders.append(str(folder))
+
+
+def find_module(name: str) -> None:
+    """Search the folders of `search_folder` from now on, if a module is nowhere else.
+
+    Packages that are merely missing are not looked for there: whoever puts a file into a folder
+    does not decide what is imported.
+    """
+    package = name.partition(".")[0]
+    if package and package not in sys.modules and importlib.util.find_spec(package) is None:
+        sys.path += [folder for folder in _folders if folder not in sys.path]
 
 
 def _in_own_units(

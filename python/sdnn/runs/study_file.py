@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib
 import itertools
 import json
-import sys
+import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +15,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 from msgspec import Meta
 
 from sdnn.runs.config_file import ConfigFile, KeyPath, dotted
+from sdnn.runs.environment import find_module, search_folder
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.registry import labels, split_label
 from sdnn.runs.settings import Settings, check_names, checked, possible_words, read
@@ -21,6 +23,12 @@ from sdnn.runs.spec import SHORTHANDS, RunSpec, overridden
 
 BASE = "base"
 """The variant without overrides, where axes are varied one at a time or nothing varies."""
+
+MOST_TRIALS = 100_000
+MOST_COMBINATIONS = 5_000
+"""Of a variant and a case."""
+MOST_SETTINGS = 5_000
+"""Of a table."""
 
 TABLES = ("study", "base", "agents", "cases", "variants", "axes")
 _NAMED_VALUES = (("environment", "kwargs"), ("environment", "ranges"))
@@ -207,13 +215,14 @@ class StudyReader:
                 name = (*name, SHORTHANDS[name[0]])
             if name in found:
                 raise self.file.error(place, f"{'.'.join(name)} is set twice")
+            if len(found) == MOST_SETTINGS:
+                raise self.file.error(where, f"must have at most {MOST_SETTINGS} settings")
             found[name] = Setting(value, place)
 
     def _import(self) -> None:
-        folder = str(self.file.path.resolve().parent)
-        if folder not in sys.path:
-            sys.path.append(folder)  # last, so that it hides nothing
+        search_folder(self.file.path.resolve().parent)
         for number, module in enumerate(self.header.imports):
+            find_module(module)
             try:
                 importlib.import_module(module)
             except Exception as error:
@@ -315,8 +324,12 @@ class StudyReader:
         axes = self._layer(("axes",), table)
         if not axes:
             return
-        values = [list(self._axis_values(axes, name)) for name in axes]
+        lasts = Counter(name[-1] for name in axes)
+        values = [list(self._axis_values(axes[name], name, lasts)) for name in axes]
         if combine == "product":
+            if math.prod(map(len, values)) > MOST_COMBINATIONS:
+                problem = f"must give at most {MOST_COMBINATIONS} combinations"
+                raise self.file.error(("axes", "combine"), problem)
             for chosen in itertools.product(*values):
                 layer = {name: setting for _, part in chosen for name, setting in part.items()}
                 words = ", ".join(word for word, _ in chosen)
@@ -327,13 +340,13 @@ class StudyReader:
             (setting,) = layer.values()
             yield StudyVariant(word, word, layer, setting.where)
 
-    def _axis_values(self, axes: Layer, name: tuple[str, ...]) -> Iterator[tuple[str, Layer]]:
-        axis = axes[name]
+    def _axis_values(
+        self, axis: Setting, name: tuple[str, ...], lasts: Mapping[str, int]
+    ) -> Iterator[tuple[str, Layer]]:
         if not isinstance(axis.value, list) or not axis.value:
             raise self.file.error(axis.where, f"must be an array of values, got {axis.value!r}")
         shown = name[:1] if name == ("agent", "name") else name
-        is_unique = [one[-1] for one in axes].count(name[-1]) == 1
-        word = shown[-1] if is_unique else ".".join(shown)
+        word = shown[-1] if lasts[name[-1]] == 1 else ".".join(shown)
         words = [f"{word}={_value_words(value)}" for value in axis.value]
         if len(set(words)) < len(words):
             raise self.file.error(axis.where, f"must be different values, got {axis.value!r}")
