@@ -282,6 +282,9 @@ _BEGINNING = b'{"__metadata__":{"sdnn":"{\\"checksum\\":\\"'
 """Of the header, which follows 8 bytes that hold its length."""
 _CHECKSUM = slice(8 + len(_BEGINNING), 16 + len(_BEGINNING))
 
+_TYPES = ("BOOL", "I8", "I16", "I32", "I64", "U8", "U16", "U32", "U64", "F16", "F32", "F64")
+"""Of arrays, as safetensors names them: those of NumPy."""
+
 Arrays = dict[str, NDArray[Any]]
 Description = dict[str, Any]
 
@@ -337,6 +340,7 @@ def read_file(path: Path, *kinds: str) -> tuple[Description, Arrays]:
         about = json.loads(header["__metadata__"]["sdnn"])
         number, kind, version = (about[key] for key in ("format", "kind", "version"))
         description = dict(about["description"])
+        types = {name: header[name]["dtype"] for name in header.keys() - {"__metadata__"}}
     except (LookupError, RecursionError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is damaged: {error!r}") from None
     if number != FORMAT:
@@ -346,6 +350,10 @@ def read_file(path: Path, *kinds: str) -> tuple[Description, Arrays]:
         )
     if kind not in kinds:
         raise ValueError(f"{path} is a file of kind {kind!r}, expected {' or '.join(kinds)}")
+    for name, found in types.items():
+        if found not in _TYPES:
+            words = f"must have one of the types {', '.join(_TYPES)}, got {found!r}"
+            raise ValueError(f"{path} is damaged: array {name} {words}")
     try:
         return description, load(data)
     except (LookupError, SafetensorError, ValueError) as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +12,18 @@ from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
 from sdnn import _core
-from sdnn.arguments import seed_of
-from sdnn.coding import Coding, from_dict, to_dict
+from sdnn.arguments import seed_of, whole
+from sdnn.coding import Coding, WithMissing, from_dict, to_dict
+from sdnn.coding.symbols import Categorical
 from sdnn.estimators.inputs import Array, Floats, Ints
-from sdnn.estimators.network import InputCode, Network
+from sdnn.estimators.network import InputCode, Network, code_bytes
 from sdnn.files import Arrays, Description, read_file, write_file
 
 __all__ = ["Fitted"]
 
 Self = TypeVar("Self", bound="Fitted")
 
+MOST_BYTES_OF_NAMES = 2**26
 NAMES = ("classes_", "feature_names_in_")  # arrays whose type may be text
 
 
@@ -45,7 +47,7 @@ class Learned:
     _weight_seed: int
 
 
-ATTRIBUTES = tuple(Learned.__annotations__)
+ATTRIBUTES = {name: get_origin(kind) or kind for name, kind in get_type_hints(Learned).items()}
 
 
 class Fitted(Learned, BaseEstimator):
@@ -129,18 +131,32 @@ class Fitted(Learned, BaseEstimator):
         write_file(Path(path), "estimator", arrays, description)
 
     @classmethod
-    def load(cls: type[Self], path: str | Path) -> Self:
-        """Read an estimator that `save` has written; ValueError if the file holds another one."""
+    def load(cls: type[Self], path: str | Path, *, memory_limit: int = 2**27) -> Self:
+        """Read an estimator that `save` has written.
+
+        Parameters
+        ----------
+        path : path
+        memory_limit : int
+            Bytes that the patterns may take; a small file may describe large ones.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be read or is not a regular file.
+        ValueError
+            If it is damaged, holds another estimator or needs more memory.
+        """
         path = Path(path)
         description, arrays = read_file(path, "estimator")
         if description.get("class") != cls.__name__:
             raise ValueError(f"{path} holds an {description.get('class')}, not an {cls.__name__}")
         try:
-            return read_estimator(description, arrays, cls)
+            return read_estimator(description, arrays, cls, memory_limit)
         except (
             ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError,
         ) as error:  # fmt: skip
-            raise ValueError(f"{path} is damaged: {error!r}") from error
+            raise ValueError(f"{path} is damaged: {error or repr(error)}") from error
 
 
 def plain(value: Any) -> Any:
@@ -190,18 +206,35 @@ def named(values: Array) -> dict[str, Any]:
     return {"type": kind, "values": values.tolist()}
 
 
-def read_estimator(description: Description, arrays: Arrays, kind: type[Self]) -> Self:
+def array_of_names(name: str, stored: Mapping[str, Any]) -> Array:
+    """Undo `named`."""
+    values, kind = stored["values"], np.dtype(stored["type"])
+    if kind.kind not in "biufUO" or kind.itemsize * len(values) > MOST_BYTES_OF_NAMES:
+        raise ValueError(f"names.{name}.type must be one of labels, got {stored['type']!r}")
+    array = np.array(values, dtype=kind)
+    if array.ndim != 1:
+        raise ValueError(f"names.{name}.values must be a list of labels")
+    return array
+
+
+def read_estimator(
+    description: Description, arrays: Arrays, kind: type[Self], memory_limit: int
+) -> Self:
     """Make the estimator with its parameters and everything it has learned."""
     estimator = kind(**{name: restored(value) for name, value in description["parameters"].items()})
+    estimator._validate_params()
     held: dict[str, Any] = estimator.__dict__
-    held |= {name: arrays[name] for name in ATTRIBUTES if name in arrays}
-    attributes = description["attributes"]
-    held |= {name: attributes[name] for name in ATTRIBUTES if name in attributes}
+    given = {**description["attributes"], **arrays}
+    for name, expected in ATTRIBUTES.items():
+        if name in given:
+            if type(given[name]) is not expected:
+                words = f"must be of type {expected.__name__}, got {given[name]!r:.80}"
+                raise ValueError(f"attributes.{name} {words}")
+            held[name] = given[name]
     for name in NAMES:
         if name in description["names"]:
-            stored = description["names"][name]
-            held[name] = np.array(stored["values"], dtype=stored["type"])
-    estimator.network_, *earlier = read_networks(description, arrays)
+            held[name] = array_of_names(name, description["names"][name])
+    estimator.network_, *earlier = read_networks(description, arrays, memory_limit)
     if "n_outputs_" in held:
         held["_earlier"] = tuple(earlier)
     require_consistent(estimator)
@@ -231,18 +264,51 @@ def require_consistent(estimator: Fitted) -> None:
         raise ValueError("its parts do not fit together")
 
 
-def read_networks(description: Description, arrays: Arrays) -> Iterator[Network]:
-    """Build the code and the networks that share it."""
-    n_units = description["n_pattern_units"]
-    numbers = {*description["modified"], *description["modifiers"]}
-    bits = {i: np.unpackbits(arrays[f"table.{i}"], axis=1, count=n_units) for i in numbers}
-    tables = {i: (2 * table.astype(np.int8) - 1).astype(np.int8) for i, table in bits.items()}
-    code = InputCode(
-        [from_dict(coding) for coding in description["codings"]],
-        [(mu, nu) for mu, nu in description["pairs"]],
+def checked(coding: Coding, n_units: int) -> Coding:
+    """Return a fitted coding; ValueError if a field of it is wrong."""
+    of_values = coding.base if isinstance(coding, WithMissing) else coding
+    if isinstance(of_values, Categorical):
+        values = np.empty(of_values.size, object)
+        values[:] = of_values.categories
+    else:
+        values = np.array(of_values.ends() or (0.0,))
+    if coding.fit(values, n_units) != coding:  # which changes nothing where all is given
+        raise ValueError(f"{coding} is not fitted")
+    return coding
+
+
+def read_code(description: Description, arrays: Arrays, memory_limit: int) -> InputCode:
+    """Build the code; nothing is allocated before its size is known."""
+    n_units = whole("n_pattern_units", description["n_pattern_units"], 2, 2**24)
+    codings = [checked(from_dict(coding), n_units) for coding in description["codings"]]
+    last = len(codings) - 1
+    pairs = [
+        (whole("pairs", mu, 0, last), whole("pairs", nu, 0, last))
+        for mu, nu in description["pairs"]
+    ]
+    n_bytes = code_bytes(codings, pairs, n_units)
+    if n_bytes > memory_limit:
+        raise ValueError(
+            f"its patterns need {n_bytes} bytes, more than memory_limit={memory_limit}"
+        )
+    tables = {}
+    for number in {*description["modified"], *description["modifiers"]}:
+        bits = arrays[f"table.{number}"]
+        if bits.dtype != np.uint8 or bits.ndim != 2 or bits.shape[1] != -(-n_units // 8):
+            raise ValueError(f"table.{number} must have the bits of patterns of {n_units} units")
+        signs = np.unpackbits(bits, axis=1, count=n_units).astype(np.int8)
+        tables[number] = (2 * signs - 1).astype(np.int8)
+    return InputCode(
+        codings,
+        pairs,
         [tables[number] for number in description["modified"]],
         [tables[number] for number in description["modifiers"]],
     )
+
+
+def read_networks(description: Description, arrays: Arrays, memory_limit: int) -> Iterator[Network]:
+    """Build the code and the networks that share it."""
+    code = read_code(description, arrays, memory_limit)
     for number in range(description["n_networks"]):
         yield Network(
             code,

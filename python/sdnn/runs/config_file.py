@@ -7,6 +7,7 @@ import json
 import re
 import sys
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -27,6 +28,10 @@ FORMAT = "sdnn-run-2"
 
 MOST_BYTES = 2**20
 """Of a file of settings."""
+MOST_LEVELS = 32
+"""Of tables and arrays within each other."""
+_MOST_PARSED = 2**21
+"""Bytes that are parsed to find a line; in larger files errors name no line."""
 
 KeyPath: TypeAlias = tuple[str | int, ...]
 """Keys from the top of a document to a value; elements of arrays are numbers from 0."""
@@ -65,9 +70,10 @@ class ConfigFile:
         is_toml = path.suffix == ".toml"
         try:
             text = read_bytes(path, MOST_BYTES).decode()
-            values = tomllib.loads(text) if is_toml else json.loads(text)
+            values = _parsed_toml(text) if is_toml else json.loads(text)
         except RecursionError:
-            raise ConfigError("", "must be nested less deeply", str(path)) from None
+            problem = f"must have at most {MOST_LEVELS} tables and arrays within each other"
+            raise ConfigError("", problem, str(path)) from None
         except OSError as error:
             raise ConfigError("", error.strerror or str(error), str(path)) from error
         except ValueError as error:
@@ -76,8 +82,13 @@ class ConfigFile:
             kind = "TOML" if is_toml else "JSON"
             raise ConfigError("", f"must be {kind}: {error}", place) from error
         if not isinstance(values, dict):
-            raise ConfigError("", f"must hold a table, got {values!r}", str(path))
-        return cls(path, text, values)
+            raise ConfigError("", f"must hold a table, got {values!r:.80}", str(path))
+        file = cls(path, text, values)
+        deep = _deep_key(values)
+        if deep is not None:
+            problem = f"must have at most {MOST_LEVELS} tables and arrays within each other"
+            raise ConfigError(dotted(deep[:3]), problem, str(path))
+        return file
 
     def specification(self) -> dict[str, Any]:
         """Return the values of a specification: all but what only a run's configuration has.
@@ -106,13 +117,26 @@ class ConfigFile:
         It is the first line with which the file's beginning has the key.
         """
         lines = self.text.splitlines()
-        while key and self.path.suffix == ".toml":
-            found = bisect.bisect_left(
-                range(len(lines)), True, key=lambda last: _begins(lines, last + 1, key)
-            )
-            if found < len(lines):
-                return f"{self.path}:{found + 1}"
-            key = key[:-1]
+        n_left = _MOST_PARSED
+
+        def begins(last: int) -> bool:
+            """Whether the first lines, with the rest of their last value, have the key."""
+            nonlocal n_left
+            for end in range(last + 1, len(lines) + 1):
+                text = "\n".join(lines[:end])
+                n_left -= len(text)
+                if n_left < 0:
+                    raise OverflowError
+                with suppress(tomllib.TOMLDecodeError):
+                    return _has(tomllib.loads(text), key)
+            return True
+
+        with suppress(OverflowError):
+            while key and self.path.suffix == ".toml":
+                found = bisect.bisect_left(range(len(lines)), True, key=begins)
+                if found < len(lines):
+                    return f"{self.path}:{found + 1}"
+                key = key[:-1]
         return str(self.path)
 
     def error(self, key: KeyPath, problem: str) -> ConfigError:
@@ -135,15 +159,29 @@ def read_spec(path: str | Path) -> RunSpec:
         raise file.located(error) from error
 
 
-def _begins(lines: list[str], n: int, key: KeyPath) -> bool:
-    """Whether the first lines of a file, with the rest of their last value, have a key."""
-    for last in range(n, len(lines) + 1):
-        try:
-            value = tomllib.loads("\n".join(lines[:last]))
-        except tomllib.TOMLDecodeError:
-            continue
-        return _has(value, key)
-    return True
+def _parsed_toml(text: str) -> dict[str, Any]:
+    """Parse TOML; ValueError for a key of many parts, which would take time without end."""
+    for part in re.split(r"[={},\n]", text):
+        if part.count(".") > MOST_LEVELS:
+            raise ValueError(f"a key must have at most {MOST_LEVELS} parts, got {part[:40]!r}...")
+    return tomllib.loads(text)
+
+
+def _deep_key(values: dict[str, Any]) -> KeyPath | None:
+    """Return the key of a value that is too deep, if there is one."""
+    level: list[tuple[KeyPath, Any]] = [((), values)]
+    for _ in range(MOST_LEVELS):
+        items = (
+            (key, value.items() if isinstance(value, dict) else enumerate(value))
+            for key, value in level
+        )
+        level = [
+            ((*key, name), inner)
+            for key, pairs in items
+            for name, inner in pairs
+            if isinstance(inner, dict | list)
+        ]
+    return level[0][0] if level else None
 
 
 def _has(value: Any, key: KeyPath) -> bool:

@@ -11,7 +11,16 @@ from sdnn.runs.engine import PlannedTrial, plan_of
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.settings import possible_words
 from sdnn.runs.spec import RunSpec
-from sdnn.runs.study_file import BASE, KnownCase, Layer, StudyCase, StudyReader, StudyVariant
+from sdnn.runs.study_file import (
+    BASE,
+    MOST_COMBINATIONS,
+    MOST_TRIALS,
+    KnownCase,
+    Layer,
+    StudyCase,
+    StudyReader,
+    StudyVariant,
+)
 from sdnn.runs.trial import TrialKey, opened
 
 __all__ = ["Combination", "Study", "read_study"]
@@ -194,10 +203,18 @@ def read_study(
             ("study", "reference"), f"no variant {reference!r}; {possible_words(reference, known)}"
         )
     variants = tuple(sorted(reader.variants, key=lambda variant: variant.id != reference))
+    n_combinations = len(reader.cases) * len(variants)
+    if n_combinations > MOST_COMBINATIONS:
+        problem = f"must be at most {MOST_COMBINATIONS} in all cases, got {n_combinations}"
+        raise reader.file.error(("variants",), problem)
+    n_each = header.trials if n_trials is None else n_trials
+    if n_each * n_combinations > MOST_TRIALS:
+        problem = f"must be at most {MOST_TRIALS} in all, got {n_each} of {n_combinations} each"
+        raise reader.file.error(("study", "trials"), problem)
     return Study(
         reader=reader,
         title=header.title or path.stem,
-        n_trials=header.trials if n_trials is None else n_trials,
+        n_trials=n_each,
         seed=header.seed if seed is None else seed,
         reference=reference,
         cases=reader.cases,
