@@ -40,11 +40,11 @@ def export(
     from sdnn.agents import load_agent
     from sdnn.export import c_header
     from sdnn.files import write_whole
-    from sdnn.runs import Run
+    from sdnn.runs.run import agent_of
 
     with run_command(words_of_run(source)):
         try:
-            agent = Run.open(source).agent() if source.is_dir() else load_agent(source)
+            agent = agent_of(source) if source.is_dir() else load_agent(source)
         except ValueError as error:
             raise click.ClickException(str(error)) from error
         try:

@@ -257,14 +257,7 @@ class Run:
 
     def agent(self) -> Agent[Any, Any]:
         """Load the agent of the last checkpoint; RunError if there is none or it is damaged."""
-        path = next((p for p in map(self.folder.joinpath, (CHECKPOINT, AGENT)) if p.exists()), None)
-        if path is None:
-            begins = command_line("sdnn", "resume", self.folder)
-            raise RunError(f"{self.folder} has no checkpoint yet: {begins} begins it")
-        try:
-            return load_agent(path)
-        except ValueError as error:
-            raise RunError(str(error)) from error
+        return agent_of(self.folder)
 
     def evaluate(self, episodes: int = 10, seed: int | None = None) -> RunEvaluation:
         """Run greedy episodes; by default with other seeds than the run's own evaluations.
@@ -430,6 +423,20 @@ class _StoredCheckpoints(CheckpointCallback):
         """Return the processor time since the last call."""
         before, self._clock = self._clock, time.thread_time()
         return self._clock - before
+
+
+def agent_of(folder: Path) -> Agent[Any, Any]:
+    """Load the agent of a run, as `Run.agent`, whatever the run's configuration says."""
+    if not (folder / CONFIG).exists():
+        raise RunError(f"{folder} holds no run: there is no {folder / CONFIG}")
+    path = next((p for p in (folder / CHECKPOINT, folder / AGENT) if p.exists()), None)
+    if path is None:
+        begins = command_line("sdnn", "resume", folder)
+        raise RunError(f"{folder} has no checkpoint yet: {begins} begins it")
+    try:
+        return load_agent(path)
+    except ValueError as error:
+        raise RunError(str(error)) from error
 
 
 def tensorboard_in(folder: Path) -> TensorBoard:
