@@ -14,6 +14,7 @@ LEAST = {
     "loop_cells": 500,
     "command_cells": 40,
     "mutation_cells": N_MUTATIONS,
+    "damage_cells": 120,
 }
 """Cells that a row must have, so that none is empty; others 700."""
 

@@ -15,7 +15,7 @@ from sdnn import _core
 from sdnn.arguments import seed_of, whole
 from sdnn.coding import Coding, WithMissing, from_dict, to_dict
 from sdnn.coding.symbols import Categorical
-from sdnn.estimators.inputs import Array, Floats, Ints
+from sdnn.estimators.inputs import Array, Floats, Ints, coding_entries
 from sdnn.estimators.network import InputCode, Network, code_bytes
 from sdnn.files import Arrays, Description, read_file, write_file
 
@@ -53,6 +53,7 @@ ATTRIBUTES = {name: get_origin(kind) or kind for name, kind in get_type_hints(Le
 class Fitted(Learned, BaseEstimator):
     """Attributes of an estimator that holds a network, and its file."""
 
+    coding: Any
     network_: Network
     _earlier: tuple[Network, ...] = ()
 
@@ -223,6 +224,7 @@ def read_estimator(
     """Make the estimator with its parameters and everything it has learned."""
     estimator = kind(**{name: restored(value) for name, value in description["parameters"].items()})
     estimator._validate_params()
+    coding_entries(estimator.coding)
     held: dict[str, Any] = estimator.__dict__
     given = {**description["attributes"], **arrays}
     for name, expected in ATTRIBUTES.items():

@@ -6,6 +6,7 @@ A row is a function that makes cells and its arguments; `watched_cells.failures`
 import bad_inputs
 import bad_options
 import core_cells
+import damaged_files
 import mutated_files
 import public_cells
 
@@ -31,7 +32,11 @@ MATRICES = {
         (public_cells.experiment_cells,),
     ],
     "commands": [(bad_options.command_cells, name) for name in bad_options.COMMANDS],
-    "files": [(mutated_files.mutation_cells, name, N_MUTATIONS) for name in mutated_files.READERS],
+    "files": [
+        *((mutated_files.mutation_cells, name, N_MUTATIONS) for name in mutated_files.READERS),
+        *((damaged_files.damage_cells, name) for name in damaged_files.READERS),
+        *((damaged_files.header_cells, number) for number in range(3)),
+    ],
 }
 ROWS = [row for rows in MATRICES.values() for row in rows]
 

@@ -1,0 +1,288 @@
+"""Every reader of files, and every damage: what strangers may put in the place of a file."""
+
+import dataclasses
+import functools
+import json
+import os
+import socket
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import gymnasium as gym
+import numpy as np
+
+import agent_files
+from bad_inputs import leaves, replaced
+from checksums import with_checksum
+from mutated_files import READERS as OTHERS
+from mutated_files import Reader, contents_of, read_estimator, written
+from sdnn.agents import JSONLines, SDNNQLearning, Training, UnrepeatedEpisodeError
+from sdnn.estimators import libsdnn
+from sdnn.files import read_file, write_file
+from sdnn.runs import Run
+from sdnn.runs.errors import RunError
+
+MOST_SECONDS = 5.0
+MOST_BYTES = 2**28
+
+
+def make_env():
+    return gym.make("Pendulum-v1")
+
+
+def save_training(path):
+    env = make_env()
+    agent = SDNNQLearning(env.observation_space, env.action_space, approximator=agent_files.SMALL)
+    training = Training(agent, env, steps=9)
+    training.run()
+    training.save(path)
+
+
+def read_lines(path):
+    rows = JSONLines(path)
+    rows.on_start(SimpleNamespace(n_rows=2))
+    rows.on_end(None)
+
+
+def read_scheduler_file(path):
+    from sdnn.runs.dask_executor import DaskExecutor
+
+    return DaskExecutor(str(path))._address()
+
+
+RUN = (
+    b'{"format": "%s", "environment": {"id": "Pendulum-v1"}, "goals": [{"at_step": 3, "steps": 9}]}'
+)
+
+READERS = {
+    **OTHERS,
+    "training": Reader(
+        "checkpoint.safetensors",
+        lambda: written(save_training),
+        lambda path: Training.load(path, make_env()),
+        (ValueError, OSError),
+    ),
+    "libsdnn parameters": Reader(
+        "parameters.txt",
+        lambda: [parameters_of(contents_of("tests/python/reference/libsdnn_files", "*.bin")[0])],
+        libsdnn.read_parameter_file,
+        (ValueError, OSError),
+    ),
+    "configuration": Reader(
+        "config.json",
+        lambda: [RUN.replace(b"%s", format_of_runs().encode())],
+        lambda path: Run.open(path.parent),
+        (RunError,),
+    ),
+    "lines": Reader("rows.jsonl", lambda: [b'{"a": 1}\n' * 4], read_lines, (OSError,)),
+    "scheduler": Reader(
+        "scheduler.json", lambda: [b'{"address": "tcp://a:1"}'], read_scheduler_file,
+        (RunError, FileNotFoundError),
+    ),
+}  # fmt: skip
+
+CHECKED = ("agent", "training", "estimator")
+"""Whose every byte is covered by a checksum."""
+
+
+def parameters_of(model):
+    length = int.from_bytes(model[:4], "little")
+    return model[4 : 4 + length]
+
+
+def format_of_runs():
+    from sdnn.runs import config_file
+
+    return config_file.FORMAT
+
+
+@functools.cache
+def good_file(name):
+    return READERS[name].good()[0]
+
+
+def bind(path):
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(path.name)  # a long path would not fit
+
+
+def sparse(path):
+    with path.open("wb") as file:
+        file.truncate(2**40)
+
+
+SPECIAL = {
+    "pipe": os.mkfifo,
+    "folder": Path.mkdir,
+    "socket": bind,
+    "link to a device": lambda path: path.symlink_to("/dev/zero"),
+    "link to a terminal": lambda path: path.symlink_to("/dev/tty"),
+    "a terabyte": sparse,
+}
+"""What is no file of a size that fits: always refused."""
+
+MIB = 2**20
+HEADERS = (b"[study]\n", b"[base]\n", b"[base.learning]\n", b"[axes]\n", b"[cases]\n", b"")
+
+CONTENTS = {
+    "nothing": b"",
+    "zeros": bytes(MIB),
+    "noise": np.random.default_rng(0).bytes(MIB),
+    "deep tables": b'{"a":' * 100_000,
+    "deep arrays": b"[" * 100_000,
+    "deep arrays of a key": b'{"a":' + b"[" * 100_000 + b"]" * 100_000 + b"}",
+    "900 levels": b'{"environment": {"id": "Pendulum-v1", "kwargs": {"a":'
+    + b"[" * 900 + b"]" * 900 + b"}}}",
+    "a long number": b'{"seed": ' + b"9" * MIB + b"}",
+    "many keys": b"{" + b",".join(b'"k%d": 1' % i for i in range(80_000)) + b"}",
+    "an endless list": b"[" + b"0," * (MIB // 2) + b"0]",
+    "deep TOML arrays": b"a = " + b"[" * 100_000 + b"]" * 100_000,
+    "deep TOML tables": b"a = " + b"{a = " * 100_000,
+    "a TOML key of many parts": b"a." * 50_000 + b"a = 1",
+    "a TOML table of many parts": b"[" + b"a." * 50_000 + b"a]\n",
+    "TOML within 900 levels": b"[base.environment.kwargs]\na = " + b"[" * 900 + b"]" * 900,
+    "a TOML array over many lines": b"[base.learning]\nepsilon = [\n" + b"1,\n" * 100_000 + b"]\n",
+    **{
+        f"many keys in {header.decode().strip() or 'the file'}": header
+        + b"".join(b"k%d = 1\n" % i for i in range(20_000))
+        for header in HEADERS
+    },
+    "10^9 trials": b'[study]\ntrials = 1_000_000_000\n[base]\nenvironment = "Pendulum-v1"\n',
+    "a product of 10^12": b'[base]\nenvironment = "Pendulum-v1"\n[axes]\ncombine = "product"\n'
+    + b"".join(b"learning.%s = %s\n" % (k, str([i / 1e3 for i in range(1000)]).encode())
+               for k in (b"epsilon", b"discount", b"learning_rate", b"final_epsilon")),
+    "many cases and variants": b'[base]\nenvironment = "Pendulum-v1"\n'
+    + b"".join(b"[cases.c%d]\nseed = %d\n[variants.v%d]\n" % (i, i, i) for i in range(5000)),
+    "commas": b"SDNN = [" + b"," * MIB + b"]",
+    "commas and brackets": b"SDNN = [" + b"(," * (MIB // 2) + b"]",
+    "repeats": b"<SDNN>{\n<PC>{\nrandom_seed = [" + b"1:100000," * 100_000 + b"1]\n}\n}\n",
+    "tags": b"<a\n" * 150_000 + b"a = 1\n" * 80_000,
+    "a long line": b"a" * MIB,
+}  # fmt: skip
+"""Contents of at most a few MiB, which a reader refuses or reads."""
+
+
+def damages(name):
+    """Yield names of damages, functions that do them to a path, and whether they are refused."""
+    good = good_file(name)
+    is_checked = name in CHECKED
+    for word, make in SPECIAL.items():
+        yield word, make, True
+    for word, content in CONTENTS.items():
+        yield word, functools.partial(Path.write_bytes, data=content), is_checked
+    for word, content in changed(name, good):
+        yield word, functools.partial(Path.write_bytes, data=content), False
+    rng = np.random.default_rng(1)
+    for number in range(30):
+        cut = good[: int(rng.integers(len(good)))]
+        yield f"cut {number}", functools.partial(Path.write_bytes, data=cut), is_checked
+    for number in range(60):
+        flipped = bytearray(good)
+        flipped[int(rng.integers(len(good)))] ^= 1 << int(rng.integers(8))
+        yield f"bit {number}", functools.partial(Path.write_bytes, data=bytes(flipped)), is_checked
+    for word, content in {"more": good + b"\0", "twice": good + good}.items():
+        yield word, functools.partial(Path.write_bytes, data=content), is_checked
+
+
+def changed(name, good):
+    """Yield contents that only this reader is harmed by."""
+    if name.startswith("libsdnn"):
+        text = good if name == "libsdnn parameters" else parameters_of(good)
+        rest = b"" if name == "libsdnn parameters" else good[4 + len(text) :]
+        for old, new in (
+            (b"input_number = 2", b"input_number = 10000"),
+            (b"input_number = 2", b"input_number = 2147483647"),
+            (b"RANDOM_INVERSE(51", b"RANDOM_INVERSE(16777216"),
+            (b"RANDOM_INVERSE(51", b"RANDOM_INVERSE(9^9^9^9"),
+            (b"combination_setting = mutual", b"combination_setting = file\nfilename = /dev/zero"),
+            (b"combination_setting = mutual", b"combination_setting = file\nfilename = ../x"),
+        ):
+            if old in text:
+                other = text.replace(old, new).replace(b":2]", b":10000]")
+                head = b"" if not rest else len(other).to_bytes(4, "little")
+                yield f"{new.decode()}", head + other + rest
+    if name in CHECKED:
+        yield from of_other_types(good)
+
+
+OTHER_TYPES = {1: ("F8_E4M3", "F8_E5M2", "BOOL"), 2: ("BF16", "F16", "U16"), 4: ("U32",),
+               8: ("C64", "U64")}  # fmt: skip
+
+
+def of_other_types(good):
+    """Yield files whose arrays have other types, under the right checksum."""
+    length = int.from_bytes(good[:8], "little")
+    header, data = json.loads(good[8 : 8 + length]), good[8 + length :]
+    sizes = {"I8": 1, "U8": 1, "I16": 2, "I32": 4, "F32": 4, "I64": 8, "U64": 8, "F64": 8}
+    for name in [name for name in header if name != "__metadata__"]:
+        for kind in OTHER_TYPES[sizes[header[name]["dtype"]]]:
+            other = header | {name: header[name] | {"dtype": kind}}
+            text = json.dumps(other, separators=(",", ":")).encode()
+            text += b" " * (-len(text) % 8)
+            yield f"{name} of {kind}", with_checksum(len(text).to_bytes(8, "little") + text + data)
+
+
+def damage_cells(name):
+    """Cells of a reader: every damage is refused by name, or read, in little time and memory."""
+    for word, damage, is_refused in damages(name):
+        yield f"{name}, {word}", functools.partial(tried, name, damage, is_refused)
+
+
+def tried(name, damage, is_refused):
+    """Say what is wrong with how a reader takes a damage, or nothing."""
+    reader = READERS[name]
+    path = Path.cwd() / reader.name
+    damage(path)
+    return verdict(reader, path, is_refused)
+
+
+def verdict(reader, path, is_refused):
+    Path("/proc/self/clear_refs").write_text("5")  # begin the highest memory anew
+    before, began = resident("VmRSS"), time.process_time()
+    error = None
+    try:
+        reader.read(path)
+    except reader.errors as caught:
+        error = caught
+    seconds, n_bytes = time.process_time() - began, resident("VmHWM") - before
+    if seconds > MOST_SECONDS:
+        return f"took {seconds:.1f} s"
+    if n_bytes > MOST_BYTES:
+        return f"took {n_bytes / MIB:.0f} MiB"
+    if error is None:
+        return "was read" if is_refused else ""
+    is_named = path.name in str(error) or isinstance(error, UnrepeatedEpisodeError)
+    return "" if is_named else f"does not name the file: {error!r:.200}"
+
+
+def resident(name):
+    (line,) = (x for x in Path("/proc/self/status").read_text().splitlines() if x.startswith(name))
+    return 1024 * int(line.split()[1])
+
+
+VALUES = {
+    "a text": "x", "2^31": 2**31, "2^70": 2**70, "-1": -1, "0.5": 0.5, "NaN": float("nan"),
+    "null": None, "true": True, "a table": {}, "a list": [], "nothing": ...,
+    "a deep list": functools.reduce(lambda x, _: [x], range(300), 0),
+    "a long text": "x" * 100_000, "many": list(range(100_000)),
+}  # fmt: skip
+
+
+def header_cells(number):
+    """Every value of an estimator's description, another one, under the right checksum."""
+    path = Path("model.safetensors").absolute()
+    path.write_bytes(READERS["estimator"].good()[number])
+    description, arrays = read_file(path, "estimator")
+    path.unlink()
+    for place in leaves(description):
+        for word, value in VALUES.items():
+            name = f"estimator {number}: {'.'.join(map(str, place))} = {word}"
+            yield name, functools.partial(_header_cell, description, arrays, place, value)
+
+
+def _header_cell(description, arrays, place, value):
+    path = Path.cwd() / "model.safetensors"
+    write_file(path, "estimator", arrays, replaced(description, place, value))
+    reader = dataclasses.replace(READERS["estimator"], read=read_estimator)
+    return verdict(reader, path, is_refused=False)
