@@ -34,7 +34,6 @@ import sdnn
 from sdnn.files import write_whole
 from sdnn.progress import ProgressBars
 from sdnn.runs.engine import (
-    POLL_SECONDS,
     Advanced,
     Executor,
     Failed,
@@ -46,6 +45,7 @@ from sdnn.runs.store import STORE_NAME, ResultStore
 
 DOCS = Path(__file__).parents[1] / "docs"
 PACKED = "benchmarks.sqlite.xz"
+POLL_SECONDS = 0.1  # between two looks at whether it was interrupted
 
 Key = tuple[Any, ...]
 """Which measurement it is, in words and numbers."""

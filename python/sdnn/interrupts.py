@@ -1,4 +1,4 @@
-"""Ctrl-C that waits for the end of a step, and Ctrl-C that extensions turn into other errors."""
+"""Signals that wait for the end of a step or a block."""
 
 from __future__ import annotations
 
@@ -50,33 +50,12 @@ class Interrupts:
 
 @contextmanager
 def stay_interrupts() -> Iterator[None]:
-    """Let a Ctrl-C leave the block as KeyboardInterrupt, whatever the code in it makes of it.
+    """Let a Ctrl-C wait for the end of the block, and be KeyboardInterrupt there.
 
     Extensions replace the exceptions of the Python code that they call, or forget them: matplotlib
-    answers a Ctrl-C with "Invalid affine transformation matrix".
+    answers a Ctrl-C with "Invalid affine transformation matrix". A second one acts as usual.
     """
-    usual = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(usual):
+    with Interrupts(lambda: None) as interrupts:
         yield
-        return
-    came = False
-
-    def handle(number: int, frame: FrameType | None) -> None:
-        nonlocal came
-        try:
-            usual(number, frame)
-        except KeyboardInterrupt:
-            came = True
-            raise
-
-    signal.signal(signal.SIGINT, handle)
-    try:
-        yield
-    except Exception as error:
-        if came:
-            raise KeyboardInterrupt from error
-        raise
-    finally:
-        signal.signal(signal.SIGINT, usual)
-    if came:
+    if interrupts.received is not None:
         raise KeyboardInterrupt

@@ -11,11 +11,11 @@ from __future__ import annotations
 import threading
 import time
 import zlib
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import dataclass
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 from signal import SIGINT, SIGTERM
 from typing import NamedTuple, Protocol
 
@@ -30,9 +30,6 @@ from sdnn.runs.trial import TrainingTrial, Trial, TrialKey, TrialRecord, opened,
 
 CHUNK_SECONDS = 0.1
 """A trial reports about this often; it is also how long an interruption waits."""
-
-POLL_SECONDS = 0.1
-"""How often the calling thread wakes up while no message comes."""
 
 
 def trial_seed(root_seed: int, case_id: str, trial: int) -> int:
@@ -314,22 +311,20 @@ class ThreadExecutor:
     ) -> Generator[Message, None, None]:
         """Run the trials; see `Executor`."""
         messages: SimpleQueue[Message | None] = SimpleQueue()
-        with (
-            ThreadPoolExecutor(self.jobs, thread_name_prefix="trial") as pool,
-            _set_at_exit(stop),
-        ):
-            for item in planned:
-                pool.submit(_run_one, item, messages, stop)
-            # Every submitted trial sends one last message, None if it was given up after a stop.
-            n_open = len(planned)
-            while n_open:
-                try:
-                    message = messages.get(timeout=POLL_SECONDS)
-                except Empty:
-                    continue
-                n_open -= not isinstance(message, Advanced)
-                if message is not None:
-                    yield message
+        with ThreadPoolExecutor(self.jobs, thread_name_prefix="trial") as pool:
+            try:
+                for item in planned:
+                    pool.submit(_run_one, item, messages, stop)
+                # Every trial sends one last message, None if it was given up after a stop.
+                n_open = len(planned)
+                while n_open:
+                    message = messages.get()
+                    n_open -= not isinstance(message, Advanced)
+                    if message is not None:
+                        yield message
+            except BaseException:  # the pool waits for its threads
+                stop.set()
+                raise
 
 
 def _run_one(
@@ -352,13 +347,3 @@ def _run_one(
         messages.put(Failed(planned, failure))
     else:
         messages.put(None if record is None else Finished(planned, record))
-
-
-@contextmanager
-def _set_at_exit(event: threading.Event) -> Iterator[None]:
-    """Let an error in the calling thread stop the workers before the pool waits for them."""
-    try:
-        yield
-    except BaseException:
-        event.set()
-        raise

@@ -118,12 +118,8 @@ class Study:
             return [self.keys(case, name)[0] for case, name in self.combinations if name == variant]
 
         mine = hashes(variant_id)
-        for variant in self.variants:
-            if variant.id == variant_id:
-                return None
-            if hashes(variant.id) == mine:
-                return variant.id
-        return None
+        first = next(variant.id for variant in self.variants if hashes(variant.id) == mine)
+        return None if first == variant_id else first
 
     def check(self, stored: Collection[TrialKey] = ()) -> None:
         """Make a trial of every specification once, so that nothing is run that could not be.
