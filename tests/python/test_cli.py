@@ -410,7 +410,7 @@ def test_damaged_result_file_is_one_clear_line(invoke, tmp_path, options):
 
 
 def test_missing_matplotlib_is_one_clear_line(invoke, tmp_path, monkeypatch):
-    monkeypatch.setattr("sdnn.runs.figures.find_spec", lambda name: None)
+    monkeypatch.setattr("sdnn.runs.report.find_spec", lambda name: None)
     result = invoke("reproduce", "a", "--quick")
     assert result.exit_code == 1
     assert 'pip install "sdnn[reproduce]"' in result.stderr

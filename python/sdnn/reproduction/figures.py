@@ -14,10 +14,10 @@ from sdnn.runs.figures import (
     INK,
     SMOOTHED_TESTS,
     agent_colors,
-    colors_of,
+    color_of,
     draw_steps,
     label,
-    require_matplotlib,
+    new_figure,
     style,
 )
 from sdnn.runs.results import CaseResult
@@ -41,16 +41,13 @@ def draw_experiment(
     Long runs have a small panel below each case, which shows the first episodes again.
     With `quick` the figure is marked as a quick look, which is no result.
     """
-    require_matplotlib()
-    from matplotlib.figure import Figure
-
     n_columns = min(2, len(experiment.cases))
     n_rows = -(-len(experiment.cases) // n_columns)
     # The start is too small a part of the panels to be seen in those of a long run.
     is_long = max(result.last_episode for result in results) >= 4 * START_EPISODES
     heights = (_PANEL_HEIGHT, _START_HEIGHT) if is_long else (_PANEL_HEIGHT,)
     height = 1.1 + n_rows * sum(heights)
-    figure = Figure(figsize=(5.4 * n_columns, height), layout="constrained")
+    figure = new_figure(5.4 * n_columns, height)
     grid = figure.subplots(
         n_rows * len(heights), n_columns, sharey=True, squeeze=False, height_ratios=heights * n_rows
     )
@@ -92,12 +89,9 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
     Exponential growth is a straight line there; quadratic growth bends. A dotted line continues
     what SDNN-C needs with 4 inputs by its number of columns.
     """
-    require_matplotlib()
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.4, 4.7), layout="constrained")
+    figure = new_figure(9.4, 4.7)
     axes = figure.add_subplot()
-    colors = colors_of(range(len(SERIES)))
+    colors = [color_of(place) for place in range(len(SERIES))]
     for number, series in enumerate(SERIES):
         own = sorted((c for c in costs if c.series == series.id), key=lambda c: c.n_inputs)
         if not own:

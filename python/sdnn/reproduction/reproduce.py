@@ -26,9 +26,9 @@ from sdnn.reproduction.figures import draw_cost, draw_experiment
 from sdnn.reproduction.reference_results import reference_results
 from sdnn.reproduction.report import Report
 from sdnn.runs.engine import Executor, Observer, PlannedTrial, ThreadExecutor, plan_of, run_trials
-from sdnn.runs.figures import figure_bytes, require_matplotlib
+from sdnn.runs.figures import figure_bytes
 from sdnn.runs.registry import split_label
-from sdnn.runs.report import Finished, describe_call, require_jinja
+from sdnn.runs.report import Finished, describe_call, require
 from sdnn.runs.results import CaseResult, measure
 from sdnn.runs.spec import PAPER_INTERVAL, AgentSpec, BudgetSpec, RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
@@ -169,8 +169,7 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
         Before any trial if matplotlib or Jinja is not installed or the result file cannot be used;
         later if the cluster cannot run trials any more: what was finished is stored.
     """
-    require_matplotlib()
-    require_jinja()
+    require("matplotlib", "jinja2")
     begin = time.monotonic()
     watcher = Observer() if observer is None else observer
     plan = request.plan

@@ -7,7 +7,6 @@ window, backend or style of the user's session is touched.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from importlib.util import find_spec
 from io import BytesIO
 from typing import TYPE_CHECKING, Literal
 
@@ -15,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.interrupts import stay_interrupts
-from sdnn.runs.errors import PlotUnavailableError
 from sdnn.runs.registry import labels, title_of
+from sdnn.runs.report import require
 from sdnn.runs.results import (
     CENSORED_MEASURES,
     CaseResult,
@@ -54,31 +53,25 @@ _TITLES: dict[MeasureName, str] = {
 _OF_STEPS, _OF_RETURNS = tuple(_TITLES)[:2], tuple(_TITLES)[2:]
 
 
-def require_matplotlib(extra: str = "reproduce") -> None:
-    """Raise a `PlotUnavailableError` that names an extra if matplotlib is not installed."""
-    if find_spec("matplotlib") is None:
-        raise PlotUnavailableError(
-            f'figures need matplotlib, which is not installed: pip install "sdnn[{extra}]"'
-        )
+def new_figure(width: float, height: float, extra: str = "reproduce") -> Figure:
+    """Make a figure whose panels leave room for titles, legend and footer.
 
-
-def colors_of(places: Sequence[int]) -> list[str]:
-    """Return the colors of things by their places in a list of which they are a part.
-
-    A thing has the same color whatever else is shown. Only where two would have the same, the later
-    one takes the next that is free, while there is any.
+    A `PlotUnavailableError` names the extra if matplotlib is not installed.
     """
-    taken: list[int] = []
-    for place in places:
-        turns = [(place + turn) % len(COLORS) for turn in range(len(COLORS))]
-        taken.append(next((color for color in turns if color not in taken), turns[0]))
-    return [COLORS[number] for number in taken]
+    require("matplotlib", extra=extra)
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def color_of(place: int) -> str:
+    """Return the color of a thing by its place in a list, the same whatever else is shown."""
+    return COLORS[place % len(COLORS)]
 
 
 def agent_colors(agents: Iterable[str]) -> dict[str, str]:
     """Return the colors of agents, each once, by their places in the registry."""
-    shown, places = list(dict.fromkeys(agents)), list(labels())
-    return dict(zip(shown, colors_of([places.index(agent) for agent in shown]), strict=True))
+    return {agent: color_of(labels().index(agent)) for agent in agents}
 
 
 def figure_bytes(figure: Figure) -> tuple[bytes, bytes]:
@@ -143,13 +136,10 @@ def draw_steps(
 
 def draw_curves(curves: Sequence[Curve]) -> Figure:
     """Draw the curves of runs: a panel per task, a color per agent."""
-    require_matplotlib("plot")
-    from matplotlib.figure import Figure
-
     tasks = list(dict.fromkeys(curve.task for curve in curves))
     agents = list(dict.fromkeys(curve.agent for curve in curves))
-    colors = dict(zip(agents, colors_of(range(len(agents))), strict=True))
-    figure = Figure(figsize=(7.5, 3.6 * len(tasks)), layout="constrained")
+    colors = {agent: color_of(place) for place, agent in enumerate(agents)}
+    figure = new_figure(7.5, 3.6 * len(tasks), extra="plot")
     panels = figure.subplots(len(tasks), squeeze=False)[:, 0]
     for task, axes in zip(tasks, panels, strict=True):
         for curve in (one for one in curves if one.task == task):
@@ -183,16 +173,13 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
     shares their mean, and a bar its interval. It is filled for the reference and where a variant
     differs from it. The footer says where the rows come from.
     """
-    require_matplotlib()
-    from matplotlib.figure import Figure
-
     cases = comparison.cases
     n_columns = min(len(cases), CASES_PER_ROW)
     n_rows = 2 * -(-len(cases) // CASES_PER_ROW)
     names = 0.3 + 0.072 * max(len(variant.title) for variant in comparison.variants)
     width = max(6.4, names + n_columns * _PANEL_WIDTH)
     panel_height = 1.0 + _LINE_HEIGHT * len(comparison.variants)
-    figure = Figure(figsize=(width, 1.2 + n_rows * panel_height), layout="constrained")
+    figure = new_figure(width, 1.2 + n_rows * panel_height)
     grid = figure.subplots(n_rows, n_columns, squeeze=False)
     for axes in grid.ravel():
         axes.set_visible(False)

@@ -153,7 +153,7 @@ class Page:
 
     def to_html(self, call: str) -> str:
         """Make it one self-contained HTML page; `call` says how it came about."""
-        require_jinja()
+        require("jinja2")
         from jinja2 import Environment, PackageLoader, StrictUndefined
 
         environment = Environment(
@@ -200,12 +200,14 @@ def markdown_text(text: str) -> str:
     return _MARKUP.sub(r"\\\g<0>", " ".join(text.split()))
 
 
-def require_jinja() -> None:
-    """Raise a `PlotUnavailableError` if Jinja is not installed."""
-    if find_spec("jinja2") is None:
-        raise PlotUnavailableError(
-            'the report needs Jinja, which is not installed: pip install "sdnn[reproduce]"'
-        )
+def require(*modules: str, extra: str = "reproduce") -> None:
+    """Raise a `PlotUnavailableError` that names an extra if one of its modules is not installed."""
+    for module in modules:
+        if find_spec(module) is None:
+            raise PlotUnavailableError(
+                f"figures and reports need {module}, which is not installed:"
+                f' pip install "sdnn[{extra}]"'
+            )
 
 
 def describe_call(outcome: RunOutcome, seconds: float, shown: Iterable[TrialRecord]) -> str:

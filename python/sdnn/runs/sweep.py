@@ -12,8 +12,8 @@ from sdnn import _core
 from sdnn.files import csv_pieces, gzip_pieces, remove_abandoned_files
 from sdnn.runs.comparison import Addition, Comparison, compare, study_json, study_page
 from sdnn.runs.engine import Executor, Observer, PlannedTrial, ThreadExecutor, run_trials
-from sdnn.runs.figures import draw_study, figure_bytes, require_matplotlib
-from sdnn.runs.report import Finished, describe_call, require_jinja
+from sdnn.runs.figures import draw_study, figure_bytes
+from sdnn.runs.report import Finished, describe_call, require
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study import Study
 from sdnn.runs.trial import ROW_HEADER, records_digest, trial_rows
@@ -61,8 +61,7 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Finishe
     ClusterError
         If the cluster cannot run trials any more; what was finished is stored.
     """
-    require_matplotlib()
-    require_jinja()
+    require("matplotlib", "jinja2")
     begin = time.monotonic()
     study, plan = request.study, request.plan
     is_new = not (request.out / STORE_NAME).exists()

@@ -272,6 +272,6 @@ def test_what_cannot_be_drawn(tmp_path, monkeypatch):
     run = make(tmp_path / "run", CONFIG)
     with pytest.raises(RunError, match="nothing to draw"):
         curves_of([run])
-    monkeypatch.setattr("sdnn.runs.figures.find_spec", lambda name: None)
+    monkeypatch.setattr("sdnn.runs.report.find_spec", lambda name: None)
     with pytest.raises(RunError, match=r'pip install "sdnn\[plot\]"'):
         draw_curves([])
