@@ -63,7 +63,8 @@ SHORTHANDS = {"environment": "id", "agent": "name"}
 _ALWAYS = ("id", "name", "preset", "steps", "episodes")
 """Settings that are written also where they are the default."""
 
-_ACROBOT = {"acrobot": AcrobotConfig, "goal": GoalScheduleConfig, "sensors": SensorConfig}
+ACROBOT = {"acrobot": AcrobotConfig, "goal": GoalScheduleConfig, "sensors": SensorConfig}
+"""Tables of the paper's task, which a specification without an environment has."""
 
 _OF_SPACES = ("observation_range", "angles", "angle_pairs", "warm_up_steps")
 """Settings of agents in environments."""
@@ -127,7 +128,7 @@ class RunSpec(Settings, frozen=True):
         super().__post_init__()
         if self.seed >= 2**64:
             raise ConfigError("seed", f"must be at most 2**64 - 1, got {self.seed}")
-        for name, kind in _ACROBOT.items():
+        for name, kind in ACROBOT.items():
             if self.environment is None:
                 self._set(**{name: self._part(name, kind())})
             elif getattr(self, name) is not None:
@@ -259,7 +260,7 @@ class RunSpec(Settings, frozen=True):
         entry = agent_entry(self.agent.name)
         if not self.is_compiled or entry.core_trial is None:
             raise ValueError(f"{self.label} has no trial in C++ under this protocol")
-        parts = {name: getattr(self, name) for name in (*_ACROBOT, "approximator", "learning")}
+        parts = {name: getattr(self, name) for name in (*ACROBOT, "approximator", "learning")}
         protocol = ProtocolConfig(
             n_learning_episodes=self.budget.episodes or 0,
             evaluate_every_episodes=self.protocol.evaluate_every_episodes or 0,
@@ -378,7 +379,7 @@ class RunSpec(Settings, frozen=True):
         if isinstance(error, ConfigError):
             return error
         name, problem = blamed(error)
-        tables = ("approximator", "learning", "agent", *(_ACROBOT if self.acrobot else ()))
+        tables = ("approximator", "learning", "agent", *(ACROBOT if self.acrobot else ()))
         for table in tables:
             if name != "n_inputs" and name in names_of(type(getattr(self, table))):
                 return ConfigError(f"{table}.{name}", problem)

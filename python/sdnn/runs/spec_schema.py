@@ -7,28 +7,17 @@ from typing import Annotated, Any
 
 import msgspec
 
-from sdnn.config import (
-    AcrobotConfig,
-    Field,
-    FuzzyQLearningConfig,
-    FuzzyRulesConfig,
-    GoalScheduleConfig,
-    QLearningConfig,
-    RBFNetworkConfig,
-    SDNNCConfig,
-    SensorConfig,
-    fields_of,
-)
-from sdnn.runs.spec import RunSpec
+from sdnn.config import Field, fields_of
+from sdnn.runs.registry import AGENTS
+from sdnn.runs.spec import ACROBOT, RunSpec
 
 __all__ = ["CORE", "spec_schema"]
 
-CORE = {
-    "acrobot": (AcrobotConfig,),
-    "goal": (GoalScheduleConfig,),
-    "sensors": (SensorConfig,),
-    "approximator": (SDNNCConfig, RBFNetworkConfig, FuzzyRulesConfig),
-    "learning": (QLearningConfig, FuzzyQLearningConfig),
+CORE: dict[str, tuple[Any, ...]] = {name: (kind,) for name, kind in ACROBOT.items()} | {
+    part: tuple(
+        dict.fromkeys(getattr(entry, part) for entry in AGENTS.values() if entry.core_trial)
+    )
+    for part in ("approximator", "learning")
 }
 """The core's settings in a specification, by their tables."""
 

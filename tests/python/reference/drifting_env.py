@@ -52,14 +52,15 @@ class BrokenEnv(DriftingEnv):
 
 
 class RestlessEnv(DriftingEnv):
-    """Drifts as it likes, whatever the seed, as a robot does; counts the steps of all of them."""
+    """Drifts at random, whatever the seed, as a robot does, to the time limit; counts all steps."""
 
     n_steps = 0
 
     def step(self, action):
         RestlessEnv.n_steps += 1
         self.state += np.random.default_rng().normal(0.0, 0.1, 2)
-        return super().step(action)
+        observation, reward, _, truncated, info = super().step(action)
+        return observation, reward, False, truncated, info
 
 
 class OnlyEnv(DriftingEnv):

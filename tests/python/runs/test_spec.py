@@ -200,7 +200,7 @@ def test_agents_are_made_with_preset_and_settings():
     ("values", "key", "words"),
     [
         ({"learning": {"discount": 2.0}}, "learning.discount", "in [0, 1]"),
-        ({"agent": {"angles": [9]}}, "agent.angles", "must be variables from 0 to 3"),
+        ({"agent": {"angles": [9]}}, "agent.angles", "got 9"),
         (
             {"approximator": {"n_hidden_units": 10}},
             "approximator.n_active_units",
