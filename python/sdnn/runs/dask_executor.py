@@ -9,6 +9,7 @@ unpickle its argument reports an error.
 
 from __future__ import annotations
 
+import asyncio
 import importlib.util
 import json
 import logging
@@ -158,7 +159,7 @@ class DaskExecutor:
             try:
                 run = _Run(self, client, list(_probes(planned)), deque(planned))
                 yield from run.messages(stop)
-            except (OSError, TimeoutError) as error:
+            except (OSError, asyncio.TimeoutError) as error:
                 raise self.failure(f"lost the scheduler at {self.scheduler}: {error}") from error
             finally:
                 client.close(timeout=CONNECT_SECONDS)
