@@ -6,6 +6,7 @@ from contextlib import suppress
 import gymnasium as gym
 import pytest
 
+from refusals import refuses
 from sdnn.agents import Callback, CheckpointCallback, JSONLines, SDNNQLearning, Training
 from sdnn.interrupts import Interrupts, stay_interrupts
 
@@ -89,8 +90,7 @@ def test_an_interrupted_training_goes_on_exactly(tmp_path, times, saved_at):
     assert training.callbacks[2].n == 1
     assert training.is_within_step == (times == 2)
     if times == 2:
-        with pytest.raises(RuntimeError, match="step"):
-            training.run()
+        refuses("step", training.run, error=RuntimeError)
     loaded = Training.load(tmp_path / "cut", gym.make("CartPole-v1"), callbacks=callbacks("cut"))
     assert loaded.n_steps == saved_at
     loaded.run()
@@ -121,7 +121,7 @@ def test_ctrl_c_stays_what_it_is_when_other_code_takes_it_for_another_error():
 
 
 def test_errors_and_ctrl_c_that_somebody_else_handled_are_left_alone():
-    with pytest.raises(ValueError, match="of its own"), stay_interrupts():
+    with pytest.raises(ValueError, match="own"), stay_interrupts():
         raise ValueError("of its own")
     asked = []
     with Interrupts(lambda: asked.append(1)), stay_interrupts():

@@ -165,7 +165,8 @@ class Training:
         require_same_kind(agent, env)
         if (steps is None) == (episodes is None):
             raise ValueError(
-                f"one of steps and episodes must be given, got steps={steps}, episodes={episodes}"
+                "one of steps and episodes must be given,"
+                f" got steps={steps!r}, episodes={episodes!r}"
             )
         if evaluate_every is not None and evaluate_every_episodes is not None:
             raise ValueError("evaluate_every must not be given with evaluate_every_episodes")

@@ -140,7 +140,7 @@ def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int, seed: in
         if pair[1] is not None and found[-1][0] == found[-1][1]:
             raise ValueError(f"a feature cannot modify itself, got {pair!r}; use None")
     if not found:
-        raise ValueError("pairs must not be empty")
+        raise ValueError(f"pairs must not be empty, got {pairs!r}")
     return found
 
 

@@ -142,7 +142,7 @@ def _problem(possible: Iterable[Any], text: str) -> str:
     if words:
         others = " or an array" if any(get_origin(one) is tuple for one in possible) else ""
         return f"must be one of {', '.join(words)}{others}"
-    expected = text.partition(", got")[0]
+    expected = text.partition(", got")[0].replace("Object missing required field", "a table with")
     for name, word in _WORDS.items():
         expected = expected.replace(name, word)
     return f"must be {expected[:1].lower() + expected[1:]}"

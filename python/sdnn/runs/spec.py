@@ -147,7 +147,7 @@ class RunSpec(Settings, frozen=True):
             return changed(base, value or {}, name, hint)
         if isinstance(value, type(base)):
             return value
-        words = f"must be a table or a {type(base).__name__}{hint}"
+        words = f"must be a table or {type(base).__name__}{hint}"
         raise ConfigError(name, f"{words}, got {value!r}")
 
     def _fill_agent(self) -> None:

@@ -4,6 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from refusals import refuses
 from sdnn.agents import FuzzyQLearning, QLearningConfig, SDNNQLearning, Transition
 from sdnn.agents.spaces import Actions
 from sdnn.approximators import SDNNCConfig
@@ -124,15 +125,13 @@ def test_many_actions_are_told_apart():
 )
 def test_what_is_no_action_is_refused(action):
     agent = agent_of(FLOATS)
-    with pytest.raises(ValueError, match=r"\baction\b"):
-        agent.learn(Transition(HERE, action, 0.0, HERE, False))
+    refuses("action", agent.learn, Transition(HERE, action, 0.0, HERE, False))
 
 
 @pytest.mark.parametrize("action", [[0.5, 0], [2, 0], [-1, 0], [True], 5e-324])
 def test_what_is_no_whole_action_is_refused(action):
     agent = agent_of(gym.spaces.MultiDiscrete([2, 4]), 0)
-    with pytest.raises(ValueError, match=r"\baction\b"):
-        agent.learn(Transition(HERE, action, 0.0, HERE, False))
+    refuses("action", agent.learn, Transition(HERE, action, 0.0, HERE, False))
 
 
 @pytest.mark.parametrize(
@@ -148,10 +147,8 @@ def test_what_is_no_whole_action_is_refused(action):
     ],
 )
 def test_impossible_spaces_are_named(space, error):
-    with pytest.raises(error, match="action_space"):
-        agent_of(space)
+    refuses("action_space", agent_of, space, error=error)
 
 
 def test_continuous_actions_need_a_box():
-    with pytest.raises(TypeError, match="action_space"):
-        FuzzyQLearning(PLANE, gym.spaces.Discrete(3))
+    refuses("action_space", FuzzyQLearning, PLANE, gym.spaces.Discrete(3), error=TypeError)

@@ -8,6 +8,7 @@ import pytest
 import sdnn_q_learning as page
 
 from handed_over import transcribe
+from refusals import refuses
 from sdnn import _core
 from sdnn.agents import PRESETS, QLearningConfig, SDNNQLearning, Transition
 from sdnn.approximators import SDNNCConfig
@@ -149,36 +150,18 @@ def test_one_transition_by_hand():
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"tie_rule": "first"}, "tie_rule"),
-        ({"tie_rule": None}, "tie_rule"),
-        ({"learning_rate": 0.0}, "learning_rate"),
-        ({"learning_rate": float("nan")}, "learning_rate"),
-        ({"discount": 1.5}, "discount"),
-        ({"epsilon": -0.1}, "epsilon"),
-        ({"n_greedy_steps": -1}, "n_greedy_steps"),
-    ],
-)
-def test_impossible_settings_are_named(change, message):
-    with pytest.raises(ValueError, match=message):
-        small_agent(learning=QLearningConfig(**change))
-
-
-@pytest.mark.parametrize(
     ("observations", "actions", "error", "message"),
     [
         (LISTS, TORQUES, TypeError, "observation_space"),
         (gym.spaces.Box(0, 1, (0,)), TORQUES, ValueError, "observation_space"),
-        (gym.spaces.Box(0, 0, (2,)), TORQUES, ValueError, "low < high"),
+        (gym.spaces.Box(0, 0, (2,)), TORQUES, ValueError, "observation_space"),
         (OBSERVATIONS, gym.spaces.Text(2), TypeError, "action_space"),
         (OBSERVATIONS, gym.spaces.Box(0, np.inf, (1,)), ValueError, "action_space"),
         (OBSERVATIONS, gym.spaces.Discrete(92), ValueError, "n_actions"),
     ],
 )
 def test_spaces_that_do_not_fit_are_named(observations, actions, error, message):
-    with pytest.raises(error, match=message):
-        SDNNQLearning(observations, actions, approximator=SMALL)
+    refuses(message, SDNNQLearning, observations, actions, approximator=SMALL, error=error)
 
 
 def test_a_box_of_actions_is_cut_evenly():
@@ -289,8 +272,7 @@ def test_a_preset_is_used_where_nothing_is_given():
     for name, chosen in PRESETS.items():
         agent = SDNNQLearning(OBSERVATIONS, TORQUES, preset=name)
         assert agent.learning == chosen.learning
-    with pytest.raises(ValueError, match="preset"):
-        SDNNQLearning(OBSERVATIONS, TORQUES, preset="best")
+    refuses("preset", SDNNQLearning, OBSERVATIONS, TORQUES, preset="best")
 
 
 # Episodes are the caller's: a terminated transition does not start the greedy first steps anew.
@@ -332,10 +314,10 @@ def test_observations_are_scaled_by_the_bounds_and_saturate():
 
 
 BAD_OBSERVATIONS = [
-    ([0.0, np.nan, 0.0], r"observation\[1\]"),
-    ([0.0, 0.0], r"\(2,\)"),
-    ([[0.0, 0.0, 0.0]], r"\(1, 3\)"),
-    (0.0, r"\(\)"),
+    ([0.0, np.nan, 0.0], "number"),
+    ([0.0, 0.0], "(2,)"),
+    ([[0.0, 0.0, 0.0]], "(1, 3)"),
+    (0.0, "()"),
     (["a", "b", "c"], "numbers"),
 ]
 
@@ -351,8 +333,7 @@ def test_bad_observations_are_named_and_teach_nothing(observation, message):
         lambda: agent.learn(Transition(observation, [0.0], 1.0, good, False)),
         lambda: agent.learn(Transition(good, [0.0], 1.0, observation, False)),
     ):
-        with pytest.raises(ValueError, match=message):
-            use()
+        refuses(message, use)
     assert np.array_equal(agent.core.action_value.weights(), before)
 
 
@@ -378,8 +359,7 @@ def test_bad_actions_are_named_and_teach_nothing(actions, action):
     agent = small_agent(actions)
     good = [0.0, 0.0, 0.0]
     before = agent.core.action_value.weights()
-    with pytest.raises(ValueError, match=r"\baction\b"):
-        agent.learn(Transition(good, action, 1.0, good, False))
+    refuses("action", agent.learn, Transition(good, action, 1.0, good, False))
     assert np.array_equal(agent.core.action_value.weights(), before)
 
 
@@ -388,8 +368,7 @@ def test_bad_rewards_are_named_and_teach_nothing(reward):
     agent = small_agent()
     good = [0.0, 0.0, 0.0]
     before = agent.core.action_value.weights()
-    with pytest.raises(ValueError, match="reward"):
-        agent.learn(Transition(good, [0.0], reward, good, False))
+    refuses("reward", agent.learn, Transition(good, [0.0], reward, good, False))
     assert np.array_equal(agent.core.action_value.weights(), before)
 
 
@@ -413,10 +392,8 @@ def test_evaluation_has_no_effect_on_learning():
 
 def test_a_bad_row_of_values_is_refused():
     policy = _core.EpsilonGreedy(_core.EpsilonGreedyConfig(), seed=1)
-    with pytest.raises(ValueError, match="values"):
-        policy.select([], 0)
-    with pytest.raises(ValueError, match="values"):
-        policy.select([np.nan, np.nan], 0)
+    refuses("values", policy.select, [], 0)
+    refuses("values", policy.select, [np.nan, np.nan], 0)
 
 
 def test_docstrings():
@@ -436,8 +413,7 @@ def test_an_agent_takes_patterns_of_any_coding():
     assert agent.q_values(observation).max() > 1.0
     around = agent.q_values(np.array([0.3, -1.0, -2.0]))  # on a circle the neighbour of 1.9
     assert around.max() > 0.5
-    with pytest.raises(ValueError, match="tables"):
-        small_agent(tables=tables[:2])
+    refuses("tables", small_agent, tables=tables[:2])
 
 
 def test_tables_have_a_row_for_each_symbol():
@@ -448,7 +424,5 @@ def test_tables_have_a_row_for_each_symbol():
         return SDNNQLearning(rooms, BUTTONS, approximator=SMALL, tables=tables)
 
     assert agent_with(3, 4).core.action_value.table(1).shape == (4, 40)
-    with pytest.raises(ValueError, match=r"tables\[1\]"):
-        agent_with(3, 5)
-    with pytest.raises(ValueError, match="tables"):
-        agent_with(3)
+    refuses("tables[1]", agent_with, 3, 5)
+    refuses("tables", agent_with, 3)

@@ -7,6 +7,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from refusals import refuses
 from sdnn.agents import (
     Callback,
     FuzzyQLearning,
@@ -74,14 +75,10 @@ def test_epsilon_may_reach_its_final_value_before_the_end(space):
 
 def test_impossible_schedules_are_named():
     for bad in (0.0, 1.5, float("nan")):
-        with pytest.raises(ValueError, match="exploration_fraction"):
-            new_agent(exploration_fraction=bad)
-    with pytest.raises(ValueError, match="schedule"):
-        new_agent(schedule="cosine")
-    with pytest.raises(ValueError, match="final_epsilon"):
-        new_agent(schedule="exponential", final_epsilon=0.0)
-    with pytest.raises(ValueError, match=r"\bepsilon\b"):
-        new_agent(schedule="exponential", epsilon=0.0, final_epsilon=0.1)
+        refuses("exploration_fraction", new_agent, exploration_fraction=bad)
+    refuses("schedule", new_agent, schedule="cosine")
+    refuses("final_epsilon", new_agent, schedule="exponential", final_epsilon=0.0)
+    refuses("epsilon", new_agent, schedule="exponential", epsilon=0.0, final_epsilon=0.1)
 
 
 @pytest.mark.parametrize("space", [PLANE, UNBOUNDED], ids=["born", "warming up"])
@@ -107,12 +104,9 @@ def test_rates_that_are_set_stay_and_are_saved(space, tmp_path):
 def test_impossible_rates_are_named(space):
     agent = new_agent(space, **FALLING)
     for bad in (-0.1, 1.1, np.nan, np.inf, "much", [0.1]):
-        with pytest.raises(ValueError, match="learning_rate"):
-            agent.learning_rate = bad
-        with pytest.raises(ValueError, match=r"\bepsilon\b"):
-            agent.epsilon = bad
-    with pytest.raises(ValueError, match="learning_rate"):
-        agent.learning_rate = 0
+        refuses("learning_rate", setattr, agent, "learning_rate", bad)
+        refuses("epsilon", setattr, agent, "epsilon", bad)
+    refuses("learning_rate", setattr, agent, "learning_rate", 0)
     assert (agent.learning_rate, agent.epsilon) == (0.8, 0.5)
 
 
@@ -176,12 +170,18 @@ def test_a_schedule_gives_the_rates_of_every_step():
 
 
 def test_impossible_schedule_callbacks_are_named():
-    with pytest.raises(TypeError, match=r"\bepsilon\b"):
-        Schedule(epsilon=0.1)
+    refuses("epsilon", Schedule, epsilon=0.1, error=TypeError)
     env = gym.make("Pendulum-v1")
     agent = FuzzyQLearning(env.observation_space, env.action_space)
-    with pytest.raises(TypeError, match=r"\bagent\b"):
-        agent.train(env, steps=5, callbacks=[Schedule(epsilon=lambda progress: 0.1)])
+    refuses(
+        "agent",
+        agent.train,
+        env,
+        steps=5,
+        callbacks=[Schedule(epsilon=lambda progress: 0.1)],
+        error=TypeError,
+    )
     agent = SDNNQLearning(env.observation_space, env.action_space, approximator=SMALL)
-    with pytest.raises(ValueError, match=r"\bepsilon\b"):
-        agent.train(env, steps=5, callbacks=[Schedule(epsilon=lambda progress: 2.0)])
+    refuses(
+        "epsilon", agent.train, env, steps=5, callbacks=[Schedule(epsilon=lambda progress: 2.0)]
+    )

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import agent_files
+from refusals import refuses
 from sdnn import SDNNRegressor
 from sdnn.agents import (
     FuzzyQLearning,
@@ -174,8 +175,7 @@ def test_the_class_is_that_of_the_file(tmp_path):
     KINDS["rbf"]().save(tmp_path / "agent")
     assert type(load_agent(tmp_path / "agent")) is RBFQLearning
     assert isinstance(RBFQLearning.load(tmp_path / "agent"), RBFQLearning)
-    with pytest.raises(ValueError, match="RBFQLearning"):
-        SDNNQLearning.load(tmp_path / "agent")
+    refuses("RBFQLearning", SDNNQLearning.load, tmp_path / "agent")
 
 
 def test_an_agent_of_ones_own_class_is_pickled_with_it(tmp_path, monkeypatch):
@@ -206,8 +206,7 @@ def test_actions_keep_their_type(tmp_path):
 
 
 def test_two_classes_of_agents_cannot_have_one_name():
-    with pytest.raises(TypeError, match="RBFQLearning"):
-        type("RBFQLearning", (SDNNQLearning,), {})
+    refuses("RBFQLearning", type, "RBFQLearning", (SDNNQLearning,), {}, error=TypeError)
     for module in ("__main__", "__main__", "script"):  # a notebook's cell, a script imported too
         again = type("DefinedAgain", (RBFQLearning,), {"__module__": module})
     agent = again(PLANE, TORQUE)
@@ -284,15 +283,15 @@ def changed(path, to, change):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda d, a: d.update({"class": "Sarsa"}), "an agent of an unknown class, 'Sarsa'"),
-        (lambda d, a: d.pop("class"), "an agent of an unknown class, None"),
-        (lambda d, a: d.pop("learning"), "is damaged: 'learning'"),
+        (lambda d, a: d.update({"class": "Sarsa"}), "Sarsa"),
+        (lambda d, a: d.pop("class"), "class"),
+        (lambda d, a: d.pop("learning"), "learning"),
         (lambda d, a: d["learning"].update(discount=7.0), "discount"),
         (lambda d, a: d["learning"].update(speed=7.0), "speed"),
-        (lambda d, a: d.update(seed=-1), r"\bseed\b"),
+        (lambda d, a: d.update(seed=-1), "seed"),
         (
             lambda d, a: d["approximator"].update(n_hidden_units=2**20),
-            r"agent\.action_value\.weights",
+            "agent.action_value.weights",
         ),
         (
             lambda d, a: d["approximator"].update(n_symbols=[2**30, 0], max_table_bytes=2**62),
@@ -302,24 +301,24 @@ def changed(path, to, change):
             lambda d, a: d["approximator"].update(n_inputs=0, max_pairs=2),
             "n_inputs",
         ),
-        (lambda d, a: d["observation"].update(low=[0.0]), r"observation\.high"),
+        (lambda d, a: d["observation"].update(low=[0.0]), "observation.high"),
         (
             lambda d, a: d["observation"].update(low=[-1.0], high=[1.0]),
             "observation",
         ),
         (
             lambda d, a: d["action"].update(low=[0.0] * 2, high=[1.0] * 2),
-            r"agent\.action_value\.0\.weights",
+            "agent.action_value.0.weights",
         ),
-        (lambda d, a: d["action"].update(number="text"), r"\bnumber\b"),
-        (lambda d, a: a.pop("agent.step"), r"agent\.step"),
+        (lambda d, a: d["action"].update(number="text"), "number"),
+        (lambda d, a: a.pop("agent.step"), "agent.step"),
         (
             lambda d, a: a.update({"agent.other": np.zeros(1)}),
-            r"agent\.other",
+            "agent.other",
         ),
         (
             lambda d, a: a.update({"agent.step": np.zeros((), np.float32)}),
-            r"agent\.step",
+            "agent.step",
         ),
         (
             lambda d, a: a.update({"agent.progress": np.array(np.nan)}),
@@ -327,7 +326,7 @@ def changed(path, to, change):
         ),
         (
             lambda d, a: a.update({"taken.indices": np.array([5], np.int64)}),
-            r"taken\.indices",
+            "taken.indices",
         ),
         (
             lambda d, a: d.update(scaling={"ranges": [[0, 1]], "redundant": 0}),
@@ -335,26 +334,23 @@ def changed(path, to, change):
         ),
         (
             lambda d, a: d.update(scaling={"ranges": [[0, 1], [1, 1]], "redundant": 0}),
-            r"\branges\b",
+            "ranges",
         ),
     ],
 )
 def test_what_does_not_fit_is_named(saved, tmp_path, change, message):
     path = changed(saved, tmp_path / "changed", change)
-    with pytest.raises(ValueError, match=message):
-        load_agent(path)
+    refuses(message, load_agent, path)
 
 
 def test_a_file_is_whole_or_not_there(saved, tmp_path):
     agent = load_agent(saved)
     path = tmp_path / "no folder" / "agent"
-    with pytest.raises(OSError, match="No such file"):
-        agent.save(path)
+    refuses("agent", agent.save, path, error=FileNotFoundError)
     agent.save(tmp_path / "agent")
     before = (tmp_path / "agent").read_bytes()
     agent.observation_space = gym.spaces.Graph(PLANE, None)
-    with pytest.raises(TypeError, match="Graph"):
-        agent.save(tmp_path / "agent")
+    refuses("Graph", agent.save, tmp_path / "agent", error=TypeError)
     assert (tmp_path / "agent").read_bytes() == before
     assert [file.name for file in tmp_path.iterdir()] == ["agent"]
 

@@ -13,6 +13,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from refusals import refuses
 from sdnn.agents import (
     Callback,
     CheckpointCallback,
@@ -119,18 +120,15 @@ def test_what_an_environment_does_to_its_arrays_spoils_nothing(kind):
 def test_an_environment_that_does_not_fit_is_refused():
     agent = corridor_agent()
     env = Corridor()
-    with pytest.raises(ValueError, match="evaluation_env"):
-        agent.train(env, steps=10, evaluate_every=5, evaluation_env=env)
+    refuses("evaluation_env", agent.train, env, steps=10, evaluate_every=5, evaluation_env=env)
     for name, space in (
         ("observation_space", gym.spaces.Box(0.0, 4.0, (2,), dtype=np.float64)),
         ("action_space", gym.spaces.Discrete(3)),
     ):
         other = Corridor()
         setattr(other, name, space)
-        with pytest.raises(ValueError, match=r"\benv\b"):
-            agent.train(other, steps=10)
-        with pytest.raises(ValueError, match=r"\benv\b"):
-            evaluate(agent, other)
+        refuses("env", agent.train, other, steps=10)
+        refuses("env", evaluate, agent, other)
 
 
 def test_an_evaluation_that_seems_not_to_end_is_warned_of():
@@ -162,8 +160,7 @@ def test_rewards_of_an_evaluation_must_be_numbers():
         def step(self, action):
             return *super().step(action)[:1], float("nan"), False, self._steps > 3, {}
 
-    with pytest.raises(ValueError, match=r"\breward\b"):
-        evaluate(corridor_agent(), Broken())
+    refuses("reward", evaluate, corridor_agent(), Broken())
 
 
 class Broken(Corridor):
@@ -332,8 +329,7 @@ def test_a_start_that_cannot_be_made_does_not_stop_a_training_for_ever(tmp_path)
     callbacks = [CheckpointCallback(path)]
     training = Training(corridor_agent(), Picky(), episodes=4, seed=7, callbacks=callbacks)
     for _ in bad:
-        with pytest.raises(RuntimeError, match="no such start"):
-            training.run()
+        refuses("start", training.run, error=RuntimeError)
         assert training.n_episodes == 2
         training = Training.load(path, Picky(), callbacks=callbacks)
     assert training.run().n_episodes == 4
@@ -399,10 +395,16 @@ def test_where_an_evaluation_fails_it_is_made_first_thereafter(tmp_path):
 
 def test_evaluations_are_in_one_environment():
     several = gym.vector.SyncVectorEnv([Corridor] * 2)
-    with pytest.raises(TypeError, match=r"\benv\b"):
-        evaluate(corridor_agent(), several)
-    with pytest.raises(TypeError, match="evaluation_env"):
-        corridor_agent().train(Corridor(), steps=9, evaluate_every=3, evaluation_env=several)
+    refuses("env", evaluate, corridor_agent(), several, error=TypeError)
+    refuses(
+        "evaluation_env",
+        corridor_agent().train,
+        Corridor(),
+        steps=9,
+        evaluate_every=3,
+        evaluation_env=several,
+        error=TypeError,
+    )
 
 
 def test_a_second_training_meets_other_episodes(tmp_path):
@@ -525,8 +527,7 @@ def test_an_unbounded_environment_is_warmed_up_and_learned(tmp_path):
 
     whole = begun()
     assert whole.agent.is_warming_up
-    with pytest.raises(RuntimeError, match="warm"):
-        whole.agent.q_values(env.reset()[0])
+    refuses("observation_range", whole.agent.q_values, env.reset()[0], error=RuntimeError)
     whole.run()
     assert not whole.agent.is_warming_up
     assert whole.agent.learning_report()["n_corrections"] > 480
@@ -564,8 +565,7 @@ def test_a_training_goes_on_from_an_observation_that_is_infinite(tmp_path):
 def test_an_environment_that_does_not_repeat_itself_is_refused(tmp_path):
     env = Corridor(is_random=True)
     Training(corridor_agent(), env, steps=500, callbacks=[Stop(20, tmp_path / "t")]).run()
-    with pytest.raises(UnrepeatedEpisodeError, match=r"\benv\b"):
-        Training.load(tmp_path / "t", env)
+    refuses("env", Training.load, tmp_path / "t", env, error=UnrepeatedEpisodeError)
 
 
 def test_new_episodes_begin_where_none_are_repeated(tmp_path):
@@ -709,8 +709,7 @@ def test_without_a_seed_the_streams_of_environments_run_on(tmp_path):
     training.run()
     training.run()
     assert (env.seeds, tested.seeds) == ([None] * 6, [None] * 30)
-    with pytest.raises(ValueError, match="repeat_episodes"):
-        Training.load(tmp_path / "t", Corridor(), evaluation_env=Corridor())
+    refuses("repeat_episodes", Training.load, tmp_path / "t", Corridor(), evaluation_env=Corridor())
     other = Training.load(
         tmp_path / "t", Corridor(), evaluation_env=Corridor(), repeat_episodes=False
     )
@@ -734,11 +733,14 @@ def test_options_of_resets_follow_the_episodes():
     )  # fmt: skip
     training.run()
     assert (env.told, tested.told) == ([1, 2, 3, 4], [2, 4])
-    with pytest.raises(ValueError, match="reset_options"):
-        Training(
-            corridor_agent(), gym.vector.SyncVectorEnv([Corridor] * 2), steps=9,
-            reset_options=dict,
-        )  # fmt: skip
+    refuses(
+        "reset_options",
+        Training,
+        corridor_agent(),
+        gym.vector.SyncVectorEnv([Corridor] * 2),
+        steps=9,
+        reset_options=dict,
+    )
 
 
 def test_a_time_limit_may_count_as_an_end():
@@ -846,9 +848,9 @@ def test_an_interrupt_reaches_the_caller_after_the_callbacks(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({}, "steps and episodes"),
-        ({"steps": 10, "episodes": 1}, "steps and episodes"),
-        ({"steps": 0}, r"\bsteps\b"),
+        ({}, "episodes"),
+        ({"steps": 10, "episodes": 1}, "episodes"),
+        ({"steps": 0}, "steps"),
         ({"episodes": 1.5}, "episodes"),
         ({"steps": 10, "evaluate_every": 5}, "evaluation_env"),
         ({"steps": 10, "evaluate_every_episodes": 5}, "evaluation_env"),
@@ -856,9 +858,8 @@ def test_an_interrupt_reaches_the_caller_after_the_callbacks(tmp_path):
             {"steps": 10, "evaluate_every": 5, "evaluate_every_episodes": 5},
             "evaluate_every",
         ),
-        ({"steps": 10, "seed": -1}, r"\bseed\b"),
+        ({"steps": 10, "seed": -1}, "seed"),
     ],
 )
 def test_impossible_trainings_are_named(options, message):
-    with pytest.raises(ValueError, match=message):
-        Training(corridor_agent(), Corridor(), **options)
+    refuses(message, Training, corridor_agent(), Corridor(), **options)

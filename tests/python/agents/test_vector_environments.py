@@ -6,6 +6,7 @@ import pytest
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 import sdnn.environments  # noqa: F401  (registers the acrobot)
+from refusals import refuses
 from sdnn.agents import (
     Callback,
     CheckpointCallback,
@@ -417,29 +418,23 @@ def test_what_cannot_be_repeated_goes_on_with_new_episodes_only(make, tmp_path):
     checkpoints = CheckpointCallback(tmp_path / "t", 1000)
     training = Training(sdnn_agent(), vector, steps=20, callbacks=[checkpoints])
     training.run()
-    with pytest.raises(ValueError, match=r"\benv\b"):
-        Training.load(tmp_path / "t", vector)
+    refuses("env", Training.load, tmp_path / "t", vector)
     again = Training.load(tmp_path / "t", vector, steps=50, repeat_episodes=False)
     assert states_equal(again.agent, training.agent)
     assert again.run().n_steps == 50
-    with pytest.raises(UnrepeatedEpisodeError, match=r"\benv\b"):
-        Training.load(tmp_path / "t", sync(2))
+    refuses("env", Training.load, tmp_path / "t", sync(2), error=UnrepeatedEpisodeError)
     Training(sdnn_agent(), sync(2), steps=20, callbacks=[checkpoints]).run()
-    with pytest.raises(ValueError, match="repeat_episodes"):
-        Training.load(tmp_path / "t", vector)
+    refuses("repeat_episodes", Training.load, tmp_path / "t", vector)
     vector.close()
 
 
 def test_another_vector_is_refused(tmp_path):
     Training(sdnn_agent(), sync(3), steps=50, callbacks=[Stop(20, tmp_path / "t")]).run()
     for other in (sync(2), Walk()):
-        with pytest.raises(ValueError, match=r"\benv\b"):
-            Training.load(tmp_path / "t", other)
-    with pytest.raises(ValueError, match=r"\benv\b"):
-        Training.load(tmp_path / "t", sync(3, lambda: Walk(drifts=True)))
+        refuses("env", Training.load, tmp_path / "t", other)
+    refuses("env", Training.load, tmp_path / "t", sync(3, lambda: Walk(drifts=True)))
     Training(sdnn_agent(), Walk(), steps=50, callbacks=[Stop(20, tmp_path / "t")]).run()
-    with pytest.raises(ValueError, match=r"\benv\b"):
-        Training.load(tmp_path / "t", sync(3))
+    refuses("env", Training.load, tmp_path / "t", sync(3))
     assert Training.load(tmp_path / "t", sync(1)).run().n_steps == 50
 
 
@@ -459,15 +454,11 @@ def test_impossible_environments_are_named(agent):
     action = agent.act(seen)
     before = agent.state()
     for bad in (2, -1, 1.5, "first", 2**70):
-        with pytest.raises(ValueError, match="environment"):
-            agent.act(seen, environment=bad)
-        with pytest.raises(ValueError, match="environment"):
-            agent.begin_episode(bad)
-        with pytest.raises(ValueError, match="environment"):
-            agent.learn(Transition(seen, action, 0.0, seen, False), bad)
+        refuses("environment", agent.act, seen, environment=bad)
+        refuses("environment", agent.begin_episode, bad)
+        refuses("environment", agent.learn, Transition(seen, action, 0.0, seen, False), bad)
     for bad in (0, -1, 1.5, None, 2**14 + 1):
-        with pytest.raises(ValueError, match="n_environments"):
-            agent.n_environments = bad
+        refuses("n_environments", setattr, agent, "n_environments", bad)
     assert agent.n_environments == 2
     after = agent.state()
     assert all(np.array_equal(before[name], after[name]) for name in before)

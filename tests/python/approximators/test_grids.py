@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from grid_transcription import FuzzyQLearning, RBFNetwork, joint_bases
+from refusals import refuses
 from sdnn import _core
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig
 
@@ -90,8 +91,7 @@ def test_the_rbf_network_corrects_at_a_rate():
         whole.update(state, action, (1.0 - rate) * value + rate * target)
         at_a_rate.update(state, action, target, rate=rate)
         assert np.array_equal(whole.weights(), at_a_rate.weights())
-    with pytest.raises(ValueError, match=r"\brate\b"):
-        whole.update([0.5, 0.5], 0, 1.0, rate=0.0)
+    refuses("rate", whole.update, [0.5, 0.5], 0, 1.0, rate=0.0)
 
 
 def test_the_exponential_of_the_core_is_the_one_of_numpy_up_to_rounding():
@@ -100,10 +100,8 @@ def test_the_exponential_of_the_core_is_the_one_of_numpy_up_to_rounding():
 
 
 def test_tables_that_are_too_large_are_refused():
-    with pytest.raises(ValueError, match="32543321076"):
-        _core.FuzzyRules(FuzzyRulesConfig(n_inputs=9))
-    with pytest.raises(ValueError, match="2147483648"):
-        _core.RBFNetwork(RBFNetworkConfig(n_inputs=13))
+    refuses("32543321076", _core.FuzzyRules, FuzzyRulesConfig(n_inputs=9))
+    refuses("2147483648", _core.RBFNetwork, RBFNetworkConfig(n_inputs=13))
 
 
 @pytest.mark.parametrize("size", [1, 3])
@@ -111,7 +109,5 @@ def test_bad_states_are_named(size):
     rules = _core.FuzzyRules(_core.FuzzyRulesConfig(n_inputs=2))
     net = _core.RBFNetwork(_core.RBFNetworkConfig(n_inputs=2))
     for use in (rules.fire, net.values):
-        with pytest.raises(ValueError, match=r"\bstate\b"):
-            use(np.zeros(size))
-        with pytest.raises(ValueError, match=r"state\[1\]"):
-            use(np.array([0.0, 1.5]))
+        refuses("state", use, np.zeros(size))
+        refuses("state[1]", use, np.array([0.0, 1.5]))

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from handed_over import transcribe
+from refusals import refuses
 from sdnn import _core
 from sdnn.approximators import SDNNC, SDNNCConfig
 from sdnn.coding import Circular, Symbolic
@@ -200,8 +201,7 @@ def test_permutations_are_permutations_and_differ(paper_network):
     for mu in range(4):
         for nu in range(4):
             if mu == nu:
-                with pytest.raises(ValueError, match="inputs"):
-                    paper_network.permutation(mu, nu)
+                refuses("inputs", paper_network.permutation, mu, nu)
                 continue
             permutation = paper_network.permutation(mu, nu)
             assert np.array_equal(np.sort(permutation), np.arange(200))
@@ -320,33 +320,31 @@ def test_c_scales_weights_and_changes_no_decision():
         ({"max_pairs": -1}, "max_pairs"),
         ({"n_symbols": (0, 3)}, "n_symbols"),
         ({"n_symbols": (0, 0, -3, 0)}, "n_symbols"),
-        ({"u_low": -1}, r"\bu_low\b"),
+        ({"u_low": -1}, "u_low"),
         ({"initial_weights": "large"}, "initial_weights"),
         ({"n_pattern_units": 70000}, "n_pattern_units"),
         ({"initial_weights": "uniform", "initial_weight_limit": 1e300}, "initial_weight_limit"),
     ],
 )
 def test_impossible_configurations_are_named(change, message):
-    with pytest.raises(ValueError, match=message):
-        SDNNC(SDNNCConfig(**change))
+    refuses(message, lambda: SDNNC(SDNNCConfig(**change)))
 
 
 @pytest.mark.parametrize("seed", [-1, 2**64, 0.5, "1"])
 def test_impossible_seeds(seed):
-    with pytest.raises(ValueError, match=r"\bseed\b"):
-        SDNNC(SDNNCConfig(**SMALL), seed=seed)
+    refuses("seed", SDNNC, SDNNCConfig(**SMALL), seed=seed)
 
 
 @pytest.mark.parametrize(
     ("state", "message"),
     [
-        ([0.1, np.nan, 0.2], r"state\[1\]"),
-        ([0.1, 0.2, 1.5], r"state\[2\]"),
-        ([0.1, 0.2, -np.inf], r"state\[2\]"),
-        ([0.1, 0.2], r"\bstate\b"),
-        ([[0.1, 0.2, 0.3]], r"\bstate\b"),
-        ([], r"\bstate\b"),
-        (0.5, r"\bstate\b"),
+        ([0.1, np.nan, 0.2], "state[1]"),
+        ([0.1, 0.2, 1.5], "state[2]"),
+        ([0.1, 0.2, -np.inf], "state[2]"),
+        ([0.1, 0.2], "state"),
+        ([[0.1, 0.2, 0.3]], "state"),
+        ([], "state"),
+        (0.5, "state"),
     ],
 )
 def test_bad_states_are_named_and_change_nothing(state, message):
@@ -357,18 +355,15 @@ def test_bad_states_are_named_and_change_nothing(state, message):
         lambda: network.value(state, 0),
         lambda: network.update(state, 0, 1.0),
     ):
-        with pytest.raises(ValueError, match=message):
-            use()
+        refuses(message, use)
     assert np.array_equal(network.weights(), before)
 
 
 def test_bad_actions_and_targets_are_named():
     network = SDNNC(SDNNCConfig(**SMALL), seed=1)
     state = [0.1, 0.2, 0.3]
-    with pytest.raises(ValueError, match=r"\baction\b"):
-        network.value(state, 91)
-    with pytest.raises(ValueError, match=r"\btarget\b"):
-        network.update(state, 0, np.nan)
+    refuses("action", network.value, state, 91)
+    refuses("target", network.update, state, 0, np.nan)
     with pytest.raises(TypeError):
         network.value(state, -1)
     with pytest.raises((TypeError, ValueError)):
@@ -430,18 +425,17 @@ def test_patterns_of_any_coding_can_be_given():
 @pytest.mark.parametrize(
     ("tables", "message"),
     [
-        ([np.ones((3, 40))], r"\btables\b"),
+        ([np.ones((3, 40))], "tables"),
         (
             [np.ones((3, 40)), np.ones((3, 41))],
-            r"\btables\b",
+            "tables",
         ),
-        ([np.ones((3, 40)), np.zeros((3, 40))], r"tables\[1\]"),
-        ([np.ones(40), np.ones((3, 40))], r"tables\[0\]"),
+        ([np.ones((3, 40)), np.zeros((3, 40))], "tables[1]"),
+        ([np.ones(40), np.ones((3, 40))], "tables[0]"),
     ],
 )
 def test_patterns_that_do_not_fit_are_refused(tables, message):
-    with pytest.raises(ValueError, match=message):
-        SDNNC(SDNNCConfig(n_inputs=2, n_pattern_units=40), tables=tables)
+    refuses(message, SDNNC, SDNNCConfig(n_inputs=2, n_pattern_units=40), tables=tables)
 
 
 def test_the_average_agrees_with_its_formula():

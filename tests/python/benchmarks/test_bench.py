@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from refusals import refuses
 from sdnn import _core
 from sdnn.benchmarks import BenchmarkError, measurements, report, run_benchmarks
 from sdnn.cli import main
@@ -113,8 +114,7 @@ def test_a_failing_process_is_one_clear_line(monkeypatch):
     assert done.exit_code == 1
     assert done.stderr.count("\n") == 1
     assert "instruction set must be portable, neon, avx2 or avx512, got sse9" in done.stderr
-    with pytest.raises(BenchmarkError, match="sse9"):
-        run_benchmarks(quick=True)
+    refuses("sse9", run_benchmarks, quick=True, error=BenchmarkError)
 
 
 def test_wrong_usage():
@@ -148,10 +148,8 @@ def test_times_of_the_core_are_nanoseconds_per_repetition():
     assert (parts.time_values(3) > 0).all()
     assert _core.BufferRead(10_000).run(4).shape == (4,)
     assert _core.DenseProduct(5, 7, 1).run(0).size == 0
-    with pytest.raises(ValueError, match="n_repetitions"):
-        parts.time_values(-1)
-    with pytest.raises(ValueError, match="n_corrected"):
-        parts.time_corrections(1, 0)
+    refuses("n_repetitions", parts.time_values, -1)
+    refuses("n_corrected", parts.time_corrections, 1, 0)
 
 
 def test_machines_that_tell_nothing(tmp_path, monkeypatch):

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from refusals import refuses
 from sdnn.coding import (
     CODINGS,
     Anchor,
@@ -138,8 +139,7 @@ def test_names():
     }  # fmt: skip
     assert coding_named("symbolic") == Symbolic()
     assert coding_named(Anchor()) == Anchor()
-    with pytest.raises(ValueError, match=r"\bcoding\b"):
-        coding_named("sine")
+    refuses("coding", coding_named, "sine")
 
 
 @pytest.mark.parametrize(
@@ -148,60 +148,52 @@ def test_names():
         (RandomInverse(length_scale=0.0), "length_scale"),
         (RandomInverse(length_scale=1e9), "length_scale"),
         (RandomInverse(length_scale=np.inf), "length_scale"),
-        (RandomInverse(n_bins=1), r"\bn_bins\b"),
-        (RandomInverse(n_bins=2.5), r"\bn_bins\b"),
+        (RandomInverse(n_bins=1), "n_bins"),
+        (RandomInverse(n_bins=2.5), "n_bins"),
         (RandomInverse(n_flipped=33), "n_flipped"),
         (RandomInverse(spacing="log"), "spacing"),
         (RandomInverse(spacing="quantile", low=0.0), "spacing"),
-        (RandomInverse(low=2.0, high=1.0), r"\blow\b"),
-        (Anchor(low=np.nan), r"\blow\b"),
+        (RandomInverse(low=2.0, high=1.0), "low"),
+        (Anchor(low=np.nan), "low"),
         (Anchor(n_interpolated=-1), "n_interpolated"),
         (Anchor(n_anchor_patterns=2000, n_interpolated=99), "n_interpolated"),
-        (Circular(period=0.0), r"\bperiod\b"),
+        (Circular(period=0.0), "period"),
         (Circular(n_anchor_patterns=1), "n_anchor_patterns"),
         (Symbolic(categories=("a", "a")), "categories"),
         (Symbolic(categories=()), "categories"),
         (CorrelationMatrix(matrix=[[1, 0.5], [0.4, 1]]), "symmetric"),
         (CorrelationMatrix(matrix=[[0.5]]), "diagonal"),
         (CorrelationMatrix(matrix=[1.0, 2.0]), "square"),
-        (CorrelationMatrix(matrix=np.eye(3)), r"\brow\b"),
-        (CorrelationMatrix(matrix=np.eye(2), categories=("a", "b", "c")), r"\brow\b"),
+        (CorrelationMatrix(matrix=np.eye(3)), "row"),
+        (CorrelationMatrix(matrix=np.eye(2), categories=("a", "b", "c")), "row"),
     ],
 )
 def test_impossible_arguments_are_named(coding, error):
-    with pytest.raises((ValueError, TypeError), match=error):
-        coding.fit(UNIT, 64)
+    refuses(error, coding.fit, UNIT, 64, error=(ValueError, TypeError))
 
 
 def test_symbols_are_checked():
-    with pytest.raises(ValueError, match="words"):
-        Symbolic().fit(np.array(["a", 1], dtype=object), 64)
-    with pytest.raises(ValueError, match="NaN"):
-        Symbolic().fit(np.array([1.0, np.nan]), 64)
-    with pytest.raises(ValueError, match="'d', 'e'"):
-        FITTED["symbolic"].bins(np.array(["a", "d", "e", "d"]))
-    with pytest.raises(ValueError, match="not fitted"):
-        RandomInverse().bins(UNIT)
+    refuses("words", Symbolic().fit, np.array(["a", 1], dtype=object), 64)
+    refuses("NaN", Symbolic().fit, np.array([1.0, np.nan]), 64)
+    refuses("'d', 'e'", FITTED["symbolic"].bins, np.array(["a", "d", "e", "d"]))
+    refuses("fitted", RandomInverse().bins, UNIT)
 
 
 def test_numbers_are_checked():
     for coding in (RandomInverse(), Anchor(), Circular(period=1.0)):
         with pytest.raises(ValueError, match="contains NaN"):
             coding.fit(UNIT, 64).bins(np.array([0.5, np.nan]))
-        with pytest.raises(ValueError, match="convert"):
-            coding.fit(UNIT, 64).bins(np.array(["a"]))
+        refuses("convert", coding.fit(UNIT, 64).bins, np.array(["a"]))
     with pytest.raises(ValueError, match=r"0\.0 and inf"):
         Anchor().fit(np.array([0.0, np.inf]), 64)
-    with pytest.raises(ValueError, match="infinity"):
-        Circular().bins(np.array([np.inf]))
+    refuses("infinity", Circular().bins, np.array([np.inf]))
     assert Anchor(low=0.0, high=1.0).bins(np.array([-np.inf, np.inf])).tolist() == [0, 359]
 
 
 @pytest.mark.parametrize("categories", ["red", 3])
 def test_lone_categories_are_refused(categories):
     for make in (Symbolic, lambda **given: CorrelationMatrix(matrix=[[1.0]], **given)):
-        with pytest.raises(ValueError, match="categories"):
-            make(categories=categories)
+        refuses("categories", make, categories=categories)
 
 
 @pytest.mark.parametrize(
@@ -232,8 +224,9 @@ def test_what_was_learned_is_not_learned_again(coding, column):
     ],
 )
 def test_impossible_knots_are_named(knots):
-    with pytest.raises(ValueError, match="knots"):
-        RandomInverse(spacing="quantile", low=0.0, high=1.0, knots=knots).fit(UNIT, 400)
+    refuses(
+        "knots", RandomInverse(spacing="quantile", low=0.0, high=1.0, knots=knots).fit, UNIT, 400
+    )
 
 
 def test_knots_are_values_and_their_mean_ranks():
@@ -264,22 +257,20 @@ def test_what_is_missing_has_the_last_bin():
     ("coding", "column", "message"),
     [
         (WithMissing(unknown="ignore"), UNIT, "unknown"),
-        (WithMissing(base=WithMissing()), UNIT, r"\bbase\b"),
-        (WithMissing(base="anchor"), UNIT, r"\bbase\b"),
+        (WithMissing(base=WithMissing()), UNIT, "base"),
+        (WithMissing(base="anchor"), UNIT, "base"),
         (WithMissing(), np.array([np.nan, np.nan]), "missing"),
         (WithMissing(), np.array([1.0, np.inf]), "infinity"),
         (WithMissing(), np.array(["a", None], dtype=object), "convert"),
     ],
 )
 def test_what_cannot_be_coded_with_missing_values(coding, column, message):
-    with pytest.raises(ValueError, match=message):
-        coding.fit(column, 8)
+    refuses(message, coding.fit, column, 8)
 
 
 def test_unknown_categories_may_stay_an_error():
     strict = WithMissing(base=Symbolic(), unknown="error").fit(LETTERS, 8)
-    with pytest.raises(ValueError, match="categories"):
-        strict.bins(np.array(["z"]))
+    refuses("categories", strict.bins, np.array(["z"]))
 
 
 def test_there_may_be_many_symbols():

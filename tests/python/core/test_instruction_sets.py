@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import sdnn
+from refusals import refuses
 from sdnn import _core, machine
 from sdnn.machine import (
     available_instruction_sets,
@@ -85,8 +86,7 @@ def test_bad_names(name):
 
 def test_levels_beyond_the_processor():
     for name in {"portable", "neon", "avx2", "avx512"} - set(available_instruction_sets()):
-        with pytest.raises(ValueError, match="processor"):
-            set_instruction_set(name)
+        refuses("processor", set_instruction_set, name)
 
 
 @pytest.mark.parametrize(

@@ -14,15 +14,17 @@ import pytest
 
 import core_cells
 import sdnn._core as core
+from refusals import refuses
 
 BINDINGS = Path(__file__).parents[3] / "cpp" / "bindings"
-IN_USE = "in use by a call in another thread"
+IN_USE = "thread"
 
 
 def test_a_made_object_cannot_be_pickled_by_any_protocol():
     for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
-        with pytest.raises(TypeError, match="pickle"):
-            pickle.dumps(core.Acrobot(core.AcrobotConfig()), protocol)
+        refuses(
+            "pickle", pickle.dumps, core.Acrobot(core.AcrobotConfig()), protocol, error=TypeError
+        )
 
 
 def test_only_one_class_releases_the_lock():
@@ -78,8 +80,7 @@ def test_a_trial_that_advances_refuses_all_else():
         lambda: network.values([0.1] * 4),
         lambda: core.NetworkParts(network, 1),
     ]
-    with pytest.raises(RuntimeError, match=IN_USE):
-        uses[0]()
+    refuses(IN_USE, uses[0], error=RuntimeError)
     for use in uses:
         assert_refused(use, thread)
     thread.join()
@@ -114,8 +115,7 @@ def test_a_layer_that_is_trained_refuses_all_else(form):
         lambda: layer.potentials(core_cells.BINS),
         lambda: core.PDeltaTrainer(layer, core_cells.BINS, [[1.0]] * 3),
     ]
-    with pytest.raises(RuntimeError, match=IN_USE):
-        uses[0]()
+    refuses(IN_USE, uses[0], error=RuntimeError)
     order[:] = -(2**31)  # it works on a copy
     for use in uses[1:]:
         assert_refused(use, thread)
@@ -130,8 +130,7 @@ def test_a_layer_may_be_read_by_many_threads_but_not_trained_meanwhile():
     bins = np.tile(np.array(core_cells.BINS, np.int32), (500_000, 1))
     expected = layer.counts(core_cells.BINS)
     reads = [in_thread(lambda: layer.counts(bins)) for _ in range(2)]
-    with pytest.raises(RuntimeError, match=IN_USE):
-        trainer.present([0])
+    refuses(IN_USE, trainer.present, [0], error=RuntimeError)
     bins[:] = 2**31 - 1  # they read a copy
     np.testing.assert_array_equal(layer.counts(core_cells.BINS), expected)
     assert layer.weights.shape == (4000, 40)
@@ -146,8 +145,7 @@ def test_a_batch_that_moves_refuses_all_else():
     batch = core.AcrobotBatch(core.AcrobotConfig(), n)
     moving = np.ones(n, np.bool_)
     thread, outcome = in_thread(lambda: batch.step(np.ones(n), np.ones(n), moving))
-    with pytest.raises(RuntimeError, match=IN_USE):
-        batch.reset(moving)
+    refuses(IN_USE, batch.reset, moving, error=RuntimeError)
     assert_refused(batch.states, thread)
     thread.join()
     assert len(outcome[0]) == 3

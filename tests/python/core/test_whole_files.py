@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from refusals import refuses
 from sdnn import files
 from sdnn.files import (
     PARTIAL_SUFFIX,
@@ -47,8 +48,7 @@ def test_a_file_is_written_as_a_whole(tmp_path):
 def test_a_file_that_cannot_be_written_stays_as_it_was(tmp_path):
     path = tmp_path / "report.html"
     path.mkdir()
-    with pytest.raises(OSError, match=r"report\.html"):
-        write_whole(path, b"new")
+    refuses("report.html", write_whole, path, b"new", error=OSError)
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
     with pytest.raises(FileNotFoundError):
         write_whole(tmp_path / "no" / "folder", b"")
@@ -172,8 +172,7 @@ def test_pieces_that_fail_leave_no_file(tmp_path):
         yield b"one"
         raise ValueError("no second piece")
 
-    with pytest.raises(ValueError, match="second"):
-        write_whole(tmp_path / "rows.csv", pieces())
+    refuses("second", write_whole, tmp_path / "rows.csv", pieces())
     assert list(tmp_path.iterdir()) == []
 
 
@@ -191,5 +190,4 @@ def test_a_full_disk_names_the_file(tmp_path, monkeypatch):
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no such device here")
 def test_a_full_device_is_named():
-    with pytest.raises(OSError, match="/dev/full"):
-        write_whole(Path("/dev/full"), b"much")
+    refuses("/dev/full", write_whole, Path("/dev/full"), b"much", error=OSError)

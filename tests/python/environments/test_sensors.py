@@ -4,6 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from refusals import refuses
 from sdnn import _core
 from sdnn.environments import (
     AcrobotSwingUpEnv,
@@ -128,21 +129,12 @@ def test_wrappers_are_part_of_the_spec():
 
 def test_bad_arguments():
     env = AcrobotSwingUpEnv()
-    with pytest.raises(ValueError, match="functions"):
-        RedundantSensors(env, ("speed",))
-    with pytest.raises(ValueError, match="bounds"):
-        RedundantSensors(env, bounds=[(0.0, 1.0)])
-    with pytest.raises(ValueError, match="noise"):
-        NoisySensors(env, sigma=-1.0)
-    with pytest.raises(ValueError, match=r"\bedge\b"):
-        NoisySensors(env, edge="clip")
-    with pytest.raises(ValueError, match=r"\bedge\b"):
-        NoisySensors(env, edge=("wrap", "wrap"))
-    with pytest.raises(ValueError, match=r"\bseed\b"):
-        NoisySensors(env, seed=-1)
-    with pytest.raises(ValueError, match="stream"):
-        NoisySensors(env, stream="weights")
-    with pytest.raises(ValueError, match=r"\[0, 1\]"):
-        NoisySensors(RedundantSensors(env, ("energy",), bounds=[(0.0, 2.0)]))
-    with pytest.raises(ValueError, match="Box"):
-        NoisySensors(gym.make("Blackjack-v1", disable_env_checker=True))
+    refuses("functions", RedundantSensors, env, ("speed",))
+    refuses("bounds", RedundantSensors, env, bounds=[(0.0, 1.0)])
+    refuses("noise", NoisySensors, env, sigma=-1.0)
+    refuses("edge", NoisySensors, env, edge="clip")
+    refuses("edge", NoisySensors, env, edge=("wrap", "wrap"))
+    refuses("seed", NoisySensors, env, seed=-1)
+    refuses("stream", NoisySensors, env, stream="weights")
+    refuses("[0, 1]", NoisySensors, RedundantSensors(env, ("energy",), bounds=[(0.0, 2.0)]))
+    refuses("Box", NoisySensors, gym.make("Blackjack-v1", disable_env_checker=True))

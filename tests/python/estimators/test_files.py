@@ -6,6 +6,7 @@ import pytest
 from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV
 
+from refusals import refuses
 from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import (
     Anchor,
@@ -99,8 +100,7 @@ def test_what_a_search_has_found_can_be_saved(tmp_path):
 def test_what_has_no_values_cannot_be_saved(tmp_path):
     for columns in (lambda _: [0], iter([0]), b"a"):
         model = SDNNRegressor(**SMALL).fit(X, Y).set_params(coding=[("anchor", columns)])
-        with pytest.raises(TypeError, match="parameter"):
-            model.save(tmp_path / "model.safetensors")
+        refuses("parameter", model.save, tmp_path / "model.safetensors", error=TypeError)
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -124,8 +124,7 @@ def test_what_is_loaded_is_what_was_saved(name, tmp_path):
 def test_the_file_of_another_class_is_refused(tmp_path):
     path = tmp_path / "model.safetensors"
     SDNNClassifier(**SMALL).fit(X, Y > 0).save(path)
-    with pytest.raises(ValueError, match="SDNNClassifier"):
-        SDNNRegressor.load(path)
+    refuses("SDNNClassifier", SDNNRegressor.load, path)
 
 
 def nested(depth):
@@ -160,14 +159,14 @@ def test_parts_that_do_not_fit_are_found_when_they_are_loaded(change, tmp_path):
     description, arrays = read_file(path, "estimator")
     change(description, arrays)
     write_file(path, "estimator", arrays, description)
-    with pytest.raises(ValueError, match="damaged"):
-        SDNNRegressor.load(path)
+    refuses("damaged", SDNNRegressor.load, path)
 
 
 def test_a_file_that_cannot_be_written_is_named_and_the_old_one_stays(tmp_path, monkeypatch):
     model = SDNNRegressor(**SMALL).fit(X, Y)
-    with pytest.raises(FileNotFoundError, match="nowhere"):
-        model.save(tmp_path / "nowhere" / "model.safetensors")
+    refuses(
+        "nowhere", model.save, tmp_path / "nowhere" / "model.safetensors", error=FileNotFoundError
+    )
     path = tmp_path / "model.safetensors"
     model.save(path)
     before = path.read_bytes()
@@ -176,8 +175,7 @@ def test_a_file_that_cannot_be_written_is_named_and_the_old_one_stays(tmp_path, 
         raise OSError("no space left")
 
     monkeypatch.setattr("os.fsync", full)
-    with pytest.raises(OSError, match="no space left"):
-        model.partial_fit(X, Y).save(path)
+    refuses("space", model.partial_fit(X, Y).save, path, error=OSError)
     assert path.read_bytes() == before
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
@@ -188,8 +186,6 @@ def test_what_cannot_be_written_as_data_is_refused(tmp_path):
 
     model = SDNNRegressor(Own(), **SMALL).fit(X, Y)
     assert isinstance(model.codings_[0], Coding)
-    with pytest.raises(TypeError, match=r"sdnn\.coding"):
-        model.save(tmp_path / "model.safetensors")
+    refuses("sdnn.coding", model.save, tmp_path / "model.safetensors", error=TypeError)
     model = SDNNRegressor([("anchor", lambda table: [0])], **SMALL).fit(X, Y)
-    with pytest.raises(TypeError, match="parameter"):
-        model.save(tmp_path / "model.safetensors")
+    refuses("parameter", model.save, tmp_path / "model.safetensors", error=TypeError)

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from refusals import refuses
 from sdnn import SDNNClassifier, SDNNKernelRidge, SDNNRegressor
 from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic, WithMissing
 from sdnn.estimators import OutOfRangeWarning
@@ -34,26 +35,22 @@ def test_columns_are_given_as_to_a_column_transformer():
         (lambda table: [table.shape[1] - 1], [2]),
     ]:
         assert column_indices(columns, names, 3, np.zeros((4, 3))) == expected
-    for bad, error in [(3, r"\b3\b"), ("d", "'d'"), (1.5, r"1\.5")]:
-        with pytest.raises(ValueError, match=error):
-            column_indices(bad, names, 3)
-    with pytest.raises(ValueError, match=r"\bmask\b"):
-        column_indices([True], names, 3)
+    for bad, error in [(3, "3"), ("d", "'d'"), (1.5, "1.5")]:
+        refuses(error, column_indices, bad, names, 3)
+    refuses("mask", column_indices, [True], names, 3)
 
 
 def test_inputs_left_out_have_the_usual_coding():
     codings = codings_of_columns([("anchor", [1])], None, 3)
     assert [coding.name for coding in codings] == ["random-inverse", "anchor", "random-inverse"]
-    with pytest.raises(ValueError, match=r"\bcoding\b"):
-        codings_of_columns([("anchor",)], None, 3)
+    refuses("coding", codings_of_columns, [("anchor",)], None, 3)
 
 
 def test_pairs_are_ordered_and_named():
     assert input_pairs("all", None, 3) == [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)]
     assert input_pairs("all", None, 1) == [(0, 0)]
     assert input_pairs([("b", "a"), (-1, None)], ["a", "b"], 2) == [(1, 0), (1, 1)]
-    with pytest.raises(ValueError, match="pair"):
-        input_pairs([(0, 1, 2)], None, 3)
+    refuses("pair", input_pairs, [(0, 1, 2)], None, 3)
 
 
 @pytest.mark.parametrize("tables", ["shared", "separate"])
@@ -87,32 +84,25 @@ def test_numbers_in_lists_with_words_stay_numbers():
     ]  # fmt: skip
     assert model.predict_one(counts[0]) == model.predict(counts[:1])[0]
     assert model.predict_one(["red", True, 3]) == model.predict([["red", True, 3]])[0]
-    with pytest.raises(ValueError, match="words"):
-        model.fit([["red", True, 3], ["blue", True, "4"]], [0, 1])
+    refuses("words", model.fit, [["red", True, 3], ["blue", True, "4"]], [0, 1])
 
 
 @pytest.mark.parametrize("missing", [float("nan"), np.nan, None])
 def test_missing_values_in_lists_of_words_are_seen(missing):
     gaps = [[missing, size] if size > 8 else [color, size] for color, size in LISTED]
-    with pytest.raises(ValueError, match="missing"):
-        SDNNRegressor(WORDS, **SMALL).fit(gaps, TARGETS)
+    refuses("missing", SDNNRegressor(WORDS, **SMALL).fit, gaps, TARGETS)
     model = SDNNRegressor([(WithMissing(base=Symbolic()), [0])], **SMALL).fit(gaps, TARGETS)
     assert model.codings_[0].base.categories == ("blue", "green", "red")
     assert model.predict([[missing, 9.0]]) == model.predict([["pink", 9.0]])
-    with pytest.raises(ValueError, match="inhomogeneous"):
-        model.fit([["red", 1.0], ["blue"]], [0, 1])
+    refuses("inhomogeneous", model.fit, [["red", 1.0], ["blue"]], [0, 1])
 
 
 def test_unknown_categories_and_missing_values_are_refused():
     model = SDNNRegressor(CODING, **SMALL).fit(TABLE, TARGETS)
-    with pytest.raises(ValueError, match="pink"):
-        model.predict(TABLE.assign(color="pink"))
-    with pytest.raises(ValueError, match="NaN"):
-        model.predict(TABLE.assign(size=np.nan))
-    with pytest.raises(ValueError, match="NaN"):
-        model.fit(TABLE.assign(color=None), TARGETS)
-    with pytest.raises(ValueError, match="infinity"):
-        model.partial_fit(TABLE.assign(size=np.inf), TARGETS)
+    refuses("pink", model.predict, TABLE.assign(color="pink"))
+    refuses("NaN", model.predict, TABLE.assign(size=np.nan))
+    refuses("NaN", model.fit, TABLE.assign(color=None), TARGETS)
+    refuses("infinity", model.partial_fit, TABLE.assign(size=np.inf), TARGETS)
 
 
 def test_missing_values_and_unknown_categories_can_have_patterns_of_their_own(tmp_path):
@@ -136,15 +126,11 @@ def test_missing_values_and_unknown_categories_can_have_patterns_of_their_own(tm
 
 
 def test_words_without_a_coding_are_refused():
-    hint = r"could not convert string to float: '\w+'.*words need a coding of their own"
-    with pytest.raises(ValueError, match=hint):
-        SDNNRegressor().fit(TABLE, TARGETS)
+    refuses("coding", SDNNRegressor().fit, TABLE, TARGETS)
     coding = [(Circular(period=24.0), "hour"), ("symbolic", ["size"])]
-    with pytest.raises(ValueError, match=hint.replace(".*", " in column 1; ")):
-        SDNNRegressor(coding).fit(TABLE, TARGETS)
-    with pytest.raises(ValueError, match=r"\by\b") as error:
-        SDNNRegressor().fit(SIZES[:, None], np.full(len(SIZES), "red"))
-    assert "coding" not in str(error.value)
+    assert "column 1" in str(refuses("coding", SDNNRegressor(coding).fit, TABLE, TARGETS))
+    words = np.full(len(SIZES), "red")
+    assert "coding" not in str(refuses("y", SDNNRegressor().fit, SIZES[:, None], words))
 
 
 def test_likeness_of_categories_generalizes():

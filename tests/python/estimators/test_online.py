@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from refusals import refuses
 from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import Circular, RandomInverse, Symbolic, WithMissing
 from sdnn.estimators import OutOfRangeWarning
@@ -133,10 +134,8 @@ def test_features_that_may_be_missing_may_be_left_out():
     assert model.predict_one(lacking) == model.predict_one(rows[3])
     other = copy.deepcopy(model)
     same(model.learn_one(lacking, 0.5), other.learn_one(rows[3], 0.5))
-    error = r"'b', 'word'"
     for bad in ({**lacking, "e": 1.0}, {"b": 0.5, "word": "u"}, {**lacking, "word": "u", "e": 1.0}):
-        with pytest.raises(ValueError, match=error):
-            model.predict_one(bad)
+        refuses("word", model.predict_one, bad)
 
 
 def test_copies_learn_apart():
@@ -157,8 +156,7 @@ def test_inputs_of_all_codings_are_coded_alike():
     assert [model.predict_one(x) for x in table] == model.predict(table).tolist()
     other = pickle.loads(pickle.dumps(model)).set_params(training="plain")
     same(model.learn_one(list(table[0]), Y[0]), other.partial_fit(table[:1], Y[:1]))
-    with pytest.raises(ValueError, match="categories"):
-        model.predict_one([0.1, 0.2, "w"])
+    refuses("categories", model.predict_one, [0.1, 0.2, "w"])
 
 
 def test_several_outputs_one_at_a_time():
@@ -166,8 +164,7 @@ def test_several_outputs_one_at_a_time():
     model = regressor().fit(X, targets)
     model.learn_one(X[0], targets[0])
     np.testing.assert_array_equal(model.predict_one(X[3]), model.predict(X[3:4])[0])
-    with pytest.raises(ValueError, match="outputs"):
-        model.learn_one(X[0], 0.5)
+    refuses("outputs", model.learn_one, X[0], 0.5)
 
 
 def test_large_weights_are_learned_too():
@@ -184,35 +181,29 @@ def test_large_weights_are_learned_too():
 
 
 @pytest.mark.parametrize(
-    ("bad", "error"),
+    "bad",
     [
-        ({"a": 1.0}, r"\bx\b"),
-        (dict.fromkeys(["a", "b", "c", "e"], 0.5), r"\bx\b"),
-        ([0.5, np.inf, 0.5, 0.5], r"\bx\b"),
-        ([0.5, "word", 0.5, 0.5], r"\bx\b"),
-        ([0.5], r"\bx\b"),
-        (X[:1], r"\bx\b"),
+        {"a": 1.0},
+        dict.fromkeys(["a", "b", "c", "e"], 0.5),
+        [0.5, np.inf, 0.5, 0.5],
+        [0.5, "word", 0.5, 0.5],
+        [0.5],
+        X[:1],
     ],
 )
-def test_bad_rows_are_named(bad, error):
+def test_bad_rows_are_named(bad):
     model = regressor().learn_one(ROWS[0], Y[0])
-    with pytest.raises(ValueError, match=error):
-        model.learn_one(bad, 0.1)
-    with pytest.raises(ValueError, match=error):
-        model.predict_one(bad)
+    refuses("x", model.learn_one, bad, 0.1)
+    refuses("x", model.predict_one, bad)
 
 
 def test_bad_targets_are_named():
     model = regressor()
     for bad in (np.nan, "word", None, [[1.0]]):
-        with pytest.raises(ValueError, match=r"\by\b"):
-            model.learn_one(X[0], bad)
-    with pytest.raises(ValueError, match="classes"):
-        classifier().learn_one(X[0], 1)
-    with pytest.raises(ValueError, match=r"\[7\]"):
-        classifier().learn_one(X[0], 7, classes=[0, 1])
-    with pytest.raises(ValueError, match="mapping"):
-        model.learn_one({1: 0.5}, 0.5)
+        refuses("y", model.learn_one, X[0], bad)
+    refuses("classes", classifier().learn_one, X[0], 1)
+    refuses("[7]", classifier().learn_one, X[0], 7, classes=[0, 1])
+    refuses("mapping", model.learn_one, {1: 0.5}, 0.5)
 
 
 def test_values_beyond_a_range_are_counted_and_said_once():
@@ -233,11 +224,9 @@ def test_values_beyond_a_range_are_counted_and_said_once():
 @pytest.mark.parametrize("kind", [regressor, classifier])
 def test_values_beyond_a_range_may_be_errors(kind):
     model = kind(out_of_range="error").fit(X, LABELS // 2)
-    with pytest.raises(ValueError, match="column 1"):
-        model.learn_one([0.5, 3.5, 0.5, 0.5], 1)
+    refuses("column", model.learn_one, [0.5, 3.5, 0.5, 0.5], 1)
     if kind is regressor:
-        with pytest.raises(ValueError, match="output_range_"):
-            model.learn_one(X[0], 3.5)
+        refuses("output_range_", model.learn_one, X[0], 3.5)
 
 
 def test_a_range_that_widens_follows_a_drift():
@@ -333,8 +322,7 @@ def test_a_river_stream_goes_on_after_a_sample_that_cannot_be_learned(kind):
     }[kind]
     for number, (row, target) in enumerate(zip(ROWS[:50], targets, strict=False)):
         if number == 19:
-            with pytest.raises(ValueError, match=r"20 samples.*NaN"):
-                model.learn_one(row, target)
+            refuses("NaN", model.learn_one, row, target)
         else:
             model.learn_one({**row, "b": float("nan")} if number == 5 else row, target)
     assert model.fitted is not None
@@ -366,8 +354,7 @@ def test_features_of_river_streams_may_come_and_go():
     lacking = {name: ROWS[0][name] for name in "abd"}
     assert with_gaps.predict_one(lacking) == with_gaps.predict_one({**lacking, "c": None})
     for use in (without.predict_one, lambda x: without.learn_one(x, 0.5)):
-        with pytest.raises(ValueError, match=r"\bx\b"):
-            use(lacking)
+        refuses("x", use, lacking)
 
 
 @pytest.mark.parametrize("n_classes", [2, 3])
@@ -392,8 +379,7 @@ def test_river_measures_and_wraps_what_has_probabilities():
         model.learn_one(row, label)
     assert model.predict_proba_one(ROWS[0]) == {"red": 0.75, "green": 0.25}
     single = RiverClassifier(SDNNClassifier(**OPTIONS, scheme="one_vs_one"))
-    with pytest.raises(NotImplementedError, match="scheme"):
-        single.predict_proba_one(ROWS[0])
+    refuses("scheme", single.predict_proba_one, ROWS[0], error=NotImplementedError)
     stream = list(zip(ROWS, (Y > 0.2).tolist(), strict=True)) * 3
     model = RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
     metric = evaluate.progressive_val_score(stream, model, metrics.ROCAUC() + metrics.LogLoss())

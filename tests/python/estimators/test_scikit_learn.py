@@ -16,6 +16,7 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import check_estimator
 
 import sdnn
+from refusals import refuses
 from sdnn import SDNNClassifier, SDNNKernelRidge, SDNNRegressor, _core
 from sdnn.coding import Anchor, Circular, CoarseCodeWarning, RandomInverse
 
@@ -87,34 +88,30 @@ def test_without_scikit_learn_the_message_says_what_to_install():
 @pytest.mark.parametrize(
     ("bad", "error"),
     [
-        (np.where(X > 2.9, np.nan, X), "contains NaN"),
+        (np.where(X > 2.9, np.nan, X), "NaN"),
         (np.where(X > 2.9, np.inf, X), "infinity"),
-        (X[:, 0], "Expected 2D array"),
-        (X[:1], "minimum of 2 is required"),
-        (X[:0], "0 sample"),
-        (X[:, :0], "0 feature"),
-        (np.full(X.shape, "word"), "could not convert string to float"),
-        (X + 1j, "Complex data not supported"),
-        (X[:50], "inconsistent numbers of samples"),
+        (X[:, 0], "2D"),
+        (X[:1], "minimum"),
+        (X[:0], "0"),
+        (X[:, :0], "0"),
+        (np.full(X.shape, "word"), "float"),
+        (X + 1j, "Complex"),
+        (X[:50], "inconsistent"),
     ],
     ids=["nan", "inf", "1d", "one", "none", "no-feature", "words", "complex", "short"],
 )
 def test_bad_samples_are_refused_as_scikit_learn_does(estimator, bad, error):
     targets = targets_of(estimator)
     n = len(bad) if "inconsistent" not in error else len(targets)
-    with pytest.raises(ValueError, match=error):
-        estimator.fit(bad, targets[:n])
+    refuses(error, estimator.fit, bad, targets[:n])
     options = {"classes": np.unique(LABELS)} if isinstance(estimator, SDNNClassifier) else {}
-    with pytest.raises(ValueError, match=error):
-        estimator.partial_fit(bad, targets[:n], **options)
+    refuses(error, estimator.partial_fit, bad, targets[:n], **options)
 
 
 def test_sparse_samples_are_refused(estimator):
-    with pytest.raises(TypeError, match=r"[Ss]parse"):
-        estimator.fit(sparse.csr_matrix(X), targets_of(estimator))
+    refuses("dense", estimator.fit, sparse.csr_matrix(X), targets_of(estimator), error=TypeError)
     estimator.fit(X, targets_of(estimator))
-    with pytest.raises(TypeError, match=r"[Ss]parse"):
-        estimator.predict(sparse.csr_matrix(X))
+    refuses("dense", estimator.predict, sparse.csr_matrix(X), error=TypeError)
 
 
 def test_prediction_checks_its_samples(estimator):
@@ -125,53 +122,46 @@ def test_prediction_checks_its_samples(estimator):
         lambda: estimator.codings_,
         lambda: estimator.weights_,
     ):
-        with pytest.raises(NotFittedError, match="not fitted"):
+        with pytest.raises(NotFittedError):
             use()
     assert not hasattr(estimator, "thresholds_")
     estimator.fit(X, targets_of(estimator))
-    with pytest.raises(ValueError, match=r"2 features.*3 features"):
-        estimator.predict(X[:, :2])
-    with pytest.raises(ValueError, match="contains NaN"):
-        estimator.predict(np.full((1, 3), np.nan))
+    refuses("features", estimator.predict, X[:, :2])
+    refuses("NaN", estimator.predict, np.full((1, 3), np.nan))
 
 
 def test_targets_are_checked():
-    with pytest.raises(ValueError, match="contains NaN"):
-        SDNNRegressor(**SMALL).fit(X, np.full(len(X), np.nan))
-    with pytest.raises(ValueError, match=r"\by\b"):
-        SDNNRegressor(**SMALL).fit(X, LABELS)
-    with pytest.raises(ValueError, match="Unknown label type"):
-        SDNNClassifier(**SMALL).fit(X, Y)
-    with pytest.raises(ValueError, match="one class"):
-        SDNNClassifier(**SMALL).fit(X, np.zeros(len(X)))
+    refuses("NaN", SDNNRegressor(**SMALL).fit, X, np.full(len(X), np.nan))
+    refuses("y", SDNNRegressor(**SMALL).fit, X, LABELS)
+    refuses("label", SDNNClassifier(**SMALL).fit, X, Y)
+    refuses("class", SDNNClassifier(**SMALL).fit, X, np.zeros(len(X)))
 
 
 @pytest.mark.parametrize(
     ("parameters", "error"),
     [
         ({"n_pattern_units": 63}, "n_pattern_units"),
-        ({"pairs": []}, r"\bpairs\b"),
-        ({"pairs": [(0, 0)]}, r"\(0, 0\)"),
-        ({"pairs": [(0, 3)]}, r"\b3\b"),
-        ({"pairs": [("a", "b")]}, "feature names"),
+        ({"pairs": []}, "pairs"),
+        ({"pairs": [(0, 0)]}, "(0, 0)"),
+        ({"pairs": [(0, 3)]}, "3"),
+        ({"pairs": [("a", "b")]}, "feature"),
         ({"pairs": [0, 1]}, "pair"),
-        ({"coding": "unheard"}, r"\bcoding\b"),
+        ({"coding": "unheard"}, "coding"),
         ({"coding": "correlation-matrix"}, "matrix"),
         ({"coding": ("anchor", [0, 1])}, "anchor"),
         ({"coding": RandomInverse(length_scale="long")}, "length_scale"),
-        ({"coding": Anchor(low="zero")}, r"\blow\b"),
-        ({"coding": Circular(period="day")}, r"\bperiod\b"),
-        ({"coding": Circular(origin=None)}, r"\borigin\b"),
+        ({"coding": Anchor(low="zero")}, "low"),
+        ({"coding": Circular(period="day")}, "period"),
+        ({"coding": Circular(origin=None)}, "origin"),
         ({"coding": [("anchor", [0, 1]), ("circular", 1)]}, "coding"),
         ({"coding": RandomInverse(length_scale=1e-9)}, "length_scale"),
-        ({"n_pattern_units": 2**24}, "n_pattern_units=16777216.*memory_limit=1073741824"),
-        ({"coding": RandomInverse(low=1.0, high=1.0)}, r"\blow\b"),
+        ({"n_pattern_units": 2**24}, "memory_limit=1073741824"),
+        ({"coding": RandomInverse(low=1.0, high=1.0)}, "low"),
         ({"coding": Anchor(n_anchor_patterns=1)}, "n_anchor_patterns"),
     ],
 )
 def test_impossible_parameters_are_named(estimator, parameters, error):
-    with pytest.raises(ValueError, match=error):
-        estimator.set_params(**parameters).fit(X, targets_of(estimator))
+    refuses(error, estimator.set_params(**parameters).fit, X, targets_of(estimator))
 
 
 OUTSIDE = {"validation_fraction": 1.0, "random_state": -1, "n_jobs": 5000, "alpha": np.inf}
@@ -187,12 +177,10 @@ def test_every_parameter_is_checked_and_named(kind):
         for bad in (object(), "unheard", OUTSIDE.get(name, -1)):
             if name == "verbose" and bad == -1:
                 continue
-            with pytest.raises(ValueError, match=name):
-                kind(**{name: bad}).fit(X, Y > 0)
+            refuses(name, kind(**{name: bad}).fit, X, Y > 0)
             if kind is not SDNNKernelRidge:
                 options = {"classes": [0, 1]} if kind is SDNNClassifier else {}
-                with pytest.raises(ValueError, match=name):
-                    kind(**{name: bad}).learn_one(X[0], 1, **options)
+                refuses(name, kind(**{name: bad}).learn_one, X[0], 1, **options)
 
 
 def test_output_ranges_are_checked():
@@ -204,8 +192,7 @@ def test_output_ranges_are_checked():
         (np.nan, 1),
         (-np.inf, np.inf),
     ):
-        with pytest.raises(ValueError, match="output_range"):
-            SDNNRegressor(output_range=bad).fit(X, Y)
+        refuses("output_range", SDNNRegressor(output_range=bad).fit, X, Y)
 
 
 def test_a_network_that_no_memory_holds_is_refused_with_its_size(monkeypatch):
@@ -213,13 +200,16 @@ def test_a_network_that_no_memory_holds_is_refused_with_its_size(monkeypatch):
         raise MemoryError("std::bad_alloc")
 
     monkeypatch.setattr(_core, "ParallelPerceptron", no_memory)
-    with pytest.raises(MemoryError, match="430080"):
-        SDNNRegressor(**SMALL).fit(X, Y)
+    refuses("430080", SDNNRegressor(**SMALL).fit, X, Y, error=MemoryError)
 
 
 def test_too_little_memory_for_a_form_is_said(estimator):
-    with pytest.raises(ValueError, match="memory"):
-        estimator.set_params(training="dual", memory_limit=1000).fit(X, targets_of(estimator))
+    refuses(
+        "memory_limit",
+        estimator.set_params(training="dual", memory_limit=1000).fit,
+        X,
+        targets_of(estimator),
+    )
 
 
 def test_feature_names_are_kept_and_compared(estimator):
@@ -227,8 +217,7 @@ def test_feature_names_are_kept_and_compared(estimator):
     estimator.fit(table, targets_of(estimator))
     assert estimator.feature_names_in_.tolist() == ["a", "b", "c"]
     assert estimator.n_features_in_ == 3
-    with pytest.raises(ValueError, match="feature names"):
-        estimator.predict(table[["c", "b", "a"]])
+    refuses("names", estimator.predict, table[["c", "b", "a"]])
 
 
 def test_a_constant_feature_is_no_information(estimator):
@@ -253,8 +242,9 @@ def test_parameters_are_kept_as_they_were_given(estimator):
     given = {"pairs": np.array([(0, 1), (1, 2)]), "coding": [("anchor", [0])], "max_iter": "many"}
     made = type(estimator)(**given)
     assert all(getattr(made, name) is value for name, value in given.items())
-    with pytest.raises(ValueError, match="pairs"):  # which could be read only once
-        type(estimator)(pairs=iter([(0, 1)])).fit(X, targets_of(estimator))
+    refuses(
+        "pairs", type(estimator)(pairs=iter([(0, 1)])).fit, X, targets_of(estimator)
+    )  # which could be read only once
 
 
 def test_docstrings_name_every_parameter(estimator):
@@ -275,10 +265,12 @@ def test_it_works_where_scikit_learn_puts_it(estimator):
     assert {fitted.length_scale for fitted in found.best_estimator_.codings_} == {
         found.best_params_["coding__length_scale"]
     }
-    with pytest.raises(ValueError, match="length"):
-        estimator.set_params(coding__length=0.1)
-    with pytest.raises(ValueError, match=r"\bcoding\b"):
-        estimator.set_params(coding=[("anchor", [0])]).set_params(coding__length_scale=0.1)
+    refuses("length", estimator.set_params, coding__length=0.1)
+    refuses(
+        "coding",
+        estimator.set_params(coding=[("anchor", [0])]).set_params,
+        coding__length_scale=0.1,
+    )
 
 
 def test_progress_is_shown_when_asked_for(estimator, capsys):

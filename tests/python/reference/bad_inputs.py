@@ -4,6 +4,7 @@ A cell gives one bad value to one parameter of one callable. The call must refus
 error that names the parameter, and leave the agent as it was; or take it and work.
 """
 
+import contextlib
 import dataclasses
 import inspect
 import re
@@ -288,8 +289,11 @@ class Lived:
         return memory(self._agent) == self._before
 
 
-def judged(parameter, call, lived_agent=None):
-    """Run a cell: ``call`` gives what is wrong with an accepted value. Give the fault, or ""."""
+def judged(parameter, call, lived_agent=None, value=None):
+    """Run a cell: ``call`` gives what is wrong with an accepted value. Give the fault, or "".
+
+    A message must show what ``value`` makes, too.
+    """
     try:
         fault = call() or ""
         if lived_agent is not None:
@@ -306,12 +310,41 @@ def judged(parameter, call, lived_agent=None):
         is_named = re.search(rf"\b{parameter}\b", message) or isinstance(error, OSError)
         if not is_named:
             return f"did not name {parameter}: {type(error).__name__}: {message[:200]}"
+        if value is not None and not is_shown(value(), message) and not isinstance(error, OSError):
+            return f"did not show the value: {type(error).__name__}: {message[:200]}"
         if lived_agent is not None and not lived_agent.is_unchanged:
             lived_agent.forget()
             return f"refused, but changed the agent: {message[:100]}"
         return ""
     except Exception as error:
         return f"raised {type(error).__name__}: {str(error)[:200]}"
+
+
+def is_shown(value, message):
+    """Whether a message shows a value, or says after "got" what kind of value, or how many."""
+    message = re.sub(r"0x[0-9a-f]+", "0x", message.lower())
+    if isinstance(value, gym.Space) or "bytes" in message:  # what follows from it is too much
+        return True
+    items = [value, *(value if isinstance(value, str | bytes | list | np.ndarray) else ())]
+    forms = {form for item in items for form in (repr(item), str(item))}
+    forms |= {f"{item:g}" for item in items if isinstance(item, int | float) and item < 10**300}
+    forms |= {str(tuple(value))} if isinstance(value, list | dict) else set()
+    with contextlib.suppress(TypeError, ValueError, OverflowError, RuntimeWarning):
+        forms |= {str(np.asarray(value, float).tolist())}
+    if any(re.sub(r"0x[0-9a-f]+", "0x", form.lower()) in message for form in forms if form):
+        return True
+    kinds = [name for item in items for name in (type(item).__name__, *_shape_and_size(item))]
+    got = message.partition("got ")[2]
+    return any(kind in got for kind in [*kinds, "more", "others", "a table"]) or re.search(
+        "too large|greater than", message
+    )
+
+
+def _shape_and_size(value):
+    try:
+        return str(np.shape(value)), str(np.size(value))
+    except ValueError:  # ragged
+        return ()
 
 
 def parameters_of(function):
@@ -333,7 +366,7 @@ def constructor_cells(name):
             def call(parameter=parameter, value=value):
                 return insanity(make_agent(name, **{parameter: value()}))
 
-            yield f"{name}({parameter}={word})", _cell(parameter, call)
+            yield f"{name}({parameter}={word})", _cell(parameter, call, value)
 
 
 def setting_cells(name):
@@ -349,11 +382,14 @@ def setting_cells(name):
                         changed = dataclasses.replace(settings, **{field.name: value()})
                         return insanity(make_agent(name + case, **{part: changed}))
 
-                    yield f"{name}{case}: {part}.{field.name}={word}", _cell(field.name, call)
+                    yield (
+                        f"{name}{case}: {part}.{field.name}={word}",
+                        _cell(field.name, call, value),
+                    )
 
 
-def _cell(parameter, call):
-    return lambda: judged(parameter, call)
+def _cell(parameter, call, value):
+    return lambda: judged(parameter, call, value=value)
 
 
 def transition_cells(kind):
@@ -369,7 +405,7 @@ def transition_cells(kind):
                     agent.learn(good._replace(**{parameter: value()}))
                     return state_fault(agent) or insanity(agent)
 
-                return judged(parameter, call, life)
+                return judged(parameter, call, life, value)
 
             yield f"{kind}.learn: {parameter}={word}", run
 
@@ -410,7 +446,7 @@ def _method_cell(life, kind, name, parameters, parameter, value):
                 return insanity(agent)
             return result_fault(agent, getattr(agent, name)(**given), given)
 
-        return judged(parameter, call, life)
+        return judged(parameter, call, life, value)
 
     return run
 
@@ -523,7 +559,7 @@ def _loop_cell(kind, name, function, parameters, parameter, value):
                 training.run()
             return ""
 
-        return judged(parameter, call, life if name == "evaluate" else None)
+        return judged(parameter, call, life if name == "evaluate" else None, value)
 
     return run
 

@@ -4,6 +4,7 @@ A cell gives one bad text to one option or argument. The command must end with e
 it, end with exit code 1 and a message that has the text (a file that is not there), or work.
 """
 
+import contextlib
 import functools
 import os
 import re
@@ -106,13 +107,27 @@ def fault_of(result, parameter, text):
     if result.exit_code == 0:
         return "printed NaN" if "nan" in result.stdout.lower() and text != "nan" else ""
     told = result.stderr
-    names = {*parameter.opts, *(one.strip("-") for one in parameter.opts)}
-    shown = parameter.metavar or parameter.name.upper()
-    names |= {shown, shown.lower()}
-    names |= {f"[{'|'.join(getattr(parameter.type, 'choices', ()))}]"} - {"[]"}
-    is_named = any(re.search(rf"(?<![\w-]){re.escape(name)}(?!\w)", told) for name in names)
-    if not is_named and not (text.strip() and text[:50] in told):
-        return f"exit code {result.exit_code} did not name {names}: {told[-200:]}"
     if result.exit_code not in (1, 2):
         return f"exit code {result.exit_code}: {told[-200:]}"
-    return ""
+    if result.exit_code == 1:  # what the text names is not there
+        return "" if text[:50] in told or is_named(parameter, told) else f"told {told[-200:]}"
+    if not is_named(parameter, told):
+        return f"did not name {parameter.opts}: {told[-200:]}"
+    return "" if is_shown(text, told) else f"did not show the value: {told[-200:]}"
+
+
+def is_named(parameter, told):
+    shown = parameter.metavar or parameter.name.upper()
+    names = {*parameter.opts, *(one.strip("-") for one in parameter.opts), shown, shown.lower()}
+    names |= {f"[{'|'.join(getattr(parameter.type, 'choices', ()))}]"} - {"[]"}
+    return any(re.search(rf"(?<![\w-]){re.escape(name)}(?!\w)", told) for name in names)
+
+
+def is_shown(text, told):
+    """Whether a message shows an option's text or number, unless no value of it would do."""
+    if not text.strip() or re.search(r"\bneeds?\b|does not take a value", told):
+        return True
+    forms = {*text.split("="), repr(text), Path(text[:50]).stem}
+    with contextlib.suppress(ValueError):
+        forms.add(str(float(text)))
+    return any(form[:50] in told for form in forms)

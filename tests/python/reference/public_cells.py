@@ -102,7 +102,7 @@ def _estimator_cell(cls, parameter, value):
         model = cls(**{**SMALL, parameter: value()}).fit(SAMPLES, TARGETS[cls])
         return _prediction_fault(model)
 
-    return lambda: _named_loosely(parameter, call)
+    return lambda: _named_loosely(parameter, call, value)
 
 
 def _data_cell(cls, parameter, value):
@@ -125,9 +125,9 @@ def _without_name(call):
     return "" if is_typed else fault
 
 
-def _named_loosely(parameter, call):
+def _named_loosely(parameter, call, value):
     """Some are named by what is in them, "a feature", or by NumPy, "Seed"."""
-    fault = judged(parameter, call)
+    fault = judged(parameter, call, value=value)
     words = {"coding": "coding|columns|feature", "pairs": "pair|feature", "random_state": "[Ss]eed"}
     is_named = re.search(words.get(parameter, parameter), fault.partition(":")[2])
     return "" if fault.startswith("did not name") and is_named else fault
@@ -163,7 +163,8 @@ def _coding_cell(cls, column, given, parameter, value):
             coding = cls(**{**given, parameter: value()}).fit(column, 40)
             return _coding_fault(coding, coding.bins(column))
 
-    return lambda: judged(parameter, call)
+    shown = None if parameter == "categories" else value  # or the values that they lack
+    return lambda: judged(parameter, call, value=shown)
 
 
 def _column_cell(cls, given, value):
@@ -208,7 +209,7 @@ def _experiment_cell(used, parameter, value):
         except ConfigError as error:
             raise ValueError(str(error)) from error
 
-    return lambda: judged(parameter, call)
+    return lambda: judged(parameter, call, value=value)
 
 
 def _protocol_used(given):
@@ -271,7 +272,7 @@ def _env_cell(maker, parameter, value):
         numbers = [np.asarray(item, np.float64) for item in (first, observation, reward)]
         return "" if all(np.isfinite(item).all() for item in numbers) else "is not finite"
 
-    return lambda: judged(parameter, call)
+    return lambda: judged(parameter, call, value=value)
 
 
 def _config_cell(config, parameter, value):
@@ -289,7 +290,7 @@ def _config_cell(config, parameter, value):
         return ""
 
     def run():
-        fault = judged(parameter, call)
+        fault = judged(parameter, call, value=value)
         return "" if "integration_step" in fault else fault  # forces too strong for it
 
     return run
@@ -297,5 +298,7 @@ def _config_cell(config, parameter, value):
 
 def _schedule_cell(parameter, value):
     return lambda: judged(
-        parameter, lambda: "" if np.isfinite(GoalSchedule()(**{parameter: value()})) else "gave NaN"
+        parameter,
+        lambda: "" if np.isfinite(GoalSchedule()(**{parameter: value()})) else "gave NaN",
+        value=value,
     )

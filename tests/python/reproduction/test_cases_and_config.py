@@ -2,8 +2,8 @@ import json
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
+from refusals import refuses
 from sdnn.agents import FuzzyQLearningConfig
 from sdnn.approximators import FuzzyRulesConfig
 from sdnn.environments import SensorConfig
@@ -60,8 +60,7 @@ def test_rows_that_share_an_id_observe_the_same():
 
 
 def test_unknown_experiment_is_named():
-    with pytest.raises(ValueError, match="got 'z'"):
-        select_experiments("z")
+    refuses("z", select_experiments, "z")
 
 
 def test_presets_run_beside_the_agents_of_a_case():
@@ -109,8 +108,7 @@ def test_a_case_fits_the_network_to_the_sensors():
     spec = case_spec(experiment.cases[1], "sdnn-c")
     assert spec.approximator.n_inputs == spec.sensors.n_sensors == 6
     assert (spec.budget.episodes, spec.protocol.evaluate_every_episodes) == (15_000, 10)
-    with pytest.raises(ValueError, match="'fuzzy'"):
-        case_spec(experiment.cases[1], "fuzzy")
+    refuses("'fuzzy'", case_spec, experiment.cases[1], "fuzzy")
 
 
 def test_a_case_gives_every_agent_its_own_settings():

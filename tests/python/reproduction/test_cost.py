@@ -5,6 +5,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from refusals import refuses
 from sdnn import _core, machine
 from sdnn.reproduction import CostConfig, draw_cost
 from sdnn.reproduction.cost import (
@@ -116,8 +117,7 @@ def test_damaged_costs_are_named(tmp_path, measured):
     with ResultStore(tmp_path) as store:
         store._connection.execute("UPDATE measurements SET content = 'x'")
         store._connection.commit()
-        with pytest.raises(StoreError, match=r"results\.sqlite"):
-            load_costs(store, SMALL.config_hash)
+        refuses("results.sqlite", load_costs, store, SMALL.config_hash, error=StoreError)
 
 
 def test_table_gives_times_and_growth(tmp_path, measured):
@@ -161,8 +161,7 @@ def test_what_there_is_no_memory_for_is_left_out():
 
 def test_costs_of_some_agents():
     assert {key.series for key in cost_keys(SMALL, ["rbf"])} == {"rbf", "rbf-plain"}
-    with pytest.raises(ValueError, match="got 'tiles'"):
-        cost_keys(SMALL, ["tiles"])
+    refuses("tiles", cost_keys, SMALL, ["tiles"])
 
 
 def make_agents(n_inputs, seed):
@@ -188,8 +187,7 @@ def test_steps_of_every_agent_are_timed(kind):
     assert times.shape == (12,)
     assert (times > 0).all()
     assert _core.time_agent_steps(agent, 0, seed=1).size == 0
-    with pytest.raises(ValueError, match="n_repetitions"):
-        _core.time_agent_steps(agent, -1, seed=1)
+    refuses("n_repetitions", _core.time_agent_steps, agent, -1, seed=1)
 
 
 def test_the_seed_decides_what_the_timed_agent_learns():

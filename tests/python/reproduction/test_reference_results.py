@@ -8,6 +8,7 @@ import pytest
 
 import sdnn.reproduction.reference_results as reference_module
 import sdnn.reproduction.reproduce as reproduce_module
+from refusals import refuses
 from sdnn.reproduction import (
     EXPERIMENTS,
     ReproduceRequest,
@@ -208,8 +209,7 @@ def test_what_is_written_of_trials_is_read_again(monkeypatch, tmp_path, fake_res
 
 def test_short_trials_are_not_kept(fake_results):
     short = replace(fake_results[0], last_episode=300)
-    with pytest.raises(ValueError, match="sdnn-c in s4"):
-        script.reference_csv([short], 7)
+    refuses("s4", script.reference_csv, [short], 7)
 
 
 def report_of(results, kept=()):

@@ -4,6 +4,7 @@ import json
 import numpy as np
 import pytest
 
+from refusals import refuses
 from run_specs import run_spec
 from sdnn.runs import EnvironmentSpec, Goal, Run, RunError
 from sdnn.runs.curves import curves_of, groups_of, write_curves
@@ -249,8 +250,7 @@ def test_what_is_left_out_of_several_runs_is_told(tmp_path):
         curves_of([short, late])
     folders = f"{short.folder}, {late.folder}"
     assert str(caught.value) == f"{folders}: they have no step in common: nothing to draw"
-    with pytest.raises(RunError, match="noth"):
-        curves_of([empty, make(tmp_path / "new", CONFIG)])
+    refuses(empty.folder.name, curves_of, [empty, make(tmp_path / "new", CONFIG)], error=RunError)
 
 
 def test_files_hold_the_numbers(tmp_path):
@@ -264,8 +264,7 @@ def test_files_hold_the_numbers(tmp_path):
         ("return", "10", "1.25"), ("running median", "10", "1.25"), ("evaluation", "20", "1.5"),
     ]  # fmt: skip
     assert (rows[2]["low"], rows[2]["high"], rows[2]["run"]) == ("1.25", "1.75", str(run.folder))
-    with pytest.raises(RunError, match=r"\.png"):
-        write_curves(curves_of([run])[0], tmp_path / "x.doc")
+    refuses(".png", write_curves, curves_of([run])[0], tmp_path / "x.doc", error=RunError)
 
 
 def test_what_cannot_be_drawn(tmp_path, monkeypatch):

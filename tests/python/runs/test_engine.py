@@ -6,6 +6,7 @@ import time
 import pytest
 from rich.console import Console
 
+from refusals import refuses
 from sdnn.progress import ProgressBars
 from sdnn.runs import Observer, ResultStore, StoreError, WorkerLostError
 from sdnn.runs.engine import Advanced, Failed, Finished, Noted, ThreadExecutor
@@ -154,8 +155,7 @@ def test_unwritable_store_stops_the_run(tmp_path, fake, use_trial):
 
 
 def test_jobs_must_be_positive():
-    with pytest.raises(ValueError, match="jobs"):
-        ThreadExecutor(0)
+    refuses("jobs", ThreadExecutor, 0)
 
 
 class Scripted:

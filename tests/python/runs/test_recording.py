@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 import drifting_env
+from refusals import refuses
 from run_specs import run_spec
 from sdnn.agents.episode import EVALUATION, episode_seed
 from sdnn.runs import EnvironmentSpec, Run, RunError
@@ -88,16 +89,13 @@ def test_what_moves_between_decisions_is_filmed(tmp_path):
 @pytest.mark.parametrize(("suffix", "package"), [("gif", "Pillow"), ("mp4", "imageio-ffmpeg")])
 def test_missing_packages_are_named(run, tmp_path, monkeypatch, suffix, package):
     monkeypatch.setattr("sdnn.runs.recording.find_spec", lambda name: None)
-    with pytest.raises(RunError, match=rf'{package}, which is missing: pip install "sdnn\[render'):
-        record(run, tmp_path / f"x.{suffix}")
+    refuses(package, record, run, tmp_path / f"x.{suffix}", error=RunError)
 
 
 def test_what_cannot_be_recorded(run, tmp_path, monkeypatch):
-    with pytest.raises(RunError, match=r"\.gif, \.mp4"):
-        record(run, tmp_path / "x.avi")
+    refuses(".gif", record, run, tmp_path / "x.avi", error=RunError)
     for picture in (None, "text", np.zeros((3, 3)), []):
         monkeypatch.setattr(drifting_env.DriftingEnv, "render", lambda self, p=picture: p)
         for name in ("x.gif", "x.mp4"):
-            with pytest.raises(RunError, match="picture"):
-                record(run, tmp_path / name)
+            refuses("render", record, run, tmp_path / name, error=RunError)
     assert list(tmp_path.iterdir()) == []

