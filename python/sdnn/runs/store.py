@@ -204,13 +204,9 @@ class ResultStore:
             run = self._begun(key, config, version)
             hashed = rows.hashed(self._hash_before(run, first))
             self._insert(run.id, rows)
-            self._update(
-                run._replace(
-                    seconds=run.seconds + seconds,
-                    finished_at=None,
-                    checksum=hashed.hexdigest(),
-                )
-            )
+            seconds += run.seconds
+            checksum = hashed.hexdigest()
+            self._update(run._replace(seconds=seconds, finished_at=None, checksum=checksum))
             self._hashes[run.id] = hashed
 
     def rows(self, key: TrialKey) -> TrialRows:
@@ -233,12 +229,7 @@ class ResultStore:
             read = self._read("rows", columns, "GROUP BY run_id")
             n_episodes = dict(zip(*read, strict=True))
             return tuple(
-                TrialTime(
-                    key=run.key,
-                    seconds=run.seconds,
-                    n_decisions=run.n_decisions,
-                    n_episodes=n_episodes.get(run.id, 0),
-                )
+                TrialTime(run.key, run.seconds, n_episodes.get(run.id, 0), run.n_decisions)
                 for run in self._runs()
                 if run.finished_at is not None
             )

@@ -212,8 +212,7 @@ class TrialRecord:
     rows: TrialRows
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrialTime:
+class TrialTime(NamedTuple):
     """The processor time of a finished trial, and its episodes and decisions."""
 
     key: TrialKey
