@@ -171,10 +171,7 @@ def flag(name: str, value: Any) -> bool:
     Traceback (most recent call last):
     TypeError: explore must be True or False, got 'no'
     """
-    if value is True or value is False:
-        return bool(value)
-    kind = getattr(getattr(value, "dtype", None), "kind", "")
-    if kind != "b" or value.size != 1:
+    if not isinstance(value, bool | np.bool_):
         raise argument_error(name, f"must be True or False, got {shown(value)}", TypeError)
     return bool(value)
 
