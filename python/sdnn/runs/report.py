@@ -43,7 +43,7 @@ NOTE = (
 MEASURE_END = ("decisions", "us/decision")
 """Header of the last `measure_cells`."""
 
-_MARKUP = re.compile(r"[\\`*_#<|~&@$]|\](?=[(\[:])|:(?=//)|(?<=www)\.", re.IGNORECASE)
+_MARKUP = re.compile(r"[\\`*_#<|~&@$]|\](?=[(\[])|:(?=//)|(?<=www)\.", re.IGNORECASE)
 """What a Markdown text may not hold as it is; brackets may, where they make no link."""
 
 
