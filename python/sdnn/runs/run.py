@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import signal
 import threading
@@ -11,9 +10,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import gymnasium as gym
+import msgspec
+from msgspec import Meta
 
 from sdnn._core import __version__
 from sdnn.agents import (
@@ -32,13 +33,13 @@ from sdnn.agents import (
 )
 from sdnn.agents.callbacks import Row
 from sdnn.agents.spaces import require_same_kind
-from sdnn.arguments import whole
 from sdnn.files import lock, open_to_append, remove_abandoned_files, write_whole
 from sdnn.interrupts import Interrupts
 from sdnn.machine import instruction_set
 from sdnn.runs.config_file import FORMAT, ConfigFile, read_spec
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line
+from sdnn.runs.settings import read
 from sdnn.runs.spec import BudgetSpec, RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.trial import (
@@ -64,23 +65,15 @@ STORE_SECONDS = 5.0  # between commits of rows
 TENSORBOARD = "tensorboard"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Goal:
-    """A new goal of a run that was resumed at a step: ``steps`` or ``episodes`` in all.
+class Goal(BudgetSpec, frozen=True, kw_only=True):
+    """A new goal of a run that was resumed at a step: ``steps`` or ``episodes`` in all."""
 
-    ValueError if a number is out of its range, or not one of ``steps`` and ``episodes`` is given.
-    """
-
-    at_step: int
-    steps: int | None = None
-    episodes: int | None = None
+    at_step: Annotated[int, Meta(ge=0)]
 
     def __post_init__(self) -> None:
-        whole("at_step", self.at_step, 0, 2**53)
-        if (self.steps is None) == (self.episodes is None):
-            raise ValueError("steps or episodes must be given")
-        name = "episodes" if self.steps is None else "steps"
-        whole(name, getattr(self, name), 1, 2**53)
+        super().__post_init__()
+        if self.steps is self.episodes is None:
+            raise ConfigError("steps", "or episodes must be given")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,10 +142,10 @@ class Run:
             raise RunError(f"{place} holds no run: there is no {path}")
         goals = ConfigFile.read(path).values.get("goals", [])
         try:
-            read = [Goal(**goal) for goal in goals]
-        except (TypeError, ValueError) as error:
+            made = [read(Goal, goal) for goal in goals]
+        except (ConfigError, TypeError) as error:
             raise ConfigError("goals", f"must be a list of goals: {error}", str(path)) from error
-        return cls(place, read_spec(path), read)
+        return cls(place, read_spec(path), made)
 
     def check(self) -> None:
         """Make all that is needed once, to see that it works; ConfigError if not."""
@@ -307,7 +300,7 @@ class Run:
         """Write the configuration and the goals."""
         values: dict[str, Any] = {"format": FORMAT, "version": __version__, **self.spec.values()}
         if self.goals:
-            goals = map(dataclasses.asdict, self.goals)
+            goals = map(msgspec.structs.asdict, self.goals)
             values["goals"] = [{k: v for k, v in goal.items() if v is not None} for goal in goals]
         write_whole(self.folder / CONFIG, (json.dumps(values, indent=2) + "\n").encode())
 
