@@ -69,7 +69,8 @@ def array_of(name: str, value: Any, kinds: str = "fiub", what: str = "numbers") 
     """
     if type(value) is np.ndarray and value.dtype.kind in kinds:
         return value
-    if isinstance(value, np.ma.MaskedArray):
+    rows = value if isinstance(value, list | tuple) else [value]
+    if any(isinstance(row, np.ma.MaskedArray) for row in rows):
         raise argument_error(name, f"must be {what} without a mask, got {shown(value)}")
     try:
         array = np.asarray(value)
@@ -135,7 +136,7 @@ def whole(name: str, value: Any, low: int, high: int) -> int:
     Traceback (most recent call last):
     ValueError: n_bins must be a whole number in [2, 65535], got 1
     """
-    is_whole = isinstance(value, Integral) and not isinstance(value, bool)
+    is_whole = isinstance(value, Integral) and not isinstance(value, bool | np.timedelta64)
     if not is_whole or not low <= value <= high:
         raise argument_error(name, f"must be a whole number in [{low}, {high}], got {shown(value)}")
     return int(value)
@@ -155,7 +156,7 @@ def real(name: str, value: Any) -> float:
     """
     if type(value) is float:
         return value
-    if not isinstance(value, Real) or isinstance(value, bool):
+    if not isinstance(value, Real) or isinstance(value, bool | np.timedelta64):
         raise argument_error(name, f"must be a number, got {shown(value)}")
     try:
         return float(value)

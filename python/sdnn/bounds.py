@@ -9,6 +9,8 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.arguments import shown
+
 __all__ = ["flat_bounds", "with_infinities"]
 
 _MOST_VARIABLES = 2**20
@@ -70,7 +72,7 @@ def _ends_of_parts(space: gym.Space[Any]) -> Iterator[tuple[NDArray[Any], NDArra
 
 def _n_variables(space: gym.Space[Any]) -> int:
     if not isinstance(space, gym.Space):
-        raise TypeError(f"observation_space must be a Gymnasium space, got {space!r}")
+        raise TypeError(f"observation_space must be a Gymnasium space, got {shown(space)}")
     try:
         return gym.spaces.flatdim(space)
     except (NotImplementedError, ValueError):

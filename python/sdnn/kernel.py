@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sdnn.arguments import array_of, seed_of, shown, whole
 from sdnn.coding import Coding, coding_named
 
 if TYPE_CHECKING:
@@ -29,11 +30,14 @@ if TYPE_CHECKING:
 __all__ = ["AnalyticKernel", "correlations", "plot_similarity", "similarity"]
 
 N_UNITS = 2000  # default number of units per pattern
+MOST_INPUTS = 4096
+_CELLS = "fiubUSO"  # types of tables
 ENTRIES_AT_ONCE = 2**18  # entries of a kernel matrix computed at a time
 
 
 def fitted(coding: str | Coding, n_units: int) -> Coding:
     """Return a fitted coding, on [0, 1] unless it has a range."""
+    whole("n_units", n_units, 2, 2**16)
     one = coding_named(coding)
     ends = None if one.learns else one.ends()
     # The range of a constant column is one point, which only such a column fits again.
@@ -60,7 +64,7 @@ def correlations(coding: str | Coding, n_units: int = N_UNITS) -> NDArray[np.flo
 
 def similarity(coding: str | Coding, n_units: int = N_UNITS, seed: int = 0) -> NDArray[np.float64]:
     """Return the correlations of patterns drawn with a seed, shape (n_bins, n_bins)."""
-    patterns = fitted(coding, n_units).patterns(n_units, seed).astype(np.float64)
+    patterns = fitted(coding, n_units).patterns(n_units, seed_of(seed)).astype(np.float64)
     return patterns @ patterns.T / n_units
 
 
@@ -92,11 +96,13 @@ class AnalyticKernel:
         if isinstance(coding, str | Coding):
             if n_inputs is None:
                 raise ValueError("n_inputs must be given with one coding for all inputs")
-            coding = [coding_named(coding)] * n_inputs
+            coding = [coding_named(coding)] * whole("n_inputs", n_inputs, 1, MOST_INPUTS)
+        if not isinstance(coding, Sequence) or not coding:
+            raise ValueError(f"coding must be a coding, or one for each input, got {shown(coding)}")
         inputs = range(len(coding))
         every = [(mu, nu) for mu in inputs for nu in inputs if mu != nu] or [(0, 0)]
         self.codings = tuple(fitted(one, n_units) for one in coding)
-        self.pairs = tuple(every if pairs is None else pairs)
+        self.pairs = tuple(every) if pairs is None else _read_pairs(pairs, len(inputs))
         self._every = pairs is None
         self._correlations = shared(one.correlations(n_units) for one in self.codings)
 
@@ -106,8 +112,8 @@ class AnalyticKernel:
         Returns shape (n_samples, n_others). Raises ValueError for another number of inputs, NaN, or
         an unknown category.
         """
-        one = np.asarray(X)
-        other = one if Y is None else np.asarray(Y)
+        one = array_of("X", X, _CELLS, "a table of numbers or words")
+        other = one if Y is None else array_of("Y", Y, _CELLS, "a table of numbers or words")
         for name, table in (("X", one), ("Y", other)):
             if table.ndim != 2 or table.shape[1] != len(self.codings):
                 raise ValueError(
@@ -143,6 +149,17 @@ class AnalyticKernel:
         for mu, nu in self.pairs:
             total += 2 * rho[mu] if mu == nu else (1 + rho[nu]) / 2 * rho[mu]
         return total / sum(2 if mu == nu else 1 for mu, nu in self.pairs)
+
+
+def _read_pairs(pairs: Any, n_inputs: int) -> tuple[tuple[int, int], ...]:
+    last = n_inputs - 1
+    try:
+        read = tuple((whole("pairs", a, 0, last), whole("pairs", b, 0, last)) for a, b in pairs)
+    except (TypeError, ValueError):
+        read = ()
+    if not read:
+        raise ValueError(f"pairs must be pairs of inputs from 0 to {last}, got {shown(pairs)}")
+    return read
 
 
 def plot_similarity(

@@ -12,6 +12,7 @@ import os
 from pathlib import Path
 
 from sdnn import _core
+from sdnn.arguments import shown
 
 _PROCESSOR_FILE = Path("/proc/cpuinfo")
 
@@ -109,4 +110,6 @@ def set_instruction_set(name: str) -> None:
     'portable'
     >>> set_instruction_set(before)
     """
+    if not isinstance(name, str):
+        raise TypeError(f"name must be that of an instruction set, got {shown(name)}")
     _core.set_instruction_set(name)

@@ -26,7 +26,7 @@ from sdnn.agents.spaces import (
     space_of,
 )
 from sdnn.agents.training import Training, TrainingResult
-from sdnn.arguments import argument_error, blamed, flag, path_of, real, seed_of, whole
+from sdnn.arguments import argument_error, blamed, flag, path_of, real, seed_of, shown, whole
 from sdnn.config import WARM_UP, values_of
 from sdnn.files import Arrays, Description, write_file
 
@@ -129,7 +129,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         for name, part in (("approximator", approximator), ("learning", learning)):
             kind: type[Any] = getattr(self, f"{name}_type")
             if not isinstance(part, kind):
-                raise TypeError(f"{name} must be a {kind.__name__}, got {part!r}")
+                raise TypeError(f"{name} must be a {kind.__name__}, got {shown(part)}")
         self._approximator, self.learning = approximator, learning
         self.seed = seed_of(seed)
         self._warm_up_steps = whole("warm_up_steps", steps, int(WARM_UP.low), int(WARM_UP.high))
@@ -203,7 +203,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     @scaling.setter
     def scaling(self, scaling: Scaling | None) -> None:
         if not isinstance(scaling, Scaling | None):
-            raise TypeError(f"scaling must be a Scaling or None, got {scaling!r}")
+            raise TypeError(f"scaling must be a Scaling or None, got {shown(scaling)}")
         self._scaling = scaling
 
     @property
@@ -297,7 +297,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         """
         self._check_environment(environment)
         if not isinstance(transition, Transition):
-            raise TypeError(f"transition must be a Transition, got {transition!r}")
+            raise TypeError(f"transition must be a Transition, got {shown(transition)}")
         observation, action, reward, next_observation, terminated = transition
         if type(reward) is not float:
             reward = reward_of(reward)

@@ -22,7 +22,7 @@ from sdnn.agents.episode import (
     step_env,
 )
 from sdnn.agents.spaces import require_same_kind, require_single
-from sdnn.arguments import has_methods, seed_of, whole
+from sdnn.arguments import has_methods, seed_of, shown, whole
 
 __all__ = ["Evaluation", "evaluate", "greedy_episode"]
 
@@ -114,7 +114,7 @@ def evaluate(
     root = None if seed is None else seed_of(seed)
     n_episodes = whole("episodes", episodes, 1, 10**9)
     if options is not None and not isinstance(options, dict):
-        raise TypeError(f"options must be a dictionary or None, got {options!r}")
+        raise TypeError(f"options must be a dictionary or None, got {shown(options)}")
     returns, lengths, ends = [], [], []
     for episode in range(n_episodes):
         for now in greedy_episode(agent, env, root, episode, options):

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 from sdnn import _core
-from sdnn.arguments import real
+from sdnn.arguments import real, shown
 
 __all__ = ["FixedRate"]
 
@@ -57,6 +57,9 @@ class FixedRate(_core.FixedRate):
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
+        for name, function in (("clock", clock), ("sleep", sleep)):
+            if not callable(function):
+                raise TypeError(f"{name} must be a function, got {shown(function)}")
         super().__init__(real("hz", hz), clock, sleep)
 
     def __iter__(self) -> FixedRate:

@@ -15,7 +15,7 @@ from sdnn import _core
 from sdnn.agents.agent import Agent
 from sdnn.agents.spaces import AnglePairs, Ranges
 from sdnn.approximators.sdnn_c import pattern_tables
-from sdnn.arguments import choice, real, whole
+from sdnn.arguments import choice, real, shown, whole
 from sdnn.config import WARM_UP, QLearningConfig, RBFNetworkConfig, SDNNCConfig
 
 __all__ = ["PRESETS", "Preset", "RBFQLearning", "SDNNQLearning"]
@@ -54,7 +54,7 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
     @learning_rate.setter
     def learning_rate(self, rate: float | None) -> None:
         if rate is not None and not 0.0 < real("learning_rate", rate) <= 1.0:
-            raise ValueError(f"learning_rate must be in (0, 1], or None, got {rate!r}")
+            raise ValueError(f"learning_rate must be in (0, 1], or None, got {shown(rate)}")
         self._controller.learning_rate = rate
 
     @property
@@ -65,7 +65,7 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
     @epsilon.setter
     def epsilon(self, epsilon: float | None) -> None:
         if epsilon is not None and not 0.0 <= real("epsilon", epsilon) <= 1.0:
-            raise ValueError(f"epsilon must be in [0, 1], or None, got {epsilon!r}")
+            raise ValueError(f"epsilon must be in [0, 1], or None, got {shown(epsilon)}")
         self._controller.epsilon = epsilon
 
     @property

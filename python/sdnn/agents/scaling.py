@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.arguments import real, whole
+from sdnn.arguments import real, shown, whole
 
 __all__ = ["Scaling", "neighbours"]
 
@@ -49,7 +49,7 @@ class Scaling:
         except (OverflowError, TypeError, ValueError):
             pairs = ()
         if not pairs or not all(-np.inf < low < high < np.inf for low, high in pairs):
-            raise ValueError(f"ranges must be pairs, finite, low < high, got {self.ranges!r}")
+            raise ValueError(f"ranges must be pairs, finite, low < high, got {shown(self.ranges)}")
         object.__setattr__(self, "ranges", pairs)
 
     @property

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import argument_error, has_methods
+from sdnn.arguments import argument_error, array_of, has_methods, shown
 from sdnn.bounds import flat_bounds, with_infinities
 
 __all__ = [
@@ -67,7 +67,7 @@ class Observations:
         if isinstance(angle_pairs, str):
             pairs = ()
             if angle_pairs not in ("none", "find"):
-                problem = f"must be 'none', 'find' or pairs of variables, got {angle_pairs!r}"
+                problem = f"must be 'none', 'find' or pairs of variables, got {shown(angle_pairs)}"
                 raise argument_error("angle_pairs", problem)
         return _core.ObservationConfig(
             low=[None if np.isnan(x) else x for x in low.tolist()],
@@ -86,7 +86,9 @@ class Observations:
                 _check_parts(self._space, observation)
                 return np.asarray(gym.spaces.flatten(self._space, observation), np.float64)
             except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-                raise ValueError(f"{name} must be of {self._space}, got {observation!r}") from error
+                raise ValueError(
+                    f"{name} must be of {self._space}, got {shown(observation)}"
+                ) from error
         if type(observation) is np.ndarray and observation.dtype is _FLOAT64:
             values: NDArray[np.float64] = observation
         else:
@@ -105,15 +107,16 @@ def _check_parts(space: gym.Space[Any], observation: Any) -> None:
         for part, one in zip(space.spaces, observation, strict=True):
             _check_parts(part, one)
     elif isinstance(space, gym.spaces.Discrete):
-        if not 0 <= observation - space.start < space.n:
+        number = array_of("a part", observation, "iub")
+        if number.shape != () or not 0 <= number - space.start < space.n:
             raise ValueError(f"must be in {space}")
     elif isinstance(space, gym.spaces.MultiDiscrete):
-        steps = np.asarray(observation) - space.start
+        steps = array_of("a part", observation, "iub") - space.start
         if steps.shape != space.shape or not ((steps >= 0) & (steps < space.nvec)).all():
             raise ValueError(f"must be in {space}")
     elif (
         isinstance(space, gym.spaces.Box | gym.spaces.MultiBinary)
-        and np.shape(observation) != space.shape
+        and array_of("a part", observation).shape != space.shape
     ):
         raise ValueError(f"must have shape {space.shape}")
 
@@ -133,13 +136,7 @@ def _symbols_of(space: gym.Space[Any], first: int = 0) -> Iterator[tuple[int, in
 
 
 def _numbers(name: str, values: Any) -> NDArray[np.float64]:
-    try:
-        array = np.asarray(values)
-    except ValueError as error:  # lists of several lengths
-        raise ValueError(f"{name} must be numbers, got {values!r}") from error
-    if array.dtype.kind not in "fiub":
-        raise ValueError(f"{name} must be numbers, got {values!r}")
-    return array.astype(np.float64, copy=False)
+    return array_of(name, values).astype(np.float64, copy=False)
 
 
 def _ranges(
@@ -148,7 +145,9 @@ def _ranges(
     """Return the range of each variable, as given or from the bounds; NaN: not known."""
     if ranges is not None:
         if not isinstance(ranges, Sequence) or isinstance(ranges, str) or len(ranges) != 2:
-            raise ValueError(f"observation_range must be (low, high) or 'adaptive', got {ranges!r}")
+            raise ValueError(
+                f"observation_range must be (low, high) or 'adaptive', got {shown(ranges)}"
+            )
         try:
             low, high = (
                 with_infinities(
@@ -158,7 +157,8 @@ def _ranges(
             )
         except ValueError:
             raise ValueError(
-                f"observation_range must be two numbers or two times {low.size}, got {ranges!r}"
+                f"observation_range must be two numbers or two times {low.size},"
+                f" got {shown(ranges)}"
             ) from None
     known = np.isfinite(low) & np.isfinite(high)
     for i in np.flatnonzero(known & (low >= high)):
@@ -232,12 +232,9 @@ class Actions:
         if type(action) is np.ndarray and action.dtype is self._dtype:
             return action
         try:
-            values = np.asarray(action)
-        except ValueError:  # lists of several lengths
-            values = np.empty(0, object)
-        if values.dtype.kind not in "biuf":
-            raise ValueError(f"action must be in {self._space}, got {action!r}")
-        return values
+            return array_of("action", action)
+        except ValueError:
+            raise ValueError(f"action must be in {self._space}, got {shown(action)}") from None
 
 
 def require_single(name: str, env: Any) -> None:
@@ -358,7 +355,7 @@ def _finite(values: NDArray[Any]) -> list[Any]:
 def space_of(data: Mapping[str, Any]) -> gym.Space[Any]:
     """Make the space that `space_data` described; ValueError if there is none."""
     if data.get("dtype", "<f4") not in _TYPES:
-        raise ValueError(f"dtype must be that of numbers, got {data['dtype']!r}")
+        raise ValueError(f"dtype must be that of numbers, got {shown(data['dtype'])}")
     sizes = [data.get("discrete", 0), *np.ravel(data.get("multi_discrete", 0)).tolist()]
     sizes += [int(np.prod(data.get("multi_binary", 0)))]
     if not all(isinstance(size, int) and 0 <= size <= _MOST_VALUES for size in sizes):

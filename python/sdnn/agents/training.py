@@ -28,7 +28,7 @@ from sdnn.agents.episode import (
 from sdnn.agents.evaluation import evaluate
 from sdnn.agents.files import SavedTraining, read_training, write_training
 from sdnn.agents.spaces import require_same_kind, require_single
-from sdnn.arguments import flag, has_methods, path_of, whole
+from sdnn.arguments import flag, has_methods, path_of, shown, whole
 from sdnn.interrupts import Interrupts
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ class Training:
         self.evaluation_episodes = whole("evaluation_episodes", evaluation_episodes, 1, 10**9)
         self.limit_bootstraps = flag("limit_bootstraps", limit_bootstraps)
         if reset_options is not None and not callable(reset_options):
-            raise TypeError(f"reset_options must be a function or None, got {reset_options!r}")
+            raise TypeError(f"reset_options must be a function or None, got {shown(reset_options)}")
         self.reset_options = reset_options
         self.n_steps = self.n_episodes = self.n_rows = 0
         self.evaluations: list[tuple[int, float]] = []
@@ -353,7 +353,7 @@ class Training:
             return None
         options = self.reset_options(episode)
         if not isinstance(options, Mapping):
-            raise TypeError(f"reset_options must return a mapping, got {options!r}")
+            raise TypeError(f"reset_options must return a mapping, got {shown(options)}")
         return dict(options)
 
     def _begin_episode(self, environment: int) -> None:
@@ -473,7 +473,7 @@ def _listed(callbacks: Iterable[Callback]) -> tuple[Callback, ...]:
     try:
         listed = tuple(callbacks)
     except TypeError:
-        raise TypeError(f"callbacks must be a list of callbacks, got {callbacks!r}") from None
+        raise TypeError(f"callbacks must be a list of callbacks, got {shown(callbacks)}") from None
     for callback in listed:
         has_methods("callbacks", callback, "callbacks", "on_start", "on_step", "on_row", "on_end")
     return listed

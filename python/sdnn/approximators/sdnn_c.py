@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import seed_of
+from sdnn.arguments import array_of, seed_of, shown
 from sdnn.config import SDNNCConfig
 
 __all__ = ["SDNNC"]
@@ -18,9 +18,9 @@ def pattern_tables(tables: Sequence[ArrayLike]) -> list[NDArray[np.int8]]:
     """Read the patterns of each input; ValueError for other entries than -1 and +1."""
     read = []
     try:
-        listed = [np.asarray(table) for table in tables]
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"tables must be matrices of -1 and +1, got {tables!r}") from error
+        listed = [array_of("tables", table) for table in tables]
+    except (TypeError, ValueError):
+        raise ValueError(f"tables must be matrices of -1 and +1, got {shown(tables)}") from None
     for number, signs in enumerate(listed):
         if signs.ndim != 2 or not np.isin(signs, (-1, 1)).all():
             raise ValueError(

@@ -10,6 +10,8 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.arguments import shown
+
 __all__ = ["CODINGS", "Coding", "coding_named", "from_dict", "known", "to_dict"]
 
 Value = TypeVar("Value")
@@ -90,11 +92,11 @@ def coding_named(coding: str | Coding) -> Coding:
     """
     if isinstance(coding, Coding):
         return coding
-    if coding == "correlation-matrix":
-        raise ValueError("'correlation-matrix' needs a matrix: use CorrelationMatrix(matrix=...)")
     if not isinstance(coding, str) or coding not in CODINGS:
         names = ", ".join(repr(name) for name in CODINGS if name != "correlation-matrix")
-        raise ValueError(f"coding must be one of {names} or a Coding object, got {coding!r}")
+        raise ValueError(f"coding must be one of {names} or a Coding object, got {shown(coding)}")
+    if coding == "correlation-matrix":
+        raise ValueError("'correlation-matrix' needs a matrix: use CorrelationMatrix(matrix=...)")
     return CODINGS[coding]()
 
 
@@ -105,8 +107,8 @@ def to_dict(coding: Coding) -> dict[str, Any]:
     >>> to_dict(Symbolic(categories=("a", "b")))
     {'coding': 'symbolic', 'categories': ('a', 'b')}
     """
-    if type(coding) is not CODINGS.get(coding.name):
-        raise TypeError(f"only codings of sdnn.coding can be described, got {coding!r}")
+    if type(coding) not in CODINGS.values():
+        raise TypeError(f"only codings of sdnn.coding can be described, got {shown(coding)}")
     fields = {field.name: getattr(coding, field.name) for field in dataclasses.fields(coding)}  # type: ignore[arg-type]
     return {"coding": coding.name, **{name: plain(value) for name, value in fields.items()}}
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.arguments import one_of, real, whole
+from sdnn.arguments import array_of, one_of, real, shown, whole
 from sdnn.coding.base import Coding, known
 
 __all__ = ["Anchor", "Circular", "CoarseCodeWarning", "RandomInverse"]
@@ -34,7 +34,7 @@ def numbers(column: NDArray[Any]) -> NDArray[np.float64]:
     """Return the column as floats; ValueError for NaN or complex numbers."""
     if np.iscomplexobj(column):
         raise ValueError("Complex data not supported")
-    values = np.asarray(column, dtype=np.float64)
+    values = array_of("column", column, "fiubO").astype(np.float64, copy=False)
     if np.isnan(values).any():
         raise ValueError("Input contains NaN")
     return values
@@ -66,13 +66,13 @@ def checked_knots(knots: Any, low: float, high: float) -> Knots:
     """Return given knots, which must rise from (low, 0) to (high, 1)."""
     last = 1.0 if low < high else 0.0
     with contextlib.suppress(IndexError, TypeError, ValueError):
-        values, levels = np.array(knots, dtype=np.float64).T
+        values, levels = array_of("knots", knots).astype(np.float64).T
         is_rising = np.all(values[1:] > values[:-1]) and np.all(levels[1:] > levels[:-1])
         if is_rising and (values[0], levels[0], values[-1], levels[-1]) == (low, 0.0, high, last):
             return tuple(zip(values.tolist(), levels.tolist(), strict=True))
     raise ValueError(
         f"knots must be (value, position) in rising order from ({low}, 0) to ({high}, 1), "
-        f"got {knots!r}"
+        f"got {shown(knots)}"
     )
 
 
@@ -152,7 +152,14 @@ class RandomInverse(Ranged):
         if self.spacing == "quantile" and has_range and not is_learned:
             raise ValueError("low and high cannot be given with spacing='quantile'")
         if not 0 < real("length_scale", self.length_scale) <= LONGEST:
-            raise ValueError(f"length_scale must be in (0, {LONGEST}], got {self.length_scale!r}")
+            raise ValueError(
+                f"length_scale must be in (0, {LONGEST}], got {shown(self.length_scale)}"
+            )
+        if self.knots is not None and not (is_learned and self.spacing == "quantile"):
+            raise ValueError(
+                "knots must be given with spacing='quantile' and the range, low and high,"
+                f" got {shown(self.knots)}"
+            )
         values = numbers(column)
         low, high = self._learned_range(values)
         n_bins, n_flipped = self._bins_and_flips(n_units)
@@ -175,7 +182,8 @@ class RandomInverse(Ranged):
             flipped = max(1, math.ceil(n_units / (4 * self.length_scale * FINE)))
             if flipped > most:
                 raise ValueError(
-                    f"length_scale must be at least {1 / (2 * FINE)}, got {self.length_scale!r}"
+                    f"length_scale must be at least {1 / (2 * FINE)},"
+                    f" got {shown(self.length_scale)}"
                 )
         if n_bins is not None:
             return n_bins, flipped
@@ -292,9 +300,9 @@ class Circular(Anchored):
         self._check_anchors()
         numbers(column)
         if not 0 < real("period", self.period) < math.inf:
-            raise ValueError(f"period must be positive and finite, got {self.period!r}")
+            raise ValueError(f"period must be positive and finite, got {shown(self.period)}")
         if not math.isfinite(real("origin", self.origin)):
-            raise ValueError(f"origin must be finite, got {self.origin!r}")
+            raise ValueError(f"origin must be finite, got {shown(self.origin)}")
         return self
 
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:

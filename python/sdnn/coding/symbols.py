@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.arguments import one_of
+from sdnn.arguments import array_of, one_of, shown
 from sdnn.coding.base import Coding, known
 from sdnn.coding.numeric import RandomInverse
 
@@ -48,10 +48,10 @@ class Categorical(Coding):
         if given is None:
             return
         if isinstance(given, str | bytes) or not isinstance(given, Iterable):
-            raise ValueError(f"categories must be a tuple of values, got {given!r}")
+            raise ValueError(f"categories must be a tuple of values, got {shown(given)}")
         object.__setattr__(self, "categories", tuple(given))
         if not all(isinstance(category, Hashable) for category in known(self.categories)):
-            raise ValueError(f"categories must be words or numbers, got {self.categories!r}")
+            raise ValueError(f"categories must be words or numbers, got {shown(self.categories)}")
 
     @property
     def learns(self) -> bool:
@@ -66,8 +66,8 @@ class Categorical(Coding):
         try:
             return np.array([places[value] for value in column.tolist()], dtype=np.int32)
         except (KeyError, TypeError):
-            unknown = dict.fromkeys(map(repr, column.tolist()))
-            names = [value for value in unknown if value not in set(map(repr, places))]
+            unknown = dict.fromkeys(map(shown, column.tolist()))
+            names = [value for value in unknown if value not in set(map(shown, places))]
             raise ValueError(f"Found unknown categories [{', '.join(names)}]") from None
 
     def knows(self, column: NDArray[Any]) -> NDArray[np.bool_]:
@@ -112,7 +112,7 @@ class Symbolic(Categorical):
     def fit(self, column: NDArray[Any], n_units: int) -> Symbolic:
         given = self.categories
         if given is not None and (not given or len(set(given)) < len(given)):
-            raise ValueError(f"categories must be different and at least one, got {given!r}")
+            raise ValueError(f"categories must be different and at least one, got {shown(given)}")
         return dataclasses.replace(self, categories=self._learned(column))
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
@@ -150,13 +150,7 @@ class CorrelationMatrix(Categorical):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        try:
-            given = np.asarray(self.matrix)
-            if given.dtype.kind == "c":
-                raise ValueError("complex numbers")
-            rows = np.atleast_2d(given.astype(np.float64))
-        except (OverflowError, TypeError, ValueError) as error:
-            raise ValueError(f"matrix must be numbers, got {self.matrix!r}: {error}") from None
+        rows = np.atleast_2d(array_of("matrix", self.matrix).astype(np.float64))
         object.__setattr__(self, "matrix", tuple(map(tuple, rows.tolist())))
 
     def fit(self, column: NDArray[Any], n_units: int) -> CorrelationMatrix:
@@ -172,7 +166,7 @@ class CorrelationMatrix(Categorical):
         names = self._learned(column)
         if len(set(names)) != len(matrix):
             raise ValueError(
-                f"matrix must have a row for each of the categories {names!r}, got "
+                f"matrix must have a row for each of the categories {shown(names)}, got "
                 f"{len(matrix)} rows"
             )
         return dataclasses.replace(self, categories=names)
@@ -218,7 +212,9 @@ class WithMissing(Coding):
     @property
     def learns(self) -> bool:
         if not isinstance(self.base, Coding) or isinstance(self.base, WithMissing):
-            raise ValueError(f"base must be a Coding without missing values, got {self.base!r}")
+            raise ValueError(
+                f"base must be a Coding without missing values, got {shown(self.base)}"
+            )
         return self.base.learns
 
     @property

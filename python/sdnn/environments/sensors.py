@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import choice, one_of, seed_of
+from sdnn.arguments import array_of, choice, one_of, seed_of, shown
 from sdnn.bounds import with_infinities
 from sdnn.config import SensorConfig
 
@@ -41,6 +41,13 @@ class _Sensors(
             raise ValueError(f"env must have a one-dimensional Box of observations, got {space}")
         self._space = space
         self._float: Any = np.float64 if space.dtype == np.float64 else np.float32
+
+    def _read(self, observation: Observation) -> Observation:
+        """Return an observation of the environment; ValueError if it is of another shape."""
+        seen = array_of("observation", observation)
+        if seen.shape != self._space.shape:
+            raise ValueError(f"observation must have shape {self._space.shape}, got {seen.shape}")
+        return seen
 
 
 class UnitSensors(_Sensors):
@@ -80,7 +87,8 @@ class UnitSensors(_Sensors):
     def observation(self, observation: Observation) -> NDArray[np.float64]:
         """Scale an observation, shape (l,)."""
         low, high = self.observation_low, self.observation_high
-        return np.clip((np.asarray(observation, np.float64) - low) / (high - low), 0.0, 1.0)
+        seen = self._read(observation).astype(np.float64, copy=False)
+        return np.clip((seen - low) / (high - low), 0.0, 1.0)
 
 
 class RedundantSensors(_Sensors):
@@ -128,6 +136,7 @@ class RedundantSensors(_Sensors):
 
     def observation(self, observation: Observation) -> Observation:
         """Append the functions' values, shape (l + n_functions,)."""
+        observation = self._read(observation)
         extra = [function(observation) for function in self._functions]
         return np.append(observation, extra).astype(_float_of(observation))
 
@@ -202,6 +211,7 @@ class NoisySensors(_RandomSensors):
 
     def observation(self, observation: Observation) -> Observation:
         """Add the noise, shape (l,)."""
+        observation = self._read(observation)
         noisy: Observation = self._noise.apply(observation)
         return noisy.astype(_float_of(observation))
 
@@ -249,16 +259,17 @@ class AcrobotSensors(_RandomSensors):
 
 def _float_of(observation: Observation) -> np.dtype[Any]:
     """Return the dtype of a float observation, else float32."""
-    dtype = np.asarray(observation).dtype
+    dtype = observation.dtype
     return dtype if dtype.kind == "f" else np.dtype(np.float32)
 
 
 def _ends(name: str, given: ArrayLike | None, bounds: NDArray[Any]) -> NDArray[np.float64]:
     """Return the lower or upper ends of all ranges, shape (l,)."""
-    ends = with_infinities(np.asarray(bounds if given is None else given, np.float64))
+    numbers = bounds if given is None else array_of(name, given)
+    ends = with_infinities(numbers.astype(np.float64))
     if ends.shape != bounds.shape:
         raise ValueError(
-            f"{name} must have {bounds.size} numbers, one per observed variable, got {given!r}"
+            f"{name} must have {bounds.size} numbers, one per observed variable, got {shown(given)}"
         )
     unbounded = np.flatnonzero(~np.isfinite(ends))
     if unbounded.size:

@@ -11,7 +11,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import one_of, whole
+from sdnn.arguments import array_of, one_of, shown, whole
 from sdnn.config import AcrobotConfig
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.picture import AcrobotPicture
@@ -137,7 +137,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         """
         if not self._was_reset.all():
             raise gym.error.ResetNeeded("call reset before step")
-        shares = np.asarray(actions, dtype=np.float64)
+        shares = array_of("actions", actions, "fiu").astype(np.float64, copy=False)
         if shares.shape not in ((self.num_envs, 1), (self.num_envs,)):
             raise ValueError(
                 f"actions must have shape ({self.num_envs}, 1), got shape {shares.shape}"
@@ -176,28 +176,24 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         self._picture = None
 
     def _reset_mask(self, mask: Any) -> NDArray[np.bool_]:
-        chosen = np.ones(self.num_envs, np.bool_) if mask is None else np.asarray(mask)
-        if chosen.dtype != np.bool_ or chosen.shape != (self.num_envs,) or not chosen.any():
+        name = "options['reset_mask']"
+        chosen = np.ones(self.num_envs, np.bool_) if mask is None else array_of(name, mask, "b")
+        if chosen.shape != (self.num_envs,) or not chosen.any():
             raise ValueError(
-                f"options['reset_mask'] must be a bool array of shape ({self.num_envs},) with at "
-                f"least one True, got {mask!r}"
+                f"{name} must be a bool array of shape ({self.num_envs},) with at "
+                f"least one True, got {shown(mask)}"
             )
         return chosen
 
     def _tolerances_of(self, values: ArrayLike) -> NDArray[np.float64]:
-        try:
-            given = np.asarray(values)
-        except ValueError:  # rows of different lengths
-            given = np.empty(0, object)
-        if given.dtype.kind not in "iuf":
-            raise TypeError(f"goal_tolerance must be numbers, got {values!r}")
+        given = array_of("goal_tolerance", values, "fiu")
         if given.shape not in ((), (self.num_envs,)):
             raise ValueError(
                 f"goal_tolerance must be a number or of shape ({self.num_envs},), "
                 f"got shape {given.shape}"
             )
         if not (given >= 0.0).all():
-            raise ValueError(f"goal_tolerance must be at least 0, got {values!r}")
+            raise ValueError(f"goal_tolerance must be at least 0, got {shown(values)}")
         return np.full(self.num_envs, given, np.float64)
 
     def _begin(self, mask: NDArray[np.bool_]) -> None:

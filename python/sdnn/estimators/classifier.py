@@ -19,6 +19,7 @@ from sklearn.utils.multiclass import (
 )
 
 from sdnn import _core
+from sdnn.arguments import shown
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.inputs import Array, Floats, Ints
 from sdnn.estimators.training import LARGEST_WEIGHT, sample_weights, weighted_mean
@@ -147,7 +148,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     def _require_classes(self, classes: ArrayLike | None) -> None:
         """Check the arguments of learning piece by piece."""
         if self.class_weight is not None:
-            raise ValueError(f"class_weight works in fit only, got {self.class_weight!r}")
+            raise ValueError(f"class_weight works in fit only, got {shown(self.class_weight)}")
         if classes is None and not hasattr(self, "network_"):
             raise ValueError("classes must be given in the first call of partial_fit or learn_one")
 
@@ -202,7 +203,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         each = compute_sample_weight(self.class_weight, self.classes_[targets])
         if not np.all((each >= 0) & (each <= LARGEST_WEIGHT)):
             raise ValueError(
-                f"class_weight must be numbers in [0, {LARGEST_WEIGHT}], got {self.class_weight!r}"
+                f"class_weight must be numbers in [0, {LARGEST_WEIGHT}],"
+                f" got {shown(self.class_weight)}"
             )
         if weights is not None:
             each = each * weights

@@ -13,6 +13,7 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils import assert_all_finite
 from sklearn.utils.validation import validate_data
 
+from sdnn.arguments import shown
 from sdnn.coding import Coding, RandomInverse, WithMissing, coding_named
 
 __all__ = [
@@ -50,7 +51,7 @@ def one_index(column: Any, names: Sequence[str] | None, n_inputs: int) -> int:
             raise ValueError(f"X has no feature named {column!r}")
         return list(names).index(column)
     if isinstance(column, bool | np.bool_) or not isinstance(column, int | np.integer):
-        raise ValueError(f"a feature is given by its name or number, got {column!r}")
+        raise ValueError(f"a feature is given by its name or number, got {shown(column)}")
     if not -n_inputs <= column < n_inputs:
         raise ValueError(f"X has {n_inputs} features, there is no number {column}")
     return int(column) % n_inputs
@@ -83,11 +84,13 @@ def coding_entries(coding: Any) -> list[tuple[Coding, Columns]]:
     if not isinstance(coding, list | tuple):
         return [(coding_named(coding), slice(None))]
     if not coding:
-        raise ValueError(f"coding must name a coding for some columns, got {coding!r}")
+        raise ValueError(f"coding must name a coding for some columns, got {shown(coding)}")
     entries = []
     for entry in coding:
         if not isinstance(entry, list | tuple) or len(entry) != 2:
-            raise ValueError(f"coding must be a list of (coding, columns), got {entry!r} in it")
+            raise ValueError(
+                f"coding must be a list of (coding, columns), got {shown(entry)} in it"
+            )
         entries.append((coding_named(entry[0]), entry[1]))
     return entries
 
@@ -130,15 +133,15 @@ def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int, seed: in
         inputs = range(n_inputs)
         return sorted((mu, int(mu + step) % n_inputs) for mu in inputs for step in away) or [(0, 0)]
     if isinstance(pairs, Iterator) or not isinstance(pairs, Iterable):
-        raise ValueError(f"pairs must be a list of (modified, modifier), got {pairs!r}")
+        raise ValueError(f"pairs must be a list of (modified, modifier), got {shown(pairs)}")
     found = []
     for pair in pairs:
         if not isinstance(pair, list | tuple | np.ndarray) or len(pair) != 2:
-            raise ValueError(f"a pair is (modified, modifier), got {pair!r}")
+            raise ValueError(f"a pair is (modified, modifier), got {shown(pair)}")
         mu = one_index(pair[0], names, n_inputs)
         found.append((mu, mu if pair[1] is None else one_index(pair[1], names, n_inputs)))
         if pair[1] is not None and found[-1][0] == found[-1][1]:
-            raise ValueError(f"a feature cannot modify itself, got {pair!r}; use None")
+            raise ValueError(f"a feature cannot modify itself, got {shown(pair)}; use None")
     if not found:
         raise ValueError(f"pairs must not be empty, got {pairs!r}")
     return found
@@ -238,13 +241,13 @@ class CodedInputs(BaseEstimator):
             try:
                 row = np.asarray(values, dtype=np.float64)
             except (TypeError, ValueError):
-                raise ValueError(f"x must be numbers, got {x!r}") from None
+                raise ValueError(f"x must be numbers, got {shown(x)}") from None
             if not np.isfinite(row).all():
-                raise ValueError(f"x must be finite numbers, got {x!r}")
+                raise ValueError(f"x must be finite numbers, got {shown(x)}")
         else:
             row = np.array(values, dtype=object)
         if row.shape != (len(codings),):
-            raise ValueError(f"x must have {len(codings)} features, got {x!r}")
+            raise ValueError(f"x must have {len(codings)} features, got {shown(x)}")
         return row if row.dtype == np.float64 else self._finite(row[None], codings)[0]
 
     def _values_of(self, x: Mapping[Any, Any], codings: tuple[Coding, ...]) -> list[Any]:
@@ -267,7 +270,9 @@ class CodedInputs(BaseEstimator):
         names = list(x) if isinstance(x, Mapping) else None
         row = np.array(list(x.values()) if isinstance(x, Mapping) else x, dtype=object)
         if row.ndim != 1 or (names is not None and not all(isinstance(n, str) for n in names)):
-            raise ValueError(f"x must be a 1-D array, or a mapping with words as keys, got {x!r}")
+            raise ValueError(
+                f"x must be a 1-D array, or a mapping with words as keys, got {shown(x)}"
+            )
         table: Array = self._validated(row[None], reset=True)
         if names is not None:
             self.feature_names_in_ = np.array(names, dtype=object)

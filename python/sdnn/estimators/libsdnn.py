@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sdnn import _core
+from sdnn.arguments import path_of, shown
 from sdnn.files import read_bytes
 
 __all__ = [
@@ -138,7 +139,9 @@ class Entries(dict[str, str]):
         word = self.get(name, default)
         if word not in (default, *others):
             words = ", ".join((default, *others))
-            raise ValueError(f"{name.replace('/', ' / ')} must be one of {words}, got {word!r}")
+            raise ValueError(
+                f"{name.replace('/', ' / ')} must be one of {words}, got {shown(word)}"
+            )
         return word
 
     def whole(self, name: str, low: int, high: int) -> int:
@@ -283,7 +286,7 @@ def read_parameter_file(path: str | Path) -> LibsdnnParameters:
     Raises ValueError if it is not one, lacks an entry, or uses codes by correlation matrix; OSError
     if it cannot be read or is not a regular file.
     """
-    path = Path(path)
+    path = path_of("path", path)
     with naming(path):
         return _parameters(read_bytes(path, MOST_BYTES).decode("latin-1"), path)
 
@@ -309,7 +312,7 @@ def read_model_file(
     ValueError
         For another kind of file, a wrong size, or weights too large for exact sums.
     """
-    path = Path(path)
+    path = path_of("path", path)
     with naming(path):
         content = read_bytes(path, MOST_BYTES_OF_MODEL)
         length = struct.unpack_from("<i", content)[0] if len(content) >= 4 else -1

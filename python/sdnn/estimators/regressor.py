@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.utils._param_validation import Interval, StrOptions
 
+from sdnn.arguments import shown
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.inputs import Array, CodedRegressor, Floats, Ints
 from sdnn.estimators.training import weighted_mean
@@ -111,9 +112,9 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         try:
             targets = np.array(y, dtype=np.float64)
         except (TypeError, ValueError):
-            raise ValueError(f"y must be a number or one per output, got {y!r}") from None
+            raise ValueError(f"y must be a number or one per output, got {shown(y)}") from None
         if targets.ndim > 1 or not np.isfinite(targets).all():
-            raise ValueError(f"y must be a finite number or one per output, got {y!r}")
+            raise ValueError(f"y must be a finite number or one per output, got {shown(y)}")
         return self._learn_one(x, targets[None], None)
 
     def predict_one(self, x: Any) -> Any:
@@ -183,7 +184,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
             ):
                 raise ValueError(
                     "output_range must be (low, high) or one row (low, high) per output, "
-                    f"within {FURTHEST}, low < high, got {self.output_range!r}"
+                    f"within {FURTHEST}, low < high, got {shown(self.output_range)}"
                 )
             return given
         self._need_two(targets, "the output_range that is not given")

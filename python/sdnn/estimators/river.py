@@ -11,6 +11,7 @@ import pandas as pd
 from river import base
 from sklearn.base import clone
 
+from sdnn.arguments import shown
 from sdnn.estimators.classifier import SDNNClassifier
 
 __all__ = ["RiverClassifier", "RiverRegressor"]
@@ -28,7 +29,7 @@ class Waiting:
 
     def __init__(self, model: Any, grace_period: int = 100) -> None:
         if grace_period < 2:
-            raise ValueError(f"grace_period must be at least 2, got {grace_period!r}")
+            raise ValueError(f"grace_period must be at least 2, got {shown(grace_period)}")
         self.model = model
         self.grace_period = grace_period
         self.fitted: Any = None
@@ -106,7 +107,7 @@ class RiverClassifier(Waiting, base.Classifier):
         if not hasattr(self.model, "predict_proba_one"):
             raise NotImplementedError(
                 "probabilities need scheme='one_vs_rest' and more than one of n_units_per_class, "
-                f"got {self.model!r}"
+                f"got {shown(self.model)}"
             )
         if self.fitted is None:
             n_samples = len(self.targets)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sdnn import _core
+from sdnn.arguments import shown
 from sdnn.estimators.inputs import Array, Floats, Ints
 from sdnn.estimators.network import Network
 
@@ -62,10 +63,10 @@ def sample_weights(
     try:
         each = np.array(weights, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ValueError(f"{wanted}, got {weights!r}") from None
+        raise ValueError(f"{wanted}, got {shown(weights)}") from None
     each = np.full(n_samples, each) if each.ndim == 0 else each
     if each.shape != (n_samples,) or not np.all((each >= 0) & (each <= LARGEST_WEIGHT)):
-        raise ValueError(f"{wanted}, got {weights!r}")
+        raise ValueError(f"{wanted}, got {shown(weights)}")
     if not each.any():
         raise ValueError(f"{name} must be above zero for some sample, got zero for all")
     if each.sum() > MOST_PRESENTED:

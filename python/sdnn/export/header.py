@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from sdnn._core import __version__
 from sdnn.agents import Agent, Scaling, SDNNQLearning
-from sdnn.arguments import argument_error, path_of, whole
+from sdnn.arguments import argument_error, path_of, shown, whole
 from sdnn.export.tables import (
     Input,
     Tables,
@@ -128,7 +128,7 @@ def c_header(agent: Agent[Any, Any], name: str, *, fraction_bits: int | None = N
         raise argument_error(
             "name",
             "must be a C identifier of letters, digits and single underscores between them,"
-            f" at most {_LARGEST_NAME} long, got {name!r}",
+            f" at most {_LARGEST_NAME} long, got {shown(name)}",
         )
     return _Writer(agent, name, fraction_bits).header()
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from sdnn.arguments import one_of
+
 PAPER_TRIALS = 10  # per case; fewer support no conclusion
 PAPER_EPISODES = 15_000  # learning episodes per trial
 
@@ -94,8 +96,7 @@ WORDS = (*(experiment.id for experiment in EXPERIMENTS), COST, "all")
 
 def select_experiments(word: str) -> tuple[Experiment, ...]:
     """Return the experiments that one of `WORDS` stands for; none for ``"cost"``."""
-    if word not in WORDS:
-        raise ValueError(f"experiment must be one of {list(WORDS)}, got {word!r}")
+    one_of("experiment", word, WORDS)
     return tuple(e for e in EXPERIMENTS if word in (e.id, "all"))
 
 

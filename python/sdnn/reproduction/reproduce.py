@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from sdnn.arguments import whole
+from sdnn.arguments import one_of, whole
 from sdnn.config import SensorConfig
 from sdnn.files import csv_bytes, remove_abandoned_files
 from sdnn.reproduction import cost
@@ -248,8 +248,7 @@ def case_spec(case: Case, agent: str, n_episodes: int = PAPER_EPISODES) -> RunSp
 
     A ValueError says that the agent takes no part in the case, or that there is no such agent.
     """
-    if agent not in case.agents:
-        raise ValueError(f"agent must be one of {case.agents} in case {case.id}, got {agent!r}")
+    one_of("agent", agent, case.agents)
     name, preset = split_label(agent)
     return RunSpec(
         agent=AgentSpec(name=name, preset=preset),

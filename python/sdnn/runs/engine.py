@@ -21,6 +21,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from sdnn.arguments import shown, whole
 from sdnn.interrupts import Interrupts
 from sdnn.machine import instruction_set, n_cores
 from sdnn.runs.registry import title_of
@@ -44,8 +45,11 @@ def trial_seed(root_seed: int, case_id: str, trial: int) -> int:
     >>> trial_seed(0, "s4", 0) == trial_seed(0, "s4", 1)
     False
     """
-    spawn_key = (zlib.crc32(case_id.encode()), trial)
-    word = np.random.SeedSequence(root_seed, spawn_key=spawn_key).generate_state(1, np.uint64)[0]
+    if not isinstance(case_id, str):
+        raise TypeError(f"case_id must be a text, got {shown(case_id)}")
+    spawn_key = (zlib.crc32(case_id.encode()), whole("trial", trial, 0, 2**32 - 1))
+    entropy = whole("root_seed", root_seed, 0, 2**64 - 1)
+    word = np.random.SeedSequence(entropy, spawn_key=spawn_key).generate_state(1, np.uint64)[0]
     return int(word) >> 1
 
 
@@ -69,6 +73,7 @@ def plan_of(
 
     The first trial of every specification comes first, so an interrupted run covers all evenly.
     """
+    whole("n_trials", n_trials, 0, 10**6)
     parts = [(case_id, spec, spec.label, spec.config_hash) for case_id, spec in specs]
     plan: dict[TrialKey, PlannedTrial] = {}
     for number in range(n_trials):
@@ -302,9 +307,7 @@ class ThreadExecutor:
     """
 
     def __init__(self, jobs: int | None = None) -> None:
-        self.jobs = n_cores() if jobs is None else jobs
-        if self.jobs < 1:
-            raise ValueError(f"jobs must be at least 1, got {self.jobs}")
+        self.jobs = n_cores() if jobs is None else whole("jobs", jobs, 1, 2**16)
 
     def run(
         self, planned: Sequence[PlannedTrial], stop: threading.Event

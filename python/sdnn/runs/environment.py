@@ -16,6 +16,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from sdnn.agents.scaling import Scaling, neighbours
+from sdnn.arguments import shown
 from sdnn.bounds import flat_bounds
 from sdnn.environments import NoisySensors, RedundantSensors, UnitSensors
 from sdnn.runs.errors import ConfigError, RunError
@@ -116,7 +117,9 @@ class EnvironmentSpec(Settings, frozen=True):
             raise ConfigError("kwargs", f"must be data that JSON has: {error}") from None
         for key, (low, high) in self.ranges.items():
             if key != ALL and not (key.isascii() and key.isdigit()):
-                raise ConfigError(f"ranges.{key}", f"must be of 'all' or a number, got {key!r}")
+                raise ConfigError(
+                    f"ranges.{key}", f"must be of 'all' or a number, got {shown(key)}"
+                )
             if not (np.isfinite([low, high]).all() and low < high):
                 raise ConfigError(
                     f"ranges.{key}", f"must be finite, low < high, got {low} and {high}"

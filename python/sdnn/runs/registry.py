@@ -26,7 +26,7 @@ from sdnn.agents import (
 )
 from sdnn.agents.episode import Learner
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
-from sdnn.arguments import argument_error
+from sdnn.arguments import argument_error, shown
 
 if TYPE_CHECKING:
     from sdnn.runs.trial import Trial
@@ -92,7 +92,7 @@ def register(entry: AgentEntry) -> None:
         If the id cannot be part of a file's name, or an agent has it already.
     """
     if not re.fullmatch(r"\w[\w.-]*", entry.id):
-        raise ValueError(f"id must be of letters, digits, '_', '.' and '-', got {entry.id!r}")
+        raise ValueError(f"id must be of letters, digits, '_', '.' and '-', got {shown(entry.id)}")
     if entry.id in AGENTS:
         raise ValueError(f"id must be a new one: an agent {entry.id!r} is already registered")
     AGENTS[entry.id] = entry
@@ -128,13 +128,13 @@ def split_label(label: str) -> tuple[str, str | None]:
     >>> split_label("sdnn-c-robust")
     ('sdnn-c', 'robust')
     """
-    if label in AGENTS:
+    if isinstance(label, str) and label in AGENTS:
         return label, None
     for entry in AGENTS.values():
         for preset in entry.presets:
-            if label == f"{entry.id}-{preset}":
+            if isinstance(label, str) and label == f"{entry.id}-{preset}":
                 return entry.id, preset
-    raise argument_error("agent", f"must be one of {', '.join(labels())}, got {label!r}")
+    raise argument_error("agent", f"must be one of {', '.join(labels())}, got {shown(label)}")
 
 
 def agent_entry(label: str) -> AgentEntry:

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
-from sdnn.arguments import real, whole
+from sdnn.arguments import real, shown, whole
 from sdnn.runs.trial import TrialRecord, TrialRows
 
 FloatArray = NDArray[np.float64]
@@ -59,7 +59,7 @@ class MeasureConfig:
 
     def __post_init__(self) -> None:
         if math.isnan(real("good_steps", self.good_steps)):
-            raise ValueError(f"good_steps must be a number, got {self.good_steps!r}")
+            raise ValueError(f"good_steps must be a number, got {shown(self.good_steps)}")
         whole("early_episodes", self.early_episodes, 0, 2**62)
         for name in ("learned_window", "stable_window", "final_window"):
             whole(name, getattr(self, name), 1, 2**62)

@@ -108,6 +108,8 @@ def checked(kind: Any, value: Any, key: str) -> Any:
         If it does not fit.
     """
     if isinstance(value, np.generic | np.ndarray):
+        if isinstance(value, np.ma.MaskedArray) or value.dtype.kind not in "biufU":
+            raise ConfigError(key, f"must be numbers or texts, got {shown(value)}")
         value = value.tolist()
     if isinstance(value, Mapping):
         for one in _alternatives(kind):

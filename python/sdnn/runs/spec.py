@@ -15,7 +15,7 @@ from msgspec import Meta
 
 from sdnn.agents import Agent
 from sdnn.agents.episode import Learner
-from sdnn.arguments import blamed
+from sdnn.arguments import blamed, shown
 from sdnn.config import ProtocolConfig
 from sdnn.environments import (
     AcrobotConfig,
@@ -148,7 +148,7 @@ class RunSpec(Settings, frozen=True):
         if isinstance(value, type(base)):
             return value
         words = f"must be a table or {type(base).__name__}{hint}"
-        raise ConfigError(name, f"{words}, got {value!r}")
+        raise ConfigError(name, f"{words}, got {shown(value)}")
 
     def _fill_agent(self) -> None:
         entry, preset = self._chosen_agent()
@@ -159,7 +159,7 @@ class RunSpec(Settings, frozen=True):
         if preset is not None and preset not in entry.presets:
             words = f"one of {', '.join(map(repr, entry.presets))}" if entry.presets else "omitted"
             raise ConfigError(
-                "agent.preset", f"must be {words} for the agent {entry.id!r}, got {preset!r}"
+                "agent.preset", f"must be {words} for the agent {entry.id!r}, got {shown(preset)}"
             )
         self._set(agent=self.agent.replace(name=entry.id, preset=preset))
         defaults = entry.parts(preset)
@@ -178,7 +178,7 @@ class RunSpec(Settings, frozen=True):
                 raise ConfigError("agent.name", blamed(error)[1]) from None
             return self._chosen_agent()  # which the environment's module may have registered
         if named is not None and preset not in (None, named):
-            raise ConfigError("agent.preset", f"must be that of {word!r}, got {preset!r}")
+            raise ConfigError("agent.preset", f"must be that of {word!r}, got {shown(preset)}")
         return agent_entry(name), named or preset
 
     def _of_spaces(self) -> dict[str, Any]:

@@ -4,7 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from bad_inputs import BAD, HOSTILE
+from bad_inputs import BAD
 from refusals import refuses
 from sdnn.agents import RBFQLearning, UnusableStepError, evaluate
 
@@ -77,7 +77,7 @@ def with_value(part, value):
 
 def bad_values(part):
     good = NUMBERS if part == "reward" else {"True"}
-    listed = {word: make() for word, make in (BAD | HOSTILE).items()} | OTHERS
+    listed = {word: make() for word, make in BAD.items()} | OTHERS
     return {word: value for word, value in listed.items() if word not in good}
 
 

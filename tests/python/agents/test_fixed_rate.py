@@ -65,3 +65,8 @@ def test_it_keeps_time_by_the_real_clock():
 @pytest.mark.parametrize("bad", [0.0, -1.0, 1e-4, 2e6, math.nan, math.inf, "fast", None, True])
 def test_impossible_rates_are_named(bad):
     refuses("hz", FixedRate, bad)
+
+
+@pytest.mark.parametrize("name", ["clock", "sleep"])
+def test_clock_and_sleep_are_functions(name):
+    refuses(name, FixedRate, 50.0, error=TypeError, **{name: 5})

@@ -183,7 +183,7 @@ def test_numbers_are_checked():
     for coding in (RandomInverse(), Anchor(), Circular(period=1.0)):
         with pytest.raises(ValueError, match="contains NaN"):
             coding.fit(UNIT, 64).bins(np.array([0.5, np.nan]))
-        refuses("convert", coding.fit(UNIT, 64).bins, np.array(["a"]))
+        refuses("column", coding.fit(UNIT, 64).bins, np.array(["a"]))
     with pytest.raises(ValueError, match=r"0\.0 and inf"):
         Anchor().fit(np.array([0.0, np.inf]), 64)
     refuses("infinity", Circular().bins, np.array([np.inf]))
@@ -224,9 +224,9 @@ def test_what_was_learned_is_not_learned_again(coding, column):
     ],
 )
 def test_impossible_knots_are_named(knots):
-    refuses(
-        "knots", RandomInverse(spacing="quantile", low=0.0, high=1.0, knots=knots).fit, UNIT, 400
-    )
+    for fields in ({"low": 0.0, "high": 1.0}, {}, {"spacing": "even"}):
+        coding = RandomInverse(**{"spacing": "quantile", "knots": knots, **fields})
+        refuses("knots", coding.fit, UNIT, 400)
 
 
 def test_knots_are_values_and_their_mean_ranks():

@@ -30,6 +30,7 @@ MATRICES = {
         (public_cells.coding_cells,),
         (public_cells.environment_cells,),
         (public_cells.experiment_cells,),
+        (public_cells.function_cells,),
     ],
     "commands": [(bad_options.command_cells, name) for name in bad_options.COMMANDS],
     "files": [

@@ -6,9 +6,13 @@ import inspect
 import pickle
 import re
 
+import gymnasium as gym
 import numpy as np
 
+import core_cells
 from bad_inputs import BAD, judged, parameters_of
+from sdnn import kernel
+from sdnn.agents import SDNNQLearning
 from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic, WithMissing
 from sdnn.environments import (
     AcrobotConfig,
@@ -18,6 +22,7 @@ from sdnn.environments import (
     SensorConfig,
 )
 from sdnn.estimators import SDNNClassifier, SDNNRegressor
+from sdnn.reproduction.cases import EXPERIMENTS, PAPER_CASES
 from sdnn.runs import (
     BudgetSpec,
     ConfigError,
@@ -25,6 +30,7 @@ from sdnn.runs import (
     MeasureConfig,
     ProtocolSpec,
     RunSpec,
+    agent_entry,
 )
 from sdnn.runs.results import episodes_to_learn
 
@@ -128,6 +134,8 @@ def _without_name(call):
 def _named_loosely(parameter, call, value):
     """Some are named by what is in them, "a feature", or by NumPy, "Seed"."""
     fault = judged(parameter, call, value=value)
+    if "while getting the repr" in fault or "Exceeds the limit" in fault:
+        return ""  # scikit-learn's message has the value
     words = {"coding": "coding|columns|feature", "pairs": "pair|feature", "random_state": "[Ss]eed"}
     is_named = re.search(words.get(parameter, parameter), fault.partition(":")[2])
     return "" if fault.startswith("did not name") and is_named else fault
@@ -184,6 +192,125 @@ def _coding_fault(coding, bins):
     return "" if is_place.all() else f"has bins {bins} of {coding.size}"
 
 
+GOOD = {
+    "agent": lambda: tiny_agent(),
+    "case": lambda: PAPER_CASES["s4"],
+    "cases": lambda: [PAPER_CASES["s4"]],
+    "case_id": lambda: "s4",
+    "coding": lambda: "anchor",
+    "config": lambda: MeasureConfig(),
+    "costs": lambda: (),
+    "data": lambda: {"coding": "anchor"},
+    "entry": lambda: agent_entry("rbf"),
+    "env": lambda: AcrobotSwingUpEnv(),
+    "episodes": lambda: 1,
+    "executor": lambda: None,
+    "experiment": lambda: EXPERIMENTS[0],
+    "fraction_bits": lambda: None,
+    "jobs": lambda: 1,
+    "label": lambda: "sdnn-c",
+    "library": lambda: "msvc",
+    "measured": lambda: (),
+    "memory_limit": lambda: 2**20,
+    "n_episodes": lambda: 20,
+    "n_trials": lambda: 1,
+    "n_units": lambda: 200,
+    "name": lambda: "portable",
+    "names": lambda: ("early_steps",),
+    "observer": lambda: None,
+    "options": lambda: None,
+    "path": lambda: "agent",
+    "plan": lambda: (),
+    "quick": lambda: True,
+    "records": lambda: (),
+    "reference": lambda: (),
+    "results": lambda: (),
+    "root_seed": lambda: 1,
+    "seed": lambda: 1,
+    "stop": lambda: None,
+    "store": lambda: None,
+    "title": lambda: "a title",
+    "trial": lambda: 0,
+    "word": lambda: "a",
+}
+"""Arguments of public functions; one that is missing here wants a line."""
+
+OBJECTS = {
+    "case", "cases", "config", "costs", "data", "entry", "executor", "experiment", "measured",
+    "names", "observer", "plan", "quick", "records", "reference", "results", "stop",
+    "store", "title",
+}  # fmt: skip
+"""Parameters of parts of this package: a wrong one gives an error of any type."""
+
+
+ELSEWHERE = {"evaluate", "load_agent"}
+"""Functions that other rows try."""
+
+NAMED = {"word": "experiment", "label": "agent", "n_episodes": "episodes", "name": "(name|set)"}
+"""Words of messages for parameters."""
+
+
+def tiny_agent():
+    spaces = gym.spaces.Box(0.0, 1.0, (2,)), gym.spaces.Discrete(2)
+    return SDNNQLearning(*spaces, approximator=core_cells.network_config())
+
+
+def public_functions():
+    for module in (*(f"sdnn.{room}" for room in ROOMS), "sdnn", "sdnn.kernel", "sdnn.export"):
+        for name in importlib.import_module(module).__all__:
+            value = getattr(importlib.import_module(module), name)
+            if inspect.isfunction(value) and name not in ELSEWHERE:
+                yield f"{module}.{name}", value
+
+
+def function_cells():
+    """Every public function: a bad value is refused, or taken; nothing crashes or hangs."""
+    for name, function in public_functions():
+        for parameter in parameters_of(function):
+            for word, value in BAD.items():
+                cell = _function_cell(function, parameter, value)
+                yield f"{name}({parameter}={word})", cell
+    one = kernel.AnalyticKernel("anchor", n_inputs=2, n_units=100)
+    for parameter in parameters_of(kernel.AnalyticKernel.__init__):
+        for word, value in BAD.items():
+            cell = _kernel_cell(kernel.AnalyticKernel, parameter, value)
+            yield f"AnalyticKernel({parameter}={word})", cell
+    for parameter in ("X", "Y"):
+        for word, value in BAD.items():
+            yield f"AnalyticKernel()({parameter}={word})", _call_cell(one, parameter, value)
+
+
+def _kernel_cell(cls, parameter, value):
+    def call():
+        given = {"coding": "anchor", "n_inputs": 2, "n_units": 100, parameter: value()}
+        return "" if np.isfinite(cls(**given)(np.zeros((2, 2)))).all() else "gave NaN"
+
+    return lambda: judged(parameter, call)
+
+
+def _call_cell(one, parameter, value):
+    def call():
+        given = {"X": np.zeros((2, 2)), parameter: value()}
+        return "" if np.isfinite(one(**given)).all() else "gave NaN"
+
+    return lambda: judged(parameter, call)
+
+
+def _function_cell(function, parameter, value):
+    def run():
+        parameters = parameters_of(function)
+        given = {name: GOOD[name]() for name in parameters} | {parameter: value()}
+        if "case" in parameters and parameter != "agent":
+            given["agent"] = "sdnn-c"
+        if parameter not in OBJECTS:
+            return _without_key(NAMED.get(parameter, parameter), lambda: (function(**given), "")[1])
+        with contextlib.suppress(Exception):
+            function(**given)
+        return ""
+
+    return run
+
+
 def experiment_cells():
     """Settings of trials and measures are refused when they are made, or work."""
     made = {
@@ -203,13 +330,19 @@ def experiment_cells():
 
 
 def _experiment_cell(used, parameter, value):
-    def call():
+    return lambda: _without_key(parameter, lambda: used({parameter: value()}), value)
+
+
+def _without_key(parameter, call, value=None):
+    """Judge a call whose ConfigError counts as a ValueError."""
+
+    def called():
         try:
-            return used({parameter: value()})
+            return call()
         except ConfigError as error:
             raise ValueError(str(error)) from error
 
-    return lambda: judged(parameter, call, value=value)
+    return judged(parameter, called, value=value)
 
 
 def _protocol_used(given):

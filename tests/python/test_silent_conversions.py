@@ -1,0 +1,128 @@
+"""What NumPy would turn into two numbers without a word is refused wherever two are expected."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from sdnn.agents import RBFQLearning, Transition
+from sdnn.coding import RandomInverse
+from sdnn.environments import (
+    AcrobotSwingUpVectorEnv,
+    NoisySensors,
+    RedundantSensors,
+    UnitSensors,
+)
+from sdnn.kernel import AnalyticKernel
+from sdnn.runs import RunSpec, trial_seed
+from sdnn.runs.settings import checked
+
+OTHERS = {
+    "masked": lambda: np.ma.masked_array([0.1, 0.2], [False, True]),
+    "dates": lambda: np.array(["1970-01-02", "1970-01-03"], "M8[D]"),
+    "times": lambda: np.array([1, 2], "m8[s]"),
+    "texts": lambda: ["0.1", "0.2"],
+    "texts of NumPy": lambda: np.array(["0.1", "0.2"]),
+    "bytes": lambda: np.array([b"0.1", b"0.2"]),
+    "complex": lambda: np.array([0.1 + 0j, 0.2 + 0j]),
+    "objects": lambda: np.array([0.1, "0.2"], object),
+    "a column": lambda: np.array([[0.1], [0.2]]),
+    "a row": lambda: np.array([[0.1, 0.2]]),
+    "three": lambda: [0.1, 0.2, 0.3],
+    "none": lambda: [],
+}
+HERE = np.array([0.1, 0.2])
+
+
+class Plane(gym.Env):
+    observation_space = gym.spaces.Box(0.0, 1.0, (2,), np.float64)
+    action_space = gym.spaces.Box(0.0, 1.0, (2,), np.float64)
+
+
+def agent():
+    return RBFQLearning(Plane.observation_space, Plane.action_space, seed=1)
+
+
+def composed():
+    space = gym.spaces.Dict(at=Plane.observation_space)
+    return RBFQLearning(space, gym.spaces.Discrete(2), seed=1)
+
+
+def acrobots():
+    envs = AcrobotSwingUpVectorEnv(num_envs=2)
+    envs.reset(seed=1)
+    return envs
+
+
+TAKERS = {
+    "act": lambda pair: agent().act(pair),
+    "act, of a Dict": lambda pair: composed().act({"at": pair}),
+    "learn, observation": lambda pair: agent().learn(Transition(pair, HERE, 1.0, HERE, False)),
+    "learn, next": lambda pair: agent().learn(Transition(HERE, HERE, 1.0, pair, False)),
+    "values": lambda pair: agent().q_values(pair),
+    "UnitSensors": lambda pair: UnitSensors(Plane()).observation(pair),
+    "RedundantSensors": lambda pair: RedundantSensors(Plane(), [np.sum]).observation(pair),
+    "NoisySensors": lambda pair: NoisySensors(Plane()).observation(pair),
+    "observation_low": lambda pair: UnitSensors(Plane(), pair, [1.0, 1.0]),
+    "knots": lambda pair: RandomInverse(knots=pair, spacing="quantile").fit(HERE, 400),
+}
+LISTS = {
+    "learn, action": lambda pair: agent().learn(Transition(HERE, pair, 1.0, HERE, False)),
+    "actions of acrobots": lambda pair: acrobots().step(pair),
+}
+"""Takers of two numbers in any shape."""
+CELLS = {
+    "kernel": lambda pair: AnalyticKernel("anchor", n_inputs=2, n_units=100)([pair]),
+    "coding": lambda pair: RandomInverse().fit(pair, 400),
+}
+"""Takers of samples: of any number of them, and words become a clear error of their own."""
+
+
+@pytest.mark.parametrize("name", [*TAKERS, *LISTS, *CELLS])
+def test_other_pairs_are_refused(name):
+    shapes = {"a column", "a row"} if name in LISTS else set()
+    if name in CELLS:
+        shapes = {"a column", "a row", "three", "objects"}
+    take = (TAKERS | LISTS | CELLS)[name]
+    for word, make in OTHERS.items():
+        if word not in shapes:
+            with pytest.raises((TypeError, ValueError)) as told:
+                take(make())
+            assert "incompatible" not in str(told.value), word
+    if name != "knots":
+        take(HERE)
+
+
+NUMBERS = {
+    "a text": "1",
+    "a text of NumPy": np.str_("1"),
+    "a date": np.datetime64(1, "ns"),
+    "a time": np.timedelta64(1, "ns"),
+    "complex": 1 + 0j,
+    "masked": np.ma.masked_array(1, True),
+    "bytes": b"1",
+}
+BOOLS = {"True": True, "True of NumPy": np.True_, "an array": np.array(True)}
+
+
+@pytest.mark.parametrize("kind", [int, float])
+def test_settings_are_numbers_of_their_kind(kind):
+    for word, value in {**NUMBERS, **BOOLS, "not finite": np.nan}.items():
+        with pytest.raises(Exception, match="must be"):
+            assert checked(kind, value) is None, word
+
+
+def test_fields_of_runs_are_of_their_type():
+    for given in (
+        {"environment": "CartPole-v1"}, {"environment": 5}, {"agent": "sdnn-c"}, {"budget": 5},
+        {"learning": 5}, {"approximator": []}, {"output": True}, {"protocol": "abc"},
+    ):  # fmt: skip
+        with pytest.raises(Exception, match=next(iter(given))):
+            RunSpec(**given)
+
+
+def test_seeds_of_trials_are_whole_numbers():
+    for value in (*NUMBERS.values(), *BOOLS.values(), 0.5, 1.0, [1]):
+        with pytest.raises(ValueError, match="root_seed"):
+            trial_seed(value, "s4", 0)
+        with pytest.raises(ValueError, match=r"\btrial\b"):
+            trial_seed(0, "s4", value)
