@@ -19,6 +19,7 @@ __all__ = [
     "choice",
     "flag",
     "has_methods",
+    "is_of_class",
     "one_of",
     "path_of",
     "real",
@@ -89,7 +90,8 @@ def argument_error(name: str, problem: str, kind: type[Exception] = ValueError) 
     >>> argument_error("n_bins", "must be at least 2, got 1")
     ValueError('n_bins must be at least 2, got 1')
     """
-    error: Any = kind(f"{name} {problem}")
+    is_named = problem.startswith(f"{name},")  # with others, as the core does
+    error: Any = kind(problem if is_named else f"{name} {problem}")
     error.argument = name
     return error  # type: ignore[no-any-return]
 
@@ -190,6 +192,19 @@ def path_of(name: str, value: Any) -> Path:
     if not isinstance(text, str) or not text or "\0" in text:
         raise argument_error(name, f"must be the name of a file, got {shown(value)}")
     return Path(text)
+
+
+def is_of_class(value: Any, kind: type[Any]) -> bool:
+    """Whether a value is of a class, or of one with its name and fields.
+
+    A cell of a notebook that runs again defines its classes again.
+    """
+    if isinstance(value, kind):
+        return True
+    own = type(value)
+    if (own.__module__, own.__qualname__) != (kind.__module__, kind.__qualname__):
+        return False
+    return getattr(own, "__annotations__", {}) == getattr(kind, "__annotations__", {})
 
 
 def has_methods(name: str, value: Any, what: str, *methods: str) -> None:

@@ -22,11 +22,22 @@ from sdnn.agents.spaces import (
     Ranges,
     action_space_of,
     observation_space_of,
+    require_unbatched,
     space_data,
     space_of,
 )
 from sdnn.agents.training import Training, TrainingResult
-from sdnn.arguments import argument_error, blamed, flag, path_of, real, seed_of, shown, whole
+from sdnn.arguments import (
+    argument_error,
+    blamed,
+    flag,
+    is_of_class,
+    path_of,
+    real,
+    seed_of,
+    shown,
+    whole,
+)
 from sdnn.config import WARM_UP, values_of
 from sdnn.files import Arrays, Description, write_file
 
@@ -38,6 +49,7 @@ if TYPE_CHECKING:
 __all__ = ["Agent", "load_agent"]
 
 _MOST_ENVIRONMENTS = 2**14
+_MANY_VARIABLES = 16
 
 Approximator = TypeVar("Approximator")
 Learning = TypeVar("Learning")
@@ -105,6 +117,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         warm_up_steps: int = WARM_UP.default,
     ) -> None:
         self._take_spaces(observation_space, action_space)
+        require_unbatched(observation_space, action_space)
         try:
             space_data(observation_space)  # what could not be saved had better not be learned
         except TypeError as error:
@@ -128,7 +141,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     def _take_settings(self, approximator: Any, learning: Any, seed: Any, steps: Any) -> None:
         for name, part in (("approximator", approximator), ("learning", learning)):
             kind: type[Any] = getattr(self, f"{name}_type")
-            if not isinstance(part, kind):
+            if not is_of_class(part, kind):
                 raise TypeError(f"{name} must be a {kind.__name__}, got {shown(part)}")
         self._approximator, self.learning = approximator, learning
         self.seed = seed_of(seed)
@@ -151,13 +164,21 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         except ValueError as error:
             argument, problem = blamed(error)
             reasons = {"n_inputs": "n_inputs follows from observation_space"}
+            if self._observations.n_variables > _MANY_VARIABLES:
+                reasons["n_inputs"] += (
+                    "; gymnasium.wrappers.TransformObservation can make fewer variables of it, such"
+                    " as features of a picture"
+                )
             if not self._actions.is_box:
                 reasons["n_actions"] = "n_actions follows from action_space"
             if len(self._action.low) > 1:
                 reasons["max_table_bytes"] = "for each dimension of action_space"
             found = [reason for word, reason in reasons.items() if word in str(error)]
             if argument.startswith("action."):
-                found = ["of action_space; gymnasium's RescaleAction gives a Box finite bounds"]
+                found = [
+                    "of action_space; gymnasium.wrappers.TransformAction(env, lambda action:"
+                    " action, gymnasium.spaces.Box(low, high)) gives it finite bounds"
+                ]
             if not (argument and found):
                 raise
             raise argument_error(argument, f"{problem} ({', '.join(found)})") from error
@@ -396,7 +417,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         another kind of agent.
         """
         agent = load_agent(path)
-        if not isinstance(agent, cls):
+        if not is_of_class(agent, cls):
             raise ValueError(f"{path} holds a {type(agent).__name__}, not a {cls.__name__}")
         return agent
 

@@ -22,6 +22,7 @@ __all__ = [
     "observation_space_of",
     "require_same_kind",
     "require_single",
+    "require_unbatched",
     "space_data",
     "space_of",
 ]
@@ -246,6 +247,30 @@ def require_single(name: str, env: Any) -> None:
         )
 
 
+def require_unbatched(observations: gym.Space[Any], actions: gym.Space[Any]) -> None:
+    """Check that spaces are not the batched ones of a vector environment; ValueError if they are.
+
+    These are a Box with rows of equal bounds, one for each environment, and as many actions.
+    """
+    n = observations.shape[0] if observations.shape else 0
+    is_batched = _has_equal_rows(observations) and (
+        _has_equal_rows(actions)
+        or (isinstance(actions, gym.spaces.MultiDiscrete) and len(set(actions.nvec.flat)) == 1)
+    )
+    if is_batched and actions.shape is not None and actions.shape[0] == n:
+        raise ValueError(
+            "observation_space and action_space must be those of one environment, got those of"
+            f" {n}: a vector has them as single_observation_space and single_action_space; where"
+            " rows are no environments, gymnasium.wrappers.FlattenObservation flattens them"
+        )
+
+
+def _has_equal_rows(space: gym.Space[Any]) -> bool:
+    if not isinstance(space, gym.spaces.Box) or len(space.shape) < 2:
+        return False
+    return bool((space.low == space.low[:1]).all() and (space.high == space.high[:1]).all())
+
+
 def require_same_kind(agent: Any, env: Any) -> None:
     """Check that an agent can learn in an environment, or in each of a vector.
 
@@ -333,13 +358,29 @@ def space_data(space: gym.Space[Any]) -> dict[str, Any]:
     if isinstance(space, gym.spaces.MultiBinary):
         return {"multi_binary": list(space.shape)}
     if isinstance(space, gym.spaces.Dict):
-        return {"dict": [[key, space_data(part)] for key, part in space.spaces.items()]}
+        return {"dict": [[_key(key), space_data(part)] for key, part in space.spaces.items()]}
     if isinstance(space, gym.spaces.Tuple):
         return {"tuple": [space_data(part) for part in space.spaces]}
     raise TypeError(
         "must be a Box, Discrete, MultiDiscrete or MultiBinary, or a Dict or Tuple of such,"
         f" got {space}"
     )
+
+
+def _key(key: Any) -> Any:
+    """Return a key of a Dict as JSON has it: a tuple as a list; TypeError for others."""
+    if type(key) is tuple:
+        return [_key(one) for one in key]
+    if type(key) not in (str, int, bool):
+        raise TypeError(
+            "must have keys that are texts, whole numbers or tuples of such, got the key"
+            f" {shown(key)}"
+        )
+    return key
+
+
+def _key_of(data: Any) -> Any:
+    return tuple(map(_key_of, data)) if isinstance(data, list) else data
 
 
 _TYPES = ["|b1", "|i1", "<i2", "<i4", "<i8", "|u1", "<u2", "<u4", "<u8", "<f2", "<f4", "<f8"]
@@ -378,7 +419,7 @@ def space_of(data: Mapping[str, Any]) -> gym.Space[Any]:
     if "multi_binary" in data:
         return gym.spaces.MultiBinary(data["multi_binary"])
     if "dict" in data:
-        return gym.spaces.Dict([(key, space_of(part)) for key, part in data["dict"]])
+        return gym.spaces.Dict([(_key_of(key), space_of(part)) for key, part in data["dict"]])
     return gym.spaces.Tuple([space_of(part) for part in data["tuple"]])
 
 

@@ -15,7 +15,7 @@ from msgspec import Meta
 
 from sdnn.agents import Agent
 from sdnn.agents.episode import Learner
-from sdnn.arguments import blamed, shown
+from sdnn.arguments import blamed, is_of_class, shown
 from sdnn.config import ProtocolConfig
 from sdnn.environments import (
     AcrobotConfig,
@@ -145,7 +145,7 @@ class RunSpec(Settings, frozen=True):
         value = getattr(self, name)
         if value is None or isinstance(value, Mapping):
             return changed(base, value or {}, name, hint)
-        if isinstance(value, type(base)):
+        if is_of_class(value, type(base)):
             return value
         words = f"must be a table or {type(base).__name__}{hint}"
         raise ConfigError(name, f"{words}, got {shown(value)}")

@@ -214,6 +214,15 @@ def test_two_classes_of_agents_cannot_have_one_name():
     assert type(copy.deepcopy(agent)) is again
 
 
+def test_classes_of_a_cell_that_runs_again_are_the_same(tmp_path):
+    first, second = (type("MineAgain", (RBFQLearning,), {}) for _ in range(2))
+    second(PLANE, TORQUE).save(tmp_path / "agent")
+    assert type(first.load(tmp_path / "agent")) is second
+    type("MineAgain", (RBFQLearning,), {"__annotations__": {"mass": float}})
+    with pytest.raises(ValueError, match="MineAgain"):
+        first.load(tmp_path / "agent")
+
+
 ONE_ANGLE = [{"angles": [0]}, {"angle_pairs": [(1, 0)]}]
 
 

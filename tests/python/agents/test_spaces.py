@@ -1,11 +1,14 @@
 """Whether an environment is one that an agent was made for."""
 
+import enum
+
 import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Tuple
 
 from refusals import refuses
+from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLearning, load_agent
 from sdnn.agents.spaces import require_same_kind
 
 PLANE = Box(-1.0, 1.0, (2,))
@@ -78,3 +81,81 @@ def test_long_spaces_are_told_in_a_line():
     with pytest.raises(ValueError, match="observation_space") as caught:
         require_same_kind(Spaces(wide), Spaces(PLANE))
     assert "\n" not in str(caught.value)
+
+
+class Colour(enum.Enum):
+    RED = 1
+
+
+@pytest.mark.parametrize("key", [("left", 0), 3, True, (("a", 1), "b"), ()])
+def test_keys_of_a_dict_come_back_from_a_file(key, tmp_path):
+    space = Dict([(key, PLANE), ("other", Discrete(3))])
+    agent = RBFQLearning(space, Discrete(2), seed=1)
+    agent.save(tmp_path / "agent")
+    again = load_agent(tmp_path / "agent")
+    assert list(again.observation_space.spaces) == [key, "other"]
+    seen = space.sample()
+    assert again.act(seen) == agent.act(seen)
+
+
+@pytest.mark.parametrize(
+    "key", [None, 0.5, b"a", Colour.RED, np.int64(3), np.str_("a"), frozenset(), ("a", 0.5)]
+)
+def test_other_keys_are_refused_before_anything_is_learned(key):
+    with pytest.raises(TypeError, match=r"observation_space.*\bkey\b"):
+        RBFQLearning(Dict([(key, PLANE)]), Discrete(2))
+
+
+@pytest.mark.parametrize("name", ["CartPole-v1", "Pendulum-v1", "MountainCarContinuous-v0"])
+@pytest.mark.parametrize("n", [1, 3])
+def test_batched_spaces_of_a_vector_are_refused_by_their_names(name, n):
+    envs = gym.make_vec(name, num_envs=n)
+    with pytest.raises(ValueError, match="single_observation_space"):
+        RBFQLearning(envs.observation_space, envs.action_space)
+    assert RBFQLearning(envs.single_observation_space, envs.single_action_space)
+
+
+def test_rows_that_are_no_environments_are_taken():
+    for observations, actions in (
+        (Box(-1.0, 1.0, (3, 2)), PLANE),
+        (Box(-1.0, 1.0, (2, 2)), PLANE),
+        (Box(-1.0, 1.0, (2, 2)), MultiDiscrete([2, 3])),
+        (Box(np.array([[-1.0], [-2.0]]), np.ones((2, 1)), dtype=np.float64), MultiDiscrete([3, 3])),
+    ):
+        assert RBFQLearning(observations, actions).is_warming_up is False
+
+
+def test_what_is_recommended_for_actions_without_bounds_works():
+    class Unbounded(gym.Env):
+        observation_space, action_space = PLANE, Box(-np.inf, np.inf, (2,))
+
+    env = Unbounded()
+    with pytest.raises(ValueError, match=r"TransformAction\(env, lambda action: action,"):
+        RBFQLearning(env.observation_space, env.action_space)
+    bounded = gym.wrappers.TransformAction(env, lambda action: action, Box(-1.0, 1.0, (2,)))
+    assert RBFQLearning(bounded.observation_space, bounded.action_space)
+
+
+def test_pictures_are_refused_with_what_helps():
+    for kind in (RBFQLearning, SDNNQLearning):
+        with pytest.raises(ValueError, match="TransformObservation"):
+            kind(Box(0, 1, (10, 10, 6), np.bool_), Discrete(6))
+
+
+@pytest.mark.parametrize("kind", [RBFQLearning, SDNNQLearning, FuzzyQLearning])
+def test_a_memory_limit_is_for_all_networks_of_an_agent(kind):
+    def fits(n_dimensions, limit):
+        approximator = kind.approximator_type(max_table_bytes=limit)
+        try:
+            kind(PLANE, Box(-1.0, 1.0, (n_dimensions,)), approximator=approximator)
+        except ValueError as error:
+            return "max_table_bytes" not in str(error)
+        return True
+
+    low, high = 1, 2**30
+    while low < high:
+        middle = (low + high) // 2
+        low, high = (low, middle) if fits(1, middle) else (middle + 1, high)
+    for n in (2, 3):
+        assert fits(n, n * low)
+        assert not fits(n, n * low - 1)
