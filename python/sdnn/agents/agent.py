@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 import gymnasium as gym
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,6 +28,7 @@ from sdnn.agents.spaces import (
     space_of,
 )
 from sdnn.agents.training import Training, TrainingResult
+from sdnn.agents.wrappers import Statistics, read_statistics
 from sdnn.arguments import (
     argument_error,
     blamed,
@@ -100,6 +102,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     _approximator: Approximator
     _controller: _core.Controller
     _scaling: Scaling | None = None
+    wrappers: Sequence[Statistics] = ()
+    """What the wrappers of its training's environment have learned; kept in files."""
     _next_episode: int = 0  # of `train` without a seed
     _tables: Sequence[NDArray[np.int8]] = ()
 
@@ -424,6 +428,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     def description(self) -> Description:
         """Return the settings, from which `rebuild` makes an agent like this one."""
         more: Description = {} if self.scaling is None else {"scaling": self.scaling.values()}
+        if self.wrappers:
+            more["wrappers"] = msgspec.to_builtins(self.wrappers)
         if self._next_episode:
             more["next_episode"] = self._next_episode
         return {
@@ -469,6 +475,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             raise ValueError(f"observation must be of {n_variables} variables")
         if "action_space" in description and agent._action != agent._actions.config:
             raise ValueError(f"action must be of {agent.action_space}, got {agent._action}")
+        if "wrappers" in description:
+            agent.wrappers = read_statistics(description["wrappers"])
         if "scaling" in description:
             agent.scaling = Scaling.of_values(description["scaling"], n_variables)
         agent._next_episode = whole("next_episode", description.get("next_episode", 0), 0, 2**53)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn.agents.files import SavedEpisode
+from sdnn.agents.wrappers import Statistics, learning_wrappers, names_of, statistics_of
 from sdnn.arguments import flag, real, shown
 
 __all__ = [
@@ -290,6 +291,8 @@ class Episodes:
         In each environment; None: the next one has not begun.
     next_number : int
         Of the episode that begins next.
+    wrappers, learned : list
+        Those that learn, and what they had learned when the last episode began.
     """
 
     def __init__(
@@ -303,10 +306,17 @@ class Episodes:
         self._env, self._seed, self._options = env, seed, options
         self._adapter_for = adapter_for
         self._adapter = adapter_for(env)
+        self.wrappers = learning_wrappers(env)
+        self.learned: list[Statistics] = []
         self.n_environments = self._adapter.n_environments
         self.next_number = first
         self.present: list[Episode | None] = [None] * self.n_environments
         self._first_left = 0  # the environments before it have learned this round's step
+
+    @property
+    def learned_before(self) -> list[Statistics]:
+        """What is learned before the present episode, or the next."""
+        return self.learned if any(self.present) else statistics_of(self.wrappers)
 
     def leave(self) -> None:
         """Begin anew in every environment with the next round, with other seeds."""
@@ -373,6 +383,7 @@ class Episodes:
         over = [i for i, episode in enumerate(self.present) if episode is None]
         numbers = {i: self.next_number + k for k, i in enumerate(over)}
         self.next_number += len(over)
+        self.learned = statistics_of(self.wrappers)
         for i, observation in self._reset(numbers).items():
             self.present[i] = Episode(numbers[i], observation)
             begin(i)
@@ -412,6 +423,11 @@ class Episodes:
         environments are others, or cannot be reset one by one with seeds.
         """
         self._require_repeatable(len(saved))
+        if self.wrappers and not isinstance(self._adapter, OneEnvironment) and any(saved):
+            raise UnrepeatedEpisodeError(
+                f"env must repeat its episodes, but {type(self.wrappers[0]).__name__} has learned"
+                " from several environments at once: repeat_episodes=False begins new ones"
+            )
         for i, one in enumerate(saved):
             if one is not None:
                 n = len(one.actions)
@@ -426,7 +442,9 @@ class Episodes:
                 if not np.array_equal(found, then.observation):
                     raise UnrepeatedEpisodeError(
                         "env must repeat the episode in which the training was saved: the same"
-                        f" seed and actions led to {found}, not to {then.observation}"
+                        f" seed and actions led to {found}, not to {then.observation}. One of"
+                        f" {names_of(self._env)} draws without the seed or remembers earlier"
+                        " episodes: repeat_episodes=False begins a new one"
                     )
 
     def _require_repeatable(self, n_saved: int) -> None:

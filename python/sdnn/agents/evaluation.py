@@ -22,6 +22,7 @@ from sdnn.agents.episode import (
     step_env,
 )
 from sdnn.agents.spaces import require_same_kind, require_single
+from sdnn.agents.wrappers import fixed
 from sdnn.arguments import has_methods, seed_of, shown, whole
 
 __all__ = ["Evaluation", "evaluate", "greedy_episode"]
@@ -83,7 +84,9 @@ def evaluate(
 
     An episode that seems not to end is warned of. Random draws for greedy actions, where several
     are best or all are random in a warm-up, come from a stream that runs on from call to call and
-    that learning does not use.
+    that learning does not use. Wrappers that learn, such as Gymnasium's ``NormalizeObservation``,
+    keep their statistics; those that have seen nothing get what the agent's training had learned,
+    else they are warned of.
 
     Parameters
     ----------
@@ -153,28 +156,30 @@ def greedy_episode(
     UnusableStepError as of `evaluate`.
     """
     own = None if seed is None else episode_seed(seed, EVALUATION, number)
-    observation = reset_env(env, own, options)
-    n_steps, total, terminated, truncated = 0, 0.0, False, False
+    with fixed(env, getattr(agent, "wrappers", ())):
+        observation = reset_env(env, own, options)
+        n_steps, total, terminated, truncated = 0, 0.0, False, False
 
-    def unusable(problem: object) -> UnusableStepError:
-        where = f"step {n_steps}" if n_steps else "the reset"
-        return UnusableStepError(
-            f"env gave what cannot be evaluated, in {where} of greedy episode {number}: {problem}"
-        )
+        def unusable(problem: object) -> UnusableStepError:
+            where = f"step {n_steps}" if n_steps else "the reset"
+            return UnusableStepError(
+                f"env gave what cannot be evaluated, in {where} of greedy episode {number}:"
+                f" {problem}"
+            )
 
-    yield GreedyEpisode(0, 0.0, False)
-    while not (terminated or truncated):
-        try:
-            action = agent.act(observation, explore=False)
-        except ValueError as error:
-            raise unusable(error) from error
-        *outcome, _ = step_env(env, action)
-        n_steps += 1
-        try:
-            observation, reward, terminated, truncated = checked(StepResult(*outcome))
-        except ValueError as error:
-            raise unusable(error) from error
-        total += reward
-        if not math.isfinite(total):
-            raise unusable(f"rewards of env must add up to a finite number, got {total}")
-        yield GreedyEpisode(n_steps, total, terminated)
+        yield GreedyEpisode(0, 0.0, False)
+        while not (terminated or truncated):
+            try:
+                action = agent.act(observation, explore=False)
+            except ValueError as error:
+                raise unusable(error) from error
+            *outcome, _ = step_env(env, action)
+            n_steps += 1
+            try:
+                observation, reward, terminated, truncated = checked(StepResult(*outcome))
+            except ValueError as error:
+                raise unusable(error) from error
+            total += reward
+            if not math.isfinite(total):
+                raise unusable(f"rewards of env must add up to a finite number, got {total}")
+            yield GreedyEpisode(n_steps, total, terminated)

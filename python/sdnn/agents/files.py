@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.agents.wrappers import Statistics, read_statistics
 from sdnn.arguments import seed_of
 from sdnn.files import Arrays, Description, read_file, write_file
 
@@ -87,11 +88,12 @@ class SavedEpisode(msgspec.Struct, frozen=True, kw_only=True):
     observation: Any = None
 
 
-class SavedTraining(msgspec.Struct, frozen=True, kw_only=True):
+class SavedTraining(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The state that `sdnn.agents.Training` resumes.
 
     ``present`` has an entry for each environment, ``evaluations`` steps and mean returns;
-    ``next_episode`` is the number of the first that has not begun.
+    ``next_episode`` is the number of the first that has not begun; ``wrappers`` have learned as
+    much when the present episode began.
     """
 
     steps: _Period | None
@@ -107,12 +109,14 @@ class SavedTraining(msgspec.Struct, frozen=True, kw_only=True):
     limit_bootstraps: bool
     evaluations: list[tuple[_Count, float]]
     present: list[SavedEpisode | None]
+    wrappers: list[Statistics] = msgspec.field(default_factory=list)
 
     def __post_init__(self) -> None:
         if (self.steps is None) == (self.episodes is None):
             raise ValueError("one of steps and episodes must be given")
         if self.seed is not None:
             seed_of(self.seed)
+        read_statistics(msgspec.to_builtins(self.wrappers))
 
 
 def write_training(path: Path, agent: Any, training: SavedTraining) -> None:

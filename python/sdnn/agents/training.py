@@ -28,6 +28,7 @@ from sdnn.agents.episode import (
 from sdnn.agents.evaluation import evaluate
 from sdnn.agents.files import SavedTraining, read_training, write_training
 from sdnn.agents.spaces import require_same_kind, require_single
+from sdnn.agents.wrappers import share_statistics, statistics_of, take_statistics
 from sdnn.arguments import flag, has_methods, path_of, shown, whole
 from sdnn.interrupts import Interrupts
 
@@ -193,6 +194,8 @@ class Training:
         self.rows: list[Row] = []
         """Rows since it was begun, or last loaded."""
         self._episodes = Episodes(env, _adapter_for, self.seed, first, self._options)
+        if evaluation_env is not None:
+            share_statistics(env, evaluation_env)
         if reset_options is not None and self.n_environments > 1:
             raise ValueError("reset_options must be None for a vector environment")
         self._place: list[dict[str, int]] = [{}]  # which environment, where there are several
@@ -259,6 +262,7 @@ class Training:
             raise RuntimeError("a training that was left within a step cannot be resumed: load it")
         self._stops = False
         with Interrupts(self.stop) as interrupts, ExitStack() as stack:
+            stack.callback(self._keep_statistics)
             for callback in self.callbacks:
                 callback.on_start(self)
                 stack.callback(callback.on_end, self)
@@ -291,8 +295,10 @@ class Training:
     def save(self, path: str | Path) -> None:
         """Write agent and training in one file for `load`; OSError if it cannot be written."""
         names = ("steps", "episodes", "next_episode", *_SETTINGS, *_STATE)
+        self._keep_statistics()
         saved = SavedTraining(
             **{name: getattr(self, name) for name in names},
+            wrappers=self._episodes.learned_before,
             present=self._episodes.saved(
                 self.agent.action_space.shape or (), self.agent.flat_observation
             ),
@@ -344,9 +350,19 @@ class Training:
         )
         for name in _STATE:
             setattr(training, name, getattr(saved, name))
+        wrappers, learned = training._episodes.wrappers, saved.wrappers
+        is_same = take_statistics(wrappers, learned if does_repeat else agent.wrappers)
         if does_repeat:
+            if learned and not is_same:
+                raise ValueError(f"env must have the training's {learned[0].wrapper}, got {env}")
+            training._episodes.learned = learned
             training._episodes.repeat(saved.present, agent.flat_observation)
         return training
+
+    def _keep_statistics(self) -> None:
+        """Let the agent keep what the wrappers of its environment have learned."""
+        if hasattr(self.agent, "wrappers"):
+            self.agent.wrappers = statistics_of(self._episodes.wrappers)
 
     def _options(self, episode: int) -> dict[str, Any] | None:
         if self.reset_options is None:
@@ -442,6 +458,7 @@ class Training:
 
     def _evaluation(self) -> Row:
         assert self.evaluation_env is not None
+        share_statistics(self.env, self.evaluation_env)
         found = evaluate(
             self.agent,
             self.evaluation_env,

@@ -1,0 +1,175 @@
+"""Wrappers that learn: a training with them is resumed exactly, and evaluated as it was trained."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.wrappers import NormalizeObservation, NormalizeReward
+
+from sdnn.agents import (
+    RBFQLearning,
+    SDNNQLearning,
+    Training,
+    UnrepeatedEpisodeError,
+    evaluate,
+    load_agent,
+)
+from sdnn.agents.wrappers import learning_wrappers, statistics_of
+from stopped_training import Stop, states_equal
+
+
+def wrapped(*wrappers):
+    env = gym.make("MountainCarContinuous-v0", max_episode_steps=60)
+    for wrapper in wrappers:
+        env = wrapper(env)
+    return env
+
+
+class OwnMoments:
+    def __init__(self):
+        self.mean, self.var, self.count = np.zeros(2), np.ones(2), 0.0
+
+
+class OwnNormalization(gym.ObservationWrapper):
+    """A wrapper of a user: no switch that keeps it as it is."""
+
+    def __init__(self, env):
+        super().__init__(env)
+        self.obs_rms = OwnMoments()
+
+    def observation(self, observation):
+        self.obs_rms.count += 1.0
+        self.obs_rms.mean = self.obs_rms.mean + (observation - self.obs_rms.mean) / (
+            self.obs_rms.count
+        )
+        return (observation - self.obs_rms.mean).astype(np.float32)
+
+
+WRAPPERS = {
+    "observations": (NormalizeObservation,),
+    "rewards": (NormalizeReward,),
+    "both": (NormalizeObservation, gym.wrappers.RecordEpisodeStatistics, NormalizeReward),
+    "one's own": (OwnNormalization,),
+}
+
+
+def agent_for(env):
+    return RBFQLearning(
+        env.observation_space, env.action_space, seed=1, observation_range=(-2.0, 2.0)
+    )
+
+
+@pytest.mark.parametrize("wrappers", WRAPPERS.values(), ids=WRAPPERS)
+@pytest.mark.parametrize("cut", [60, 61, 95, 119])
+def test_a_training_through_wrappers_goes_on_exactly(wrappers, cut, tmp_path):
+    given = {"steps": 200, "evaluate_every": 50, "evaluation_episodes": 1}
+    env = wrapped(*wrappers)
+    whole = Training(agent_for(env), env, evaluation_env=wrapped(*wrappers), **given)
+    whole.run()
+    env = wrapped(*wrappers)
+    cut_training = Training(
+        agent_for(env),
+        env,
+        evaluation_env=wrapped(*wrappers),
+        callbacks=[Stop(cut, tmp_path / "training")],
+        **given,
+    )
+    cut_training.run()
+    for callbacks in ([Stop(cut + 7, tmp_path / "training")], []):
+        resumed = Training.load(
+            tmp_path / "training",
+            wrapped(*wrappers),
+            evaluation_env=wrapped(*wrappers),
+            callbacks=callbacks,
+        )
+        resumed.run()
+    assert states_equal(whole.agent, resumed.agent)
+    assert whole.evaluations == resumed.evaluations
+    assert whole.agent.wrappers == resumed.agent.wrappers != []
+
+
+def test_an_agent_that_is_loaded_observes_what_it_was_trained_with(tmp_path):
+    env = wrapped(NormalizeObservation)
+    agent = agent_for(env)
+    agent.train(env, steps=300)
+    agent.save(tmp_path / "agent")
+    found = [
+        evaluate(one, wrapped(NormalizeObservation), 2, seed=5).returns.tolist()
+        for one in (agent, load_agent(tmp_path / "agent"))
+    ]
+    trained = evaluate(agent, env, 2, seed=5).returns.tolist()
+    assert found == [trained, trained]
+
+
+def test_an_evaluation_changes_no_statistics():
+    for wrappers in WRAPPERS.values():
+        env = wrapped(*wrappers)
+        agent = agent_for(env)
+        agent.train(env, steps=70)
+        before = statistics_of(learning_wrappers(env))
+        evaluate(agent, env, 1)
+        assert statistics_of(learning_wrappers(env)) == before
+        flags = [getattr(one, "update_running_mean", True) for one in learning_wrappers(env)]
+        assert all(flags)
+
+
+def test_wrappers_that_have_seen_nothing_are_warned_of_by_name():
+    env = wrapped(NormalizeObservation)
+    with pytest.warns(RuntimeWarning, match="NormalizeObservation"):
+        evaluate(agent_for(env), env, 1)
+
+
+@pytest.mark.parametrize("learns_in", [0, 1])
+def test_environments_that_are_wrapped_otherwise_are_warned_of(learns_in):
+    envs = [wrapped(NormalizeObservation), wrapped()]
+    env, other = envs[learns_in], envs[1 - learns_in]
+    with pytest.warns(RuntimeWarning, match=r"NormalizeObservation.*wrap both"):
+        Training(agent_for(env), env, steps=5, evaluate_every=5, evaluation_env=other)
+
+
+def test_a_vector_whose_wrappers_learn_begins_new_episodes(tmp_path):
+    def envs():
+        return gym.vector.SyncVectorEnv([lambda: wrapped(NormalizeObservation)] * 2)
+
+    training = Training(
+        SDNNQLearning(
+            envs().single_observation_space, envs().single_action_space, warm_up_steps=20
+        ),
+        envs(),
+        steps=90,
+        callbacks=[Stop(40, tmp_path / "training")],
+    )
+    training.run()
+    with pytest.raises(UnrepeatedEpisodeError, match=r"NormalizeObservation.*repeat_episodes"):
+        Training.load(tmp_path / "training", envs())
+    again = envs()
+    resumed = Training.load(tmp_path / "training", again, repeat_episodes=False)
+    assert statistics_of(learning_wrappers(again)) == resumed.agent.wrappers
+    assert resumed.run().n_steps == 90
+
+
+class Remembers(gym.Wrapper):
+    """Counts its steps for ever, and observes them."""
+
+    n = 0
+
+    def step(self, action):
+        self.n += 1
+        seen, *rest = self.env.step(action)
+        return (seen + self.n % 2).astype(np.float32), *rest
+
+
+def test_a_wrapper_whose_memory_nobody_knows_is_named_with_the_way_out(tmp_path):
+    env = wrapped(Remembers)
+    training = Training(agent_for(env), env, steps=200, callbacks=[Stop(75, tmp_path / "training")])
+    training.run()
+    with pytest.raises(UnrepeatedEpisodeError, match=r"Remembers.*repeat_episodes=False"):
+        Training.load(tmp_path / "training", wrapped(Remembers, Remembers))
+    assert Training.load(tmp_path / "training", wrapped(), repeat_episodes=False)
+
+
+def test_statistics_in_a_file_are_checked(tmp_path):
+    env = wrapped(NormalizeObservation)
+    training = Training(agent_for(env), env, steps=200, callbacks=[Stop(75, tmp_path / "training")])
+    training.run()
+    with pytest.raises(ValueError, match="NormalizeObservation"):
+        Training.load(tmp_path / "training", wrapped())
