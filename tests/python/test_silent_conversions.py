@@ -108,12 +108,13 @@ BOOLS = {"True": True, "True of NumPy": np.True_, "an array": np.array(True)}
 def test_settings_are_numbers_of_their_kind(kind):
     for word, value in {**NUMBERS, **BOOLS, "not finite": np.nan}.items():
         with pytest.raises(Exception, match="must be"):
-            assert checked(kind, value) is None, word
+            assert checked(kind, value, "key") is None, word
 
 
 def test_fields_of_runs_are_of_their_type():
     for given in (
-        {"environment": "CartPole-v1"}, {"environment": 5}, {"agent": "sdnn-c"}, {"budget": 5},
+        {"environment": 5}, {"agent": 5}, {"budget": 5}, {"budget": {"target_return": np.nan}},
+        {"budget": {"target_return": "abc"}}, {"output": {"tensorboard": "yes"}},
         {"learning": 5}, {"approximator": []}, {"output": True}, {"protocol": "abc"},
     ):  # fmt: skip
         with pytest.raises(Exception, match=next(iter(given))):

@@ -179,10 +179,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
                 reasons["max_table_bytes"] = "for each dimension of action_space"
             found = [reason for word, reason in reasons.items() if word in str(error)]
             if argument.startswith("action."):
-                found = [
-                    "of action_space; gymnasium.wrappers.TransformAction(env, lambda action:"
-                    " action, gymnasium.spaces.Box(low, high)) gives it finite bounds"
-                ]
+                found = ["of action_space"]
             if not (argument and found):
                 raise
             raise argument_error(argument, f"{problem} ({', '.join(found)})") from error

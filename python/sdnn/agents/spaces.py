@@ -206,7 +206,10 @@ class Actions:
             )
         if not np.isfinite([low, high]).all():
             problem = f"must have finite bounds, got {_line(space)}"
-            remedy = "gymnasium's RescaleAction gives a Box finite bounds"
+            remedy = (
+                "gymnasium.wrappers.TransformAction(env, lambda action: action,"
+                " gymnasium.spaces.Box(low, high)) gives it such"
+            )
             raise argument_error("action_space", f"{problem}: {remedy}")
         dtype = np.dtype(space.dtype)
         self._dtype = dtype
