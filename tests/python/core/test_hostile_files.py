@@ -2,6 +2,7 @@
 
 import os
 import sqlite3
+import stat
 import struct
 import subprocess
 import sys
@@ -12,8 +13,20 @@ import numpy as np
 import pytest
 
 from made_records import hash_of, make_record
-from sdnn.runs import ResultStore, StoreError, TrialRows
+from sdnn.agents import load_agent
+from sdnn.files import write_file, write_whole
+from sdnn.runs import EnvironmentSpec, ResultStore, Run, RunSpec, StoreError, TrialRows
+from sdnn.runs.curves import curves_of, write_curves
+from sdnn.runs.errors import RunError
+from sdnn.runs.run import tensorboard_in
 from sdnn.runs.store import STORE_NAME
+
+RUN = RunSpec(
+    environment=EnvironmentSpec(id="Pendulum-v1"),
+    approximator={"n_pattern_units": 12, "n_hidden_units": 24, "n_active_units": 8},
+    budget={"steps": 20},
+    protocol={"evaluate_every": 10, "evaluation_episodes": 1},
+)
 
 TRAINED = [
     {"kind": "episode", "step": 3 * n, "episode": n, "return": -1.5, "length": 3,
@@ -219,3 +232,92 @@ def test_measurements_are_json(tmp_path):
         )
         with pytest.raises(StoreError, match=r"results\.sqlite"):
             store.measurements("cost")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a system of POSIX")
+@pytest.mark.parametrize("kind", ["link", "pipe", "device"])
+def test_nothing_in_a_run_folder_is_written_through(tmp_path, kind):
+    folder, kept = tmp_path / "run", tmp_path / "kept"
+    Run.create(folder, RUN)
+    Run.open(folder).train()
+    (folder / "agent.safetensors").unlink()
+    names = ["agent.safetensors", "checkpoint.safetensors", "config.json", "curves.png",
+             "curves.csv", "results.md"]  # fmt: skip
+    kept.mkdir()
+    for name in names:
+        target, path = kept / name, folder / name
+        if path.exists():
+            path.rename(target)
+        else:
+            target.write_bytes(b"mine")
+        if kind == "pipe":
+            os.mkfifo(path)
+        else:
+            path.symlink_to(target if kind == "link" else "/dev/null")
+    contents = {name: (kept / name).read_bytes() for name in names}
+    for name in ("config.json", "checkpoint.safetensors"):
+        if kind != "link":  # a run is read from files only
+            with pytest.raises((OSError, RunError), match=name):
+                Run.open(folder).train(steps=30)
+            (folder / name).unlink()
+            (folder / name).write_bytes(contents[name])
+    run = Run.open(folder)
+    run.train(steps=30)
+    write_curves(curves_of([run])[0], folder / "curves.png")
+    write_whole(folder / "results.md", b"new")
+    for name in names:
+        assert (kept / name).read_bytes() == contents[name], name
+        assert stat.S_ISREG((folder / name).lstat().st_mode), name
+    load_agent(folder / "agent.safetensors")
+
+
+@pytest.mark.parametrize("name", [".lock", "tensorboard", STORE_NAME])
+def test_links_that_would_be_written_to_are_refused(tmp_path, name):
+    folder, other = tmp_path / "run", tmp_path / "other"
+    run = Run.create(folder, RUN)
+    other.mkdir()
+    path = folder / name
+    path.unlink(missing_ok=True)
+    if name == "tensorboard":
+        path.symlink_to(other)
+        with pytest.raises(RunError, match=name):
+            tensorboard_in(folder)
+    else:
+        path.symlink_to(other / "made")
+        with pytest.raises((OSError, RunError), match=name):
+            run.train()
+    assert list(other.iterdir()) == []
+
+
+TRUNCATED = """
+import sys
+from pathlib import Path
+from sdnn import files
+
+path, real = Path(sys.argv[1]), files.os.fstat
+
+def truncated(descriptor):
+    status = real(descriptor)
+    with open(path, "r+b") as file:  # as another process, after the size was asked for
+        file.truncate(status.st_size // 2)
+    return status
+
+files.os.fstat = truncated
+try:
+    files.read_file(path, "agent")
+except ValueError as error:
+    print(error)
+"""
+
+
+def test_a_file_that_is_cut_while_it_is_read_is_damaged(tmp_path):
+    path = tmp_path / "file"
+    write_file(path, "agent", {"a": np.zeros(2**20)}, {})
+    done = subprocess.run(
+        [sys.executable, "-c", TRUNCATED, str(path)],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+    )
+    assert done.returncode == 0, done.stderr
+    assert f"{path} is damaged" in done.stdout

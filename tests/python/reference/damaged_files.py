@@ -1,6 +1,5 @@
 """Every reader of files, and every damage: what strangers may put in the place of a file."""
 
-import dataclasses
 import functools
 import json
 import os
@@ -16,8 +15,8 @@ import agent_files
 from bad_inputs import leaves, replaced
 from checksums import with_checksum
 from mutated_files import READERS as OTHERS
-from mutated_files import Reader, contents_of, read_estimator, written
-from sdnn.agents import JSONLines, SDNNQLearning, Training, UnrepeatedEpisodeError
+from mutated_files import Reader, contents_of, written
+from sdnn.agents import JSONLines, SDNNQLearning, Training
 from sdnn.estimators import libsdnn
 from sdnn.files import read_file, write_file
 from sdnn.runs import Run
@@ -252,8 +251,10 @@ def verdict(reader, path, is_refused):
         return f"took {n_bytes / MIB:.0f} MiB"
     if error is None:
         return "was read" if is_refused else ""
-    is_named = path.name in str(error) or isinstance(error, UnrepeatedEpisodeError)
-    return "" if is_named else f"does not name the file: {error!r:.200}"
+    of_arguments = str(error).startswith(("env ", "evaluation_env ", "repeat_episodes "))
+    return (
+        "" if path.name in str(error) or of_arguments else f"does not name the file: {error!r:.200}"
+    )
 
 
 def resident(name):
@@ -269,20 +270,21 @@ VALUES = {
 }  # fmt: skip
 
 
-def header_cells(number):
-    """Every value of an estimator's description, another one, under the right checksum."""
-    path = Path("model.safetensors").absolute()
-    path.write_bytes(READERS["estimator"].good()[number])
-    description, arrays = read_file(path, "estimator")
+def header_cells(name, number):
+    """Every value of a file's description, another one, under the right checksum."""
+    reader = READERS[name]
+    path = Path(reader.name).absolute()
+    path.write_bytes(reader.good()[number])
+    description, arrays = read_file(path, name)
     path.unlink()
     for place in leaves(description):
         for word, value in VALUES.items():
-            name = f"estimator {number}: {'.'.join(map(str, place))} = {word}"
-            yield name, functools.partial(_header_cell, description, arrays, place, value)
+            other = replaced(description, place, value)
+            label = f"{name} {number}: {'.'.join(map(str, place))} = {word}"
+            yield label, functools.partial(_header_cell, name, arrays, other)
 
 
-def _header_cell(description, arrays, place, value):
-    path = Path.cwd() / "model.safetensors"
-    write_file(path, "estimator", arrays, replaced(description, place, value))
-    reader = dataclasses.replace(READERS["estimator"], read=read_estimator)
-    return verdict(reader, path, is_refused=False)
+def _header_cell(name, arrays, description):
+    path = Path.cwd() / READERS[name].name
+    write_file(path, name, arrays, description)
+    return verdict(READERS[name], path, is_refused=False)

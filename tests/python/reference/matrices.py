@@ -36,7 +36,9 @@ MATRICES = {
     "files": [
         *((mutated_files.mutation_cells, name, N_MUTATIONS) for name in mutated_files.READERS),
         *((damaged_files.damage_cells, name) for name in damaged_files.READERS),
-        *((damaged_files.header_cells, number) for number in range(3)),
+        *((damaged_files.header_cells, "estimator", number) for number in range(3)),
+        *((damaged_files.header_cells, "agent", number) for number in (0, 5)),
+        (damaged_files.header_cells, "training", 0),
     ],
 }
 ROWS = [row for rows in MATRICES.values() for row in rows]
