@@ -27,14 +27,10 @@ from pathlib import Path
 from typing import Any, BinaryIO, TextIO
 
 import numpy as np
+from filelock import lock_descriptor
 from numpy.typing import NDArray
 
 from sdnn._core import __version__
-
-try:
-    import fcntl
-except ImportError:  # not on this system
-    fcntl = None  # type: ignore[assignment]
 
 __all__ = [
     "Arrays",
@@ -98,7 +94,7 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
             yield file
             file.flush()
             os.fsync(file.fileno())
-            if fcntl is None:  # where an open file cannot be given another name
+            if os.name == "nt":  # where an open file cannot be given another name
                 file.close()
             partial.replace(path)
         _sync_folder(path.parent)
@@ -191,15 +187,10 @@ def lock(descriptor: int) -> bool | None:
     Returns whether it is locked now: False if another process holds it, None where files cannot be
     locked.
     """
-    if fcntl is None:
-        return None
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
+        return lock_descriptor(descriptor, blocking=False)
     except OSError:  # not in this folder
         return None
-    return True
 
 
 def _new_file(path: Path) -> BinaryIO:
@@ -268,9 +259,9 @@ def remove_abandoned_files(folder: Path) -> None:
         with suppress(OSError):  # another process may have removed it, or given it its own name
             with open(path, "rb+", opener=_open_itself) as file:
                 is_abandoned = lock(file.fileno())
-                if is_abandoned:
+                if is_abandoned and os.name != "nt":  # where an open file cannot be removed
                     path.unlink()
-            age = time.time() - path.stat().st_mtime if is_abandoned is None else 0.0
+            age = 0.0 if is_abandoned is False else time.time() - path.stat().st_mtime
             if age > _ABANDONED_SECONDS:
                 path.unlink()
 

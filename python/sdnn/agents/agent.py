@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.agents.episode import Transition, reward_of
-from sdnn.agents.files import read_agent, register
+from sdnn.agents.files import Statistics, read_agent, read_statistics, register
 from sdnn.agents.scaling import Scaling
 from sdnn.agents.spaces import (
     Actions,
@@ -28,7 +28,6 @@ from sdnn.agents.spaces import (
     space_of,
 )
 from sdnn.agents.training import Training, TrainingResult
-from sdnn.agents.wrappers import Statistics, read_statistics
 from sdnn.arguments import (
     argument_error,
     blamed,

@@ -14,8 +14,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sdnn.agents.files import SavedEpisode
-from sdnn.agents.wrappers import Statistics, learning_wrappers, names_of, statistics_of
+from sdnn.agents.files import SavedEpisode, Statistics, learning_wrappers, names_of, statistics_of
 from sdnn.arguments import flag, real, shown
 
 __all__ = [

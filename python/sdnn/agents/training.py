@@ -26,9 +26,15 @@ from sdnn.agents.episode import (
     checked,
 )
 from sdnn.agents.evaluation import evaluate
-from sdnn.agents.files import SavedTraining, read_training, write_training
+from sdnn.agents.files import (
+    SavedTraining,
+    read_training,
+    share_statistics,
+    statistics_of,
+    take_statistics,
+    write_training,
+)
 from sdnn.agents.spaces import require_same_kind, require_single
-from sdnn.agents.wrappers import share_statistics, statistics_of, take_statistics
 from sdnn.arguments import flag, has_methods, path_of, shown, whole
 from sdnn.interrupts import Interrupts
 
@@ -163,6 +169,7 @@ class Training:
                     " the episode that is learned from"
                 )
             require_same_kind(agent, evaluation_env)
+            share_statistics(env, evaluation_env)
         require_same_kind(agent, env)
         if (steps is None) == (episodes is None):
             raise ValueError(
@@ -194,8 +201,6 @@ class Training:
         self.rows: list[Row] = []
         """Rows since it was begun, or last loaded."""
         self._episodes = Episodes(env, _adapter_for, self.seed, first, self._options)
-        if evaluation_env is not None:
-            share_statistics(env, evaluation_env)
         if reset_options is not None and self.n_environments > 1:
             raise ValueError("reset_options must be None for a vector environment")
         self._place: list[dict[str, int]] = [{}]  # which environment, where there are several
@@ -239,8 +244,7 @@ class Training:
         KeyboardInterrupt
             After the step in which it came and the callbacks' ``on_end``; a second one at once.
         UnusableStepError
-            If an observation, a reward, ``terminated`` or ``truncated`` cannot be used: a
-            `ValueError` that names step and episode. If `reset` or `step` returns something else.
+            If a step or reset cannot be used: a `ValueError` that names step and episode.
         RuntimeError
             If an error of a callback left a step of this training half done before.
         """
@@ -350,8 +354,8 @@ class Training:
         )
         for name in _STATE:
             setattr(training, name, getattr(saved, name))
-        wrappers, learned = training._episodes.wrappers, saved.wrappers
-        is_same = take_statistics(wrappers, learned if does_repeat else agent.wrappers)
+        learned = saved.wrappers if does_repeat else agent.wrappers
+        is_same = take_statistics(training._episodes.wrappers, learned)
         if does_repeat:
             if learned and not is_same:
                 raise ValueError(f"env must have the training's {learned[0].wrapper}, got {env}")

@@ -75,7 +75,7 @@ def test_only_what_a_killed_process_left_is_removed(tmp_path):
 
 @pytest.mark.parametrize(("seconds", "stays"), [(0, True), (3600, False)])
 def test_where_files_cannot_be_locked_their_age_counts(tmp_path, monkeypatch, seconds, stays):
-    monkeypatch.setattr(files, "fcntl", None)
+    monkeypatch.setattr(files, "lock", lambda descriptor: None)
     left = tmp_path / f"rows.csv.0123456789abcdef{PARTIAL_SUFFIX}"
     mine = [tmp_path / "mine.txt", tmp_path / f"mine{PARTIAL_SUFFIX}"]
     for path in (left, *mine):

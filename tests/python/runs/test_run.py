@@ -249,16 +249,21 @@ def test_nothing_is_written_for_what_cannot_work(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def _no_locks(*_):
+def _no_locks(*_, **__):
     raise OSError(errno.ENOLCK, "No locks available")
 
 
 def test_two_processes_do_not_train_one_run(tmp_path, monkeypatch):
     run = Run.create(tmp_path / "run", CONFIG)
-    with run._locked(), pytest.raises(RunError, match="process"):
-        run.train()
+    code = f"from sdnn.runs import Run; Run.open({str(run.folder)!r}).train(steps=20)"
+    with run._locked():
+        refuses("process", run.train, error=RunError)
+        other = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)
+    assert b"RunError" in other.stderr
+    assert b"process" in other.stderr
+    assert not run.rows()
     assert run.train(steps=20).n_steps == 20
-    monkeypatch.setattr("fcntl.flock", _no_locks)  # as in some folders of networks
+    monkeypatch.setattr("sdnn.files.lock_descriptor", _no_locks)  # as in some folders of networks
     assert run.train(steps=40).n_steps == 40
 
 
