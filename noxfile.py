@@ -5,8 +5,10 @@ Sessions run in the environment that nox itself runs in: ``pip install ".[test]"
 """
 
 import os
+import re
 import shutil
 import sys
+import sysconfig
 from pathlib import Path
 
 import nox
@@ -148,9 +150,16 @@ def fuzz(session):
 
 @weekly()
 def tidy(session):
-    """Run clang-tidy over the headers and the C++ tests."""
+    """Run clang-tidy over the headers and the C++ tests; check what headers include."""
     session.run("cmake", "--preset", "tidy", external=True)
     session.run("run-clang-tidy.py", "-quiet", "-p", "build/tidy", f"-j{JOBS}")
+    # A header includes what it uses. The check looks at main files only.
+    headers = [name for name in cpp_sources() if re.search(r"cpp/(include|tools)/.*hpp$", name)]
+    flags = ["-xc++", "-std=c++20", "-ffp-contract=off", "-DSDNN_NO_CONTRACTION"]
+    flags += [f"-I{ROOT}/cpp/include", f"-I{ROOT}/cpp", "-isystem/usr/include/eigen3"]
+    flags += [f"-isystem{sysconfig.get_path('purelib')}/cmeel.prefix/include/eigen3"]
+    checks = "--checks=-*,misc-include-cleaner"
+    session.run("clang-tidy", "--quiet", checks, *headers, "--", *flags)
 
 
 @weekly()

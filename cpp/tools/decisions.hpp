@@ -8,6 +8,7 @@
 #include "sdnn/agents/agent.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/environments/acrobot.hpp"
+#include "sdnn/environments/acrobot_config.hpp"
 #include "tools/stopwatch.hpp"
 #include "tools/trial.hpp"
 

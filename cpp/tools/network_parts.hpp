@@ -11,6 +11,8 @@
 #include "sdnn/approximators/detail/column_sums.hpp"
 #include "sdnn/approximators/error_correction.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
+#include "sdnn/coding/detail/ternary_code.hpp"
+#include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/coding/state_code.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"

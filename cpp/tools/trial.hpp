@@ -20,6 +20,7 @@
 #include "sdnn/core/errors.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/environments/acrobot.hpp"
+#include "sdnn/environments/acrobot_config.hpp"
 #include "sdnn/environments/acrobot_sensors.hpp"
 #include "sdnn/environments/goal_schedule.hpp"
 

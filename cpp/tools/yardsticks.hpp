@@ -9,6 +9,8 @@
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/kernel.hpp"
+#include "sdnn/core/detail/lanes.hpp"
+#include "sdnn/core/instruction_set.hpp"
 #include "sdnn/core/random.hpp"
 #include "tools/stopwatch.hpp"
 

@@ -130,7 +130,7 @@ class Actions {
       core::require(high - low < kMostActions, high_name, "at most 2^20 - 1 above action.low",
                     high);
     } else {
-      core::require(high > low, high_name, "greater than action.low", high);
+      core::require_greater(high_name, high, low_name, low);
     }
   }
 

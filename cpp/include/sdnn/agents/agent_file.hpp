@@ -19,7 +19,14 @@
 #include <variant>
 #include <vector>
 
+#include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/controller.hpp"
+#include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/q_learning_config.hpp"
+#include "sdnn/approximators/fuzzy_rules.hpp"
+#include "sdnn/approximators/rbf_network.hpp"
+#include "sdnn/approximators/sdnn_c_config.hpp"
+#include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/safetensors.hpp"
 #include "sdnn/core/state.hpp"
 

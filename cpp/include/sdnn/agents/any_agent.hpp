@@ -13,11 +13,13 @@
 
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
+#include "sdnn/agents/q_learning_config.hpp"
 #include "sdnn/agents/vector_fuzzy_q_learning.hpp"
 #include "sdnn/approximators/decoupled.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
+#include "sdnn/approximators/sdnn_c_config.hpp"
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"

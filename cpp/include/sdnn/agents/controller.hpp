@@ -21,11 +21,13 @@
 #include "sdnn/agents/observations.hpp"
 #include "sdnn/agents/range_use.hpp"
 #include "sdnn/agents/warm_up.hpp"
+#include "sdnn/approximators/sdnn_c_config.hpp"
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/detail/identity.hpp"
+#include "sdnn/core/pcg64.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/core/state.hpp"
 

@@ -22,6 +22,7 @@
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/elementary.hpp"
 #include "sdnn/core/errors.hpp"
+#include "sdnn/core/random.hpp"
 
 namespace sdnn::agents {
 

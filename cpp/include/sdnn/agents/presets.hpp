@@ -4,6 +4,7 @@
 #include <array>
 
 #include "sdnn/agents/q_learning.hpp"
+#include "sdnn/agents/q_learning_config.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"
 
 namespace sdnn::agents {

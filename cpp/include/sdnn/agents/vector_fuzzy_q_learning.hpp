@@ -12,6 +12,7 @@
 #include "sdnn/approximators/decoupled.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/random.hpp"
 
 namespace sdnn::agents {
 

@@ -20,12 +20,12 @@ class OutputScale {
   OutputScale(int u_low, int u_high, double q_low, double q_high)
       : u_low_(u_low), u_high_(u_high), q_low_(q_low), q_high_(q_high) {
     core::require_in_range("u_low", u_low, 0, 1 << 20);
-    core::require(u_high > u_low, "u_high", "greater than u_low", u_high);
+    core::require_greater("u_high", u_high, "u_low", u_low);
     core::require_finite("q_low", q_low);
     core::require_finite("q_high", q_high);
     core::require_in_range("q_low", q_low, -kLargest, kLargest);
     core::require_in_range("q_high", q_high, -kLargest, kLargest);
-    core::require(q_high > q_low, "q_high", "greater than q_low", q_high);
+    core::require_greater("q_high", q_high, "q_low", q_low);
   }
 
   int u_low() const noexcept { return u_low_; }

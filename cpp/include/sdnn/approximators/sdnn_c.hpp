@@ -25,6 +25,7 @@
 #include "sdnn/approximators/output_scale.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"
 #include "sdnn/coding/action_code.hpp"
+#include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/coding/state_code.hpp"
 #include "sdnn/core/detail/check.hpp"

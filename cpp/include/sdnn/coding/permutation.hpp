@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sdnn/coding/pattern_table.hpp"
+#include "sdnn/core/bit_layer.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/random.hpp"

@@ -15,8 +15,11 @@
 
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/pattern_table.hpp"
+#include "sdnn/core/bit_layer.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/kernel.hpp"
+#include "sdnn/core/detail/lanes.hpp"
+#include "sdnn/core/instruction_set.hpp"
 
 namespace sdnn::coding {
 

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/coding/permutation.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/lanes.hpp"
 #include "sdnn/core/errors.hpp"
 #include "sdnn/environments/acrobot_config.hpp"
 #include "sdnn/environments/acrobot_state.hpp"

@@ -16,6 +16,7 @@
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/detail/presentation_window.hpp"
 #include "sdnn/estimators/detail/unit_ranking.hpp"
+#include "sdnn/estimators/detail/weight_tiles.hpp"
 #include "sdnn/estimators/parallel_perceptron.hpp"
 
 namespace sdnn::estimators {

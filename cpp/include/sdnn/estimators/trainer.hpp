@@ -19,6 +19,7 @@
 #include "sdnn/estimators/detail/block_training.hpp"
 #include "sdnn/estimators/detail/dual_training.hpp"
 #include "sdnn/estimators/detail/plain_training.hpp"
+#include "sdnn/estimators/detail/presentation_window.hpp"
 #include "sdnn/estimators/parallel_perceptron.hpp"
 #include "sdnn/estimators/training_form.hpp"
 

@@ -15,6 +15,7 @@
 #include "sdnn/core/errors.hpp"
 #include "sdnn/estimators/detail/block_training.hpp"
 #include "sdnn/estimators/detail/dual_training.hpp"
+#include "sdnn/estimators/detail/weight_tiles.hpp"
 
 namespace sdnn::estimators {
 

@@ -12,6 +12,8 @@
 
 #include "sdnn/approximators/detail/correction_log.hpp"
 #include "sdnn/approximators/hidden_layer.hpp"
+#include "sdnn/coding/detail/ternary_code.hpp"
+#include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/coding/state_code.hpp"
 
 namespace sdnn::approximators {

@@ -11,6 +11,7 @@
 
 #include "sdnn/core/bit_layer.hpp"
 #include "sdnn/core/detail/kernel.hpp"
+#include "sdnn/core/detail/lanes.hpp"
 
 namespace sdnn::approximators {
 

@@ -10,6 +10,7 @@
 
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/kernel.hpp"
+#include "sdnn/core/instruction_set.hpp"
 
 #if SDNN_X86_KERNELS
 #include <immintrin.h>

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sdnn/coding/detail/ternary_code.hpp"
+#include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/interruption.hpp"

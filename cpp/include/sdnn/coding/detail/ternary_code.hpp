@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "sdnn/core/detail/kernel.hpp"
+#include "sdnn/core/detail/lanes.hpp"
+#include "sdnn/core/instruction_set.hpp"
 
 #if SDNN_X86_KERNELS
 #include <immintrin.h>

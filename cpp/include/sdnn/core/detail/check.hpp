@@ -34,6 +34,16 @@ void require_in_range(std::string_view name, Value value, std::type_identity_t<V
   require(false, name, expected.str(), value);
 }
 
+/// Throws std::invalid_argument unless `value` is greater than `other`.
+template <class Value>
+void require_greater(std::string_view name, Value value, std::string_view other_name,
+                     std::type_identity_t<Value> other) {
+  if (value > other) return;
+  std::ostringstream expected;
+  expected << "greater than " << other_name << " = " << other;
+  require(false, name, expected.str(), value);
+}
+
 /// Throws std::invalid_argument unless `value` is a finite number greater than zero.
 inline void require_positive(std::string_view name, double value) {
   require(std::isfinite(value) && value > 0.0, name, "a finite number greater than 0", value);

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <optional>
+#include <ostream>
 #include <sstream>
 #include <string>
 #include <tuple>

@@ -186,6 +186,7 @@ class RegularFile {
   void read(std::uint64_t begin, std::span<std::byte> into) {
 #if SDNN_HAS_POSIX_FILES
     while (!into.empty()) {
+      // NOLINTNEXTLINE(misc-include-cleaner): off_t is in <unistd.h>
       const auto n = ::pread(file_, into.data(), into.size(), static_cast<off_t>(begin));
       if (n < 0 && errno == EINTR) continue;
       if (n <= 0) refuse("cannot be read to its end");

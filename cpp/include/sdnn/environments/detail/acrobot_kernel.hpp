@@ -7,6 +7,8 @@
 #include <cstdint>
 
 #include "sdnn/core/detail/kernel.hpp"
+#include "sdnn/core/detail/lanes.hpp"
+#include "sdnn/core/instruction_set.hpp"
 #include "sdnn/environments/detail/acrobot_dynamics.hpp"
 
 namespace sdnn::environments {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "sdnn/coding/detail/ternary_code.hpp"
+#include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/detail/worker_team.hpp"
@@ -22,6 +23,7 @@
 #include "sdnn/estimators/detail/query_order.hpp"
 #include "sdnn/estimators/detail/signed_sums.hpp"
 #include "sdnn/estimators/detail/transposition.hpp"
+#include "sdnn/estimators/detail/weight_tiles.hpp"
 #include "sdnn/estimators/parallel_perceptron.hpp"
 
 namespace sdnn::estimators {

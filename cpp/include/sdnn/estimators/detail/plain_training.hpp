@@ -11,6 +11,7 @@
 #include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/detail/presentation_window.hpp"
+#include "sdnn/estimators/detail/weight_tiles.hpp"
 #include "sdnn/estimators/parallel_perceptron.hpp"
 
 namespace sdnn::estimators {

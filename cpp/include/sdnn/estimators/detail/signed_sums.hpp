@@ -7,9 +7,11 @@
 #include <cstdint>
 #include <vector>
 
+#include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/integer_register.hpp"
 #include "sdnn/core/detail/kernel.hpp"
+#include "sdnn/core/detail/lanes.hpp"
 
 namespace sdnn::estimators {
 

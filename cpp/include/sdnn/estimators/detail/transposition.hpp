@@ -7,6 +7,7 @@
 
 #include "sdnn/core/detail/integer_register.hpp"
 #include "sdnn/core/detail/kernel.hpp"
+#include "sdnn/core/detail/lanes.hpp"
 
 namespace sdnn::estimators {
 
