@@ -82,8 +82,9 @@ class ArgumentTypeError : public core::ArgumentError {
   using ArgumentError::ArgumentError;
 };
 
+/// The representation of any value, for a message.
 inline std::string shown(pybind11::handle value) {
-  return pybind11::repr(value).cast<std::string>();
+  return pybind11::module_::import("sdnn.arguments").attr("shown")(value).cast<std::string>();
 }
 
 /// Whether it is True or False, of Python or NumPy.
@@ -284,7 +285,8 @@ pybind11::class_<Config> bind_config(pybind11::module_& module, const char* name
     std::string values;
     for (const auto& [key, value] : dictionary_of(self.cast<const Config&>())) {
       values +=
-          (values.empty() ? "" : ", ") + key.template cast<std::string>() + "=" + shown(value);
+          (values.empty() ? "" : ", ") + key.template cast<std::string>() + "=" +
+              std::string(pybind11::repr(value));
     }
     return py::cast<std::string>(py::type::of(self).attr("__name__")) + "(" + values + ")";
   });

@@ -303,8 +303,6 @@ def judged(parameter, call, lived_agent=None, value=None):
         return ""
     except TYPED as error:
         message = str(error)
-        if "Exceeds the limit" in message:
-            return ""  # of digits in a message of the core
         if "incompatible" in message or "not supported" in message:
             return f"said {type(error).__name__}: {message[:200]}"
         is_named = re.search(rf"\b{parameter}\b", message) or isinstance(error, OSError)
@@ -317,8 +315,6 @@ def judged(parameter, call, lived_agent=None, value=None):
             return f"refused, but changed the agent: {message[:100]}"
         return ""
     except Exception as error:
-        if isinstance(error, RecursionError) and "repr" in str(error):
-            return ""  # in a message of the core
         return f"raised {type(error).__name__}: {str(error)[:200]}"
 
 
