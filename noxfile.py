@@ -110,7 +110,7 @@ def cluster(session):
 
 @quick()
 def robustness(session):
-    """Try bad values of every argument, option and file; end commands at random instants."""
+    """Try bad values and damaged files; end commands anywhere; let every call of writers fail."""
     pytest(session, "tests/robustness")
 
 

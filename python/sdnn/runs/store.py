@@ -397,6 +397,8 @@ def _as_store_error(path: Path) -> Iterator[None]:
     """Turn errors of SQLite and the file system into one that names the file."""
     try:
         yield
+    except MemoryError as error:
+        raise StoreError(f"cannot use {path}: out of memory") from error
     except (
         sqlite3.DatabaseError, OSError, ValueError, TypeError, OverflowError, RecursionError,
     ) as error:  # fmt: skip
