@@ -416,10 +416,10 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         OSError if the file cannot be read; ValueError if it is damaged, of another format, or holds
         another kind of agent.
         """
-        agent = load_agent(path)
+        agent: Any = load_agent(path)
         if not is_of_class(agent, cls):
             raise ValueError(f"{path} holds a {type(agent).__name__}, not a {cls.__name__}")
-        return agent
+        return agent  # type: ignore[no-any-return]
 
     def description(self) -> Description:
         """Return the settings, from which `rebuild` makes an agent like this one."""

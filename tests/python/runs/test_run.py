@@ -326,3 +326,25 @@ def test_a_run_can_be_watched_before_its_first_checkpoint(tmp_path, whole, monke
     assert seen
     assert seen == run.rows()[: len(seen)]
     assert contents(run) == contents(whole(CONFIG))
+
+
+def normalized_cart_pole():
+    return gym.wrappers.NormalizeObservation(gym.make("CartPole-v1").unwrapped)
+
+
+def test_a_run_keeps_what_wrappers_have_learned(tmp_path):
+    gym.register("tests/Normalized-v0", entry_point=normalized_cart_pole, max_episode_steps=60)
+    spec = RunSpec.from_values(
+        {
+            "environment": "tests/Normalized-v0",
+            "budget": {"steps": 200},
+            "protocol": {"evaluate_every": 100, "evaluation_episodes": 1},
+            "agent": {"warm_up_steps": 50},
+        }
+    )
+    cut, whole = (Run.create(tmp_path / name, spec) for name in ("cut", "whole"))
+    cut.train(callbacks=[StopAt(117)])
+    cut.train()
+    whole.train()
+    assert cut.rows() == whole.rows()
+    assert np.array_equal(cut.evaluate(2).returns, whole.evaluate(2).returns)  # without a warning
