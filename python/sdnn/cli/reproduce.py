@@ -29,7 +29,11 @@ from sdnn.reproduction.cases import MOST_EPISODES, WORDS, includes_cost, select_
 )
 @executor_options
 @click.option(
-    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Root of all seeds."
+    "--seed",
+    type=click.IntRange(min=0, max=2**64 - 1),
+    default=0,
+    show_default=True,
+    help="Root of all seeds.",
 )
 @click.option(
     "--out",

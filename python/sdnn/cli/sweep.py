@@ -19,7 +19,9 @@ from sdnn.cli.executor_options import executor_options
     help="Trials per case and variant, instead of the file's.",
 )
 @click.option(
-    "--seed", type=click.IntRange(min=0), help="Root of all seeds, instead of the file's."
+    "--seed",
+    type=click.IntRange(min=0, max=2**64 - 1),
+    help="Root of all seeds, instead of the file's.",
 )
 @executor_options
 @click.option(
