@@ -314,7 +314,8 @@ class ResultStore:
         return run
 
     def _update(self, run: _Run) -> None:
-        """Store what may change of a run."""
+        """Store what may change of a run, as it will be read again: np.float64 as float."""
+        run = run._replace(n_decisions=int(run.n_decisions), seconds=float(run.seconds))
         self._connection.execute(
             "UPDATE runs SET version = ?, n_decisions = ?, seconds = ?, finished_at = ?,"
             " checksum = ?, crc = ? WHERE id = ?",

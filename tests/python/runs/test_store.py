@@ -59,6 +59,12 @@ def test_every_row_reaches_its_labels(tmp_path):
     assert row == (*make_record().key, "0.1", 10, 1, 1)
 
 
+def test_numbers_of_numpy_are_stored_as_numbers(tmp_path):
+    with ResultStore(tmp_path) as store:
+        store.add(make_record(seconds=np.float64(0.5), n_decisions=np.int64(57)))
+        assert store.load()[0].seconds == 0.5
+
+
 def test_settings_live_side_by_side(tmp_path):
     with ResultStore(tmp_path) as store:
         store.add(make_record(steps=(50, 50)))
