@@ -68,8 +68,9 @@ def array_of(name: str, value: Any, kinds: str = "fiub", what: str = "numbers") 
     Traceback (most recent call last):
     ValueError: levels must be numbers, got [0.5, 'a']
     """
-    if type(value) is np.ndarray and value.dtype.kind in kinds:
-        return value
+    is_plain = type(value) is np.ndarray or isinstance(value, np.generic)
+    if is_plain and value.dtype.kind in kinds:
+        return np.asarray(value)
     rows = value if isinstance(value, list | tuple) else [value]
     if any(isinstance(row, np.ma.MaskedArray) for row in rows):
         raise argument_error(name, f"must be {what} without a mask, got {shown(value)}")

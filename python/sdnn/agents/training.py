@@ -174,7 +174,7 @@ class Training:
         if (steps is None) == (episodes is None):
             raise ValueError(
                 "one of steps and episodes must be given,"
-                f" got steps={steps!r}, episodes={episodes!r}"
+                f" got steps={shown(steps)}, episodes={shown(episodes)}"
             )
         if evaluate_every is not None and evaluate_every_episodes is not None:
             raise ValueError("evaluate_every must not be given with evaluate_every_episodes")
