@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 
-from sdnn.files import is_there
+from sdnn.files import is_there, open_regular
 from sdnn.runs.errors import StoreError
 from sdnn.runs.spec import HASH_DIGITS
 from sdnn.runs.trial import ROW, TrialKey, TrialRecord, TrialRows, TrialTime
@@ -31,6 +31,8 @@ APPLICATION_ID = int.from_bytes(b"sdnn", "big")
 """Marks a SQLite file as ours (SQLite's header field of that name)."""
 BUSY_SECONDS = 60.0
 """How long to wait for another process that writes the same file."""
+MOST_BYTES = 2**37
+"""Of the file; SQLite's check of it needs a bit for each page."""
 MOST_BYTES_OF_VALUE = 2**24
 """Of a text in the file."""
 
@@ -426,7 +428,7 @@ def _inspect(path: Path) -> bool:
             connection.execute("PRAGMA user_version").fetchone()
     if not is_there(path) or path.stat().st_size == 0:
         return True
-    with path.open("rb") as file:
+    with open_regular(path, MOST_BYTES) as file:
         header = file.read(20)
     if not header.startswith(b"SQLite format 3\0"):
         raise sqlite3.DatabaseError("no SQLite file")

@@ -199,7 +199,7 @@ def read_study(
             ("study", "reference"), f"no variant {reference!r}; {possible_words(reference, known)}"
         )
     variants = tuple(sorted(reader.variants, key=lambda variant: variant.id != reference))
-    n_combinations = len(reader.cases) * len(variants)
+    n_combinations = sum(len(variant.only or reader.cases) for variant in variants)
     if n_combinations > MOST_COMBINATIONS:
         problem = f"must be at most {MOST_COMBINATIONS} in all cases, got {n_combinations}"
         raise reader.file.error(("variants",), problem)

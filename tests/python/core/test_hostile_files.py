@@ -82,6 +82,14 @@ def test_no_flipped_bit_changes_what_a_store_gives(tmp_path):
     assert n_noticed > 50
 
 
+def test_a_store_of_a_terabyte_is_refused(tmp_path):
+    path = make_store(tmp_path)
+    with path.open("rb+") as file:
+        file.truncate(2**40)  # which takes no room
+    with pytest.raises(StoreError, match=r"results\.sqlite"):
+        ResultStore(tmp_path)
+
+
 def crc_of(values):
     return zlib.crc32(repr(values).encode())
 

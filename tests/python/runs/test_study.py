@@ -305,6 +305,18 @@ WRONG = {
     "study key": ("[study]\nseeds = 3\n", 2, "study.seeds: unknown key; possible: seed,"),
     "study value": ("[study]\ntrials = 'x'\n", 2, "study.trials: must be a whole number, got 'x'"),
     "trials": ("[study]\ntrials = 0\n", 2, "study.trials: must be a whole number of at least"),
+    "too many trials": (
+        "[study]\ntrials = 1_000_000_000\n[cases.s4]\n", 2,
+        "study.trials: must be at most 100000 in all",
+    ),
+    "too many combinations": (
+        "[cases.s4]\n[axes]\ncombine = 'product'\n"
+        + "".join(f"learning.{name} = {[n / 100 for n in range(100)]}\n"
+                  for name in ("epsilon", "discount", "learning_rate")),
+        3, "axes.combine: must give at most 5000 combinations",
+    ),
+    "deep": ("[base]\nenvironment.kwargs.a = " + 99 * "[" + 99 * "]", None, "base.environment"),
+    "a long key": ("[base]\n" + 99 * "a." + "a = 1", None, "must be TOML: a key must have"),
     "seed": ("[study]\nseed = -1\n", 2, "study.seed: must be a whole number of at least 0, got -1"),
     "no cases": ("[base]\nagent = 'fuzzy'\n", None, "no cases: give some of the paper's"),
     "case": (
