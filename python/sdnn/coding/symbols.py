@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.arguments import array_of, one_of, shown
+from sdnn.arguments import array_of, one_of, seed_of, shown
 from sdnn.coding.base import Coding, known
 from sdnn.coding.numeric import RandomInverse
 
@@ -233,7 +233,7 @@ class WithMissing(Coding):
         return found
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
-        own = int(np.random.SeedSequence(seed).generate_state(1, np.uint64)[0])
+        own = int(np.random.SeedSequence(seed_of(seed)).generate_state(1, np.uint64)[0])
         missing = _core.symbol_patterns(1, n_units, own)
         return np.vstack([self.base.patterns(n_units, seed), missing])
 

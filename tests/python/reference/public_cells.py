@@ -163,6 +163,10 @@ def coding_cells():
                 yield f"{cls.__name__}({parameter}={word})", cell
         for word, value in BAD.items():
             yield f"{cls.__name__}.fit({word})", _column_cell(cls, given, value)
+        for parameter in ("n_units", "seed"):
+            for word, value in BAD.items():
+                cell = _patterns_cell(cls, column, given, parameter, value)
+                yield f"{cls.__name__}.patterns({parameter}={word})", cell
 
 
 def _coding_cell(cls, column, given, parameter, value):
@@ -173,6 +177,19 @@ def _coding_cell(cls, column, given, parameter, value):
 
     shown = None if parameter == "categories" else value  # or the values that they lack
     return lambda: judged(parameter, call, value=shown)
+
+
+def _patterns_cell(cls, column, given, parameter, value):
+    """An error of any type: the core's callers have checked both."""
+
+    def run():
+        fitted = cls(**given).fit(column, 40)
+        with contextlib.suppress(Exception):
+            patterns = fitted.patterns(**{"n_units": 40, "seed": 1, parameter: value()})
+            return "" if set(np.unique(patterns)) == {-1, 1} else f"gave {patterns}"
+        return ""
+
+    return run
 
 
 def _column_cell(cls, given, value):
