@@ -125,6 +125,17 @@ TEST(RegularFile, DevicesAndFoldersAreRefused) {
   if (std::filesystem::exists("/dev/zero")) {
     EXPECT_EQ(error_of("/dev/zero"), "is not a regular file");
   }
+#if SDNN_HAS_POSIX_FILES
+  const auto pipe = folder / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(error_of(pipe), "is not a regular file");  // without waiting for a writer
+  {
+    WholeFile file(pipe);  // nor for a reader
+    write(file, "text");
+    file.finish();
+  }
+  EXPECT_EQ(testing::content_of(pipe), "text");
+#endif
 }
 
 }  // namespace
