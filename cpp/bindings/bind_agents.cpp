@@ -21,9 +21,11 @@
 #include "sdnn/agents/observation_scale.hpp"
 #include "sdnn/agents/presets.hpp"
 #include "sdnn/agents/q_learning.hpp"
+#include "sdnn/agents/sarsa.hpp"
 #include "sdnn/agents/vector_fuzzy_q_learning.hpp"
 #include "sdnn/approximators/decoupled.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
+#include "sdnn/approximators/linear_sdnn.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 #include "states.hpp"
@@ -34,9 +36,13 @@ using namespace sdnn;
 using agents::FuzzyQLearning;
 using agents::FuzzyQLearningConfig;
 using agents::QLearningConfig;
+using agents::Sarsa;
+using agents::SarsaConfig;
 using agents::VectorFuzzyQLearning;
 using approximators::FuzzyRules;
 using approximators::FuzzyRulesConfig;
+using approximators::LinearSDNN;
+using approximators::LinearSDNNConfig;
 using approximators::RBFNetwork;
 using approximators::RBFNetworkConfig;
 using approximators::SDNNC;
@@ -117,19 +123,32 @@ py::array_t<double> q_values(const Agent& agent, const ArrayArgument<double>& st
 }
 
 /// What agents that learn by Q-learning have in common.
-template <class Agent>
-void def_q_learning(py::class_<Agent>& agent) {
+template <class Agent, class QValues>
+void def_q_learning(py::class_<Agent>& agent, const QValues& q_values) {
   agent.def("set_progress", &Agent::set_progress, py::arg("progress"))
       .def("set_learning_rate", &Agent::set_learning_rate, py::arg("rate"))
       .def("set_epsilon", &Agent::set_epsilon, py::arg("epsilon"))
       .def_property_readonly("progress", &Agent::progress)
       .def_property_readonly("learning_rate", &Agent::learning_rate)
       .def_property_readonly("epsilon", &Agent::epsilon)
-      .def("q_values", &q_values<Agent>, py::arg("state"), py::arg("dimension") = 0,
+      .def("q_values", q_values, py::arg("state"), py::arg("dimension") = 0,
            "Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) "
            "-> "
            "(n_actions,)");
   def_agent(agent);
+}
+
+py::array_t<double> q_values_of_readout(const Sarsa& agent, const ArrayArgument<double>& state,
+                                        std::size_t dimension) {
+  const LinearSDNN& readout = agent.action_value();
+  core::require(dimension < readout.n_dimensions(), "dimension",
+                "less than " + std::to_string(readout.n_dimensions()), dimension);
+  const auto at = bindings::copied(bindings::vector(state, "state"));
+  py::array_t<double> out(static_cast<py::ssize_t>(readout.n_actions(dimension)));
+  const std::span row(out.mutable_data(), readout.n_actions(dimension));
+  const bindings::WithoutGIL unlocked(agent, readout);
+  readout.values(at, bindings::workspace_of(readout), row, dimension, true);
+  return out;
 }
 
 /// What agents that learn by fuzzy rules have in common.
@@ -163,7 +182,7 @@ py::class_<agents::QLearning<Approximator>> bind_q_learning(py::module_& module,
       .def_property_readonly(
           "action_value", [](Agent& self) -> Approximator& { return self.action_value(); },
           py::return_value_policy::reference_internal);
-  def_q_learning(agent);
+  def_q_learning(agent, &q_values<Agent>);
   return agent;
 }
 
@@ -187,7 +206,7 @@ void bind_decoupled_q_learning(py::module_& module, const char* name, const char
             return approximator_of(self, dimension);
           },
           py::arg("dimension"), py::return_value_policy::reference_internal);
-  def_q_learning(agent);
+  def_q_learning(agent, &q_values<Agent>);
 }
 
 /// Where an input of a state comes from: its kind, and the numbers that belong to it.
@@ -392,11 +411,16 @@ void bind_agents(py::module_& module) {
             return policy.select(bindings::vector(values, "values"), step, explore);
           },
           py::arg("values"), py::arg("step"), py::arg("explore") = true);
-  bindings::bind_config<QLearningConfig>(
+  const auto def_schedule = []<class Config>(py::class_<Config> config) {
+    config.def("learning_rate_at", &agents::learning_rate_at<Config>, py::arg("progress"))
+        .def("epsilon_at", &agents::epsilon_at<Config>, py::arg("progress"));
+  };
+  def_schedule(bindings::bind_config<QLearningConfig>(
       module, "QLearningConfig",
-      "The parameters of Q-learning; the defaults are the paper's (section 4.2).")
-      .def("learning_rate_at", &QLearningConfig::learning_rate_at, py::arg("progress"))
-      .def("epsilon_at", &QLearningConfig::epsilon_at, py::arg("progress"));
+      "The parameters of Q-learning; the defaults are the paper's (section 4.2)."));
+  def_schedule(bindings::bind_config<SarsaConfig>(
+      module, "SarsaConfig",
+      "The parameters of Sarsa(lambda) and Q(lambda) with a linear readout of the SDNN code."));
   bindings::bind_config<FuzzyQLearningConfig>(
       module, "FuzzyQLearningConfig",
       "The parameters of fuzzy Q-learning; the defaults are the paper's (section 4.3).");
@@ -411,6 +435,17 @@ void bind_agents(py::module_& module) {
         return found;
       },
       "Named settings of Q-learning with SDNN-C: titles, settings of approximator and learning");
+  module.def(
+      "linear_presets",
+      [] {
+        py::typing::Dict<py::str, py::typing::Tuple<py::str, LinearSDNNConfig, SarsaConfig>> found;
+        for (const auto& [name, title, preset] :
+             agents::linear_presets(LinearSDNNConfig{}.n_inputs)) {
+          found[name] = py::make_tuple(title, preset.approximator, preset.learning);
+        }
+        return found;
+      },
+      "The same of Sarsa with a linear readout");
 
   py::class_<agents::FixedRate>(module, "FixedRate", "Waits for ticks at a fixed rate")
       .def(py::init<double, agents::FixedRate::Clock, agents::FixedRate::Sleep>(), py::arg("hz"),
@@ -475,5 +510,22 @@ void bind_agents(py::module_& module) {
           },
           py::arg("dimension"), py::return_value_policy::reference_internal);
   def_fuzzy(vector_fuzzy_agent);
+  py::class_<Sarsa> sarsa(module, "Sarsa", "Sarsa(lambda) with a linear readout of the SDNN code");
+  sarsa
+      .def(py::init([](const LinearSDNNConfig& approximator,
+                       const std::vector<std::size_t>& n_actions, const SarsaConfig& learning,
+                       std::uint64_t seed, const std::vector<ArrayArgument<std::int8_t>>& tables) {
+             return Sarsa(tables.empty() ? LinearSDNN(approximator, n_actions, seed)
+                                         : LinearSDNN(approximator, n_actions,
+                                                      bindings::tables_of(tables), seed),
+                          learning, seed);
+           }),
+           py::kw_only(), py::arg("approximator"), py::arg("n_actions"), py::arg("learning"),
+           py::arg("seed"), py::arg("tables") = std::vector<ArrayArgument<std::int8_t>>())
+      .def_property_readonly(
+          "action_value", [](Sarsa& self) -> LinearSDNN& { return self.action_value(); },
+          py::return_value_policy::reference_internal)
+      .def_property_readonly("n_learned", &Sarsa::n_learned, "Transitions that were learned");
+  def_q_learning(sarsa, &q_values_of_readout);
   bind_controller(module);
 }

@@ -1,6 +1,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "bind_config.hpp"
 #include "bindings.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
+#include "sdnn/approximators/linear_sdnn.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 #include "workspaces.hpp"
@@ -17,6 +19,8 @@ namespace py = pybind11;
 using namespace sdnn;
 using approximators::FuzzyRules;
 using approximators::FuzzyRulesConfig;
+using approximators::LinearSDNN;
+using approximators::LinearSDNNConfig;
 using approximators::RBFNetwork;
 using approximators::RBFNetworkConfig;
 using approximators::SDNNC;
@@ -149,6 +153,46 @@ void bind_fuzzy_rules(py::module_& module) {
           py::arg("rule"), "A copy of v(rule, a) for every action: (n_actions,)");
 }
 
+void bind_linear_sdnn(py::module_& module) {
+  bindings::bind_config<LinearSDNNConfig>(
+      module, "LinearSDNNConfig",
+      "Everything that defines a linear readout of the SDNN code; not in the paper.");
+
+  py::class_<LinearSDNN>(module, "LinearSDNN", "Q(s, a) linear in the SDNN code, in integers")
+      .def(py::init([](const LinearSDNNConfig& config, const std::vector<std::size_t>& n_actions,
+                       std::uint64_t seed) { return LinearSDNN(config, n_actions, seed); }),
+           py::arg("config"), py::arg("n_actions"), py::arg("seed"))
+      .def_property_readonly("config", [](const LinearSDNN& net) { return net.config(); })
+      .def_property_readonly("n_inputs", &LinearSDNN::n_inputs)
+      .def_property_readonly("n_dimensions", &LinearSDNN::n_dimensions)
+      .def_property_readonly("exponent", &LinearSDNN::exponent,
+                             "A unit of values is 2 to this power; None before any reward")
+      .def(
+          "table",
+          [](const LinearSDNN& net, std::size_t input) {
+            return bindings::signs_of(net.state_code().table(input));
+          },
+          py::arg("input"), "Patterns of an input: (n_bins, m) of -1, +1")
+      .def(
+          "code",
+          [](const LinearSDNN& net, const ArrayArgument<double>& state) {
+            auto& workspace = bindings::workspace_of(net);
+            net.encode(bindings::vector(state, "state"), workspace, workspace.code);
+            py::array_t<std::int8_t> out(static_cast<py::ssize_t>(net.n_slots()));
+            std::ranges::copy(workspace.code.signs(), out.mutable_data());
+            return out;
+          },
+          py::arg("state"), "The paired code of a state, -1, 0 or +1: (n_inputs,) -> (n_slots,)")
+      .def(
+          "weights",
+          [](const LinearSDNN& net) {
+            py::array_t<std::int32_t> out({net.n_rows(), net.n_slots()});
+            std::ranges::copy(net.weights(), out.mutable_data());
+            return out;
+          },
+          "A copy, in units: (n_rows, n_slots), the units of one dimension after the other");
+}
+
 void bind_rbf_network(py::module_& module) {
   bindings::bind_config<RBFNetworkConfig>(
       module, "RBFNetworkConfig",
@@ -183,12 +227,13 @@ void bind_approximators(py::module_& module) {
       "Everything that defines an SDNN-C; the defaults are the paper's values.")
       .def_property_readonly(
           "n_pairs",
-          [](const SDNNCConfig& config) { return config.n_inputs * config.n_partners(); },
+          [](const SDNNCConfig& config) { return config.n_inputs * coding::n_partners_of(config); },
           "Pairs of inputs that are formed; the code has n_pattern_units for each.")
       .def_property_readonly(
           "n_code_bytes",
           [](const SDNNCConfig& config) {
-            return static_cast<std::uint64_t>(config.pattern_bytes(config.n_bins()));
+            return static_cast<std::uint64_t>(
+                coding::pattern_bytes_of(config, coding::n_bins_of(config)));
           },
           "Bytes of the patterns, by anchors and of symbols, plain and permuted.");
 
@@ -277,4 +322,5 @@ void bind_approximators(py::module_& module) {
 
   bind_fuzzy_rules(module);
   bind_rbf_network(module);
+  bind_linear_sdnn(module);
 }

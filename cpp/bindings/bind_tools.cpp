@@ -5,7 +5,9 @@
 #include "bindings.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
+#include "sdnn/agents/sarsa.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
+#include "sdnn/approximators/linear_sdnn.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 #include "times.hpp"
@@ -128,6 +130,12 @@ QLearning<SDNNC> sdnn_agent(const SDNNCConfig& approximator, const QLearningConf
   return {SDNNC(approximator, seed), learning, seed};
 }
 
+agents::Sarsa linear_agent(const approximators::LinearSDNNConfig& approximator,
+                           const agents::SarsaConfig& learning, std::uint64_t seed) {
+  const std::size_t n_actions[] = {static_cast<std::size_t>(approximator.n_actions)};
+  return {approximators::LinearSDNN(approximator, n_actions, seed), learning, seed};
+}
+
 void bind_trials(py::module_& module) {
   bindings::bind_config<ProtocolConfig>(
       module, "ProtocolConfig",
@@ -140,6 +148,10 @@ void bind_trials(py::module_& module) {
             &agent_with<FuzzyQLearning, FuzzyRules, FuzzyRulesConfig, FuzzyQLearningConfig>);
   def_trial(module, "RBFAcrobotTrial", "Q-learning with an RBF network learns the acrobot swing-up",
             &agent_with<QLearning<RBFNetwork>, RBFNetwork, RBFNetworkConfig, QLearningConfig>);
+
+  def_trial(module, "LinearAcrobotTrial",
+            "Sarsa with a linear readout of the SDNN code learns the acrobot swing-up",
+            &linear_agent);
 
   using PlainRBFAgent = QLearning<PlainRBFNetwork>;
   py::class_<PlainRBFAgent>(module, "PlainRBFQLearning",

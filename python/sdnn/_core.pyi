@@ -522,6 +522,154 @@ class RBFNetwork:
     @property
     def n_joint_bases(self) -> int:
         ...
+class LinearSDNNConfig:
+    """
+    Everything that defines a linear readout of the SDNN code; not in the paper.
+    
+    Parameters
+    ----------
+    n_inputs : int
+        l, number of inputs (section 3.1). Must be in [2, 1024].
+    max_pairs : int
+        Most pairs of inputs that are formed: all l (l - 1) if there are no more or with 0; else an even share of them at random, each input modified by as many others as it modifies, and by one at least. Cost grows with pairs, so with many inputs it then grows as their number, not as its square. Not in the paper, which has all. Must be in [0, 1048576].
+    n_pattern_units : int
+        m, units per pattern. 0: as many as make about 3,072 columns, from 64 to 768. Must be in [0, 65536].
+    n_anchor_patterns : int
+        Random anchor patterns p_1, p_2, ... of a code book (section 3.1: 9). The last one is not assigned to a bin. Must be in [2, 10000].
+    n_interpolated : int
+        Patterns between neighbouring anchors (section 3.1: 44). There are (n_anchor_patterns - 1) (n_interpolated + 1) bins, 360 in the paper. Must be in [0, 10000].
+    balanced_anchors : bool
+        Whether anchors have as many +1 as -1. An assumption: the paper says "random".
+    circular : tuple[bool, ...]
+        Per input, whether the last anchor equals the first, as angles want it; empty: none. An assumption: the paper does not say.
+    n_symbols : tuple[int, ...]
+        Per input, how many symbols it may be, each with a random pattern of its own: symbol k of n is a value of (k + 0.5) / n. 0 for a number; empty: numbers only. Not in the paper. Must be in [0, 16777216].
+    n_actions : int
+        Number of actions, of each dimension of a box. Must be in [1, 65536].
+    action_window : int
+        Neighbouring readout units that an action of a box has. Actions less than so many apart share some, and so learn from each other; with 1 none do. Must be in [1, 65536].
+    averaging_interval : int
+        With more than 0 the readout keeps an average of its weights, by which greedy actions are chosen, and takes a snapshot for it after so many corrections. What was learned last counts most. Must be in [0, 1000000000].
+    max_table_bytes : int
+        A larger readout (weights, patterns, one trace) is refused before memory is allocated; 1 GiB by default.
+    
+    Raises
+    ------
+    TypeError, ValueError
+        For a value of another type or out of its bounds; ``argument`` is its name.
+    """
+    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
+    fields: typing.ClassVar[tuple[typing.Any, ...]]
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_inputs: int = ..., max_pairs: int = ..., n_pattern_units: int = ..., n_anchor_patterns: int = ..., n_interpolated: int = ..., balanced_anchors: bool = ..., circular: collections.abc.Sequence[bool] = ..., n_symbols: collections.abc.Sequence[int] = ..., n_actions: int = ..., action_window: int = ..., averaging_interval: int = ..., max_table_bytes: int = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> LinearSDNNConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
+    def replace(self, **changes: typing.Any) -> LinearSDNNConfig:
+        """
+        Return a copy with other values of some fields.
+        """
+    @property
+    def action_window(self) -> int:
+        """
+        Neighbouring readout units that an action of a box has. Actions less than so many apart share some, and so learn from each other; with 1 none do.
+        """
+    @property
+    def averaging_interval(self) -> int:
+        """
+        With more than 0 the readout keeps an average of its weights, by which greedy actions are chosen, and takes a snapshot for it after so many corrections. What was learned last counts most.
+        """
+    @property
+    def balanced_anchors(self) -> bool:
+        """
+        Whether anchors have as many +1 as -1. An assumption: the paper says "random".
+        """
+    @property
+    def circular(self) -> tuple[bool, ...]:
+        """
+        Per input, whether the last anchor equals the first, as angles want it; empty: none. An assumption: the paper does not say.
+        """
+    @property
+    def max_pairs(self) -> int:
+        """
+        Most pairs of inputs that are formed: all l (l - 1) if there are no more or with 0; else an even share of them at random, each input modified by as many others as it modifies, and by one at least. Cost grows with pairs, so with many inputs it then grows as their number, not as its square. Not in the paper, which has all.
+        """
+    @property
+    def max_table_bytes(self) -> int:
+        """
+        A larger readout (weights, patterns, one trace) is refused before memory is allocated; 1 GiB by default.
+        """
+    @property
+    def n_actions(self) -> int:
+        """
+        Number of actions, of each dimension of a box.
+        """
+    @property
+    def n_anchor_patterns(self) -> int:
+        """
+        Random anchor patterns p_1, p_2, ... of a code book (section 3.1: 9). The last one is not assigned to a bin.
+        """
+    @property
+    def n_inputs(self) -> int:
+        """
+        l, number of inputs (section 3.1).
+        """
+    @property
+    def n_interpolated(self) -> int:
+        """
+        Patterns between neighbouring anchors (section 3.1: 44). There are (n_anchor_patterns - 1) (n_interpolated + 1) bins, 360 in the paper.
+        """
+    @property
+    def n_pattern_units(self) -> int:
+        """
+        m, units per pattern. 0: as many as make about 3,072 columns, from 64 to 768.
+        """
+    @property
+    def n_symbols(self) -> tuple[int, ...]:
+        """
+        Per input, how many symbols it may be, each with a random pattern of its own: symbol k of n is a value of (k + 0.5) / n. 0 for a number; empty: numbers only. Not in the paper.
+        """
+class LinearSDNN:
+    """
+    Q(s, a) linear in the SDNN code, in integers
+    """
+    def __init__(self, config: LinearSDNNConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def code(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.int8]:
+        """
+        The paired code of a state, -1, 0 or +1: (n_inputs,) -> (n_slots,)
+        """
+    def table(self, input: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
+        """
+        Patterns of an input: (n_bins, m) of -1, +1
+        """
+    def weights(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        A copy, in units: (n_rows, n_slots), the units of one dimension after the other
+        """
+    @property
+    def config(self) -> LinearSDNNConfig:
+        ...
+    @property
+    def exponent(self) -> int | None:
+        """
+        A unit of values is 2 to this power; None before any reward
+        """
+    @property
+    def n_dimensions(self) -> int:
+        ...
+    @property
+    def n_inputs(self) -> int:
+        ...
 class GoalScheduleConfig:
     """
     How the goal tolerance lambda(k) falls with the learning episode k (section 4.1).
@@ -1082,14 +1230,14 @@ class QLearningConfig:
         Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau. Must be finite and at least 0.
     n_steps : int
         Rewards in a target before it bootstraps. Not in the paper, which has 1: with more, a transition is learned, once, when so many steps are known or the episode ends. Must be in [1, 1000].
+    value_range : {'fixed', 'adaptive'}
+        Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that grows with the discounted sums of the rewards that come (`adaptive`). Not in the paper.
     max_action_repeat : int
         Steps that a random action may last. Not in the paper, which has 1: with more, it is kept for at least k steps with probability 1 / k. Must be in [1, 1000000].
     final_learning_rate : float | None
         What alpha becomes as the agent's progress goes from 0 to 1; by default it stays. Not in the paper. Must be in (0, 1].
     final_epsilon : float | None
         What epsilon becomes as the agent's progress goes from 0 to 1; by default it stays. Not in the paper. Must be in [0, 1].
-    value_range : {'fixed', 'adaptive'}
-        Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that grows with the discounted sums of the rewards that come (`adaptive`). Not in the paper.
     schedule : {'linear', 'exponential'}
         How alpha and epsilon go to their final values: `linear`: in a straight line; `exponential`: by the same factor in equal parts of the progress, first * (final / first) ** progress. A constant rate is the common choice where the task itself changes; a line is what most libraries of deep Q-learning take for epsilon; an exponential spends more of the training near a small final value, which must not be 0. Any other function of the progress: `sdnn.agents.Schedule`.
     exploration_fraction : float
@@ -1110,7 +1258,7 @@ class QLearningConfig:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, learning_rate: float = ..., discount: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ..., n_steps: int = ..., max_action_repeat: int = ..., final_learning_rate: float | None = ..., final_epsilon: float | None = ..., value_range: typing.Literal['fixed', 'adaptive'] = ..., schedule: typing.Literal['linear', 'exponential'] = ..., exploration_fraction: float = ..., start_steps: int = ...) -> None:
+    def __init__(self, *, learning_rate: float = ..., discount: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ..., n_steps: int = ..., value_range: typing.Literal['fixed', 'adaptive'] = ..., max_action_repeat: int = ..., final_learning_rate: float | None = ..., final_epsilon: float | None = ..., schedule: typing.Literal['linear', 'exponential'] = ..., exploration_fraction: float = ..., start_steps: int = ...) -> None:
         ...
     def __replace__(self, **changes: typing.Any) -> QLearningConfig:
         ...
@@ -1195,6 +1343,154 @@ class QLearningConfig:
     def value_range(self) -> typing.Literal['fixed', 'adaptive']:
         """
         Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that grows with the discounted sums of the rewards that come (`adaptive`). Not in the paper.
+        """
+class SarsaConfig:
+    """
+    The parameters of Sarsa(lambda) and Q(lambda) with a linear readout of the SDNN code.
+    
+    Parameters
+    ----------
+    learning_rate : float
+        alpha. Must be in (0, 1].
+    discount : float
+        gamma. Must be in [0, 1].
+    epsilon : float
+        Probability of a random action; in fuzzy Q-learning each fired rule picks one for itself. Must be in [0, 1].
+    n_greedy_steps : int
+        First steps of an episode in which epsilon is 0. Must be in [0, 1073741824].
+    tie_rule : {'uniform', 'lowest', 'middle'}
+        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
+    tie_tolerance : float
+        Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau. Must be finite and at least 0.
+    trace_decay : float
+        lambda: what remains of a trace after a step, beside the discount. 0: one-step targets. Must be in [0, 1].
+    bootstrap : {'sarsa', 'q_learning'}
+        What targets bootstrap from: `sarsa`: the value of the next action; `q_learning`: the best value, and traces end where a worse action is taken (Watkins).
+    traces : {'dutch', 'replacing'}
+        What a trace becomes in a state that returns: `dutch`: such that learning equals the forward view at every step (true online); `replacing`: as if it were the first time.
+    schedule_steps : int
+        Steps after which alpha and epsilon have gone half of the way to their final values: after t steps they have gone t / (t + schedule_steps) of it, whatever the planned end. With 0 they follow the agent's progress. Must be in [0, 1073741824].
+    max_action_repeat : int
+        Steps that a random action may last. Not in the paper, which has 1: with more, it is kept for at least k steps with probability 1 / k. Must be in [1, 1000000].
+    final_learning_rate : float | None
+        What alpha becomes as the agent's progress goes from 0 to 1; by default it stays. Not in the paper. Must be in (0, 1].
+    final_epsilon : float | None
+        What epsilon becomes as the agent's progress goes from 0 to 1; by default it stays. Not in the paper. Must be in [0, 1].
+    schedule : {'linear', 'exponential'}
+        How alpha and epsilon go to their final values: `linear`: in a straight line; `exponential`: by the same factor in equal parts of the progress, first * (final / first) ** progress. A constant rate is the common choice where the task itself changes; a line is what most libraries of deep Q-learning take for epsilon; an exponential spends more of the training near a small final value, which must not be 0. Any other function of the progress: `sdnn.agents.Schedule`.
+    exploration_fraction : float
+        Part of the progress in which epsilon goes to final_epsilon, where it then stays. Not in the paper. Must be in (0, 1].
+    start_steps : int
+        First steps of the agent's life in which every action is random, whatever epsilon. Not in the paper, which has 0: a rare success is found before the greedy actions have learned to do nothing. Must be in [0, 1073741824].
+    
+    Raises
+    ------
+    TypeError, ValueError
+        For a value of another type or out of its bounds; ``argument`` is its name.
+    """
+    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
+    fields: typing.ClassVar[tuple[typing.Any, ...]]
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, learning_rate: float = ..., discount: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ..., trace_decay: float = ..., bootstrap: typing.Literal['sarsa', 'q_learning'] = ..., traces: typing.Literal['dutch', 'replacing'] = ..., schedule_steps: int = ..., max_action_repeat: int = ..., final_learning_rate: float | None = ..., final_epsilon: float | None = ..., schedule: typing.Literal['linear', 'exponential'] = ..., exploration_fraction: float = ..., start_steps: int = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> SarsaConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
+    def epsilon_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        ...
+    def learning_rate_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        ...
+    def replace(self, **changes: typing.Any) -> SarsaConfig:
+        """
+        Return a copy with other values of some fields.
+        """
+    @property
+    def bootstrap(self) -> typing.Literal['sarsa', 'q_learning']:
+        """
+        What targets bootstrap from: `sarsa`: the value of the next action; `q_learning`: the best value, and traces end where a worse action is taken (Watkins).
+        """
+    @property
+    def discount(self) -> float:
+        """
+        gamma.
+        """
+    @property
+    def epsilon(self) -> float:
+        """
+        Probability of a random action; in fuzzy Q-learning each fired rule picks one for itself.
+        """
+    @property
+    def exploration_fraction(self) -> float:
+        """
+        Part of the progress in which epsilon goes to final_epsilon, where it then stays. Not in the paper.
+        """
+    @property
+    def final_epsilon(self) -> float | None:
+        """
+        What epsilon becomes as the agent's progress goes from 0 to 1; by default it stays. Not in the paper.
+        """
+    @property
+    def final_learning_rate(self) -> float | None:
+        """
+        What alpha becomes as the agent's progress goes from 0 to 1; by default it stays. Not in the paper.
+        """
+    @property
+    def learning_rate(self) -> float:
+        """
+        alpha.
+        """
+    @property
+    def max_action_repeat(self) -> int:
+        """
+        Steps that a random action may last. Not in the paper, which has 1: with more, it is kept for at least k steps with probability 1 / k.
+        """
+    @property
+    def n_greedy_steps(self) -> int:
+        """
+        First steps of an episode in which epsilon is 0.
+        """
+    @property
+    def schedule(self) -> typing.Literal['linear', 'exponential']:
+        """
+        How alpha and epsilon go to their final values: `linear`: in a straight line; `exponential`: by the same factor in equal parts of the progress, first * (final / first) ** progress. A constant rate is the common choice where the task itself changes; a line is what most libraries of deep Q-learning take for epsilon; an exponential spends more of the training near a small final value, which must not be 0. Any other function of the progress: `sdnn.agents.Schedule`.
+        """
+    @property
+    def schedule_steps(self) -> int:
+        """
+        Steps after which alpha and epsilon have gone half of the way to their final values: after t steps they have gone t / (t + schedule_steps) of it, whatever the planned end. With 0 they follow the agent's progress.
+        """
+    @property
+    def start_steps(self) -> int:
+        """
+        First steps of the agent's life in which every action is random, whatever epsilon. Not in the paper, which has 0: a rare success is found before the greedy actions have learned to do nothing.
+        """
+    @property
+    def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
+        """
+        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
+        """
+    @property
+    def tie_tolerance(self) -> float:
+        """
+        Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau.
+        """
+    @property
+    def trace_decay(self) -> float:
+        """
+        lambda: what remains of a trace after a step, beside the discount. 0: one-step targets.
+        """
+    @property
+    def traces(self) -> typing.Literal['dutch', 'replacing']:
+        """
+        What a trace becomes in a state that returns: `dutch`: such that learning equals the forward view at every step (true online); `replacing`: as if it were the first time.
         """
 class FuzzyQLearningConfig:
     """
@@ -1558,6 +1854,58 @@ class VectorFuzzyQLearning:
     @property
     def n_environments(self) -> int:
         ...
+class Sarsa:
+    """
+    Sarsa(lambda) with a linear readout of the SDNN code
+    """
+    def __init__(self, *, approximator: LinearSDNNConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], learning: SarsaConfig, seed: typing.SupportsInt | typing.SupportsIndex, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = []) -> None:
+        ...
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[int]:
+        ...
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def q_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) -> (n_actions,)
+        """
+    def restore(self, state: dict) -> None:
+        """
+        Take what `state` of one with the same settings gave; on an error nothing changes
+        """
+    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_learning_rate(self, rate: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def state(self) -> dict:
+        """
+        What it remembers: arrays by name
+        """
+    @property
+    def action_value(self) -> LinearSDNN:
+        ...
+    @property
+    def epsilon(self) -> float:
+        ...
+    @property
+    def learning_rate(self) -> float:
+        ...
+    @property
+    def n_environments(self) -> int:
+        ...
+    @property
+    def n_learned(self) -> int:
+        """
+        Transitions that were learned
+        """
+    @property
+    def progress(self) -> float:
+        ...
 class ObservationConfig:
     """
     The observed variables of a task.
@@ -1578,6 +1926,8 @@ class ObservationConfig:
         Whether angle_pairs are those that observations have.
     symbols : tuple[tuple[int, ...], ...]
         First variables, and how many there are, of which one is 1.
+    relevant_only : bool
+        Whether inputs that have nothing to do with rewards or actions, as the warm-up finds, are left out.
     
     Raises
     ------
@@ -1592,7 +1942,7 @@ class ObservationConfig:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, low: collections.abc.Sequence[float | None] = ..., high: collections.abc.Sequence[float | None] = ..., adaptive: bool = ..., angles: collections.abc.Sequence[int] = ..., angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., find_angle_pairs: bool = ..., symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ...) -> None:
+    def __init__(self, *, low: collections.abc.Sequence[float | None] = ..., high: collections.abc.Sequence[float | None] = ..., adaptive: bool = ..., angles: collections.abc.Sequence[int] = ..., angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., find_angle_pairs: bool = ..., symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., relevant_only: bool = ...) -> None:
         ...
     def __replace__(self, **changes: typing.Any) -> ObservationConfig:
         ...
@@ -1633,6 +1983,11 @@ class ObservationConfig:
     def low(self) -> tuple[float | None, ...]:
         """
         Lowest value of each variable; none: not known.
+        """
+    @property
+    def relevant_only(self) -> bool:
+        """
+        Whether inputs that have nothing to do with rewards or actions, as the warm-up finds, are left out.
         """
     @property
     def symbols(self) -> tuple[tuple[int, ...], ...]:
@@ -1704,7 +2059,7 @@ class Controller:
     An agent in the units of its task
     """
     fields: typing.ClassVar[tuple] = (('warm_up_steps', 'int', 1000, 'Random steps before learning, where ranges are not known.', 2.0, 10000000.0, False))
-    def __init__(self, *, approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig, learning: QLearningConfig | FuzzyQLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex, observation: ObservationConfig, action: ActionConfig, warm_up_steps: typing.SupportsInt | typing.SupportsIndex = 1000, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = [], state: dict | None = None) -> None:
+    def __init__(self, *, approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig, learning: QLearningConfig | FuzzyQLearningConfig | SarsaConfig, seed: typing.SupportsInt | typing.SupportsIndex, observation: ObservationConfig, action: ActionConfig, warm_up_steps: typing.SupportsInt | typing.SupportsIndex = 1000, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = [], state: dict | None = None) -> None:
         """
         New, or as it was when `state` was taken
         """
@@ -1734,7 +2089,7 @@ class Controller:
         The agent in itself, with states in [0, 1]
         """
     @property
-    def approximator(self) -> SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig:
+    def approximator(self) -> SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig:
         ...
     @property
     def epsilon(self) -> float:
@@ -1927,6 +2282,34 @@ class RBFAcrobotTrial:
     @property
     def n_decisions(self) -> int:
         ...
+class LinearAcrobotTrial:
+    """
+    Sarsa with a linear readout of the SDNN code learns the acrobot swing-up
+    """
+    def __init__(self, *, approximator: LinearSDNNConfig, learning: SarsaConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Runs up to n more learning episodes
+        """
+    def test_rows(self) -> dict[str, numpy.ndarray]:
+        """
+        Columns of the test episodes so far
+        """
+    @property
+    def agent(self) -> Sarsa:
+        """
+        The agent at work: asking for values changes nothing that follows
+        """
+    @property
+    def episode(self) -> int:
+        ...
+    @property
+    def finished(self) -> bool:
+        ...
+    @property
+    def n_decisions(self) -> int:
+        ...
 class PlainRBFQLearning:
     """
     Q-learning with an RBF network evaluated without its product structure; only to be timed
@@ -2045,6 +2428,10 @@ def libsdnn_weights(n_units: typing.SupportsInt | typing.SupportsIndex, n_column
     """
     LIBSDNN's first (weights, thresholds)
     """
+def linear_presets() -> dict[str, tuple[str, LinearSDNNConfig, SarsaConfig]]:
+    """
+    The same of Sarsa with a linear readout
+    """
 def log(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
 def n_units_for(scheme: str, n_classes: typing.SupportsInt | typing.SupportsIndex) -> int:
@@ -2085,6 +2472,11 @@ def time_agent_steps(agent: FuzzyQLearning, n_repetitions: typing.SupportsInt | 
     """
 @typing.overload
 def time_agent_steps(agent: RBFQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
+    """
+@typing.overload
+def time_agent_steps(agent: Sarsa, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """

@@ -7,10 +7,10 @@ import reprlib
 from collections.abc import Mapping
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 __all__ = [
     "argument_error",
@@ -68,6 +68,8 @@ def array_of(name: str, value: Any, kinds: str = "fiub", what: str = "numbers") 
     Traceback (most recent call last):
     ValueError: levels must be numbers, got [0.5, 'a']
     """
+    import numpy as np  # takes longer than all else that `import sdnn` loads
+
     is_plain = type(value) is np.ndarray or isinstance(value, np.generic)
     if is_plain and value.dtype.kind in kinds:
         return np.asarray(value)
@@ -132,6 +134,17 @@ def one_of(name: str, word: Any, words: tuple[str, ...]) -> str:
     return choice(name, word, {member: member for member in words})
 
 
+def _is_of_numpy(value: Any, *names: str) -> bool:
+    """Return whether a value is one of NumPy's scalars of these names, without NumPy."""
+    kind = type(value)
+    return kind.__module__ == "numpy" and kind.__name__ in names
+
+
+def _is_no_number(value: Any) -> bool:
+    """Return whether it is a truth value or a duration, which Python and NumPy count as numbers."""
+    return isinstance(value, bool) or _is_of_numpy(value, "timedelta64")
+
+
 def whole(name: str, value: Any, low: int, high: int) -> int:
     """Check that an argument is a whole number within bounds; ValueError if not.
 
@@ -139,7 +152,7 @@ def whole(name: str, value: Any, low: int, high: int) -> int:
     Traceback (most recent call last):
     ValueError: n_bins must be a whole number in [2, 65535], got 1
     """
-    is_whole = isinstance(value, Integral) and not isinstance(value, bool | np.timedelta64)
+    is_whole = isinstance(value, Integral) and not _is_no_number(value)
     if not is_whole or not low <= value <= high:
         raise argument_error(name, f"must be a whole number in [{low}, {high}], got {shown(value)}")
     return int(value)
@@ -159,7 +172,7 @@ def real(name: str, value: Any) -> float:
     """
     if type(value) is float:
         return value
-    if not isinstance(value, Real) or isinstance(value, bool | np.timedelta64):
+    if not isinstance(value, Real) or _is_no_number(value):
         raise argument_error(name, f"must be a number, got {shown(value)}")
     try:
         return float(value)
@@ -175,7 +188,7 @@ def flag(name: str, value: Any) -> bool:
     Traceback (most recent call last):
     TypeError: explore must be True or False, got 'no'
     """
-    if not isinstance(value, bool | np.bool_):
+    if not isinstance(value, bool) and not _is_of_numpy(value, "bool", "bool_"):
         raise argument_error(name, f"must be True or False, got {shown(value)}", TypeError)
     return bool(value)
 

@@ -14,11 +14,13 @@ from sdnn.agents.evaluation import Evaluation, evaluate
 from sdnn.agents.fixed_rate import FixedRate
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.q_learning import PRESETS, Preset, RBFQLearning, SDNNQLearning
+from sdnn.agents.sarsa import LINEAR_PRESETS, SDNNSarsa
 from sdnn.agents.scaling import Scaling
 from sdnn.agents.training import Training, TrainingResult
-from sdnn.config import FuzzyQLearningConfig, QLearningConfig
+from sdnn.config import FuzzyQLearningConfig, QLearningConfig, SarsaConfig
 
 __all__ = [
+    "LINEAR_PRESETS",
     "PRESETS",
     "Agent",
     "Callback",
@@ -32,6 +34,8 @@ __all__ = [
     "QLearningConfig",
     "RBFQLearning",
     "SDNNQLearning",
+    "SDNNSarsa",
+    "SarsaConfig",
     "Scaling",
     "Schedule",
     "StopTrainingOnRewardThreshold",

@@ -19,6 +19,7 @@ from sdnn.agents.scaling import Scaling
 from sdnn.agents.spaces import (
     Actions,
     AnglePairs,
+    Inputs,
     Observations,
     Ranges,
     action_space_of,
@@ -83,6 +84,10 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     angle_pairs : "none", "find" or sequence of (int, int)
         Pairs of variables that are the cosine and the sine of an angle, which becomes one input.
         ``"find"``: those that the warm-up finds on the unit circle.
+    inputs : "all" or "relevant"
+        ``"relevant"``: only those that rewards or actions have to do with, as far as the warm-up
+        shows: by themselves, or because another one that has depends on them. Slow or fast noise
+        is left out.
     warm_up_steps : int
         Transitions of the warm-up, where there is one.
 
@@ -117,6 +122,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         observation_range: Ranges | None = None,
         angles: Sequence[int] = (),
         angle_pairs: AnglePairs = "none",
+        inputs: Inputs = "all",
         warm_up_steps: int = WARM_UP.default,
     ) -> None:
         self._take_spaces(observation_space, action_space)
@@ -131,7 +137,9 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             seed,
             warm_up_steps,
         )
-        self._observation = self._observations.config(observation_range, angles, angle_pairs)
+        self._observation = self._observations.config(
+            observation_range, angles, angle_pairs, inputs
+        )
         self._action = self._actions.config
         self._make(tables=list(self._tables))
 

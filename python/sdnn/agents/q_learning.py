@@ -13,34 +13,43 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.agents.agent import Agent
-from sdnn.agents.spaces import AnglePairs, Ranges
+from sdnn.agents.spaces import AnglePairs, Inputs, Ranges
 from sdnn.approximators.sdnn_c import pattern_tables
 from sdnn.arguments import choice, real, shown, whole
-from sdnn.config import WARM_UP, QLearningConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.config import (
+    WARM_UP,
+    LinearSDNNConfig,
+    QLearningConfig,
+    RBFNetworkConfig,
+    SarsaConfig,
+    SDNNCConfig,
+)
 
 __all__ = ["PRESETS", "Preset", "RBFQLearning", "SDNNQLearning"]
 
-Approximator = TypeVar("Approximator", SDNNCConfig, RBFNetworkConfig)
+Approximator = TypeVar("Approximator", SDNNCConfig, RBFNetworkConfig, LinearSDNNConfig)
+Learning = TypeVar("Learning", QLearningConfig, SarsaConfig)
 
 
 class Preset(NamedTuple):
     """Settings that belong together, with a title of a few words."""
 
     title: str
-    approximator: SDNNCConfig
-    learning: QLearningConfig
+    approximator: Any
+    learning: Any
 
 
-PRESETS: Mapping[str, Preset] = MappingProxyType(
-    {name: Preset(*settings) for name, settings in _core.presets().items()}
-)
+def presets_of(listed: Mapping[str, Any]) -> Mapping[str, Preset]:
+    """Return the settings that the core lists, by name."""
+    return MappingProxyType({name: Preset(*settings) for name, settings in listed.items()})
+
+
+PRESETS = presets_of(_core.presets())
 """Settings by name: ``"paper"``, ``"general"``, ``"robust"`` and ``"small"``."""
 
 
-class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approximator]):
-    """Q-learning with any approximator."""
-
-    learning_type = QLearningConfig
+class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, Learning]):
+    """An agent that learns the values of actions, with any approximator."""
 
     @property
     def learning_rate(self) -> float:
@@ -123,7 +132,7 @@ class _QLearning(Agent[Approximator, QLearningConfig], abc.ABC, Generic[Approxim
         return core.action_value if self.n_dimensions == 1 else core.action_value(dimension)
 
 
-class SDNNQLearning(_QLearning[SDNNCConfig]):
+class SDNNQLearning(ValueAgent[SDNNCConfig, QLearningConfig]):
     """An agent that learns Q(s, a) with SDNN-C, one transition at a time.
 
     A ``Box`` of actions is cut evenly into the network's actions, 5 in each dimension by default;
@@ -133,7 +142,8 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
 
     Parameters
     ----------
-    observation_space, action_space, seed, observation_range, angles, angle_pairs, warm_up_steps
+    observation_space, action_space, seed, observation_range, angles, angle_pairs, inputs, \
+warm_up_steps
         See `Agent`.
     approximator : SDNNCConfig, optional
         ``n_inputs`` (and ``n_actions``, unless actions are a Box) are taken from the spaces.
@@ -164,6 +174,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
 
     kind = "sdnn-c"
     approximator_type = SDNNCConfig
+    learning_type = QLearningConfig
 
     def __init__(
         self,
@@ -178,6 +189,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         observation_range: Ranges | None = None,
         angles: Sequence[int] = (),
         angle_pairs: AnglePairs = "none",
+        inputs: Inputs = "all",
         warm_up_steps: int = WARM_UP.default,
     ) -> None:
         chosen = choice("preset", preset, PRESETS)
@@ -191,6 +203,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
             observation_range=observation_range,
             angles=angles,
             angle_pairs=angle_pairs,
+            inputs=inputs,
             warm_up_steps=warm_up_steps,
         )
 
@@ -231,7 +244,7 @@ class SDNNQLearning(_QLearning[SDNNCConfig]):
         }
 
 
-class RBFQLearning(_QLearning[RBFNetworkConfig]):
+class RBFQLearning(ValueAgent[RBFNetworkConfig, QLearningConfig]):
     """An agent that learns Q(s, a) with an RBF network, one transition at a time.
 
     It is the baseline whose cost the paper quotes: normalized Gaussians on an even grid over state
@@ -256,3 +269,4 @@ class RBFQLearning(_QLearning[RBFNetworkConfig]):
 
     kind = "rbf"
     approximator_type = RBFNetworkConfig
+    learning_type = QLearningConfig

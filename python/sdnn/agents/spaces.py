@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import argument_error, array_of, has_methods, shown
+from sdnn.arguments import argument_error, array_of, choice, has_methods, shown
 from sdnn.bounds import flat_bounds, with_infinities
 
 __all__ = [
     "Actions",
     "AnglePairs",
+    "Inputs",
     "Observations",
     "Ranges",
     "action_space_of",
@@ -26,6 +27,8 @@ __all__ = [
     "space_data",
     "space_of",
 ]
+
+Inputs: TypeAlias = Literal["all", "relevant"]
 
 AnglePairs: TypeAlias = Literal["none", "find"] | Sequence[tuple[int, int]]
 """Which variables are the cosine and the sine of one angle."""
@@ -59,7 +62,7 @@ class Observations:
             raise ValueError(f"observation_space must have a variable, got {space}")
 
     def config(
-        self, ranges: Ranges | None, angles: Sequence[int], angle_pairs: AnglePairs
+        self, ranges: Ranges | None, angles: Sequence[int], angle_pairs: AnglePairs, inputs: Inputs
     ) -> _core.ObservationConfig:
         """Return the core's settings for these arguments of `sdnn.agents.Agent`."""
         is_adaptive = isinstance(ranges, str) and ranges == "adaptive"
@@ -78,6 +81,7 @@ class Observations:
             angle_pairs=pairs,
             find_angle_pairs=isinstance(angle_pairs, str) and angle_pairs == "find",
             symbols=list(_symbols_of(self._space)),
+            relevant_only=choice("inputs", inputs, {"all": False, "relevant": True}),
         )
 
     def vector(self, name: str, observation: Any) -> NDArray[np.float64]:

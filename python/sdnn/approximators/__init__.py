@@ -1,6 +1,6 @@
 """Approximators of action values."""
 
 from sdnn.approximators.sdnn_c import SDNNC
-from sdnn.config import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.config import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
 
-__all__ = ["SDNNC", "FuzzyRulesConfig", "RBFNetworkConfig", "SDNNCConfig"]
+__all__ = ["SDNNC", "FuzzyRulesConfig", "LinearSDNNConfig", "RBFNetworkConfig", "SDNNCConfig"]

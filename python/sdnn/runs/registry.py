@@ -15,17 +15,20 @@ from typing import TYPE_CHECKING, Any
 
 from sdnn import _core
 from sdnn.agents import (
+    LINEAR_PRESETS,
     PRESETS,
     FuzzyQLearning,
     FuzzyQLearningConfig,
     Preset,
     QLearningConfig,
     RBFQLearning,
+    SarsaConfig,
     SDNNQLearning,
+    SDNNSarsa,
     Training,
 )
 from sdnn.agents.episode import Learner
-from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.arguments import argument_error, shown
 
 if TYPE_CHECKING:
@@ -189,5 +192,16 @@ register(
         learning=QLearningConfig,
         agent=RBFQLearning,
         core_trial=_core.RBFAcrobotTrial,
+    )
+)
+register(
+    AgentEntry(
+        id="sdnn-linear",
+        title="SDNN, linear",
+        approximator=LinearSDNNConfig,
+        learning=SarsaConfig,
+        agent=SDNNSarsa,
+        core_trial=_core.LinearAcrobotTrial,
+        presets=LINEAR_PRESETS,
     )
 )

@@ -264,7 +264,11 @@ class AgentSpec(Settings, frozen=True):
     """Who learns."""
 
     name: Annotated[
-        str, Meta(description="The agent: `sdnn-c`, `rbf`, `fuzzy`, or one that was registered.")
+        str,
+        Meta(
+            description="The agent: `sdnn-c`, `sdnn-linear`, `rbf`, `fuzzy`, or one that was"
+            " registered."
+        ),
     ] = "sdnn-c"
     preset: Annotated[
         str | None,

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from refusals import refuses
-from sdnn.agents import RBFQLearning, SDNNQLearning, Transition
+from sdnn.agents import RBFQLearning, SDNNQLearning, Transition, load_agent
 from sdnn.agents.spaces import Observations
 from sdnn.approximators import SDNNCConfig
 from sdnn.bounds import flat_bounds
@@ -17,7 +17,7 @@ BUTTONS = gym.spaces.Discrete(2)
 
 
 def config(space, ranges=None, angles=(), angle_pairs="none"):
-    return Observations(space).config(ranges, angles, angle_pairs)
+    return Observations(space).config(ranges, angles, angle_pairs, "all")
 
 
 def sdnn_agent(space, **options):
@@ -199,3 +199,37 @@ def test_a_space_without_a_range_names_a_remedy():
 )
 def test_elements_of_other_spaces_are_refused_by_name(space, observation):
     refuses("next_observation", Observations(space).vector, "next_observation", observation)
+
+
+class _Distracted(gym.ObservationWrapper):
+    """CartPole with slow noise beside what it observes."""
+
+    def __init__(self, env, n_noise):
+        super().__init__(env)
+        self.observation_space = gym.spaces.Box(-np.inf, np.inf, (4 + n_noise,))
+        self._noise = np.zeros(n_noise)
+
+    def observation(self, observation):
+        self._noise = 0.9 * self._noise + 0.4 * self.np_random.normal(size=self._noise.size)
+        return np.concatenate([observation, self._noise])
+
+
+def test_irrelevant_inputs_are_left_out_and_stay_so(tmp_path):
+    env = _Distracted(gym.make("CartPole-v1"), 6)
+    agent = SDNNQLearning(
+        env.observation_space, env.action_space, preset="small", seed=1, inputs="relevant"
+    )
+    agent.train(env, steps=1001, seed=1)
+    kept = [variables[0] for _, variables in agent.inputs]
+    assert kept[:4] == [0, 1, 2, 3]
+    assert len(kept) <= 5  # of ten
+    agent.save(tmp_path / "agent.safetensors")
+    loaded = load_agent(tmp_path / "agent.safetensors")
+    assert loaded.inputs == agent.inputs
+    observation = np.linspace(-0.1, 0.1, 10)
+    np.testing.assert_array_equal(loaded.q_values(observation), agent.q_values(observation))
+
+
+def test_inputs_are_all_or_relevant():
+    env = gym.make("CartPole-v1")
+    refuses("inputs", SDNNQLearning, env.observation_space, env.action_space, inputs="some")

@@ -20,12 +20,14 @@ from sdnn.agents import (
     FuzzyQLearningConfig,
     QLearningConfig,
     RBFQLearning,
+    SarsaConfig,
     SDNNQLearning,
+    SDNNSarsa,
     Training,
     Transition,
     load_agent,
 )
-from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.arguments import shown
 from sdnn.files import read_file, write_file
 
@@ -151,6 +153,10 @@ SETTINGS = {
             n_actions=5,
         ),
         QLearningConfig(n_steps=2, value_range="adaptive", n_greedy_steps=0),
+    ),
+    SDNNSarsa: (
+        LinearSDNNConfig(n_pattern_units=20, n_anchor_patterns=4, n_interpolated=6),
+        SarsaConfig(schedule_steps=20),
     ),
     RBFQLearning: (RBFNetworkConfig(n_actions=5), QLearningConfig(n_greedy_steps=0)),
     FuzzyQLearning: (

@@ -35,6 +35,11 @@ def network_config(**sizes):
     return core.SDNNCConfig(**{**small, **sizes})
 
 
+def linear_config(**sizes):
+    small = {"n_inputs": 2, "n_pattern_units": 20, "averaging_interval": 2}
+    return core.LinearSDNNConfig(**{**small, **sizes})
+
+
 def learning(kind=core.QLearningConfig):
     return kind(n_greedy_steps=0)
 
@@ -93,6 +98,15 @@ GOOD = {
     "DecoupledRBFQLearning": lambda: {
         "approximator": core.RBFNetworkConfig(), "n_actions": [3, 4], "learning": learning(),
         "seed": 1,
+    },
+    "LinearSDNN": lambda: {"config": linear_config(), "n_actions": [3, 4], "seed": 1},
+    "Sarsa": lambda: {
+        "approximator": linear_config(), "n_actions": [3, 4], "learning": core.SarsaConfig(),
+        "seed": 1, "tables": [],
+    },
+    "LinearAcrobotTrial": lambda: {
+        "approximator": linear_config(n_inputs=4), **trial_settings(),
+        "learning": core.SarsaConfig(),
     },
     "FuzzyQLearning": lambda: {
         "approximator": core.FuzzyRulesConfig(), "learning": learning(core.FuzzyQLearningConfig),

@@ -355,7 +355,7 @@ WRONG = {
     ),
     "agent": (
         "[cases.s4]\n[variants.a]\nagent = 'fuzzyy'\n", 3,
-        "variants.a.agent: must be one of sdnn-c, fuzzy, rbf, sdnn-c-general,",
+        "variants.a.agent: must be one of sdnn-c, fuzzy, rbf,",
     ),
     "agents": ("[agents.dqn]\n[cases.s4]\n", 1, "agents.dqn: no such agent; possible: sdnn-c"),
     "agent of agents": (

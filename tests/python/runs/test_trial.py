@@ -48,7 +48,17 @@ def python_trial(spec, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "agent", ["sdnn-c", "sdnn-c-robust", "sdnn-c-general", "sdnn-c-small", "fuzzy", "rbf"]
+    "agent",
+    [
+        "sdnn-c",
+        "sdnn-c-robust",
+        "sdnn-c-general",
+        "sdnn-c-small",
+        "fuzzy",
+        "rbf",
+        "sdnn-linear",
+        "sdnn-linear-general",
+    ],
 )
 @pytest.mark.parametrize(("n_sensors", "noise"), [(4, 0.0), (4, 0.02), (5, 0.02), (6, 0.02)])
 def test_it_reproduces_the_compiled_trial_bit_for_bit(agent, n_sensors, noise, monkeypatch):
@@ -139,10 +149,12 @@ def test_ids_are_registered_once():
 
 
 def test_agents_are_looked_up_by_word():
-    words = ["sdnn-c", "fuzzy", "rbf", "sdnn-c-general", "sdnn-c-robust", "sdnn-c-small"]
+    words = ["sdnn-c", "fuzzy", "rbf", "sdnn-linear", "sdnn-c-general", "sdnn-c-robust"]
+    words += ["sdnn-c-small", "sdnn-linear-general"]
     assert list(labels()) == words
     assert [title_of(word) for word in words] == [
-        "SDNN-C", "FQL", "RBFN", "SDNN-C, general", "SDNN-C, robust", "SDNN-C, small"
+        "SDNN-C", "FQL", "RBFN", "SDNN, linear", "SDNN-C, general", "SDNN-C, robust",
+        "SDNN-C, small", "SDNN, linear, general",
     ]  # fmt: skip
     assert all(agent_entry(name) is entry for name, entry in AGENTS.items())
     assert agent_entry("sdnn-c-small") is AGENTS["sdnn-c"]

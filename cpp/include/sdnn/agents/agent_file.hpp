@@ -23,7 +23,9 @@
 #include "sdnn/agents/controller.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning_config.hpp"
+#include "sdnn/agents/sarsa_config.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
+#include "sdnn/approximators/linear_sdnn_config.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"
 #include "sdnn/core/config_fields.hpp"
@@ -168,8 +170,10 @@ namespace detail {
 struct AgentKind {
   std::string_view name, class_in_python;
 };
-inline constexpr std::array<AgentKind, 3> kAgentKinds{
-    {{"sdnn-c", "SDNNQLearning"}, {"rbf", "RBFQLearning"}, {"fuzzy", "FuzzyQLearning"}}};
+inline constexpr std::array<AgentKind, 4> kAgentKinds{{{"sdnn-c", "SDNNQLearning"},
+                                                       {"rbf", "RBFQLearning"},
+                                                       {"fuzzy", "FuzzyQLearning"},
+                                                       {"sdnn-linear", "SDNNSarsa"}}};
 
 /// The settings of a controller in a file's description.
 inline ControllerConfig controller_config_in(const nlohmann::json& description) {
@@ -194,11 +198,17 @@ inline ControllerConfig controller_config_in(const nlohmann::json& description) 
       config.approximator =
           config_from_json<approximators::FuzzyRulesConfig>(approximator, "approximator");
       break;
+    case 3:
+      config.approximator =
+          config_from_json<approximators::LinearSDNNConfig>(approximator, "approximator");
+      break;
     default:
-      refuse("kind", "sdnn-c, rbf or fuzzy", name);
+      refuse("kind", "sdnn-c, rbf, fuzzy or sdnn-linear", name);
   }
   if (is_fuzzy(config.approximator)) {
     config.learning = config_from_json<FuzzyQLearningConfig>(learning, "learning");
+  } else if (is_linear(config.approximator)) {
+    config.learning = config_from_json<SarsaConfig>(learning, "learning");
   } else {
     config.learning = config_from_json<QLearningConfig>(learning, "learning");
   }

@@ -14,13 +14,18 @@
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/agents/q_learning_config.hpp"
+#include "sdnn/agents/sarsa.hpp"
+#include "sdnn/agents/sarsa_config.hpp"
 #include "sdnn/agents/vector_fuzzy_q_learning.hpp"
 #include "sdnn/approximators/decoupled.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
+#include "sdnn/approximators/linear_sdnn.hpp"
+#include "sdnn/approximators/linear_sdnn_config.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"
 #include "sdnn/coding/pattern_table.hpp"
+#include "sdnn/coding/state_code_config.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 
@@ -31,7 +36,7 @@ using AnyAgent = std::variant<QLearning<approximators::SDNNC>,
                               QLearning<approximators::Decoupled<approximators::SDNNC>>,
                               QLearning<approximators::RBFNetwork>,
                               QLearning<approximators::Decoupled<approximators::RBFNetwork>>,
-                              FuzzyQLearning, VectorFuzzyQLearning>;
+                              FuzzyQLearning, VectorFuzzyQLearning, Sarsa>;
 
 /// What one reader of such an agent needs.
 template <class Agents>
@@ -45,8 +50,8 @@ using AnyWorkspace = WorkspacesOf<AnyAgent>::type;
 /// The settings of its parts. Fuzzy rules belong to fuzzy Q-learning.
 using AnyApproximatorConfig =
     std::variant<approximators::SDNNCConfig, approximators::RBFNetworkConfig,
-                 approximators::FuzzyRulesConfig>;
-using AnyLearningConfig = std::variant<QLearningConfig, FuzzyQLearningConfig>;
+                 approximators::FuzzyRulesConfig, approximators::LinearSDNNConfig>;
+using AnyLearningConfig = std::variant<QLearningConfig, FuzzyQLearningConfig, SarsaConfig>;
 
 /// Whether it is one of the two that learn by fuzzy rules.
 template <class Agent>
@@ -56,8 +61,12 @@ inline constexpr bool kIsFuzzy =
 inline bool is_fuzzy(const AnyApproximatorConfig& config) noexcept {
   return std::holds_alternative<approximators::FuzzyRulesConfig>(config);
 }
+inline bool is_linear(const AnyApproximatorConfig& config) noexcept {
+  return std::holds_alternative<approximators::LinearSDNNConfig>(config);
+}
+/// Whether states have an SDNN code.
 inline bool is_sdnn(const AnyApproximatorConfig& config) noexcept {
-  return std::holds_alternative<approximators::SDNNCConfig>(config);
+  return std::holds_alternative<approximators::SDNNCConfig>(config) || is_linear(config);
 }
 
 /// How many actions of a box there are in each dimension; 0: any.
@@ -67,6 +76,8 @@ inline std::size_t n_actions_in_box(const AnyApproximatorConfig& config) {
   if (const auto* const sdnn = std::get_if<approximators::SDNNCConfig>(&config)) {
     n = sdnn->n_actions;
     if (n == 0) n = sdnn->n_hidden_units - sdnn->n_active_units + 1;
+  } else if (const auto* const linear = std::get_if<approximators::LinearSDNNConfig>(&config)) {
+    n = linear->n_actions;
   } else {
     n = std::get<approximators::RBFNetworkConfig>(config).n_actions;
   }
@@ -81,35 +92,46 @@ inline double power(int base, int exponent) {
   return product;
 }
 
+/// Code books are in no array of a file. Those of agents take less than their weights.
+template <class Config>
+void expect_code_room(const Config& config, double weight_bytes, double n_dimensions) {
+  const double n_bytes = coding::pattern_bytes_of(config, coding::n_bins_of(config));
+  const double most = static_cast<double>(core::kDefaultMaxTableBytes) / n_dimensions;
+  core::require(n_bytes <= std::max(most, weight_bytes), "n_interpolated or n_symbols",
+                "smaller: code books would not fit", n_bytes);
+}
+
 }  // namespace detail
 
 /// Throws std::invalid_argument unless an agent's arrays in a state, called "agent." and so on, are
 /// as large as the settings make them: before memory is asked for.
 template <class Reader>
 void expect_sizes(const Reader& reader, const AnyApproximatorConfig& config,
-                  std::size_t n_dimensions, bool has_tables) {
+                  const std::vector<std::size_t>& n_actions, bool has_tables) {
+  const std::string name = "agent.action_value.";
+  if (const auto* const linear = std::get_if<approximators::LinearSDNNConfig>(&config)) {
+    const double n_weights = approximators::n_linear_weights(*linear, n_actions);
+    reader.expect_size(name + "weights", n_weights);
+    if (!has_tables) detail::expect_code_room(*linear, 4.0 * n_weights, 1.0);
+    return;
+  }
+  const std::size_t n_dimensions = n_actions.size();
   for (std::size_t d = 0; d < n_dimensions; ++d) {
     const std::string number = n_dimensions > 1 ? std::to_string(d) + "." : "";
     if (const auto* const rules = std::get_if<approximators::FuzzyRulesConfig>(&config)) {
       reader.expect_size("agent." + number + "rules.values",
                          detail::power(rules->n_sets, rules->n_inputs) * rules->n_actions);
-      continue;
+    } else if (const auto* const rbf = std::get_if<approximators::RBFNetworkConfig>(&config)) {
+      reader.expect_size(name + number + "weights", detail::power(rbf->n_bases, rbf->n_inputs + 1));
+    } else {
+      const auto& sdnn = std::get<approximators::SDNNCConfig>(config);
+      const double n_weights = 1.0 * sdnn.n_hidden_units * sdnn.n_pattern_units * sdnn.n_inputs *
+                               coding::n_partners_of(sdnn);
+      reader.expect_size(name + number + "weights", n_weights);
+      if (!has_tables) {
+        detail::expect_code_room(sdnn, 2.0 * n_weights, static_cast<double>(n_dimensions));
+      }
     }
-    const std::string name = "agent.action_value." + number + "weights";
-    if (const auto* const rbf = std::get_if<approximators::RBFNetworkConfig>(&config)) {
-      reader.expect_size(name, detail::power(rbf->n_bases, rbf->n_inputs + 1));
-      continue;
-    }
-    const auto& sdnn = std::get<approximators::SDNNCConfig>(config);
-    const double n_weights =
-        1.0 * sdnn.n_hidden_units * sdnn.n_pattern_units * sdnn.n_inputs * sdnn.n_partners();
-    reader.expect_size(name, n_weights);
-    if (has_tables) continue;
-    // Code books are in no array. Those of agents take less than their weights.
-    const double n_code_bytes = sdnn.pattern_bytes(sdnn.n_bins());
-    const double most = static_cast<double>(core::kDefaultMaxTableBytes / n_dimensions);
-    core::require(n_code_bytes <= std::max(most, 2.0 * n_weights), "n_interpolated or n_symbols",
-                  "smaller: code books would not fit", n_code_bytes);
   }
 }
 
@@ -133,17 +155,26 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
                            const std::vector<std::size_t>& n_actions, std::uint64_t seed,
                            const std::vector<coding::PatternTable>& tables = {}) {
   using namespace approximators;
-  core::require(is_fuzzy(config) == std::holds_alternative<FuzzyQLearningConfig>(learning),
-                "learning", "that of Q-learning, or of fuzzy Q-learning with fuzzy rules",
-                "the other");
-  core::require(tables.empty() || (is_sdnn(config) && n_actions.size() == 1), "tables",
-                "None where actions have several dimensions", tables.size());
+  const bool fits = is_fuzzy(config)    ? std::holds_alternative<FuzzyQLearningConfig>(learning)
+                    : is_linear(config) ? std::holds_alternative<SarsaConfig>(learning)
+                                        : std::holds_alternative<QLearningConfig>(learning);
+  core::require(fits, "learning",
+                "FuzzyQLearningConfig with fuzzy rules, SarsaConfig with a linear readout, else "
+                "QLearningConfig",
+                "another one");
+  core::require(tables.empty() || is_linear(config) || (is_sdnn(config) && n_actions.size() == 1),
+                "tables", "None where actions have several dimensions", tables.size());
   if (const auto* const rules = std::get_if<FuzzyRulesConfig>(&config)) {
     const auto& rule = std::get<FuzzyQLearningConfig>(learning);
     if (n_actions.size() == 1) return FuzzyQLearning(FuzzyRules(*rules), rule, seed);
     FuzzyRulesConfig of_dimension = *rules;
     of_dimension.max_table_bytes /= n_actions.size();
     return VectorFuzzyQLearning(of_dimension, n_actions.size(), rule, seed);
+  }
+  if (const auto* const linear = std::get_if<LinearSDNNConfig>(&config)) {
+    return Sarsa(tables.empty() ? LinearSDNN(*linear, n_actions, seed)
+                                : LinearSDNN(*linear, n_actions, tables, seed),
+                 std::get<SarsaConfig>(learning), seed);
   }
   const auto& rule = std::get<QLearningConfig>(learning);
   if (const auto* const rbf = std::get_if<RBFNetworkConfig>(&config)) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <string>
@@ -18,9 +19,13 @@
 #include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/detail/saved_tables.hpp"
 #include "sdnn/agents/detail/taken_actions.hpp"
+#include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/observations.hpp"
 #include "sdnn/agents/range_use.hpp"
+#include "sdnn/agents/relevance.hpp"
+#include "sdnn/agents/schedule_config.hpp"
 #include "sdnn/agents/warm_up.hpp"
+#include "sdnn/approximators/linear_sdnn_config.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/core/config_fields.hpp"
@@ -129,14 +134,14 @@ class Controller {
   }
   /// As they are now. Require Q-learning.
   double learning_rate() const {
-    const double planned = learning_rate_.value_or(
-        std::get<QLearningConfig>(config_.learning).learning_rate_at(progress_));
-    return of_q_learning([](const auto& agent) { return agent.learning_rate(); }, planned);
+    const double otherwise = learning_rate_.value_or(
+        planned([this](const auto& config) { return learning_rate_at(config, progress_); }));
+    return of_q_learning([](const auto& agent) { return agent.learning_rate(); }, otherwise);
   }
   double epsilon() const {
-    const double planned =
-        epsilon_.value_or(std::get<QLearningConfig>(config_.learning).epsilon_at(progress_));
-    return of_q_learning([](const auto& agent) { return agent.epsilon(); }, planned);
+    const double otherwise = epsilon_.value_or(
+        planned([this](const auto& config) { return epsilon_at(config, progress_); }));
+    return of_q_learning([](const auto& agent) { return agent.epsilon(); }, otherwise);
   }
 
   /// How many robots, or environments, the agent learns from at once: each has an episode of its
@@ -315,18 +320,13 @@ class Controller {
           }
         },
         approximator_);
-    if (auto* const sdnn = std::get_if<approximators::SDNNCConfig>(&approximator_)) {
-      const auto circular = observations_.circular();
-      const auto n_symbols = observations_.n_symbols();
-      const auto has = [](const auto& list) {
-        return std::ranges::any_of(list, [](auto one) { return one != 0; });
-      };
-      if (has(circular) && sdnn->circular.empty()) sdnn->circular = circular;
-      if (has(n_symbols) && sdnn->n_symbols.empty()) sdnn->n_symbols = n_symbols;
-      check_tables(n_symbols);
-    }
+    std::visit(
+        [this](auto& config) {
+          if constexpr (requires { config.circular; }) fill_in_code(config);
+        },
+        approximator_);
     if (reader != nullptr) {
-      expect_sizes(*reader, approximator_, n_dimensions(), !tables_.empty());
+      expect_sizes(*reader, approximator_, actions_.n_actions(), !tables_.empty());
     }
     agent_.emplace(
         make_agent(approximator_, config_.learning, actions_.n_actions(), config_.seed, tables_));
@@ -342,12 +342,42 @@ class Controller {
     next_state_.resize(state_.size());
   }
 
+  /// What the code of states, and actions of symbols, follow from.
+  template <class Config>
+  void fill_in_code(Config& config) {
+    const auto circular = observations_.circular();
+    const auto n_symbols = observations_.n_symbols();
+    const auto has = [](const auto& list) {
+      return std::ranges::any_of(list, [](auto one) { return one != 0; });
+    };
+    if (has(circular) && config.circular.empty()) config.circular = circular;
+    if (has(n_symbols) && config.n_symbols.empty()) config.n_symbols = n_symbols;
+    if constexpr (requires { config.action_window; }) {
+      if (config_.action.discrete) config.action_window = 1;
+      config = approximators::with_pattern_units(config);
+    }
+    check_tables(n_symbols);
+  }
+
   void check_tables(const std::vector<int>& n_symbols) const {
     for (std::size_t i = 0; i < std::min(tables_.size(), n_symbols.size()); ++i) {
       const auto n = static_cast<std::size_t>(n_symbols[i]);
       core::require(n == 0 || tables_[i].n_bins() == n, "tables[" + std::to_string(i) + "]",
                     "of a row for each of " + std::to_string(n) + " symbols", tables_[i].n_bins());
     }
+  }
+
+  /// What `call` gives of the settings of learning, but for fuzzy Q-learning.
+  template <class Call>
+  double planned(const Call& call) const {
+    return std::visit(
+        [&call](const auto& config) {
+          if constexpr (std::is_same_v<std::remove_cvref_t<decltype(config)>, FuzzyQLearningConfig>)
+            return 0.0;
+          else
+            return call(config);
+        },
+        config_.learning);
   }
 
   /// Calls what Q-learning is changed by, where there is such an agent.
@@ -465,6 +495,9 @@ class Controller {
   void end_warm_up() {
     Observations fitted = observations_;
     fitted.fit(warm_up_->seen());
+    if (config_.observation.relevant_only) {
+      fitted.keep(Relevance(random_experience(fitted)).inputs());
+    }
     observations_ = std::move(fitted);
     fit();
     const WarmUp warm_up = std::move(*warm_up_);
@@ -476,6 +509,30 @@ class Controller {
       for (std::size_t t = 0; t < warm_up.size(); ++t) relive(warm_up.step(t));
     }
     set_n_environments(warm_up.n_environments());
+  }
+
+  /// The warm-up, one environment after the other.
+  RandomExperience random_experience(const Observations& fitted) const {
+    std::vector<std::size_t> order(warm_up_->size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::stable_sort(order, {}, [this](auto t) { return warm_up_->step(t).environment; });
+    RandomExperience experience{.n_inputs = fitted.n_inputs(), .circular = fitted.circular()};
+    experience.actions.resize(n_dimensions());
+    std::vector<double> state(fitted.n_inputs());
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      const WarmUp::Step step = warm_up_->step(order[k]);
+      fitted.scale(step.observation, state);
+      experience.states.insert(experience.states.end(), state.begin(), state.end());
+      fitted.scale(step.next_observation, state, "next_observation");
+      experience.next_states.insert(experience.next_states.end(), state.begin(), state.end());
+      for (std::size_t d = 0; d < n_dimensions(); ++d) {
+        experience.actions[d].push_back(step.action[d]);
+      }
+      experience.rewards.push_back(step.reward);
+      if (k > 0 && step.begins) experience.ends.back() = true;
+      experience.ends.push_back(step.terminated);
+    }
+    return experience;
   }
 
   void relive(const WarmUp::Step& step) {

@@ -28,6 +28,7 @@ struct ObservationConfig {
   std::vector<std::vector<int>> angle_pairs = {};
   bool find_angle_pairs = false;
   std::vector<std::vector<int>> symbols = {};
+  bool relevant_only = false;
 
   static constexpr auto fields() noexcept {
     return std::tuple(core::field("low", &ObservationConfig::low,
@@ -43,7 +44,10 @@ struct ObservationConfig {
                       core::field("find_angle_pairs", &ObservationConfig::find_angle_pairs,
                                   "Whether angle_pairs are those that observations have."),
                       core::field("symbols", &ObservationConfig::symbols,
-                                  "First variables, and how many there are, of which one is 1."));
+                                  "First variables, and how many there are, of which one is 1."),
+                      core::field("relevant_only", &ObservationConfig::relevant_only,
+                                  "Whether inputs that have nothing to do with rewards or actions, "
+                                  "as the warm-up finds, are left out."));
   }
   bool operator==(const ObservationConfig&) const = default;
 };
@@ -78,7 +82,8 @@ class Observations {
       for (const int variable : pair) claim(Role::pair, variable, "angle_pairs");
     }
     const Ranges fixed = fixed_ranges(config_.angle_pairs);
-    needs_fit_ = config_.find_angle_pairs || std::ranges::any_of(fixed.low, is_unknown);
+    needs_fit_ = config_.find_angle_pairs || config_.relevant_only ||
+                 std::ranges::any_of(fixed.low, is_unknown);
     if (!needs_fit_) take(fixed, config_.angle_pairs);
   }
 
@@ -130,6 +135,18 @@ class Observations {
     take(ranges, pairs);
   }
 
+  /// Leaves out some of the inputs. Shape: (n_inputs,). Requires that it is fitted, and that one is
+  /// kept.
+  void keep(const std::vector<bool>& kept) {
+    std::vector<ObservedInput> inputs;
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+      if (!kept[i]) continue;
+      kept_.push_back(static_cast<std::int32_t>(i));
+      inputs.push_back(inputs_[i]);
+    }
+    take_inputs(std::move(inputs));
+  }
+
   /// Lists what was fitted; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
@@ -140,6 +157,8 @@ class Observations {
     archive.numbers("low", ranges.low);
     archive.numbers("high", ranges.high);
     archive.numbers("angle_pairs", listed);
+    std::vector<std::int32_t> kept = self.kept_;  // empty: all
+    if (self.config_.relevant_only) archive.numbers("kept", kept);
     if constexpr (Archive::kReads) {
       archive.expect(ranges.low.size() == self.n_variables(), "low", "one for each variable");
       archive.expect(listed.size() % 2 == 0, "angle_pairs", "pairs");
@@ -150,6 +169,14 @@ class Observations {
         pairs.push_back({listed[k], listed[k + 1]});
       }
       archive.taking("low", [&] { self.take(ranges, pairs); });
+      if (kept.empty()) return;
+      std::vector<bool> is_kept(self.n_inputs());
+      for (const std::int32_t i : kept) {
+        archive.expect(i >= 0 && static_cast<std::uint32_t>(i) < is_kept.size(), "kept",
+                       "of inputs");
+        is_kept[static_cast<std::size_t>(i)] = true;
+      }
+      self.keep(is_kept);
     }
   }
 
@@ -285,15 +312,20 @@ class Observations {
     for (std::size_t i = 0; i < n_variables(); ++i) {
       if (!is_part[i]) inputs.push_back(of_variable[i]);
     }
-    while (!inputs.empty() && inputs.size() < least_inputs_) inputs.push_back(inputs.back());
     return inputs;
   }
 
   void take(const Ranges& ranges, const Pairs& pairs) {
-    auto inputs = inputs_with(pairs);
-    scale_.emplace(ranges.low, ranges.high, inputs);
+    ObservationScale(ranges.low, ranges.high, {});  // throws before anything changes
     ranges_ = ranges;
     pairs_ = pairs;
+    kept_.clear();
+    take_inputs(inputs_with(pairs));
+  }
+
+  void take_inputs(std::vector<ObservedInput> inputs) {
+    while (!inputs.empty() && inputs.size() < least_inputs_) inputs.push_back(inputs.back());
+    scale_.emplace(ranges_.low, ranges_.high, inputs);
     inputs_ = std::move(inputs);
   }
 
@@ -304,6 +336,7 @@ class Observations {
   Ranges ranges_;
   Pairs pairs_;
   std::vector<ObservedInput> inputs_;
+  std::vector<std::int32_t> kept_;  ///< numbers of the inputs that were kept, if some were not
   std::optional<ObservationScale> scale_;
 };
 

@@ -3,8 +3,9 @@
 
 #include <array>
 
-#include "sdnn/agents/q_learning.hpp"
 #include "sdnn/agents/q_learning_config.hpp"
+#include "sdnn/agents/sarsa_config.hpp"
+#include "sdnn/approximators/linear_sdnn_config.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"
 
 namespace sdnn::agents {
@@ -70,6 +71,45 @@ inline std::array<NamedPreset, 4> presets(int n_inputs) {
             robust_preset(n_inputs)},
            {"small", "as recommended for small processors: the general one, fewer units",
             small_preset(n_inputs)}}};
+}
+
+/// Settings of Sarsa with a linear readout that belong together.
+struct LinearPreset {
+  approximators::LinearSDNNConfig approximator = {};
+  SarsaConfig learning = {};
+};
+struct NamedLinearPreset {
+  const char* name;
+  const char* title;
+  LinearPreset preset;
+};
+
+/// The paper's rule, one-step Q-learning, in the paper's task: targets of one step, 61 torques
+/// whose neighbours share nine of ten units, and patterns of 40 units.
+inline LinearPreset paper_linear_preset(int n_inputs) {
+  return {.approximator = {.n_inputs = n_inputs,
+                           .n_pattern_units = 40,
+                           .n_actions = 61,
+                           .action_window = 10,
+                           .averaging_interval = 0},
+          .learning = {.learning_rate = 0.5,
+                       .discount = 0.9,
+                       .policy = {},
+                       .trace_decay = 0.0,
+                       .bootstrap = Bootstrap::q_learning,
+                       .schedule_steps = 0,
+                       .final_learning_rate = {},
+                       .final_epsilon = {}}};
+}
+
+/// The defaults: for any task.
+inline LinearPreset general_linear_preset(int n_inputs) {
+  return {.approximator = {.n_inputs = n_inputs}};
+}
+
+inline std::array<NamedLinearPreset, 2> linear_presets(int n_inputs) {
+  return {{{"paper", "the paper's rule, in the paper's task", paper_linear_preset(n_inputs)},
+           {"general", "as recommended for any task", general_linear_preset(n_inputs)}}};
 }
 
 }  // namespace sdnn::agents

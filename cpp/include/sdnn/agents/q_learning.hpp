@@ -15,9 +15,11 @@
 
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/epsilon_greedy.hpp"
+#include "sdnn/agents/exploration.hpp"
 #include "sdnn/agents/n_step_buffer.hpp"
 #include "sdnn/agents/q_learning_config.hpp"
 #include "sdnn/agents/return_range.hpp"
+#include "sdnn/agents/schedule_config.hpp"
 #include "sdnn/approximators/action_value.hpp"
 #include "sdnn/approximators/decoupled.hpp"
 #include "sdnn/coding/action_code.hpp"
@@ -43,15 +45,6 @@ namespace sdnn::agents {
 /// Learning from delayed rewards (corrected n-step returns); Sutton, R., Barto, A. (2018).
 /// Reinforcement learning, section 7.1.
 ///
-/// With max_action_repeat = m > 1 a random action is kept for d steps, where d is at least k with
-/// probability 1 / k, and m at most: what single random steps do not reach, some of these do.
-/// Source: Dabney, W., Ostrovski, G., Barreto, A. (2021). Temporally-extended epsilon-greedy
-/// exploration (with this distribution in the place of the zeta one, which it resembles).
-///
-/// In its first start_steps steps an agent takes random actions only: a rare success is found
-/// before the greedy ones have learned to do nothing. Source: the start_steps of Achiam, J. (2018),
-/// Spinning up in deep reinforcement learning, kept for some steps as above.
-///
 /// An agent may learn in several environments at once, numbered from 0: what belongs to an episode
 /// (the steps that wait, the kept action, the number of its steps, the sum of its rewards) is then
 /// kept for each, all else is shared. Which of them acts or learns when is the caller's choice.
@@ -70,12 +63,10 @@ class QLearning {
 
   /// Throws std::invalid_argument naming the field that is out of range.
   QLearning(Q action_value, const QLearningConfig& config, std::uint64_t seed)
-      : config_(checked(config)),
+      : config_(checked_schedule(config)),
         action_value_(std::move(action_value)),
-        policy_(config.policy, seed),
-        repetitions_(seed, core::Stream::repetitions),
+        exploration_(config, seed),
         range_(config.discount),
-        n_random_left_(config.start_steps),
         learning_rate_(config.learning_rate),
         workspace_(workspace()),
         episodes_(new_episode()) {}
@@ -105,26 +96,23 @@ class QLearning {
   /// How much of the learning is done, in [0, 1], where alpha and epsilon go from one value to
   /// another with it. Throws std::invalid_argument outside.
   void set_progress(double progress) {
-    core::require_in_range("progress", progress, 0.0, 1.0);
-    progress_ = progress;
+    rates_.set_progress(progress);
     apply_rates();
   }
-  double progress() const noexcept { return progress_; }
+  double progress() const noexcept { return rates_.progress(); }
   /// Sets alpha or epsilon, whatever the progress, until it is set anew; none: it follows the
   /// progress again. Throws std::invalid_argument outside (0, 1] and [0, 1].
   void set_learning_rate(std::optional<double> rate) {
-    if (rate) require_rate("learning_rate", *rate);
-    set_learning_rate_ = rate;
+    rates_.set_learning_rate(rate);
     apply_rates();
   }
   void set_epsilon(std::optional<double> epsilon) {
-    if (epsilon) core::require_in_range("epsilon", *epsilon, 0.0, 1.0);
-    set_epsilon_ = epsilon;
+    rates_.set_epsilon(epsilon);
     apply_rates();
   }
   /// As they were set, or as progress has made them.
   double learning_rate() const noexcept { return learning_rate_; }
-  double epsilon() const noexcept { return policy_.config().epsilon; }
+  double epsilon() const noexcept { return exploration_.policy().config().epsilon; }
 
   /// In how many environments at once the agent learns: each has an episode of its own. Of those
   /// that are no more, what waits is learned. Throws std::invalid_argument outside [1, 2^14], and
@@ -142,8 +130,7 @@ class QLearning {
   /// and as learn does.
   void begin_episode(std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
-    episode.step = 0;
-    episode.n_kept = 0;
+    episode.exploration.begin();
     episode.sum = 0.0;
     NStepBuffer& buffer = episode.buffer;
     if (buffer.size() > 0) learn_all(buffer, state_value(buffer.next_state()));
@@ -176,7 +163,9 @@ class QLearning {
   Action best_action(std::span<const double> state, Workspace& workspace,
                      core::Random& ties) const {
     read(state, workspace);
-    return each_best([&](std::size_t d) { return policy_.best_action(workspace.values[d], ties); });
+    return each_best([&](std::size_t d) {
+      return exploration_.policy().best_action(workspace.values[d], ties);
+    });
   }
 
   /// The two steps of act without `explore`: `read` takes the time and is for many threads, as
@@ -185,8 +174,9 @@ class QLearning {
     for (std::size_t d = 0; d < n_dimensions(); ++d) averaged_values(state, workspace, d);
   }
   Action best_of(const Workspace& workspace) {
-    return each_best(
-        [&](std::size_t d) { return policy_.best_action(workspace.values[d], false); });
+    return each_best([&](std::size_t d) {
+      return exploration_.policy().best_action(workspace.values[d], false);
+    });
   }
 
   /// The action to take in `state`; without `explore` a best one, by the average of the weights
@@ -198,26 +188,13 @@ class QLearning {
       return best_of(workspace_);
     }
     core::require_unit_values("state", state, n_inputs());  // before anything is drawn
-    // Evaluating is no step of the episode: it must not move the end of the greedy phase.
-    const int step = episode.step++;
-    const bool at_random = n_random_left_ > 0;
-    if (at_random) --n_random_left_;
-    if (episode.n_kept == 0 && !at_random && !policy_.explores(step)) {
-      return each_best(
-          [&](std::size_t d) { return policy_.best_action(values(state, workspace_, d), true); });
+    const auto n_actions_of = [this](std::size_t d) { return n_actions(d); };
+    if (!exploration_.takes_random_action(episode.exploration, n_actions_of)) {
+      return each_best([&](std::size_t d) {
+        return exploration_.policy().best_action(values(state, workspace_, d), true);
+      });
     }
-    std::vector<std::size_t>& kept = episode.kept;
-    if (episode.n_kept > 0) {
-      --episode.n_kept;
-      return as_action(kept);
-    }
-    for (std::size_t d = 0; d < kept.size(); ++d) kept[d] = policy_.random_action(n_actions(d));
-    if (config_.max_action_repeat > 1) {
-      const double drawn = 1.0 - repetitions_.uniform();  // in (0, 1]
-      const double most = static_cast<double>(config_.max_action_repeat);
-      episode.n_kept = static_cast<int>(std::min(1.0 / drawn, most)) - 1;
-    }
-    return as_action(kept);
+    return as_action(episode.exploration.kept);
   }
 
   /// The action as a number in [-1, 1]: actions cut the range evenly.
@@ -259,27 +236,13 @@ class QLearning {
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.part("action_value", self.action_value_);
-    archive.part("policy", self.policy_);
-    archive.part("repetitions", self.repetitions_);
+    Exploration::serialize(self.exploration_, archive);
     archive.part("range", self.range_);
-    archive.number("progress", self.progress_);
-    archive.number("learning_rate", self.set_learning_rate_);
-    archive.number("epsilon", self.set_epsilon_);
-    std::optional<int> n_random_left;  // none where there are no more
-    if (self.n_random_left_ > 0) n_random_left = self.n_random_left_;
-    archive.number("n_random_left", n_random_left);
+    Rates::serialize(self.rates_, archive);
     Episodes<Episode>::serialize(
         self.episodes_, archive, [&self] { return self.new_episode(); },
         [&](auto& episode) { serialize_episode(self, episode, archive); });
     if constexpr (Archive::kReads) {
-      archive.expect(self.progress_ >= 0.0 && self.progress_ <= 1.0, "progress", "in [0, 1]");
-      const double rate = self.set_learning_rate_.value_or(1.0);
-      archive.expect(rate > 0.0 && rate <= 1.0, "learning_rate", "in (0, 1]");
-      const double epsilon = self.set_epsilon_.value_or(0.0);
-      archive.expect(epsilon >= 0.0 && epsilon <= 1.0, "epsilon", "in [0, 1]");
-      self.n_random_left_ = n_random_left.value_or(0);
-      archive.expect(self.n_random_left_ >= 0 && self.n_random_left_ <= self.config_.start_steps,
-                     "n_random_left", "in [0, start_steps]");
       self.apply_rates();
       self.workspace_ = self.workspace();  // a copy's has no room
     }
@@ -292,31 +255,22 @@ class QLearning {
   /// What belongs to the present episode in one environment.
   struct Episode {
     NStepBuffer buffer;
-    std::vector<std::size_t> kept;  ///< the random action
-    int n_kept = 0;                 ///< steps that it will still last
-    int step = 0;
+    Exploration::Episode exploration;
     double sum = 0.0;  ///< of ReturnRange
   };
 
   Episode new_episode() const {
     return {NStepBuffer(static_cast<std::size_t>(config_.n_steps), n_inputs(), n_dimensions()),
-            std::vector<std::size_t>(n_dimensions())};
+            {.kept = std::vector<std::size_t>(n_dimensions())}};
   }
 
   template <class Self, class Listed, class Archive>
   static void serialize_episode(Self& self, Listed& episode, Archive& archive) {
     archive.part("n_step_buffer", episode.buffer);
     archive.number("range.sum", episode.sum);
-    archive.number("step", episode.step);
-    std::vector<std::int64_t> kept(episode.kept.begin(), episode.kept.end());
-    archive.numbers("kept_action", kept);
-    archive.number("n_kept", episode.n_kept);
+    self.exploration_.serialize_episode(episode.exploration, archive,
+                                        [&self](std::size_t d) { return self.n_actions(d); });
     if constexpr (Archive::kReads) {
-      archive.expect(kept.size() == episode.kept.size(), "kept_action", "one per dimension");
-      for (std::size_t d = 0; d < kept.size(); ++d) {
-        archive.expect(self.has_action(d, kept[d]), "kept_action", "an action");
-        episode.kept[d] = static_cast<std::size_t>(kept[d]);
-      }
       const auto is_of_actions = [&self](const NStepBuffer::Step& step) {
         for (std::size_t d = 0; d < step.action.size(); ++d) {
           if (step.action[d] >= self.n_actions(d)) return false;
@@ -326,29 +280,12 @@ class QLearning {
       archive.expect(episode.buffer.each_is(is_of_actions), "n_step_buffer.actions", "of actions");
       archive.expect(!episode.buffer.is_full(), "n_step_buffer.rewards", "fewer than n_steps");
       archive.expect(ReturnRange::is_sum(episode.sum), "range.sum", "a finite sum");
-      archive.expect(episode.step >= 0, "step", "0 or more");
-      archive.expect(episode.n_kept >= 0 && episode.n_kept < self.config_.max_action_repeat,
-                     "n_kept", "in [0, max_action_repeat)");
     }
-  }
-
-  static void require_rate(std::string_view name, double rate) {
-    core::require(rate > 0.0 && rate <= 1.0, name, "in (0, 1]", rate);
-  }
-
-  static QLearningConfig checked(const QLearningConfig& config) {
-    core::check_fields(config);
-    if (config.schedule == Schedule::exponential && config.final_epsilon) {
-      const char* const expected = "greater than 0 where the schedule is exponential";
-      core::require(config.policy.epsilon > 0.0, "epsilon", expected, config.policy.epsilon);
-      core::require(*config.final_epsilon > 0.0, "final_epsilon", expected, *config.final_epsilon);
-    }
-    return config;
   }
 
   void apply_rates() {
-    learning_rate_ = set_learning_rate_.value_or(config_.learning_rate_at(progress_));
-    policy_.set_epsilon(set_epsilon_.value_or(config_.epsilon_at(progress_)));
+    learning_rate_ = rates_.learning_rate(config_);
+    exploration_.policy().set_epsilon(rates_.epsilon(config_));
   }
 
   bool adapts_range() const noexcept { return config_.value_range == ValueRange::adaptive; }
@@ -361,10 +298,6 @@ class QLearning {
       if (action[d] < n_actions(d)) continue;
       core::require(false, "action", "less than " + std::to_string(n_actions(d)), action[d]);
     }
-  }
-
-  bool has_action(std::size_t d, std::int64_t action) const {
-    return action >= 0 && static_cast<std::uint64_t>(action) < n_actions(d);
   }
 
   static std::span<const std::size_t> indices(const Action& action) noexcept {
@@ -447,12 +380,9 @@ class QLearning {
 
   QLearningConfig config_;
   Q action_value_;
-  EpsilonGreedy policy_;
-  core::Random repetitions_;
+  Exploration exploration_;
   ReturnRange range_;
-  int n_random_left_;  ///< steps that will still be random
-  double progress_ = 0.0;
-  std::optional<double> set_learning_rate_, set_epsilon_;
+  Rates rates_;
   double learning_rate_;
   Workspace workspace_;
   Episodes<Episode> episodes_;

@@ -1,15 +1,14 @@
 /// Everything that defines an SDNN-C.
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string_view>
 #include <tuple>
 #include <vector>
 
+#include "sdnn/coding/state_code_config.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 
@@ -61,117 +60,72 @@ struct SDNNCConfig {
   std::uint64_t max_table_bytes = core::kDefaultMaxTableBytes;
 
   static constexpr auto fields() noexcept {
-    return std::tuple(
-        core::field("n_inputs", &SDNNCConfig::n_inputs, "l, number of inputs (section 3.1).",
-                    core::within(2, 1024)),
-        core::field("max_pairs", &SDNNCConfig::max_pairs,
-                    "Most pairs of inputs that are formed: all l (l - 1) if there are no more or "
-                    "with 0; else an even share of them at random, each input modified by as many "
-                    "others as it modifies, and by one at least. Cost grows with pairs, so with "
-                    "many inputs it then grows as their number, not as its square. Not in the "
-                    "paper, which has all.",
-                    core::within(0, 1 << 20)),
-        core::field("n_pattern_units", &SDNNCConfig::n_pattern_units,
-                    "m, units per pattern (section 4.2: 200).", core::within(2, 1 << 16)),
-        core::field("n_anchor_patterns", &SDNNCConfig::n_anchor_patterns,
-                    "Random anchor patterns p_1, p_2, ... of a code book (section 3.1: 9). The "
-                    "last one is not assigned to a bin.",
-                    core::within(2, 10000)),
-        core::field("n_interpolated", &SDNNCConfig::n_interpolated,
-                    "Patterns between neighbouring anchors (section 3.1: 44). There are "
-                    "(n_anchor_patterns - 1) (n_interpolated + 1) bins, 360 in the paper.",
-                    core::within(0, 10000)),
-        core::field(
-            "balanced_anchors", &SDNNCConfig::balanced_anchors,
-            "Whether anchors have as many +1 as -1. An assumption: the paper says \"random\"."),
-        core::field("circular", &SDNNCConfig::circular,
-                    "Per input, whether the last anchor equals the first, as angles want it; "
-                    "empty: none. An assumption: the paper does not say."),
-        core::field("n_symbols", &SDNNCConfig::n_symbols,
-                    "Per input, how many symbols it may be, each with a random pattern of its "
-                    "own: symbol k of n is a value of (k + 0.5) / n. 0 for a number; empty: "
-                    "numbers only. Not in the paper.",
-                    core::within(0, 1 << 24)),
-        core::field("n_hidden_units", &SDNNCConfig::n_hidden_units,
-                    "n, hidden units (section 4.2: 900).", core::within(1, 1 << 20)),
-        core::field("n_active_units", &SDNNCConfig::n_active_units,
-                    "n', units in an action's window (section 4.2: 300), at most n_hidden_units.",
-                    core::within(1, 1 << 20)),
-        core::field("n_actions", &SDNNCConfig::n_actions,
-                    "Number of actions; 0 stands for all n_hidden_units - n_active_units + 1 "
-                    "(601).",
-                    core::within(0, 1 << 20)),
-        core::field("q_low", &SDNNCConfig::q_low,
-                    "Lowest value of the output range (section 4.2: -20).",
-                    core::within(-1e301, 1e301)),
-        core::field("q_high", &SDNNCConfig::q_high,
-                    "Highest value of the output range (section 4.2: 20).",
-                    core::within(-1e301, 1e301)),
-        core::field("u_low", &SDNNCConfig::u_low,
-                    "Count of active units at which the output is q_low; by default "
-                    "n_active_units // 15 (section 4.2: 20).",
-                    core::within(0, 1 << 20)),
-        core::field("u_high", &SDNNCConfig::u_high,
-                    "Count of active units at which the output is q_high; by default "
-                    "n_active_units - u_low (section 4.2: 280).",
-                    core::within(0, 1 << 20)),
-        core::field("learning_coefficient", &SDNNCConfig::learning_coefficient,
-                    "c (section 4.2: 0.1). It scales weights and thresholds alike and changes no "
-                    "decision.",
-                    core::above(0)),
-        core::field("lattice", &SDNNCConfig::lattice,
-                    "Weights are integer multiples of learning_coefficient / lattice.",
-                    core::within(1, 64)),
-        core::field("initial_threshold", &SDNNCConfig::initial_threshold,
-                    "The \"large\" initial threshold, in units of c: a multiple of 1 / lattice. A "
-                    "reading.",
-                    core::at_least(0)),
-        core::field("initial_weights", &SDNNCConfig::initial_weights,
-                    "The \"small random\" initial weights: `ternary`: one lattice step down, "
-                    "none, or up with probabilities 1/4, 1/2, 1/4; `uniform`: within "
-                    "initial_weight_limit, rounded to the lattice. An assumption."),
-        core::field("initial_weight_limit", &SDNNCConfig::initial_weight_limit,
-                    "Of `uniform` initial weights, in units of c.", core::at_least(0)),
-        core::field("rounding", &SDNNCConfig::rounding,
-                    "Of the number of units that are to fire. `half_up`: to the nearest; "
-                    "`random`: up or down at random in proportion, so that no small change is "
-                    "lost on average; `away`: in the direction of the change by at least one "
-                    "unit. An assumption."),
-        core::field("averaging_interval", &SDNNCConfig::averaging_interval,
-                    "With more than 0 the network keeps an average of its weights, by which "
-                    "greedy actions are chosen; learning continues with the weights themselves. "
-                    "Snapshots for it are taken after so many corrections, 100 for example, or "
-                    "after every 64th part of all, whichever is more; what was learned last "
-                    "counts most. The weights take four times the memory. Not in the paper, which "
-                    "has 0.",
-                    core::within(0, 1000000000)),
-        core::field("max_table_bytes", &SDNNCConfig::max_table_bytes,
-                    "A larger network (weights, patterns, remembered potentials) is refused "
-                    "before memory is allocated; 1 GiB by default. For all action dimensions "
-                    "together, where an agent has several."));
+    return std::tuple_cat(
+        coding::state_code_fields<SDNNCConfig>(),
+        std::tuple(
+            core::field("n_hidden_units", &SDNNCConfig::n_hidden_units,
+                        "n, hidden units (section 4.2: 900).", core::within(1, 1 << 20)),
+            core::field(
+                "n_active_units", &SDNNCConfig::n_active_units,
+                "n', units in an action's window (section 4.2: 300), at most n_hidden_units.",
+                core::within(1, 1 << 20)),
+            core::field("n_actions", &SDNNCConfig::n_actions,
+                        "Number of actions; 0 stands for all n_hidden_units - n_active_units + 1 "
+                        "(601).",
+                        core::within(0, 1 << 20)),
+            core::field("q_low", &SDNNCConfig::q_low,
+                        "Lowest value of the output range (section 4.2: -20).",
+                        core::within(-1e301, 1e301)),
+            core::field("q_high", &SDNNCConfig::q_high,
+                        "Highest value of the output range (section 4.2: 20).",
+                        core::within(-1e301, 1e301)),
+            core::field("u_low", &SDNNCConfig::u_low,
+                        "Count of active units at which the output is q_low; by default "
+                        "n_active_units // 15 (section 4.2: 20).",
+                        core::within(0, 1 << 20)),
+            core::field("u_high", &SDNNCConfig::u_high,
+                        "Count of active units at which the output is q_high; by default "
+                        "n_active_units - u_low (section 4.2: 280).",
+                        core::within(0, 1 << 20)),
+            core::field(
+                "learning_coefficient", &SDNNCConfig::learning_coefficient,
+                "c (section 4.2: 0.1). It scales weights and thresholds alike and changes no "
+                "decision.",
+                core::above(0)),
+            core::field("lattice", &SDNNCConfig::lattice,
+                        "Weights are integer multiples of learning_coefficient / lattice.",
+                        core::within(1, 64)),
+            core::field(
+                "initial_threshold", &SDNNCConfig::initial_threshold,
+                "The \"large\" initial threshold, in units of c: a multiple of 1 / lattice. A "
+                "reading.",
+                core::at_least(0)),
+            core::field("initial_weights", &SDNNCConfig::initial_weights,
+                        "The \"small random\" initial weights: `ternary`: one lattice step down, "
+                        "none, or up with probabilities 1/4, 1/2, 1/4; `uniform`: within "
+                        "initial_weight_limit, rounded to the lattice. An assumption."),
+            core::field("initial_weight_limit", &SDNNCConfig::initial_weight_limit,
+                        "Of `uniform` initial weights, in units of c.", core::at_least(0)),
+            core::field("rounding", &SDNNCConfig::rounding,
+                        "Of the number of units that are to fire. `half_up`: to the nearest; "
+                        "`random`: up or down at random in proportion, so that no small change is "
+                        "lost on average; `away`: in the direction of the change by at least one "
+                        "unit. An assumption."),
+            core::field(
+                "averaging_interval", &SDNNCConfig::averaging_interval,
+                "With more than 0 the network keeps an average of its weights, by which "
+                "greedy actions are chosen; learning continues with the weights themselves. "
+                "Snapshots for it are taken after so many corrections, 100 for example, or "
+                "after every 64th part of all, whichever is more; what was learned last "
+                "counts most. The weights take four times the memory. Not in the paper, which "
+                "has 0.",
+                core::within(0, 1000000000)),
+            core::field("max_table_bytes", &SDNNCConfig::max_table_bytes,
+                        "A larger network (weights, patterns, remembered potentials) is refused "
+                        "before memory is allocated; 1 GiB by default. For all action dimensions "
+                        "together, where an agent has several.")));
   }
   bool operator==(const SDNNCConfig&) const = default;
-
-  /// How many inputs modify each one: an even share of max_pairs, at least one.
-  int n_partners() const noexcept {
-    if (n_inputs < 2) return 0;
-    return max_pairs > 0 ? std::clamp(max_pairs / n_inputs, 1, n_inputs - 1) : n_inputs - 1;
-  }
-  /// Bins of all inputs by anchors and symbols, and the bytes of the patterns of so many bins,
-  /// plain and permuted for each partner. Of any fields, impossible ones too: hence doubles.
-  double n_bins() const noexcept {
-    double n_of_symbols = 0.0;
-    double n_numbers = n_inputs;
-    for (const int n : n_symbols) {
-      if (n <= 0) continue;
-      n_of_symbols += n;
-      n_numbers -= 1.0;
-    }
-    return n_of_symbols + n_numbers * (n_anchor_patterns - 1.0) * (n_interpolated + 1.0);
-  }
-  double pattern_bytes(double n_bins) const noexcept {
-    return (n_partners() + 1.0) * n_bins * 8.0 * std::ceil(n_pattern_units / 64.0);
-  }
 };
 
 }  // namespace sdnn::approximators

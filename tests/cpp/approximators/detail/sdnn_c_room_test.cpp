@@ -1,4 +1,4 @@
-#include "sdnn/approximators/detail/wiring.hpp"
+#include "sdnn/approximators/detail/sdnn_c_room.hpp"
 
 #include <gtest/gtest.h>
 

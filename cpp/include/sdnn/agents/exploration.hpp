@@ -1,0 +1,115 @@
+/// Random actions: when they are taken, how they are drawn, and how long they are kept.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "sdnn/agents/epsilon_greedy.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::agents {
+
+/// An epsilon-greedy policy for actions of any number of dimensions, which are random together.
+///
+/// With max_action_repeat = m > 1 a random action is kept for d steps, where d is at least k with
+/// probability 1 / k, and m at most: what single random steps do not reach, some of these do.
+/// Source: Dabney, W., Ostrovski, G., Barreto, A. (2021). Temporally-extended epsilon-greedy
+/// exploration (with this distribution in the place of the zeta one, which it resembles).
+///
+/// In its first start_steps steps an agent takes random actions only: a rare success is found
+/// before the greedy ones have learned to do nothing. Source: the start_steps of Achiam, J. (2018),
+/// Spinning up in deep reinforcement learning, kept for some steps as above.
+class Exploration {
+ public:
+  /// What belongs to the present episode in one environment.
+  struct Episode {
+    std::vector<std::size_t> kept;  ///< the random action
+    int n_kept = 0;                 ///< steps that it will still last
+    int step = 0;
+
+    void begin() noexcept {
+      step = 0;
+      n_kept = 0;
+    }
+  };
+
+  /// Of the fields of a learning configuration. Throws std::invalid_argument naming the field.
+  template <class Config>
+  Exploration(const Config& config, std::uint64_t seed)
+      : policy_(config.policy, seed),
+        repetitions_(seed, core::Stream::repetitions),
+        max_action_repeat_(config.max_action_repeat),
+        start_steps_(config.start_steps),
+        n_random_left_(config.start_steps) {}
+
+  EpsilonGreedy& policy() noexcept { return policy_; }
+  const EpsilonGreedy& policy() const noexcept { return policy_; }
+
+  /// Whether the next step is random: then episode.kept is the action, one of n_actions(d) in each
+  /// dimension d; else a best one is to be taken.
+  template <class NActions>
+  bool takes_random_action(Episode& episode, const NActions& n_actions) {
+    const int step = episode.step++;
+    const bool at_random = n_random_left_ > 0;
+    if (at_random) --n_random_left_;
+    if (episode.n_kept == 0 && !at_random && !policy_.explores(step)) return false;
+    if (episode.n_kept > 0) {
+      --episode.n_kept;
+      return true;
+    }
+    for (std::size_t d = 0; d < episode.kept.size(); ++d) {
+      episode.kept[d] = policy_.random_action(n_actions(d));
+    }
+    if (max_action_repeat_ > 1) {
+      const double drawn = 1.0 - repetitions_.uniform();  // in (0, 1]
+      const double most = static_cast<double>(max_action_repeat_);
+      episode.n_kept = static_cast<int>(std::min(1.0 / drawn, most)) - 1;
+    }
+    return true;
+  }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive) {
+    archive.part("policy", self.policy_);
+    archive.part("repetitions", self.repetitions_);
+    std::optional<int> n_random_left;  // none where there are no more
+    if (self.n_random_left_ > 0) n_random_left = self.n_random_left_;
+    archive.number("n_random_left", n_random_left);
+    if constexpr (Archive::kReads) {
+      self.n_random_left_ = n_random_left.value_or(0);
+      archive.expect(self.n_random_left_ >= 0 && self.n_random_left_ <= self.start_steps_,
+                     "n_random_left", "in [0, start_steps]");
+    }
+  }
+  template <class Listed, class Archive, class NActions>
+  void serialize_episode(Listed& episode, Archive& archive, const NActions& n_actions) const {
+    archive.number("step", episode.step);
+    std::vector<std::int64_t> kept(episode.kept.begin(), episode.kept.end());
+    archive.numbers("kept_action", kept);
+    archive.number("n_kept", episode.n_kept);
+    if constexpr (Archive::kReads) {
+      archive.expect(kept.size() == episode.kept.size(), "kept_action", "one per dimension");
+      for (std::size_t d = 0; d < kept.size(); ++d) {
+        archive.expect(kept[d] >= 0 && static_cast<std::uint64_t>(kept[d]) < n_actions(d),
+                       "kept_action", "an action");
+        episode.kept[d] = static_cast<std::size_t>(kept[d]);
+      }
+      archive.expect(episode.step >= 0, "step", "0 or more");
+      archive.expect(episode.n_kept >= 0 && episode.n_kept < max_action_repeat_, "n_kept",
+                     "in [0, max_action_repeat)");
+    }
+  }
+
+ private:
+  EpsilonGreedy policy_;
+  core::Random repetitions_;
+  int max_action_repeat_;
+  int start_steps_;
+  int n_random_left_;  ///< steps that will still be random
+};
+
+}  // namespace sdnn::agents

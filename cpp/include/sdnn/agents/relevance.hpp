@@ -1,0 +1,179 @@
+/// Which inputs of a task have to do with its rewards or actions.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sdnn/core/detail/floating_point.hpp"
+#include "sdnn/core/detail/interruption.hpp"
+
+namespace sdnn::agents {
+
+/// Transitions of random actions, in the order in which they came.
+struct RandomExperience {
+  std::size_t n_inputs = 0;
+  std::vector<double> states = {};                ///< (n, n_inputs), in [0, 1]
+  std::vector<double> next_states = {};           ///< (n, n_inputs), in [0, 1]
+  std::vector<bool> circular = {};                ///< (n_inputs,): 0 and 1 are neighbours
+  std::vector<double> rewards = {};               ///< (n,)
+  std::vector<bool> ends = {};                    ///< (n,): the next transition begins anew
+  std::vector<std::vector<double>> actions = {};  ///< of each dimension, (n,)
+
+  std::size_t size() const noexcept { return rewards.size(); }
+};
+
+/// Finds the inputs that matter: those that the next rewards depend on, those that actions change,
+/// and all that these depend on, however far back.
+///
+/// An input matters by itself if the sums of the next 20 rewards differ between its values, or if
+/// its change in a step differs between actions. Then every input counts on which the change of one
+/// that matters depends. So a velocity that says nothing about the reward is found by the position
+/// that it moves, also where no reward was met at all; noise, whatever its own dynamics, is not
+/// found, as it moves nothing but itself.
+///
+/// "Depends" compares the F statistic over eight bins of equal counts with that of the same series
+/// against each other when one is shifted in time, by 40 different lengths: 1.5 times the largest
+/// of these must be exceeded. Shifts leave each series as it is, so slow noise, which seems to
+/// depend on everything, is compared with itself.
+class Relevance {
+ public:
+  explicit Relevance(const RandomExperience& experience) : experience_(experience) {}
+
+  /// For each input whether it matters; all do where fewer than two are found.
+  std::vector<bool> inputs() const {
+    const std::size_t n_inputs = experience_.n_inputs;
+    const std::size_t n = experience_.size();
+    std::vector<bool> matters(n_inputs);
+    if (n < kLeast) return std::vector<bool>(n_inputs, true);
+    std::vector<std::vector<std::uint8_t>> bins, bins_of_actions;
+    std::vector<std::vector<double>> changes;
+    for (std::size_t i = 0; i < n_inputs; ++i) {
+      bins.push_back(binned(column(experience_.states, i)));
+      changes.push_back(changes_of(i));
+    }
+    for (const auto& actions : experience_.actions) bins_of_actions.push_back(binned(actions));
+    const std::vector<double> sums = sums_of_rewards();
+    std::vector<std::size_t> found;
+    for (std::size_t i = 0; i < n_inputs; ++i) {
+      matters[i] =
+          depends(sums, bins[i]) || std::ranges::any_of(bins_of_actions, [&](const auto& actions) {
+            return depends(changes[i], actions);
+          });
+      if (matters[i]) found.push_back(i);
+    }
+    while (!found.empty()) {
+      const std::size_t moved = found.back();
+      found.pop_back();
+      for (std::size_t i = 0; i < n_inputs; ++i) {
+        core::interruption_point();
+        if (matters[i] || !depends(changes[moved], bins[i])) continue;
+        matters[i] = true;
+        found.push_back(i);
+      }
+    }
+    if (std::ranges::count(matters, true) < 2) matters.assign(n_inputs, true);
+    return matters;
+  }
+
+ private:
+  static constexpr std::size_t kLeast = 100;  // fewer say nothing
+  static constexpr std::size_t kBins = 8;
+  static constexpr std::size_t kShifts = 40;
+  static constexpr std::size_t kRewards = 20;
+  static constexpr double kDiscount = 0.95;
+  static constexpr double kFactor = 1.5;
+
+  std::vector<double> column(const std::vector<double>& rows, std::size_t i) const {
+    std::vector<double> values;
+    for (; i < rows.size(); i += experience_.n_inputs) values.push_back(rows[i]);
+    return values;
+  }
+
+  std::vector<double> changes_of(std::size_t i) const {
+    const std::vector<double> before = column(experience_.states, i);
+    std::vector<double> changes = column(experience_.next_states, i);
+    for (std::size_t t = 0; t < changes.size(); ++t) {
+      changes[t] -= before[t];
+      if (experience_.circular[i]) changes[t] -= std::round(changes[t]);
+    }
+    return changes;
+  }
+
+  std::vector<double> sums_of_rewards() const {
+    std::vector<double> sums(experience_.size());
+    for (std::size_t t = 0; t < sums.size(); ++t) {
+      double weight = 1.0;
+      for (std::size_t k = t; k < std::min(sums.size(), t + kRewards); ++k) {
+        sums[t] += weight * experience_.rewards[k];
+        weight *= kDiscount;
+        if (experience_.ends[k]) break;
+      }
+    }
+    return sums;
+  }
+
+  /// Bins of about equal counts; equal values share one.
+  static std::vector<std::uint8_t> binned(const std::vector<double>& values) {
+    std::vector<double> sorted = values;
+    std::ranges::sort(sorted);
+    std::vector<double> edges;
+    for (std::size_t b = 1; b < kBins; ++b) {
+      const double edge = sorted[b * sorted.size() / kBins];
+      if (edge > sorted.front() && (edges.empty() || edge > edges.back())) edges.push_back(edge);
+    }
+    std::vector<std::uint8_t> bins;
+    for (const double value : values) {
+      const auto bin = std::ranges::upper_bound(edges, value) - edges.begin();
+      bins.push_back(static_cast<std::uint8_t>(bin));
+    }
+    return bins;
+  }
+
+  /// Between the bins' means and within the bins; 0 where nothing varies. Bin t + shift belongs to
+  /// value t.
+  static double f_statistic(const std::vector<double>& values,
+                            const std::vector<std::uint8_t>& bins, std::size_t shift) {
+    double sums[kBins] = {};
+    double counts[kBins] = {};
+    double total = 0.0;
+    const std::size_t n = values.size();
+    for (std::size_t t = 0, s = shift; t < n; ++t, ++s) {
+      if (s == n) s = 0;
+      sums[bins[s]] += values[t];
+      counts[bins[s]] += 1.0;
+      total += values[t];
+    }
+    const double mean = total / static_cast<double>(n);
+    double square = 0.0;
+    for (const double value : values) square += (value - mean) * (value - mean);
+    double between = 0.0;
+    double n_bins = 0.0;
+    for (std::size_t b = 0; b < kBins; ++b) {
+      if (counts[b] == 0.0) continue;
+      const double difference = sums[b] / counts[b] - mean;
+      between += counts[b] * difference * difference;
+      n_bins += 1.0;
+    }
+    if (n_bins < 2.0 || !(square > 0.0)) return 0.0;
+    const double within = std::max(square - between, 1e-12 * square);
+    return between / (n_bins - 1.0) / (within / (static_cast<double>(n) - n_bins));
+  }
+
+  static bool depends(const std::vector<double>& values, const std::vector<std::uint8_t>& bins) {
+    const double statistic = f_statistic(values, bins, 0);
+    if (!(statistic > 0.0)) return false;
+    for (std::size_t k = 1; k <= kShifts; ++k) {
+      const std::size_t shift = k * values.size() / (kShifts + 1);
+      if (statistic <= kFactor * f_statistic(values, bins, shift)) return false;
+    }
+    return true;
+  }
+
+  const RandomExperience& experience_;
+};
+
+}  // namespace sdnn::agents

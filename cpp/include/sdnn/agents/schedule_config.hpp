@@ -1,0 +1,156 @@
+/// What is scheduled over a training, for every configuration that has a learning rate and epsilon.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <string_view>
+#include <tuple>
+
+#include "sdnn/core/config_fields.hpp"
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/check_fields.hpp"
+#include "sdnn/core/elementary.hpp"
+
+namespace sdnn::agents {
+
+/// How alpha and epsilon go from their first to their final values.
+enum class Schedule {
+  linear,       ///< in a straight line
+  exponential,  ///< by the same factor in equal parts of the progress; no end may be 0
+};
+constexpr std::array<std::string_view, 2> words_of(Schedule) noexcept {
+  return {"linear", "exponential"};
+}
+
+/// Learning rate, discount and policy, of any configuration with members of these names.
+template <class Config>
+constexpr auto learning_fields() noexcept {
+  return std::tuple_cat(
+      std::tuple(
+          core::field("learning_rate", &Config::learning_rate, "alpha.", core::above_up_to(0, 1)),
+          core::field("discount", &Config::discount, "gamma.", core::within(0, 1))),
+      core::nested_fields(&Config::policy));
+}
+
+/// Final values, schedule and random actions, of any configuration with members of these names.
+template <class Config>
+constexpr auto schedule_fields() noexcept {
+  return std::tuple(
+      core::field("max_action_repeat", &Config::max_action_repeat,
+                  "Steps that a random action may last. Not in the paper, which has 1: with "
+                  "more, it is kept for at least k steps with probability 1 / k.",
+                  core::within(1, 1000000)),
+      core::field("final_learning_rate", &Config::final_learning_rate,
+                  "What alpha becomes as the agent's progress goes from 0 to 1; by default it "
+                  "stays. Not in the paper.",
+                  core::above_up_to(0, 1)),
+      core::field("final_epsilon", &Config::final_epsilon,
+                  "What epsilon becomes as the agent's progress goes from 0 to 1; by default it "
+                  "stays. Not in the paper.",
+                  core::within(0, 1)),
+      core::field("schedule", &Config::schedule,
+                  "How alpha and epsilon go to their final values: `linear`: in a straight "
+                  "line; `exponential`: by the same factor in equal parts of the progress, "
+                  "first * (final / first) ** progress. A constant rate is the common choice "
+                  "where the task itself changes; a line is what most libraries of deep "
+                  "Q-learning take for epsilon; an exponential spends more of the training near "
+                  "a small final value, which must not be 0. Any other function of the "
+                  "progress: `sdnn.agents.Schedule`."),
+      core::field("exploration_fraction", &Config::exploration_fraction,
+                  "Part of the progress in which epsilon goes to final_epsilon, where it then "
+                  "stays. Not in the paper.",
+                  core::above_up_to(0, 1)),
+      core::field("start_steps", &Config::start_steps,
+                  "First steps of the agent's life in which every action is random, whatever "
+                  "epsilon. Not in the paper, which has 0: a rare success is found before the "
+                  "greedy actions have learned to do nothing.",
+                  core::within(0, 1 << 30)));
+}
+
+namespace detail {
+
+inline double scheduled(double first, const std::optional<double>& last, Schedule schedule,
+                        double progress) noexcept {
+  if (!last) return first;
+  if (schedule == Schedule::linear) return (1.0 - progress) * first + progress * *last;
+  if (progress == 1.0) return *last;  // without rounding
+  return first * core::exp(progress * core::log(*last / first));
+}
+
+}  // namespace detail
+
+/// Alpha and epsilon at a progress in [0, 1].
+template <class Config>
+double learning_rate_at(const Config& config, double progress) noexcept {
+  return detail::scheduled(config.learning_rate, config.final_learning_rate, config.schedule,
+                           progress);
+}
+template <class Config>
+double epsilon_at(const Config& config, double progress) noexcept {
+  return detail::scheduled(config.policy.epsilon, config.final_epsilon, config.schedule,
+                           std::min(1.0, progress / config.exploration_fraction));
+}
+
+/// Throws std::invalid_argument naming the field that is out of range.
+template <class Config>
+Config checked_schedule(const Config& config) {
+  core::check_fields(config);
+  if (config.schedule == Schedule::exponential && config.final_epsilon) {
+    const char* const expected = "greater than 0 where the schedule is exponential";
+    core::require(config.policy.epsilon > 0.0, "epsilon", expected, config.policy.epsilon);
+    core::require(*config.final_epsilon > 0.0, "final_epsilon", expected, *config.final_epsilon);
+  }
+  return config;
+}
+
+/// Alpha and epsilon as they are now: as they were set, or as the progress makes them.
+class Rates {
+ public:
+  /// Throws std::invalid_argument outside [0, 1].
+  void set_progress(double progress) {
+    core::require_in_range("progress", progress, 0.0, 1.0);
+    progress_ = progress;
+  }
+  double progress() const noexcept { return progress_; }
+  /// None: as the progress makes it. Throws std::invalid_argument outside (0, 1] and [0, 1].
+  void set_learning_rate(std::optional<double> rate) {
+    if (rate) core::require(*rate > 0.0 && *rate <= 1.0, "learning_rate", "in (0, 1]", *rate);
+    learning_rate_ = rate;
+  }
+  void set_epsilon(std::optional<double> epsilon) {
+    if (epsilon) core::require_in_range("epsilon", *epsilon, 0.0, 1.0);
+    epsilon_ = epsilon;
+  }
+  template <class Config>
+  double learning_rate(const Config& config) const noexcept {
+    return learning_rate_.value_or(learning_rate_at(config, progress_));
+  }
+  template <class Config>
+  double epsilon(const Config& config) const noexcept {
+    return epsilon_.value_or(epsilon_at(config, progress_));
+  }
+  bool has_learning_rate() const noexcept { return learning_rate_.has_value(); }
+  bool has_epsilon() const noexcept { return epsilon_.has_value(); }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive) {
+    archive.number("progress", self.progress_);
+    archive.number("learning_rate", self.learning_rate_);
+    archive.number("epsilon", self.epsilon_);
+    if constexpr (Archive::kReads) {
+      archive.expect(self.progress_ >= 0.0 && self.progress_ <= 1.0, "progress", "in [0, 1]");
+      const double rate = self.learning_rate_.value_or(1.0);
+      archive.expect(rate > 0.0 && rate <= 1.0, "learning_rate", "in (0, 1]");
+      const double epsilon = self.epsilon_.value_or(0.0);
+      archive.expect(epsilon >= 0.0 && epsilon <= 1.0, "epsilon", "in [0, 1]");
+    }
+  }
+
+ private:
+  double progress_ = 0.0;
+  std::optional<double> learning_rate_, epsilon_;
+};
+
+}  // namespace sdnn::agents

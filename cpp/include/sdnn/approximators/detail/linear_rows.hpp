@@ -1,0 +1,115 @@
+/// Rows of integer weights over a code of -1, 0 and +1: their sums, and one step of learning.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+#include "sdnn/core/detail/kernel.hpp"
+#include "sdnn/core/detail/lanes.hpp"
+
+namespace sdnn::approximators {
+
+/// A code as two masks per column, all bits or none: whether it is not 0, and whether it is -1.
+struct CodeMasks {
+  const std::int32_t* active;
+  const std::int32_t* negative;
+};
+
+/// How a row and its trace change. Numbers of fixed point; all products fit into 32 bits.
+struct RowStep {
+  std::int32_t decay;       ///< what remains of the trace: in [0, 2^13], 2^13 for all of it
+  std::int32_t gain;        ///< the code's part of the new trace, 2^12 for 1; 0 outside the action
+  std::int32_t replace;     ///< all bits: the code replaces the trace where it is not 0
+  std::int32_t step;        ///< weights change by step * trace / 2^shift; below 2^13
+  std::int32_t shift;       ///< in [1, 30]
+  std::int32_t correction;  ///< subtracted from the weight, times the code
+};
+
+/// Of a row after a step: bits that any trace has, and that any weight's size has.
+struct RowUse {
+  std::int32_t traces = 0;
+  std::int32_t weights = 0;
+};
+
+/// Traces are kept within +- kLargestTrace, 32 times a code's 1.
+inline constexpr std::int32_t kTraceOne = 1 << 12;
+inline constexpr std::int32_t kLargestTrace = (1 << 17) - 1;
+inline constexpr std::int32_t kDecayOne = 1 << 13;
+
+/// x, 0 or -x.
+SDNN_INLINE std::int32_t times_code(std::int32_t x, std::int32_t active,
+                                    std::int32_t negative) noexcept {
+  return ((x & active) ^ negative) - negative;
+}
+
+namespace detail {
+
+SDNN_INLINE std::int64_t row_sum_body(const std::int32_t* row, CodeMasks code,
+                                      std::size_t n_columns) noexcept {
+  constexpr std::size_t kBlock = 256;  // whose sum fits into 32 bits
+  std::int64_t total = 0;
+  for (std::size_t first = 0; first < n_columns; first += kBlock) {
+    const std::size_t last = std::min(n_columns, first + kBlock);
+    std::int32_t sum = 0;
+    for (std::size_t j = first; j < last; ++j) {
+      sum += times_code(row[j], code.active[j], code.negative[j]);
+    }
+    total += sum;
+  }
+  return total;
+}
+
+SDNN_INLINE RowUse learn_row_body(std::int32_t* weights, std::int32_t* traces, CodeMasks code,
+                                  std::size_t n_columns, RowStep step) noexcept {
+  const std::int32_t half = std::int32_t{1} << (step.shift - 1);
+  std::int32_t traces_used = 0;
+  std::int32_t weights_used = 0;
+  for (std::size_t j = 0; j < n_columns; ++j) {
+    const std::int32_t active = code.active[j];
+    const std::int32_t negative = code.negative[j];
+    const std::int32_t product = traces[j] * step.decay;
+    std::int32_t trace = (product + ((product >> 31) & (kDecayOne - 1))) >> 13;  // towards 0
+    trace = (trace & ~(active & step.replace)) + times_code(step.gain, active, negative);
+    trace = std::clamp(trace, -kLargestTrace, kLargestTrace);
+    traces[j] = trace;
+    std::int32_t weight = weights[j] + ((step.step * trace + half) >> step.shift);
+    weight -= times_code(step.correction, active, negative);
+    weights[j] = weight;
+    traces_used |= trace;
+    weights_used |= weight ^ (weight >> 31);
+  }
+  return {traces_used, weights_used};
+}
+
+SDNN_INLINE void spread_bits_body(const std::uint64_t* words, std::size_t n_words,
+                                  std::int32_t* masks) noexcept {
+  for (std::size_t w = 0; w < n_words; ++w) {
+    for (std::size_t half = 0; half < 2; ++half, masks += 32) {
+      const auto bits = static_cast<std::uint32_t>(words[w] >> (32 * half));
+      for (std::uint32_t bit = 0; bit < 32; ++bit) {
+        masks[bit] = -static_cast<std::int32_t>(bits >> bit & 1);
+      }
+    }
+  }
+}
+
+}  // namespace detail
+
+/// A mask for every bit: all bits or none. Shapes: words (n_words,), masks (64 n_words,).
+SDNN_KERNEL(void, spread_bits,
+            (const std::uint64_t* words, std::size_t n_words, std::int32_t* masks),
+            (words, n_words, masks))
+
+/// The sum of a row's weights, times the code. Requires weights below 2^23 in size. Shapes: row and
+/// masks (n_columns,).
+SDNN_KERNEL(std::int64_t, row_sum, (const std::int32_t* row, CodeMasks code, std::size_t n_columns),
+            (row, code, n_columns))
+
+/// One step of learning of a row. Shapes: weights, traces and masks (n_columns,).
+SDNN_KERNEL(RowUse, learn_row,
+            (std::int32_t* weights, std::int32_t* traces, CodeMasks code, std::size_t n_columns,
+             RowStep step),
+            (weights, traces, code, n_columns, step))
+
+}  // namespace sdnn::approximators

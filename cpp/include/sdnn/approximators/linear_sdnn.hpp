@@ -1,0 +1,446 @@
+/// A linear readout of the SDNN code: Q(s, a) by integer weights, with eligibility traces.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <numeric>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sdnn/approximators/detail/linear_rows.hpp"
+#include "sdnn/approximators/detail/state_wiring.hpp"
+#include "sdnn/approximators/linear_sdnn_config.hpp"
+#include "sdnn/coding/action_code.hpp"
+#include "sdnn/coding/pattern_table.hpp"
+#include "sdnn/coding/state_code.hpp"
+#include "sdnn/coding/state_code_config.hpp"
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/grid_cells.hpp"
+#include "sdnn/core/detail/identity.hpp"
+
+namespace sdnn::approximators {
+
+/// Weights of a readout with so many actions in each dimension, with those that are always 0. Of
+/// any fields, impossible ones too: hence a double.
+inline double n_linear_weights(const LinearSDNNConfig& config,
+                               std::span<const std::size_t> n_actions) {
+  double n_rows = 0.0;
+  for (const std::size_t n : n_actions) {
+    n_rows += static_cast<double>(n) + config.action_window - 1.0;
+  }
+  return n_rows * 64.0 * std::ceil(config.n_pattern_units / 64.0) * config.n_inputs *
+         coding::n_partners_of(config);
+}
+
+/// Throws std::length_error if so many weights, with the patterns of so many bins and one trace,
+/// have more bytes than config.max_table_bytes.
+inline void require_room(const LinearSDNNConfig& config, double n_bins, double n_weights) {
+  const double n_copies = config.averaging_interval > 0 ? 3.0 : 2.0;
+  core::require_table_bytes(
+      "max_pairs, n_pattern_units, n_inputs, n_actions, action_window or n_interpolated",
+      "weights, a trace and patterns",
+      4.0 * n_copies * n_weights + coding::pattern_bytes_of(config, n_bins),
+      config.max_table_bytes);
+}
+/// The same of one dimension: before the code is made.
+inline void require_room(const LinearSDNNConfig& config, double n_bins) {
+  const std::size_t n_actions[] = {static_cast<std::size_t>(config.n_actions)};
+  require_room(config, n_bins, n_linear_weights(config, n_actions));
+}
+
+/// Q(s, a) = sum over the dimensions d of the action, and over the units in the window of a_d, of
+/// the inner product of the unit's weights and the code x_SD(s).
+///
+/// The maximum over all actions is the sum of the dimensions' maxima: exact, in one pass.
+///
+/// Everything is an integer. A value counts *units* of 2^exponent; weights have the same unit. The
+/// exponent follows the rewards: the first one that is not 0 has 31 bits, and when a weight would
+/// need more than 23 bits, or a value more than 33, all are halved and the exponent grows by one.
+/// So there is no range of values to be chosen, and sums are exact in any order.
+///
+/// The code is the paired one of StateCode, whose inner products are half of those of x_SD: a
+/// quarter of its columns are not neutral.
+///
+/// Source: the code of section 3.1, layers 1 to 3, with a linear readout in the place of layers 4
+/// and 5; not in the paper.
+class LinearSDNN {
+ public:
+  /// The code of a state, in the form that rows of weights are multiplied by.
+  class Code {
+   public:
+    /// Columns that are not 0.
+    std::int32_t n_active() const noexcept { return n_active_; }
+    /// -1, 0 or +1 for each column.
+    std::vector<std::int8_t> signs() const {
+      std::vector<std::int8_t> signs(active_.size());
+      for (std::size_t j = 0; j < signs.size(); ++j) {
+        signs[j] = static_cast<std::int8_t>(times_code(1, active_[j], negative_[j]));
+      }
+      return signs;
+    }
+
+   private:
+    friend class LinearSDNN;
+    CodeMasks masks() const noexcept { return {active_.data(), negative_.data()}; }
+
+    std::vector<std::int32_t> active_, negative_;
+    std::int32_t n_active_ = 0;
+  };
+
+  /// What one user needs to read the model.
+  struct Workspace {
+    Code code;
+    std::vector<coding::Bin> bins;
+    std::vector<std::uint64_t> words;
+    std::vector<std::int64_t> sums;  ///< of the units of a dimension
+  };
+
+  /// What one stream of experience needs: which weights had a part in the values before.
+  class Trace {
+   public:
+    void clear() noexcept {
+      for (std::size_t row = 0; row < live_.size(); ++row) {
+        if (live_[row]) std::fill_n(&values_[row * n_columns_], n_columns_, 0);
+        live_[row] = false;
+      }
+    }
+
+    /// Lists what is remembered; see core/state.hpp.
+    template <class Self, class Archive>
+    static void serialize(Self& self, Archive& archive) {
+      std::vector<std::int32_t> values;  // none where there is no trace
+      if (std::ranges::find(self.live_, true) != self.live_.end()) values = self.values_;
+      archive.numbers("values", values);
+      if constexpr (Archive::kReads) {
+        archive.expect(values.empty() || values.size() == self.values_.size(), "values",
+                       "empty or one for each weight");
+        archive.expect(std::ranges::all_of(
+                           values, [](std::int32_t z) { return std::abs(z) <= kLargestTrace; }),
+                       "values", "in their range");
+        values.resize(self.values_.size());
+        self.values_ = std::move(values);
+        for (std::size_t row = 0; row < self.live_.size(); ++row) {
+          const auto* const first = &self.values_[row * self.n_columns_];
+          self.live_[row] = std::any_of(first, first + self.n_columns_, [](auto z) { return z; });
+        }
+      }
+    }
+
+   private:
+    friend class LinearSDNN;
+    Trace(std::size_t n_rows, std::size_t n_columns)
+        : n_columns_(n_columns), values_(n_rows * n_columns), live_(n_rows) {}
+
+    std::size_t n_columns_;
+    std::vector<std::int32_t> values_;
+    std::vector<bool> live_;  ///< rows that are not all 0
+  };
+
+  /// How a step of learning moves the weights; see SarsaConfig.
+  struct Step {
+    std::int64_t error = 0;       ///< in units: what the trace is multiplied by
+    std::int64_t correction = 0;  ///< in units: what the code is multiplied by
+    std::int32_t rate = 0;        ///< alpha, 2^16 for 1
+    std::int32_t decay = 0;       ///< gamma lambda, kDecayOne for 1
+    bool is_dutch = true;         ///< else the trace is replaced
+  };
+
+  static constexpr std::int32_t kRateOne = 1 << 16;
+
+  /// Code books by anchor interpolation, or of symbols. `n_actions` has the number of actions of
+  /// each dimension. Throws std::invalid_argument naming the field that is impossible;
+  /// std::length_error naming bytes, before much memory is asked for; std::bad_alloc.
+  LinearSDNN(const LinearSDNNConfig& config, std::span<const std::size_t> n_actions,
+             std::uint64_t seed)
+      : LinearSDNN(config, n_actions, code_books_of(with_pattern_units(config), seed), seed) {}
+
+  /// Code books of any coding, a table per input. Throws as above.
+  LinearSDNN(const LinearSDNNConfig& config, std::span<const std::size_t> n_actions,
+             std::vector<coding::PatternTable> tables, std::uint64_t seed)
+      : config_(with_pattern_units(config)), code_(wiring_of(config_, std::move(tables), seed)) {
+    core::require(!n_actions.empty(), "n_actions", "of one dimension at least", 0);
+    for (const std::size_t n : n_actions) {
+      core::require_in_range("n_actions", n, std::size_t{1}, std::size_t{1} << 16);
+    }
+    double n_bins = 0.0;
+    for (std::size_t i = 0; i < n_inputs(); ++i) {
+      n_bins += static_cast<double>(code_->table(i).n_bins());
+    }
+    require_room(config_, n_bins, n_linear_weights(config_, n_actions));
+    std::size_t row = 0;
+    for (const std::size_t n : n_actions) {
+      dimensions_.push_back({n, row});
+      row += n + window() - 1;
+    }
+    n_rows_ = row;
+    weights_.resize(n_rows_ * n_slots());
+    if (config_.averaging_interval > 0) averaged_.resize(weights_.size());
+  }
+
+  const LinearSDNNConfig& config() const noexcept { return config_; }
+  const coding::StateCode& state_code() const noexcept { return *code_; }
+  /// A number that no other model of the process has.
+  std::uint64_t identity() const noexcept { return identity_.number(); }
+  std::size_t n_inputs() const noexcept { return code_->n_inputs(); }
+  std::size_t n_dimensions() const noexcept { return dimensions_.size(); }
+  std::size_t n_actions(std::size_t d = 0) const noexcept { return dimensions_[d].n_actions; }
+  /// Units of all dimensions: rows of the weights.
+  std::size_t n_rows() const noexcept { return n_rows_; }
+  /// Columns of a row, with those that are always 0.
+  std::size_t n_slots() const noexcept { return 64 * code_->n_words(); }
+  /// Shape: (n_rows, n_slots).
+  std::span<const std::int32_t> weights() const noexcept { return weights_; }
+  /// The size of a unit of values is 2 to this power; none before a reward that is not 0.
+  std::optional<std::int32_t> exponent() const noexcept { return exponent_; }
+
+  Workspace workspace() const {
+    return {new_code(), std::vector<coding::Bin>(n_inputs()),
+            std::vector<std::uint64_t>(2 * code_->n_words()), std::vector<std::int64_t>(n_rows_)};
+  }
+  Trace trace() const { return {n_rows_, n_slots()}; }
+  Code new_code() const {
+    Code code;
+    code.active_.resize(n_slots());
+    code.negative_.resize(n_slots());
+    return code;
+  }
+
+  /// Shape: state (l,) in [0, 1]. Throws std::invalid_argument for another one.
+  void encode(std::span<const double> state, Workspace& workspace, Code& code) const {
+    code_->bins_of(state, workspace.bins);
+    std::uint64_t* const active = workspace.words.data();
+    std::uint64_t* const positive = active + code_->n_words();
+    code_->encode(workspace.bins, active, positive);
+    std::size_t n_active = 0;
+    for (std::size_t w = 0; w < code_->n_words(); ++w) {
+      n_active += static_cast<std::size_t>(std::popcount(active[w]));
+      positive[w] = active[w] & ~positive[w];
+    }
+    code.n_active_ = static_cast<std::int32_t>(n_active);
+    spread_bits(active, code_->n_words(), code.active_.data());
+    spread_bits(positive, code_->n_words(), code.negative_.data());
+  }
+
+  /// The dimension's part of Q(s, a) for each of its actions, in units; by the average of the
+  /// weights where `averaged` and there is one. Valid until the workspace is used again.
+  std::span<const std::int64_t> sums(const Code& code, Workspace& workspace, std::size_t d,
+                                     bool averaged = false) const {
+    const std::vector<std::int32_t>& rows = averaged && n_snapshots_ > 0 ? averaged_ : weights_;
+    const Dimension& dimension = dimensions_[d];
+    for (std::size_t i = 0; i < dimension.n_actions + window() - 1; ++i) {
+      workspace.sums[i] =
+          row_sum(&rows[(dimension.first_row + i) * n_slots()], code.masks(), n_slots());
+    }
+    if (window() > 1) {
+      for (std::size_t a = 0; a < dimension.n_actions; ++a) {
+        const auto first = workspace.sums.begin() + static_cast<std::ptrdiff_t>(a);
+        workspace.sums[a] =
+            std::accumulate(first, first + static_cast<std::ptrdiff_t>(window()), std::int64_t{0});
+      }
+    }
+    return {workspace.sums.data(), dimension.n_actions};
+  }
+
+  /// The same as numbers, Q_d(state, a). Shapes: state (l,), out (n_actions(d),).
+  void values(std::span<const double> state, Workspace& workspace, std::span<double> out,
+              std::size_t d = 0, bool averaged = false) const {
+    assert(out.size() == n_actions(d));
+    encode(state, workspace, workspace.code);
+    const auto units = sums(workspace.code, workspace, d, averaged);
+    for (std::size_t a = 0; a < out.size(); ++a) out[a] = value_of(units[a]);
+  }
+
+  /// Q(s, a) in units. Shape: action (n_dimensions,).
+  std::int64_t sum(const Code& code, std::span<const std::size_t> action) const noexcept {
+    std::int64_t total = 0;
+    for_window(action, [&](std::size_t row) {
+      total += row_sum(&weights_[row * n_slots()], code.masks(), n_slots());
+    });
+    return total;
+  }
+  /// What `sum` gives of the trace in the place of the weights, kTraceOne for 1.
+  std::int64_t sum_of_trace(const Code& code, std::span<const std::size_t> action,
+                            const Trace& trace) const noexcept {
+    std::int64_t total = 0;
+    for_window(action, [&](std::size_t row) {
+      if (!trace.live_[row]) return;
+      total += row_sum(&trace.values_[row * n_slots()], code.masks(), n_slots());
+    });
+    return total;
+  }
+
+  /// A number in units, rounded to the nearest, halves up. The first one that is not 0 decides how
+  /// large a unit is; a larger one may make units larger. Returns how often they were doubled.
+  /// Requires a finite number of at most 1e300 in size.
+  int fit_unit(double number) {
+    if (number == 0.0) return 0;
+    if (!exponent_) exponent_ = std::ilogb(number) - 30;
+    int n = 0;
+    while (std::abs(std::ldexp(number, -*exponent_)) >= kLargestReward) {
+      double_unit();
+      ++n;
+    }
+    return n;
+  }
+  std::int64_t units_of(double number) const noexcept {
+    if (!exponent_) return 0;
+    return static_cast<std::int64_t>(std::floor(std::ldexp(number, -*exponent_) + 0.5));
+  }
+  double value_of(std::int64_t units) const noexcept {
+    return std::ldexp(static_cast<double>(units), exponent_.value_or(0));
+  }
+
+  /// Twice as large a unit: weights are halved, halves up. Who keeps values halves them likewise.
+  void double_unit() noexcept {
+    assert(exponent_);
+    ++*exponent_;
+    for (std::int32_t& weight : weights_) weight = halved(weight);
+    for (std::int32_t& weight : averaged_) weight = halved(weight);
+  }
+  template <class Number>
+  static Number halved(Number units) noexcept {
+    return (units + 1) >> 1;
+  }
+  /// Whether a value has more bits than it may: then double the unit.
+  static bool is_too_large(std::int64_t units) noexcept {
+    return units >= kLargestValue || units <= -kLargestValue;
+  }
+
+  /// The trace decays and takes up the code of (s, a), and the weights move by rate / n times the
+  /// error along the trace, less rate / n times the correction along the code, where n is the
+  /// number of weights that have a part in Q(s, a). Returns how often the unit was doubled.
+  int learn(const Code& code, std::span<const std::size_t> action, Trace& trace, const Step& step) {
+    const std::int64_t n = std::max<std::int64_t>(
+        1, std::int64_t{code.n_active()} * static_cast<std::int64_t>(n_dimensions() * window()));
+    const std::int64_t rate = (std::int64_t{step.rate} << 12) / n;  // 2^28 for 1
+    RowStep row_step{
+        .decay = step.decay, .gain = 0, .replace = 0, .step = 0, .shift = 1, .correction = 0};
+    std::int32_t gain = kTraceOne;
+    if (step.is_dutch) {
+      const std::int64_t before = scaled(sum_of_trace(code, action, trace), rate, 28);
+      gain -= static_cast<std::int32_t>(
+          std::clamp<std::int64_t>(scaled(before, step.decay, 13), -kLargestTrace, kLargestTrace));
+    }
+    int n_doubled = 0;
+    std::int64_t error = std::clamp(step.error, -kLargestError, kLargestError);
+    std::int64_t drift = std::clamp(step.correction, -kLargestError, kLargestError);
+    while (std::max(std::abs(scaled(error, rate, 28)), std::abs(scaled(drift, rate, 28))) >=
+           kLargestWeight) {
+      double_unit();
+      ++n_doubled;
+      error = halved(error);
+      drift = halved(drift);
+    }
+    const std::int64_t along_trace = scaled(error, rate, 28);
+    int n_bits = 0;
+    while (std::abs(along_trace) >> n_bits >= (1 << 13) - 1) ++n_bits;
+    row_step.step = static_cast<std::int32_t>(scaled(along_trace, 1, n_bits));
+    row_step.shift = 12 - n_bits;
+    const auto correction = static_cast<std::int32_t>(scaled(drift, rate, 28));
+    std::int32_t used = 0;
+    std::size_t row = 0;
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      const std::size_t first = dimensions_[d].first_row + action[d];
+      const std::size_t end = dimensions_[d].first_row + n_actions(d) + window() - 1;
+      for (; row < end; ++row) {
+        const bool is_active = row >= first && row < first + window();
+        if (!is_active && !trace.live_[row]) continue;
+        row_step.gain = is_active ? gain : 0;
+        row_step.replace = is_active && !step.is_dutch ? -1 : 0;
+        row_step.correction = is_active ? correction : 0;
+        const RowUse use = learn_row(&weights_[row * n_slots()], &trace.values_[row * n_slots()],
+                                     code.masks(), n_slots(), row_step);
+        trace.live_[row] = use.traces != 0;
+        used |= use.weights;
+      }
+    }
+    for (; used >= kLargestWeight; used >>= 1) {
+      double_unit();
+      ++n_doubled;
+    }
+    if (config_.averaging_interval > 0) note_step();
+    return n_doubled;
+  }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive) {
+    archive.fixed("weights", {self.n_rows_, self.n_slots()}, self.weights_);
+    archive.number("exponent", self.exponent_);
+    if (self.config_.averaging_interval > 0) {
+      archive.fixed("averaged_weights", {self.n_rows_, self.n_slots()}, self.averaged_);
+      archive.number("n_steps", self.n_steps_);
+      archive.number("n_snapshots", self.n_snapshots_);
+    }
+    if constexpr (Archive::kReads) {
+      const auto fits = [](std::int32_t w) { return w > -kLargestWeight && w < kLargestWeight; };
+      archive.expect(std::ranges::all_of(self.weights_, fits), "weights", "below 2^23 in size");
+      archive.expect(std::ranges::all_of(self.averaged_, fits), "averaged_weights",
+                     "below 2^23 in size");
+      archive.expect(!self.exponent_ || std::abs(*self.exponent_) <= 1100, "exponent",
+                     "in [-1100, 1100]");
+      archive.expect(self.n_steps_ >= 0 && self.n_snapshots_ >= 0, "n_steps", "0 or more");
+      self.identity_ = core::Identity();
+    }
+  }
+
+ private:
+  struct Dimension {
+    std::size_t n_actions;
+    std::size_t first_row;
+  };
+
+  static constexpr std::int32_t kLargestWeight = 1 << 23;
+  static constexpr std::int64_t kLargestValue = std::int64_t{1} << 33;
+  static constexpr double kLargestReward = 4294967296.0;
+  static constexpr std::int64_t kLargestError = (std::int64_t{1} << 34) - 1;
+
+  std::size_t window() const noexcept { return static_cast<std::size_t>(config_.action_window); }
+
+  /// a * b / 2^n_bits, rounded to the nearest, halves up.
+  static std::int64_t scaled(std::int64_t a, std::int64_t b, int n_bits) noexcept {
+    if (n_bits == 0) return a * b;
+    return (a * b + (std::int64_t{1} << (n_bits - 1))) >> n_bits;
+  }
+
+  template <class Call>
+  void for_window(std::span<const std::size_t> action, const Call& call) const {
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      for (std::size_t i = 0; i < window(); ++i) call(dimensions_[d].first_row + action[d] + i);
+    }
+  }
+
+  /// The average moves to the weights by 1 / 2^k of the way, ever less: by about 3 / (n + 3).
+  void note_step() noexcept {
+    if (++n_steps_ % config_.averaging_interval != 0) return;
+    const int k = std::bit_width(static_cast<std::uint64_t>(n_snapshots_ / 3 + 1)) - 1;
+    const std::int32_t half = k > 0 ? 1 << (k - 1) : 0;
+    for (std::size_t j = 0; j < weights_.size(); ++j) {
+      averaged_[j] += (weights_[j] - averaged_[j] + half) >> k;
+    }
+    if (n_snapshots_ < kMostSnapshots) ++n_snapshots_;
+  }
+
+  static constexpr std::int64_t kMostSnapshots = 3 << 10;
+
+  LinearSDNNConfig config_;
+  std::shared_ptr<const coding::StateCode> code_;
+  std::vector<Dimension> dimensions_;
+  std::size_t n_rows_ = 0;
+  std::vector<std::int32_t> weights_;
+  std::vector<std::int32_t> averaged_;  ///< none without averaging
+  std::optional<std::int32_t> exponent_;
+  std::int64_t n_steps_ = 0;
+  std::int64_t n_snapshots_ = 0;
+  core::Identity identity_;
+};
+
+}  // namespace sdnn::approximators

@@ -1,0 +1,164 @@
+#include "sdnn/agents/sarsa.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <stdexcept>
+#include <vector>
+
+#include "instruction_sets.hpp"
+#include "sdnn/approximators/linear_sdnn.hpp"
+#include "sdnn/core/random.hpp"
+#include "sdnn/core/state.hpp"
+
+namespace sdnn::agents {
+namespace {
+
+using approximators::LinearSDNN;
+using approximators::LinearSDNNConfig;
+using State = std::vector<double>;
+
+Sarsa agent_of(const SarsaConfig& config, std::vector<std::size_t> n_actions = {3}, int window = 1,
+               std::uint64_t seed = 1) {
+  return {
+      LinearSDNN(
+          {.n_inputs = 2, .n_pattern_units = 40, .action_window = window, .averaging_interval = 3},
+          n_actions, seed),
+      config, seed};
+}
+
+double q(const Sarsa& agent, const State& state, std::size_t action) {
+  auto workspace = agent.workspace();
+  return agent.values(state, workspace)[action];
+}
+
+/// Steps of a random walk, in `n_environments` in turn.
+void live(Sarsa& agent, int n_steps, std::uint64_t seed) {
+  core::Random random(seed, core::Stream::useless_inputs);
+  State state{random.uniform(), random.uniform()};
+  for (int step = 0; step < n_steps; ++step) {
+    const auto action = agent.act(state);
+    const State next{random.uniform(), random.uniform()};
+    const bool terminated = random.below(10) == 0;
+    agent.learn(state, action, random.normal(), next, terminated);
+    state = next;
+    if (terminated) agent.begin_episode();
+  }
+}
+
+// gamma = 1/2, alpha = 1, no trace: the value of what follows halves.
+TEST(Sarsa, OneStepTargetsByHand) {
+  Sarsa agent = agent_of(
+      {.learning_rate = 1.0, .discount = 0.5, .trace_decay = 0.0, .final_learning_rate = {}});
+  const State a{0.1, 0.1}, b{0.9, 0.9};
+  agent.learn(b, {2}, 8.0, b, true);
+  EXPECT_NEAR(q(agent, b, 2), 8.0, 1e-3);
+  agent.learn(a, {0}, 1.0, b, false);
+  EXPECT_EQ(q(agent, a, 0), 0.0);  // waits for the next action
+  agent.learn(b, {2}, 8.0, b, true);
+  EXPECT_NEAR(q(agent, a, 0), 5.0, 0.5);
+}
+
+TEST(Sarsa, ALimitBootstrapsFromTheBestValueATerminalStateDoesNot) {
+  const SarsaConfig config{.discount = 1.0, .trace_decay = 0.0, .final_learning_rate = {}};
+  const State a{0.1, 0.1}, b{0.9, 0.9};
+  for (const bool terminated : {false, true}) {
+    Sarsa agent = agent_of(config);
+    agent.learn(b, {1}, 4.0, b, true);
+    agent.learn(a, {0}, 1.0, b, terminated);
+    agent.begin_episode();
+    EXPECT_NEAR(q(agent, a, 0), terminated ? 1.0 : 5.0, 0.5);
+  }
+}
+
+TEST(Sarsa, ATraceCarriesARewardBack) {
+  const State a{0.1, 0.1}, b{0.5, 0.5}, c{0.9, 0.9};
+  const auto value_of_first = [&](double trace_decay) {
+    Sarsa agent = agent_of({.trace_decay = trace_decay, .final_learning_rate = {}});
+    agent.learn(a, {0}, 0.0, b, false);
+    agent.learn(b, {1}, 0.0, c, false);
+    agent.learn(c, {2}, 1.0, c, true);
+    return q(agent, a, 0);
+  };
+  EXPECT_NEAR(value_of_first(0.0), 0.0, 0.05);
+  EXPECT_NEAR(value_of_first(0.9), 0.99 * 0.99 * 0.9 * 0.9, 0.15);
+}
+
+TEST(Sarsa, RatesHaveGoneHalfOfTheWayAfterScheduleSteps) {
+  Sarsa agent = agent_of({.learning_rate = 1.0,
+                          .policy = {.epsilon = 0.5, .n_greedy_steps = 0},
+                          .schedule_steps = 100,
+                          .final_learning_rate = 0.5,
+                          .final_epsilon = 0.25});
+  EXPECT_EQ(agent.learning_rate(), 1.0);
+  live(agent, 100, 1);
+  EXPECT_EQ(agent.learning_rate(), 0.75);
+  EXPECT_EQ(agent.epsilon(), 0.375);
+  agent.set_learning_rate(0.125);
+  EXPECT_EQ(agent.learning_rate(), 0.125);
+  agent.set_learning_rate({});
+  EXPECT_EQ(agent.learning_rate(), 0.75);
+}
+
+TEST(Sarsa, LearnsTheSameOnEveryInstructionSet) {
+  for (const auto traces : {TraceKind::dutch, TraceKind::replacing}) {
+    std::vector<std::vector<std::int32_t>> learned;
+    testing::on_every_instruction_set([&](auto) {
+      Sarsa agent = agent_of({.traces = traces}, {5, 2}, 2);
+      live(agent, 300, 2);
+      const auto weights = agent.action_value().weights();
+      learned.emplace_back(weights.begin(), weights.end());
+    });
+    for (const auto& weights : learned) EXPECT_EQ(weights, learned.front());
+  }
+}
+
+TEST(Sarsa, ItsStateResumesExactly) {
+  for (const int n_steps : {0, 1, 57, 200}) {
+    Sarsa agent = agent_of({.max_action_repeat = 5}, {3, 2}, 3);
+    live(agent, n_steps, 3);
+    Sarsa other = agent_of({.max_action_repeat = 5}, {3, 2}, 3);
+    core::restore(other, core::state_of(agent));
+    EXPECT_EQ(core::state_of(other), core::state_of(agent));
+    live(agent, 100, 4);
+    live(other, 100, 4);
+    EXPECT_EQ(core::state_of(other), core::state_of(agent));
+  }
+}
+
+TEST(Sarsa, EnvironmentsHaveTracesOfTheirOwn) {
+  Sarsa together = agent_of({});
+  together.set_n_environments(2);
+  const State a{0.1, 0.1}, b{0.5, 0.5};
+  together.learn(a, {0}, 0.0, b, false, 0);
+  together.learn(b, {1}, 1.0, b, true, 1);  // nobody else's trace carries it back
+  EXPECT_NEAR(q(together, a, 0), 0.0, 0.3);
+  together.set_n_environments(1);
+  EXPECT_THROW(together.learn(a, {0}, 0.0, b, false, 1), std::invalid_argument);
+}
+
+TEST(Sarsa, RefusesWhatCannotBeLearnedAndLearnsNothing) {
+  Sarsa agent = agent_of({});
+  const State a{0.1, 0.1};
+  const core::State before = core::state_of(agent);
+  EXPECT_THROW(agent.learn({{0.1}}, {0}, 0.0, a, false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(a, {3}, 0.0, a, false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(a, {0, 0}, 0.0, a, false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(a, {0}, 1e301, a, false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(a, {0}, 0.0, State{0.1, 1.1}, false), std::invalid_argument);
+  EXPECT_THROW(agent.act(State{0.1, 1.1}), std::invalid_argument);
+  EXPECT_EQ(core::state_of(agent), before);
+  EXPECT_THROW(agent_of({.trace_decay = 1.1}), std::invalid_argument);
+  EXPECT_THROW(agent_of({}, {}), std::invalid_argument);
+  EXPECT_THROW(agent_of({}, {0}), std::invalid_argument);
+}
+
+TEST(LinearSDNN, RefusesWhatDoesNotFitIntoItsMemory) {
+  const std::size_t n_actions[] = {3};
+  EXPECT_THROW(LinearSDNN({.n_inputs = 2, .max_table_bytes = 1000}, n_actions, 1),
+               std::length_error);
+}
+
+}  // namespace
+}  // namespace sdnn::agents

@@ -1,0 +1,128 @@
+#include "sdnn/approximators/detail/linear_rows.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "instruction_sets.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::approximators {
+namespace {
+
+struct Rows {
+  std::vector<std::int32_t> weights, traces, active, negative;
+  CodeMasks code() const { return {active.data(), negative.data()}; }
+};
+
+Rows random_rows(std::size_t n, std::uint64_t seed) {
+  core::Random random(seed, core::Stream::weights);
+  Rows rows;
+  for (std::size_t j = 0; j < n; ++j) {
+    rows.weights.push_back(static_cast<std::int32_t>(random.below((1 << 24) - 1)) - (1 << 23) + 1);
+    rows.traces.push_back(static_cast<std::int32_t>(random.below(2 * kLargestTrace + 1)) -
+                          kLargestTrace);
+    const bool active = random.below(2) == 1;
+    rows.active.push_back(active ? -1 : 0);
+    rows.negative.push_back(active && random.below(2) == 1 ? -1 : 0);
+  }
+  return rows;
+}
+
+TEST(LinearRows, SumsOfTheLargestWeightsAreExactOnEveryInstructionSet) {
+  for (const std::size_t n : {64, 192, 256, 320, 1024}) {
+    Rows rows = random_rows(n, n);
+    std::int64_t expected = 0;
+    for (std::size_t j = 0; j < n; ++j) {
+      if (rows.active[j] != 0)
+        expected += rows.negative[j] != 0 ? -rows.weights[j] : rows.weights[j];
+    }
+    Rows full = rows;
+    for (std::size_t j = 0; j < n; ++j) {
+      full.weights[j] = (1 << 23) - 1;
+      full.active[j] = -1;
+      full.negative[j] = 0;
+    }
+    testing::on_every_instruction_set([&](auto) {
+      EXPECT_EQ(row_sum(rows.weights.data(), rows.code(), n), expected);
+      EXPECT_EQ(row_sum(full.weights.data(), full.code(), n),
+                static_cast<std::int64_t>(n) * ((1 << 23) - 1));
+    });
+  }
+}
+
+TEST(LinearRows, AStepByHand) {
+  // Traces 3 and -3 (of kTraceOne / 4 + 1) decay towards 0; a code of +1, -1, 0.
+  std::vector<std::int32_t> weights{100, 100, 100}, traces{3, -3, 4096};
+  const std::vector<std::int32_t> active{-1, -1, 0}, negative{0, -1, 0};
+  const RowStep step{.decay = kDecayOne / 2,
+                     .gain = kTraceOne,
+                     .replace = 0,
+                     .step = 5,
+                     .shift = 12,
+                     .correction = 2};
+  const RowUse use =
+      learn_row(weights.data(), traces.data(), {active.data(), negative.data()}, 3, step);
+  EXPECT_EQ(traces, (std::vector<std::int32_t>{4097, -4097, 2048}));
+  // 100 + round(5 * 4097 / 4096) - 2; 100 + round(-5.001) + 2; 100 + round(2.5), halves up
+  EXPECT_EQ(weights, (std::vector<std::int32_t>{103, 97, 103}));
+  EXPECT_EQ(use.weights, 103 | 97);
+  EXPECT_NE(use.traces, 0);
+}
+
+TEST(LinearRows, AReplacedTraceForgetsWhatItWasWhereTheCodeIsNotNeutral) {
+  std::vector<std::int32_t> weights{0, 0}, traces{9000, 9000};
+  const std::vector<std::int32_t> active{-1, 0}, negative{-1, 0};
+  learn_row(weights.data(), traces.data(), {active.data(), negative.data()}, 2,
+            {.decay = kDecayOne,
+             .gain = kTraceOne,
+             .replace = -1,
+             .step = 0,
+             .shift = 1,
+             .correction = 0});
+  EXPECT_EQ(traces, (std::vector<std::int32_t>{-kTraceOne, 9000}));
+}
+
+TEST(LinearRows, ATraceEndsAtZeroAndIsNeverBeyondItsLimit) {
+  std::vector<std::int32_t> weights{0, 0}, traces{kLargestTrace, -kLargestTrace};
+  const std::vector<std::int32_t> active{-1, -1}, negative{0, -1};
+  RowStep step{
+      .decay = kDecayOne, .gain = kTraceOne, .replace = 0, .step = 0, .shift = 1, .correction = 0};
+  const CodeMasks code{active.data(), negative.data()};
+  learn_row(weights.data(), traces.data(), code, 2, step);
+  EXPECT_EQ(traces, (std::vector<std::int32_t>{kLargestTrace, -kLargestTrace}));
+  step.gain = 0;
+  step.decay = kDecayOne * 9 / 10;
+  int n = 0;
+  while (learn_row(weights.data(), traces.data(), code, 2, step).traces != 0) ASSERT_LT(++n, 1000);
+  EXPECT_EQ(traces, (std::vector<std::int32_t>{0, 0}));
+}
+
+TEST(LinearRows, AStepIsTheSameOnEveryInstructionSet) {
+  for (const std::size_t n : {64, 320}) {
+    for (std::uint64_t seed = 0; seed < 20; ++seed) {
+      core::Random random(seed, core::Stream::rounding);
+      const RowStep step{.decay = static_cast<std::int32_t>(random.below(kDecayOne + 1)),
+                         .gain = static_cast<std::int32_t>(random.below(2 * kTraceOne)) - kTraceOne,
+                         .replace = random.below(2) == 1 ? -1 : 0,
+                         .step = static_cast<std::int32_t>(random.below(1 << 14)) - (1 << 13),
+                         .shift = 1 + static_cast<std::int32_t>(random.below(12)),
+                         .correction = static_cast<std::int32_t>(random.below(1 << 20))};
+      const Rows start = random_rows(n, seed);
+      Rows expected = start;
+      detail::learn_row_portable(expected.weights.data(), expected.traces.data(), expected.code(),
+                                 n, step);
+      testing::on_every_instruction_set([&](auto name) {
+        Rows rows = start;
+        learn_row(rows.weights.data(), rows.traces.data(), rows.code(), n, step);
+        EXPECT_EQ(rows.weights, expected.weights) << name;
+        EXPECT_EQ(rows.traces, expected.traces) << name;
+      });
+    }
+  }
+}
+
+}  // namespace
+}  // namespace sdnn::approximators

@@ -1,0 +1,176 @@
+"""Sarsa with a linear readout: equal to its transcription, and what users meet."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sarsa_transcription import Sarsa
+from sdnn import _core
+from sdnn.agents import SarsaConfig, SDNNSarsa, Transition, evaluate, load_agent
+from sdnn.approximators import LinearSDNNConfig
+
+SMALL = {
+    "n_inputs": 2,
+    "averaging_interval": 0,
+    "n_pattern_units": 6,
+    "n_anchor_patterns": 3,
+    "n_interpolated": 2,
+}
+
+
+def life(seed, n_steps, n_actions, scale):
+    """Transitions of episodes that end in a terminal state, at a limit, or not at all."""
+    rng = np.random.default_rng(seed)
+    state = rng.random(2)
+    for _ in range(n_steps):
+        action = [int(rng.integers(n)) for n in n_actions]
+        reward = float(scale ** rng.integers(-1, 3) * rng.normal()) if rng.random() < 0.7 else 0.0
+        next_state = rng.random(2)
+        end = rng.choice(["none", "terminal", "limit", "jump"], p=[0.8, 0.1, 0.05, 0.05])
+        yield state, action, reward, next_state, end
+        state = next_state if end == "none" else rng.random(2)
+
+
+@given(
+    seed=st.integers(0, 10**6),
+    n_actions=st.lists(st.integers(1, 4), min_size=1, max_size=2),
+    window=st.integers(1, 3),
+    bootstrap=st.sampled_from(["sarsa", "q_learning"]),
+    traces=st.sampled_from(["dutch", "replacing"]),
+    trace_decay=st.sampled_from([0.0, 0.8, 1.0]),
+    discount=st.sampled_from([0.0, 0.9, 1.0]),
+    learning_rate=st.sampled_from([1e-6, 0.3, 1.0]),
+    scale=st.sampled_from([1.0, 100.0, 1e6, 1e-40]),
+)
+@settings(max_examples=60, deadline=None)
+def test_weights_are_those_of_the_transcription(
+    seed, n_actions, window, bootstrap, traces, trace_decay, discount, learning_rate, scale
+):
+    learning = {
+        "learning_rate": learning_rate,
+        "final_learning_rate": 0.01,
+        "schedule_steps": 7,
+        "bootstrap": bootstrap,
+        "traces": traces,
+        "trace_decay": trace_decay,
+        "discount": discount,
+    }
+    agent = _core.Sarsa(
+        approximator=LinearSDNNConfig(**SMALL, action_window=window),
+        n_actions=n_actions,
+        learning=SarsaConfig(**learning),
+        seed=seed,
+    )
+    slow = Sarsa(agent.action_value.code, n_actions, window, {**learning, "n_inputs": 2})
+    for state, action, reward, next_state, end in life(seed, 25, n_actions, scale):
+        for one in (agent, slow):
+            one.learn(state, action, reward, next_state, end == "terminal")
+            if end == "limit":
+                one.begin_episode()
+        assert agent.action_value.exponent == slow.exponent
+        np.testing.assert_array_equal(agent.action_value.weights(), slow.weights)
+
+
+def test_a_full_step_corrects_the_whole_error_of_a_new_state():
+    agent = _core.Sarsa(
+        approximator=LinearSDNNConfig(n_inputs=2, n_actions=3),
+        n_actions=[3],
+        learning=SarsaConfig(learning_rate=1.0, final_learning_rate=1.0),
+        seed=1,
+    )
+    agent.learn([0.3, 0.7], [1], 5.0, [0.4, 0.7], True)
+    np.testing.assert_allclose(agent.q_values([0.3, 0.7]), [0, 5, 0], rtol=1e-3)
+    assert 0 < agent.q_values([0.35, 0.7])[1] < 5  # a neighbour learns from it
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1.0, 1e12])
+def test_the_scale_of_rewards_changes_nothing_but_the_scale_of_values(scale):
+    def values(scale):
+        agent = _core.Sarsa(
+            approximator=LinearSDNNConfig(**SMALL), n_actions=[3], learning=SarsaConfig(), seed=1
+        )
+        for state, action, reward, next_state, end in life(3, 200, [3], 2.0):
+            agent.learn(state, action, reward * scale, next_state, end == "terminal")
+        return np.array(agent.q_values([0.2, 0.6]))
+
+    factor = 2.0 ** round(np.log2(scale))  # exact in binary
+    np.testing.assert_array_equal(values(factor), values(1.0) * factor)
+
+
+def test_one_enormous_reward_costs_resolution_and_nothing_else():
+    agent = _core.Sarsa(
+        approximator=LinearSDNNConfig(n_inputs=2),
+        n_actions=[2],
+        learning=SarsaConfig(final_learning_rate=1.0, trace_decay=0.0),
+        seed=1,
+    )
+    agent.learn([0.1, 0.1], [0], -1e6, [0.2, 0.1], True)
+    for _ in range(30):
+        agent.learn([0.1, 0.1], [0], 1.0, [0.2, 0.1], True)
+    assert agent.q_values([0.1, 0.1])[0] == pytest.approx(1.0, abs=0.5)
+
+
+@pytest.mark.parametrize("learned", [0, 40, 300])
+def test_a_saved_agent_continues_to_the_same_bits(tmp_path, learned):
+    env = gym.make("CartPole-v1")
+
+    def agent_of(steps):
+        agent = SDNNSarsa(env.observation_space, env.action_space, seed=3, warm_up_steps=50)
+        agent.train(env, steps=steps, seed=5)
+        return agent
+
+    agent = (
+        agent_of(learned)
+        if learned
+        else SDNNSarsa(env.observation_space, env.action_space, seed=3, warm_up_steps=50)
+    )
+    agent.save(tmp_path / "agent.safetensors")
+    loaded = load_agent(tmp_path / "agent.safetensors")
+    rng = np.random.default_rng(1)
+    for one in (agent, loaded):
+        one.begin_episode()
+    for _ in range(100):
+        observation, following = rng.normal(size=(2, 4)).astype(np.float32) / 20
+        actions = [one.act(observation) for one in (agent, loaded)]
+        assert actions[0] == actions[1]
+        for one in (agent, loaded):
+            one.learn(Transition(observation, actions[0], 1.0, following, False))
+    if not agent.is_warming_up:
+        np.testing.assert_array_equal(
+            agent.core.action_value.weights(), loaded.core.action_value.weights()
+        )
+
+
+def test_cartpole_is_learned_in_a_few_thousand_steps():
+    env = gym.make("CartPole-v1")
+    agent = SDNNSarsa(env.observation_space, env.action_space, seed=1)
+    agent.train(env, steps=20_000, seed=1)
+    assert evaluate(agent, gym.make("CartPole-v1"), episodes=10, seed=7).mean_return > 300
+
+
+@pytest.mark.parametrize(
+    "space",
+    [
+        gym.spaces.Box(-1.0, 1.0, (2,)),
+        gym.spaces.MultiDiscrete([2, 3]),
+        gym.spaces.MultiBinary(2),
+        gym.spaces.Discrete(4, start=2),
+    ],
+    ids=str,
+)
+def test_every_space_of_actions(space):
+    observations = gym.spaces.Dict(
+        {"x": gym.spaces.Box(-1.0, 1.0, (1,)), "k": gym.spaces.Discrete(3)}
+    )
+    agent = SDNNSarsa(observations, space, approximator=LinearSDNNConfig(action_window=2))
+    observations.seed(1)
+    observation = observations.sample()
+    for step in range(60):
+        action = agent.act(observation)
+        assert action in space
+        following = observations.sample()
+        agent.learn(Transition(observation, action, 1.0, following, step % 9 == 0))
+        observation = following
+    assert agent.act(observation, explore=False) in space
