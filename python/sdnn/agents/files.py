@@ -298,6 +298,11 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
             raise ValueError(f"{path} is damaged: {name} must be there, of numbers")
         return arrays[name]
 
+    def actions(name: str) -> NDArray[Any]:
+        if not _are_actions(agent.action_space, array(name)):
+            raise ValueError(f"{path} is damaged: {name} must be actions of {agent.action_space}")
+        return arrays[name]
+
     try:
         saved = msgspec.convert(description.get("training"), SavedTraining)
     except msgspec.ValidationError as error:
@@ -306,9 +311,22 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
         episode
         and msgspec.structs.replace(
             episode,
-            actions=array(f"{_ARRAYS_OF_TRAINING}{i}.actions"),
+            actions=actions(f"{_ARRAYS_OF_TRAINING}{i}.actions"),
             observation=array(f"{_ARRAYS_OF_TRAINING}{i}.observation"),
         )
         for i, episode in enumerate(saved.present)
     ]
     return agent, msgspec.structs.replace(saved, present=present)
+
+
+def _are_actions(space: Any, values: NDArray[Any]) -> bool:
+    """Whether the rows of an array are actions of a space: an environment need not check them."""
+    if isinstance(space, gym.spaces.Discrete):
+        low, high = space.start, space.start + space.n - 1
+    else:
+        low, high = space.low, space.high
+    is_alike = values.dtype.kind == space.dtype.kind or np.can_cast(values.dtype, space.dtype)
+    is_shaped = values.ndim > 0 and values.shape[1:] == space.shape
+    return is_shaped and (
+        len(values) == 0 or (is_alike and bool(((low <= values) & (values <= high)).all()))
+    )

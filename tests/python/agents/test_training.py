@@ -31,6 +31,7 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.approximators import SDNNCConfig
+from sdnn.files import read_file, write_file
 from stopped_training import Stop, states_equal
 
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
@@ -291,6 +292,29 @@ def test_what_was_learned_before_an_environment_failed_is_kept(
     told = [json.loads(line) for line in rows.path.read_text().splitlines()]
     assert [row["episode"] for row in told] == list(range(training.n_episodes))
     assert {row["length"] for row in told} == {20}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda actions: actions + 9,
+        lambda actions: actions - 9,
+        lambda actions: actions[:, np.newaxis],
+        lambda actions: actions + 0.0,
+        lambda actions: actions.astype(np.uint64),
+        lambda actions: actions[0],
+    ],
+)
+def test_an_environment_gets_no_actions_that_it_does_not_have_from_a_file(change, tmp_path):
+    path = tmp_path / "checkpoint"
+    env = Corridor()
+    agent = SDNNQLearning(env.observation_space, env.action_space, approximator=SMALL, seed=3)
+    Training(agent, env, episodes=9, callbacks=[Stop(3, path)]).run()
+    description, arrays = read_file(path, "training")
+    name = "training.0.actions"
+    assert len(arrays[name]) > 0
+    write_file(path, "training", arrays | {name: change(arrays[name])}, description)
+    refuses(name, Training.load, path, env)
 
 
 @pytest.mark.parametrize("has_own_resets", [False, True])
