@@ -18,7 +18,6 @@ nox.options.error_on_missing_interpreters = True
 
 ROOT = Path(__file__).parent
 JOBS = str(os.cpu_count() or 1)
-FUZZ_SEEDS = {"agent_file_fuzz": "tests/data/agents"}
 
 
 def quick(**options):
@@ -128,24 +127,13 @@ def packaging(session):
 
 @quick()
 def fuzz(session):
-    """Run every fuzz target over its corpus and for some seconds beyond it.
+    """Run every fuzz target, in C++ and Python, over its corpus and for some seconds beyond it.
 
-    ``nox -s fuzz -- 600`` for ten minutes each.
+    ``nox -s fuzz -- --seconds 600`` for ten minutes each; build/fuzzing/counts.json sums up.
     """
-    seconds = session.posargs[0] if session.posargs else "8"
     cmake_build(session, "fuzz")
-    for target in sorted(p.stem for p in (ROOT / "tests/fuzz").glob("*_fuzz.cpp")):
-        found = Path(session.create_tmp()) / target
-        found.mkdir(parents=True, exist_ok=True)
-        folders = [found, f"tests/fuzz/corpus/{target}"]
-        folders += [FUZZ_SEEDS[target]] if target in FUZZ_SEEDS else []
-        session.run(
-            f"build/fuzz/tests/fuzz/{target}",
-            *("-rss_limit_mb=1024", "-timeout=10", "-max_len=16384", "-len_control=10"),
-            *(f"-max_total_time={seconds}", f"-artifact_prefix={found}/", "-verbosity=0"),
-            *map(str, folders),
-            external=True,
-        )
+    arguments = ("--out", "build/fuzzing", "--seconds", "8", "--jobs", JOBS)
+    python(session, "tests/fuzz/campaign.py", *arguments, *session.posargs)
 
 
 @weekly()

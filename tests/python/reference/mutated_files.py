@@ -27,6 +27,7 @@ ROOT = Path(__file__).parents[3]
 X = np.random.RandomState(0).uniform(size=(40, 2))
 SMALL = {"n_pattern_units": 10, "max_iter": 2, "random_state": 0}
 
+NUMBER = re.compile(rb"-?\d+(\.\d+)?")
 EXTREME = (b"0", b"-1", b"1", b"1e400", b"-1e308", b"NaN", b"2147483648", b"9999999999999999999",
            b"1e-320", b"null", b"true", b"[]", b"{}", b'""', b"[[[[[[[[")  # fmt: skip
 
@@ -161,9 +162,8 @@ def with_other_bytes(data, random):
             number = (0, 1, 127, 2**31 - 1, 2**63 - 1, 2**64 - 1)[random.randint(6)]
             changed[place : place + 8] = number.to_bytes(8, "little")
         else:
-            numbers = list(re.finditer(rb"-?\d+(\.\d+)?", bytes(changed)))
-            if numbers:
-                found = numbers[random.randint(len(numbers))]
+            found = NUMBER.search(changed, place)
+            if found:
                 changed[found.start() : found.end()] = EXTREME[random.randint(len(EXTREME))]
     return bytes(changed)
 

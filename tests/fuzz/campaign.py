@@ -1,0 +1,199 @@
+"""Runs fuzz targets, in C++ and Python, and counts their executions in a file.
+
+    python tests/fuzz/campaign.py --out FOLDER [--seconds 60] [--executions N] [TARGET ...]
+
+Each target runs for so many seconds or executions. ``FOLDER/counts.json`` has the executions of
+each commit and target, and of a later call the sum: it goes on from the corpora and the numbers of
+the earlier ones. What fails is in ``FOLDER/TARGET``; ``--number N`` repeats one execution of a
+reader in Python.
+"""
+
+import argparse
+import concurrent.futures
+import json
+import multiprocessing
+import os
+import re
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+BUILD = ROOT / "build" / "fuzz" / "tests" / "fuzz"
+SEEDS = {"agent_file_fuzz": ["agents", "files"], "safetensors_fuzz": ["agents", "files"]}
+"""Folders of tests/data, beside the target's corpus."""
+
+MOST_SECONDS = 5.0
+"""Of processor time, of an execution."""
+MOST_BYTES = 2**28
+HANG_SECONDS = 60.0
+"""Without an execution's end, whatever the machine does."""
+HEADROOM = 2**32
+MOST_FAULTS = 50
+PER_WORKER = 200_000
+"""Executions; a new process shows what is kept from one to the next."""
+
+
+def run_cpp(name, seconds, executions, out):
+    """Run a target of libFuzzer; return its executions and faults."""
+    found = out / name
+    found.mkdir(parents=True, exist_ok=True)
+    corpora = [found, ROOT / "tests" / "fuzz" / "corpus" / name]
+    corpora += [ROOT / "tests" / "data" / folder for folder in SEEDS.get(name, ())]
+    limits = ["-rss_limit_mb=1024", "-timeout=10", "-max_len=16384", "-len_control=10"]
+    limits += [f"-max_total_time={seconds}", f"-runs={executions or -1}"]
+    done = subprocess.run(
+        [BUILD / name, *limits, f"-artifact_prefix={found}/fault-", "-print_final_stats=1",
+         "-verbosity=0", *corpora],
+        stderr=subprocess.PIPE, text=True, errors="replace", check=False,
+    )  # fmt: skip
+    count = re.search(r"number_of_executed_units: (\d+)", done.stderr)
+    faults = [] if done.returncode == 0 else [done.stderr[-8000:]]
+    return int(count[1]) if count else 0, faults
+
+
+def run_python(name, seconds, executions, out, first):
+    """Let a reader read the inputs of numbers from the first on; return their number and faults."""
+    context = multiprocessing.get_context("spawn")
+    number = first
+    last = first + executions if executions else sys.maxsize
+    until = time.monotonic() + seconds
+    faults = []
+    with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:
+        while number < last and time.monotonic() < until and len(faults) < MOST_FAULTS:
+            present = context.Value("q", number, lock=False)
+            there, here = context.Pipe(duplex=False)
+            end = min(last, number + PER_WORKER)
+            worker = context.Process(target=_work, args=(name, present, end, until, here, folder))
+            worker.start()
+            here.close()
+            found = _watched(worker, present, there)
+            number = present.value + bool(found)
+            for fault in found:
+                faults.append(fault)
+                (out / name).mkdir(parents=True, exist_ok=True)
+                with (out / name / "faults.txt").open("a") as file:
+                    file.write(fault + "\n")
+    return number - first, faults
+
+
+def _watched(worker, present, pipe):
+    """Wait for a worker; return its fault, after which another one has to go on."""
+    before, began = present.value, time.monotonic()
+    while not pipe.poll(1.0):
+        if present.value != before:
+            before, began = present.value, time.monotonic()
+        elif time.monotonic() - began > HANG_SECONDS:
+            worker.kill()
+    try:
+        found = pipe.recv()
+    except EOFError:
+        worker.join()
+        what = "took too long" if worker.exitcode == -signal.SIGPROF else "ended the process"
+        found = [f"{present.value}: {what}, exit code {worker.exitcode}"]
+    worker.join()
+    return found
+
+
+def _work(name, present, end, until, pipe, folder):
+    warnings.simplefilter("ignore")
+    os.chdir(folder)
+    import python_readers
+
+    with open("/proc/self/statm") as file:
+        used = int(file.read().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + HEADROOM,) * 2)
+    most = None
+    fault = ""
+    for number in range(present.value, end):
+        present.value = number
+        signal.setitimer(signal.ITIMER_PROF, MOST_SECONDS)  # its signal ends the process
+        try:
+            fault = python_readers.execute(name, number)
+        except Exception:
+            fault = traceback.format_exc()
+        highest = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        most = most or highest + MOST_BYTES  # the first has loaded what all need
+        if not fault and highest > most:
+            fault = f"took {(highest - most + MOST_BYTES) / 2**20:.0f} MiB"
+        if fault or time.monotonic() > until:
+            break
+    else:
+        present.value = end
+    pipe.send([f"{number}: {fault}"] if fault else [])
+
+
+def timed(name, cpp, given, first):
+    """Run a target; return its executions, its faults and the seconds."""
+    began = time.monotonic()
+    if cpp:
+        done, faults = run_cpp(name, given.seconds, given.executions, given.out)
+    else:
+        done, faults = run_python(name, given.seconds, given.executions, given.out, first)
+    return done, faults, time.monotonic() - began
+
+
+def count(counts, name, **numbers):
+    """Add what a target did to the counts of the present commit."""
+    own = counts.setdefault(commit(), {}).setdefault(name, dict.fromkeys(numbers, 0))
+    for key, number in numbers.items():
+        own[key] = round(own[key] + number)
+
+
+def commit():
+    """The commit of the work tree."""
+    arguments = ["git", "-C", ROOT, "rev-parse", "--short", "HEAD"]
+    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    return done.stdout.strip() or "unknown"
+
+
+def main():
+    import python_readers
+
+    cpp = sorted(path.stem for path in (ROOT / "tests" / "fuzz").glob("*_fuzz.cpp"))
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("targets", nargs="*", metavar="TARGET", help="default: all")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--seconds", type=int, default=60, help="at most, of a target")
+    parser.add_argument("--executions", type=int, help="at most, of a target; default: no limit")
+    parser.add_argument("--jobs", type=int, default=1, help="targets at a time")
+    parser.add_argument("--number", type=int, help="an execution of a reader to repeat")
+    given = parser.parse_args()
+    known = [*cpp, *python_readers.NAMES, python_readers.FAULTY]
+    if unknown := set(given.targets).difference(known):
+        parser.error(f"unknown: {', '.join(sorted(unknown))}; possible: {', '.join(known)}")
+    if given.number is not None:
+        with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:
+            os.chdir(folder)
+            sys.exit(python_readers.execute(given.targets[0], given.number))
+    given.out.mkdir(parents=True, exist_ok=True)
+    path = given.out / "counts.json"
+    counts = json.loads(path.read_text()) if path.exists() else {}
+    n_faults = 0
+    with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
+        runs = {}
+        for name in given.targets or known[:-1]:
+            first = sum(own.get(name, {}).get("executions", 0) for own in counts.values())
+            runs[pool.submit(timed, name, name in cpp, given, first)] = name
+        for run in concurrent.futures.as_completed(runs):
+            done, faults, took = run.result()
+            name = runs[run]
+            count(counts, name, executions=done, seconds=took, faults=len(faults))
+            path.write_text(json.dumps(counts, indent=1) + "\n")
+            n_faults += len(faults)
+            rate = done / took
+            print(f"{name}: {done:,} executions, {rate:,.0f} a second, {len(faults)} faults")
+            print("".join(f"{fault}\n" for fault in faults[:5]), end="", flush=True)
+    total = sum(own["executions"] for of in counts.values() for own in of.values())
+    print(f"{total:,} executions in all")
+    return 1 if n_faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
