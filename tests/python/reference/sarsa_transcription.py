@@ -82,29 +82,29 @@ class Sarsa:
         if terminated:
             self._correct(0)
             self._end()
+        elif self.learning["bootstrap"] == "q_learning":
+            self._correct(self._best_in_range(self.code(next_state)))
 
     def begin_episode(self) -> None:
         if self.waiting is not None:
-            next_code = self.code(self.waiting[3])
-            while abs(self._best(next_code)) >= 2**33:
-                self._double_unit()
-            self._correct(self._best(next_code))
+            if self.learning["bootstrap"] == "sarsa":
+                self._correct(self._best_in_range(self.code(self.waiting[3])))
             self._end()
 
-    def _finish(self, code: list[int], action: list[int]) -> None:
-        while abs(self._sum(code, action)) >= 2**33:
+    def _best_in_range(self, code: list[int]) -> int:
+        while abs(self._best(code)) >= 2**33:
             self._double_unit()
-        following = self._sum(code, action)
-        goes_on = True
+        return self._best(code)
+
+    def _finish(self, code: list[int], action: list[int]) -> None:
         if self.learning["bootstrap"] == "q_learning":
-            while abs(self._best(code)) >= 2**33:
+            if self._sum(code, action) < self._best(code):
+                self._end()
+        else:
+            while abs(self._sum(code, action)) >= 2**33:
                 self._double_unit()
-            following = self._best(code)
-            goes_on = self._sum(code, action) == following
-        self._correct(following)
+            self._correct(self._sum(code, action))
         self.waiting = None
-        if not goes_on:
-            self._end()
 
     def _rate(self) -> int:
         first = round(self.learning["learning_rate"] * 65536)

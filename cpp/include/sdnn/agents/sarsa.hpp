@@ -32,11 +32,11 @@ namespace sdnn::agents {
 ///     delta = r + gamma Q' - Q,  Q_old <- Q'
 ///
 /// Q' is the value of the action that is taken next (Sarsa), or the best one (Q-learning: then a
-/// worse action ends the trace). So a transition waits until the next one begins where it ended, or
-/// the episode ends: a terminated one has Q' = 0, any other end the best value. With replacing
-/// traces z is x where x is not 0, and w moves along z alone. A step of alpha = 1 corrects the
-/// whole error of a state that comes for the first time; it never overshoots, for <z, x> is
-/// bounded.
+/// worse action ends the trace). With Sarsa a transition waits until the next one begins where it
+/// ended, or the episode ends. A terminated one has Q' = 0, any other end the best value. With
+/// replacing traces z is x where x is not 0, and w moves along z alone. A step of alpha = 1
+/// corrects the whole error of a state that comes for the first time; it never overshoots, for <z,
+/// x> is bounded.
 ///
 /// After the scaling of observations everything is an integer: alpha and epsilon in steps of 2^-16,
 /// gamma of 2^-15, gamma lambda of 2^-13, traces of 2^-12, values and weights in the readout's
@@ -169,7 +169,7 @@ class Sarsa {
     return coding::action_value(action.front(), n_actions(0), -1.0, 1.0);
   }
 
-  /// Learns one transition: at once if it terminated, else when the next one is known. Throws
+  /// Learns one transition: with Sarsa when the next one is known, unless it terminated. Throws
   /// std::invalid_argument for a reward that is not finite or beyond +- 1e300 or an environment
   /// that is none; then nothing has been learned.
   void learn(std::span<const double> state, const Action& action, double reward,
@@ -195,6 +195,8 @@ class Sarsa {
     if (terminated) {
       correct(episode, 0);
       end(episode);
+    } else if (config_.bootstrap == Bootstrap::q_learning) {
+      correct_by_best(episode);
     }
   }
 
@@ -224,7 +226,7 @@ class Sarsa {
   struct Episode {
     Readout::Trace trace;
     Readout::Code code;  ///< of state
-    bool waits = false;  ///< a transition waits to be learned: from here on
+    bool waits = false;  ///< the episode continues; with Sarsa, this transition is to be learned:
     std::vector<double> state;
     std::vector<std::size_t> action;
     double reward = 0.0;
@@ -371,25 +373,26 @@ class Sarsa {
     return value;
   }
 
-  /// Learns what waits: in the state of next_code_, `action` is taken.
+  /// Continues the episode: in the state of next_code_, `action` is taken.
   void finish(Episode& episode, const Action& action) {
-    std::int64_t next = in_range([&] { return action_value_.sum(next_code_, action); });
-    bool goes_on = true;
     if (config_.bootstrap == Bootstrap::q_learning) {
-      const std::int64_t best = in_range([&] { return best_sum(next_code_); });
-      goes_on = action_value_.sum(next_code_, action) == best;
-      next = best;
+      if (action_value_.sum(next_code_, action) < best_sum(next_code_)) end(episode);
+    } else {
+      correct(episode, in_range([&] { return action_value_.sum(next_code_, action); }));
     }
-    correct(episode, next);
     episode.waits = false;
-    if (!goes_on) end(episode);
   }
 
-  /// Learns what waits where the episode ended without a terminal state.
+  /// Ends an episode that has no terminal state.
   void finish_at_end(Episode& episode) {
+    if (config_.bootstrap == Bootstrap::sarsa) correct_by_best(episode);
+    end(episode);
+  }
+
+  /// Learns a transition by the best value of its next state.
+  void correct_by_best(Episode& episode) {
     action_value_.encode(episode.next_state, workspace_.approximator, next_code_);
     correct(episode, in_range([&] { return best_sum(next_code_); }));
-    end(episode);
   }
 
   static void end(Episode& episode) noexcept {
