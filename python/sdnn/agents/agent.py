@@ -85,9 +85,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         Pairs of variables that are the cosine and the sine of an angle, which becomes one input.
         ``"find"``: those that the warm-up finds on the unit circle.
     inputs : "all" or "relevant"
-        ``"relevant"``: only those that rewards or actions have to do with, as far as the warm-up
-        shows: by themselves, or because another one that has depends on them. Slow or fast noise
-        is left out.
+        ``"relevant"``: those that rewards or actions have to do with, by the warm-up; see
+        docs/agents.md.
     warm_up_steps : int
         Transitions of the warm-up, where there is one.
 
