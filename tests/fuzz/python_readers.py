@@ -26,10 +26,10 @@ from agent_files import SMALL
 from checksums import BEFORE, with_checksum
 from made_records import make_record
 from mutated_files import Reader, with_other_bytes, with_other_contents, written
-from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLearning, Training
+from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLearning, SDNNSarsa, Training
 from sdnn.agents.agent import load_agent
 from sdnn.agents.files import read_statistics
-from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig
+from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig
 from sdnn.runs import ResultStore, StoreError, TrialRows
 from sdnn.runs.spec import HASH_DIGITS
 from sdnn.runs.trial import ROW
@@ -59,11 +59,13 @@ class Env(gym.Env):
 def made_agents():
     rules = FuzzyRulesConfig(n_sets=3, n_actions=3)
     bases = RBFNetworkConfig(n_bases=3, n_actions=3)
+    linear = LinearSDNNConfig(n_pattern_units=12, n_anchor_patterns=4, n_interpolated=6)
     return (
         SDNNQLearning(BOX, GEAR, approximator=SMALL),
         SDNNQLearning(BOX, BOX, approximator=SMALL),
         RBFQLearning(BOX, GEAR, approximator=bases),
         FuzzyQLearning(BOX, BOX, approximator=rules),
+        SDNNSarsa(BOX, GEAR, approximator=linear),
     )
 
 

@@ -303,7 +303,8 @@ class Sarsa {
       }
     }
     rate_ = std::max(1, static_cast<std::int32_t>(std::lround(rate * kOne)));
-    exploration_.policy().set_epsilon(std::lround(epsilon * kOne) / static_cast<double>(kOne));
+    exploration_.policy().set_epsilon(static_cast<double>(std::lround(epsilon * kOne)) /
+                                      static_cast<double>(kOne));
   }
 
   void require_action(const Action& action) const {

@@ -421,7 +421,8 @@ class LinearSDNN {
   /// The average moves to the weights by 1 / 2^k of the way, ever less: by about 3 / (n + 3).
   void note_step() noexcept {
     if (++n_steps_ % config_.averaging_interval != 0) return;
-    const int k = std::bit_width(static_cast<std::uint64_t>(n_snapshots_ / 3 + 1)) - 1;
+    const int k =
+        static_cast<int>(std::bit_width(static_cast<std::uint64_t>(n_snapshots_ / 3 + 1))) - 1;
     const std::int32_t half = k > 0 ? 1 << (k - 1) : 0;
     for (std::size_t j = 0; j < weights_.size(); ++j) {
       averaged_[j] += (weights_[j] - averaged_[j] + half) >> k;
