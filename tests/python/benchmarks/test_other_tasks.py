@@ -2,7 +2,6 @@
 
 import argparse
 import contextlib
-import os
 import sys
 import time
 from pathlib import Path
@@ -10,6 +9,8 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 import pytest
+
+from measurements_for_tests import squared
 
 DOCS = Path(__file__).parents[3] / "docs"
 BENCH = Path(__file__).parents[3] / "bench"
@@ -128,14 +129,6 @@ def test_evaluations_take_no_part_in_the_processor_time(scripts, monkeypatch):
     assert clock.curve["cpu_seconds"][-1] < 0.3
 
 
-def squared(name, number):
-    if number < 0:
-        raise ValueError("negative")
-    if number == 0:
-        os._exit(3)
-    return {"square": number**2}
-
-
 def fail_in_store(measured, folder):
     with contextlib.suppress(RuntimeError), measured.opened(folder) as store:
         store.put("squares", '["c", 3]', {"square": 9})
@@ -158,8 +151,7 @@ def test_what_fails_ends_nothing_else_and_leaves_the_packed_store(scripts, tmp_p
     assert len(measured.measured("squares", tmp_path)) == 3
 
 
-def test_a_process_that_dies_is_reported(scripts, tmp_path, capsys, monkeypatch):
-    monkeypatch.syspath_prepend(Path(__file__).parent)
+def test_a_process_that_dies_is_reported(scripts, tmp_path, capsys):
     measured = scripts.measured
     keys = [("x", 0), ("x", 3)]
     measured.measure_missing("squares", squared, keys, given(tmp_path, jobs=2), apart=True)

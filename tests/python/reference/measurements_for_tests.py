@@ -1,0 +1,12 @@
+"""What tests of benchmarks measure: a module that processes of their own can import."""
+
+import os
+
+
+def squared(name, number):
+    """Return the square of a number; fail for negative ones, and end the process for 0."""
+    if number < 0:
+        raise ValueError("negative")
+    if number == 0:
+        os._exit(3)
+    return {"square": number**2}
