@@ -284,9 +284,8 @@ pybind11::class_<Config> bind_config(pybind11::module_& module, const char* name
   type.def("__repr__", [](const py::object& self) {
     std::string values;
     for (const auto& [key, value] : dictionary_of(self.cast<const Config&>())) {
-      values +=
-          (values.empty() ? "" : ", ") + key.template cast<std::string>() + "=" +
-              std::string(pybind11::repr(value));
+      values += (values.empty() ? "" : ", ") + key.template cast<std::string>() + "=" +
+                std::string(pybind11::repr(value));
     }
     return py::cast<std::string>(py::type::of(self).attr("__name__")) + "(" + values + ")";
   });

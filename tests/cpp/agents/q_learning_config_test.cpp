@@ -72,13 +72,13 @@ TEST(QLearning, RatesFallByEqualFactorsWithAnExponentialSchedule) {
   EXPECT_DOUBLE_EQ(agent.epsilon(), 0.25);
   agent.set_progress(0.75);
   EXPECT_DOUBLE_EQ(agent.learning_rate(), 0.125);
-  EXPECT_EQ(config.learning_rate_at(0.75), agent.learning_rate());
-  EXPECT_EQ(config.epsilon_at(0.75), agent.epsilon());
+  EXPECT_EQ(learning_rate_at(config, 0.75), agent.learning_rate());
+  EXPECT_EQ(epsilon_at(config, 0.75), agent.epsilon());
   agent.set_progress(1.0);
   EXPECT_EQ(agent.learning_rate(), 0.0625);
   EXPECT_EQ(agent.epsilon(), 0.125);
   const Agent steady(LookupTable(1, 5, 2), {.schedule = Schedule::exponential}, 1);
-  EXPECT_EQ(steady.config().learning_rate_at(0.7), 0.5);
+  EXPECT_EQ(learning_rate_at(steady.config(), 0.7), 0.5);
 }
 
 TEST(QLearning, AnExponentialScheduleStaysBetweenItsEnds) {
@@ -89,13 +89,13 @@ TEST(QLearning, AnExponentialScheduleStaysBetweenItsEnds) {
     const QLearningConfig config{
         .learning_rate = first, .final_learning_rate = last, .schedule = Schedule::exponential};
     const double progress = random.uniform();
-    const double rate = config.learning_rate_at(progress);
+    const double rate = learning_rate_at(config, progress);
     ASSERT_GE(rate, std::min(first, last));
     ASSERT_LE(rate, std::max(first, last));
     ASSERT_NEAR(std::log(rate), (1.0 - progress) * std::log(first) + progress * std::log(last),
                 1e-11);
-    ASSERT_EQ(config.learning_rate_at(0.0), first);
-    ASSERT_EQ(config.learning_rate_at(1.0), last);
+    ASSERT_EQ(learning_rate_at(config, 0.0), first);
+    ASSERT_EQ(learning_rate_at(config, 1.0), last);
   }
 }
 
@@ -116,14 +116,14 @@ TEST(QLearning, EpsilonMayReachItsFinalValueBeforeTheEnd) {
   }
   QLearningConfig exponential = config;
   exponential.schedule = Schedule::exponential;
-  EXPECT_DOUBLE_EQ(exponential.epsilon_at(0.125), 0.25);
-  EXPECT_EQ(exponential.epsilon_at(0.3), 0.125);
+  EXPECT_DOUBLE_EQ(epsilon_at(exponential, 0.125), 0.25);
+  EXPECT_EQ(epsilon_at(exponential, 0.3), 0.125);
   EXPECT_EQ(message({.exploration_fraction = 0.0}),
             "exploration_fraction must be in (0, 1], got 0");
   EXPECT_EQ(message({.exploration_fraction = 1.5}),
             "exploration_fraction must be in (0, 1], got 1.5");
   const Agent steady(LookupTable(1, 5, 2), {.exploration_fraction = 0.25}, 1);
-  EXPECT_EQ(steady.config().epsilon_at(0.1), 0.1);
+  EXPECT_EQ(epsilon_at(steady.config(), 0.1), 0.1);
 }
 
 TEST(QLearning, AnExponentialScheduleHasNoEndAtZero) {
