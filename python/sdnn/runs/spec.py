@@ -127,7 +127,7 @@ class RunSpec(Settings, frozen=True):
                 self._set(**{name: {key: value}})
         super().__post_init__()
         if self.seed >= 2**64:
-            raise ConfigError("seed", f"must be at most 2**64 - 1, got {self.seed}")
+            raise ConfigError("seed", f"must be at most 2**64 - 1, got {shown(self.seed)}")
         for name, kind in ACROBOT.items():
             if self.environment is None:
                 self._set(**{name: self._part(name, kind())})

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sdnn/approximators/sdnn_c.hpp"
+#include "sdnn/coding/state_code_config.hpp"
 
 namespace sdnn::approximators {
 namespace {
@@ -29,8 +30,8 @@ TEST(Wiring, HasATablePerInput) {
   std::vector<std::size_t> sizes;
   for (const auto& table : tables) sizes.push_back(table.n_bins());
   EXPECT_EQ(sizes, (std::vector<std::size_t>{10, 7, 10, 3, 10}));
-  EXPECT_EQ(config.n_bins(), 40.0);
-  EXPECT_EQ(config.pattern_bytes(config.n_bins()), 40.0 * (1 + 4) * 8);
+  EXPECT_EQ(coding::n_bins_of(config), 40.0);
+  EXPECT_EQ(coding::pattern_bytes_of(config, coding::n_bins_of(config)), 40.0 * (1 + 4) * 8);
 }
 
 TEST(Wiring, StridesAreAsManyAsThereArePartners) {
@@ -86,7 +87,7 @@ TEST(Wiring, TheSizeOfCodeBooksIsANumberForAnyFields) {
                              .n_anchor_patterns = n,
                              .n_interpolated = n,
                              .n_symbols = {n, n}};
-    EXPECT_TRUE(std::isfinite(config.pattern_bytes(config.n_bins())));
+    EXPECT_TRUE(std::isfinite(coding::pattern_bytes_of(config, coding::n_bins_of(config))));
   }
 }
 
