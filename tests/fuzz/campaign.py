@@ -3,8 +3,8 @@
     python tests/fuzz/campaign.py --out FOLDER [--seconds 60] [--executions N] [TARGET ...]
 
 Each target runs for so many seconds or executions. ``FOLDER/counts.json`` has the executions of
-each commit and target, and of a later call the sum: it goes on from the corpora and the numbers of
-the earlier ones. What fails is in ``FOLDER/TARGET``; ``--number N`` repeats one execution of a
+each commit and target. A later call continues with the corpora and numbers of the earlier ones and
+adds its executions. What fails is in ``FOLDER/TARGET``; ``--number N`` repeats one execution of a
 reader in Python.
 """
 

@@ -5,30 +5,25 @@ from __future__ import annotations
 import abc
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, ClassVar, Generic, NamedTuple
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.agents.agent import Agent
+from sdnn.agents.agent import Agent, Approximator, Learning
 from sdnn.agents.spaces import AnglePairs, Inputs, Ranges
 from sdnn.approximators.sdnn_c import pattern_tables
 from sdnn.arguments import choice, real, shown, whole
 from sdnn.config import (
     WARM_UP,
-    LinearSDNNConfig,
     QLearningConfig,
     RBFNetworkConfig,
-    SarsaConfig,
     SDNNCConfig,
 )
 
 __all__ = ["PRESETS", "Preset", "RBFQLearning", "SDNNQLearning"]
-
-Approximator = TypeVar("Approximator", SDNNCConfig, RBFNetworkConfig, LinearSDNNConfig)
-Learning = TypeVar("Learning", QLearningConfig, SarsaConfig)
 
 
 class Preset(NamedTuple):
@@ -126,13 +121,45 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
     def _dimension(self, dimension: int) -> int:
         return whole("dimension", dimension, 0, self.n_dimensions - 1)
 
-    def _network(self, dimension: int) -> Any:
-        """Return the approximator of a dimension."""
-        core = self.core
-        return core.action_value if self.n_dimensions == 1 else core.action_value(dimension)
+
+class CodedAgent(ValueAgent[Approximator, Learning], abc.ABC, Generic[Approximator, Learning]):
+    """An agent whose states have an SDNN code: with presets, and patterns that may be given."""
+
+    presets: ClassVar[Mapping[str, Preset]]
+
+    def __init__(
+        self,
+        observation_space: gym.Space[Any],
+        action_space: gym.Space[Any],
+        *,
+        approximator: Approximator | None = None,
+        learning: Learning | None = None,
+        seed: int = 0,
+        tables: Sequence[ArrayLike] | None = None,
+        preset: str = "general",
+        observation_range: Ranges | None = None,
+        angles: Sequence[int] = (),
+        angle_pairs: AnglePairs = "none",
+        inputs: Inputs = "all",
+        warm_up_steps: int = WARM_UP.default,
+    ) -> None:
+        chosen = choice("preset", preset, self.presets)
+        self._tables = () if tables is None else pattern_tables(tables)
+        super().__init__(
+            observation_space,
+            action_space,
+            approximator=chosen.approximator if approximator is None else approximator,
+            learning=chosen.learning if learning is None else learning,
+            seed=seed,
+            observation_range=observation_range,
+            angles=angles,
+            angle_pairs=angle_pairs,
+            inputs=inputs,
+            warm_up_steps=warm_up_steps,
+        )
 
 
-class SDNNQLearning(ValueAgent[SDNNCConfig, QLearningConfig]):
+class SDNNQLearning(CodedAgent[SDNNCConfig, QLearningConfig]):
     """An agent that learns Q(s, a) with SDNN-C, one transition at a time.
 
     A ``Box`` of actions is cut evenly into the network's actions, 5 in each dimension by default;
@@ -175,37 +202,7 @@ warm_up_steps
     kind = "sdnn-c"
     approximator_type = SDNNCConfig
     learning_type = QLearningConfig
-
-    def __init__(
-        self,
-        observation_space: gym.Space[Any],
-        action_space: gym.Space[Any],
-        *,
-        approximator: SDNNCConfig | None = None,
-        learning: QLearningConfig | None = None,
-        seed: int = 0,
-        tables: Sequence[ArrayLike] | None = None,
-        preset: str = "general",
-        observation_range: Ranges | None = None,
-        angles: Sequence[int] = (),
-        angle_pairs: AnglePairs = "none",
-        inputs: Inputs = "all",
-        warm_up_steps: int = WARM_UP.default,
-    ) -> None:
-        chosen = choice("preset", preset, PRESETS)
-        self._tables = () if tables is None else pattern_tables(tables)
-        super().__init__(
-            observation_space,
-            action_space,
-            approximator=chosen.approximator if approximator is None else approximator,
-            learning=chosen.learning if learning is None else learning,
-            seed=seed,
-            observation_range=observation_range,
-            angles=angles,
-            angle_pairs=angle_pairs,
-            inputs=inputs,
-            warm_up_steps=warm_up_steps,
-        )
+    presets = PRESETS
 
     def learning_report(self) -> dict[str, Any]:
         """Return statistics of learning so far, to find settings that cannot work.
@@ -242,6 +239,11 @@ warm_up_steps
             "share_of_range": [one and one[0] for one in use],
             "share_beyond_range": [one and one[1] for one in use],
         }
+
+    def _network(self, dimension: int) -> Any:
+        """Return the approximator of a dimension."""
+        core = self.core
+        return core.action_value if self.n_dimensions == 1 else core.action_value(dimension)
 
 
 class RBFQLearning(ValueAgent[RBFNetworkConfig, QLearningConfig]):
