@@ -7,6 +7,8 @@
 #include "input.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
+#include "sdnn/agents/sarsa.hpp"
+#include "sdnn/approximators/linear_sdnn.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 #include "sdnn/core/state.hpp"
@@ -97,16 +99,40 @@ void fuzzy(FuzzedDataProvider& input) {
   use(agent, input);
 }
 
+void linear(FuzzedDataProvider& input) {
+  approximators::LinearSDNNConfig config{.n_inputs = input.ConsumeIntegralInRange(2, 4),
+                                         .n_pattern_units = 20,
+                                         .n_interpolated = 4,
+                                         .averaging_interval = 2};
+  fuzz::change(config, input);
+  config.max_table_bytes = kMostBytes;
+  agents::SarsaConfig learning;
+  fuzz::change(learning, input);
+  std::vector<std::size_t> n_actions(input.ConsumeIntegralInRange<std::size_t>(1, 2));
+  for (auto& n : n_actions) n = input.ConsumeIntegralInRange<std::size_t>(1, 9);
+  agents::Sarsa agent(approximators::LinearSDNN(config, n_actions, 1), learning, 1);
+  use(agent, input);
+  auto workspace = agent.workspace();
+  const std::vector<double> state(agent.n_inputs(), 0.5);
+  for (std::size_t d = 0; d < agent.n_dimensions(); ++d) {
+    for (const double value : agent.values(state, workspace, d)) {
+      fuzz::expect(std::isfinite(value), "a value is not finite");
+    }
+  }
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   FuzzedDataProvider input(data, size);
   sdnn::fuzz::accepted([&] {
-    switch (input.ConsumeIntegralInRange(0, 2)) {
+    switch (input.ConsumeIntegralInRange(0, 3)) {
       case 0:
         return sdnn_c(input);
       case 1:
         return rbf(input);
+      case 2:
+        return linear(input);
       default:
         return fuzzy(input);
     }

@@ -173,8 +173,9 @@ TEST(AgentFile, SaysWhatDoesNotFit) {
 // they did next, and what they had learned then.
 TEST(AgentFile, LivesAsInPython) {
   const testing::Folder folder;
-  for (const std::string name : {"sdnn", "sdnn-vector", "sdnn-discrete", "sdnn-symbols",
-                                 "sdnn-pairs", "sdnn-warm-up", "rbf", "fuzzy", "fuzzy-vector"}) {
+  for (const std::string name :
+       {"sdnn", "sdnn-vector", "sdnn-discrete", "sdnn-symbols", "sdnn-pairs", "sdnn-warm-up",
+        "linear", "linear-vector", "rbf", "fuzzy", "fuzzy-vector"}) {
     SCOPED_TRACE(name);
     const std::filesystem::path data(SDNN_TEST_DATA "/agents");
     std::ifstream lives(data / (name + ".json"));

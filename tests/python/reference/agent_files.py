@@ -18,12 +18,19 @@ from sdnn.agents import (
     FuzzyQLearningConfig,
     QLearningConfig,
     RBFQLearning,
+    SarsaConfig,
     Scaling,
     SDNNQLearning,
+    SDNNSarsa,
     Training,
     Transition,
 )
-from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.approximators import (
+    FuzzyRulesConfig,
+    LinearSDNNConfig,
+    RBFNetworkConfig,
+    SDNNCConfig,
+)
 
 FOLDER = Path(__file__).parents[2] / "data"
 OBSERVATIONS = gym.spaces.Box(
@@ -62,18 +69,33 @@ def agents():
         "sdnn-symbols": SDNNQLearning,
         "sdnn-pairs": SDNNQLearning,
         "sdnn-warm-up": SDNNQLearning,
+        "linear": SDNNSarsa,
+        "linear-vector": SDNNSarsa,
         "rbf": RBFQLearning,
         "fuzzy": FuzzyQLearning,
         "fuzzy-vector": FuzzyQLearning,
     }
     two = gym.spaces.Box(np.array([0.0, -1.0]), np.array([1.0, 1.0]), dtype=np.float64)
     spaces = {
+        "linear-vector": two,
         "sdnn-vector": two,
         "fuzzy-vector": two,
         "sdnn-discrete": gym.spaces.Discrete(3, start=4),
     }
     rules = {"approximator": FuzzyRulesConfig(n_sets=3, n_actions=4), "learning": fuzzy}
+    linear = {
+        "approximator": LinearSDNNConfig(
+            n_pattern_units=20,
+            n_anchor_patterns=4,
+            n_interpolated=6,
+            n_actions=5,
+            averaging_interval=3,
+        ),
+        "learning": SarsaConfig(epsilon=0.3, schedule_steps=50, max_action_repeat=6),
+    }
     settings = {
+        "linear": linear | {"inputs": "relevant"},
+        "linear-vector": linear,
         "rbf": {"approximator": RBFNetworkConfig(n_bases=3, n_actions=7), "learning": LEARNING},
         "sdnn-pairs": {"approximator": replace(SMALL, max_pairs=3), "learning": LEARNING},
         "fuzzy": rules,
