@@ -1,4 +1,6 @@
-"""Show the settings that the core declares with their signatures: compiled classes have none."""
+"""Show the settings that the core declares, and names that packages load when they are used."""
+
+import importlib
 
 import griffe
 
@@ -6,7 +8,12 @@ import sdnn.config
 
 
 class CoreSettings(griffe.Extension):
-    """Give the classes of `sdnn.config` the parameters of their constructors."""
+    """Give the classes of `sdnn.config` their parameters, and lazy packages their ``__all__``."""
+
+    def on_module_members(self, *, mod, **kwargs):
+        """Note the public names of a package whose list is made when it is imported."""
+        if "attach" in mod.imports:
+            mod.exports = importlib.import_module(mod.path).__all__
 
     def on_class(self, *, cls, **kwargs):
         """Add the constructor's parameters to a class of the core that has fields."""

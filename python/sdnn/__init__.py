@@ -21,42 +21,30 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sdnn._core import __version__
+from sdnn._core import __version__ as __version__
 from sdnn.lazy import attach
-from sdnn.machine import instruction_set, set_instruction_set
 
 if TYPE_CHECKING:
     from sdnn import (
-        agents,
-        approximators,
-        benchmarks,
-        coding,
-        environments,
-        estimators,
-        export,
-        kernel,
-        reproduction,
-        runs,
+        agents as agents,
+        approximators as approximators,
+        benchmarks as benchmarks,
+        coding as coding,
+        environments as environments,
+        estimators as estimators,
+        export as export,
+        kernel as kernel,
+        reproduction as reproduction,
+        runs as runs,
     )
-    from sdnn.estimators import SDNNClassifier, SDNNKernelRidge, SDNNRegressor
+    from sdnn.estimators import (
+        SDNNClassifier as SDNNClassifier,
+        SDNNKernelRidge as SDNNKernelRidge,
+        SDNNRegressor as SDNNRegressor,
+    )
+    from sdnn.machine import (
+        instruction_set as instruction_set,
+        set_instruction_set as set_instruction_set,
+    )
 
-__all__ = [
-    "SDNNClassifier",
-    "SDNNKernelRidge",
-    "SDNNRegressor",
-    "__version__",
-    "agents",
-    "approximators",
-    "benchmarks",
-    "coding",
-    "environments",
-    "estimators",
-    "export",
-    "instruction_set",
-    "kernel",
-    "reproduction",
-    "runs",
-    "set_instruction_set",
-]
-
-__getattr__, __dir__ = attach(globals())
+__getattr__, __dir__, __all__ = attach(globals())

@@ -12,22 +12,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = [
-    "argument_error",
-    "array_of",
-    "blamed",
-    "choice",
-    "flag",
-    "has_methods",
-    "is_of_class",
-    "one_of",
-    "path_of",
-    "real",
-    "seed_of",
-    "shown",
-    "whole",
-]
-
 Member = TypeVar("Member")
 
 _REPR = reprlib.Repr()

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from sdnn.arguments import shown
 
-__all__ = ["flat_bounds", "with_infinities"]
-
 _MOST_VARIABLES = 2**20
 _LEAST_INTEGER_BYTES = 4
 """Of whole numbers whose limits are those of their type rather than of what is observed."""

@@ -32,25 +32,6 @@ from numpy.typing import NDArray
 
 from sdnn._core import __version__
 
-__all__ = [
-    "Arrays",
-    "Description",
-    "csv_bytes",
-    "csv_pieces",
-    "gzip_pieces",
-    "is_there",
-    "lock",
-    "naming",
-    "open_regular",
-    "open_to_append",
-    "read_bytes",
-    "read_file",
-    "remove_abandoned_files",
-    "whole_file",
-    "write_file",
-    "write_whole",
-]
-
 PARTIAL_SUFFIX = ".partial"
 """Of a file under way."""
 _NAME_OF_PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial$")

@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["Interrupts", "stay_interrupts"]
-
 
 class Interrupts:
     """A context in which a first signal calls ``ask_to_stop``; a second one acts as usual.

@@ -7,21 +7,22 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
-__all__ = ["attach"]
 
-
-def attach(namespace: dict[str, Any]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Make ``__getattr__`` and ``__dir__`` of a package from its imports for type checkers.
+def attach(
+    namespace: dict[str, Any],
+) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """Make ``__getattr__``, ``__dir__`` and ``__all__`` of a package from its imports.
 
     What a package imports under ``if TYPE_CHECKING:`` is thus written once, for type checkers,
-    for readers and for loading. ``namespace`` is the package's ``globals()``.
+    for readers and for loading: ``from sdnn.module import Name as Name``, which type checkers take
+    for a public name. ``namespace`` is the package's ``globals()``.
 
     Examples
     --------
     >>> import sdnn
-    >>> load, names = attach(vars(sdnn))
-    >>> load("coding").__name__, "SDNNRegressor" in names()
-    ('sdnn.coding', True)
+    >>> load, names, public = attach(vars(sdnn))
+    >>> load("coding").__name__, "SDNNRegressor" in names(), "SDNNRegressor" in public
+    ('sdnn.coding', True, True)
     """
     package = namespace["__name__"]
     with open(namespace["__file__"], encoding="utf-8") as source:
@@ -36,4 +37,4 @@ def attach(namespace: dict[str, Any]) -> tuple[Callable[[str], Any], Callable[[]
             return import_module(f"{package}.{name}")
         return getattr(import_module(homes[name]), name)
 
-    return load, lambda: sorted({*namespace, *homes})
+    return load, lambda: sorted({*namespace, *homes}), sorted(homes)

@@ -10,8 +10,6 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
     from typing_extensions import Self
 
-__all__ = ["ProgressBars"]
-
 _SPEED_SECONDS = 60.0
 """Time over which the speed is averaged for the time left."""
 

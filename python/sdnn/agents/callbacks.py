@@ -19,17 +19,6 @@ if TYPE_CHECKING:
 
     from sdnn.agents.training import Training
 
-__all__ = [
-    "Callback",
-    "CheckpointCallback",
-    "JSONLines",
-    "ProgressBarCallback",
-    "Row",
-    "Schedule",
-    "StopTrainingOnRewardThreshold",
-    "TensorBoard",
-]
-
 MOST_BYTES_OF_ROWS = 2**32
 
 _STEPS_BETWEEN = 64

@@ -17,26 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn.agents.files import SavedEpisode, Statistics, learning_wrappers, names_of, statistics_of
 from sdnn.arguments import flag, real, shown
 
-__all__ = [
-    "EVALUATION",
-    "EnvironmentAdapter",
-    "Episode",
-    "Episodes",
-    "Learner",
-    "OneEnvironment",
-    "Options",
-    "Seeds",
-    "StepResult",
-    "Transition",
-    "UnrepeatedEpisodeError",
-    "UnusableStepError",
-    "checked",
-    "episode_seed",
-    "reset_env",
-    "reward_of",
-    "step_env",
-]
-
 _LEARNING, EVALUATION = 0, 1
 """The kinds of episodes that `episode_seed` gives seeds to."""
 

@@ -32,8 +32,6 @@ from sdnn.agents.files import (
 from sdnn.agents.spaces import require_same_kind, require_single
 from sdnn.arguments import has_methods, seed_of, shown, whole
 
-__all__ = ["Evaluation", "evaluate", "greedy_episode"]
-
 _LONG = 100_000
 """Warn after this many steps in one episode."""
 

@@ -16,23 +16,6 @@ from numpy.typing import NDArray
 from sdnn.arguments import seed_of
 from sdnn.files import Arrays, Description, read_file, write_file
 
-__all__ = [
-    "SavedEpisode",
-    "SavedTraining",
-    "Statistics",
-    "learning_wrappers",
-    "moments_of",
-    "names_of",
-    "read_agent",
-    "read_statistics",
-    "read_training",
-    "register",
-    "share_statistics",
-    "statistics_of",
-    "take_statistics",
-    "write_training",
-]
-
 _ARRAYS_OF_TRAINING = "training."
 """How the names of arrays begin that are not the agent's."""
 

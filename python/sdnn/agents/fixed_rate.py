@@ -8,8 +8,6 @@ from collections.abc import Callable
 from sdnn import _core
 from sdnn.arguments import real, shown
 
-__all__ = ["FixedRate"]
-
 
 class FixedRate(_core.FixedRate):
     """A loop at ``hz`` ticks a second, for robots.

@@ -12,8 +12,6 @@ from sdnn.agents.agent import Agent
 from sdnn.arguments import whole
 from sdnn.config import FuzzyQLearningConfig, FuzzyRulesConfig
 
-__all__ = ["FuzzyQLearning"]
-
 
 class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     """An agent that learns by Jouffe's fuzzy Q-learning, one transition at a time.

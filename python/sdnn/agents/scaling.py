@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from sdnn.arguments import real, shown, whole
 
-__all__ = ["Scaling", "neighbours"]
-
 
 def neighbours(n_variables: int, n_redundant: int) -> Iterator[tuple[int, int]]:
     """Yield the pairs of variables whose means are redundant ones.

@@ -43,8 +43,6 @@ if TYPE_CHECKING:
 
     from sdnn.agents.callbacks import Callback, Row
 
-__all__ = ["Training", "TrainingResult"]
-
 _SETTINGS = (
     "seed", "evaluate_every", "evaluate_every_episodes", "evaluation_episodes", "limit_bootstraps"
 )  # fmt: skip

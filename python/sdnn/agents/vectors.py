@@ -22,8 +22,6 @@ from sdnn.agents.episode import (
 )
 from sdnn.arguments import array_of
 
-__all__ = ["vector_adapter"]
-
 
 def vector_adapter(env: gym.vector.VectorEnv[Any, Any, Any]) -> EnvironmentAdapter:
     """Return the adapter for a vector environment."""

@@ -11,8 +11,6 @@ from sdnn import _core
 from sdnn.arguments import array_of, seed_of, shown
 from sdnn.config import SDNNCConfig
 
-__all__ = ["SDNNC"]
-
 
 def pattern_tables(tables: Sequence[ArrayLike]) -> list[NDArray[np.int8]]:
     """Read the patterns of each input; ValueError for other entries than -1 and +1."""

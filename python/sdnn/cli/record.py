@@ -31,8 +31,7 @@ def record(folder: Path, out: Path, seed: int | None, steps: int | None) -> None
     """
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # pictures need no screen
     from sdnn.runs import Run
-    from sdnn.runs.recording import SUFFIXES
-    from sdnn.runs.recording import record as record_run
+    from sdnn.runs.recording import SUFFIXES, record as record_run
 
     check_ending("OUT", out, SUFFIXES)
     with run_command(words_of_run(folder)):

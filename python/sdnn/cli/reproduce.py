@@ -75,8 +75,7 @@ def reproduce(
     Finished trials are stored in OUT/results.sqlite; the same command continues where it stopped.
     Files of other agents, trials, episodes or seeds than the paper's have these in their names.
     """
-    from sdnn.reproduction.reproduce import ReproduceRequest
-    from sdnn.reproduction.reproduce import reproduce as run
+    from sdnn.reproduction.reproduce import ReproduceRequest, reproduce as run
 
     request = ReproduceRequest(
         experiments=select_experiments(experiment), cost=includes_cost(experiment), **options

@@ -58,8 +58,7 @@ def sweep(
     """
     from sdnn.reproduction.studies import add_claims, read_study
     from sdnn.runs.errors import ConfigError
-    from sdnn.runs.sweep import SweepRequest
-    from sdnn.runs.sweep import sweep as run
+    from sdnn.runs.sweep import SweepRequest, sweep as run
 
     try:
         request = SweepRequest(

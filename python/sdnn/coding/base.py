@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from sdnn.arguments import shown
 
-__all__ = ["CODINGS", "Coding", "coding_named", "from_dict", "known", "to_dict"]
-
 Value = TypeVar("Value")
 
 CODINGS: dict[str, type[Coding]] = {}

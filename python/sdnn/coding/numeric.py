@@ -15,8 +15,6 @@ from sdnn import _core
 from sdnn.arguments import array_of, one_of, real, shown, whole
 from sdnn.coding.base import Coding, known
 
-__all__ = ["Anchor", "Circular", "CoarseCodeWarning", "RandomInverse"]
-
 MAX_BINS = 65535
 FINE = 1000  # bins; more make no visible difference
 LONGEST = 1000.0  # the largest length_scale

@@ -14,8 +14,6 @@ from sdnn.arguments import array_of, one_of, seed_of, shown
 from sdnn.coding.base import Coding, known
 from sdnn.coding.numeric import RandomInverse
 
-__all__ = ["Categorical", "CorrelationMatrix", "Symbolic", "WithMissing", "missing_as_nan"]
-
 Category = str | float | int | bool
 
 

@@ -17,8 +17,6 @@ from sdnn.environments.picture import AcrobotMotion, AcrobotPicture
 if TYPE_CHECKING:
     from gymnasium.core import RenderFrame
 
-__all__ = ["AcrobotSwingUpEnv"]
-
 _DTYPES: dict[str, type[np.float32] | type[np.float64]] = {
     "float32": np.float32,
     "float64": np.float64,

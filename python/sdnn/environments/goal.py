@@ -12,8 +12,6 @@ from sdnn import _core
 from sdnn.arguments import whole
 from sdnn.config import GoalScheduleConfig
 
-__all__ = ["GoalSchedule", "TighteningGoal"]
-
 
 class GoalSchedule:
     """The goal tolerance as a function of the learning episode.

@@ -18,8 +18,6 @@ from sdnn.config import AcrobotConfig
 if TYPE_CHECKING:
     import pygame
 
-__all__ = ["AcrobotMotion", "AcrobotPicture"]
-
 Colour = tuple[int, int, int]
 
 _SIZE = 500  # pixels

@@ -14,8 +14,6 @@ from sdnn.arguments import array_of, choice, one_of, seed_of, shown
 from sdnn.bounds import with_infinities
 from sdnn.config import SensorConfig
 
-__all__ = ["AcrobotSensors", "NoisySensors", "RedundantSensors", "UnitSensors"]
-
 Observation = NDArray[Any]
 Env = gym.Env[Observation, Any]
 SensorFunction = Callable[[Observation], float]

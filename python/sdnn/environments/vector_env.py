@@ -16,8 +16,6 @@ from sdnn.config import AcrobotConfig
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.picture import AcrobotPicture
 
-__all__ = ["AcrobotSwingUpVectorEnv"]
-
 # Gymnasium 1.0 knows this mode only and has no name for it.
 _AUTORESET = getattr(getattr(gym.vector, "AutoresetMode", None), "NEXT_STEP", "NextStep")
 

@@ -10,22 +10,16 @@ from typing import TYPE_CHECKING, Any
 from sdnn.lazy import attach
 
 if TYPE_CHECKING:
-    from sdnn.estimators.base import OutOfRangeWarning
-    from sdnn.estimators.classifier import SDNNClassifier
-    from sdnn.estimators.kernel_ridge import SDNNKernelRidge
-    from sdnn.estimators.libsdnn import read_model_file, read_parameter_file
-    from sdnn.estimators.regressor import SDNNRegressor
+    from sdnn.estimators.base import OutOfRangeWarning as OutOfRangeWarning
+    from sdnn.estimators.classifier import SDNNClassifier as SDNNClassifier
+    from sdnn.estimators.kernel_ridge import SDNNKernelRidge as SDNNKernelRidge
+    from sdnn.estimators.libsdnn import (
+        read_model_file as read_model_file,
+        read_parameter_file as read_parameter_file,
+    )
+    from sdnn.estimators.regressor import SDNNRegressor as SDNNRegressor
 
-_load, __dir__ = attach(globals())
-
-__all__ = [
-    "OutOfRangeWarning",
-    "SDNNClassifier",
-    "SDNNKernelRidge",
-    "SDNNRegressor",
-    "read_model_file",
-    "read_parameter_file",
-]
+_load, __dir__, __all__ = attach(globals())
 
 
 def __getattr__(name: str) -> Any:

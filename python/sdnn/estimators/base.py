@@ -30,8 +30,6 @@ from sdnn.estimators.network import (
 from sdnn.estimators.pair_selection import select_pairs, with_categories
 from sdnn.estimators.training import History, Trainer, run_epochs, sample_weights
 
-__all__ = ["BaseSDNN", "OutOfRangeWarning"]
-
 Self = TypeVar("Self", bound="BaseSDNN")
 
 

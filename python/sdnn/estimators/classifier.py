@@ -24,8 +24,6 @@ from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.inputs import Array, Floats, Ints
 from sdnn.estimators.training import LARGEST_WEIGHT, sample_weights, weighted_mean
 
-__all__ = ["SDNNClassifier"]
-
 UNITS_EACH = 60
 MOST_UNITS = 1200
 OWN_SHARE = 5 / 6  # of a class's units, to fire for its samples; the rest for others

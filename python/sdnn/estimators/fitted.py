@@ -19,8 +19,6 @@ from sdnn.estimators.inputs import Array, Floats, Ints, coding_entries
 from sdnn.estimators.network import InputCode, Network, code_bytes
 from sdnn.files import Arrays, Description, read_file, write_file
 
-__all__ = ["Fitted"]
-
 Self = TypeVar("Self", bound="Fitted")
 
 MOST_BYTES_OF_NAMES = 2**26

@@ -16,18 +16,6 @@ from sklearn.utils.validation import validate_data
 from sdnn.arguments import shown
 from sdnn.coding import Coding, RandomInverse, WithMissing, coding_named
 
-__all__ = [
-    "PAIR_BUDGET",
-    "Array",
-    "CodedInputs",
-    "CodedRegressor",
-    "Floats",
-    "Ints",
-    "Pairs",
-    "column_indices",
-    "input_pairs",
-]
-
 Columns = int | str | slice | Sequence[int] | Sequence[str] | Sequence[bool] | Callable[[Any], Any]
 Pairs = list[tuple[int, int]]
 Array = NDArray[Any]

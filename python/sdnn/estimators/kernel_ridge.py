@@ -15,8 +15,6 @@ from sklearn.utils.validation import check_is_fitted
 from sdnn.estimators.inputs import CodedRegressor, Floats, input_pairs
 from sdnn.kernel import N_UNITS, AnalyticKernel
 
-__all__ = ["SDNNKernelRidge"]
-
 SAMPLES_AT_ONCE = 4096  # in prediction
 
 Self = TypeVar("Self", bound="SDNNKernelRidge")

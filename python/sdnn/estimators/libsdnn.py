@@ -19,14 +19,6 @@ from sdnn import _core
 from sdnn.arguments import path_of, shown
 from sdnn.files import read_bytes
 
-__all__ = [
-    "LibsdnnInput",
-    "LibsdnnModel",
-    "LibsdnnParameters",
-    "read_model_file",
-    "read_parameter_file",
-]
-
 Library = Literal["msvc", "libstdc++"]
 
 MOST_BYTES = 2**20  # of parameters

@@ -16,8 +16,6 @@ from sdnn.coding import Coding
 from sdnn.coding.symbols import missing_as_nan
 from sdnn.estimators.inputs import PAIR_BUDGET, Array, Floats, Ints, Pairs
 
-__all__ = ["InputCode", "Network", "code_bytes", "draw_input_code", "units_for_pairs"]
-
 COLUMN_BUDGET = 16000  # columns divided among the pairs by default
 FEW_SAMPLES = 32  # up to which weights in bytes are faster
 

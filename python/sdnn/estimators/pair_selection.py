@@ -13,8 +13,6 @@ from sklearn.utils import _safe_indexing
 from sdnn.coding import Coding, CorrelationMatrix, Symbolic, WithMissing
 from sdnn.estimators.inputs import Array, Floats, Pairs
 
-__all__ = ["select_pairs", "with_categories"]
-
 N_FOLDS = 5
 STANDARD_ERRORS = 2.0
 

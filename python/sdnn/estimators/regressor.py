@@ -15,8 +15,6 @@ from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.inputs import Array, CodedRegressor, Floats, Ints
 from sdnn.estimators.training import weighted_mean
 
-__all__ = ["SDNNRegressor"]
-
 MARGIN = 0.2  # that a learned output range adds on either side
 FURTHEST = 1e300  # largest end of an output range, so that its width is finite
 

@@ -14,8 +14,6 @@ from sklearn.base import clone
 from sdnn.arguments import shown
 from sdnn.estimators.classifier import SDNNClassifier
 
-__all__ = ["RiverClassifier", "RiverRegressor"]
-
 
 def named(x: Mapping[Any, Any]) -> dict[str, Any]:
     """Return a sample with strings as names, as scikit-learn requires."""

@@ -16,8 +16,6 @@ from sdnn.arguments import shown
 from sdnn.estimators.inputs import Array, Floats, Ints
 from sdnn.estimators.network import Network
 
-__all__ = ["History", "Trainer", "run_epochs", "sample_weights", "weighted_mean"]
-
 LARGEST_WEIGHT = 10**6
 MOST_PRESENTED = 2**28  # samples in an epoch: their indices take a GiB
 

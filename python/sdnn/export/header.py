@@ -31,8 +31,6 @@ from sdnn.export.tables import (
 )
 from sdnn.files import write_whole
 
-__all__ = ["CHeader", "c_header", "export_c_header"]
-
 _LARGEST_NAME = 40
 _DEFAULT_FRACTION_BITS = 16
 _MOST_FRACTION_BITS = 30

@@ -11,17 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "Input",
-    "Tables",
-    "bit_planes",
-    "by_dimension",
-    "conversions",
-    "joined",
-    "table_lines",
-    "wrapped",
-]
-
 _DIRECTION_BITS = 30
 _BYTES = {"uint8_t": 1, "uint16_t": 2, "int32_t": 4, "uint32_t": 4}
 

@@ -10,28 +10,24 @@ from typing import TYPE_CHECKING
 from sdnn.lazy import attach
 
 if TYPE_CHECKING:
-    from sdnn.reproduction.cases import EXPERIMENTS, Case, Experiment, select_experiments
-    from sdnn.reproduction.claims import CLAIMS, Claim, judge_claims
-    from sdnn.reproduction.cost import CostConfig, CostRecord
-    from sdnn.reproduction.figures import draw_cost, draw_experiment
-    from sdnn.reproduction.reproduce import ReproduceRequest, case_spec, collect, plan_trials
+    from sdnn.reproduction.cases import (
+        EXPERIMENTS as EXPERIMENTS,
+        Case as Case,
+        Experiment as Experiment,
+        select_experiments as select_experiments,
+    )
+    from sdnn.reproduction.claims import (
+        CLAIMS as CLAIMS,
+        Claim as Claim,
+        judge_claims as judge_claims,
+    )
+    from sdnn.reproduction.cost import CostConfig as CostConfig, CostRecord as CostRecord
+    from sdnn.reproduction.figures import draw_cost as draw_cost, draw_experiment as draw_experiment
+    from sdnn.reproduction.reproduce import (
+        ReproduceRequest as ReproduceRequest,
+        case_spec as case_spec,
+        collect as collect,
+        plan_trials as plan_trials,
+    )
 
-__getattr__, __dir__ = attach(globals())
-
-__all__ = [
-    "CLAIMS",
-    "EXPERIMENTS",
-    "Case",
-    "Claim",
-    "CostConfig",
-    "CostRecord",
-    "Experiment",
-    "ReproduceRequest",
-    "case_spec",
-    "collect",
-    "draw_cost",
-    "draw_experiment",
-    "judge_claims",
-    "plan_trials",
-    "select_experiments",
-]
+__getattr__, __dir__, __all__ = attach(globals())

@@ -13,70 +13,56 @@ from typing import TYPE_CHECKING
 from sdnn.lazy import attach
 
 if TYPE_CHECKING:
-    from sdnn.runs.dask_executor import DaskExecutor
+    from sdnn.runs.dask_executor import DaskExecutor as DaskExecutor
     from sdnn.runs.engine import (
-        Executor,
-        Observer,
-        PlannedTrial,
-        ThreadExecutor,
-        run_trials,
-        trial_seed,
+        Executor as Executor,
+        Observer as Observer,
+        PlannedTrial as PlannedTrial,
+        ThreadExecutor as ThreadExecutor,
+        run_trials as run_trials,
+        trial_seed as trial_seed,
     )
-    from sdnn.runs.environment import EnvironmentSpec
+    from sdnn.runs.environment import EnvironmentSpec as EnvironmentSpec
     from sdnn.runs.errors import (
-        ClusterError,
-        ConfigError,
-        PlotUnavailableError,
-        RunError,
-        RunTerminatedError,
-        StoreError,
-        WorkerLostError,
+        ClusterError as ClusterError,
+        ConfigError as ConfigError,
+        PlotUnavailableError as PlotUnavailableError,
+        RunError as RunError,
+        RunTerminatedError as RunTerminatedError,
+        StoreError as StoreError,
+        WorkerLostError as WorkerLostError,
     )
-    from sdnn.runs.registry import AGENTS, AgentEntry, agent_entry, register
-    from sdnn.runs.results import CaseResult, Estimate, MeasureConfig, measure
-    from sdnn.runs.run import Goal, Run, RunEvaluation, RunOutcome
-    from sdnn.runs.spec import AgentSpec, BudgetSpec, OutputSpec, ProtocolSpec, RunSpec
-    from sdnn.runs.store import ResultStore
-    from sdnn.runs.trial import Trial, TrialKey, TrialRecord, TrialRows
+    from sdnn.runs.registry import (
+        AGENTS as AGENTS,
+        AgentEntry as AgentEntry,
+        agent_entry as agent_entry,
+        register as register,
+    )
+    from sdnn.runs.results import (
+        CaseResult as CaseResult,
+        Estimate as Estimate,
+        MeasureConfig as MeasureConfig,
+        measure as measure,
+    )
+    from sdnn.runs.run import (
+        Goal as Goal,
+        Run as Run,
+        RunEvaluation as RunEvaluation,
+        RunOutcome as RunOutcome,
+    )
+    from sdnn.runs.spec import (
+        AgentSpec as AgentSpec,
+        BudgetSpec as BudgetSpec,
+        OutputSpec as OutputSpec,
+        ProtocolSpec as ProtocolSpec,
+        RunSpec as RunSpec,
+    )
+    from sdnn.runs.store import ResultStore as ResultStore
+    from sdnn.runs.trial import (
+        Trial as Trial,
+        TrialKey as TrialKey,
+        TrialRecord as TrialRecord,
+        TrialRows as TrialRows,
+    )
 
-__getattr__, __dir__ = attach(globals())
-
-__all__ = [
-    "AGENTS",
-    "AgentEntry",
-    "AgentSpec",
-    "BudgetSpec",
-    "CaseResult",
-    "ClusterError",
-    "ConfigError",
-    "DaskExecutor",
-    "EnvironmentSpec",
-    "Estimate",
-    "Executor",
-    "Goal",
-    "MeasureConfig",
-    "Observer",
-    "OutputSpec",
-    "PlannedTrial",
-    "PlotUnavailableError",
-    "ProtocolSpec",
-    "ResultStore",
-    "Run",
-    "RunError",
-    "RunEvaluation",
-    "RunOutcome",
-    "RunSpec",
-    "RunTerminatedError",
-    "StoreError",
-    "ThreadExecutor",
-    "Trial",
-    "TrialKey",
-    "TrialRecord",
-    "TrialRows",
-    "WorkerLostError",
-    "agent_entry",
-    "measure",
-    "register",
-    "run_trials",
-    "trial_seed",
-]
+__getattr__, __dir__, __all__ = attach(globals())

@@ -21,8 +21,6 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["FORMAT", "ConfigFile", "KeyPath", "dotted", "read_spec"]
-
 FORMAT = "sdnn-run-2"
 """Of the configuration in a run's folder."""
 

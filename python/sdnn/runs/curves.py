@@ -19,8 +19,6 @@ from sdnn.runs.errors import RunError
 from sdnn.runs.figures import draw_curves
 from sdnn.runs.run import Run
 
-__all__ = ["SUFFIXES", "Curve", "Group", "curves_of", "groups_of", "write_curves"]
-
 WINDOW = 20
 """Episodes in the running median of the returns, or all so far where they are fewer."""
 

@@ -22,18 +22,6 @@ from sdnn.environments import NoisySensors, RedundantSensors, UnitSensors
 from sdnn.runs.errors import ConfigError, RunError
 from sdnn.runs.settings import Settings
 
-__all__ = [
-    "ALL",
-    "Ends",
-    "EnvironmentSpec",
-    "MeanOfNeighbours",
-    "Stream",
-    "find_module",
-    "render_modes",
-    "search_folder",
-]
-
-
 ALL = "all"
 """The key of the range of all variables that have no other."""
 

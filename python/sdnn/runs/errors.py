@@ -4,17 +4,6 @@ from __future__ import annotations
 
 import shlex
 
-__all__ = [
-    "ClusterError",
-    "ConfigError",
-    "PlotUnavailableError",
-    "RunError",
-    "RunTerminatedError",
-    "StoreError",
-    "WorkerLostError",
-    "command_line",
-]
-
 
 class RunError(Exception):
     """Base of the errors whose message alone is enough to correct them."""

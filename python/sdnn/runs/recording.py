@@ -21,8 +21,6 @@ from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
 from sdnn.runs.spec import RunSpec
 
-__all__ = ["SUFFIXES", "Recording", "record"]
-
 SUFFIXES = (".gif", ".mp4")
 
 _PACKAGES = {".gif": ("PIL", "Pillow"), ".mp4": ("imageio_ffmpeg", "imageio-ffmpeg")}

@@ -55,8 +55,6 @@ from sdnn.runs.trial import (
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["Goal", "Run", "RunEvaluation", "RunOutcome"]
-
 CONFIG = "config.json"
 LOCK = ".lock"
 CHECKPOINT = "checkpoint.safetensors"

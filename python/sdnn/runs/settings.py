@@ -20,18 +20,6 @@ from sdnn.arguments import blamed, shown
 from sdnn.config import WARM_UP, ProtocolConfig, fields_of
 from sdnn.runs.errors import ConfigError
 
-__all__ = [
-    "AgentSpec",
-    "BudgetSpec",
-    "OutputSpec",
-    "ProtocolSpec",
-    "Settings",
-    "changed",
-    "names_of",
-    "possible_words",
-    "read",
-]
-
 AnySettings = TypeVar("AnySettings", bound="Settings")
 
 _WORDS = {

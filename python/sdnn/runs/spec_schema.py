@@ -11,8 +11,6 @@ from sdnn.config import Field, fields_of
 from sdnn.runs.registry import AGENTS
 from sdnn.runs.spec import ACROBOT, RunSpec
 
-__all__ = ["CORE", "spec_schema"]
-
 CORE: dict[str, tuple[Any, ...]] = {name: (kind,) for name, kind in ACROBOT.items()} | {
     part: tuple(
         dict.fromkeys(getattr(entry, part) for entry in AGENTS.values() if entry.core_trial)

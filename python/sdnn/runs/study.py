@@ -23,8 +23,6 @@ from sdnn.runs.study_file import (
 )
 from sdnn.runs.trial import TrialKey, opened
 
-__all__ = ["Combination", "Study", "read_study"]
-
 DEFAULT = "default"
 """The variant that others are compared with unless the file says otherwise, if there is one."""
 

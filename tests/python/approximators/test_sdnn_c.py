@@ -4,8 +4,7 @@ import importlib
 import numpy as np
 import pytest
 import sdnn_q_learning as page
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from handed_over import transcribe
 from refusals import refuses

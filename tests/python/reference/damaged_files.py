@@ -14,8 +14,7 @@ import numpy as np
 import agent_files
 from bad_inputs import leaves, replaced
 from checksums import with_checksum
-from mutated_files import READERS as OTHERS
-from mutated_files import Reader, contents_of, written
+from mutated_files import READERS as OTHERS, Reader, contents_of, written
 from sdnn.agents import JSONLines, SDNNQLearning, Training
 from sdnn.estimators import libsdnn
 from sdnn.files import read_file, write_file
