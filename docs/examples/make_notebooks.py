@@ -1,6 +1,6 @@
 """Make a notebook of each example: ``python docs/examples/make_notebooks.py FOLDER [--execute]``.
 
-The scripts are the source; a notebook is never edited. Needs ``pip install "sdnn[examples]"``.
+The scripts are the source; a notebook is never edited. Needs ``pip install ".[examples]"``.
 """
 
 import argparse

@@ -167,7 +167,7 @@ def plot_similarity(
 ) -> Figure:
     """Plot the `similarity` of a coding's patterns, and that of one bin as a curve.
 
-    Needs matplotlib (``pip install "sdnn[plot]"``).
+    Needs matplotlib.
     """
     from matplotlib.figure import Figure
 

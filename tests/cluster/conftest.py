@@ -10,7 +10,7 @@ import textwrap
 import psutil
 import pytest
 
-pytest.importorskip("distributed", reason='needs Dask: pip install "sdnn[dask]"')
+pytest.importorskip("distributed", reason="needs Dask")
 
 SETTINGS = {
     "DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "error",

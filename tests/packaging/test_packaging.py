@@ -176,7 +176,7 @@ def test_the_type_stub_is_up_to_date():
 # What is shipped.
 
 SHIPPED = (
-    r"PKG-INFO|CMakeLists\.txt|pyproject\.toml|LICENSE|CITATION\.cff|[A-Z]+\.md",
+    r"PKG-INFO|CMakeLists\.txt|pyproject\.toml|LICENSE|CITATION\.cff|[A-Z_]+\.md",
     r"CMakePresets\.json|noxfile\.py|mkdocs\.yml|\.gitignore|\.clang-(format|tidy)|docs/site/Doxyfile",
     r"cmake/(toolchains/)?[^/]+\.cmake(\.in)?",
     r"cpp/include/sdnn/([a-z_]+/){0,2}[a-z0-9_]+\.hpp",
@@ -194,6 +194,7 @@ NEEDED = (
     "pyproject.toml",
     "README.md",
     "LICENSE",
+    "THIRD_PARTY_NOTICES.md",
     "cmake/*",
     "cpp/include/**/*.hpp",
     "cpp/tools/*.hpp",
@@ -218,7 +219,7 @@ def sdist(tmp_path_factory):
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    return next(out.glob("sdnn-*.tar.gz"))
+    return next(out.glob("sdnn_learn-*.tar.gz"))
 
 
 def names_in(sdist):
@@ -256,7 +257,7 @@ def test_a_wheel_built_from_the_source_distribution_is_complete(sdist, tmp_path)
         [*command, "-w", tmp_path, sdist], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    wheel = next(tmp_path.glob("sdnn-*.whl"))
+    wheel = next(tmp_path.glob("sdnn_learn-*.whl"))
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
     sources = ROOT / "python"

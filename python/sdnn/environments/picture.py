@@ -71,7 +71,7 @@ class AcrobotPicture:
             import pygame
         except ImportError as error:
             raise gym.error.DependencyNotInstalled(
-                'rendering needs pygame: pip install "sdnn[render]"'
+                "rendering needs pygame: pip install pygame-ce"
             ) from error
         self._pygame = pygame
         self._config = config

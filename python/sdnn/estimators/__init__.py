@@ -1,4 +1,4 @@
-"""The network as scikit-learn estimators; needs ``pip install "sdnn[sklearn]"``.
+"""The network as scikit-learn estimators; needs scikit-learn.
 
 Names are loaded when they are first used, so that ``import sdnn`` needs no scikit-learn.
 """
@@ -29,5 +29,5 @@ def __getattr__(name: str) -> Any:
         if error.name is None or error.name.partition(".")[0] == "sdnn":
             raise
         raise ModuleNotFoundError(
-            f'{name} needs {error.name}: pip install "sdnn[sklearn]"', name=error.name
+            f"{name} needs scikit-learn: pip install scikit-learn", name=error.name
         ) from error

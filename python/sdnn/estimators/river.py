@@ -1,4 +1,4 @@
-"""The estimators for the river library; needs the extra ``sdnn[river]``."""
+"""The estimators for the river library; needs river and scikit-learn."""
 
 from __future__ import annotations
 

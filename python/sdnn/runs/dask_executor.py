@@ -136,9 +136,7 @@ class DaskExecutor:
                 f"scheduler_timeout must be finite and above 0, got {scheduler_timeout}"
             )
         if importlib.util.find_spec("distributed") is None:
-            raise ClusterError(
-                'trials on a cluster need Dask, which is not installed: pip install "sdnn[dask]"'
-            )
+            raise ClusterError('trials on a cluster need Dask: pip install "dask[distributed]"')
         self.scheduler = scheduler
         self.scheduler_timeout = scheduler_timeout
 

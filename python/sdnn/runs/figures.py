@@ -53,12 +53,12 @@ _TITLES: dict[MeasureName, str] = {
 _OF_STEPS, _OF_RETURNS = tuple(_TITLES)[:2], tuple(_TITLES)[2:]
 
 
-def new_figure(width: float, height: float, extra: str = "reproduce") -> Figure:
+def new_figure(width: float, height: float) -> Figure:
     """Make a figure whose panels leave room for titles, legend and footer.
 
-    A `PlotUnavailableError` names the extra if matplotlib is not installed.
+    Raises a `PlotUnavailableError` if matplotlib is not installed.
     """
-    require("matplotlib", extra=extra)
+    require("matplotlib")
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
@@ -139,7 +139,7 @@ def draw_curves(curves: Sequence[Curve]) -> Figure:
     tasks = list(dict.fromkeys(curve.task for curve in curves))
     agents = list(dict.fromkeys(curve.agent for curve in curves))
     colors = {agent: color_of(place) for place, agent in enumerate(agents)}
-    figure = new_figure(7.5, 3.6 * len(tasks), extra="plot")
+    figure = new_figure(7.5, 3.6 * len(tasks))
     panels = figure.subplots(len(tasks), squeeze=False)[:, 0]
     for task, axes in zip(tasks, panels, strict=True):
         for curve in (one for one in curves if one.task == task):

@@ -99,7 +99,7 @@ def record(
         raise RunError(f"out must end in one of {', '.join(SUFFIXES)}, got {path}")
     module, package = _PACKAGES[path.suffix]
     if find_spec(module) is None:
-        raise RunError(f'{path} needs {package}, which is missing: pip install "sdnn[render]"')
+        raise RunError(f"{path} needs {package}, which is missing: pip install {package}")
     agent = run.agent()
     root = run.fresh_seed if seed is None else seed
     with closing(_filmed(run.spec)) as env:

@@ -200,14 +200,10 @@ def markdown_text(text: str) -> str:
     return _MARKUP.sub(r"\\\g<0>", " ".join(text.split()))
 
 
-def require(*modules: str, extra: str = "reproduce") -> None:
-    """Raise a `PlotUnavailableError` that names an extra if one of its modules is not installed."""
-    for module in modules:
-        if find_spec(module) is None:
-            raise PlotUnavailableError(
-                f"figures and reports need {module}, which is not installed:"
-                f' pip install "sdnn[{extra}]"'
-            )
+def require(*packages: str) -> None:
+    """Raise a `PlotUnavailableError` that names the packages which are not installed."""
+    if missing := " ".join(name for name in packages if find_spec(name) is None):
+        raise PlotUnavailableError(f"figures and reports need more packages: pip install {missing}")
 
 
 def describe_call(outcome: RunOutcome, seconds: float, shown: Iterable[TrialRecord]) -> str:

@@ -14,7 +14,7 @@ from sdnn.reproduction import EXPERIMENTS, plan_trials
 from sdnn.runs import ClusterError, DaskExecutor
 from sdnn.runs.dask_executor import probe
 
-pytest.importorskip("distributed", reason='needs Dask: pip install "sdnn[dask]"')
+pytest.importorskip("distributed", reason="needs Dask")
 
 
 def test_a_probe_depends_on_settings_and_rows():
@@ -55,7 +55,7 @@ def test_dask_missing_says_what_to_install(monkeypatch, tmp_path):
     arguments = ["reproduce", "a", "--executor", "dask", "--scheduler", "h:1", "--out", tmp_path]
     result = CliRunner().invoke(main, [str(a) for a in arguments])
     assert result.exit_code == 1
-    assert 'pip install "sdnn[dask]"' in result.stderr
+    assert 'pip install "dask[distributed]"' in result.stderr
 
 
 @pytest.mark.parametrize(
