@@ -1928,6 +1928,8 @@ class ObservationConfig:
         First variables, and how many there are, of which one is 1.
     relevant_only : bool
         Whether inputs that have nothing to do with rewards or actions, as the warm-up finds, are left out.
+    inputs : tuple[int, ...]
+        Variables that are never left out.
     
     Raises
     ------
@@ -1942,7 +1944,7 @@ class ObservationConfig:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, low: collections.abc.Sequence[float | None] = ..., high: collections.abc.Sequence[float | None] = ..., adaptive: bool = ..., angles: collections.abc.Sequence[int] = ..., angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., find_angle_pairs: bool = ..., symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., relevant_only: bool = ...) -> None:
+    def __init__(self, *, low: collections.abc.Sequence[float | None] = ..., high: collections.abc.Sequence[float | None] = ..., adaptive: bool = ..., angles: collections.abc.Sequence[int] = ..., angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., find_angle_pairs: bool = ..., symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., relevant_only: bool = ..., inputs: collections.abc.Sequence[int] = ...) -> None:
         ...
     def __replace__(self, **changes: typing.Any) -> ObservationConfig:
         ...
@@ -1978,6 +1980,11 @@ class ObservationConfig:
     def high(self) -> tuple[float | None, ...]:
         """
         Highest value of each variable; none: not known.
+        """
+    @property
+    def inputs(self) -> tuple[int, ...]:
+        """
+        Variables that are never left out.
         """
     @property
     def low(self) -> tuple[float | None, ...]:

@@ -84,9 +84,9 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     angle_pairs : "none", "find" or sequence of (int, int)
         Pairs of variables that are the cosine and the sine of an angle, which becomes one input.
         ``"find"``: those that the warm-up finds on the unit circle.
-    inputs : "all" or "relevant"
+    inputs : "all", "relevant" or sequence of int
         ``"relevant"``: those that rewards or actions have to do with, by the warm-up; see
-        docs/agents.md.
+        docs/agents.md. A list: these variables in any case, and others that are relevant.
     warm_up_steps : int
         Transitions of the warm-up, where there is one.
 

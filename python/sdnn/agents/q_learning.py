@@ -32,6 +32,8 @@ class Preset(NamedTuple):
     title: str
     approximator: Any
     learning: Any
+    angle_pairs: AnglePairs = "none"
+    inputs: Inputs = "all"
 
 
 def presets_of(listed: Mapping[str, Any]) -> Mapping[str, Preset]:
@@ -139,8 +141,8 @@ class CodedAgent(ValueAgent[Approximator, Learning], abc.ABC, Generic[Approximat
         preset: str = "general",
         observation_range: Ranges | None = None,
         angles: Sequence[int] = (),
-        angle_pairs: AnglePairs = "none",
-        inputs: Inputs = "all",
+        angle_pairs: AnglePairs | None = None,
+        inputs: Inputs | None = None,
         warm_up_steps: int = WARM_UP.default,
     ) -> None:
         chosen = choice("preset", preset, self.presets)
@@ -153,8 +155,8 @@ class CodedAgent(ValueAgent[Approximator, Learning], abc.ABC, Generic[Approximat
             seed=seed,
             observation_range=observation_range,
             angles=angles,
-            angle_pairs=angle_pairs,
-            inputs=inputs,
+            angle_pairs=chosen.angle_pairs if angle_pairs is None else angle_pairs,
+            inputs=chosen.inputs if inputs is None else inputs,
             warm_up_steps=warm_up_steps,
         )
 

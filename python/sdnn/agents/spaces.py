@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import argument_error, array_of, choice, has_methods, shown
+from sdnn.arguments import argument_error, array_of, has_methods, shown
 from sdnn.bounds import flat_bounds, with_infinities
 
 __all__ = [
@@ -28,7 +28,8 @@ __all__ = [
     "space_of",
 ]
 
-Inputs: TypeAlias = Literal["all", "relevant"]
+Inputs: TypeAlias = Literal["all", "relevant"] | Sequence[int]
+"""Which inputs of a state there are; variables: the relevant ones and, in any case, these."""
 
 AnglePairs: TypeAlias = Literal["none", "find"] | Sequence[tuple[int, int]]
 """Which variables are the cosine and the sine of one angle."""
@@ -73,6 +74,10 @@ class Observations:
             if angle_pairs not in ("none", "find"):
                 problem = f"must be 'none', 'find' or pairs of variables, got {shown(angle_pairs)}"
                 raise argument_error("angle_pairs", problem)
+        is_list = not isinstance(inputs, str)
+        if not is_list and inputs not in ("all", "relevant"):
+            problem = f"must be 'all', 'relevant' or a list of variables, got {shown(inputs)}"
+            raise argument_error("inputs", problem)
         return _core.ObservationConfig(
             low=[None if np.isnan(x) else x for x in low.tolist()],
             high=[None if np.isnan(x) else x for x in high.tolist()],
@@ -81,7 +86,8 @@ class Observations:
             angle_pairs=pairs,
             find_angle_pairs=isinstance(angle_pairs, str) and angle_pairs == "find",
             symbols=list(_symbols_of(self._space)),
-            relevant_only=choice("inputs", inputs, {"all": False, "relevant": True}),
+            relevant_only=is_list or inputs == "relevant",
+            inputs=inputs if is_list else (),
         )
 
     def vector(self, name: str, observation: Any) -> NDArray[np.float64]:

@@ -75,11 +75,11 @@ class AgentEntry:
     presets: Mapping[str, Preset] = field(default_factory=dict)
     version: str = ""
 
-    def parts(self, preset: str | None) -> tuple[Any, Any]:
-        """Return the settings of approximator and learning under a preset; None: the defaults."""
+    def settings(self, preset: str | None) -> Preset:
+        """Return the settings of a preset; None: the defaults."""
         if preset is None:
-            return self.approximator(), self.learning()
-        return self.presets[preset].approximator, self.presets[preset].learning
+            return Preset("", self.approximator(), self.learning())
+        return self.presets[preset]
 
 
 AGENTS: dict[str, AgentEntry] = {}

@@ -274,12 +274,20 @@ class AgentSpec(Settings, frozen=True):
         Meta(description="Observed variables, from 0, that are angles: their ranges wrap around."),
     ] = ()
     angle_pairs: Annotated[
-        Literal["none", "find"] | tuple[tuple[Index, Index], ...],
+        Literal["none", "find"] | tuple[tuple[Index, Index], ...] | None,
         Meta(
             description="Which cosines and sines of an angle become one input: pairs of observed"
-            " variables, from 0, or those that the warm-up finds."
+            " variables, from 0, or those that the warm-up finds. By default `none`."
         ),
-    ] = "none"
+    ] = None
+    inputs: Annotated[
+        Literal["all", "relevant"] | tuple[Index, ...] | None,
+        Meta(
+            description="Which observed variables are inputs: `all`; those that the warm-up finds"
+            " `relevant`; or a list, from 0, of some that are inputs in any case, beside the"
+            " relevant ones. By default `all`."
+        ),
+    ] = None
     warm_up_steps: Annotated[
         Annotated[int, Meta(ge=int(WARM_UP.low), le=int(WARM_UP.high))],
         Meta(description=WARM_UP.doc),

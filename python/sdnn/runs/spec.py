@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import hashlib
 import json
 from collections.abc import Mapping
@@ -13,8 +12,9 @@ import gymnasium as gym
 import msgspec
 from msgspec import Meta
 
-from sdnn.agents import Agent
+from sdnn.agents import Agent, Preset
 from sdnn.agents.episode import Learner
+from sdnn.agents.q_learning import CodedAgent
 from sdnn.arguments import blamed, is_of_class, shown
 from sdnn.config import ProtocolConfig
 from sdnn.environments import (
@@ -47,7 +47,6 @@ __all__ = [
     "OutputSpec",
     "ProtocolSpec",
     "RunSpec",
-    "overridden",
 ]
 
 HASH_DIGITS = 16
@@ -66,17 +65,11 @@ _ALWAYS = ("id", "name", "preset", "steps", "episodes")
 ACROBOT = {"acrobot": AcrobotConfig, "goal": GoalScheduleConfig, "sensors": SensorConfig}
 """Tables of the paper's task, which a specification without an environment has."""
 
-_OF_SPACES = ("observation_range", "angles", "angle_pairs", "warm_up_steps")
+_OF_SPACES = ("observation_range", "angles", "angle_pairs", "inputs", "warm_up_steps")
 """Settings of agents in environments."""
 
-_REPLACED = {
-    "budget.steps": "budget.episodes",
-    "budget.episodes": "budget.steps",
-    "protocol.evaluate_every": "protocol.evaluate_every_episodes",
-    "protocol.evaluate_every_episodes": "protocol.evaluate_every",
-    "agent.name": "agent.preset",
-}
-"""What an option replaces in a file, besides its own key."""
+_UNUSED = AgentSpec(angle_pairs="none", inputs="all")
+"""What these are on the acrobot."""
 
 
 class RunSpec(Settings, frozen=True):
@@ -161,10 +154,11 @@ class RunSpec(Settings, frozen=True):
             raise ConfigError(
                 "agent.preset", f"must be {words} for the agent {entry.id!r}, got {shown(preset)}"
             )
-        self._set(agent=self.agent.replace(name=entry.id, preset=preset))
-        defaults = entry.parts(preset)
-        for name, base in zip(("approximator", "learning"), defaults, strict=True):
+        defaults = entry.settings(preset)
+        for name in ("approximator", "learning"):
+            base = getattr(defaults, name)
             self._set(**{name: self._part(name, base, f" (agent {entry.id})")})
+        self._set(agent=self.agent.replace(name=entry.id, preset=preset, **self._chosen(defaults)))
         if self.environment is None:
             self._set(approximator=changed_size(self.approximator, self.sensors.n_inputs))
 
@@ -181,11 +175,20 @@ class RunSpec(Settings, frozen=True):
             raise ConfigError("agent.preset", f"must be that of {word!r}, got {shown(preset)}")
         return agent_entry(name), named or preset
 
+    def _chosen(self, preset: Preset) -> dict[str, Any]:
+        """Return what is an input: as given, or as the preset has it in environments."""
+        environment, agent = self.environment, self.agent
+        default = _UNUSED if environment is None else preset
+        pairs = "none" if environment and environment.changes_observations else default.angle_pairs
+        return {
+            "angle_pairs": pairs if agent.angle_pairs is None else agent.angle_pairs,
+            "inputs": default.inputs if agent.inputs is None else agent.inputs,
+        }
+
     def _of_spaces(self) -> dict[str, Any]:
-        """Return the settings for environments that are not the default."""
+        """Return the settings for environments that are not those of the acrobot."""
         given = {name: getattr(self.agent, name) for name in _OF_SPACES}
-        default = AgentSpec()
-        return {name: value for name, value in given.items() if value != getattr(default, name)}
+        return {k: value for k, value in given.items() if value not in (None, getattr(_UNUSED, k))}
 
     def _fill_protocol(self) -> None:
         on_acrobot, environment = self.environment is None, self.environment
@@ -345,7 +348,7 @@ class RunSpec(Settings, frozen=True):
         entry = agent_entry(self.agent.name)
         approximator = self.approximator
         shape = env.observation_space.shape
-        is_own = isinstance(entry.agent, type) and issubclass(entry.agent, Agent)
+        is_own = _is_kind_of(entry.agent, Agent)
         if not is_own and shape is not None and len(shape) == 1:
             approximator = changed_size(approximator, shape[0])  # others find it out themselves
         try:
@@ -366,6 +369,8 @@ class RunSpec(Settings, frozen=True):
     def _agent_options(self, env: gym.Env[Any, Any]) -> dict[str, Any]:
         """Return the arguments that only some agents have: those that are not the default."""
         given, environment = self._of_spaces(), self.environment
+        if _is_kind_of(agent_entry(self.agent.name).agent, CodedAgent):  # by its preset
+            given |= {"angle_pairs": self.agent.angle_pairs, "inputs": self.agent.inputs}
         if environment is None or not environment.ranges or environment.has_other_sensors:
             return given
         if "observation_range" in given:
@@ -441,6 +446,8 @@ class RunSpec(Settings, frozen=True):
         for name in ("seed", "output"):
             del values[name]
         values["agent"].pop("preset")
+        if values["agent"]["inputs"] == "all":  # as in trials from before there was a choice
+            del values["agent"]["inputs"]
         if version := agent_entry(self.agent.name).version:
             values["agent"]["version"] = version
         return json.dumps(
@@ -453,40 +460,15 @@ class RunSpec(Settings, frozen=True):
         return hashlib.sha256(self.canonical_json().encode()).hexdigest()[:HASH_DIGITS]
 
 
-def overridden(values: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values of a specification with others in their place.
-
-    Parameters
-    ----------
-    values
-        As a file has them.
-    options
-        Values by their keys, with dots between tables.
-    """
-    made = copy.deepcopy(dict(values))
-    for name, key in SHORTHANDS.items():
-        if isinstance(made.get(name), str):
-            made[name] = {key: made[name]}
-    for key in options:
-        table, _, name = _REPLACED.get(key, "").partition(".")
-        if isinstance(made.get(table), dict):
-            made[table].pop(name, None)
-    for key, value in options.items():
-        *tables, last = key.split(".")
-        place = made
-        for table in tables:
-            if not isinstance(place.get(table), dict):
-                place[table] = {}
-            place = place[table]
-        place[last] = value
-    return made
-
-
 def changed_size(approximator: Any, n_inputs: int) -> Any:
     """Return the settings of an approximator for so many inputs, if these are among them."""
     if "n_inputs" not in names_of(type(approximator)):
         return approximator
     return replace(approximator, n_inputs=n_inputs)
+
+
+def _is_kind_of(agent: Any, kind: type[Any]) -> bool:
+    return isinstance(agent, type) and issubclass(agent, kind)
 
 
 def _canonical(value: Any) -> Any:

@@ -51,13 +51,17 @@ RandomExperience pushed_mass(std::size_t n, std::size_t n_noise, double memory, 
   return experience;
 }
 
+std::vector<bool> relevant(const RandomExperience& experience) {
+  return Relevance(experience).inputs(std::vector<bool>(experience.n_inputs));
+}
+
 TEST(Relevance, KeepsWhatActionsAndRewardsHaveToDoWith) {
   int n_noise_kept = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     for (const double memory : {0.0, 0.95}) {
       for (const bool is_rewarded : {false, true}) {
         const auto experience = pushed_mass(1000, 8, memory, is_rewarded, seed);
-        const std::vector<bool> kept = Relevance(experience).inputs();
+        const std::vector<bool> kept = relevant(experience);
         EXPECT_TRUE(kept[0]) << seed << ' ' << memory << ' ' << is_rewarded;
         EXPECT_TRUE(kept[1]) << seed << ' ' << memory << ' ' << is_rewarded;
         n_noise_kept += static_cast<int>(std::count(kept.begin() + 2, kept.end(), true));
@@ -71,8 +75,18 @@ TEST(Relevance, KeepsEverythingWhereNothingIsFoundOrLittleIsKnown) {
   RandomExperience nothing = pushed_mass(500, 3, 0.0, false, 1);
   std::ranges::fill(nothing.states, 0.5);
   std::ranges::fill(nothing.next_states, 0.5);
-  EXPECT_EQ(Relevance(nothing).inputs(), std::vector<bool>(5, true));
-  EXPECT_EQ(Relevance(pushed_mass(99, 3, 0.0, true, 1)).inputs(), std::vector<bool>(5, true));
+  EXPECT_EQ(relevant(nothing), std::vector<bool>(5, true));
+  EXPECT_EQ(relevant(pushed_mass(99, 3, 0.0, true, 1)), std::vector<bool>(5, true));
+}
+
+TEST(Relevance, KeepsWhatIsKnownToMatterAndWhatItDependsOn) {
+  const auto experience = pushed_mass(1000, 3, 0.0, false, 1);
+  EXPECT_EQ(Relevance(experience).inputs({false, false, false, true, false}),
+            (std::vector<bool>{true, true, false, true, false}));
+  RandomExperience still = experience;  // neither actions nor rewards: the position is known
+  std::ranges::fill(still.actions[0], 0.0);
+  EXPECT_EQ(Relevance(still).inputs({true, false, false, false, false}),
+            (std::vector<bool>{true, true, false, false, false}));
 }
 
 TEST(Relevance, AnAngleThatPassesItsEndHasMovedLittle) {
@@ -91,7 +105,7 @@ TEST(Relevance, AnAngleThatPassesItsEndHasMovedLittle) {
     experience.rewards.push_back(std::cos(6.2831853 * angle));
     experience.ends.push_back(false);
   }
-  EXPECT_EQ(Relevance(experience).inputs(), (std::vector<bool>{true, true, false}));
+  EXPECT_EQ(relevant(experience), (std::vector<bool>{true, true, false}));
 }
 
 }  // namespace

@@ -230,6 +230,30 @@ def test_irrelevant_inputs_are_left_out_and_stay_so(tmp_path):
     np.testing.assert_array_equal(loaded.q_values(observation), agent.q_values(observation))
 
 
-def test_inputs_are_all_or_relevant():
-    env = gym.make("CartPole-v1")
-    refuses("inputs", SDNNQLearning, env.observation_space, env.action_space, inputs="some")
+def test_listed_inputs_are_kept_whatever_the_evidence():
+    env = _Distracted(gym.make("CartPole-v1"), 6)
+    agent = sdnn_agent(env.observation_space, inputs=[9, 6])
+    agent.train(env, steps=1001, seed=1)
+    kept = [variables[0] for _, variables in agent.inputs]
+    assert {0, 1, 2, 3, 6, 9} <= set(kept)
+    assert len(kept) <= 7
+
+
+def test_any_variable_of_a_symbol_or_an_angle_keeps_it():
+    space = gym.spaces.Tuple([gym.spaces.Discrete(3)] + [gym.spaces.Box(-1, 1, (1,))] * 3)
+    agent = sdnn_agent(space, angle_pairs=[(3, 4)], inputs=[1, 4], warm_up_steps=100)
+    rng = np.random.default_rng(1)
+
+    def noise():
+        x, y, z = rng.uniform(-1, 1, (3, 1))
+        return int(rng.integers(3)), x, y, z
+
+    for _ in range(100):
+        agent.learn(Transition(noise(), 0, 0.0, noise(), False))
+    assert agent.inputs == [("symbol", [0, 3]), ("angle", [3, 4])]
+
+
+@pytest.mark.parametrize("inputs", ["some", [4], [-1], [0.5], 3, [[0]], None])
+def test_inputs_are_all_relevant_or_variables(inputs):
+    spaces = gym.spaces.Box(-1, 1, (4,)), BUTTONS
+    refuses("inputs", RBFQLearning, *spaces, inputs=inputs, error=(TypeError, ValueError))

@@ -145,6 +145,22 @@ def test_pairs_are_declared_in_own_units_of_noisy_sensors():
     assert caught.value.key.startswith("angle_pairs")
 
 
+@pytest.mark.parametrize("inputs", ["relevant", (1, 3)])
+def test_inputs_are_chosen_in_a_run(inputs):
+    spec = RunSpec(environment=CART_POLE, agent=AgentSpec(inputs=inputs, warm_up_steps=50))
+    assert RunSpec.from_values(json.loads(json.dumps(spec.values()))) == spec
+    env = spec.make_env()
+    agent = spec.make_agent(env)
+    assert agent.is_warming_up  # it looks for relevant inputs
+    plain = spec.replace(agent=spec.agent.replace(inputs="all"))
+    assert plain.config_hash != spec.config_hash
+    assert plain.replace(agent=AgentSpec(warm_up_steps=50)).config_hash == plain.config_hash
+    unknown = spec.replace(agent=spec.agent.replace(inputs=(4,)))
+    with pytest.raises(ConfigError) as caught:
+        unknown.make_agent(env)
+    assert caught.value.key == "agent.inputs"
+
+
 def test_an_agent_brings_its_own_training():
     class Told(Training):
         def pieces(self, seconds):

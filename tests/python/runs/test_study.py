@@ -535,7 +535,13 @@ def test_trials_that_could_not_be_compared_are_refused(study, settings, key):
     )
 
 
-@pytest.mark.parametrize("setting", ["angles = [0]", "angle_pairs = 'find'", "warm_up_steps = 9"])
+SETTINGS_OF_ENVIRONMENTS = [
+    "angles = [0]", "angle_pairs = 'find'", "inputs = 'relevant'", "inputs = [1]",
+    "warm_up_steps = 9",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("setting", SETTINGS_OF_ENVIRONMENTS)
 def test_what_the_acrobot_does_not_use_is_refused(study, setting):
     key = f"agent.{setting.partition(' ')[0]}"
     text = f"[cases.s4]\n[base]\nagent.{setting}\n"

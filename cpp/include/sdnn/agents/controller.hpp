@@ -496,7 +496,7 @@ class Controller {
     Observations fitted = observations_;
     fitted.fit(warm_up_->seen());
     if (config_.observation.relevant_only) {
-      fitted.keep(Relevance(random_experience(fitted)).inputs());
+      fitted.keep(Relevance(random_experience(fitted)).inputs(fitted.required()));
     }
     observations_ = std::move(fitted);
     fit();

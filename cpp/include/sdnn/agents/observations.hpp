@@ -29,6 +29,7 @@ struct ObservationConfig {
   bool find_angle_pairs = false;
   std::vector<std::vector<int>> symbols = {};
   bool relevant_only = false;
+  std::vector<int> inputs = {};
 
   static constexpr auto fields() noexcept {
     return std::tuple(core::field("low", &ObservationConfig::low,
@@ -47,7 +48,9 @@ struct ObservationConfig {
                                   "First variables, and how many there are, of which one is 1."),
                       core::field("relevant_only", &ObservationConfig::relevant_only,
                                   "Whether inputs that have nothing to do with rewards or actions, "
-                                  "as the warm-up finds, are left out."));
+                                  "as the warm-up finds, are left out."),
+                      core::field("inputs", &ObservationConfig::inputs,
+                                  "Variables that are never left out."));
   }
   bool operator==(const ObservationConfig&) const = default;
 };
@@ -81,6 +84,7 @@ class Observations {
       core::require(pair.size() == 2, "angle_pairs", "pairs of variables", pair.size());
       for (const int variable : pair) claim(Role::pair, variable, "angle_pairs");
     }
+    for (const int variable : config_.inputs) require_variable("inputs", variable);
     const Ranges fixed = fixed_ranges(config_.angle_pairs);
     needs_fit_ = config_.find_angle_pairs || config_.relevant_only ||
                  std::ranges::any_of(fixed.low, is_unknown);
@@ -120,6 +124,19 @@ class Observations {
   void scale(std::span<const double> observation, std::span<double> state,
              const char* name = "observation") const {
     (*scale_)(observation, state, name);
+  }
+
+  /// Which inputs have a variable that is never left out.
+  std::vector<bool> required() const {
+    std::vector<bool> required;
+    for (const ObservedInput& input : inputs_) {
+      required.push_back(std::ranges::any_of(config_.inputs, [&input](int variable) {
+        const std::size_t i = index(variable);
+        if (input.kind == ObservedKind::symbol) return i - input.first < input.second;
+        return i == input.first || (input.kind == ObservedKind::angle && i == input.second);
+      }));
+    }
+    return required;
   }
 
   /// Takes unknown ranges and pairs from observations. Shape: (n, n_variables), row by row.
@@ -198,10 +215,14 @@ class Observations {
   }
   static std::size_t index(int variable) noexcept { return static_cast<std::size_t>(variable); }
 
-  /// Gives a variable a role; each has one only.
-  void claim(Role role, int variable, const char* name) {
+  void require_variable(const char* name, int variable) const {
     core::require(is_variable(variable), name,
                   "of variables below " + std::to_string(n_variables()), variable);
+  }
+
+  /// Gives a variable a role; each has one only.
+  void claim(Role role, int variable, const char* name) {
+    require_variable(name, variable);
     Role& present = roles_[index(variable)];
     core::require(present != Role::symbol, name, "of numbers, not of variables of a symbol",
                   variable);

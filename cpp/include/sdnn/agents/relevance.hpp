@@ -43,8 +43,9 @@ class Relevance {
  public:
   explicit Relevance(const RandomExperience& experience) : experience_(experience) {}
 
-  /// For each input whether it matters; all do where fewer than two are found.
-  std::vector<bool> inputs() const {
+  /// For each input whether it matters, as those that are `known` to do; all do where fewer than
+  /// two are found. Shapes: (n_inputs,).
+  std::vector<bool> inputs(const std::vector<bool>& known) const {
     const std::size_t n_inputs = experience_.n_inputs;
     const std::size_t n = experience_.size();
     std::vector<bool> matters(n_inputs);
@@ -60,7 +61,7 @@ class Relevance {
     std::vector<std::size_t> found;
     for (std::size_t i = 0; i < n_inputs; ++i) {
       matters[i] =
-          depends(sums, bins[i]) || std::ranges::any_of(bins_of_actions, [&](const auto& actions) {
+          known[i] || depends(sums, bins[i]) || std::ranges::any_of(bins_of_actions, [&](const auto& actions) {
             return depends(changes[i], actions);
           });
       if (matters[i]) found.push_back(i);
