@@ -1,4 +1,4 @@
-"""The measurements, and the process that makes them and prints them as JSON.
+"""The measurements behind ``sdnn bench``.
 
 Other programs disturb every measurement. So everything is repeated often and briefly, things that
 are compared take turns, and medians are taken. The loops are in C++; here are nanoseconds per
@@ -10,15 +10,12 @@ has the quartiles of repetitions as ``lower``, ``median`` and ``upper``.
 
 from __future__ import annotations
 
-import json
 import platform
-import sys
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from datetime import date
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -48,9 +45,6 @@ SELECTIONS_PER_REPETITION = 100
 N_COLD = 2
 """Repetitions after which a turn has the caches it would have without the others."""
 
-_CACHE_FOLDER = Path("/sys/devices/system/cpu/cpu0/cache")
-_MULTIPLES = {"K": 2**10, "M": 2**20, "G": 2**30}
-
 
 @dataclass(frozen=True)
 class Effort:
@@ -65,10 +59,10 @@ class Effort:
 QUICK = Effort(n_rounds=3, n_repetitions=2, n_episodes=10, n_runs=2)
 
 
-def measure(*, quick: bool = False) -> dict[str, Any]:
-    """Measure everything, about half a minute; with `quick` little of it.
+def run_benchmarks(*, quick: bool = False) -> dict[str, Any]:
+    """Measure everything, about half a minute, and return what ``sdnn bench --json`` prints.
 
-    NumPy's linear algebra should have one thread: see `sdnn.benchmarks.run_benchmarks`.
+    With `quick` there are few repetitions: to see that it works, not how quick it is.
     """
     effort = QUICK if quick else Effort()
     return {
@@ -87,40 +81,14 @@ def measure(*, quick: bool = False) -> dict[str, Any]:
 
 
 def describe_machine() -> dict[str, Any]:
-    """Describe this machine; what cannot be found out is "unknown" or left out.
-
-    ``n_cores`` are those this process may use, ``caches`` the bytes of each that one core sees.
-    """
-    try:
-        found = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
-        blas = f"{found['name']} {found['version']}"
-    except (KeyError, TypeError):
-        blas = "unknown"
+    """Describe this machine; ``n_cores`` are those that this process may use."""
     return {
         "processor": processor(),
         "system": f"{platform.system()} {platform.machine()}",
         "n_cores": n_cores(),
-        "caches": _caches(_CACHE_FOLDER),
         "python": platform.python_version(),
         "numpy": np.__version__,
-        "blas": blas,
     }
-
-
-def _caches(folder: Path) -> dict[str, int]:
-    """Bytes of the first core's caches by name, such as L1d, L2."""
-    caches = {}
-    try:
-        for index in sorted(folder.glob("index*")):
-            kind, level, size = (
-                (index / name).read_text().strip() for name in ("type", "level", "size")
-            )
-            if kind != "Instruction":
-                name = f"L{level}{'d' if kind == 'Data' else ''}"
-                caches[name] = int(size.rstrip("KMG")) * _MULTIPLES.get(size[-1:], 1)
-    except (OSError, ValueError):
-        pass
-    return caches
 
 
 def in_turns(runs: Mapping[str, Run], effort: Effort) -> dict[str, Nanoseconds]:
@@ -146,31 +114,17 @@ def spread(times: Nanoseconds, n_parts: int = 1) -> dict[str, float]:
 
 
 def measure_network(n_inputs: int, effort: Effort) -> dict[str, Any]:
-    """Time the parts of a network that has learned a little, beside a dense product of its size.
+    """Time the parts of a network that has learned a little.
 
     Spreads are those of ``values`` (all action values of a new state, by instruction set),
     ``remembered_values`` (of the same state again), ``correction`` (a learning step of a state just
-    asked about), ``selection`` (of its units), ``dense`` (a float32 product of n_hidden_units x
-    n_columns weights, by who computes it) and ``read`` (a buffer of ``weight_bytes``).
-    ``pass_bytes`` are those that a pass has to read, on average, and ``least_time`` their time at
-    the rate of ``read``: no pass can be quicker. ``ratio_to_dense`` is the time of ``values`` over
-    that of the quickest dense product, ``share_of_limit`` ``least_time`` over it.
+    asked about) and ``selection`` (of its units).
     """
-    trial = _short_trial(n_inputs, 0.0, effort.n_episodes)
-    trial.advance(effort.n_episodes)
-    parts = _core.NetworkParts(trial, SEED)
+    parts = network_parts(n_inputs, effort)
     config = _core.SDNNCConfig(n_inputs=n_inputs)
-    n_columns = config.n_pattern_units * n_inputs * (n_inputs - 1)
     levels = available_instruction_sets()
-    read = _core.BufferRead(parts.weight_bytes)
-    dense: dict[str, Run] = {
-        "numpy": _numpy_product(config.n_hidden_units, n_columns),
-        "core": _core.DenseProduct(config.n_hidden_units, n_columns, SEED).run,
-    }
     runs: dict[str, Run] = {
-        **{level: _at_level(level, parts.time_values) for level in levels},
-        **dense,
-        "read": read.run,
+        **{level: at_level(level, parts.time_values) for level in levels},
         "remembered_values": parts.time_remembered_values,
         "selection": lambda n: parts.time_selections(n, SELECTIONS_PER_REPETITION, N_CORRECTED),
     }
@@ -181,13 +135,10 @@ def measure_network(n_inputs: int, effort: Effort) -> dict[str, Any]:
     corrections = in_turns(
         {"correction": lambda n: parts.time_corrections(n, N_CORRECTED)}, effort
     )["correction"]
-    pass_bytes = parts.mean_bytes_of_pass(effort.n_rounds)
-    least_time = times["read"]["median"] * pass_bytes / read.n_bytes
-    least_dense = min(times[name]["median"] for name in dense)
     return {
         "n_inputs": n_inputs,
         "n_hidden_units": config.n_hidden_units,
-        "n_columns": n_columns,
+        "n_columns": config.n_pattern_units * n_inputs * (n_inputs - 1),
         "n_actions": config.n_hidden_units - config.n_active_units + 1,
         "n_learning_episodes": effort.n_episodes,
         "values": {level: times[level] for level in levels},
@@ -195,15 +146,14 @@ def measure_network(n_inputs: int, effort: Effort) -> dict[str, Any]:
         "correction": spread(corrections),
         "n_corrected": N_CORRECTED,
         "selection": times["selection"],
-        "dense": {name: times[name] for name in dense},
-        "read": times["read"],
-        "weight_bytes": parts.weight_bytes,
-        "pass_bytes": pass_bytes,
-        "gigabytes_per_second": read.n_bytes / times["read"]["median"] / 1000.0,
-        "least_time": least_time,
-        "ratio_to_dense": {level: times[level]["median"] / least_dense for level in levels},
-        "share_of_limit": {level: least_time / times[level]["median"] for level in levels},
     }
+
+
+def network_parts(n_inputs: int, effort: Effort) -> _core.NetworkParts:
+    """Return the parts of a network that has learned in a short trial."""
+    trial = _short_trial(n_inputs, 0.0, effort.n_episodes)
+    trial.advance(effort.n_episodes)
+    return _core.NetworkParts(trial, SEED)
 
 
 def measure_acrobot(effort: Effort) -> dict[str, Any]:
@@ -296,7 +246,9 @@ def _short_trial(n_inputs: int, noise: float, n_episodes: int) -> _core.AcrobotT
     )
 
 
-def _at_level(level: str, run: Run) -> Run:
+def at_level(level: str, run: Run) -> Run:
+    """Return a run with another instruction set."""
+
     def _run(n: int) -> Nanoseconds:
         before = instruction_set()
         set_instruction_set(level)
@@ -306,25 +258,3 @@ def _at_level(level: str, run: Run) -> Run:
             set_instruction_set(before)
 
     return _run
-
-
-def _numpy_product(n_rows: int, n_columns: int) -> Run:
-    """Make the run of NumPy's product; calling it from here costs less than a microsecond."""
-    generator = np.random.default_rng(SEED)
-    weights = generator.random((n_rows, n_columns), dtype=np.float32)
-    vector = generator.random(n_columns, dtype=np.float32)
-    out: NDArray[Any] = np.empty(n_rows, dtype=np.float32)
-
-    def _run(n: int) -> Nanoseconds:
-        times = np.empty(n, dtype=np.int64)
-        for i in range(n):
-            begin = time.perf_counter_ns()
-            np.dot(weights, vector, out=out)
-            times[i] = time.perf_counter_ns() - begin
-        return times
-
-    return _run
-
-
-if __name__ == "__main__":
-    json.dump(measure(quick="--quick" in sys.argv[1:]), sys.stdout)

@@ -1,0 +1,125 @@
+"""Runs ``sdnn bench``, and what a pass is compared with: a dense product, and reading its bytes.
+
+    python bench/yardsticks.py > docs/performance.json && python bench/performance_tables.py
+
+NumPy's linear algebra has one thread.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from pathlib import Path
+
+# Read when NumPy is loaded.
+for name in ("OPENBLAS_NUM", "MKL_NUM", "OMP_NUM", "BLIS_NUM", "VECLIB_MAXIMUM"):
+    os.environ[f"{name}_THREADS"] = "1"
+
+import numpy as np  # noqa: E402
+
+from sdnn import _core  # noqa: E402
+from sdnn.benchmarks.measurements import (  # noqa: E402
+    QUICK,
+    SEED,
+    Effort,
+    at_level,
+    in_turns,
+    network_parts,
+    run_benchmarks,
+    spread,
+)
+from sdnn.machine import available_instruction_sets  # noqa: E402
+
+CACHE_FOLDER = Path("/sys/devices/system/cpu/cpu0/cache")
+MULTIPLES = {"K": 2**10, "M": 2**20, "G": 2**30}
+
+
+def of_network(network, effort):
+    """Compare passes of a network that `measure_network` has measured with its yardsticks.
+
+    Spreads are those of ``dense`` (a float32 product of n_hidden_units x n_columns weights, by who
+    computes it) and ``read`` (a buffer of ``weight_bytes``), in turns with passes. ``pass_bytes``
+    are those that a pass has to read, on average, and ``least_time`` their time at the rate of
+    ``read``: no pass can be quicker. ``ratio_to_dense`` is the time of ``values`` over that of the
+    quickest dense product, ``share_of_limit`` ``least_time`` over it.
+    """
+    size = network["n_hidden_units"], network["n_columns"]
+    parts = network_parts(network["n_inputs"], effort)
+    levels = available_instruction_sets()
+    read = _core.BufferRead(parts.weight_bytes)
+    dense = {"numpy": numpy_product(*size), "core": _core.DenseProduct(*size, SEED).run}
+    passes = {level: at_level(level, parts.time_values) for level in levels}
+    taken = in_turns({**passes, **dense, "read": read.run}, effort)
+    times = {name: spread(one) for name, one in taken.items()}
+    pass_bytes = parts.mean_bytes_of_pass(effort.n_rounds)
+    least_time = times["read"]["median"] * pass_bytes / read.n_bytes
+    least_dense = min(times[name]["median"] for name in dense)
+    return {
+        "values": {level: times[level] for level in levels},
+        "dense": {name: times[name] for name in dense},
+        "read": times["read"],
+        "weight_bytes": parts.weight_bytes,
+        "pass_bytes": pass_bytes,
+        "gigabytes_per_second": read.n_bytes / times["read"]["median"] / 1000.0,
+        "least_time": least_time,
+        "ratio_to_dense": {level: times[level]["median"] / least_dense for level in levels},
+        "share_of_limit": {level: least_time / times[level]["median"] for level in levels},
+    }
+
+
+def numpy_product(n_rows, n_columns):
+    """The run of NumPy's product; calling it from here costs less than a microsecond."""
+    generator = np.random.default_rng(SEED)
+    weights = generator.random((n_rows, n_columns), dtype=np.float32)
+    vector = generator.random(n_columns, dtype=np.float32)
+    out = np.empty(n_rows, dtype=np.float32)
+
+    def run(n):
+        times = np.empty(n, dtype=np.int64)
+        for i in range(n):
+            begin = time.perf_counter_ns()
+            np.dot(weights, vector, out=out)
+            times[i] = time.perf_counter_ns() - begin
+        return times
+
+    return run
+
+
+def caches(folder=CACHE_FOLDER):
+    """Bytes of the first core's caches by name, such as L1d, L2."""
+    found = {}
+    try:
+        for index in sorted(folder.glob("index*")):
+            kind, level, size = (
+                (index / name).read_text().strip() for name in ("type", "level", "size")
+            )
+            if kind != "Instruction":
+                name = f"L{level}{'d' if kind == 'Data' else ''}"
+                found[name] = int(size.rstrip("KMG")) * MULTIPLES.get(size[-1:], 1)
+    except (OSError, ValueError):
+        pass
+    return found
+
+
+def blas():
+    """Which library computes NumPy's product."""
+    try:
+        found = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
+    except (KeyError, TypeError):
+        return "unknown"
+    return f"{found['name']} {found['version']}"
+
+
+def measure(*, quick=False):
+    """The results of ``sdnn bench --json``, with the yardsticks of each network."""
+    results = run_benchmarks(quick=quick)
+    effort = QUICK if quick else Effort()
+    machine = {**results["machine"], "caches": caches(), "blas": blas()}
+    networks = [{**network, **of_network(network, effort)} for network in results["networks"]]
+    return {**results, "machine": machine, "networks": networks}
+
+
+if __name__ == "__main__":
+    json.dump(measure(quick="--quick" in sys.argv[1:]), sys.stdout, indent=2)
