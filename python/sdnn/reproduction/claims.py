@@ -50,12 +50,6 @@ from sdnn.runs.results import (
 N_DRAWS = 10_000
 _N_RESAMPLES, _N_DRAWS_OF_EACH = 200, 250
 
-MULTIPLES = (2, 4, 8, 16, 32)
-"""Numbers of trials whose power is estimated, as multiples of those that are there."""
-
-N_POWER_DRAWS = 200
-_N_MEDIANS = 1000
-
 EQUAL_STEPS = 2.0  # by which two agents that do "almost the same" may differ
 
 
@@ -397,36 +391,3 @@ class TenTrials:
         return tuple(
             check.contains(reduce(np.subtract, kind)) for kind in zip(*medians, strict=True)
         )
-
-
-def powers(check: Check, samples: Sequence[FloatArray]) -> list[dict[str, float]]:
-    """Draw more trials than these samples of a check, judge each draw, for each of `MULTIPLES`.
-
-    Returns, for each number of trials, the shares of the draws in which the check holds and fails.
-    """
-    found = []
-    for multiple in MULTIPLES:
-        generator = np.random.default_rng(BOOTSTRAP_SEED)
-        medians = reduce(np.subtract, [drawn_medians(one, multiple, generator) for one in samples])
-        lower, upper = tails(medians)
-        holds = float((check.contains(lower) & check.contains(upper)).mean())
-        fails = float(check.excludes(lower, upper).mean())
-        found.append({"n_trials": multiple * samples[0].size, "holds": holds, "fails": fails})
-    return found
-
-
-def drawn_medians(sample: FloatArray, multiple: int, generator: np.random.Generator) -> FloatArray:
-    """Draw trials repeatedly and return the bootstrap medians of each, (N_POWER_DRAWS, 1000).
-
-    The sorted trials of a resample lie at places that are order statistics of uniform numbers,
-    which are drawn instead of the resamples: of the middle one, and given it of the next.
-    """
-    n = multiple * sample.size
-    drawn = np.sort(sample[generator.integers(sample.size, size=(N_POWER_DRAWS, n))], axis=1)
-    middle = (n + 1) // 2
-    first = generator.beta(middle, n + 1 - middle, _N_MEDIANS)
-    low = drawn[:, (n * first).astype(np.intp)]
-    if n % 2:
-        return low
-    second = first + (1.0 - first) * generator.beta(1, n - middle, _N_MEDIANS)
-    return (low + drawn[:, (n * second).astype(np.intp)]) / 2.0

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAX_STEPS = 50  # an episode's limit: the upper end of the steps axis
-START_EPISODES = 500  # learning episodes shown in the panels of the start
-_PANEL_HEIGHT, _START_HEIGHT = 3.3, 1.9
+LONG_EPISODES = 2_000  # learning episodes from which running medians lie over the curves
+_PANEL_HEIGHT = 3.3
 _WARNING_COLOR = "#a31515"
 _MARKERS = ("o", "s", "^", "v")
 
@@ -38,21 +38,14 @@ def draw_experiment(
 ) -> Figure:
     """Draw an experiment: a panel per case, a line and an interquartile band per agent.
 
-    Long runs have a small panel below each case, which shows the first episodes again.
     With `quick` the figure is marked as a quick look, which is no result.
     """
     n_columns = min(2, len(experiment.cases))
     n_rows = -(-len(experiment.cases) // n_columns)
-    # The start is too small a part of the panels to be seen in those of a long run.
-    is_long = max(result.last_episode for result in results) >= 4 * START_EPISODES
-    heights = (_PANEL_HEIGHT, _START_HEIGHT) if is_long else (_PANEL_HEIGHT,)
-    height = 1.1 + n_rows * sum(heights)
+    is_long = max(result.last_episode for result in results) >= LONG_EPISODES
+    height = 1.1 + n_rows * _PANEL_HEIGHT
     figure = new_figure(5.4 * n_columns, height)
-    grid = figure.subplots(
-        n_rows * len(heights), n_columns, sharey=True, squeeze=False, height_ratios=heights * n_rows
-    )
-    panels = grid[:: len(heights)].ravel()
-    starts = grid[1::2].ravel() if is_long else ()
+    panels = figure.subplots(n_rows, n_columns, sharey=True, squeeze=False).ravel()
     colors = agent_colors(result.agent for result in results)
     for number, (case, axes) in enumerate(zip(experiment.cases, panels, strict=False)):
         shown = [result for result in results if result.case_id == case.id]
@@ -62,16 +55,11 @@ def draw_experiment(
         axes.set_ylim(0, MAX_STEPS)
         if number % n_columns == 0:
             axes.set_ylabel("steps per test episode")
-        if is_long or number >= len(experiment.cases) - n_columns:
+        if number >= len(experiment.cases) - n_columns:
             axes.set_xlabel("learning episodes")
         if quick:
             _watermark(axes)
-        if is_long:
-            start, words = starts[number], f"the first {START_EPISODES} learning episodes"
-            draw_steps(start, shown, colors, smooth=False)
-            start.set(xlim=(0, START_EPISODES), ylim=(0, MAX_STEPS))
-            start.set_title(words, fontsize=8.5, loc="left", color=FAINT)
-    for axes in (*panels[len(experiment.cases) :], *starts[len(experiment.cases) :]):
+    for axes in panels[len(experiment.cases) :]:
         axes.set_visible(False)
     if len(colors) > 1 or experiment not in EXPERIMENTS:
         lines, titles = panels[0].get_legend_handles_labels()

@@ -15,17 +15,13 @@ from sdnn import _core
 from sdnn.reproduction.cases import PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.reproduction.claims import (
     ALWAYS,
-    MULTIPLES,
-    N_POWER_DRAWS,
     NEVER,
     CheckOutcome,
-    Claim,
     ClaimOutcome,
     Growth,
     Verdict,
     is_paper_scale,
     judge_claims,
-    powers,
 )
 from sdnn.reproduction.cost import SERIES, CostRecord
 from sdnn.reproduction.reference_results import ReferenceResult
@@ -56,10 +52,6 @@ CHANCE_NOTE = (
     " medians lie in all ranges of the claim. What these trials leave undecided holds if"
     f" {100 * ALWAYS:.0f} % of the draws or more show it, does not hold if {100 * NEVER:.0f} % or"
     " fewer do, and is inconclusive in between: what ten trials show then depends on their seeds."
-)
-POWER_NOTE = (
-    "What more trials would say, by drawing so many from those that are there,"
-    f" {N_POWER_DRAWS} times: in how many of these draws the line would hold / would not."
 )
 COST_NOTE = (
     "Median time of a step (acting in a new random state and learning the transition to it, without"
@@ -100,16 +92,6 @@ class Report:
         """The claims that these results speak about, with what reference results say of them."""
         return judge_claims(self.results, self.costs, self.reference)
 
-    @cached_property
-    def powers(self) -> tuple[tuple[Claim, CheckOutcome, list[dict[str, float]]], ...]:
-        """What more trials would say of the checks that the most trials leave undecided."""
-        return tuple(
-            (one.claim, checked, powers(checked.check, checked.samples))
-            for one in self.claims
-            for checked in (one.more or one).checks
-            if checked.verdict is Verdict.UNDECIDED and checked.samples
-        )
-
     def page(self, pictures: Mapping[str, bytes]) -> Page:
         """Return the page, with the SVG of figures by the names of their files without suffix."""
         warnings = []
@@ -149,15 +131,6 @@ class Report:
                 f" measures are kept with the library. {CHANCE_NOTE}"
             )
             yield Section(level=3, table=more, notes=[note])
-        if self.powers:
-            rows = [
-                (str(claim.number), str(checked.check.quantity), format_quantity(checked),
-                 *(f"{100 * one['holds']:.0f} / {100 * one['fails']:.0f} %" for one in found))
-                for claim, checked, found in self.powers
-            ]  # fmt: skip
-            header = ("claim", "measured", "ours", *(f"{n} x the trials" for n in MULTIPLES))
-            table = Table("What is undecided", header, rows)
-            yield Section(level=3, table=table, notes=[POWER_NOTE])
 
     def _result_sections(self, pictures: Mapping[str, bytes]) -> Iterator[Section]:
         words = tuple(name.replace("_", " ") for name in STEP_MEASURES)
@@ -216,10 +189,6 @@ class Report:
                     "decided": one.decided.value,
                 }
                 for one in self.claims
-            ],
-            "powers": [
-                {"claim": claim.number, "measured": str(checked.check.quantity), "with": found}
-                for claim, checked, found in self.powers
             ],
         }
 

@@ -7,7 +7,6 @@ import pytest
 from sdnn.reproduction.cases import EXPERIMENTS
 from sdnn.reproduction.claims import (
     CLAIMS,
-    MULTIPLES,
     Check,
     CheckOutcome,
     Claim,
@@ -16,16 +15,12 @@ from sdnn.reproduction.claims import (
     Median,
     Subject,
     Verdict,
-    drawn_medians,
     is_paper_scale,
     judge_claims,
-    powers,
     verdict_of,
 )
 from sdnn.reproduction.cost import QUICK_COST, SERIES, CostConfig, CostRecord
-from sdnn.reproduction.report import POWER_NOTE, Report
 from sdnn.runs import Estimate, TrialKey, TrialRecord, TrialRows, measure
-from sdnn.runs.results import estimate_contrast, estimate_median
 
 PICTURES = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}
 CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
@@ -151,84 +146,10 @@ def test_trials_that_disagree_leave_a_claim_undecided():
     assert found[2] == Verdict.UNDECIDED
 
 
-def test_reports_tell_what_more_trials_would_say():
-    split = [4] * 7 + [50] * 3
-    summaries = (result("s4", "sdnn-c", split), result("s6", "sdnn-c", 4))
-    report = Report(
-        experiments=((EXPERIMENTS[0], summaries),), costs=(), quick=False, seed=0, digest="d" * 64
-    )
-    page = report.page(PICTURES)
-    table = next(one for one in page.tables if one.title == "What is undecided")
-    assert table.header[-1] == f"{MULTIPLES[-1]} x the trials"
-    rows = table.rows
-    assert POWER_NOTE in page.notes
-    row = next(row for row in rows if row[:2] == ("2", "final steps: SDNN-C, 4 inputs"))
-    assert row[-1] == "100 / 0 %"
-    told = report.to_json()["powers"]
-    assert [one["claim"] for one in told] == [int(row[0]) for row in rows]
-    one = next(one for one in told if one["measured"] == row[1])
-    assert one["with"][-1] == {"n_trials": 320, "holds": 1.0, "fails": 0.0}
-    assert "What is undecided" in page.to_html("")
-    decided = replace(report, experiments=((EXPERIMENTS[0], summaries[1:]),)).page(PICTURES)
-    assert "What is undecided" not in [table.title for table in decided.tables]
-    assert "What is undecided" not in decided.to_html("")
-
-
 @pytest.mark.parametrize("size", [{"n_trials": 9}, {"n_tests": 1499}])
 def test_less_than_the_papers_scale_is_not_judged(size):
     found = verdicts([result("s4", "sdnn-c", 4, **size), result("s6", "sdnn-c", 4)])
     assert found[1] == found[2] == Verdict.NOT_JUDGED
-
-
-def outcome_of(values, others=None, **limits):
-    samples = tuple(np.array(v, float) for v in (values, others) if v is not None)
-    estimate = estimate_median(values) if others is None else estimate_contrast(values, others)
-    check = Check(Median("final_steps", Subject("s4")), "", **limits)
-    return CheckOutcome(check, estimate, verdict_of(check, estimate), samples)
-
-
-def powers_of(outcome):
-    return powers(outcome.check, outcome.samples)
-
-
-def test_power_is_repeatable():
-    undecided = outcome_of([3, 4, 5, 9], at_most=5)
-    assert undecided.verdict == Verdict.UNDECIDED
-    assert [one["n_trials"] for one in powers_of(undecided)] == [4 * n for n in MULTIPLES]
-    assert powers_of(undecided) == powers_of(undecided)
-
-
-def test_power_says_what_more_trials_would_decide():
-    mostly_good = powers_of(outcome_of([4] * 7 + [math.inf] * 3, at_most=5))
-    assert [one["fails"] for one in mostly_good] == [0.0] * len(MULTIPLES)
-    assert mostly_good[0]["holds"] < 0.9
-    assert mostly_good[-1]["holds"] == 1.0
-    mostly_bad = powers_of(outcome_of([4] * 4 + [50] * 8, at_most=5))
-    assert mostly_bad[-1] == {"n_trials": 12 * MULTIPLES[-1], "holds": 0.0, "fails": 1.0}
-    for one in powers_of(outcome_of([4] * 5 + [50] * 5, at_most=5)):  # a coin, however often thrown
-        assert one["holds"] + one["fails"] < 0.2
-    apart = powers_of(outcome_of([9, 10, 11, 30], [5, 8, 9, 10], at_least=1))
-    assert apart[-1]["holds"] > 0.95
-    assert apart[-1]["fails"] == 0.0
-
-
-@pytest.mark.parametrize("multiple", [1, 3, 4])
-def test_power_draws_medians_as_resampling_does(multiple):
-    """Order statistics of uniform numbers against resamples: the same means and spreads."""
-    sample = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
-    drawn = drawn_medians(sample, multiple, np.random.default_rng(1))
-    generator = np.random.default_rng(2)
-    n = multiple * sample.size
-    others = np.empty_like(drawn)
-    for row in others:
-        trials = generator.choice(sample, n)
-        row[:] = np.median(generator.choice(trials, (row.size, n)), axis=1)
-    error = others.mean(axis=1).std() * math.sqrt(2 / len(others))
-    assert drawn.mean() == pytest.approx(others.mean(), abs=4 * error)
-    for quantile in (0.1, 0.5, 0.9):
-        mine, theirs = (np.quantile(d, quantile, axis=1) for d in (drawn, others))
-        error = max(theirs.std(), 0.05) * math.sqrt(2 / len(others))
-        assert mine.mean() == pytest.approx(theirs.mean(), abs=4 * error)
 
 
 def test_growth_is_a_ratio_of_medians():

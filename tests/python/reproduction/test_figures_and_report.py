@@ -77,14 +77,6 @@ def test_short_runs_are_drawn_as_they_are(tmp_path, fake, run):
         np.testing.assert_array_equal(line, np.median(result.steps, axis=0))
 
 
-def test_start_has_panels_of_its_own_in_long_runs(results):
-    figure = draw_experiment(EXPERIMENT, results)
-    assert len(figure.axes) == 4
-    for axes, start in zip(figure.axes[:2], figure.axes[2:], strict=True):
-        assert start.get_xlim() == (0, 500)
-        np.testing.assert_array_equal(curves_of(start)[0][1], curves_of(axes)[-1][1])
-
-
 def test_only_the_planned_trials_are_drawn(results):
     assert [result.n_trials for result in results] == [3, 3]
 
