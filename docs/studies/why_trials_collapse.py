@@ -24,7 +24,7 @@ from sdnn.files import write_whole
 from sdnn.reproduction.cases import EXPERIMENTS
 from sdnn.reproduction.reproduce import case_spec
 from sdnn.runs.engine import trial_seed
-from sdnn.runs.results import MeasureConfig, episode_of_collapse
+from sdnn.runs.results import episode_of_collapse
 from sdnn.runs.spec import RunSpec
 
 CASE = next(case for case in EXPERIMENTS[1].cases if case.id == "s4-noise")
@@ -170,8 +170,7 @@ def end_of_mastery(rows: Rows) -> float:
 
 def last_success(rows: Rows) -> float:
     """Return the same with runs of ten tests: where the agent still did it for a last time."""
-    short = MeasureConfig(stable_window=10)
-    return episode_of_collapse(rows["test_episode"], rows["test_steps"], short)
+    return episode_of_collapse(rows["test_episode"], rows["test_steps"], window=10)
 
 
 class Kept:

@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from sdnn.runs.results import (
         CaseResult as CaseResult,
         Estimate as Estimate,
-        MeasureConfig as MeasureConfig,
         measure as measure,
     )
     from sdnn.runs.run import (

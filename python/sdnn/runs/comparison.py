@@ -23,7 +23,7 @@ from sdnn.runs.report import (
     settings_section,
 )
 from sdnn.runs.results import (
-    DEFAULT_MEASURES,
+    FINAL_WINDOW,
     MEASURES,
     RETURN_MEASURES,
     SHARE_STABLE,
@@ -50,7 +50,7 @@ DIFFERENCE_NOTE = (
 )
 SOLVED_NOTE = (
     "end solved: trials that solve at least"
-    f" {100 * SHARE_STABLE:.0f} % of their last {DEFAULT_MEASURES.final_window} tests."
+    f" {100 * SHARE_STABLE:.0f} % of their last {FINAL_WINDOW} tests."
 )
 
 

@@ -23,7 +23,6 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
-from sdnn.arguments import real, shown, whole
 from sdnn.runs.trial import TrialRecord, TrialRows
 
 FloatArray = NDArray[np.float64]
@@ -40,42 +39,22 @@ MeasureName = Literal[
 
 SHARE_STABLE = 0.9
 """Share of test episodes that an agent must solve at the end to be called stable."""
+GOOD_STEPS = 10.0
+"""A test episode of at most so many steps is good: the paper's "within 10 steps"."""
+LEARNED_WINDOW, STABLE_WINDOW = 10, 50
+"""Tests in a row whose median must be good for the task to count as learned, and as mastered."""
+EARLY_EPISODES = 2_500
+"""A third of the way to the paper's 7,500."""
+FINAL_WINDOW = 50
+"""Tests at the end."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class MeasureConfig:
-    """Constants of the measures.
-
-    A test episode of at most `good_steps` is good: the paper's "within 10 steps". The median of
-    `learned_window` consecutive tests must be good for the task to count as learned, and of
-    `stable_window` as mastered. `early_episodes` are a third of the way to the paper's 7,500.
-    """
-
-    good_steps: float = 10.0
-    learned_window: int = 10
-    early_episodes: int = 2_500
-    stable_window: int = 50
-    final_window: int = 50
-
-    def __post_init__(self) -> None:
-        if math.isnan(real("good_steps", self.good_steps)):
-            raise ValueError(f"good_steps must be a number, got {shown(self.good_steps)}")
-        whole("early_episodes", self.early_episodes, 0, 2**62)
-        for name in ("learned_window", "stable_window", "final_window"):
-            whole(name, getattr(self, name), 1, 2**62)
-
-
-DEFAULT_MEASURES = MeasureConfig()
-
-
-def episodes_to_learn(
-    episode: ArrayLike, steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES
-) -> float:
+def episodes_to_learn(episode: ArrayLike, steps: ArrayLike) -> float:
     """Return the learning episodes until the task is learned; infinite if it never is (censored).
 
-    The task is learned at the first test episode that (1) takes at most `good_steps` steps
-    and (2) begins `learned_window` consecutive test episodes whose median is at most
-    `good_steps`. The result is the number of learning episodes done before that test.
+    The task is learned at the first test episode that (1) takes at most `GOOD_STEPS` steps
+    and (2) begins `LEARNED_WINDOW` consecutive test episodes whose median is at most
+    `GOOD_STEPS`. The result is the number of learning episodes done before that test.
 
     (1) keeps failed tests just before the first good one from counting as learned already;
     (2) keeps a single lucky test from counting. A later relapse does not undo learning. A window
@@ -87,19 +66,17 @@ def episodes_to_learn(
     >>> episodes_to_learn(episode, 12 * [50])
     inf
     """
-    medians = _medians_of_windows(steps, config.learned_window)
+    medians = _medians_of_windows(steps, LEARNED_WINDOW)
     first = np.asarray(steps, np.float64)[: medians.size]
-    good = (medians <= config.good_steps) & (first <= config.good_steps)
+    good = (medians <= GOOD_STEPS) & (first <= GOOD_STEPS)
     return float(np.asarray(episode)[int(np.argmax(good))]) if good.any() else math.inf
 
 
-def episode_of_collapse(
-    episode: ArrayLike, steps: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES
-) -> float:
+def episode_of_collapse(episode: ArrayLike, steps: ArrayLike, window: int = STABLE_WINDOW) -> float:
     """Return the learning episodes after which the task is not mastered any more.
 
-    The task is mastered in every run of `stable_window` consecutive test episodes whose median is
-    at most `good_steps`. The result is the number of learning episodes done before the last test of
+    The task is mastered in every run of `window` consecutive test episodes whose median is
+    at most `GOOD_STEPS`. The result is the number of learning episodes done before the last test of
     the last such run. It is infinite (censored) if that is the trial's last test: the trial ended
     before a collapse. It is 0 if there is no such run: there was nothing to collapse; NaN if there
     are fewer tests than in a run. Relapses from which the agent recovers do not count.
@@ -112,22 +89,22 @@ def episode_of_collapse(
     >>> episode_of_collapse(episode, 200 * [50])
     0.0
     """
-    mastered = _medians_of_windows(steps, config.stable_window) <= config.good_steps
+    mastered = _medians_of_windows(steps, window) <= GOOD_STEPS
     if not mastered.any():
         return 0.0 if mastered.size else math.nan
     last = int(np.flatnonzero(mastered)[-1])
     if last == mastered.size - 1:
         return math.inf
-    return float(np.asarray(episode)[last + config.stable_window - 1])
+    return float(np.asarray(episode)[last + window - 1])
 
 
-def final_share_solved(solved: ArrayLike, config: MeasureConfig = DEFAULT_MEASURES) -> float:
-    """Return the share solved of the last `final_window` tests, or of all if there are fewer.
+def final_share_solved(solved: ArrayLike) -> float:
+    """Return the share solved of the last `FINAL_WINDOW` tests, or of all if there are fewer.
 
     >>> final_share_solved([False, True, True, True])
     0.75
     """
-    return float(np.mean(np.asarray(solved, np.float64)[-config.final_window :]))
+    return float(np.mean(np.asarray(solved, np.float64)[-FINAL_WINDOW:]))
 
 
 def _medians_of_windows(steps: ArrayLike, window: int) -> FloatArray:
@@ -138,40 +115,39 @@ def _medians_of_windows(steps: ArrayLike, window: int) -> FloatArray:
     return np.asarray(np.median(sliding_window_view(taken, window), axis=1))
 
 
-_DEFAULT = DEFAULT_MEASURES
-_GOOD = f"{_DEFAULT.good_steps:g}"
+_GOOD = f"{GOOD_STEPS:g}"
 
-MEASURES: dict[MeasureName, tuple[str, Callable[[TrialRows, MeasureConfig], float]]] = {
+MEASURES: dict[MeasureName, tuple[str, Callable[[TrialRows], float]]] = {
     "episodes_to_learn": (
         f"learning episodes before the first test of at most {_GOOD} steps that begins"
-        f" {_DEFAULT.learned_window} tests in a row with a median of at most {_GOOD}",
-        lambda rows, config: episodes_to_learn(rows.episode, rows.steps, config),
+        f" {LEARNED_WINDOW} tests in a row with a median of at most {_GOOD}",
+        lambda rows: episodes_to_learn(rows.episode, rows.steps),
     ),
     "early_steps": (
-        f"median steps of the tests in the first {_DEFAULT.early_episodes:,} learning episodes",
-        lambda rows, c: float(np.median(rows.steps[rows.episode <= c.early_episodes])),
+        f"median steps of the tests in the first {EARLY_EPISODES:,} learning episodes",
+        lambda rows: float(np.median(rows.steps[rows.episode <= EARLY_EPISODES])),
     ),
     "episode_of_collapse": (
-        f"learning episodes before the end of the last {_DEFAULT.stable_window} tests in a row with"
+        f"learning episodes before the end of the last {STABLE_WINDOW} tests in a row with"
         f" a median of at most {_GOOD} steps: until then the agent can do the task; censored (> the"
         " last episode) if it still can at the end",
-        lambda rows, config: episode_of_collapse(rows.episode, rows.steps, config),
+        lambda rows: episode_of_collapse(rows.episode, rows.steps),
     ),
     "final_steps": (
-        f"median steps of the last {_DEFAULT.final_window} tests",
-        lambda rows, config: float(np.median(rows.steps[-config.final_window :])),
+        f"median steps of the last {FINAL_WINDOW} tests",
+        lambda rows: float(np.median(rows.steps[-FINAL_WINDOW:])),
     ),
     "final_share_solved": (
-        f"share of the last {_DEFAULT.final_window} tests that reach the goal",
-        lambda rows, config: final_share_solved(rows.solved, config),
+        f"share of the last {FINAL_WINDOW} tests that reach the goal",
+        lambda rows: final_share_solved(rows.solved),
     ),
     "final_return": (
         "mean return of the last tenth of the tests",
-        lambda rows, _: float(np.mean(rows.episode_return[-max(1, rows.episode.size // 10) :])),
+        lambda rows: float(np.mean(rows.episode_return[-max(1, rows.episode.size // 10) :])),
     ),
     "mean_return": (
         "mean return of all tests: the area under the learning curve",
-        lambda rows, _: float(np.mean(rows.episode_return)),
+        lambda rows: float(np.mean(rows.episode_return)),
     ),
 }
 """What each measure means, for a reader, and how it is taken from the rows of a trial."""
@@ -396,7 +372,6 @@ def measure(
     title: str,
     records: Sequence[TrialRecord],
     names: Iterable[MeasureName] = STEP_MEASURES,
-    config: MeasureConfig = DEFAULT_MEASURES,
 ) -> CaseResult:
     """Measure the trials of an agent in a case of some title.
 
@@ -410,7 +385,7 @@ def measure(
         case_id=case_id,
         agent=agent,
         last_episode=int(records[0].rows.episode[-1]),
-        values={name: np.array([MEASURES[name][1](r.rows, config) for r in records])
+        values={name: np.array([MEASURES[name][1](r.rows) for r in records])
                 for name in names},
         title=title,
         records=tuple(records),

@@ -27,12 +27,10 @@ from sdnn.runs import (
     BudgetSpec,
     ConfigError,
     EnvironmentSpec,
-    MeasureConfig,
     ProtocolSpec,
     RunSpec,
     agent_entry,
 )
-from sdnn.runs.results import episodes_to_learn
 
 ROOMS = ("agents", "approximators", "coding", "environments", "estimators", "reproduction", "runs")
 
@@ -215,7 +213,6 @@ GOOD = {
     "cases": lambda: [PAPER_CASES["s4"]],
     "case_id": lambda: "s4",
     "coding": lambda: "anchor",
-    "config": lambda: MeasureConfig(),
     "costs": lambda: (),
     "data": lambda: {"coding": "anchor"},
     "entry": lambda: agent_entry("rbf"),
@@ -253,7 +250,7 @@ GOOD = {
 """Arguments of public functions; one that is missing here wants a line."""
 
 OBJECTS = {
-    "case", "cases", "config", "costs", "data", "entry", "executor", "experiment", "measured",
+    "case", "cases", "costs", "data", "entry", "executor", "experiment", "measured",
     "names", "observer", "plan", "quick", "records", "reference", "results", "stop",
     "store", "title",
 }  # fmt: skip
@@ -329,12 +326,11 @@ def _function_cell(function, parameter, value):
 
 
 def experiment_cells():
-    """Settings of trials and measures are refused when they are made, or work."""
+    """Settings of trials are refused when they are made, or work."""
     made = {
         ProtocolSpec: _protocol_used,
         BudgetSpec: _budget_used,
         EnvironmentSpec: _environment_used,
-        MeasureConfig: _measure_used,
         RunSpec: _spec_used,
     }
     for config, used in made.items():
@@ -378,12 +374,6 @@ def _environment_used(given):
         observation, _ = environment.make().reset(seed=1)
         return "" if np.isfinite(observation).all() else f"gave {observation}"
     return ""
-
-
-def _measure_used(given):
-    tests = np.arange(30)
-    learned = episodes_to_learn(10 * tests, tests % 12, MeasureConfig(**given))
-    return "" if learned >= 0 else f"gave {learned}"
 
 
 def _spec_used(given):

@@ -5,9 +5,7 @@ import pytest
 
 from sdnn.runs import TrialRows
 from sdnn.runs.results import (
-    DEFAULT_MEASURES,
     MEASURES,
-    MeasureConfig,
     episode_of_collapse,
     episodes_to_learn,
     final_share_solved,
@@ -18,12 +16,12 @@ def episodes(steps):
     return 10 * np.arange(1, len(steps) + 1)
 
 
-def of_rows(name, steps, returns=None, config=DEFAULT_MEASURES):
+def of_rows(name, steps, returns=None):
     """A measure of a trial that took so many steps in its tests, or gave these returns."""
     steps = np.asarray(steps)
     returns = np.zeros(steps.size) if returns is None else np.asarray(returns)
     rows = TrialRows.of_tests(episodes(steps), steps, returns, steps < 50)
-    return MEASURES[name][1](rows, config)
+    return MEASURES[name][1](rows)
 
 
 def learned(steps):
@@ -100,8 +98,7 @@ def test_too_few_tests_for_a_run_say_nothing():
 def test_early_steps_are_those_of_the_first_episodes():
     steps = [4] * 150 + [8] * 100 + [50] * 750
     assert of_rows("early_steps", steps) == 4.0
-    more = MeasureConfig(early_episodes=10_000)
-    assert of_rows("early_steps", steps, config=more) == 50.0
+    assert of_rows("early_steps", [50] * 251) == 50.0
 
 
 @pytest.mark.parametrize("n_tests", [1, 9, 10, 49, 50, 137])
