@@ -137,7 +137,7 @@ def run_study(
         if is_wanted((variant, case), given)
     ]
     if not given.redraw:
-        executor = Processes(learn, given.jobs, study.reader.header.imports)
+        executor = Processes(learn, given.jobs, study.header.imports)
         plan = plan_of(specs, study.n_trials, study.seed)
         run_missing(plan, executor, given.folder, lambda store: _Trials(store, kind))
 

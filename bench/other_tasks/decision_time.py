@@ -16,14 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from sdnn.agents import Transition
-from sdnn.runs.study import read_study
+from sdnn.runs.study import Study
 
 NANOSECONDS_A_MICROSECOND = 1000.0
 
 
 def decision_times(name: str, steps: int) -> tuple[np.ndarray, np.ndarray]:
     """Microseconds of each step's acting and learning, and of the environment: shapes (steps,)."""
-    spec = read_study(Path(__file__).with_name("study.toml")).combinations[name, "sdnn-c"].spec
+    spec = Study(Path(__file__).with_name("study.toml")).combinations[name, "sdnn-c"].spec
     env = spec.make_env()
     agent = spec.make_agent(env)
     clock = time.perf_counter_ns

@@ -25,7 +25,7 @@ from studies import curves, run_study
 from tasks import TASKS, parts_of
 
 from sdnn.runs import RunSpec
-from sdnn.runs.study import read_study
+from sdnn.runs.study import Study
 
 STUDY = Path(__file__).with_name("study.toml")
 KIND, SOLVED_KIND = "other tasks", "until solved"
@@ -45,7 +45,7 @@ def main() -> None:
     parser = options(__doc__ or "", seeds=10, jobs=2)
     parser.add_argument("--until-solved", action="store_true")
     given = parser.parse_args()
-    study = read_study(STUDY, n_trials=given.seeds)
+    study = Study(STUDY, n_trials=given.seeds)
     if given.until_solved:
         run_study(SOLVED_KIND, study, given, until_solved)
     else:

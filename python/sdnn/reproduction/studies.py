@@ -10,7 +10,6 @@ from pathlib import Path
 from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS
 from sdnn.reproduction.claims import Claim, ClaimOutcome, TenTrials, Verdict, judge_claims
 from sdnn.reproduction.report import RULE_NOTE, VERDICT_KINDS, format_quantity
-from sdnn.runs import study
 from sdnn.runs.comparison import Addition, Comparison
 from sdnn.runs.report import Section, Table, format_share
 from sdnn.runs.results import CaseResult, Estimate
@@ -35,14 +34,14 @@ _KINDS = {"-": "none", **{word + end: kind for word, kind in VERDICT_KINDS.items
 
 
 def read_study(path: Path, *, n_trials: int | None = None, seed: int | None = None) -> Study:
-    """Read a study that may name the paper's cases; see `sdnn.runs.study.read_study`."""
+    """Read a study that may name the paper's cases; see `sdnn.runs.study.Study`."""
     known_cases = {
         case.id: KnownCase(
             case.title, {"sensors.n_sensors": case.n_sensors, "sensors.noise": case.noise}
         )
         for case in PAPER_CASES.values()
     }
-    return study.read_study(path, n_trials=n_trials, seed=seed, known_cases=known_cases)
+    return Study(path, n_trials=n_trials, seed=seed, known_cases=known_cases)
 
 
 @dataclass(frozen=True)

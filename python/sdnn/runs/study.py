@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
-from sdnn.runs.config_file import ConfigFile
 from sdnn.runs.engine import PlannedTrial, plan_of
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.settings import possible_words
@@ -18,7 +17,7 @@ from sdnn.runs.study_file import (
     KnownCase,
     Layer,
     StudyCase,
-    StudyReader,
+    StudyFile,
     StudyVariant,
 )
 from sdnn.runs.trial import TrialKey, opened
@@ -27,19 +26,8 @@ DEFAULT = "default"
 """The variant that others are compared with unless the file says otherwise, if there is one."""
 
 
-@dataclass(frozen=True)
-class Combination:
-    """A variant in a case.
-
-    Parameters
-    ----------
-    case, variant
-        Which.
-    spec
-        What is run; the seeds of the trials are others.
-    settings
-        Those of the file that made it, with their places.
-    """
+class Combination(NamedTuple):
+    """A variant in a case, what is run of it but for seeds, and the settings that made it."""
 
     case: StudyCase
     variant: StudyVariant
@@ -47,42 +35,71 @@ class Combination:
     settings: Layer
 
 
-@dataclass(frozen=True, kw_only=True)
-class Study:
-    """A study, read from a file.
+class Study(StudyFile):
+    """A study, read from a file; modules that it imports are looked for beside it, too.
 
     Parameters
     ----------
-    reader
-        Its file.
-    title
-        For a reader.
-    n_trials
-        Trials of each variant in each case.
-    seed
-        Root of all seeds. That of a trial depends on this, its case and its number only, so that
-        variants can be compared trial by trial.
-    reference
+    path
+        A TOML file; ``docs/sweep.md`` describes it.
+    known_cases
+        Cases that the file may name, by their ids.
+    n_trials, seed
+        Trials of each variant in each case, and the root of all seeds, instead of the file's. The
+        seed of a trial depends on the root, its case and its number only, so that variants can be
+        compared trial by trial.
+
+    Attributes
+    ----------
+    reference : str
         Id of the variant that the others are compared with.
-    cases, variants
+    cases, variants : tuple
         In the order of the file, but for the reference, which comes first.
-    combinations
+    combinations : dict
         Every variant in every case in which it runs, by their ids (case, variant).
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be read, or says something unknown or impossible; the message names
+        file, line and key. What only agents and environments refuse is found by `check`.
     """
 
-    reader: StudyReader
-    title: str
-    n_trials: int
-    seed: int
-    reference: str
-    cases: tuple[StudyCase, ...]
-    variants: tuple[StudyVariant, ...]
-    combinations: Mapping[tuple[str, str], Combination]
-
-    @property
-    def file(self) -> ConfigFile:
-        """The file it was read from."""
-        return self.reader.file
+    def __init__(
+        self,
+        path: Path,
+        *,
+        known_cases: Mapping[str, KnownCase] | None = None,
+        n_trials: int | None = None,
+        seed: int | None = None,
+    ) -> None:
+        super().__init__(path, known_cases or {})
+        header = self.header
+        self.title = header.title or path.stem
+        self.n_trials = header.trials if n_trials is None else n_trials
+        self.seed = header.seed if seed is None else seed
+        known = [variant.id for variant in self.variants]
+        self.reference = header.reference
+        if self.reference is None:
+            self.reference = next((name for name in (DEFAULT, BASE) if name in known), known[0])
+        if self.reference not in known:
+            words = f"no variant {self.reference!r}; {possible_words(self.reference, known)}"
+            raise self.file.error(("study", "reference"), words)
+        self.variants = tuple(sorted(self.variants, key=lambda one: one.id != self.reference))
+        n_combinations = sum(len(variant.only or self.cases) for variant in self.variants)
+        if n_combinations > MOST_COMBINATIONS:
+            problem = f"must be at most {MOST_COMBINATIONS} in all cases, got {n_combinations}"
+            raise self.file.error(("variants",), problem)
+        if self.n_trials * n_combinations > MOST_TRIALS:
+            given = f"{self.n_trials} of {n_combinations} each"
+            problem = f"must be at most {MOST_TRIALS} in all, got {given}"
+            raise self.file.error(("study", "trials"), problem)
+        self.combinations = {
+            (case.id, variant.id): Combination(case, variant, *self.spec(case, variant))
+            for case in self.cases
+            for variant in self.variants
+            if case.id in (variant.only or [case.id])
+        }
 
     def trials(self, case_id: str, variant_id: str) -> tuple[PlannedTrial, ...]:
         """List the trials of a variant in a case."""
@@ -143,7 +160,7 @@ class Study:
                     _require_comparable(one.spec)
             except Exception as error:  # of whatever agent or environment
                 refusal = one.spec.refusal(error)
-                raise self.reader.refusal(one.settings, one.case, one.variant, refusal) from error
+                raise self.refusal(one.settings, one.case, one.variant, refusal) from error
 
 
 def _require_comparable(spec: RunSpec) -> None:
@@ -158,65 +175,3 @@ def _require_comparable(spec: RunSpec) -> None:
             f"protocol.{name}",
             f"a study with budget.{unit} needs protocol.{name} from 1 to {budget}, got {every}",
         )
-
-
-def read_study(
-    path: Path,
-    *,
-    known_cases: Mapping[str, KnownCase] | None = None,
-    n_trials: int | None = None,
-    seed: int | None = None,
-) -> Study:
-    """Read a study.
-
-    Modules that it imports are looked for beside the file, too.
-
-    Parameters
-    ----------
-    path
-        A TOML file; ``docs/sweep.md`` describes it.
-    known_cases
-        Cases that the file may name, by their ids.
-    n_trials, seed
-        Instead of the file's.
-
-    Raises
-    ------
-    ConfigError
-        If the file cannot be read, or says something unknown or impossible; the message names
-        file, line and key. What only agents and environments refuse is found by `Study.check`.
-    """
-    reader = StudyReader(path, known_cases or {})
-    header = reader.header
-    known = [variant.id for variant in reader.variants]
-    reference = header.reference
-    if reference is None:
-        reference = next((name for name in (DEFAULT, BASE) if name in known), known[0])
-    if reference not in known:
-        raise reader.file.error(
-            ("study", "reference"), f"no variant {reference!r}; {possible_words(reference, known)}"
-        )
-    variants = tuple(sorted(reader.variants, key=lambda variant: variant.id != reference))
-    n_combinations = sum(len(variant.only or reader.cases) for variant in variants)
-    if n_combinations > MOST_COMBINATIONS:
-        problem = f"must be at most {MOST_COMBINATIONS} in all cases, got {n_combinations}"
-        raise reader.file.error(("variants",), problem)
-    n_each = header.trials if n_trials is None else n_trials
-    if n_each * n_combinations > MOST_TRIALS:
-        problem = f"must be at most {MOST_TRIALS} in all, got {n_each} of {n_combinations} each"
-        raise reader.file.error(("study", "trials"), problem)
-    return Study(
-        reader=reader,
-        title=header.title or path.stem,
-        n_trials=n_each,
-        seed=header.seed if seed is None else seed,
-        reference=reference,
-        cases=reader.cases,
-        variants=variants,
-        combinations={
-            (case.id, variant.id): Combination(case, variant, *reader.spec(case, variant))
-            for case in reader.cases
-            for variant in variants
-            if case.id in (variant.only or [case.id])
-        },
-    )

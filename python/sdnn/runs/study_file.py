@@ -110,8 +110,8 @@ class StudyVariant:
     only: tuple[str, ...] = ()  # ids of the cases in which it runs; none: all
 
 
-class StudyReader:
-    """Reads the tables of a study.
+class StudyFile:
+    """The tables of a study, read from its file.
 
     Parameters
     ----------

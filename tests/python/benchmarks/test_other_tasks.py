@@ -33,7 +33,7 @@ def scripts():
 
         yield argparse.Namespace(
             measured=measured, page=page, report=report, run=run, studies=studies,
-            study=run.read_study(run.STUDY),
+            study=run.Study(run.STUDY),
         )  # fmt: skip
     finally:
         sys.path[:] = path
@@ -99,7 +99,7 @@ def test_every_agent_learns_on_the_engine(scripts, monkeypatch):
 
 def test_a_trial_runs_in_a_process_of_its_own_and_once(scripts, tmp_path):
     studies = scripts.studies
-    study = scripts.run.read_study(scripts.run.STUDY, n_trials=1)
+    study = scripts.run.Study(scripts.run.STUDY, n_trials=1)
     options = given(tmp_path, "tiles", "Pendulum", "noise")
     found = {}
     for _ in range(2):
