@@ -36,9 +36,11 @@ class Preset(NamedTuple):
     inputs: Inputs = "all"
 
 
-def presets_of(listed: Mapping[str, Any]) -> Mapping[str, Preset]:
-    """Return the settings that the core lists, by name."""
-    return MappingProxyType({name: Preset(*settings) for name, settings in listed.items()})
+def presets_of(listed: Mapping[str, Any], **more: Mapping[str, Any]) -> Mapping[str, Preset]:
+    """Return the settings that the core lists, by name, with more of some of them."""
+    return MappingProxyType(
+        {name: Preset(*settings, **more.get(name, {})) for name, settings in listed.items()}
+    )
 
 
 PRESETS = presets_of(_core.presets())

@@ -8,7 +8,9 @@ from sdnn.config import LinearSDNNConfig, SarsaConfig
 
 __all__ = ["LINEAR_PRESETS", "SDNNSarsa"]
 
-LINEAR_PRESETS = presets_of(_core.linear_presets())
+LINEAR_PRESETS = presets_of(
+    _core.linear_presets(), general={"angle_pairs": "find", "inputs": "relevant"}
+)
 """Settings by name: ``"general"`` and ``"paper"``."""
 
 
@@ -23,9 +25,11 @@ class SDNNSarsa(CodedAgent[LinearSDNNConfig, SarsaConfig]):
 
     Parameters
     ----------
-    observation_space, action_space, seed, observation_range, angles, angle_pairs, inputs, \
-warm_up_steps
+    observation_space, action_space, seed, observation_range, angles, warm_up_steps
         See `Agent`.
+    angle_pairs, inputs
+        See `Agent`; by default ``"find"`` and ``"relevant"``, with the preset ``"paper"``
+        ``"none"`` and ``"all"``. So the agent begins with a warm-up, unless there is no choice.
     approximator : LinearSDNNConfig, optional
         ``n_inputs`` (and ``n_actions``, unless actions are a Box) are taken from the spaces.
     learning : SarsaConfig, optional

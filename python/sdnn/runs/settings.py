@@ -261,8 +261,8 @@ class AgentSpec(Settings, frozen=True):
     preset: Annotated[
         str | None,
         Meta(
-            description="Named settings of the agent `sdnn-c`: `general`, `robust`, `small` or"
-            " `paper`. By default `general`."
+            description="Named settings: `general`, the default, or `paper`; of `sdnn-c` also"
+            " `robust` or `small`. `rbf` and `fuzzy` have none."
         ),
     ] = None
     observation_range: Annotated[
@@ -277,7 +277,8 @@ class AgentSpec(Settings, frozen=True):
         Literal["none", "find"] | tuple[tuple[Index, Index], ...] | None,
         Meta(
             description="Which cosines and sines of an angle become one input: pairs of observed"
-            " variables, from 0, or those that the warm-up finds. By default `none`."
+            " variables, from 0, or those that the warm-up finds. By default `none`;"
+            " of `sdnn-linear`, `find`, unless observations are scaled."
         ),
     ] = None
     inputs: Annotated[
@@ -285,7 +286,7 @@ class AgentSpec(Settings, frozen=True):
         Meta(
             description="Which observed variables are inputs: `all`; those that the warm-up finds"
             " `relevant`; or a list, from 0, of some that are inputs in any case, beside the"
-            " relevant ones. By default `all`."
+            " relevant ones. By default `all`; of `sdnn-linear`, `relevant`."
         ),
     ] = None
     warm_up_steps: Annotated[

@@ -173,3 +173,25 @@ def test_every_space_of_actions(space):
         agent.learn(Transition(observation, action, 1.0, following, step % 9 == 0))
         observation = following
     assert agent.act(observation, explore=False) in space
+
+
+@pytest.mark.parametrize(
+    ("space", "is_searched"),
+    [
+        (gym.spaces.Box(-1, 1, (3,)), True),
+        (gym.spaces.Box(-1, 1, (2,)), True),  # the two may be one angle
+        (gym.spaces.Box(-1, 1, (1,)), False),
+        (gym.spaces.MultiDiscrete([3, 4]), False),  # of two inputs both are kept
+        (gym.spaces.MultiDiscrete([3, 4, 5]), True),
+    ],
+)
+def test_a_warm_up_is_only_where_there_is_a_choice(space, is_searched):
+    assert SDNNSarsa(space, gym.spaces.Discrete(2)).is_warming_up == is_searched
+    assert not SDNNSarsa(space, gym.spaces.Discrete(2), preset="paper").is_warming_up
+
+
+def test_angles_are_found_by_default():
+    env = gym.make("Pendulum-v1")
+    agent = SDNNSarsa(env.observation_space, env.action_space, seed=1)
+    agent.train(env, steps=1001, seed=1)
+    assert agent.inputs == [("angle", [0, 1]), ("variable", [2])]

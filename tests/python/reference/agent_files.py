@@ -95,7 +95,7 @@ def agents():
     }
     settings = {
         "linear": linear | {"inputs": "relevant"},
-        "linear-vector": linear,
+        "linear-vector": linear | {"inputs": "all"},
         "rbf": {"approximator": RBFNetworkConfig(n_bases=3, n_actions=7), "learning": LEARNING},
         "sdnn-pairs": {"approximator": replace(SMALL, max_pairs=3), "learning": LEARNING},
         "fuzzy": rules,

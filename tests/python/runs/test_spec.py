@@ -161,6 +161,30 @@ def test_inputs_are_chosen_in_a_run(inputs):
     assert caught.value.key == "agent.inputs"
 
 
+@pytest.mark.parametrize(
+    ("preset", "noise", "given", "found"),
+    [
+        ("general", 0.0, {}, ("find", "relevant")),
+        ("general", 0.1, {}, ("none", "relevant")),
+        ("general", 0.0, {"angle_pairs": "none", "inputs": "all"}, ("none", "all")),
+        ("paper", 0.0, {}, ("none", "all")),
+    ],
+)
+def test_what_an_agent_finds_follows_from_its_preset(preset, noise, given, found):
+    environment = EnvironmentSpec(id="Pendulum-v1", noise=noise)
+    agent = AgentSpec(name="sdnn-linear", preset=preset, **given)
+    spec = RunSpec(environment=environment, agent=agent)
+    assert (spec.agent.angle_pairs, spec.agent.inputs) == found
+    assert RunSpec.from_values(spec.values()) == spec
+    assert spec.make_agent(spec.make_env()).is_warming_up == (found != ("none", "all"))
+
+
+def test_the_paper_s_task_has_all_its_inputs():
+    spec = RunSpec(agent=AgentSpec(name="sdnn-linear", preset="general"))
+    assert (spec.agent.angle_pairs, spec.agent.inputs) == ("none", "all")
+    assert spec.make_agent(spec.make_env()).approximator.n_inputs == 4
+
+
 def test_an_agent_brings_its_own_training():
     class Told(Training):
         def pieces(self, seconds):

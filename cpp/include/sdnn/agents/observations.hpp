@@ -86,7 +86,7 @@ class Observations {
     }
     for (const int variable : config_.inputs) require_variable("inputs", variable);
     const Ranges fixed = fixed_ranges(config_.angle_pairs);
-    needs_fit_ = config_.find_angle_pairs || config_.relevant_only ||
+    needs_fit_ = may_find_pairs() || may_leave_out_inputs() ||
                  std::ranges::any_of(fixed.low, is_unknown);
     if (!needs_fit_) take(fixed, config_.angle_pairs);
   }
@@ -288,6 +288,16 @@ class Observations {
     std::vector<double> values;
     for (; i < seen.size(); i += n_variables()) values.push_back(seen[i]);
     return values;
+  }
+
+  bool may_find_pairs() const {
+    const auto are_numbers = [](Role a, Role b) { return a == Role::number && b == a; };
+    return config_.find_angle_pairs &&
+           std::ranges::adjacent_find(roles_, are_numbers) != roles_.end();
+  }
+  /// Of two inputs both are kept; see Relevance.
+  bool may_leave_out_inputs() const {
+    return config_.relevant_only && inputs_with(config_.angle_pairs).size() > 2;
   }
 
   Pairs pairs_in(std::span<const double> seen) const {
