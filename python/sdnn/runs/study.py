@@ -79,9 +79,8 @@ class Study(StudyFile):
         self.n_trials = header.trials if n_trials is None else n_trials
         self.seed = header.seed if seed is None else seed
         known = [variant.id for variant in self.variants]
-        self.reference = header.reference
-        if self.reference is None:
-            self.reference = next((name for name in (DEFAULT, BASE) if name in known), known[0])
+        default = next((name for name in (DEFAULT, BASE) if name in known), known[0])
+        self.reference = default if header.reference is None else header.reference
         if self.reference not in known:
             words = f"no variant {self.reference!r}; {possible_words(self.reference, known)}"
             raise self.file.error(("study", "reference"), words)
